@@ -1,0 +1,77 @@
+"""jaxgear: what a spur-gear flank modification does under load, and which one is best.
+
+The pipeline in reading order, every step differentiable and vmappable:
+
+    Gear, GearPair              geometry of an external involute spur pair
+    TipRelief + LeadCrowning    microgeometry, composed with `+`
+    default_compliance          teeth, gear bodies with coupled neighbours, Hertzian contact
+    prepare, solve              loaded tooth contact over one base pitch -> MeshCycle
+    peak_to_peak, ...           metrics on the MeshCycle
+    minimize                    the best modification by gradient
+
+Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in constructors.
+Importing jaxgear changes no JAX setting; switch on `jax_enable_x64` for double precision.
+"""
+
+from .compliance import Beam as Beam
+from .compliance import CenterDistance as CenterDistance
+from .compliance import Compliance as Compliance
+from .compliance import ConstantHertz as ConstantHertz
+from .compliance import DepthReferenced as DepthReferenced
+from .compliance import ElasticRing as ElasticRing
+from .compliance import HalfPlane as HalfPlane
+from .compliance import Kovalskii as Kovalskii
+from .compliance import NonlinearPower as NonlinearPower
+from .compliance import Palmgren as Palmgren
+from .compliance import Sainsot as Sainsot
+from .compliance import Weber as Weber
+from .compliance import default_compliance as default_compliance
+from .compliance import legacy_compliance as legacy_compliance
+from .contact import Mesh as Mesh
+from .contact import MeshCycle as MeshCycle
+from .contact import Resolution as Resolution
+from .contact import prepare as prepare
+from .contact import solve as solve
+from .geometry import STEEL as STEEL
+from .geometry import Gear as Gear
+from .geometry import GearPair as GearPair
+from .geometry import Material as Material
+from .geometry import PathOfContact as PathOfContact
+from .geometry import diameter as diameter
+from .geometry import path_of_contact as path_of_contact
+from .geometry import roll_angle as roll_angle
+from .geometry import roll_length as roll_length
+from .metrics import contact_shock as contact_shock
+from .metrics import effective_contact_ratio as effective_contact_ratio
+from .metrics import flash_temperature as flash_temperature
+from .metrics import harmonics as harmonics
+from .metrics import load_sharing as load_sharing
+from .metrics import loss_factor as loss_factor
+from .metrics import ohlendorf_loss_factor as ohlendorf_loss_factor
+from .metrics import peak_to_peak as peak_to_peak
+from .metrics import root_factors as root_factors
+from .metrics import root_stress as root_stress
+from .metrics import secant_stiffness as secant_stiffness
+from .metrics import smooth_peak_to_peak as smooth_peak_to_peak
+from .metrics import summary as summary
+from .microgeometry import EndRelief as EndRelief
+from .microgeometry import LeadCrowning as LeadCrowning
+from .microgeometry import LeadSlope as LeadSlope
+from .microgeometry import Linear as Linear
+from .microgeometry import NoModification as NoModification
+from .microgeometry import Parabolic as Parabolic
+from .microgeometry import Polynomial as Polynomial
+from .microgeometry import Power as Power
+from .microgeometry import ProfileCrowning as ProfileCrowning
+from .microgeometry import ProfileSlope as ProfileSlope
+from .microgeometry import Quadratic as Quadratic
+from .microgeometry import RootRelief as RootRelief
+from .microgeometry import Sinusoidal as Sinusoidal
+from .microgeometry import Spline as Spline
+from .microgeometry import TabulatedProfile as TabulatedProfile
+from .microgeometry import TipRelief as TipRelief
+from .optimize import iso_relief as iso_relief
+from .optimize import iso_stiffness as iso_stiffness
+from .optimize import long_relief_length as long_relief_length
+from .optimize import relief_amount as relief_amount
+from .optimize import short_relief_length as short_relief_length

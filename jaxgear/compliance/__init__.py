@@ -1,0 +1,27 @@
+"""Compliance of the teeth, the gear bodies and the contact, in um/N per unit face width (um mm/N).
+
+    tooth (beam) + body (elastic ring with neighbouring teeth, or Sainsot's polynomial) + contact law (Hertz)
+
+`Compliance` composes the parts; `default_compliance` is the recommended set, `legacy_compliance` the one that most
+published spur-gear studies use.
+"""
+
+from .assembly import Compliance as Compliance
+from .assembly import default_compliance as default_compliance
+from .assembly import legacy_compliance as legacy_compliance
+from .beam import AbstractTooth as AbstractTooth
+from .beam import Beam as Beam
+from .body import AbstractBody as AbstractBody
+from .body import ElasticRing as ElasticRing
+from .body import HalfPlane as HalfPlane
+from .body import Sainsot as Sainsot
+from .hertz import AbstractContact as AbstractContact
+from .hertz import CenterDistance as CenterDistance
+from .hertz import ConstantHertz as ConstantHertz
+from .hertz import DepthReferenced as DepthReferenced
+from .hertz import Kovalskii as Kovalskii
+from .hertz import NonlinearPower as NonlinearPower
+from .hertz import Palmgren as Palmgren
+from .hertz import Weber as Weber
+from .plane import Plane as Plane
+from .toothload import ToothLoad as ToothLoad

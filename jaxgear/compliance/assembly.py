@@ -1,0 +1,63 @@
+"""Composition of tooth, body and contact models into the compliance of a mesh."""
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from .beam import AbstractTooth, Beam
+from .body import AbstractBody, ElasticRing, Sainsot
+from .hertz import AbstractContact, AbstractLaw, ConstantHertz, DepthReferenced, contact_geometry
+from .plane import Plane, check_plane
+from .toothload import ToothLoad
+
+
+class Compliance(eqx.Module):
+    """Which models make up the compliance of the mesh.
+
+    Attributes:
+        tooth: the tooth alone, root held.
+        body: gear body with hub wind-up and coupling of neighbouring teeth.
+        contact: approach of the flanks.
+        plane: "stress" for narrow faces, "strain" for wide ones (face width above about five tooth heights; Cornell 1981).
+    """
+
+    tooth: AbstractTooth
+    body: AbstractBody
+    contact: AbstractContact
+    plane: Plane = eqx.field(static=True)
+
+    def __check_init__(self):
+        check_plane(self.plane)
+
+    def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "pairs pairs positions"]:
+        """Compliance of both gears between all pairs in contact, in um per N/mm, without contact law and hub wind-up."""
+        total = self.body.compliance(pinion, +1, self.plane) + self.body.compliance(wheel, -1, self.plane)
+        teeth = self.tooth.compliance(pinion, self.plane) + self.tooth.compliance(wheel, self.plane)
+        for i in range(teeth.shape[0]):
+            total = total.at[i, i].add(teeth[i])
+        return total
+
+    def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, ""]:
+        """Wind-up of both gear bodies, in um per N/mm of total line load."""
+        return self.body.hub(pinion.outline) + self.body.hub(wheel.outline)
+
+    def law(self, pinion: ToothLoad, wheel: ToothLoad, face_width) -> AbstractLaw:
+        """The prepared contact law."""
+        return self.contact.prepare(contact_geometry(pinion, wheel, self.plane, face_width))
+
+
+def default_compliance(plane: Plane = "stress", *, hub_windup: bool = True) -> Compliance:
+    """Beam over the true outline, coupled elastic ring, depth-referenced Hertz contact.
+
+    Args:
+        plane: "stress" or "strain".
+        hub_windup: include the common torsion of the gear bodies between bore and root circle.
+    """
+    return Compliance(Beam(), ElasticRing(hub_windup=hub_windup), DepthReferenced(), plane)
+
+
+def legacy_compliance() -> Compliance:
+    """Beam, Sainsot's uncoupled foundation, constant Hertz stiffness, plane stress: the usual published model.
+
+    It overstates the variation of the transmission error by 20 to 120 % against finite elements.
+    """
+    return Compliance(Beam(), Sainsot(), ConstantHertz(), "stress")

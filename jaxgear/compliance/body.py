@@ -1,0 +1,128 @@
+"""Gear-body models: what the root of a loaded tooth, and of its neighbours, gives way."""
+
+from abc import abstractmethod
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry.outline import Outline
+from . import ring, sainsot
+from .plane import Plane, check_plane, plane_modulus, plane_poisson
+from .toothload import ToothLoad
+
+
+class AbstractBody(eqx.Module):
+    """Compliance of the gear body between the teeth in contact."""
+
+    @abstractmethod
+    def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
+        """Displacement of tooth i along its load line per unit line load on tooth j, in um per N/mm.
+
+        Args:
+            load: loads on neighbouring teeth in the order of mesh, arrays of shape (pairs, positions).
+            step: +1 where the following tooth lies counter-clockwise when the load pushes counter-clockwise (driving
+                gear), -1 for the driven gear.
+            plane: plane stress or plane strain.
+        """
+
+    @abstractmethod
+    def hub(self, outline: Outline) -> Float[Array, ""]:
+        """Rotation of the root circle against the bore, on the line of action, in um per N/mm of total line load."""
+
+
+class ElasticRing(AbstractBody):
+    """Elastic ring held at the bore, with exact coupling of neighbouring teeth (see `ring`).
+
+    Attributes:
+        hub_windup: include the torsion of the ring between bore and root circle. It is common to all teeth: it shifts the
+            transmission error and changes neither its variation nor the load sharing.
+        coupling: let neighbouring teeth feel each other. Off only to show what the coupling is worth.
+        harmonics: Fourier terms of the ring solution.
+    """
+
+    hub_windup: bool = eqx.field(static=True, default=True)
+    coupling: bool = eqx.field(static=True, default=True)
+    harmonics: int = eqx.field(static=True, default=400)
+
+    def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
+        outline, count = load.outline, load.angle.shape[0]
+        gear = outline.gear
+        spacing = jnp.arange(count, dtype=load.angle.dtype) * (2 * jnp.pi / gear.teeth)
+        blocks = ring.arc_compliance(
+            outline.root_half_angle,
+            gear.root_circle_radius / gear.bore_radius,
+            plane_poisson(gear.material, plane),
+            spacing,
+            self.harmonics,
+        )
+        arm = (load.height - outline.root_height) / gear.root_circle_radius
+        cosine = jnp.cos(load.angle)
+        modes = jnp.stack([-arm * cosine, cosine, -jnp.sin(load.angle)], axis=1)  # (pairs, 3, positions)
+        rows = []
+        for i in range(count):
+            row = []
+            for j in range(count):
+                # the responding tooth i lies (i - j) steps from the loaded tooth j; K(-phi) = K(phi)^T
+                block = blocks[abs(i - j)] if step * (i - j) >= 0 else blocks[abs(i - j)].T
+                coupled = self.coupling or i == j
+                value = jnp.einsum("ap,ab,bp->p", modes[i], block, modes[j])
+                row.append(value if coupled else jnp.zeros_like(value))
+            rows.append(jnp.stack(row))
+        return 1e3 / plane_modulus(gear.material, plane) * jnp.stack(rows)
+
+    def hub(self, outline: Outline) -> Float[Array, ""]:
+        """(1 + nu) (h^2 - 1) / (2 pi E) (r_b / r_f)^2: torsion of the ring, the same in both plane states."""
+        gear, material = outline.gear, outline.gear.material
+        ratio = gear.root_circle_radius / gear.bore_radius
+        torsion = (1 + material.poisson_ratio) * (ratio**2 - 1) / (2 * jnp.pi * material.elastic_modulus)
+        value = 1e3 * torsion * (gear.base_radius / gear.root_circle_radius) ** 2
+        return value if self.hub_windup else jnp.zeros_like(value)
+
+
+class Sainsot(AbstractBody):
+    """Sainsot's polynomial (legacy): no coupling, hub torsion inside each tooth, plane stress whatever is asked."""
+
+    def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
+        outline, gear = load.outline, load.outline.gear
+        ratio = gear.root_circle_radius / gear.bore_radius
+        bending, mixed, shear, axial = sainsot.coefficients(outline.root_half_angle, ratio)
+        arm = _arm_over_chord(load)
+        bracket = bending * arm**2 + mixed * arm + shear * (1 + axial * jnp.tan(load.angle) ** 2)
+        return _diagonal(1e3 * jnp.cos(load.angle) ** 2 / gear.material.elastic_modulus * bracket)
+
+    def hub(self, outline: Outline) -> Float[Array, ""]:
+        return jnp.zeros_like(outline.root_half_angle)
+
+
+class HalfPlane(AbstractBody):
+    """Half-plane foundation of Weber and Banaschek with Cornell's coefficients: no bore, no coupling.
+
+    References:
+        C. Weber, K. Banaschek, Formaenderung und Profilruecknahme, 1953; R. W. Cornell, J. Mech. Des. 103 (1981) 447-459.
+    """
+
+    def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
+        check_plane(plane)
+        material = load.outline.gear.material
+        nu, arm = material.poisson_ratio, _arm_over_chord(load)
+        shear = 1.534 * (1 + 0.4167 * jnp.tan(load.angle) ** 2 / (1 + nu))
+        if plane == "strain":
+            bracket = (1 - nu**2) * (5.306 * arm**2 + 2 * (1 - nu - 2 * nu**2) / (1 - nu**2) * arm + shear)
+        else:
+            bracket = 5.306 * arm**2 + 2 * (1 - nu) * arm + shear
+        return _diagonal(1e3 * jnp.cos(load.angle) ** 2 / material.elastic_modulus * bracket)
+
+    def hub(self, outline: Outline) -> Float[Array, ""]:
+        return jnp.zeros_like(outline.root_half_angle)
+
+
+def _arm_over_chord(load: ToothLoad) -> Float[Array, "..."]:
+    """u_f / S_f: height of the crossing above the root circle over the root chord."""
+    outline = load.outline
+    radius = outline.gear.root_circle_radius
+    return (load.height - radius) / (2 * radius * jnp.sin(outline.root_half_angle))
+
+
+def _diagonal(values: Float[Array, "pairs positions"]) -> Float[Array, "pairs pairs positions"]:
+    return jnp.eye(values.shape[0], dtype=values.dtype)[:, :, None] * values[None]

@@ -1,0 +1,252 @@
+"""Approach of two flanks in line contact: laws of the deflection over the line load.
+
+A law is prepared once per mesh from the local geometry (`AbstractContact.prepare`) and then evaluated inside the contact
+solution (`deflection`). All prepared leaves have the shape (pairs, 1, positions).
+
+Notation: q line load [N/mm], R reduced radius, a half width of the contact, E' plane modulus, nu' plane Poisson's ratio,
+h_k depth from the contact to the tooth centreline along the load line. In plane strain E' = E/(1 - nu^2) and
+nu' = nu/(1 - nu), which gives the usual forms; plane stress has E and nu in their place.
+"""
+
+from abc import abstractmethod
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .plane import Plane, plane_modulus, plane_poisson
+from .toothload import ToothLoad
+
+Field = Float[Array, "pairs 1 positions"]
+Real = Float[Array, "..."]
+
+# Line load that keeps the logarithm finite at separation [N/mm]: its effect at 1 N/mm is below 1e-6 of the deflection.
+_LOAD_FLOOR = 1e-6
+
+
+class ContactSide(eqx.Module):
+    """One flank at the contact; arrays of shape (pairs, 1, positions).
+
+    Attributes:
+        radius: radius of curvature [mm].
+        depth: distance from the contact to the tooth centreline along the load line [mm].
+        young: Young's modulus [MPa].
+        modulus: modulus of the plane problem, E' [MPa].
+        poisson: Poisson's ratio of the plane problem, nu'.
+        strain_modulus: E / (1 - nu^2) [MPa], whatever the plane.
+    """
+
+    radius: Field
+    depth: Field
+    young: Field
+    modulus: Field
+    poisson: Field
+    strain_modulus: Field
+
+
+class ContactGeometry(eqx.Module):
+    """Both flanks at the contact and the face width [mm], shape (pairs, 1, positions)."""
+
+    pinion: ContactSide
+    wheel: ContactSide
+    face_width: Field
+
+    @property
+    def sides(self) -> tuple[ContactSide, ContactSide]:
+        """Pinion and wheel."""
+        return self.pinion, self.wheel
+
+    @property
+    def width_factor(self) -> Field:
+        """a^2 / q = 4 R / (pi E*) [mm^2 per N/mm], 1 / E* = 1 / E'_1 + 1 / E'_2."""
+        reduced = self.pinion.radius * self.wheel.radius / (self.pinion.radius + self.wheel.radius)
+        return 4 * reduced / jnp.pi * sum(1 / side.modulus for side in self.sides)
+
+
+def contact_geometry(pinion: ToothLoad, wheel: ToothLoad, plane: Plane, face_width) -> ContactGeometry:
+    """Collects the local geometry of both flanks, arrays (pairs, positions), on a common shape."""
+    shape = pinion.roll_length.shape
+
+    def field(value):
+        return jnp.broadcast_to(value, shape)[:, None]
+
+    def side(load):
+        material = load.outline.gear.material
+        return ContactSide(
+            radius=field(load.roll_length),
+            depth=field(load.depth),
+            young=field(material.elastic_modulus),
+            modulus=field(plane_modulus(material, plane)),
+            poisson=field(plane_poisson(material, plane)),
+            strain_modulus=field(plane_modulus(material, "strain")),
+        )
+
+    return ContactGeometry(side(pinion), side(wheel), field(face_width))
+
+
+class AbstractLaw(eqx.Module):
+    """A prepared contact law."""
+
+    @abstractmethod
+    def deflection(self, line_load: Real) -> Real:
+        """Approach of the two flanks [um] under a line load [N/mm], elementwise; increasing, zero at zero."""
+
+
+class AbstractContact(eqx.Module):
+    """A choice of contact law."""
+
+    @abstractmethod
+    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
+        """The law for a given local geometry."""
+
+
+class LinearLaw(AbstractLaw):
+    """deflection = compliance * q"""
+
+    compliance: Field
+
+    def deflection(self, line_load: Real) -> Real:
+        return self.compliance * line_load
+
+
+class LogarithmicLaw(AbstractLaw):
+    """deflection = q (constant - slope ln(q + floor)): every law with the half width a ~ sqrt(q) under a logarithm."""
+
+    constant: Field
+    slope: Field
+
+    def deflection(self, line_load: Real) -> Real:
+        return line_load * (self.constant - self.slope * jnp.log(line_load + _LOAD_FLOOR))
+
+
+class PowerLaw(AbstractLaw):
+    """deflection = factor q^exponent, with a finite slope at zero load."""
+
+    factor: Field
+    exponent: Field
+
+    def deflection(self, line_load: Real) -> Real:
+        return self.factor * line_load * (line_load + _LOAD_FLOOR) ** (self.exponent - 1)
+
+
+class DepthLaw(AbstractLaw):
+    """Exact depth-referenced law, see `DepthReferenced`; tuples hold pinion and wheel."""
+
+    compliance: tuple[Field, Field]
+    depth: tuple[Field, Field]
+    poisson: tuple[Field, Field]
+    width_factor: Field
+
+    def deflection(self, line_load: Real) -> Real:
+        squared = self.width_factor * (line_load + _LOAD_FLOOR)
+        log_width = 0.5 * jnp.log(squared)
+        total = jnp.zeros_like(line_load)
+        for compliance, depth, poisson in zip(self.compliance, self.depth, self.poisson):
+            reach = jnp.sqrt(depth**2 + squared) + depth
+            # asinh(h / a) = ln((h + sqrt(h^2 + a^2)) / a)
+            total = total + compliance * (jnp.log(reach) - log_width - poisson * depth / reach)
+        return line_load * total
+
+
+class ConstantHertz(AbstractContact):
+    """Load-independent approach 4 (1 - nu^2) / (pi E) per unit line load, for both gears together (legacy).
+
+    Three to four times too stiff at usual loads. Plane strain in any case, as in the literature.
+
+    References:
+        D. C. H. Yang, Z. S. Sun, J. Mech. Trans. Autom. 107 (1985) 529-535.
+    """
+
+    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
+        return LinearLaw(1e3 * 2 / jnp.pi * sum(1 / side.strain_modulus for side in geometry.sides))
+
+
+class DepthReferenced(AbstractContact):
+    """Approach of the surfaces against the tooth centrelines (default).
+
+        delta = sum_k 2 q / (pi E'_k) [ asinh(h_k / a) - nu'_k h_k / (sqrt(h_k^2 + a^2) + h_k) ]
+
+    The integral of the strain below a Hertzian pressure down to the depth h_k, exact for any h/a; it contains no bulk
+    compression beyond the centreline, which the tooth and body models carry.
+
+    References:
+        C. Weber, K. Banaschek 1953; E. McEwen, Phil. Mag. 40 (1949) 454-459 for the stress field it integrates.
+    """
+
+    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
+        sides = geometry.sides
+        return DepthLaw(
+            compliance=tuple(1e3 * 2 / (jnp.pi * side.modulus) for side in sides),
+            depth=tuple(side.depth for side in sides),
+            poisson=tuple(side.poisson for side in sides),
+            width_factor=geometry.width_factor,
+        )
+
+
+class Weber(AbstractContact):
+    """`DepthReferenced` in its limit h >> a: delta = sum_k 2 q / (pi E'_k) [ ln(2 h_k / a) - nu'_k / 2 ].
+
+    References:
+        C. Weber, K. Banaschek 1953.
+    """
+
+    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
+        return _logarithmic(geometry, [jnp.log(2 * side.depth) - side.poisson / 2 for side in geometry.sides])
+
+
+class CenterDistance(AbstractContact):
+    """Centre-to-centre approach of two cylinders: bracket ln(4 R_k / a) - 1/2 per body. Double counts the tooth bulk.
+
+    References:
+        K. L. Johnson, Contact Mechanics, 1985, eq. (4.57).
+    """
+
+    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
+        return _logarithmic(geometry, [jnp.log(4 * side.radius) - 0.5 for side in geometry.sides])
+
+
+class Kovalskii(AbstractContact):
+    """Roark's two cylinders: bracket ln(2 R_k / a) + 0.407 per body. Double counts the tooth bulk.
+
+    References:
+        Roark's Formulas for Stress and Strain, contact of two cylinders.
+    """
+
+    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
+        return _logarithmic(geometry, [jnp.log(2 * side.radius) + 0.407 for side in geometry.sides])
+
+
+class Palmgren(AbstractContact):
+    """Roller-bearing power law delta = 3.84e-5 F^0.9 / L^0.8 [mm, N, mm], steel on steel; centre to centre.
+
+    The length of the roller is the face width; slices use the law of the full width.
+    """
+
+    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
+        factor = 1e3 * 3.84e-5 * geometry.face_width**0.1
+        return PowerLaw(factor, jnp.full_like(factor, 0.9))
+
+
+class NonlinearPower(AbstractContact):
+    """Power law k = E^0.9 b^0.8 F^0.1 / 1.275 (secant stiffness), a smooth substitute close to the depth law.
+
+    E is the harmonic mean of the two moduli; slices use the law of the full width.
+
+    References:
+        R. W. Cornell, J. Mech. Des. 103 (1981) 447-459; D. C. H. Yang, J. Y. Lin, J. Mech. Trans. Autom. 109 (1987).
+    """
+
+    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
+        young = 2 / sum(1 / side.young for side in geometry.sides)
+        factor = 1e3 * 1.275 * geometry.face_width**0.1 / young**0.9
+        return PowerLaw(factor, jnp.full_like(factor, 0.9))
+
+
+def _logarithmic(geometry: ContactGeometry, brackets: list[Field]) -> LogarithmicLaw:
+    """sum_k 2 q / (pi E'_k) [ bracket_k - ln a ] with a = sqrt(width_factor q)."""
+    half_log = 0.5 * jnp.log(geometry.width_factor)
+    constant = sum(
+        2 / (jnp.pi * side.modulus) * (bracket - half_log) for side, bracket in zip(geometry.sides, brackets)
+    )
+    slope = sum(1 / (jnp.pi * side.modulus) for side in geometry.sides)
+    return LogarithmicLaw(1e3 * constant, 1e3 * slope)

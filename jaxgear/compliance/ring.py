@@ -1,0 +1,163 @@
+"""The gear body as an elastic ring, held at the bore and loaded on the root arcs of its teeth.
+
+Each tooth passes three load modes to its root arc, as stresses on the chord: linear bending (M), uniform shear (V) and
+uniform compression (N). Their Fourier series on the root circle meet the ring's compliance per harmonic (Michell's plane
+solution); the work-conjugate displacements of any arc then give a 3 x 3 matrix K between any two teeth. K is exactly
+reciprocal, K(-phi) = K(phi)^T, and holds for self compliance (phi = 0) and neighbouring teeth alike.
+
+Lengths are relative to the root radius, stresses to the plane modulus. The rigid torsion of the ring between bore and root
+circle is left out here: it is the same for every tooth and is accounted for once, as hub wind-up.
+
+References:
+    J. H. Michell, Proc. London Math. Soc. 31 (1899) 100-124; harmonic-wise ring solution and load modes after
+    P. Sainsot, P. Velex, O. Duverger, J. Mech. Des. 126 (2004) 748-752, doi 10.1115/1.1758252.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+Scalar = Float[Array, ""]
+
+MODES = ("moment", "shear", "normal")
+
+
+def arc_compliance(half_angle: Scalar, thickness_ratio: Scalar, poisson: Scalar, spacing, harmonics: int):
+    """K between two root arcs, without the ring's rigid torsion.
+
+    Args:
+        half_angle: half angle of the root arc, theta_f [rad].
+        thickness_ratio: root radius over bore radius, h.
+        poisson: Poisson's ratio of the plane problem.
+        spacing: angles of the responding arc minus the loaded one [rad], shape (k,).
+        harmonics: terms of the Fourier series; the error falls with (harmonics * half_angle)^-2.
+
+    Returns:
+        K times the plane modulus, dimensionless, shape (k, 3, 3), rows responding and columns loaded modes
+        (moment, shear, normal).
+    """
+    ring = ring_compliance(thickness_ratio, poisson, harmonics)
+    modes = arc_modes(half_angle, harmonics)
+    order = jnp.arange(1, harmonics + 1, dtype=modes.dtype)
+    pairs = jnp.einsum("ani,nij,bnj->abn", modes[:, 1:], ring, modes[:, 1:])
+    angle = order * spacing[:, None]
+    even = jnp.einsum("abn,kn->kab", pairs, jnp.cos(angle))
+    odd = jnp.einsum("abn,kn->kab", pairs, jnp.sin(angle))
+    # moment and shear have odd radial and even tangential stress, normal the reverse: same kinds meet in cos, others in sin
+    same = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    cross = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [1.0, 1.0, 0.0]])
+    matrix = jnp.pi * (even * jnp.asarray(same, even.dtype) + odd * jnp.asarray(cross, odd.dtype))
+    breathing = 2 * jnp.pi * modes[2, 0, 0] ** 2 * uniform_compliance(thickness_ratio, poisson)
+    return matrix.at[:, 2, 2].add(breathing)
+
+
+def uniform_compliance(thickness_ratio: Scalar, poisson: Scalar) -> Scalar:
+    """Radial displacement of the root circle per uniform radial stress (harmonic 0)."""
+    inner = thickness_ratio**-2
+    return (1 - poisson**2) * (1 - inner) / ((1 + poisson) + (1 - poisson) * inner)
+
+
+def arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
+    """Fourier coefficients of the three load modes for unit resultants, n = 0 ... harmonics.
+
+    The traction per arc length is the chord stress times cos(theta), turned into polar components. The second component
+    is the sine coefficient of the shear stress, for M and V minus its cosine coefficient, so that one ring compliance
+    serves all modes.
+    """
+    t = half_angle
+    order = np.arange(harmonics + 1, dtype=float)
+
+    def cosine(shift):  # int cos((n + shift) theta) over the arc, for each n
+        frequency = jnp.asarray(order + shift, t.dtype)
+        zero = order + shift == 0
+        return jnp.where(zero, 2 * t, 2 * jnp.sin(frequency * t) / jnp.where(zero, 1.0, frequency))
+
+    def even(*terms):  # cosine series of sum of amplitude * cos(shift theta)
+        return sum(a * 0.5 * (cosine(s) + cosine(-s)) for a, s in terms)
+
+    def odd(*terms):  # sine series of sum of amplitude * sin(shift theta)
+        return sum(a * 0.5 * (cosine(-s) - cosine(s)) for a, s in terms)
+
+    sine = jnp.sin(t)
+    # resultants over the chord y = sin(theta): int (y / y_f) y dy, int dy, int dy
+    moment_resultant, force_resultant = 2 * sine**2 / 3, 2 * sine
+    # cos^2 sin = (sin + sin 3) / 4, sin^2 cos = (cos - cos 3) / 4, cos sin = sin 2 / 2, cos^2 = (1 + cos 2) / 2
+    moment = (odd((0.25, 1), (0.25, 3)) / sine, even((0.25, 1), (-0.25, 3)) / sine)
+    shear = (odd((0.5, 2)), -even((0.5, 0), (0.5, 2)))
+    normal = (even((0.5, 0), (0.5, 2)), -odd((0.5, 2)))
+    rows = [
+        jnp.stack(moment, axis=-1) / moment_resultant,
+        jnp.stack(shear, axis=-1) / force_resultant,
+        jnp.stack(normal, axis=-1) / force_resultant,
+    ]
+    scale = np.where(order == 0, 1 / (2 * np.pi), 1 / np.pi)
+    return jnp.stack(rows) * jnp.asarray(scale, t.dtype)[:, None]
+
+
+def ring_compliance(thickness_ratio: Scalar, poisson: Scalar, harmonics: int) -> Float[Array, "n 2 2"]:
+    """Displacements (u_r, u_theta) of the root circle per stresses (sigma_r, tau) of harmonic n = 1 ... harmonics.
+
+    Four Michell terms per harmonic; the decaying ones are scaled to their value at the bore so that no power overflows.
+    """
+    first = _first_harmonic(thickness_ratio, poisson)[None]
+    if harmonics == 1:
+        return first
+    return jnp.concatenate([first, _higher_harmonics(thickness_ratio, poisson, harmonics)])
+
+
+def _condense(bore, outer_displacement, outer_stress, poisson):
+    """Eliminates the four term amplitudes: u = 0 at the bore, unit stresses outside. Trailing axes (2, 4) per harmonic."""
+    system = jnp.concatenate([bore, outer_stress], axis=-2)
+    unit = jnp.zeros((*system.shape[:-1], 2), system.dtype).at[..., 2, 0].set(1.0).at[..., 3, 1].set(1.0)
+    amplitude = jnp.linalg.solve(system, unit)
+    return (1 + poisson) * jnp.einsum("...ij,...jk->...ik", outer_displacement, amplitude)  # 1 / (2 mu) = (1 + nu) / E
+
+
+def _higher_harmonics(thickness_ratio, poisson, harmonics):
+    n = jnp.arange(2, harmonics + 1, dtype=thickness_ratio.dtype)
+    kappa = (3 - poisson) / (1 + poisson)
+    inner = 1 / thickness_ratio
+    fade = inner**n  # growing terms at the bore relative to the root circle, and decaying ones the other way round
+    one = jnp.ones_like(n)
+    displacement = jnp.stack(
+        [
+            jnp.stack([kappa - n - 1, kappa + n - 1, -n, n], -1),
+            jnp.stack([kappa + n + 1, -(kappa - n + 1), n, n], -1),
+        ],
+        -2,
+    )
+    stress = jnp.stack(
+        [
+            jnp.stack([-(n + 1) * (n - 2), -(n + 2) * (n - 1), -n * (n - 1), -n * (n + 1)], -1),
+            jnp.stack([n * (n + 1), -n * (n - 1), n * (n - 1), -n * (n + 1)], -1),
+        ],
+        -2,
+    )
+    outer = jnp.stack([one, fade, one, fade], -1)[:, None]
+    bore = jnp.stack([fade * inner, inner * one, fade / inner, one / inner], -1)[:, None]
+    return _condense(displacement * bore, displacement * outer, stress * outer, poisson)
+
+
+def _first_harmonic(thickness_ratio, poisson):
+    kappa = (3 - poisson) / (1 + poisson)
+
+    def columns(r):
+        one, log = jnp.ones_like(r), jnp.log(r)
+        displacement = jnp.stack(
+            [
+                jnp.stack([(kappa - 2) * r**2, r**-2, one, -1 + 2 * kappa * log]),
+                jnp.stack([(kappa + 2) * r**2, r**-2, -one, -1 - 2 * kappa * log]),
+            ]
+        )
+        zero = jnp.zeros_like(r)
+        stress = jnp.stack(
+            [
+                jnp.stack([2 * r, -2 * r**-3, zero, (kappa + 3) / r]),
+                jnp.stack([2 * r, -2 * r**-3, zero, -(kappa - 1) / r]),
+            ]
+        )
+        return displacement, stress
+
+    outer_displacement, outer_stress = columns(jnp.ones_like(thickness_ratio))
+    bore, _ = columns(1 / thickness_ratio)
+    return _condense(bore, outer_displacement, outer_stress, poisson)

@@ -1,0 +1,23 @@
+"""Gears, their pairing, the generated tooth outline and the path of contact (external involute spur gears).
+
+Coordinates and signs used everywhere:
+
+- the pinion drives, the wheel is driven, whatever their tooth numbers;
+- a point on a flank is named by its roll length rho = sqrt(r^2 - r_b^2), the radius of curvature of the involute [mm];
+  it stays smooth down to the base circle, where pressure angles do not;
+- `path` s is the position along the line of action from the pitch point [mm], positive towards the pinion tip (recess):
+  rho_pinion = rho_C,pinion + s, rho_wheel = rho_C,wheel - s;
+- `phase` psi counts base pitches, psi = 0 with the reference pair at the pitch point: s = psi p_b.
+"""
+
+from .gear import Gear as Gear
+from .involute import diameter as diameter
+from .involute import roll_angle as roll_angle
+from .involute import roll_length as roll_length
+from .material import STEEL as STEEL
+from .material import Material as Material
+from .outline import Outline as Outline
+from .outline import outline as outline
+from .pair import GearPair as GearPair
+from .path import PathOfContact as PathOfContact
+from .path import path_of_contact as path_of_contact

@@ -1,0 +1,40 @@
+"""Involute relations in the roll length rho = sqrt(r^2 - r_b^2) [mm] (ISO 21771).
+
+With t = rho / r_b = tan(alpha_y) the involute function is inv(alpha_y) = t - atan(t): no inverse cosine, so values and
+derivatives stay finite at the base circle.
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..numerics import safe_sqrt
+from .gear import Gear
+
+Real = Float[Array, "..."]
+
+
+def involute(tangent: Real) -> Real:
+    """inv(alpha) [rad] from tan(alpha)."""
+    return tangent - jnp.arctan(tangent)
+
+
+def half_tooth_angle(gear: Gear, rho: Real) -> Real:
+    """Angle between the tooth centreline and the involute at a roll length [mm], seen from the gear centre [rad]."""
+    alpha = jnp.deg2rad(gear.pressure_angle)
+    at_base = (jnp.pi / 2 + 2 * gear.profile_shift * jnp.tan(alpha)) / gear.teeth + involute(jnp.tan(alpha))
+    return at_base - involute(rho / gear.base_radius)
+
+
+def roll_length(gear: Gear, diameter: Real) -> Real:
+    """Roll length [mm] of the involute point on a diameter [mm]; 0 below the base circle."""
+    return safe_sqrt((0.5 * diameter) ** 2 - gear.base_radius**2)
+
+
+def roll_angle(gear: Gear, rho: Real) -> Real:
+    """Roll angle [deg] from the roll length [mm]."""
+    return jnp.rad2deg(rho / gear.base_radius)
+
+
+def diameter(gear: Gear, rho: Real) -> Real:
+    """Diameter [mm] of the involute point with a roll length [mm]."""
+    return 2 * jnp.sqrt(gear.base_radius**2 + rho**2)

@@ -1,0 +1,21 @@
+"""Free functions on a `MeshCycle`: what the loaded mesh means for noise, strength and losses."""
+
+from .flash import flash_temperature as flash_temperature
+from .load import ContactShock as ContactShock
+from .load import contact_shock as contact_shock
+from .load import effective_contact_ratio as effective_contact_ratio
+from .load import load_sharing as load_sharing
+from .loss import loss_factor as loss_factor
+from .loss import ohlendorf_loss_factor as ohlendorf_loss_factor
+from .pressure import corner_pressure as corner_pressure
+from .pressure import flank_pressure as flank_pressure
+from .report import summary as summary
+from .root_stress import RootFactors as RootFactors
+from .root_stress import RootStress as RootStress
+from .root_stress import root_factors as root_factors
+from .root_stress import root_stress as root_stress
+from .stiffness import secant_stiffness as secant_stiffness
+from .transmission_error import Harmonics as Harmonics
+from .transmission_error import harmonics as harmonics
+from .transmission_error import peak_to_peak as peak_to_peak
+from .transmission_error import smooth_peak_to_peak as smooth_peak_to_peak

@@ -1,0 +1,48 @@
+"""Flash temperature of the contact (Blok)."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..compliance.plane import plane_modulus
+from ..contact import MeshCycle
+from ..numerics import check, real, safe_divide, safe_sqrt
+
+Load = Float[Array, "pairs slices positions"]
+
+_BLOK_FACTOR = 1.13  # 2 / sqrt(pi), semi-elliptic heat flux (ISO/TS 6336-20, where Blok's own 1.11 is rounded)
+
+
+def flash_temperature(cycle: MeshCycle, speed, *, friction=0.06) -> Load:
+    """Rise of the flank temperature in the contact [K], at the line loads of this cycle.
+
+        T_fl = 1.13 mu w |v1 - v2| / [(B1 sqrt(v1) + B2 sqrt(v2)) sqrt(2 b_H)]
+
+    Zero where the pair is apart, in corner contact (no flank curvature there), and at the pitch point.
+
+    Args:
+        cycle: solved mesh cycle.
+        speed: of the pinion [rpm], scalar.
+        friction: mean coefficient of friction; 0.06 is the leading constant of ISO/TR 13989-1 at unit load and speed terms.
+
+    Raises:
+        ValueError: for a negative speed or friction.
+
+    References:
+        ISO/TS 6336-20 (ISO/TR 13989-1); H. Blok 1937.
+    """
+    check("flash_temperature", "speed", speed, "rpm", low=0.0)
+    check("flash_temperature", "friction", friction, "", low=0.0)
+    mesh = cycle.mesh
+    plane, pair = mesh.compliance.plane, mesh.pair
+    pinion_speed, wheel_speed = mesh.path_of_contact.rolling_speeds(mesh.path, real(speed))
+    pinion_radius, wheel_radius = mesh.pinion_load.roll_length, mesh.wheel_load.roll_length
+    reduced = pinion_radius * wheel_radius / (pinion_radius + wheel_radius)
+    compliance = sum(1 / plane_modulus(gear.material, plane) for gear in (pair.pinion, pair.wheel))
+    half_width = safe_sqrt(4 * cycle.line_load * reduced[:, None] * compliance / jnp.pi) * 1e-3  # [m]
+    heat = real(friction) * cycle.line_load * 1e3 * jnp.abs(pinion_speed - wheel_speed)[:, None]
+    sink = (
+        pair.pinion.material.thermal_contact_coefficient * safe_sqrt(pinion_speed)
+        + pair.wheel.material.thermal_contact_coefficient * safe_sqrt(wheel_speed)
+    )
+    rise = _BLOK_FACTOR * safe_divide(heat, sink[:, None] * safe_sqrt(2 * half_width))
+    return jnp.where((mesh.outside <= 0)[:, None], rise, 0.0)

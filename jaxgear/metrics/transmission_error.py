@@ -1,0 +1,59 @@
+"""Variation of a transmission error curve over one base pitch."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+Curve = Float[Array, "... positions"]
+
+
+class Harmonics(eqx.Module):
+    """Mesh-frequency harmonics 1 ... n of a curve: curve = mean + sum_n amplitude_n cos(2 pi n psi + phase_n).
+
+    Attributes:
+        amplitude: [unit of the curve], shape (..., n).
+        phase: [deg], shape (..., n); zero with zero gradient where the amplitude vanishes.
+    """
+
+    amplitude: Float[Array, "... harmonics"]
+    phase: Float[Array, "... harmonics"]
+
+
+def peak_to_peak(curve: Curve) -> Float[Array, "..."]:
+    """Largest minus smallest value over the positions (PPTE for a transmission error, in um).
+
+    It touches two positions only and has zero gradient on ties: report it, and follow `smooth_peak_to_peak` or the
+    harmonics when optimizing. NaN is passed on even where the reductions of the backend would drop it.
+    """
+    spread = jnp.max(curve, axis=-1) - jnp.min(curve, axis=-1)
+    return jnp.where(jnp.isfinite(jnp.sum(curve, axis=-1)), spread, jnp.nan)
+
+
+def smooth_peak_to_peak(curve: Curve, smoothing) -> Float[Array, "..."]:
+    """Soft maximum minus soft minimum, smoothing log-mean-exp over the positions.
+
+    Args:
+        curve: values at equally spaced positions.
+        smoothing: width of the soft extremes in units of the curve; towards zero the result rises to `peak_to_peak`.
+    """
+    count = jnp.log(jnp.asarray(curve.shape[-1], curve.dtype))
+    top = jax.nn.logsumexp(curve / smoothing, axis=-1) - count
+    bottom = jax.nn.logsumexp(-curve / smoothing, axis=-1) - count
+    return smoothing * (top + bottom)
+
+
+def harmonics(curve: Curve, count: int = 5) -> Harmonics:
+    """Amplitudes and phases of the first `count` mesh harmonics; amplitude_n = 2 |mean(curve e^(-2 pi i n psi))|."""
+    positions = curve.shape[-1]
+    if not 1 <= count < positions / 2:
+        raise ValueError(f"harmonics: count = {count} must be at least 1 and less than half of {positions} positions")
+    order = jnp.arange(1, count + 1, dtype=curve.dtype)
+    angle = 2 * jnp.pi * order[:, None] * jnp.arange(positions, dtype=curve.dtype) / positions
+    real = 2 * jnp.mean(curve[..., None, :] * jnp.cos(angle), axis=-1)
+    imaginary = -2 * jnp.mean(curve[..., None, :] * jnp.sin(angle), axis=-1)
+    squared = real**2 + imaginary**2
+    present = squared > 0
+    amplitude = jnp.where(present, jnp.sqrt(jnp.where(present, squared, 1.0)), 0.0)
+    phase = jnp.where(present, jnp.arctan2(jnp.where(present, imaginary, 0.0), jnp.where(present, real, 1.0)), 0.0)
+    return Harmonics(amplitude, jnp.rad2deg(phase))

@@ -1,0 +1,27 @@
+"""What is taken off the flank: profile and lead modifications, composed with `+`.
+
+Positive means material removed, in um, normal to the flank in the transverse plane (ISO 21771), which is along the line
+of action. Profile lengths are roll lengths in mm (differences of radii of curvature) and are counted from the tip for a
+`TipRelief`, from the start of the active profile for a `RootRelief`.
+"""
+
+from .base import AbstractModification as AbstractModification
+from .base import Flank as Flank
+from .base import NoModification as NoModification
+from .base import Sum as Sum
+from .curves import AbstractCurve as AbstractCurve
+from .curves import Linear as Linear
+from .curves import Parabolic as Parabolic
+from .curves import Polynomial as Polynomial
+from .curves import Power as Power
+from .curves import Quadratic as Quadratic
+from .curves import Sinusoidal as Sinusoidal
+from .curves import Spline as Spline
+from .lead import EndRelief as EndRelief
+from .lead import LeadCrowning as LeadCrowning
+from .lead import LeadSlope as LeadSlope
+from .profile import ProfileCrowning as ProfileCrowning
+from .profile import ProfileSlope as ProfileSlope
+from .profile import RootRelief as RootRelief
+from .profile import TipRelief as TipRelief
+from .tabulated import TabulatedProfile as TabulatedProfile

@@ -1,0 +1,82 @@
+"""Modifications along the profile. Names of ISO 21771: C_alpha_a, C_alpha_f, C_alpha, C_H_alpha."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..numerics import check, real, safe_divide
+from .base import AbstractModification, Flank
+from .curves import AbstractCurve, Linear, Parabolic
+
+
+def relief(depth, amount, length, curve: AbstractCurve) -> Float[Array, "..."]:
+    """Relief [um] at a depth [mm] beyond its start; zero before the start, and everywhere for a length of zero."""
+    d = jnp.clip(safe_divide(depth, length), 0.0, 1.0)
+    return amount * jnp.where((depth > 0) & (length > 0), curve(d), 0.0)
+
+
+class TipRelief(AbstractModification):
+    """Tip relief C_alpha_a: `amount` [um] at the tip, over the last `length` [mm] of roll length.
+
+    A length of zero means no relief.
+    """
+
+    amount: Float[Array, ""] = eqx.field(converter=real)
+    length: Float[Array, ""] = eqx.field(converter=real)
+    curve: AbstractCurve = eqx.field(default_factory=Parabolic)
+
+    def __check_init__(self):
+        check("TipRelief", "amount", self.amount, "um")
+        check("TipRelief", "length", self.length, "mm", low=0.0)
+
+    def __call__(self, flank: Flank):
+        depth = flank.roll_length - (flank.tip_roll_length - self.length)
+        return relief(depth, self.amount, self.length, self.curve)
+
+
+class RootRelief(AbstractModification):
+    """Root relief C_alpha_f: `amount` [um] at the start of the active profile, over the first `length` [mm]."""
+
+    amount: Float[Array, ""] = eqx.field(converter=real)
+    length: Float[Array, ""] = eqx.field(converter=real)
+    curve: AbstractCurve = eqx.field(default_factory=Linear)
+
+    def __check_init__(self):
+        check("RootRelief", "amount", self.amount, "um")
+        check("RootRelief", "length", self.length, "mm", low=0.0)
+
+    def __call__(self, flank: Flank):
+        depth = flank.start_roll_length + self.length - flank.roll_length
+        return relief(depth, self.amount, self.length, self.curve)
+
+
+class ProfileCrowning(AbstractModification):
+    """Profile crowning C_alpha: parabola with zero in the middle of the active profile and `amount` [um] at its ends."""
+
+    amount: Float[Array, ""] = eqx.field(converter=real)
+
+    def __check_init__(self):
+        check("ProfileCrowning", "amount", self.amount, "um")
+
+    def __call__(self, flank: Flank):
+        return self.amount * _from_middle(flank) ** 2
+
+
+class ProfileSlope(AbstractModification):
+    """Profile slope C_H_alpha: straight line, half the `amount` [um] removed at the tip, half added at the start of the
+    active profile, so that the middle stays."""
+
+    amount: Float[Array, ""] = eqx.field(converter=real)
+
+    def __check_init__(self):
+        check("ProfileSlope", "amount", self.amount, "um")
+
+    def __call__(self, flank: Flank):
+        return 0.5 * self.amount * _from_middle(flank)
+
+
+def _from_middle(flank: Flank):
+    """-1 at the start of the active profile, +1 at the tip."""
+    middle = 0.5 * (flank.tip_roll_length + flank.start_roll_length)
+    half = 0.5 * (flank.tip_roll_length - flank.start_roll_length)
+    return (flank.roll_length - middle) / half

@@ -1,0 +1,53 @@
+"""Modifications given as a table: measured flanks, worn flanks, iterated profiles."""
+
+from typing import Literal
+
+import equinox as eqx
+import interpax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..numerics import check, concrete, real
+from .base import AbstractModification, Flank
+
+
+class TabulatedProfile(AbstractModification):
+    """Material removed, tabulated over the profile and interpolated; constant beyond the ends of the table.
+
+    Attributes:
+        position: increasing table positions, shape (points,).
+        amount: material removed [um], shape (points,).
+        coordinate: what the positions are: "roll_length" [mm] (default) or "roll_angle" [deg].
+        method: "linear", or "cubic2" for a natural cubic spline, or "monotonic" for a shape-preserving cubic.
+    """
+
+    position: Float[Array, " points"] = eqx.field(converter=real)
+    amount: Float[Array, " points"] = eqx.field(converter=real)
+    coordinate: Literal["roll_length", "roll_angle"] = eqx.field(default="roll_length", static=True)
+    method: Literal["linear", "cubic2", "monotonic"] = eqx.field(default="linear", static=True)
+
+    def __check_init__(self):
+        if self.position.ndim != 1 or self.position.shape != self.amount.shape or self.position.shape[0] < 2:
+            raise ValueError(
+                f"TabulatedProfile: position {self.position.shape} and amount {self.amount.shape} must be two lists of "
+                "the same length, at least 2"
+            )
+        if self.coordinate not in ("roll_length", "roll_angle"):
+            raise ValueError(
+                f'TabulatedProfile: coordinate = {self.coordinate!r} must be "roll_length" or "roll_angle"'
+            )
+        if self.method not in ("linear", "cubic2", "monotonic"):
+            raise ValueError(f'TabulatedProfile: method = {self.method!r} must be "linear", "cubic2" or "monotonic"')
+        unit = "mm" if self.coordinate == "roll_length" else "deg"
+        check("TabulatedProfile", "position", self.position, unit)
+        check("TabulatedProfile", "amount", self.amount, "um")
+        position = concrete(self.position)
+        if position is not None and not (position[1:] > position[:-1]).all():
+            raise ValueError("TabulatedProfile: position must increase strictly")
+
+    def __call__(self, flank: Flank):
+        x = flank.roll_length
+        if self.coordinate == "roll_angle":
+            x = jnp.rad2deg(x / flank.base_radius)
+        x = jnp.clip(x, self.position[0], self.position[-1])
+        return interpax.interp1d(x.reshape(-1), self.position, self.amount, method=self.method).reshape(x.shape)

@@ -1,0 +1,8 @@
+"""Choosing a modification: sizing rules and gradient optimization."""
+
+from .sizing import IsoStiffness as IsoStiffness
+from .sizing import iso_relief as iso_relief
+from .sizing import iso_stiffness as iso_stiffness
+from .sizing import long_relief_length as long_relief_length
+from .sizing import relief_amount as relief_amount
+from .sizing import short_relief_length as short_relief_length
