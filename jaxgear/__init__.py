@@ -70,8 +70,10 @@ from .microgeometry import Sinusoidal as Sinusoidal
 from .microgeometry import Spline as Spline
 from .microgeometry import TabulatedProfile as TabulatedProfile
 from .microgeometry import TipRelief as TipRelief
+from .optimize import Optimum as Optimum
 from .optimize import iso_relief as iso_relief
 from .optimize import iso_stiffness as iso_stiffness
 from .optimize import long_relief_length as long_relief_length
+from .optimize import minimize as minimize
 from .optimize import relief_amount as relief_amount
 from .optimize import short_relief_length as short_relief_length

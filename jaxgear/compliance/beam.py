@@ -61,26 +61,34 @@ class Beam(AbstractTooth):
         fillet_end = jnp.where(in_fillet, _fillet_parameter(outline, height), outline.junction)
         involute_end = jnp.where(in_fillet, outline.form_roll_length, _involute_roll_length(outline, height))
         fillet = self._segment(load, trochoid, jnp.full_like(height, jnp.pi / 2), fillet_end)
-        flank = self._segment(load, involute_point, jnp.broadcast_to(outline.form_roll_length, height.shape), involute_end)
+        flank = self._segment(
+            load, involute_point, jnp.broadcast_to(outline.form_roll_length, height.shape), involute_end
+        )
         return fillet[0] + flank[0], fillet[1] + flank[1]
 
     def _segment(self, load: ToothLoad, curve, start, end) -> tuple[Array, Array]:
+        """The two integrals over a part of the outline, with the quadrature nodes on a leading axis."""
         gear = load.outline.gear
-        bending, area = jnp.zeros_like(start), jnp.zeros_like(start)
-        for node, weight in zip(*gauss_legendre(self.nodes)):
-            parameter = start + float(node) * (end - start)
-            (x, y), (_, slope) = jax.jvp(lambda t: curve(gear, t), (parameter,), (end - start,))
-            step = float(weight) * slope
-            bending = bending + step * (load.height - y) ** 2 * 1.5 / x**3
-            area = area + step * 0.5 / x
-        return bending, area
+        nodes, weights = (
+            jnp.asarray(table, start.dtype).reshape((-1,) + (1,) * start.ndim) for table in gauss_legendre(self.nodes)
+        )
+        parameter, extent = (
+            start[None] + nodes * (end - start)[None],
+            jnp.broadcast_to(end - start, (self.nodes, *start.shape)),
+        )
+        (x, y), (_, slope) = jax.jvp(lambda t: curve(gear, t), (parameter,), (extent,))
+        step = weights * slope
+        return jnp.sum(step * (load.height[None] - y) ** 2 * 1.5 / x**3, axis=0), jnp.sum(step * 0.5 / x, axis=0)
 
 
 def _fillet_parameter(outline: Outline, height):
     """Trochoid parameter at a height of the centreline; the ends of the fillet for heights beyond them."""
     low = jnp.broadcast_to(outline.junction, height.shape)
     return bracketed_root(
-        lambda g, args: trochoid(args[0].gear, g)[1] - args[1], low, jnp.full_like(height, jnp.pi / 2), (outline, height)
+        lambda g, args: trochoid(args[0].gear, g)[1] - args[1],
+        low,
+        jnp.full_like(height, jnp.pi / 2),
+        (outline, height),
     )
 
 

@@ -4,6 +4,7 @@ from abc import abstractmethod
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry.outline import Outline
@@ -59,17 +60,14 @@ class ElasticRing(AbstractBody):
         arm = (load.height - outline.root_height) / gear.root_circle_radius
         cosine = jnp.cos(load.angle)
         modes = jnp.stack([-arm * cosine, cosine, -jnp.sin(load.angle)], axis=1)  # (pairs, 3, positions)
-        rows = []
-        for i in range(count):
-            row = []
-            for j in range(count):
-                # the responding tooth i lies (i - j) steps from the loaded tooth j; K(-phi) = K(phi)^T
-                block = blocks[abs(i - j)] if step * (i - j) >= 0 else blocks[abs(i - j)].T
-                coupled = self.coupling or i == j
-                value = jnp.einsum("ap,ab,bp->p", modes[i], block, modes[j])
-                row.append(value if coupled else jnp.zeros_like(value))
-            rows.append(jnp.stack(row))
-        return 1e3 / plane_modulus(gear.material, plane) * jnp.stack(rows)
+        # the responding tooth i lies (i - j) steps from the loaded tooth j; K(-phi) = K(phi)^T
+        order = step * (np.arange(count)[:, None] - np.arange(count)[None])
+        both = jnp.stack([blocks, blocks.transpose(0, 2, 1)])
+        between = both[(order < 0).astype(int), abs(order)]
+        if not self.coupling:
+            between = between * jnp.eye(count, dtype=between.dtype)[:, :, None, None]
+        shape = jnp.einsum("iap,ijab,jbp->ijp", modes, between, modes)
+        return 1e3 / plane_modulus(gear.material, plane) * shape
 
     def hub(self, outline: Outline) -> Float[Array, ""]:
         """(1 + nu) (h^2 - 1) / (2 pi E) (r_b / r_f)^2: torsion of the ring, the same in both plane states."""

@@ -107,9 +107,7 @@ class Mesh(eqx.Module):
         )
 
 
-def prepare(
-    pair: GearPair, *, compliance: Compliance | None = None, resolution: Resolution | None = None
-) -> Mesh:
+def prepare(pair: GearPair, *, compliance: Compliance | None = None, resolution: Resolution | None = None) -> Mesh:
     """Prepares a gear pair for `solve`: contact points, corner gaps and compliances over one base pitch.
 
     Args:

@@ -83,9 +83,7 @@ def _rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
     """Centre of the rack's tip arc: distance from the tooth centreline [mm], depth below the pitch line, and radius."""
     alpha, m = jnp.deg2rad(gear.pressure_angle), gear.module
     tip = gear.root_radius * m
-    from_rack_centre = (
-        jnp.pi * m / 4 - gear.dedendum * m * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * tip / jnp.cos(alpha)
-    )
+    from_rack_centre = jnp.pi * m / 4 - gear.dedendum * m * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * tip / jnp.cos(alpha)
     return jnp.pi * m / 2 - from_rack_centre, (gear.dedendum - gear.profile_shift) * m - tip, tip
 
 

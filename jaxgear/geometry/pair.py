@@ -82,4 +82,3 @@ def _backlash_free_angle(pair: GearPair) -> Scalar:
         target,
     )
     return jnp.arctan(tangent)
-

@@ -40,9 +40,8 @@ def flash_temperature(cycle: MeshCycle, speed, *, friction=0.06) -> Load:
     compliance = sum(1 / plane_modulus(gear.material, plane) for gear in (pair.pinion, pair.wheel))
     half_width = safe_sqrt(4 * cycle.line_load * reduced[:, None] * compliance / jnp.pi) * 1e-3  # [m]
     heat = real(friction) * cycle.line_load * 1e3 * jnp.abs(pinion_speed - wheel_speed)[:, None]
-    sink = (
-        pair.pinion.material.thermal_contact_coefficient * safe_sqrt(pinion_speed)
-        + pair.wheel.material.thermal_contact_coefficient * safe_sqrt(wheel_speed)
-    )
+    sink = pair.pinion.material.thermal_contact_coefficient * safe_sqrt(
+        pinion_speed
+    ) + pair.wheel.material.thermal_contact_coefficient * safe_sqrt(wheel_speed)
     rise = _BLOK_FACTOR * safe_divide(heat, sink[:, None] * safe_sqrt(2 * half_width))
     return jnp.where((mesh.outside <= 0)[:, None], rise, 0.0)

@@ -59,9 +59,7 @@ def critical_section(gear: Gear) -> CriticalSection:
     """Section of the generated root at the 30 degree tangent (external spur gear)."""
     alpha, m, z = jnp.deg2rad(gear.pressure_angle), gear.module, gear.teeth
     radius = gear.root_radius
-    centre = (
-        jnp.pi / 4 - gear.dedendum * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * radius / jnp.cos(alpha)
-    )
+    centre = jnp.pi / 4 - gear.dedendum * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * radius / jnp.cos(alpha)
     g = radius - gear.dedendum + gear.profile_shift
     h = 2 / z * (jnp.pi / 2 - centre) - jnp.pi / 3
     theta = jax.lax.fori_loop(

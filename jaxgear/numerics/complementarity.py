@@ -14,6 +14,7 @@ All arrays keep the positions innermost and the P springs are unrolled: XLA then
 """
 
 from functools import partial
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -70,66 +71,98 @@ def solve_contact(problem: ContactProblem, *, steps: int) -> ContactSolution:
         derivative is one-sided.
     """
     line_load, approach = _solve(steps, problem)
-    rows = list(line_load)
-    opening = jnp.stack([y - h for y, (h, _) in zip(_mismatch(problem, rows, approach), _law(problem, rows))])
-    return ContactSolution(line_load, approach, opening, _residual(problem, line_load, approach))
+    state = _evaluate(problem, list(line_load), approach)
+    opening = jnp.stack([y - h for y, h in zip(state.mismatch, state.deflection)])
+    return ContactSolution(line_load, approach, opening, _residual(problem, state))
 
 
 def tangent_stiffness(problem: ContactProblem, solution: ContactSolution) -> Float[Array, " positions"]:
     """d load / d approach at the solution, for the springs in contact."""
-    rows = list(solution.line_load)
-    slopes = [slope for _, slope in _law(problem, rows)]
-    active = _active(problem, rows, solution.approach)
-    ones = [mask.astype(slope.dtype) for mask, slope in zip(active, slopes)]
-    unit, _ = _eliminate(problem, slopes, active, ones, ones)
+    state = _evaluate(problem, list(solution.line_load), solution.approach)
+    ones = [jnp.asarray(mask, slope.dtype) for mask, slope in zip(state.active, state.slope)]
+    unit, _ = _eliminate(problem, state, ones, ones)
     return _total(problem, unit)
+
+
+class _State(NamedTuple):
+    """An iterate with everything that follows from it, a list over the springs in every field but one."""
+
+    load: Rows
+    approach: Float[Array, " positions"]
+    deflection: Rows  # h
+    slope: Rows  # dh/dq
+    mismatch: Rows  # y
+    active: Rows  # in contact
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _solve(steps: int, problem: ContactProblem):
-    rows = [jnp.broadcast_to(problem.load / jnp.sum(problem.weight), gap.shape) for gap in problem.gap]
-    active = _reachable(problem, rows)
-    approach = jnp.zeros(problem.gap.shape[-1], problem.gap.dtype)
-    for _ in range(steps):
-        rows, approach = _newton(problem, rows, active)
-        active = _active(problem, rows, approach)
-    return jnp.stack(rows), approach
+    state = jax.lax.fori_loop(0, steps, lambda _, state: _newton(problem, state), _start(problem))
+    return jnp.stack(state.load), state.approach
 
 
 @_solve.defjvp
 def _solve_jvp(steps, primals, tangents):
     (problem,), (problem_dot,) = primals, tangents
     line_load, approach = _solve(steps, problem)
-    rows = list(line_load)
+    state = _evaluate(problem, list(line_load), approach)
 
     def conditions(data):
-        return _mismatch(data, rows, approach), _total(data, rows) - data.load
+        return _mismatch(data, state.load, _deflection(data, state.load), approach), _total(
+            data, state.load
+        ) - data.load
 
-    (_, _), (mismatch_dot, total_dot) = jax.jvp(conditions, (problem,), (problem_dot,))
-    slopes = [slope for _, slope in _law(problem, rows)]
-    active = _active(problem, rows, approach)
-    rows_dot, approach_dot = _balance(problem, slopes, active, [-dot for dot in mismatch_dot], -total_dot)
-    return (line_load, approach), (jnp.stack(rows_dot), approach_dot)
-
-
-def _newton(problem, rows, active):
-    laws = _law(problem, rows)
-    known = [-gap - (h - slope * q) for gap, (h, slope), q in zip(problem.gap, laws, rows)]
-    slopes = [slope for _, slope in laws]
-    rows, approach = _balance(problem, slopes, active, known, problem.load)
-    return [jnp.maximum(q, 0.0) for q in rows], approach
+    _, (mismatch_dot, total_dot) = jax.jvp(conditions, (problem,), (problem_dot,))
+    load_dot, approach_dot = _balance(problem, state, [-dot for dot in mismatch_dot], -total_dot)
+    return (line_load, approach), (jnp.stack(load_dot), approach_dot)
 
 
-def _balance(problem, slopes, active, known, load):
+def _start(problem: ContactProblem) -> _State:
+    """Equal loads on every spring that can be in contact at all.
+
+    Gaps wider than the approach of any one spring that bears the load alone stay open.
+    """
+    load = [jnp.broadcast_to(problem.load / jnp.sum(problem.weight), gap.shape) for gap in problem.gap]
+    state = _evaluate(problem, load, jnp.zeros(problem.gap.shape[-1], problem.gap.dtype))
+    alone = [
+        jnp.max(gap + h + problem.compliance[i, i][None] * q, axis=0)
+        for i, (gap, h, q) in enumerate(zip(problem.gap, state.deflection, load))
+    ]
+    bound = jnp.min(jnp.stack(alone), axis=0)[None]
+    return state._replace(active=_positive([bound - gap for gap in problem.gap]))
+
+
+def _newton(problem: ContactProblem, state: _State) -> _State:
+    """One Newton step on the active set, followed by the new set."""
+    known = [-gap - (h - slope * q) for gap, h, slope, q in zip(problem.gap, state.deflection, state.slope, state.load)]
+    load, approach = _balance(problem, state, known, problem.load)
+    return _evaluate(problem, [jnp.maximum(q, 0.0) for q in load], approach)
+
+
+def _evaluate(problem: ContactProblem, load: Rows, approach) -> _State:
+    deflection, slope = jax.jvp(lambda rows: _deflection(problem, rows), (load,), ([jnp.ones_like(q) for q in load],))
+    mismatch = _mismatch(problem, load, deflection, approach)
+    signal = [(problem.compliance[i, i][None] + slope[i]) * load[i] - mismatch[i] for i in range(len(load))]
+    return _State(load, approach, deflection, slope, mismatch, _positive(signal))
+
+
+def _positive(signal: Rows) -> Rows:
+    """Where the signal is positive; at zero load the largest counts, so that the system stays regular."""
+    largest = jnp.max(jnp.stack([jnp.max(s, axis=0) for s in signal]), axis=0)[None]
+    return [(s > 0) | (s >= largest) for s in signal]
+
+
+def _balance(problem, state, known, load):
     """Solves (C + slope) q = known + d on the active rows, q = 0 on the others, together with sum w q = load."""
-    ones = [mask.astype(k.dtype) for mask, k in zip(active, known)]
-    unit, part = _eliminate(problem, slopes, active, ones, [jnp.where(m, k, 0.0) for m, k in zip(active, known)])
+    ones = [jnp.asarray(mask, k.dtype) for mask, k in zip(state.active, known)]
+    unit, part = _eliminate(problem, state, ones, [jnp.where(mask, k, 0.0) for mask, k in zip(state.active, known)])
     approach = (load - _total(problem, part)) / _total(problem, unit)
     return [u * approach[None] + p for u, p in zip(unit, part)], approach
 
 
-def _eliminate(problem, slopes, active, first, second) -> tuple[Rows, Rows]:
+def _eliminate(problem, state, first: Rows, second: Rows) -> tuple[Rows, Rows]:
     """LDL^T solution of the active P x P systems for two right-hand sides, unrolled over the springs."""
+    active, slopes = state.active, state.slope
     count = len(active)
     lower: dict[tuple[int, int], Array] = {}
     pivot: list[Array] = []
@@ -156,64 +189,33 @@ def _eliminate(problem, slopes, active, first, second) -> tuple[Rows, Rows]:
     return a, b
 
 
-def _law(problem, rows) -> list[tuple[Array, Array]]:
-    """Deflection and slope of every spring."""
-    result = []
-    for i, q in enumerate(rows):
-        law = jax.tree.map(lambda leaf: leaf[i], problem.law)
-        result.append(jax.jvp(law.deflection, (q,), (jnp.ones_like(q),)))
-    return result
+def _deflection(problem, load: Rows) -> Rows:
+    """h of every spring."""
+    return [jax.tree.map(lambda leaf: leaf[i], problem.law).deflection(q) for i, q in enumerate(load)]
 
 
-def _mismatch(problem, rows, approach) -> Rows:
+def _mismatch(problem, load: Rows, deflection: Rows, approach) -> Rows:
     """y of every spring."""
     result = []
-    for i, (h, _) in enumerate(_law(problem, rows)):
-        elastic = h
-        for j, q in enumerate(rows):
+    for i, elastic in enumerate(deflection):
+        for j, q in enumerate(load):
             elastic = elastic + problem.compliance[i, j][None] * q
         result.append(elastic + problem.gap[i] - approach[None])
     return result
 
 
-def _total(problem, rows) -> Float[Array, " positions"]:
-    return sum(jnp.sum(problem.weight[:, None] * q, axis=0) for q in rows)
+def _total(problem, load: Rows) -> Float[Array, " positions"]:
+    return sum(jnp.sum(problem.weight[:, None] * q, axis=0) for q in load)
 
 
-def _active(problem, rows, approach) -> list[Array]:
-    """Springs in contact. At zero load the one that touches first counts, so that the system stays regular."""
-    slopes = [slope for _, slope in _law(problem, rows)]
-    mismatch = _mismatch(problem, rows, approach)
-    signal = [
-        (problem.compliance[i, i][None] + slopes[i]) * rows[i] - mismatch[i] for i in range(len(rows))
-    ]
-    return _with_largest(signal, [s > 0 for s in signal])
-
-
-def _reachable(problem, rows) -> list[Array]:
-    """Springs that can be in contact: gaps wider than the approach of any one spring that bears the load alone cannot."""
-    laws = _law(problem, rows)
-    alone = [
-        gap + h + problem.compliance[i, i][None] * q for i, (gap, (h, _), q) in enumerate(zip(problem.gap, laws, rows))
-    ]
-    bound = jnp.min(jnp.stack([jnp.max(a, axis=0) for a in alone]), axis=0)[None]
-    signal = [bound - gap for gap in problem.gap]
-    return _with_largest(signal, [s > 0 for s in signal])
-
-
-def _with_largest(signal, active):
-    largest = jnp.max(jnp.stack([jnp.max(s, axis=0) for s in signal]), axis=0)[None]
-    return [mask | (s >= largest) for mask, s in zip(active, signal)]
-
-
-def _residual(problem, line_load, approach) -> Float[Array, " positions"]:
-    line_load, approach, problem = jax.lax.stop_gradient((line_load, approach, problem))
-    rows = list(line_load)
-    scale = jnp.max(jnp.abs(jnp.stack(_mismatch(problem, rows, jnp.zeros_like(approach)))) * (line_load > 0), axis=(0, 1))
-    worst = jnp.zeros_like(approach)
-    for q, y in zip(rows, _mismatch(problem, rows, approach)):
-        violation = jnp.where(q > 0, jnp.abs(y), jnp.maximum(-y, 0.0))
+def _residual(problem: ContactProblem, state: _State) -> Float[Array, " positions"]:
+    problem, state = jax.lax.stop_gradient((problem, state))
+    worst, scale = jnp.zeros_like(state.approach), jnp.zeros_like(state.approach)
+    for q, y in zip(state.load, state.mismatch):
+        closed = q > 0
+        violation = jnp.where(closed, jnp.abs(y), jnp.maximum(-y, 0.0))
         worst = jnp.maximum(worst, jnp.max(violation, axis=0))
-    tiny = jnp.finfo(approach.dtype).tiny
-    balance = jnp.abs(_total(problem, rows) - problem.load) / (jnp.abs(problem.load) + tiny)
+        scale = jnp.maximum(scale, jnp.max(jnp.where(closed, jnp.abs(y + state.approach[None]), 0.0), axis=0))
+    tiny = jnp.finfo(worst.dtype).tiny
+    balance = jnp.abs(_total(problem, state.load) - problem.load) / (jnp.abs(problem.load) + tiny)
     return jnp.maximum(worst / (scale + tiny), balance)

@@ -53,7 +53,9 @@ def check(
         return
     shown = known[bad].flat[0] if known.ndim else known
     unit_text = f" {unit}" if unit else ""
-    raise ValueError(f"{owner}: {name} = {float(shown):g}{unit_text} {_range(low, high, open_low, open_high, unit_text)}")
+    raise ValueError(
+        f"{owner}: {name} = {float(shown):g}{unit_text} {_range(low, high, open_low, open_high, unit_text)}"
+    )
 
 
 def _range(low, high, open_low, open_high, unit_text) -> str:

@@ -1,5 +1,7 @@
 """Choosing a modification: sizing rules and gradient optimization."""
 
+from .gradient import Optimum as Optimum
+from .gradient import minimize as minimize
 from .sizing import IsoStiffness as IsoStiffness
 from .sizing import iso_relief as iso_relief
 from .sizing import iso_stiffness as iso_stiffness
