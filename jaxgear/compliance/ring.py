@@ -40,13 +40,13 @@ def arc_compliance(half_angle: Scalar, thickness_ratio: Scalar, poisson: Scalar,
     modes = arc_modes(half_angle, harmonics)
     order = jnp.arange(1, harmonics + 1, dtype=modes.dtype)
     pairs = jnp.einsum("ani,nij,bnj->abn", modes[:, 1:], ring, modes[:, 1:])
-    angle = order * spacing[:, None]
+    angle = order[None] * spacing[:, None]
     even = jnp.einsum("abn,kn->kab", pairs, jnp.cos(angle))
     odd = jnp.einsum("abn,kn->kab", pairs, jnp.sin(angle))
     # moment and shear have odd radial and even tangential stress, normal the reverse: same kinds meet in cos, others in sin
     same = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     cross = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [1.0, 1.0, 0.0]])
-    matrix = jnp.pi * (even * jnp.asarray(same, even.dtype) + odd * jnp.asarray(cross, odd.dtype))
+    matrix = jnp.pi * (even * jnp.asarray(same, even.dtype)[None] + odd * jnp.asarray(cross, odd.dtype)[None])
     breathing = 2 * jnp.pi * modes[2, 0, 0] ** 2 * uniform_compliance(thickness_ratio, poisson)
     return matrix.at[:, 2, 2].add(breathing)
 
@@ -91,7 +91,7 @@ def arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
         jnp.stack(normal, axis=-1) / force_resultant,
     ]
     scale = np.where(order == 0, 1 / (2 * np.pi), 1 / np.pi)
-    return jnp.stack(rows) * jnp.asarray(scale, t.dtype)[:, None]
+    return jnp.stack(rows) * jnp.asarray(scale, t.dtype)[None, :, None]
 
 
 def ring_compliance(thickness_ratio: Scalar, poisson: Scalar, harmonics: int) -> Float[Array, "n 2 2"]:
