@@ -1,0 +1,118 @@
+"""How far jaxgear is from finite elements: `python -m benchmarks.accuracy`.
+
+Compares the default model, the usual published model and the default with one ingredient less with 52 finite-element
+mesh cycles (`reference/README.md`). Exit code 1 when an error of the default model has grown past `accuracy_bounds.json`.
+"""
+
+import jax
+
+jax.config.update("jax_enable_x64", True)
+
+import argparse  # noqa: E402
+import json  # noqa: E402
+import sys  # noqa: E402
+from collections.abc import Sequence  # noqa: E402
+from pathlib import Path  # noqa: E402
+
+from .cases import PAIRS, PLANES, Case, reference, select  # noqa: E402
+from .models import DEFAULT, MODELS, Model, run  # noqa: E402
+from .quantities import QUANTITIES, errors  # noqa: E402
+from .report import Errors, print_detail, print_summary  # noqa: E402
+
+BOUNDS = Path(__file__).parent / "accuracy_bounds.json"
+# A recorded worst error may grow by this much before the benchmark fails: room for other JAX versions and processors, and
+# for changes elsewhere that nobody would call a loss of accuracy.
+_MARGIN = 1.05
+_MARGIN_BY_UNIT = {"%": 0.05, "um": 0.002, "": 0.0005}
+
+
+def compare(models: Sequence[Model], cases: Sequence[Case]) -> Errors:
+    """Errors of every model in every case, {model name: {case: {quantity: error}}}.
+
+    Raises:
+        ValueError: when there is nothing to compare.
+    """
+    if not cases or not models:
+        raise ValueError("nothing to compare: no cases or no models")
+    results = {}
+    for model in models:
+        curves = run(model, cases)
+        results[model.name] = {case: errors(case, curves[case], reference(case)) for case in cases}
+    return results
+
+
+def worst(results: dict[Case, dict[str, float]]) -> dict[str, dict[str, float]]:
+    """Largest absolute error per gear pair and quantity."""
+    pairs = sorted({case.pair for case in results})
+    return {
+        pair: {
+            quantity.key: max(abs(error[quantity.key]) for case, error in results.items() if case.pair == pair)
+            for quantity in QUANTITIES
+        }
+        for pair in pairs
+    }
+
+
+def exceeded(results: dict[Case, dict[str, float]], bounds: dict[str, dict[str, float]]) -> list[str]:
+    """One line for every error that has grown past its recorded bound."""
+    lines = []
+    for pair, found in worst(results).items():
+        for quantity in QUANTITIES:
+            allowed = bounds[pair][quantity.key] * _MARGIN + _MARGIN_BY_UNIT[quantity.unit]
+            # written so that nan counts as exceeded
+            if not found[quantity.key] <= allowed:
+                lines.append(f"{pair} {quantity.title}: {found[quantity.key]:.4g} {quantity.unit} > {allowed:.4g}")
+    return lines
+
+
+def load_bounds(path: Path = BOUNDS) -> dict[str, dict[str, float]]:
+    """Recorded worst errors per gear pair and quantity."""
+    return json.loads(path.read_text())
+
+
+def _record(results, path: Path) -> None:
+    rounded = {pair: {key: float(f"{value:.4g}") for key, value in row.items()} for pair, row in worst(results).items()}
+    path.write_text(json.dumps(rounded, indent=2) + "\n")
+
+
+def _arguments(argv) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=__doc__.split("\n\n")[0])
+    parser.add_argument("--cases", default=",".join(PAIRS), help="gear pairs, for example A,B (default: all)")
+    parser.add_argument("--quick", action="store_true", help="default model, plane stress only")
+    parser.add_argument("--detail", action="store_true", help="one table per quantity with every case")
+    parser.add_argument("--figures", metavar="DIR", type=Path, help="write the figures to this folder")
+    parser.add_argument("--record", action="store_true", help="record the worst errors as the new bounds")
+    arguments = parser.parse_args(argv)
+    if arguments.record and (arguments.quick or arguments.cases != ",".join(PAIRS)):
+        parser.error("--record needs all cases: leave out --quick and --cases")
+    return arguments
+
+
+def main(argv: Sequence[str] | None = None, models: Sequence[Model] = MODELS, bounds: Path = BOUNDS) -> int:
+    """Runs the benchmark; the first of the models is held to the bounds. Returns the exit code."""
+    arguments = _arguments(argv)
+    cases = select(arguments.cases.split(","), PLANES[:1] if arguments.quick else PLANES)
+    models = models[:1] if arguments.quick else models
+    results = compare(models, cases)
+    if arguments.detail:
+        print_detail(results)
+    print_summary(results)
+    if arguments.figures:
+        from .figures import write_figures
+
+        for path in write_figures(arguments.figures, results):
+            print(f"wrote {path}")
+    held = results[models[0].name]
+    if arguments.record:
+        _record(held, bounds)
+        print(f"recorded {bounds}")
+        return 0
+    lines = exceeded(held, load_bounds(bounds))
+    print(
+        "\n".join(["", "Worse than recorded:", *lines]) if lines else f"\nWithin the recorded bounds of {bounds.name}."
+    )
+    return 1 if lines else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

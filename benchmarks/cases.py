@@ -1,0 +1,147 @@
+"""The finite-element reference cases and the same cases as jaxgear inputs (see `reference/README.md`)."""
+
+import csv
+import functools
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import jaxgear as jg
+
+REFERENCE = Path(__file__).parent / "reference"
+PAIRS = ("A", "B", "C", "D")
+PLANES = ("stress", "strain")
+PAIR_COUNT = 4
+_ROOT_RADIUS = 0.25 / (1 - np.sin(np.deg2rad(20.0)))  # full rounding of the finite-element rack's clearance
+
+
+@dataclass(frozen=True)
+class Case:
+    """One operating point: gear pair, plane state, torque on the pinion [N m] and name of the relief."""
+
+    pair: str
+    plane: str
+    torque: float
+    relief: str
+
+    def __str__(self) -> str:
+        return f"{self.pair} {self.plane} {self.torque:g} N m {self.relief}"
+
+
+@dataclass(frozen=True)
+class Curves:
+    """One mesh cycle. Pair axis in the order of jaxgear: 0 leads the reference pair 1 by one base pitch.
+
+    Attributes:
+        transmission_error: [um], shape (positions,).
+        unloaded_transmission_error: [um], shape (positions,).
+        force: [N], shape (pairs, positions).
+        pressure: [MPa], shape (pairs, positions); nan where a tip corner carries load.
+    """
+
+    transmission_error: np.ndarray
+    unloaded_transmission_error: np.ndarray
+    force: np.ndarray
+    pressure: np.ndarray
+
+    @property
+    def share(self) -> np.ndarray:
+        """Share of every pair in the total force."""
+        return self.force / self.force.sum(axis=0)
+
+
+@functools.cache
+def inputs() -> dict:
+    """Gear data, torques and reliefs of every pair, as stored."""
+    return json.loads((REFERENCE / "cases.json").read_text())
+
+
+def select(pairs=PAIRS, planes=PLANES) -> list[Case]:
+    """All cases of the given pairs and planes.
+
+    Raises:
+        ValueError: for an unknown pair or plane, and when nothing is left.
+    """
+    unknown = sorted(set(pairs) - set(PAIRS)) + sorted(set(planes) - set(PLANES))
+    if unknown:
+        raise ValueError(f"unknown cases {', '.join(unknown)}: choose from {', '.join(PAIRS + PLANES)}")
+    found = [
+        Case(pair, plane, float(torque), relief)
+        for pair in pairs
+        for plane in planes
+        for torque in inputs()[pair]["torques"]
+        for relief in inputs()[pair]["reliefs"]
+    ]
+    if not found:
+        raise ValueError("no cases selected: nothing to compare")
+    return found
+
+
+def strong(tree):
+    """The tree with NumPy-typed leaves: Python floats are weakly typed in JAX, integers not, and both kinds retrace."""
+    return jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)), tree)
+
+
+@functools.cache
+def gear_pair(name: str) -> jg.GearPair:
+    """The gear pair of that name; every pair has the same pytree structure, so one compilation serves all."""
+    data = inputs()[name]
+    material = jg.Material(data["elastic_modulus"], data["poisson_ratio"])
+    gears = [
+        jg.Gear(
+            gear["teeth"],
+            data["module"],
+            face_width=data["face_width"],
+            bore_diameter=gear["bore_diameter"],
+            tip_diameter=gear["tip_diameter"],
+            root_radius=_ROOT_RADIUS,
+            material=material,
+        )
+        for gear in data["gears"]
+    ]
+    return strong(jg.GearPair(*gears))
+
+
+def reliefs(case: Case) -> tuple[jg.TipRelief, jg.TipRelief]:
+    """Tip reliefs of pinion and wheel; "none" is a relief of zero amount, so that it shares the compiled solution."""
+    data = inputs()[case.pair]["reliefs"][case.relief]
+    pair = gear_pair(case.pair)
+    path = jg.path_of_contact(pair)
+    lengths = {"long": (jg.long_relief_length(pair),) * 2, "pitch": (path.end, -path.start)}
+    pinion, wheel = lengths.get(data["length"], (data["length"],) * 2)
+    curve = jg.Polynomial(data["coefficients"])
+    return strong((jg.TipRelief(data["amount"], pinion, curve), jg.TipRelief(data["amount"], wheel, curve)))
+
+
+def reference(case: Case) -> Curves:
+    """Finite-element result of a case."""
+    return _table(case.pair, case.plane)[case.torque, case.relief]
+
+
+@functools.cache
+def _table(pair: str, plane: str) -> dict[tuple[float, str], Curves]:
+    with (REFERENCE / f"{pair}_{plane}.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    groups: dict[tuple[float, str], list] = {}
+    for row in rows:
+        groups.setdefault((float(row["torque_Nm"]), row["relief"]), []).append(row)
+
+    def column(group, name):
+        return np.array([float(row[name] or "nan") for row in group])
+
+    def pairs(group, name):
+        return np.stack([column(group, name.format(i)) for i in range(PAIR_COUNT)])
+
+    return {
+        key: Curves(
+            column(group, "te_um"),
+            column(group, "te_unloaded_um"),
+            pairs(group, "force_{}_N"),
+            pairs(group, "pressure_{}_MPa"),
+        )
+        for key, group in groups.items()
+    }

@@ -1,0 +1,112 @@
+"""The models under comparison: jaxgear's default, the usual published model, and the default with one ingredient less."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import jaxgear as jg
+
+from .cases import Case, Curves, gear_pair, reliefs, strong
+
+POSITIONS = 128  # those of the reference
+_APART = 1e6  # corner gap that keeps tip corners out of contact [um]
+
+
+@dataclass(frozen=True)
+class Model:
+    """A compliance model for each plane, with or without corner contact."""
+
+    name: str
+    compliance: Callable[[str], jg.Compliance]
+    corner_contact: bool = True
+
+
+def _default_with(body=None, contact=None) -> Callable[[str], jg.Compliance]:
+    def compliance(plane):
+        base = jg.default_compliance(plane)
+        return jg.Compliance(base.tooth, body or base.body, contact or base.contact, plane)
+
+    return compliance
+
+
+DEFAULT = Model("default", jg.default_compliance)
+LEGACY = Model("legacy", lambda plane: jg.legacy_compliance())
+MODELS = (
+    DEFAULT,
+    LEGACY,
+    Model("no coupling", _default_with(body=jg.ElasticRing(coupling=False))),
+    Model("no corner contact", jg.default_compliance, corner_contact=False),
+    Model("constant Hertz", _default_with(contact=jg.ConstantHertz())),
+    Model("Weber", _default_with(contact=jg.Weber())),
+)
+
+
+def run(model: Model, cases: Sequence[Case]) -> dict[Case, Curves]:
+    """Solves all cases with one model.
+
+    Raises:
+        RuntimeError: when a contact solution has not converged.
+    """
+    curves = {}
+    for case in cases:
+        mesh = _mesh(model, case.pair, case.plane)
+        cycle = eqx.tree_at(lambda c: c.mesh, _solved(mesh, case), mesh)
+        if not bool(jnp.all(cycle.converged)):
+            raise RuntimeError(
+                f"{model.name}, {case}: contact solution not converged, residual {cycle.residual.max():g}"
+            )
+        curves[case] = _curves(cycle)
+    return curves
+
+
+def _curves(cycle: jg.MeshCycle) -> Curves:
+    force = np.asarray(cycle.pair_force)
+    corner = (np.asarray(cycle.mesh.outside) > 0) & (force > 0)
+    pressure = np.where(corner, np.nan, np.asarray(cycle.contact_pressure[:, 0]))
+    te = np.asarray(cycle.transmission_error)
+    return Curves(te, np.asarray(cycle.unloaded_transmission_error), force, pressure)
+
+
+_prepare = eqx.filter_jit(jg.prepare)
+_solve = eqx.filter_jit(jg.solve)
+_PREPARED: dict[tuple[str, str, str], jg.Mesh] = {}
+
+
+def _mesh(model: Model, pair: str, plane: str) -> jg.Mesh:
+    plane = model.compliance(plane).plane  # the published model knows plane stress only
+    key = (model.name, pair, plane)
+    if key not in _PREPARED:
+        _PREPARED[key] = _with_model(_default_mesh(pair, plane), model)
+    return _PREPARED[key]
+
+
+def _default_mesh(pair: str, plane: str) -> jg.Mesh:
+    key = ("", pair, plane)
+    if key not in _PREPARED:
+        compliance, resolution = jg.default_compliance(plane), jg.Resolution(positions=POSITIONS)
+        _PREPARED[key] = strong(_prepare(gear_pair(pair), compliance=compliance, resolution=resolution))
+    return _PREPARED[key]
+
+
+def _with_model(mesh: jg.Mesh, model: Model) -> jg.Mesh:
+    """Swaps the compliance of a prepared mesh: cheaper than `prepare`, which would be compiled for every model."""
+    compliance, default = model.compliance(mesh.compliance.plane), mesh.compliance
+    if not model.corner_contact:
+        apart = jnp.where(mesh.outside > 0, _APART, mesh.corner_gap)
+        mesh = eqx.tree_at(lambda m: m.corner_gap, mesh, apart)
+    loads = mesh.pinion_load, mesh.wheel_load
+    if not eqx.tree_equal((compliance.tooth, compliance.body), (default.tooth, default.body)):
+        mesh = eqx.tree_at(lambda m: (m.structure, m.hub), mesh, (compliance.structure(*loads), compliance.hub(*loads)))
+    law = compliance.law(*loads, mesh.pair.face_width)
+    return strong(eqx.tree_at(lambda m: (m.compliance, m.law), mesh, (compliance, law)))
+
+
+def _solved(mesh: jg.Mesh, case: Case) -> jg.MeshCycle:
+    """`solve` reads the prepared compliance only, so one label for all models leaves one compilation per contact law."""
+    labelled = eqx.tree_at(lambda m: m.compliance, mesh, strong(jg.default_compliance()))
+    pinion, wheel = reliefs(case)
+    return _solve(labelled, jnp.asarray(np.float64(case.torque)), pinion=pinion, wheel=wheel)
