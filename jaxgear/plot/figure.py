@@ -1,0 +1,174 @@
+"""What all pictures share: report size, line styles, marks and files."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.transforms import ScaledTranslation
+
+from ..geometry import PathOfContact
+
+_INCH = 25.4  # mm
+_POINTS_PER_INCH = 72
+WIDTH, HEIGHT = 120.0, 75.0  # of a figure in a report [mm]
+_FONT = 9.0  # [pt]
+_DPI = 200
+
+# Okabe and Ito's colours, which stay apart for every kind of colour vision, without the yellow that pales on paper;
+# each comes with its own dashes for a black-and-white print.
+_COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_DASHES = (
+    "-",
+    (0, (6, 1.5)),
+    (0, (1.5, 1)),
+    (0, (7, 1.5, 1.5, 1.5)),
+    (0, (3, 1.5)),
+    (0, (9, 2, 2, 2, 2, 2)),
+    (0, (1, 2)),
+)
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+GREY = "#595959"
+ABOVE_MARKS = 16.0  # [pt]; clears a line of text that stands on the Axes
+
+_STYLE = {
+    "font.size": _FONT,
+    "axes.labelsize": _FONT,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.fontsize": _FONT - 1,
+    "mathtext.default": "regular",
+}
+
+
+def line_style(index: int) -> dict:
+    """Colour, dashes and width of the curve with this number."""
+    return {"color": _COLOURS[index % len(_COLOURS)], "linestyle": _DASHES[index % len(_DASHES)], "linewidth": 1.4}
+
+
+def marker_style(index: int) -> dict:
+    """`line_style` with a marker on every point."""
+    return {**line_style(index), "marker": _MARKERS[index % len(_MARKERS)], "markersize": 3.5}
+
+
+@contextmanager
+def report_axes(ax: Axes | None, *, columns: int = 1, width: float = WIDTH, height: float = HEIGHT) -> Iterator:
+    """The given Axes as they are, or new ones in report style; the style is off again after the `with` block.
+
+    Args:
+        ax: Axes, an array of them for several columns, or None.
+        columns: number of panels side by side with a common ordinate; several give an array of Axes.
+        width, height: of a new figure [mm].
+    """
+    if ax is not None:
+        yield ax
+        return
+    with matplotlib.rc_context(_STYLE):
+        figure = plt.figure(figsize=(width / _INCH, height / _INCH), layout="constrained")
+        panels = figure.subplots(1, columns, sharey=True, squeeze=False)[0]
+        for panel in panels:
+            # ticks are made when the figure is drawn, long after the style has gone: they need their own sizes
+            panel.tick_params(labelsize=_FONT, width=0.6, length=3)
+            panel.grid(True, color="#D9D9D9", linewidth=0.5)
+        yield panels if columns > 1 else panels[0]
+
+
+def legend_above(ax: Axes, *, distance: float = 4.0) -> None:
+    """Legend over the Axes, where it covers no data, in as many columns as fit.
+
+    Args:
+        ax: Axes with labelled artists.
+        distance: between Axes and legend [pt]; `ABOVE_MARKS` where letters stand in between.
+    """
+    handles, labels = ax.get_legend_handles_labels()
+    if not handles:
+        return
+    room = laid_out_size(ax)[0]
+    lift = ScaledTranslation(0, distance / _POINTS_PER_INCH, _root(ax).dpi_scale_trans)
+    for columns in range(len(labels), 0, -1):
+        legend = ax.legend(
+            handles,
+            labels,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            bbox_transform=ax.transAxes + lift,
+            ncols=columns,
+            borderaxespad=0.0,
+            borderpad=0.1,
+            frameon=False,
+            handlelength=2.6,
+            columnspacing=1.5,
+        )
+        if _in_points(ax, legend.get_window_extent().width) <= room:
+            return
+
+
+def laid_out_size(ax: Axes) -> tuple[float, float]:
+    """Width and height that the Axes have when the figure is drawn [pt]."""
+    _root(ax).draw_without_rendering()
+    box = ax.get_window_extent()
+    return _in_points(ax, box.width), _in_points(ax, box.height)
+
+
+def _in_points(ax: Axes, pixels: float) -> float:
+    return pixels * _POINTS_PER_INCH / _root(ax).dpi
+
+
+def _root(ax: Axes) -> Any:
+    """The figure of the Axes, also if they stand in a subfigure."""
+    canvas: Any = ax.figure.canvas
+    return canvas.figure
+
+
+def mark_path(ax: Axes, contact: PathOfContact, *, zorder: float = 0.5) -> None:
+    """Thin lines at the points A to E of the path of contact, with their letters above the Axes."""
+    outer = {"A": contact.start, "B": contact.inner_single, "D": contact.outer_single, "E": contact.end}
+    marks = sorted([(0.0, "C"), *((float(position), letter) for letter, position in outer.items())])
+    close = 0.03 * (marks[-1][0] - marks[0][0])
+    previous, letters = marks[0]
+    for position, letter in marks[1:]:
+        if position - previous < close:
+            letters += letter
+            continue
+        text_above(ax, previous, letters)
+        previous, letters = position, letter
+    text_above(ax, previous, letters)
+    for position, _ in marks:
+        ax.axvline(position, color=GREY, linewidth=0.6, zorder=zorder)
+
+
+def text_above(ax: Axes, x: float, text: str) -> None:
+    """Grey text that stands on the upper edge of the Axes, centred at x."""
+    ax.annotate(
+        text,
+        (x, 1.0),
+        xycoords=ax.get_xaxis_transform(),
+        xytext=(0, 1),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        color=GREY,
+    )
+
+
+def save(fig: Figure, path: str | Path) -> Path:
+    """Writes a figure as PNG at 200 dpi, cut to its contents, and closes it.
+
+    Args:
+        fig: the figure, `ax.figure` of the Axes that a plot function returned.
+        path: file to write; missing folders are made.
+
+    Returns:
+        the path.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fig.savefig(path, format="png", dpi=_DPI, bbox_inches="tight", pad_inches=0.03, facecolor="white")
+    plt.close(fig)
+    return path

@@ -1,0 +1,257 @@
+"""Pictures show what the cycle holds, name their units, and leave matplotlib as they found it."""
+
+import subprocess
+import sys
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import matplotlib
+import numpy as np
+import pytest
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+
+import jaxgear as jg
+from jaxgear import plot
+from jaxgear.plot.figure import line_style
+
+TORQUE, AMOUNT, LENGTH = 50.0, 8.0, 5.0
+TORQUES = np.array([10.0, 30.0, 50.0, 80.0])
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    pinion = jg.Gear(teeth=19, module=3.0, face_width=20.0)
+    wheel = jg.Gear(teeth=48, module=3.0, face_width=18.0)
+    resolution = jg.Resolution(positions=24, slices=3)
+    return eqx.filter_jit(lambda pair: jg.prepare(pair, resolution=resolution))(jg.GearPair(pinion, wheel))
+
+
+@pytest.fixture(scope="module")
+def designs():
+    """On the pinion and on the wheel; the relieved pinion is also crowned, so that its slices differ."""
+    relief = jg.TipRelief(AMOUNT, LENGTH)
+    return {"unmodified": (None, None), "long relief": (relief + jg.LeadCrowning(4.0), relief)}
+
+
+@pytest.fixture(scope="module")
+def cycles(mesh, designs):
+    solve = eqx.filter_jit(jg.solve)
+    return {name: solve(mesh, TORQUE, pinion=pinion, wheel=wheel) for name, (pinion, wheel) in designs.items()}
+
+
+@pytest.fixture(scope="module")
+def curves(mesh, designs):
+    """Transmission error over the torque, shape (torques, positions), by design."""
+    at = eqx.filter_jit(lambda mesh, torque, pinion, wheel: jg.solve(mesh, torque, pinion=pinion, wheel=wheel))
+    every = jax.vmap(lambda torque, design: at(mesh, torque, *design).transmission_error, (0, None))
+    return {name: every(jnp.asarray(TORQUES), design) for name, design in designs.items()}
+
+
+@pytest.fixture(autouse=True)
+def clean_figures():
+    before = dict(matplotlib.rcParams)
+    yield
+    plt.close("all")
+    assert dict(matplotlib.rcParams) == before
+
+
+@pytest.fixture
+def draw(mesh, designs, cycles, curves):
+    """Every picture by name, as a function of the Axes to draw into."""
+    ppte = {name: jg.peak_to_peak(curve) for name, curve in curves.items()}
+    return {
+        "transmission_error": lambda ax=None: plot.transmission_error(cycles, ax),
+        "load_sharing": lambda ax=None: plot.load_sharing(cycles, ax),
+        "pressure": lambda ax=None: plot.pressure(cycles, ax),
+        "pressure_map": lambda ax=None: plot.pressure_map(cycles["long relief"], ax),
+        "ppte_over_torque": lambda ax=None: plot.ppte_over_torque(TORQUES, ppte, ax, design_torque=TORQUE),
+        "harris_map": lambda ax=None: plot.harris_map(mesh.phase, TORQUES, curves["long relief"], ax),
+        "k_chart": lambda ax=None: plot.k_chart(mesh, designs, ax),
+    }
+
+
+UNITS = {
+    "transmission_error": ("[base pitches]", "[µm]"),
+    "load_sharing": ("[mm]", "[-]"),
+    "pressure": ("[mm]", "[MPa]"),
+    "pressure_map": ("[mm]", "[mm]"),
+    "ppte_over_torque": ("[N m]", "[µm]"),
+    "harris_map": ("[base pitches]", "[µm]"),
+    "k_chart": ("[deg]", "[µm]"),
+}
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_axes_name_their_units(draw, name):
+    first = np.atleast_1d(draw[name]())[0]
+    assert first.get_xlabel().endswith(UNITS[name][0])
+    assert first.get_ylabel().endswith(UNITS[name][1])
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_a_given_ax_is_used_and_its_figure_gains_no_other(draw, name):
+    figure, ax = plt.subplots(1, 2)
+    given = ax if name == "k_chart" else ax[0]
+    returned = draw[name](given)
+    assert np.all(np.atleast_1d(returned) == np.atleast_1d(given))
+    assert plt.get_fignums() == [figure.number]
+
+
+@pytest.mark.parametrize("name", ["transmission_error", "load_sharing", "pressure", "ppte_over_torque"])
+def test_legend_and_marks_cover_no_data(draw, name):
+    ax = draw[name]()
+    ax.figure.draw_without_rendering()
+    frame, legend = ax.get_window_extent(), ax.get_legend().get_window_extent()
+    marks = [text.get_window_extent() for text in ax.texts]
+    assert legend.y0 >= frame.y1
+    assert all(mark.y0 >= frame.y1 and mark.y1 <= legend.y0 + 1 for mark in marks)
+    assert legend.y1 <= ax.figure.bbox.y1 + 1 and legend.x1 <= ax.figure.bbox.x1 + 1
+
+
+def test_seven_designs_differ_in_colour_and_without():
+    styles = [line_style(index) for index in range(7)]
+    assert len({style["color"] for style in styles}) == len({style["linestyle"] for style in styles}) == 7
+
+
+def test_transmission_error_repeats_one_base_pitch(cycles):
+    ax = plot.transmission_error(cycles)
+    for line, cycle in zip(ax.lines, cycles.values()):
+        x, y = line.get_data()
+        curve = np.asarray(cycle.transmission_error)
+        np.testing.assert_allclose(np.diff(x), 1 / curve.size, rtol=1e-9)
+        np.testing.assert_array_equal(y, np.concatenate([curve, curve, curve[:1]]))
+        assert (x[0], x[-1]) == (0.0, 2.0)
+        assert f"{np.ptp(curve):.2f} µm" in line.get_label()
+
+
+def test_shares_of_following_pairs_sum_to_one(cycles, mesh):
+    """One pair's history, cut into base pitches and laid over itself, is the whole load."""
+    ax = plot.load_sharing(cycles)
+    positions = mesh.resolution.positions
+    for line in ax.lines[: len(cycles)]:
+        path, share = line.get_data()
+        np.testing.assert_allclose(np.diff(path), float(mesh.path_of_contact.base_pitch) / positions, rtol=1e-9)
+        np.testing.assert_allclose(share.reshape(-1, positions).sum(axis=0), 1.0, rtol=1e-9)
+        # the pair carries everything at the pitch point, which lies in single contact, and nothing far outside
+        assert share[np.argmin(np.abs(path))] == pytest.approx(1.0)
+        assert share[0] == share[-1] == 0.0
+
+
+def test_path_marks_stand_at_a_to_e(cycles, mesh):
+    ax = plot.load_sharing(cycles)
+    contact = mesh.path_of_contact
+    expected = {
+        "A": contact.start,
+        "B": contact.inner_single,
+        "C": 0.0,
+        "D": contact.outer_single,
+        "E": contact.end,
+    }
+    marked = {text.get_text(): text.xy[0] for text in ax.texts}
+    assert marked == {letter: pytest.approx(float(position)) for letter, position in expected.items()}
+    low, high = ax.get_xlim()
+    assert low < min(marked.values()) and high > max(marked.values())
+
+
+def test_flank_pressure_stays_on_the_path_and_corner_contact_apart(cycles, mesh):
+    ax = plot.pressure(cycles)
+    contact = mesh.path_of_contact
+    for line, cycle in zip(ax.lines, cycles.values()):
+        path, drawn = line.get_data()
+        on_path = (path >= float(contact.start)) & (path <= float(contact.end))
+        assert np.isfinite(drawn[on_path]).all() and np.isnan(drawn[~on_path]).all()
+        assert np.nanmax(drawn) == pytest.approx(float(jnp.max(cycle.contact_pressure)))
+    # an unmodified pair meets with its tip corners under load, a well relieved one does not
+    bare, relieved = (line.get_label() for line in ax.lines[:2])
+    highest = float(jnp.max(cycles["unmodified"].corner_pressure))
+    assert highest > 1000
+    assert bare == f"unmodified (corners {round(highest, -1):.0f} MPa)"
+    assert relieved == "long relief"
+    step = float(contact.base_pitch) / mesh.resolution.positions
+    corners = np.concatenate([path.vertices for path in ax.collections[0].get_paths()])[:, 0]
+    assert (
+        corners.size and ((corners < float(contact.start) + step / 2) | (corners > float(contact.end) - step / 2)).all()
+    )
+
+
+def test_pressure_map_has_one_row_per_slice(cycles, mesh):
+    cycle = cycles["long relief"]
+    ax = plot.pressure_map(cycle)
+    drawn = ax.collections[0].get_array()
+    positions = mesh.resolution.pairs * mesh.resolution.positions
+    assert drawn.shape == (mesh.resolution.slices, positions)
+    np.testing.assert_allclose(drawn.max(axis=1), jnp.max(cycle.contact_pressure, axis=(0, 2)), rtol=1e-12)
+    assert drawn[1].max() > drawn[0].max()  # crowning loads the middle of the face
+    assert ax.get_ylim() == pytest.approx((-9.0, 9.0))
+
+
+def test_ppte_over_torque_marks_the_design_torque(curves):
+    ppte = {name: jg.peak_to_peak(curve) for name, curve in curves.items()}
+    ax = plot.ppte_over_torque(TORQUES, ppte, design_torque=TORQUE)
+    for line, curve in zip(ax.lines, ppte.values()):
+        np.testing.assert_array_equal(line.get_xdata(), TORQUES)
+        np.testing.assert_array_equal(line.get_ydata(), curve)
+    assert [text.get_text() for text in ax.texts] == ["design torque 50 N m"]
+    assert ax.texts[0].xy[0] == TORQUE
+
+
+def test_harris_map_labels_every_curve_even_if_they_meet():
+    phase, torques = np.arange(8) / 8, [60.0, 5.0, 6.0, 7.0]
+    te = np.array([9.0, 1.00, 1.01, 1.02])[:, None] + 0.1 * np.sin(2 * np.pi * phase)
+    ax = plot.harris_map(phase, torques, te)
+    ax.figure.draw_without_rendering()
+    assert [text.get_text() for text in ax.texts] == ["5 N m", "6 N m", "7 N m", "60 N m"]
+    boxes = [text.get_window_extent() for text in ax.texts]
+    assert all(lower.y0 < upper.y0 and not lower.overlaps(upper) for lower, upper in zip(boxes, boxes[1:]))
+    assert all(box.x0 >= ax.get_window_extent().x1 for box in boxes)
+    np.testing.assert_array_equal(ax.lines[-1].get_ydata()[:8], te[0])
+
+
+def test_k_chart_shows_the_relief_from_its_start_to_the_tip(mesh, designs):
+    panels = plot.k_chart(mesh, designs)
+    contact, pair = mesh.path_of_contact, mesh.pair
+    starts = contact.pinion_roll_length(contact.start), contact.wheel_roll_length(contact.end)
+    for panel, gear, start in zip(panels, (pair.pinion, pair.wheel), starts):
+        nominal, relieved = panel.lines
+        angle, removed = relieved.get_data()
+        assert angle[0] == pytest.approx(float(jg.roll_angle(gear, start)))
+        assert angle[-1] == pytest.approx(float(jg.roll_angle(gear, gear.tip_roll_length)))
+        np.testing.assert_array_equal(nominal.get_ydata(), 0.0)
+        # mid-face, where the crowning of the pinion removes nothing
+        assert removed[-1] == pytest.approx(AMOUNT) and removed[0] == 0.0
+        begin = float(jg.roll_angle(gear, gear.tip_roll_length - LENGTH))
+        assert (removed[angle < begin] == 0).all() and (np.diff(removed[angle > begin]) > 0).all()
+        # removed material goes down, and the upper axis ends at the tip diameter
+        low, high = panel.get_ylim()
+        assert low > AMOUNT and high < 0
+        panel.figure.draw_without_rendering()
+        diameters = panel.child_axes[0].get_xlim()
+        assert diameters[1] == pytest.approx(2 * float(gear.tip_radius))
+        assert diameters[0] == pytest.approx(float(jg.diameter(gear, start)))
+
+
+def test_save_writes_a_report_sized_png_and_closes_the_figure(cycles, tmp_path):
+    figure = plot.transmission_error(cycles).figure
+    path = plot.save(figure, tmp_path / "new" / "te.png")
+    height, width, _ = plt.imread(path).shape
+    assert (width, height) == (pytest.approx(120 / 25.4 * 200, rel=0.05), pytest.approx(75 / 25.4 * 200, rel=0.05))
+    assert not plt.fignum_exists(figure.number)
+
+
+def test_imports_leave_matplotlib_alone():
+    """The library needs no matplotlib until something is drawn, and drawing changes no setting of its user."""
+    program = """
+import sys
+import jaxgear
+assert not any(name.split(".")[0] == "matplotlib" for name in sys.modules)
+import matplotlib
+before = dict.copy(matplotlib.rcParams)
+import jaxgear.plot
+changed = [key for key in before if dict.__getitem__(matplotlib.rcParams, key) is not before[key]]
+assert not changed, changed
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=300)
