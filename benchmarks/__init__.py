@@ -1,1 +1,1 @@
-"""Benchmarks: how accurate jaxgear is against finite elements, and how fast it is. Each runs with `python -m benchmarks.<name>`."""
+"""How accurate jaxgear is against finite elements. Run with `python -m benchmarks.accuracy`."""

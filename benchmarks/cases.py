@@ -106,11 +106,18 @@ def gear_pair(name: str) -> jg.GearPair:
     return strong(jg.GearPair(*gears))
 
 
+@functools.cache
+def path_of_contact(name: str) -> jg.PathOfContact:
+    """Path of contact of the pair of that name, as Python floats."""
+    return jax.tree.map(float, jg.path_of_contact(gear_pair(name)))
+
+
+@functools.cache
 def reliefs(case: Case) -> tuple[jg.TipRelief, jg.TipRelief]:
     """Tip reliefs of pinion and wheel; "none" is a relief of zero amount, so that it shares the compiled solution."""
     data = inputs()[case.pair]["reliefs"][case.relief]
     pair = gear_pair(case.pair)
-    path = jg.path_of_contact(pair)
+    path = path_of_contact(case.pair)
     lengths = {"long": (jg.long_relief_length(pair),) * 2, "pitch": (path.end, -path.start)}
     pinion, wheel = lengths.get(data["length"], (data["length"],) * 2)
     curve = jg.Polynomial(data["coefficients"])
