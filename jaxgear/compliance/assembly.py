@@ -1,10 +1,12 @@
 """Composition of tooth, body and contact models into the compliance of a mesh."""
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .beam import AbstractTooth, Beam
 from .body import AbstractBody, ElasticRing, Sainsot
+from .edge import EdgeLaw, edge
 from .hertz import AbstractContact, AbstractLaw, ConstantHertz, DepthReferenced, contact_geometry
 from .plane import Plane, check_plane
 from .toothload import ToothLoad
@@ -18,12 +20,14 @@ class Compliance(eqx.Module):
         body: gear body with hub wind-up and coupling of neighbouring teeth.
         contact: approach of the flanks.
         plane: "stress" for narrow faces, "strain" for wide ones (face width above about five tooth heights; Cornell 1981).
+        edge_softening: soften the contact where a tip corner cuts it off (see `edge`).
     """
 
     tooth: AbstractTooth
     body: AbstractBody
     contact: AbstractContact
     plane: Plane = eqx.field(static=True)
+    edge_softening: bool = eqx.field(static=True, default=True)
 
     def __check_init__(self):
         check_plane(self.plane)
@@ -40,9 +44,14 @@ class Compliance(eqx.Module):
         """Wind-up of both gear bodies, in um per N/mm of total line load."""
         return self.body.hub(pinion.outline) + self.body.hub(wheel.outline)
 
-    def law(self, pinion: ToothLoad, wheel: ToothLoad, face_width) -> AbstractLaw:
-        """The prepared contact law."""
-        return self.contact.prepare(contact_geometry(pinion, wheel, self.plane, face_width))
+    def law(self, pinion: ToothLoad, wheel: ToothLoad, outside, face_width) -> AbstractLaw:
+        """The prepared contact law, for contacts at a distance `outside` the path of contact [mm]."""
+        geometry = contact_geometry(pinion, wheel, self.plane, face_width)
+        law = self.contact.prepare(geometry)
+        if not self.edge_softening:
+            return law
+        truncation = 4 / jnp.pi * sum(1 / side.modulus for side in geometry.sides)
+        return EdgeLaw(law, geometry.width_factor, truncation, edge(pinion, wheel, outside, geometry))
 
 
 def default_compliance(plane: Plane = "stress", *, hub_windup: bool = True) -> Compliance:
@@ -60,4 +69,4 @@ def legacy_compliance() -> Compliance:
 
     It overstates the variation of the transmission error by 20 to 120 % against finite elements.
     """
-    return Compliance(Beam(), Sainsot(), ConstantHertz(), "stress")
+    return Compliance(Beam(), Sainsot(), ConstantHertz(), "stress", edge_softening=False)

@@ -21,7 +21,7 @@ Field = Float[Array, "pairs 1 positions"]
 Real = Float[Array, "..."]
 
 # Line load that keeps the logarithm finite at separation [N/mm]: its effect at 1 N/mm is below 1e-6 of the deflection.
-_LOAD_FLOOR = 1e-6
+LOAD_FLOOR = 1e-6
 
 
 class ContactSide(eqx.Module):
@@ -116,7 +116,7 @@ class LogarithmicLaw(AbstractLaw):
     slope: Field
 
     def deflection(self, line_load: Real) -> Real:
-        return line_load * (self.constant - self.slope * jnp.log(line_load + _LOAD_FLOOR))
+        return line_load * (self.constant - self.slope * jnp.log(line_load + LOAD_FLOOR))
 
 
 class PowerLaw(AbstractLaw):
@@ -126,7 +126,7 @@ class PowerLaw(AbstractLaw):
     exponent: Field
 
     def deflection(self, line_load: Real) -> Real:
-        return self.factor * line_load * (line_load + _LOAD_FLOOR) ** (self.exponent - 1)
+        return self.factor * line_load * (line_load + LOAD_FLOOR) ** (self.exponent - 1)
 
 
 class DepthLaw(AbstractLaw):
@@ -138,7 +138,7 @@ class DepthLaw(AbstractLaw):
     width_factor: Field
 
     def deflection(self, line_load: Real) -> Real:
-        squared = self.width_factor * (line_load + _LOAD_FLOOR)
+        squared = self.width_factor * (line_load + LOAD_FLOOR)
         log_width = 0.5 * jnp.log(squared)
         total = jnp.zeros_like(line_load)
         for compliance, depth, poisson in zip(self.compliance, self.depth, self.poisson):

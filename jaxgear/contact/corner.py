@@ -31,7 +31,7 @@ def corner_gap(
     """Gap and contact point of a tip corner outside the path of contact.
 
     Args:
-        x: distance outside the path along the line of action [mm]; at x <= 0 the gap is zero.
+        x: distance outside the path along the line of action [mm], not negative.
         tip_roll_length: roll length of the corner on its gear [mm].
         tip_base_radius: base radius of that gear [mm].
         mate_roll_length: roll length of the mate at the end of the path [mm].
@@ -40,8 +40,7 @@ def corner_gap(
     Returns:
         the gap [um] and the roll length of the touched point of the mate [mm].
     """
-    outside = jnp.maximum(x, 0.0)
-    angle = outside / tip_base_radius
+    angle = x / tip_base_radius
     sine, versine = jnp.sin(angle), 2 * jnp.sin(0.5 * angle) ** 2
     du = versine * tip_roll_length - sine * tip_base_radius
     dv = sine * tip_roll_length + versine * tip_base_radius
@@ -53,5 +52,5 @@ def corner_gap(
     growth = (squared - mate_roll_length**2) / (tangent + mate_roll_length)
     cross = mate_base_radius * (du - growth) - dv * tangent
     dot = (mate_roll_length + du) * tangent + (mate_base_radius + dv) * mate_base_radius
-    gap = outside + growth + mate_base_radius * jnp.arctan2(cross, dot)
+    gap = x + growth + mate_base_radius * jnp.arctan2(cross, dot)
     return 1e3 * gap, tangent

@@ -49,8 +49,8 @@ class MeshCycle(eqx.Module):
 
     @property
     def pair_force(self) -> Float[Array, "pairs positions"]:
-        """Force on every pair [N]."""
-        return jnp.sum(self.line_load * self.mesh.slice_width[None, :, None], axis=1)
+        """Force on the line of action that every pair contributes [N]; the pairs of a position sum to `force`."""
+        return self.mesh.lever * jnp.sum(self.line_load * self.mesh.slice_width[None, :, None], axis=1)
 
     @property
     def contact_pressure(self) -> Load:
@@ -106,11 +106,11 @@ def solve(
     removed = (pinion or NoModification())(mesh.pinion_flank) + (wheel or NoModification())(mesh.wheel_flank)
     gap = jnp.broadcast_to(mesh.corner_gap[:, None] + removed, shape)
     force = 1e3 * torque / mesh.pair.pinion.base_radius
-    problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.slice_width, force)
+    problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, force)
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps)
     windup = mesh.hub * force / mesh.pair.face_width
     contact_stiffness = tangent_stiffness(problem, solution)
-    unloaded = jnp.min(gap, axis=(0, 1))
+    unloaded = jnp.min(gap / mesh.lever[:, None], axis=(0, 1))
     tolerance = _ROUNDING_STEPS * jnp.finfo(gap.dtype).eps
     return MeshCycle(
         mesh=mesh,

@@ -58,6 +58,8 @@ class Mesh(eqx.Module):
         pinion_load, wheel_load: load lines at the contact points.
         outside: distance of every pair outside the path of contact [mm], zero on it.
         corner_gap: gap of the unmodified flanks there [um].
+        lever: what a pair closes per unit of transmission error; 1 on the path of contact, less beyond it, because the
+            corner's gap opens while the gears turn on.
         structure: compliance of both gears, (pairs, pairs, positions) [um per N/mm].
         law: prepared contact law.
         hub: common wind-up of the gear bodies [um per N/mm].
@@ -75,6 +77,7 @@ class Mesh(eqx.Module):
     wheel_load: ToothLoad
     outside: Field
     corner_gap: Field
+    lever: Field
     structure: Float[Array, "pairs pairs positions"]
     law: AbstractLaw
     hub: Scalar
@@ -129,7 +132,7 @@ def prepare(pair: GearPair, *, compliance: Compliance | None = None, resolution:
     phase = jnp.arange(resolution.positions, dtype=dtype) / resolution.positions
     offset = resolution.leading - jnp.arange(resolution.pairs, dtype=dtype)
     path = (phase[None] + offset[:, None]) * contact.base_pitch
-    pinion_rho, wheel_rho, gap, outside = _contact_points(pair, contact, path)
+    pinion_rho, wheel_rho, gap, lever, outside = _contact_points(pair, contact, path)
     pinion, wheel = tooth_load(outline(pair.pinion), pinion_rho), tooth_load(outline(pair.wheel), wheel_rho)
     slices, width = resolution.slices, pair.face_width
     centre = (jnp.arange(slices, dtype=dtype) + 0.5) / slices - 0.5
@@ -144,40 +147,53 @@ def prepare(pair: GearPair, *, compliance: Compliance | None = None, resolution:
         wheel_load=wheel,
         outside=outside,
         corner_gap=gap,
+        lever=lever,
         structure=compliance.structure(pinion, wheel),
-        law=compliance.law(pinion, wheel, width),
+        law=compliance.law(pinion, wheel, outside, width),
         hub=compliance.hub(pinion, wheel),
         face_coordinate=centre * width,
         slice_width=jnp.full((slices,), 1.0 / slices, dtype) * width,
     )
 
 
-def _contact_points(pair: GearPair, contact: PathOfContact, path: Field) -> tuple[Field, Field, Field, Field]:
-    """Roll lengths of pinion and wheel at the contact, corner gap [um] and distance outside the path, per pair."""
+def _contact_points(pair: GearPair, contact: PathOfContact, path: Field) -> tuple[Field, Field, Field, Field, Field]:
+    """Roll lengths of pinion and wheel at the contact, corner gap [um], lever and distance outside the path, per pair.
+
+    `phase` is the mean position of both gears: under a transmission error d the pinion leads it by d/2 and the wheel lags
+    by d/2, so a corner is d/2 farther out than its nominal position and its gap grows by half its slope times d.
+    """
     pinion_base, wheel_base = contact.pinion_base_radius, contact.wheel_base_radius
     before, after = contact.start - path, path - contact.end
     on_path = jnp.clip(path, contact.start, contact.end)
     approach = contact.pinion_roll_length(contact.start), pinion_base
     recess = contact.wheel_roll_length(contact.end), wheel_base
-    gap_before, pinion_rho = _corner(before, pair.wheel.tip_roll_length, wheel_base, *approach, contact.base_pitch)
-    gap_after, wheel_rho = _corner(after, pair.pinion.tip_roll_length, pinion_base, *recess, contact.base_pitch)
+    reach = REACH * contact.base_pitch
+    gap_before, slope_before, pinion_rho = _corner(before, reach, pair.wheel.tip_roll_length, wheel_base, *approach)
+    gap_after, slope_after, wheel_rho = _corner(after, reach, pair.pinion.tip_roll_length, pinion_base, *recess)
     return (
         jnp.where(before > 0, pinion_rho, contact.pinion_roll_length(on_path)),
         jnp.where(after > 0, wheel_rho, contact.wheel_roll_length(on_path)),
         gap_before + gap_after,
+        1 - 0.5e-3 * (slope_before + slope_after),
         jnp.maximum(jnp.maximum(before, after), 0.0),
     )
 
 
-def _corner(x, tip_rho, tip_base, mate_rho, mate_base, base_pitch):
-    """Corner gap that goes on along its tangent beyond `REACH`, so that far pairs stay finite and apart."""
-    reach = REACH * base_pitch
-    near = jnp.minimum(x, reach)
-    gap, rho = corner_gap(near, tip_rho, tip_base, mate_rho, mate_base)
-    end, slope = jax.jvp(
-        lambda t: corner_gap(t, tip_rho, tip_base, mate_rho, mate_base)[0], (reach,), (jnp.ones_like(reach),)
+def _corner(x, reach, tip_rho, tip_base, mate_rho, mate_base):
+    """Corner gap [um], its slope [um/mm] and the mate's roll length [mm].
+
+    Beyond `reach` the gap goes on along its tangent, so that far pairs stay finite and apart.
+    """
+    near = jnp.clip(x, 0.0, reach)
+    (gap, rho), (slope, _) = jax.jvp(
+        lambda t: corner_gap(t, tip_rho, tip_base, mate_rho, mate_base), (near,), (jnp.ones_like(near),)
     )
-    return jnp.where(x > reach, end + slope * (x - near), gap), rho
+    outside = x > 0
+    return (
+        jnp.where(outside, gap + slope * (jnp.maximum(x, reach) - reach), 0.0),
+        jnp.where(outside, slope, 0.0),
+        rho,
+    )
 
 
 def _check_cover(contact: PathOfContact, resolution: Resolution) -> None:

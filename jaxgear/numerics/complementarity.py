@@ -2,8 +2,8 @@
 
 For every position the unknowns are the line loads q[p, s] >= 0 of P springs in S slices and the common approach d:
 
-    y[p, s] = sum_j C[p, j] q[j, s] + h_p(q[p, s]) + gap[p, s] - d >= 0,    q >= 0,    q y = 0,
-    sum_{p, s} w[s] q[p, s] = load.
+    y[p, s] = sum_j C[p, j] q[j, s] + h_p(q[p, s]) + gap[p, s] - lever[p] d >= 0,    q >= 0,    q y = 0,
+    sum_{p, s} lever[p] w[s] q[p, s] = load.
 
 C is symmetric positive semi-definite and h increases, so this is the optimality condition of a strictly convex
 programme: the solution exists and is unique. It is found by Newton's method on the active set; slices meet only in d,
@@ -31,6 +31,7 @@ class ContactProblem(eqx.Module):
         compliance: C, shape (pairs, pairs, positions).
         law: Module with `deflection(q)`; every leaf has shape (pairs, 1, positions).
         gap: shape (pairs, slices, positions).
+        lever: what a spring closes per unit of common approach, positive, shape (pairs, positions).
         weight: width of each slice, shape (slices,).
         load: total load, scalar.
     """
@@ -38,6 +39,7 @@ class ContactProblem(eqx.Module):
     compliance: Float[Array, "pairs pairs positions"]
     law: eqx.Module
     gap: Float[Array, "pairs slices positions"]
+    lever: Float[Array, "pairs positions"]
     weight: Float[Array, " slices"]
     load: Float[Array, ""]
 
@@ -48,7 +50,7 @@ class ContactSolution(eqx.Module):
     Attributes:
         line_load: q, shape (pairs, slices, positions).
         approach: d, shape (positions,).
-        opening: y without the spring's own deflection, C q + gap - d, shape (pairs, slices, positions): the remaining gap
+        opening: y without the spring's own deflection, C q + gap - lever d, shape (pairs, slices, positions): the remaining gap
             where it is positive, minus the contact deflection h(q) where the spring is loaded.
         residual: largest violation of any condition, relative to the approach and to the load, shape (positions,).
     """
@@ -70,17 +72,20 @@ def solve_contact(problem: ContactProblem, *, steps: int) -> ContactSolution:
         the solution; it is differentiable with respect to every leaf of `problem`. Where a spring is just touching the
         derivative is one-sided.
     """
+    # a gap common to all springs only shifts the approach: without it light loads lose no digits to wide gaps
+    common = jax.lax.stop_gradient(jnp.min(problem.gap / problem.lever[:, None], axis=(0, 1)))
+    problem = eqx.tree_at(lambda p: p.gap, problem, problem.gap - (problem.lever * common[None])[:, None])
     line_load, approach = _solve(steps, problem)
     state = _evaluate(problem, list(line_load), approach)
     opening = jnp.stack([y - h for y, h in zip(state.mismatch, state.deflection)])
-    return ContactSolution(line_load, approach, opening, _residual(problem, state))
+    return ContactSolution(line_load, approach + common, opening, _residual(problem, state))
 
 
 def tangent_stiffness(problem: ContactProblem, solution: ContactSolution) -> Float[Array, " positions"]:
     """d load / d approach at the solution, for the springs in contact."""
     state = _evaluate(problem, list(solution.line_load), solution.approach)
-    ones = [jnp.asarray(mask, slope.dtype) for mask, slope in zip(state.active, state.slope)]
-    unit, _ = _eliminate(problem, state, ones, ones)
+    levers = _levers(problem, state)
+    unit, _ = _eliminate(problem, state, levers, levers)
     return _total(problem, unit)
 
 
@@ -125,11 +130,12 @@ def _start(problem: ContactProblem) -> _State:
     load = [jnp.broadcast_to(problem.load / jnp.sum(problem.weight), gap.shape) for gap in problem.gap]
     state = _evaluate(problem, load, jnp.zeros(problem.gap.shape[-1], problem.gap.dtype))
     alone = [
-        jnp.max(gap + h + problem.compliance[i, i][None] * q, axis=0)
+        jnp.max(gap + h + problem.compliance[i, i][None] * q / problem.lever[i][None], axis=0) / problem.lever[i]
         for i, (gap, h, q) in enumerate(zip(problem.gap, state.deflection, load))
     ]
-    bound = jnp.min(jnp.stack(alone), axis=0)[None]
-    return state._replace(active=_positive([bound - gap for gap in problem.gap]))
+    bound = jnp.min(jnp.stack(alone), axis=0)
+    signal = [(lever * bound)[None] - gap for lever, gap in zip(problem.lever, problem.gap)]
+    return state._replace(active=_positive(signal, bound))
 
 
 def _newton(problem: ContactProblem, state: _State) -> _State:
@@ -143,19 +149,25 @@ def _evaluate(problem: ContactProblem, load: Rows, approach) -> _State:
     deflection, slope = jax.jvp(lambda rows: _deflection(problem, rows), (load,), ([jnp.ones_like(q) for q in load],))
     mismatch = _mismatch(problem, load, deflection, approach)
     signal = [(problem.compliance[i, i][None] + slope[i]) * load[i] - mismatch[i] for i in range(len(load))]
-    return _State(load, approach, deflection, slope, mismatch, _positive(signal))
+    return _State(load, approach, deflection, slope, mismatch, _positive(signal, approach))
 
 
-def _positive(signal: Rows) -> Rows:
+def _positive(signal: Rows, approach) -> Rows:
     """Where the signal is positive; at zero load the largest counts, so that the system stays regular."""
-    largest = jnp.max(jnp.stack([jnp.max(s, axis=0) for s in signal]), axis=0)[None]
-    return [(s > 0) | (s >= largest) for s in signal]
+    largest, smallest = (
+        extreme(jnp.stack([extreme(s, axis=0) for s in signal]), axis=0) for extreme in (jnp.max, jnp.min)
+    )
+    # A compiler may evaluate the signal twice, for the maximum and for the comparison, with different rounding: without
+    # this margin no spring at all might be left.
+    size = jnp.maximum(jnp.abs(largest), jnp.abs(smallest)) + jnp.abs(approach)
+    floor = jnp.minimum(largest - 8 * jnp.finfo(size.dtype).eps * size, 0.0)[None]
+    return [s >= floor for s in signal]
 
 
 def _balance(problem, state, known, load):
-    """Solves (C + slope) q = known + d on the active rows, q = 0 on the others, together with sum w q = load."""
-    ones = [jnp.asarray(mask, k.dtype) for mask, k in zip(state.active, known)]
-    unit, part = _eliminate(problem, state, ones, [jnp.where(mask, k, 0.0) for mask, k in zip(state.active, known)])
+    """Solves (C + slope) q = known + lever d on the active rows, q = 0 on the others, with sum lever w q = load."""
+    levers = _levers(problem, state)
+    unit, part = _eliminate(problem, state, levers, [jnp.where(mask, k, 0.0) for mask, k in zip(state.active, known)])
     approach = (load - _total(problem, part)) / _total(problem, unit)
     return [u * approach[None] + p for u, p in zip(unit, part)], approach
 
@@ -200,22 +212,27 @@ def _mismatch(problem, load: Rows, deflection: Rows, approach) -> Rows:
     for i, elastic in enumerate(deflection):
         for j, q in enumerate(load):
             elastic = elastic + problem.compliance[i, j][None] * q
-        result.append(elastic + problem.gap[i] - approach[None])
+        result.append(elastic + problem.gap[i] - (problem.lever[i] * approach)[None])
     return result
 
 
 def _total(problem, load: Rows) -> Float[Array, " positions"]:
-    return sum(jnp.sum(problem.weight[:, None] * q, axis=0) for q in load)
+    return sum(lever * jnp.sum(problem.weight[:, None] * q, axis=0) for lever, q in zip(problem.lever, load))
+
+
+def _levers(problem, state) -> Rows:
+    """Levers of the springs in contact, zero elsewhere."""
+    return [jnp.where(mask, lever[None], 0.0) for mask, lever in zip(state.active, problem.lever)]
 
 
 def _residual(problem: ContactProblem, state: _State) -> Float[Array, " positions"]:
     problem, state = jax.lax.stop_gradient((problem, state))
     worst, scale = jnp.zeros_like(state.approach), jnp.zeros_like(state.approach)
-    for q, y in zip(state.load, state.mismatch):
+    for q, y, lever in zip(state.load, state.mismatch, problem.lever):
         closed = q > 0
         violation = jnp.where(closed, jnp.abs(y), jnp.maximum(-y, 0.0))
         worst = jnp.maximum(worst, jnp.max(violation, axis=0))
-        scale = jnp.maximum(scale, jnp.max(jnp.where(closed, jnp.abs(y + state.approach[None]), 0.0), axis=0))
+        scale = jnp.maximum(scale, jnp.max(jnp.where(closed, jnp.abs(y + (lever * state.approach)[None]), 0.0), axis=0))
     tiny = jnp.finfo(worst.dtype).tiny
     balance = jnp.abs(_total(problem, state.load) - problem.load) / (jnp.abs(problem.load) + tiny)
     return jnp.maximum(worst / (scale + tiny), balance)
