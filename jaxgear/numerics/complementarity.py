@@ -78,7 +78,7 @@ def solve_contact(problem: ContactProblem, *, steps: int) -> ContactSolution:
     line_load, approach = _solve(steps, problem)
     state = _evaluate(problem, list(line_load), approach)
     opening = jnp.stack([y - h for y, h in zip(state.mismatch, state.deflection)])
-    return ContactSolution(line_load, approach + common, opening, _residual(problem, state))
+    return ContactSolution(line_load, approach + common, opening, _residual(problem, state, common))
 
 
 def tangent_stiffness(problem: ContactProblem, solution: ContactSolution) -> Float[Array, " positions"]:
@@ -225,14 +225,20 @@ def _levers(problem, state) -> Rows:
     return [jnp.where(mask, lever[None], 0.0) for mask, lever in zip(state.active, problem.lever)]
 
 
-def _residual(problem: ContactProblem, state: _State) -> Float[Array, " positions"]:
+def _residual(problem: ContactProblem, state: _State, common) -> Float[Array, " positions"]:
+    """Largest violation; `common` is the part of the approach that has been taken out of the gaps."""
     problem, state = jax.lax.stop_gradient((problem, state))
-    worst, scale = jnp.zeros_like(state.approach), jnp.zeros_like(state.approach)
-    for q, y, lever in zip(state.load, state.mismatch, problem.lever):
+    worst, scale = jnp.zeros_like(state.approach), jnp.abs(common)
+    softest = jnp.zeros_like(state.approach)
+    for i, (q, y, slope) in enumerate(zip(state.load, state.mismatch, state.slope)):
         closed = q > 0
         violation = jnp.where(closed, jnp.abs(y), jnp.maximum(-y, 0.0))
+        closing = (problem.lever[i] * state.approach)[None]
         worst = jnp.maximum(worst, jnp.max(violation, axis=0))
-        scale = jnp.maximum(scale, jnp.max(jnp.where(closed, jnp.abs(y + (lever * state.approach)[None]), 0.0), axis=0))
-    tiny = jnp.finfo(worst.dtype).tiny
-    balance = jnp.abs(_total(problem, state.load) - problem.load) / (jnp.abs(problem.load) + tiny)
+        scale = jnp.maximum(scale, jnp.max(jnp.where(closed, jnp.abs(y + closing), 0.0), axis=0))
+        softest = jnp.maximum(softest, problem.compliance[i, i] + jnp.max(slope, axis=0))
+    tiny, eps = jnp.finfo(worst.dtype).tiny, jnp.finfo(worst.dtype).eps
+    # the load that a rounding error of the approach makes, so that zero load is not measured against zero
+    rounding = eps * jnp.abs(common) * jnp.sum(problem.weight) / softest
+    balance = jnp.abs(_total(problem, state.load) - problem.load) / (jnp.abs(problem.load) + rounding + tiny)
     return jnp.maximum(worst / (scale + tiny), balance)
