@@ -1,0 +1,107 @@
+"""Gears, meshes and reference values that several tests share."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+
+import jaxgear as jg
+
+COARSE = jg.Resolution(positions=32)
+
+# compiled once per array shape, whatever the gears; teeth, module and all other numbers are traced
+_prepare = eqx.filter_jit(jg.prepare)
+solve = eqx.filter_jit(jg.solve)
+
+
+def prepare(pair: jg.GearPair, compliance: jg.Compliance | None = None, resolution: jg.Resolution = COARSE) -> jg.Mesh:
+    """`jaxgear.prepare`, compiled."""
+    return _prepare(
+        pair, compliance=jg.default_compliance() if compliance is None else compliance, resolution=resolution
+    )
+
+
+def gear_pair(
+    teeth=(19, 48), module=3.0, *, shift=(0.0, 0.0), face_width=18.0, bores=(24.0, 70.0), tips=(None, None), **rack
+) -> jg.GearPair:
+    """A pair of gears from one basic rack; (pinion, wheel) tuples."""
+    pinion, wheel = (
+        jg.Gear(z, module, profile_shift=x, face_width=face_width, bore_diameter=bore, tip_diameter=tip, **rack)
+        for z, x, bore, tip in zip(teeth, shift, bores, tips)
+    )
+    return jg.GearPair(pinion, wheel)
+
+
+class Point(NamedTuple):
+    """Loaded transmission error [um] at a point of the path of contact, by finite elements and by the ring model."""
+
+    place: str
+    finite_element: float
+    ring: float
+
+
+class Case(NamedTuple):
+    """A pair with reference values: plane stress, hub wind-up included, Weber contact, no modification.
+
+    Attributes:
+        line_load: force over face width [N/mm].
+        points: transmission error at A (two pairs), in the middle of double contact, and at C, B, D with one pair.
+        share: share of the first pair at A, finite elements and ring model, or None.
+        ppte: peak to peak with corner contact by finite elements [um].
+        effective_contact_ratio: by finite-element compliances, with corner contact.
+    """
+
+    name: str
+    teeth: tuple[int, int]
+    module: float
+    face_width: float
+    bores: tuple[float, float]
+    torque: float
+    line_load: float
+    points: tuple[Point, ...]
+    share: tuple[float, float] | None
+    ppte: float
+    effective_contact_ratio: float
+
+    def pair(self) -> jg.GearPair:
+        """The gears, from the ISO 53 rack A."""
+        return gear_pair(self.teeth, self.module, face_width=self.face_width, bores=self.bores)
+
+
+# Plane-stress finite elements of both whole gears, bores clamped, combined with Weber contact; "ring" is the beam up to
+# the crossing of load line and centreline, plus elastic ring with coupling, plus Weber contact.
+FINITE_ELEMENT_CASES = (
+    Case(
+        "30/30 m2", (30, 30), 2.0, 20.0, (12.6, 12.6), 150.0, 266.04,
+        (
+            Point("A", 23.307, 23.693), Point("middle", 22.884, 23.269),
+            Point("C", 28.810, 29.572), Point("B", 29.091, 29.846), Point("D", 29.091, 29.846),
+        ),
+        (0.396, 0.402), 5.95, 1.869,
+    ),
+    Case(
+        "20/30 m4", (20, 30), 4.0, 40.0, (23.4, 76.6), 98.0, 65.18,
+        (
+            Point("A", 3.797, 3.883), Point("middle", 3.693, 3.774),
+            Point("C", 5.383, 5.570), Point("B", 5.506, 5.698), Point("D", 5.461, 5.637),
+        ),
+        (0.401, 0.405), 1.755, 1.672,
+    ),
+    Case(
+        "19/48 m3", (19, 48), 3.0, 18.0, (24.0, 70.0), 50.0, 103.72,
+        (
+            Point("A", 5.694, 5.834), Point("middle", 5.504, 5.628),
+            Point("C", 8.043, 8.323), Point("B", 8.263, 8.568), Point("D", 8.094, 8.354),
+        ),
+        (0.389, 0.391), 2.635, 1.754,
+    ),
+)  # fmt: skip
+
+
+def kahraman_gear(tip_diameter=154.5709, **changes) -> jg.Gear:
+    """Gear of the 50/50 module 3 test pair; tip diameter 154.5709 mm makes the contact ratio 1.37, 156 mm 1.755."""
+    return jg.Gear(50, 3.0, face_width=20.0, tip_diameter=tip_diameter, bore_diameter=50.0, **changes)
+
+
+def high_contact_ratio_pair() -> jg.GearPair:
+    """Slender teeth, contact ratio between 2 and 3."""
+    return gear_pair((40, 60), 2.0, bores=(40.0, 60.0), addendum=1.4, dedendum=1.65, root_radius=0.25)

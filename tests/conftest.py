@@ -1,0 +1,36 @@
+"""Settings of every test: double precision, no silent promotion of dtypes or ranks, compiled functions kept on disk."""
+
+import os
+from pathlib import Path
+
+import jax
+import pytest
+
+jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_numpy_dtype_promotion", "strict")
+jax.config.update("jax_numpy_rank_promotion", "raise")
+
+
+def _compilation_cache() -> Path:
+    """A folder of this user only: what is in it gets executed."""
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    folder = Path(base) / "jaxgear" / "tests"
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    folder.chmod(0o700)
+    return folder
+
+
+try:
+    jax.config.update("jax_compilation_cache_dir", str(_compilation_cache()))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+except OSError:  # a read-only home: the tests run all the same, only slower
+    pass
+
+
+@pytest.fixture(scope="session")
+def solved():
+    """The coupled reference cases of the catalogue, each solved once with its own torque: {name: (case, cycle)}."""
+    from catalogue import FINITE_ELEMENT_CASES, prepare, solve
+
+    return {case.name: (case, solve(prepare(case.pair()), case.torque)) for case in FINITE_ELEMENT_CASES}

@@ -1,0 +1,68 @@
+"""Random contact problems in the range of gear teeth, for the tests of the contact solver."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from jaxgear.numerics import ContactProblem
+
+
+class LinearSpring(eqx.Module):
+    """h = c q"""
+
+    c: Array
+
+    def deflection(self, q):
+        return self.c * q
+
+
+class SofteningSpring(eqx.Module):
+    """h = q (a - b log(q + floor)), as Hertzian line contact: it stiffens under load and has a finite slope at zero."""
+
+    a: Array
+    b: Array
+
+    def deflection(self, q):
+        return q * (self.a - self.b * jnp.log(q + 1e-6))
+
+
+class PowerSpring(eqx.Module):
+    """h = a q (q + floor)^(n - 1)"""
+
+    a: Array
+    n: Array
+
+    def deflection(self, q):
+        return self.a * q * (q + 1e-6) ** (self.n - 1)
+
+
+def problem(compliance, law, gap, *, lever=None, weight=(1.0,), load=1.0) -> ContactProblem:
+    """A contact problem from anything array-like; levers default to 1."""
+    gap = jnp.asarray(gap)
+    lever = jnp.ones((gap.shape[0], gap.shape[-1])) if lever is None else jnp.asarray(lever)
+    return ContactProblem(jnp.asarray(compliance), law, gap, lever, jnp.asarray(weight), jnp.asarray(load))
+
+
+def random_problem(seed, springs, slices, positions, law="softening", levers=True) -> ContactProblem:
+    """Coupled springs of 0.005 ... 0.05 um/N with gaps from 0 to 1000 um, many of them exactly equal."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(springs, springs, positions))
+    compliance = np.einsum("ikn,jkn->ijn", root, root) * 0.01 / springs
+    compliance[np.arange(springs), np.arange(springs)] += rng.uniform(0.005, 0.04, (springs, positions))
+    size = rng.choice([0.0, 1.0, 10.0, 100.0, 1000.0], size=(springs, 1, positions))
+    gap = size * rng.uniform(0.0, 1.0, (springs, slices, positions))
+    field = (springs, 1, positions)
+    if law == "softening":
+        spring = SofteningSpring(rng.uniform(0.02, 0.04, field), rng.uniform(0.001, 0.003, field))
+    else:
+        spring = PowerSpring(rng.uniform(0.01, 0.04, field), rng.uniform(0.7, 0.95, field))
+    lever = rng.uniform(0.8, 1.0, (springs, positions)) if levers else None
+    spring = jax.tree.map(jnp.asarray, spring)
+    return problem(compliance, spring, gap, lever=lever, weight=rng.uniform(0.5, 1.5, slices), load=1.0)
+
+
+def with_load(data: ContactProblem, load) -> ContactProblem:
+    """The same problem under another load."""
+    return eqx.tree_at(lambda p: p.load, data, load)
