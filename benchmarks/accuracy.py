@@ -15,7 +15,7 @@ import sys  # noqa: E402
 from collections.abc import Sequence  # noqa: E402
 from pathlib import Path  # noqa: E402
 
-from .cases import PAIRS, PLANES, Case, reference, select  # noqa: E402
+from .cases import PAIRS, PLANES, Case, aligned, reference, select  # noqa: E402
 from .models import MODELS, Model, run  # noqa: E402
 from .quantities import QUANTITIES, errors  # noqa: E402
 from .report import Errors, print_detail, print_summary  # noqa: E402
@@ -38,7 +38,7 @@ def compare(models: Sequence[Model], cases: Sequence[Case]) -> Errors:
     results = {}
     for model in models:
         curves = run(model, cases)
-        results[model.name] = {case: errors(case, curves[case], reference(case)) for case in cases}
+        results[model.name] = {case: errors(case, curves[case], reference(case), aligned(case)) for case in cases}
     return results
 
 

@@ -129,6 +129,31 @@ def reference(case: Case) -> Curves:
     return _table(case.pair, case.plane)[case.torque, case.relief]
 
 
+def aligned(case: Case) -> Curves:
+    """`reference` at the phases of jaxgear, the mean position of both gears.
+
+    The reference holds the wheel at its phase and advances the pinion, so the mean position is half a transmission
+    error further. Values are interpolated, which rounds off sharp peaks: use it to compare point by point.
+    """
+    truth = reference(case)
+    pairs, positions = truth.force.shape
+    phase = np.arange(positions) / positions
+    moved = phase + 0.5e-3 * truth.transmission_error / path_of_contact(case.pair).base_pitch
+    # along the path one pair takes the place of its predecessor, the last of the axis being the first
+    offset = np.arange(pairs)[:, None] - pairs
+    travelled, shifted = (phase + offset).ravel(), (moved + offset).ravel()
+
+    def pair_curve(values):
+        return np.interp(travelled, shifted, values[::-1].ravel()).reshape(values.shape)[::-1]
+
+    return Curves(
+        np.interp(phase, moved, truth.transmission_error, period=1.0),
+        np.interp(phase, moved, truth.unloaded_transmission_error, period=1.0),
+        pair_curve(truth.force),
+        pair_curve(truth.pressure),
+    )
+
+
 @functools.cache
 def _table(pair: str, plane: str) -> dict[tuple[float, str], Curves]:
     with (REFERENCE / f"{pair}_{plane}.csv").open(newline="") as file:

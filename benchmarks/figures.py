@@ -5,7 +5,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from .cases import Case, inputs, reference
+from .cases import Case, aligned, inputs
 from .models import DEFAULT, LEGACY, POSITIONS, run
 from .quantities import QUANTITIES
 from .report import Errors
@@ -54,7 +54,7 @@ def _draw_curves(figure) -> None:
         ax.plot(phase, np.append(curve, curve[0]), **style)
 
     for ax, case in zip(panels.flat, PANELS):
-        draw(ax, reference(case).transmission_error, color=_FINITE_ELEMENTS, lw=4, label="finite elements")
+        draw(ax, aligned(case).transmission_error, color=_FINITE_ELEMENTS, lw=4, label="finite elements")
         draw(ax, curves["default"][case].transmission_error, color=_DEFAULT, lw=1.3, label="jaxgear, default model")
         draw(
             ax,
@@ -104,6 +104,6 @@ def _draw_models(ax, results: Errors) -> None:
     ax.set_xticks([0.1, 1, 10, 100], ["0.1", "1", "10", "100"])
     ax.set_xlabel("error of the peak-to-peak transmission error [%], relative to at least 2 µm")
     count = len(next(iter(results.values())))
-    ax.set_title(f"what each ingredient of the model buys: {count} mesh cycles against finite elements, bar: mean", loc="left")
+    ax.set_title(f"what each ingredient buys: {count} mesh cycles against finite elements, bar: mean", loc="left")
     ax.grid(axis="x", color="#E6E6E6", lw=0.5)
     ax.set_axisbelow(True)

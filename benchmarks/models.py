@@ -1,10 +1,10 @@
-"""The models under comparison: jaxgear's default, the usual published model, and the default with one ingredient less."""
+"""The models under comparison: jaxgear's default, the usual published model, and the default with one
+ingredient changed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -25,12 +25,8 @@ class Model:
     corner_contact: bool = True
 
 
-def _default_with(body=None, contact=None) -> Callable[[str], jg.Compliance]:
-    def compliance(plane):
-        base = jg.default_compliance(plane)
-        return jg.Compliance(base.tooth, body or base.body, contact or base.contact, plane)
-
-    return compliance
+def _default_with(**changes) -> Callable[[str], jg.Compliance]:
+    return lambda plane: replace(jg.default_compliance(plane), **changes)
 
 
 DEFAULT = Model("default", jg.default_compliance)
@@ -39,6 +35,7 @@ MODELS = (
     DEFAULT,
     LEGACY,
     Model("no coupling", _default_with(body=jg.ElasticRing(coupling=False))),
+    Model("no edge softening", _default_with(edge_softening=False)),
     Model("no corner contact", jg.default_compliance, corner_contact=False),
     Model("constant Hertz", _default_with(contact=jg.ConstantHertz())),
     Model("Weber", _default_with(contact=jg.Weber())),
@@ -101,12 +98,14 @@ def _with_model(mesh: jg.Mesh, model: Model) -> jg.Mesh:
     loads = mesh.pinion_load, mesh.wheel_load
     if not eqx.tree_equal((compliance.tooth, compliance.body), (default.tooth, default.body)):
         mesh = eqx.tree_at(lambda m: (m.structure, m.hub), mesh, (compliance.structure(*loads), compliance.hub(*loads)))
-    law = compliance.law(*loads, mesh.pair.face_width)
+    law = compliance.law(*loads, mesh.outside, mesh.pair.face_width)
     return strong(eqx.tree_at(lambda m: (m.compliance, m.law), mesh, (compliance, law)))
 
 
 def _solved(mesh: jg.Mesh, case: Case) -> jg.MeshCycle:
-    """`solve` reads the prepared compliance only, so one label for all models leaves one compilation per contact law."""
+    """`solve` reads the prepared compliance only, so one label for all models leaves one compilation per
+    contact law.
+    """
     labelled = eqx.tree_at(lambda m: m.compliance, mesh, strong(jg.default_compliance()))
     pinion, wheel = reliefs(case)
     return _solve(labelled, jnp.asarray(np.float64(case.torque)), pinion=pinion, wheel=wheel)

@@ -30,18 +30,25 @@ class Quantity:
     why: str
 
 
-def errors(case: Case, model: Curves, truth: Curves) -> dict[str, float]:
-    """All signed scalar errors of one case by the key of their quantity; largest-of-many errors are positive."""
+def errors(case: Case, model: Curves, truth: Curves, aligned: Curves) -> dict[str, float]:
+    """All scalar errors of one case by the key of their quantity, signed unless they are the largest of many.
+
+    Args:
+        case: the case.
+        model: curves of the model.
+        truth: curves of the reference.
+        aligned: the reference at the phases of the model.
+    """
     te, expected = model.transmission_error, truth.transmission_error
     mean, ppte = expected.mean(), np.ptp(expected)
-    difference = te - expected
-    share_error = np.abs(model.share - truth.share)
-    flank = _flank_contact(model) & _flank_contact(truth)
-    on_flank = np.isfinite(truth.pressure) & ((truth.force > 0) | (model.force > 0))
-    smooth = on_flank & _away_from_edges(case, truth) & (truth.share > _LIGHT_SHARE)
+    difference = te - aligned.transmission_error
+    share_error = np.abs(model.share - aligned.share)
+    flank = _flank_contact(model) & _flank_contact(aligned)
+    on_flank = np.isfinite(aligned.pressure) & ((aligned.force > 0) | (model.force > 0))
+    smooth = on_flank & _away_from_edges(case, aligned) & (aligned.share > _LIGHT_SHARE)
     highest = np.nanmax(truth.pressure)
     pressure = np.nan_to_num(model.pressure)
-    pressure_error = np.abs(pressure - truth.pressure) / highest
+    pressure_error = np.abs(pressure - aligned.pressure) / highest
     return {
         "mean": 100 * (te.mean() / mean - 1),
         "ppte": 100 * (np.ptp(te) - ppte) / max(ppte, _SMALLEST_PPTE),
@@ -50,7 +57,7 @@ def errors(case: Case, model: Curves, truth: Curves) -> dict[str, float]:
         "shape": 100 * np.std(difference) / mean,
         "k1": 100 * (stiffness(model, 1) / stiffness(truth, 1) - 1),
         "k2": 100 * (stiffness(model, 2) / stiffness(truth, 2) - 1),
-        "share_points": np.abs(share_at_points(case, model) - share_at_points(case, truth)).max(),
+        "share_points": np.abs(share_at_points(case, model) - share_at_points(case, aligned)).max(),
         "share_flank": share_error[:, flank].max(),
         "share": share_error.max(),
         "pressure_max": 100 * (pressure[on_flank].max() / highest - 1),
@@ -117,18 +124,28 @@ def _half_width(case: Case, force: np.ndarray, roll_lengths: tuple[np.ndarray, n
     return np.sqrt(4 / np.pi * force / float(pair.face_width) * reduced * compliance)
 
 
+_SOFT = "The tooth's beam on the elastic ring is slightly softer than the finite elements."
+_KINK = (
+    "The contact patch feels the kinked start of a relief over its whole width. The model takes the relief at the "
+    "centre of the contact: there its transmission error dips up to 0.3 um below the rounded curve of the finite elements."
+)
+_PRESSURE = (
+    "The model gives Hertz's pressure of the involutes. Where the patch covers the kinked start of a relief the finite "
+    "elements find up to 45 % more (singular for linear reliefs, so it grows with every refinement). Clear of kinks "
+    "and tip corners the difference is that of the load."
+)
 QUANTITIES = (
-    Quantity("mean", "mean TE", "%", 2.5, ""),
-    Quantity("ppte", "PPTE, relative to at least 2 um", "%", 5.0, ""),
+    Quantity("mean", "mean TE", "%", 2.5, _SOFT),
+    Quantity("ppte", "PPTE, of at least 2 um", "%", 5.0, _KINK),
     Quantity("ppte_um", "PPTE", "um", None, ""),
-    Quantity("rms", "TE curve, rms / mean TE", "%", 2.0, ""),
-    Quantity("shape", "same, means removed", "%", 2.0, ""),
-    Quantity("k1", "largest single-pair stiffness", "%", 3.0, ""),
-    Quantity("k2", "largest double-pair stiffness", "%", None, ""),
-    Quantity("share_points", "load share at A, B, C, D, E", "", 0.02, ""),
-    Quantity("share_flank", "load share, no corner loaded", "", 0.02, ""),
-    Quantity("share", "load share, whole cycle", "", 0.02, ""),
-    Quantity("pressure_max", "largest flank pressure", "%", None, ""),
+    Quantity("rms", "TE curve, rms / mean TE", "%", 2.0, _SOFT),
+    Quantity("shape", "same, means removed", "%", 2.0, _KINK),
+    Quantity("k1", "single-pair stiffness", "%", 3.0, _SOFT),
+    Quantity("k2", "double-pair stiffness", "%", None, ""),
+    Quantity("share_points", "load share at A, B, C, D, E", "", 0.02, _KINK),
+    Quantity("share_flank", "load share, flank only", "", 0.02, _KINK),
+    Quantity("share", "load share, whole cycle", "", 0.02, _KINK),
+    Quantity("pressure_max", "largest flank pressure", "%", None, _PRESSURE),
     Quantity("pressure", "flank pressure, pointwise", "%", None, ""),
-    Quantity("pressure_smooth", "same, clear of corners and kinks", "%", None, ""),
+    Quantity("pressure_smooth", "same, smooth flank", "%", None, ""),
 )

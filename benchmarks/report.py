@@ -53,6 +53,8 @@ def print_detail(results: Errors) -> None:
 
 def _print_goal(console: Console, name: str, cases, quantity: Quantity) -> None:
     if quantity.goal is None:
+        if quantity.why:
+            _print_text(console, f"Note on {quantity.title}: {quantity.why}")
         return
     values = _absolute(cases, quantity)
     missed = int((values > quantity.goal).sum())
@@ -61,9 +63,12 @@ def _print_goal(console: Console, name: str, cases, quantity: Quantity) -> None:
     at = list(cases)[int(values.argmax())]
     head = f"MISSED by the {name} model in {missed} of {len(values)}: {quantity.title} within {quantity.goal:g} "
     text = f"{head}{quantity.unit} (worst {_number(values.max(), quantity)} {quantity.unit} in {at}). {quantity.why}"
-    console.print(
-        textwrap.fill(" ".join(text.split()), _WIDTH - 4, subsequent_indent="    "), markup=False, highlight=False
-    )
+    _print_text(console, text)
+
+
+def _print_text(console: Console, text: str) -> None:
+    lines = textwrap.fill(" ".join(text.split()), _WIDTH - 4, subsequent_indent="    ")
+    console.print(lines, markup=False, highlight=False)
 
 
 def _absolute(cases: dict[Case, dict[str, float]], quantity: Quantity) -> np.ndarray:

@@ -68,7 +68,17 @@ def test_reference_is_complete_and_in_equilibrium():
 
 def test_reference_agrees_with_itself():
     truth = cases.reference(CASE)
-    assert max(abs(value) for value in quantities.errors(CASE, truth, truth).values()) < 1e-12
+    assert max(abs(value) for value in quantities.errors(CASE, truth, truth, truth).values()) < 1e-12
+
+
+def test_alignment_moves_by_half_the_transmission_error():
+    truth, moved = cases.reference(CASE), cases.aligned(CASE)
+    share = 1e-3 * truth.transmission_error[40] / cases.path_of_contact(CASE.pair).base_pitch
+    assert 1e-4 < share < 1e-2
+    # the curve at phase 40/128 comes from half that share of a base pitch earlier
+    slope = (truth.force[1, 41] - truth.force[1, 39]) * 64
+    np.testing.assert_allclose(moved.force[1, 40], truth.force[1, 40] - 0.5 * share * slope, rtol=1e-4)
+    np.testing.assert_allclose(moved.force.sum(axis=0), truth.force.sum(axis=0), rtol=1e-9)
 
 
 @pytest.mark.parametrize(
