@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 from .beam import AbstractTooth, Beam
 from .body import AbstractBody, ElasticRing, Sainsot
 from .edge import EdgeLaw, edge
-from .hertz import AbstractContact, AbstractLaw, ConstantHertz, DepthReferenced, contact_geometry
+from .hertz import AbstractContact, AbstractLaw, ConstantHertz, ContactGeometry, DepthReferenced
 from .plane import Plane, check_plane
 from .toothload import ToothLoad
 
@@ -44,9 +44,8 @@ class Compliance(eqx.Module):
         """Wind-up of both gear bodies, in um per N/mm of total line load."""
         return self.body.hub(pinion.outline) + self.body.hub(wheel.outline)
 
-    def law(self, pinion: ToothLoad, wheel: ToothLoad, outside, face_width) -> AbstractLaw:
+    def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside) -> AbstractLaw:
         """The prepared contact law, for contacts at a distance `outside` the path of contact [mm]."""
-        geometry = contact_geometry(pinion, wheel, self.plane, face_width)
         law = self.contact.prepare(geometry)
         if not self.edge_softening:
             return law

@@ -60,6 +60,7 @@ class ElasticRing(AbstractBody):
         arm = (load.height - outline.root_height) / gear.root_circle_radius
         cosine = jnp.cos(load.angle)
         modes = jnp.stack([-arm * cosine, cosine, -jnp.sin(load.angle)], axis=1)  # (pairs, 3, positions)
+        blocks = blocks.at[0].add(-ring.relaxation(outline.root_half_angle))
         # the responding tooth i lies (i - j) steps from the loaded tooth j; K(-phi) = K(phi)^T
         order = step * (np.arange(count)[:, None] - np.arange(count)[None])
         both = jnp.stack([blocks, blocks.transpose(0, 2, 1)])

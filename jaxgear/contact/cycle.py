@@ -2,10 +2,11 @@
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import ContactProblem, check, real, solve_contact, tangent_stiffness
+from ..numerics import ContactProblem, check, real, safe_sqrt, solve_contact, tangent_stiffness
 from .mesh import Mesh
 
 Scalar = Float[Array, ""]
@@ -103,9 +104,9 @@ def solve(
     check("solve", "torque", torque, "N m", low=0.0)
     torque = real(torque).astype(mesh.phase.dtype)
     shape = (mesh.resolution.pairs, mesh.resolution.slices, mesh.resolution.positions)
-    removed = (pinion or NoModification())(mesh.pinion_flank) + (wheel or NoModification())(mesh.wheel_flank)
-    gap = jnp.broadcast_to(mesh.corner_gap[:, None] + removed, shape)
     force = 1e3 * torque / mesh.pair.pinion.base_radius
+    removed = _removed(mesh, force, pinion or NoModification(), wheel or NoModification())
+    gap = jnp.broadcast_to(mesh.corner_gap[:, None] + removed, shape)
     problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, force)
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps)
     windup = mesh.hub * force / mesh.pair.face_width
@@ -125,3 +126,21 @@ def solve(
         residual=solution.residual,
         converged=solution.residual <= tolerance,
     )
+
+
+def _removed(mesh: Mesh, force: Scalar, pinion: AbstractModification, wheel: AbstractModification) -> Load:
+    """Material removed from both flanks, averaged over the contact with the weight of the Hertzian pressure [um].
+
+    To first order a small gap that varies across the contact acts with its pressure-weighted mean. The half width is that of
+    one pair that carries the full load. Chebyshev nodes of the second kind integrate exactly with the semi-elliptic weight.
+    """
+    count = mesh.resolution.patch_nodes
+    half_width = safe_sqrt(mesh.width_factor * force / mesh.pair.face_width)
+    total = jnp.zeros((), mesh.phase.dtype)
+    for k in range(1, count + 1):
+        angle = np.pi * k / (count + 1)
+        offset = float(np.cos(angle)) * half_width
+        pinion_flank, wheel_flank = mesh.flanks(offset)
+        weight = float(2 / (count + 1) * np.sin(angle) ** 2)
+        total = total + weight * (pinion(pinion_flank) + wheel(wheel_flank))
+    return total

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..compliance import Compliance, default_compliance
-from ..compliance.hertz import AbstractLaw
+from ..compliance.hertz import AbstractLaw, contact_geometry
 from ..compliance.toothload import ToothLoad, tooth_load
 from ..geometry import GearPair, PathOfContact, outline, path_of_contact
 from ..microgeometry import Flank
@@ -25,16 +25,19 @@ class Resolution(eqx.Module):
         slices: slices over the common face width.
         pairs: tooth pairs carried along. Pair i runs at phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two
             base pitches on either side of the pitch point: contact ratios up to 3.
+        patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks and
+            steep flanks over its own width; 1 takes the nominal contact point alone.
         newton_steps: steps of the contact solution.
     """
 
     positions: int = eqx.field(static=True, default=64)
     slices: int = eqx.field(static=True, default=1)
     pairs: int = eqx.field(static=True, default=4)
+    patch_nodes: int = eqx.field(static=True, default=4)
     newton_steps: int = eqx.field(static=True, default=8)
 
     def __check_init__(self):
-        for name, low in (("positions", 4), ("slices", 1), ("pairs", 2), ("newton_steps", 1)):
+        for name, low in (("positions", 4), ("slices", 1), ("pairs", 2), ("patch_nodes", 1), ("newton_steps", 1)):
             value = getattr(self, name)
             if not isinstance(value, int) or value < low:
                 raise ValueError(f"Resolution: {name} = {value!r} must be a whole number of at least {low}")
@@ -62,6 +65,7 @@ class Mesh(eqx.Module):
             corner's gap opens while the gears turn on.
         structure: compliance of both gears, (pairs, pairs, positions) [um per N/mm].
         law: prepared contact law.
+        width_factor: squared half width of the contact per line load [mm^2 per N/mm].
         hub: common wind-up of the gear bodies [um per N/mm].
         face_coordinate: middle of every slice [mm], shape (slices,).
         slice_width: [mm], shape (slices,).
@@ -80,6 +84,7 @@ class Mesh(eqx.Module):
     lever: Field
     structure: Float[Array, "pairs pairs positions"]
     law: AbstractLaw
+    width_factor: Field
     hub: Scalar
     face_coordinate: Float[Array, " slices"]
     slice_width: Float[Array, " slices"]
@@ -87,21 +92,31 @@ class Mesh(eqx.Module):
     @property
     def pinion_flank(self) -> Flank:
         """Contact points on the pinion, for its modification; fields broadcast to (pairs, slices, positions)."""
-        contact = self.path_of_contact
-        start = contact.pinion_roll_length(contact.start)
-        return self._flank(self.pinion_load, start)
+        return self.flanks(0.0)[0]
 
     @property
     def wheel_flank(self) -> Flank:
         """Contact points on the wheel, for its modification; fields broadcast to (pairs, slices, positions)."""
-        contact = self.path_of_contact
-        start = contact.wheel_roll_length(contact.end)
-        return self._flank(self.wheel_load, start)
+        return self.flanks(0.0)[1]
 
-    def _flank(self, load: ToothLoad, start: Scalar) -> Flank:
+    def flanks(self, offset) -> tuple[Flank, Flank]:
+        """Points of both flanks that face each other at a distance from the centre of contact.
+
+        Args:
+            offset: distance along the flanks, towards the pinion tip [mm], scalar or (pairs, positions).
+        """
+        contact = self.path_of_contact
+        return (
+            self._flank(self.pinion_load, contact.pinion_roll_length(contact.start), offset),
+            self._flank(self.wheel_load, contact.wheel_roll_length(contact.end), -offset),
+        )
+
+    def _flank(self, load: ToothLoad, start: Scalar, offset) -> Flank:
         gear = load.outline.gear
+        # arc length of an involute: ds = rho / r_b d rho
+        moved = jnp.maximum(load.roll_length + offset * gear.base_radius / load.roll_length, 0.0)
         return Flank(
-            roll_length=load.roll_length[:, None],
+            roll_length=moved[:, None],
             tip_roll_length=gear.tip_roll_length,
             start_roll_length=start,
             base_radius=gear.base_radius,
@@ -135,6 +150,7 @@ def prepare(pair: GearPair, *, compliance: Compliance | None = None, resolution:
     pinion_rho, wheel_rho, gap, lever, outside = _contact_points(pair, contact, path)
     pinion, wheel = tooth_load(outline(pair.pinion), pinion_rho), tooth_load(outline(pair.wheel), wheel_rho)
     slices, width = resolution.slices, pair.face_width
+    geometry = contact_geometry(pinion, wheel, compliance.plane, width)
     centre = (jnp.arange(slices, dtype=dtype) + 0.5) / slices - 0.5
     return Mesh(
         pair=pair,
@@ -149,7 +165,8 @@ def prepare(pair: GearPair, *, compliance: Compliance | None = None, resolution:
         corner_gap=gap,
         lever=lever,
         structure=compliance.structure(pinion, wheel),
-        law=compliance.law(pinion, wheel, outside, width),
+        law=compliance.law(geometry, pinion, wheel, outside),
+        width_factor=geometry.width_factor[:, 0],
         hub=compliance.hub(pinion, wheel),
         face_coordinate=centre * width,
         slice_width=jnp.full((slices,), 1.0 / slices, dtype) * width,
