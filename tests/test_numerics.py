@@ -1,0 +1,117 @@
+"""Roots, safe functions, quadrature and the field checks."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxgear.numerics import (
+    bracketed_root,
+    check,
+    gauss_legendre,
+    optional_real,
+    real,
+    safe_divide,
+    safe_log,
+    safe_power,
+    safe_sqrt,
+)
+
+
+def kepler(eccentricity):
+    """E - e sin E = 1"""
+    one = jnp.ones_like(eccentricity)
+    return bracketed_root(lambda x, e: x - e * jnp.sin(x) - 1.0, 0 * one, 3 * one, eccentricity)
+
+
+def test_root_value_and_three_derivatives():
+    """The cube root as the root of x^3 - a. The third derivative is as good as the bisection's bracket, 1e-7."""
+
+    def cube_root(a):
+        return bracketed_root(lambda x, a: x**3 - a, jnp.zeros_like(a), jnp.full_like(a, 4.0), a)
+
+    a = 5.0
+    f, values = cube_root, []
+    for _ in range(4):
+        values.append(float(jax.jit(f)(a)))
+        f = jax.grad(f)
+    exact = [a ** (1 / 3), a ** (-2 / 3) / 3, -2 / 9 * a ** (-5 / 3), 10 / 27 * a ** (-8 / 3)]
+    np.testing.assert_allclose(values[:3], exact[:3], rtol=1e-13)
+    np.testing.assert_allclose(values[3], exact[3], rtol=1e-6)
+
+
+def test_root_is_elementwise_and_solves_the_equation():
+    e = jnp.linspace(0.0, 0.95, 50)
+    x = kepler(e)
+    np.testing.assert_allclose(x - e * jnp.sin(x), 1.0, rtol=1e-15)
+    np.testing.assert_allclose(jax.vmap(jax.grad(kepler))(e), jnp.sin(x) / (1 - e * jnp.cos(x)), rtol=1e-13)
+
+
+def test_root_of_a_decreasing_function():
+    x = bracketed_root(lambda x, a: a - x**2, jnp.asarray(0.0), jnp.asarray(3.0), jnp.asarray(2.0))
+    assert float(x) == pytest.approx(2**0.5, rel=1e-15)
+
+
+def test_without_a_sign_change_the_nearer_end_is_returned():
+    low, high = jnp.asarray([1.0, 1.0]), jnp.asarray([2.0, 2.0])
+    roots = bracketed_root(lambda x, a: x - a, low, high, jnp.asarray([0.5, 7.0]))
+    np.testing.assert_array_equal(roots, [1.0, 2.0])
+
+
+def test_roots_at_the_ends_of_the_bracket_keep_their_value():
+    low, high = jnp.asarray([1.0, 1.0]), jnp.asarray([2.0, 2.0])
+    roots = bracketed_root(lambda x, a: x - a, low, high, jnp.asarray([1.0, 2.0]))
+    np.testing.assert_allclose(roots, [1.0, 2.0], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("function", "bad", "value", "good"),
+    [
+        (safe_sqrt, 0.0, 0.0, 4.0),
+        (safe_sqrt, -1.0, 0.0, 4.0),
+        (safe_log, 0.0, 0.0, 2.0),
+        (lambda x: safe_divide(3.0, x), 0.0, 0.0, 2.0),
+        (lambda x: safe_power(x, 0.5), 0.0, 0.0, 4.0),
+        (lambda x: safe_power(2.0 * x, 1.5), -1.0, 0.0, 4.0),
+    ],
+)
+def test_safe_functions_have_finite_derivatives_where_the_plain_ones_have_not(function, bad, value, good):
+    bad, good = jnp.asarray(bad), jnp.asarray(good)
+    assert float(function(bad)) == value
+    for derivative in (jax.grad(function), jax.grad(jax.grad(function))):
+        assert float(derivative(bad)) == 0.0
+    h = 1e-6
+    difference = (function(good + h) - function(good - h)) / (2 * h)
+    assert float(jax.grad(function)(good)) == pytest.approx(float(difference), rel=1e-8)
+
+
+def test_gauss_legendre_is_exact_for_polynomials_of_degree_2n_minus_1():
+    nodes, weights = gauss_legendre(6)
+    for degree in range(12):
+        assert np.sum(weights * nodes**degree) == pytest.approx(1 / (degree + 1), rel=1e-13)
+    assert np.sum(weights * nodes**12) != pytest.approx(1 / 13, rel=1e-9)
+
+
+def test_real_makes_differentiable_arrays():
+    assert real(2).dtype == jnp.float64
+    assert real(np.float32(2)).dtype == jnp.float32
+    assert optional_real(None) is None
+    assert float(jax.grad(lambda x: real(x) ** 2)(3.0)) == 6.0
+
+
+def test_check_names_owner_parameter_value_unit_and_range():
+    with pytest.raises(ValueError, match=r"Gear: module = -1 mm must be greater than 0 mm") as error:
+        check("Gear", "module", -1.0, "mm", low=0.0, open_low=True)
+    assert "\n" not in str(error.value)
+    with pytest.raises(ValueError, match=r"x = 7 must be at least 1 and at most 5"):
+        check("A", "x", jnp.asarray([2.0, 7.0]), "", low=1.0, high=5.0)
+    with pytest.raises(ValueError, match="nan"):
+        check("A", "x", jnp.nan, "um")
+    with pytest.raises(ValueError, match="inf"):
+        check("A", "x", jnp.inf, "um", low=0.0)
+
+
+def test_check_lets_good_values_none_and_tracers_pass():
+    check("A", "x", 0.0, "", low=0.0, high=1.0)
+    check("A", "x", None, "", low=0.0)
+    jax.jit(lambda x: check("A", "x", x, "", low=0.0))(-1.0)
