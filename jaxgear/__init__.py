@@ -9,7 +9,8 @@ The pipeline in reading order, every step differentiable and vmappable:
     peak_to_peak, ...           metrics on the MeshCycle
     minimize                    the best modification by gradient
 
-Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in constructors.
+Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in
+    constructors.
 Importing jaxgear changes no JAX setting; switch on `jax_enable_x64` for double precision.
 """
 
@@ -31,7 +32,9 @@ from .contact import Mesh as Mesh
 from .contact import MeshCycle as MeshCycle
 from .contact import Resolution as Resolution
 from .contact import prepare as prepare
+from .contact import removed_material as removed_material
 from .contact import solve as solve
+from .contact import solve_removed as solve_removed
 from .geometry import STEEL as STEEL
 from .geometry import Gear as Gear
 from .geometry import GearPair as GearPair

@@ -19,7 +19,8 @@ class Compliance(eqx.Module):
         tooth: the tooth alone, root held.
         body: gear body with hub wind-up and coupling of neighbouring teeth.
         contact: approach of the flanks.
-        plane: "stress" for narrow faces, "strain" for wide ones (face width above about five tooth heights; Cornell 1981).
+        plane: "stress" for narrow faces, "strain" for wide ones (face width above about five tooth heights; Cornell
+            1981).
         edge_softening: soften the contact where a tip corner cuts it off (see `edge`).
     """
 
@@ -33,7 +34,7 @@ class Compliance(eqx.Module):
         check_plane(self.plane)
 
     def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "pairs pairs positions"]:
-        """Compliance of both gears between all pairs in contact, in um per N/mm, without contact law and hub wind-up."""
+        """Compliance of teeth and bodies between all pairs in contact [um per N/mm], without hub wind-up."""
         total = self.body.compliance(pinion, +1, self.plane) + self.body.compliance(wheel, -1, self.plane)
         teeth = self.tooth.compliance(pinion, self.plane) + self.tooth.compliance(wheel, self.plane)
         for i in range(teeth.shape[0]):
@@ -49,7 +50,7 @@ class Compliance(eqx.Module):
         law = self.contact.prepare(geometry)
         if not self.edge_softening:
             return law
-        truncation = 4 / jnp.pi * sum(1 / side.modulus for side in geometry.sides)
+        truncation = 4 / jnp.pi * geometry.compliance
         return EdgeLaw(law, geometry.width_factor, truncation, edge(pinion, wheel, outside, geometry))
 
 

@@ -26,11 +26,12 @@ class AbstractTooth(eqx.Module):
 class Beam(AbstractTooth):
     """Beam over the generated outline from the root circle up to where the load line crosses the centreline.
 
-        1/k_b = int [(y_C - y) cos a]^2 / (E I) dy,   1/k_s = int 1.2 cos^2 a / (G A) dy,   1/k_a = int sin^2 a / (E A) dy
+        1/k_b = int [(y_C - y) cos a]^2 / (E I) dy,   1/k_s = int 1.2 cos^2 a / (G A) dy,   1/k_a = int sin^2 a / (E A)
+        dy
 
-    with I = 2/3 x(y)^3 and A = 2 x(y) per unit width. Stopping at the crossing instead of at the contact point leaves the
-    part of the tooth beside the load to the depth-referenced contact law, which contains it. The trochoid is the true one,
-    so there is no case distinction between root and base circle.
+    with I = 2/3 x(y)^3 and A = 2 x(y) per unit width. Stopping at the crossing instead of at the contact point leaves
+    the part of the tooth beside the load to the depth-referenced contact law, which contains it. The trochoid is the
+    true one, so there is no case distinction between root and base circle.
 
     Attributes:
         nodes: Gauss-Legendre nodes on the fillet and on the involute each.

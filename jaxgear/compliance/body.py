@@ -36,8 +36,8 @@ class ElasticRing(AbstractBody):
     """Elastic ring held at the bore, with exact coupling of neighbouring teeth (see `ring`).
 
     Attributes:
-        hub_windup: include the torsion of the ring between bore and root circle. It is common to all teeth: it shifts the
-            transmission error and changes neither its variation nor the load sharing.
+        hub_windup: include the torsion of the ring between bore and root circle. It is common to all teeth: it shifts
+            the transmission error and changes neither its variation nor the load sharing.
         coupling: let neighbouring teeth feel each other. Off only to show what the coupling is worth.
         harmonics: Fourier terms of the ring solution.
     """
@@ -98,7 +98,8 @@ class HalfPlane(AbstractBody):
     """Half-plane foundation of Weber and Banaschek with Cornell's coefficients: no bore, no coupling.
 
     References:
-        C. Weber, K. Banaschek, Formaenderung und Profilruecknahme, 1953; R. W. Cornell, J. Mech. Des. 103 (1981) 447-459.
+        C. Weber, K. Banaschek, Formaenderung und Profilruecknahme, 1953; R. W. Cornell, J. Mech. Des. 103 (1981)
+        447-459.
     """
 
     def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:

@@ -9,12 +9,13 @@ soften it:
        L = 2/3 (t + sqrt(t^2 + 3 a^2)),     delta - delta_Hertz = a^2 / R Phi(t / a),
        Phi = (l/2 - tau)^2 / 2 + l^2 / 16 + ln(2 / l) / 2 - 1/4,    l = L / a,  tau = t / a < 1,
 
-   t the distance of the virtual centre of contact from the corner (negative beyond it), a the half width and delta_Hertz the
-   approach of the full contact. It is the closed-form solution of the singular integral equation of the plane contact with
-   one singular end; at tau = 1 the patch just reaches the corner and Phi = 0.
+   t the distance of the virtual centre of contact from the corner (negative beyond it), a the half width and
+   delta_Hertz the approach of the full contact. It is the closed-form solution of the singular integral equation of the
+   plane contact with one singular end; at tau = 1 the patch just reaches the corner and Phi = 0.
 2. The missing material. Behind the corner there is a wedge of interior angle 2 beta, not a half plane. Loaded at its
-   apex it gives way by q / E' K ln(r), K = sin^2 b / (b + sin(2b)/2) + cos^2 b / (b - sin(2b)/2), against 2 / pi for the
-   half plane (Flamant). The excess acts between the distance of the load from the corner and the size of the tooth tip.
+   apex it gives way by q / E' K ln(r), K = sin^2 b / (b + sin(2b)/2) + cos^2 b / (b - sin(2b)/2), against 2 / pi for
+   the half plane (Flamant). The excess acts between the distance of the load from the corner and the size of the tooth
+   tip.
 
 References:
     K. L. Johnson, Contact Mechanics, 1985, sections 2.7 and 5.1 (wedge, integral equations of plane contact).
@@ -31,8 +32,9 @@ from .toothload import ToothLoad
 Field = Float[Array, "pairs 1 positions"]
 Real = Float[Array, "..."]
 
-# Distance from the corner, relative to the depth of the centreline below it, at which the wedge's excess compliance ends.
-# Found once from finite-element compliances of single teeth of 17 to 75 mm radius loaded close to their tips: 0.24 ... 0.28.
+# Distance from the corner, relative to the depth of the centreline below it, at which the wedge's excess compliance
+# ends. Found once from finite-element compliances of single teeth of 17 to 75 mm radius loaded close to their tips:
+# 0.24 ... 0.28.
 _WEDGE_REACH = 0.25
 # Point load at unit distance from the apex of a wedge: its apex solution holds from 1.82 times that distance on (Mellin
 # transform of the wedge, interior angles of 110 to 130 degrees: 1.77 ... 1.88).

@@ -1,9 +1,10 @@
 """Approach of two flanks in line contact: laws of the deflection over the line load.
 
-A law is prepared once per mesh from the local geometry (`AbstractContact.prepare`) and then evaluated inside the contact
-solution (`deflection`). All prepared leaves have the shape (pairs, 1, positions).
+A law is prepared once per mesh from the local geometry (`AbstractContact.prepare`) and then evaluated inside the
+contact solution (`deflection`). All prepared leaves have the shape (pairs, 1, positions).
 
-Notation: q line load [N/mm], R reduced radius, a half width of the contact, E' plane modulus, nu' plane Poisson's ratio,
+Notation: q line load [N/mm], R reduced radius, a half width of the contact, E' plane modulus, nu' plane Poisson's
+    ratio,
 h_k depth from the contact to the tooth centreline along the load line. In plane strain E' = E/(1 - nu^2) and
 nu' = nu/(1 - nu), which gives the usual forms; plane stress has E and nu in their place.
 """
@@ -57,10 +58,15 @@ class ContactGeometry(eqx.Module):
         return self.pinion, self.wheel
 
     @property
+    def compliance(self) -> Field:
+        """1 / E* = 1 / E'_1 + 1 / E'_2 [1/MPa]."""
+        return 1 / self.pinion.modulus + 1 / self.wheel.modulus
+
+    @property
     def width_factor(self) -> Field:
-        """a^2 / q = 4 R / (pi E*) [mm^2 per N/mm], 1 / E* = 1 / E'_1 + 1 / E'_2."""
+        """a^2 / q = 4 R / (pi E*) [mm^2 per N/mm]."""
         reduced = self.pinion.radius * self.wheel.radius / (self.pinion.radius + self.wheel.radius)
-        return 4 * reduced / jnp.pi * sum(1 / side.modulus for side in self.sides)
+        return 4 * reduced / jnp.pi * self.compliance
 
 
 def contact_geometry(pinion: ToothLoad, wheel: ToothLoad, plane: Plane, face_width) -> ContactGeometry:
@@ -158,7 +164,7 @@ class ConstantHertz(AbstractContact):
     """
 
     def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        return LinearLaw(1e3 * 2 / jnp.pi * sum(1 / side.strain_modulus for side in geometry.sides))
+        return LinearLaw(2e3 / jnp.pi * (1 / geometry.pinion.strain_modulus + 1 / geometry.wheel.strain_modulus))
 
 
 class DepthReferenced(AbstractContact):
@@ -174,11 +180,11 @@ class DepthReferenced(AbstractContact):
     """
 
     def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        sides = geometry.sides
+        pinion, wheel = geometry.sides
         return DepthLaw(
-            compliance=tuple(1e3 * 2 / (jnp.pi * side.modulus) for side in sides),
-            depth=tuple(side.depth for side in sides),
-            poisson=tuple(side.poisson for side in sides),
+            compliance=(2e3 / (jnp.pi * pinion.modulus), 2e3 / (jnp.pi * wheel.modulus)),
+            depth=(pinion.depth, wheel.depth),
+            poisson=(pinion.poisson, wheel.poisson),
             width_factor=geometry.width_factor,
         )
 
@@ -237,7 +243,7 @@ class NonlinearPower(AbstractContact):
     """
 
     def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        young = 2 / sum(1 / side.young for side in geometry.sides)
+        young = 2 / (1 / geometry.pinion.young + 1 / geometry.wheel.young)
         factor = 1e3 * 1.275 * geometry.face_width**0.1 / young**0.9
         return PowerLaw(factor, jnp.full_like(factor, 0.9))
 
@@ -245,8 +251,8 @@ class NonlinearPower(AbstractContact):
 def _logarithmic(geometry: ContactGeometry, brackets: list[Field]) -> LogarithmicLaw:
     """sum_k 2 q / (pi E'_k) [ bracket_k - ln a ] with a = sqrt(width_factor q)."""
     half_log = 0.5 * jnp.log(geometry.width_factor)
-    constant = sum(
-        2 / (jnp.pi * side.modulus) * (bracket - half_log) for side, bracket in zip(geometry.sides, brackets)
+    pinion, wheel = (
+        2 / (jnp.pi * side.modulus) * (bracket - half_log)
+        for side, bracket in zip(geometry.sides, brackets, strict=True)
     )
-    slope = sum(1 / (jnp.pi * side.modulus) for side in geometry.sides)
-    return LogarithmicLaw(1e3 * constant, 1e3 * slope)
+    return LogarithmicLaw(1e3 * (pinion + wheel), 1e3 / jnp.pi * geometry.compliance)

@@ -1,9 +1,9 @@
 """The gear body as an elastic ring, held at the bore and loaded on the root arcs of its teeth.
 
 Each tooth passes three load modes to its root arc, as stresses on the chord: linear bending (M), uniform shear (V) and
-uniform compression (N). Their Fourier series on the root circle meet the ring's compliance per harmonic (Michell's plane
-solution); the work-conjugate displacements of any arc then give a 3 x 3 matrix K between any two teeth. K is exactly
-reciprocal, K(-phi) = K(phi)^T, and holds for self compliance (phi = 0) and neighbouring teeth alike.
+uniform compression (N). Their Fourier series on the root circle meet the ring's compliance per harmonic (Michell's
+plane solution); the work-conjugate displacements of any arc then give a 3 x 3 matrix K between any two teeth. K is
+exactly reciprocal, K(-phi) = K(phi)^T, and holds for self compliance (phi = 0) and neighbouring teeth alike.
 
 Lengths are relative to the root radius, stresses to the plane modulus. The rigid torsion of the ring between bore and root
 circle is left out here: it is the same for every tooth and is accounted for once, as hub wind-up.
@@ -43,7 +43,8 @@ def arc_compliance(half_angle: Scalar, thickness_ratio: Scalar, poisson: Scalar,
     angle = order[None] * spacing[:, None]
     even = jnp.einsum("abn,kn->kab", pairs, jnp.cos(angle))
     odd = jnp.einsum("abn,kn->kab", pairs, jnp.sin(angle))
-    # moment and shear have odd radial and even tangential stress, normal the reverse: same kinds meet in cos, others in sin
+    # moment and shear have odd radial and even tangential stress, normal the reverse: same kinds meet in
+    # cos, others in sin
     same = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     cross = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [1.0, 1.0, 0.0]])
     matrix = jnp.pi * (even * jnp.asarray(same, even.dtype)[None] + odd * jnp.asarray(cross, odd.dtype)[None])
@@ -54,11 +55,11 @@ def arc_compliance(half_angle: Scalar, thickness_ratio: Scalar, poisson: Scalar,
 def relaxation(half_angle: Scalar) -> Float[Array, "3 3"]:
     """What the self compliance loses because the root traction is not what the load modes assume.
 
-    By the principle of least complementary energy a prescribed traction overstates the compliance. Towards a rigid tooth
-    the traction turns into that of a bonded punch, p ~ (1 - y^2)^(-1/2), whose energy on the half plane is lower by 2 / pi in
-    L = K_MM S^2 and by (2 / pi) (3/2 - 2 ln 2) in K_VV and K_NN (plane modulus 1). The tooth root is about as compliant as the
-    body it sits on, so half of the redistribution, and half of the gain, is realised (Ritz's method with the punch traction
-    as second term and equal compliances on both sides).
+    By the principle of least complementary energy a prescribed traction overstates the compliance. Towards a rigid
+    tooth the traction turns into that of a bonded punch, p ~ (1 - y^2)^(-1/2), whose energy on the half plane is lower
+    by 2 / pi in L = K_MM S^2 and by (2 / pi) (3/2 - 2 ln 2) in K_VV and K_NN (plane modulus 1). The tooth root is about
+    as compliant as the body it sits on, so half of the redistribution, and half of the gain, is realised (Ritz's method
+    with the punch traction as second term and equal compliances on both sides).
 
     Returns:
         the reduction of K at zero spacing, times the plane modulus, shape (3, 3).
@@ -124,7 +125,7 @@ def ring_compliance(thickness_ratio: Scalar, poisson: Scalar, harmonics: int) ->
 
 
 def _condense(bore, outer_displacement, outer_stress, poisson):
-    """Eliminates the four term amplitudes: u = 0 at the bore, unit stresses outside. Trailing axes (2, 4) per harmonic."""
+    """Eliminates the four term amplitudes: u = 0 at the bore, unit stresses outside; trailing axes (2, 4)."""
     system = jnp.concatenate([bore, outer_stress], axis=-2)
     unit = jnp.zeros((*system.shape[:-1], 2), system.dtype).at[..., 2, 0].set(1.0).at[..., 3, 1].set(1.0)
     amplitude = jnp.linalg.solve(system, unit)

@@ -3,7 +3,8 @@
     delta = F cos^2 a / (E b) { L (u/S)^2 + M u/S + P (1 + Q tan^2 a) },   X = A/t^2 + B h^2 + C h/t + D/t + E h + F
 
 It is a fit to plane-stress rings with clamped bore and contains the ring's torsion. Stated validity: 1.4 <= h <= 7,
-0.01 <= t <= 0.12 with t = theta_f; pinions below about 25 teeth lie outside, where the polynomial extrapolates smoothly.
+0.01 <= t <= 0.12 with t = theta_f; pinions below about 25 teeth lie outside, where the polynomial extrapolates
+smoothly.
 
 References:
     P. Sainsot, P. Velex, O. Duverger, J. Mech. Des. 126 (2004) 748-752, doi 10.1115/1.1758252, eq. (15) and Table 1.

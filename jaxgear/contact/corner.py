@@ -1,18 +1,20 @@
 """Contact of a tip corner with the mate's involute, before and after the theoretical path of contact.
 
-A pair that is a distance x outside the path of contact touches with the tip corner of one gear on the flank of the other.
-With the corner's gear in its nominal position, the gap is the arc of the mate's base circle by which the mate has to turn
-until its involute passes through the corner. In the frame of the line of action this is a closed form: no root, no table.
+A pair that is a distance x outside the path of contact touches with the tip corner of one gear on the flank of the
+other. With the corner's gear in its nominal position, the gap is the arc of the mate's base circle by which the mate
+has to turn until its involute passes through the corner. In the frame of the line of action this is a closed form: no
+root, no table.
 
     Q = corner, at (du, dv) from the end of the path,  rho_Q = tangent length from Q to the mate's base circle,
     S = x + rho_Q - rho_mate + r_b,mate tau,  tau = turn of that tangent away from the line of action.
 
-To second order S = x^2 rho_tip C / (2 rho_mate r_b,tip^2) with C = rho_tip + rho_mate, so the gap joins the path with zero
-slope. All differences are formed without cancellation, so single precision keeps 1e-4 um where contact is possible.
+To second order S = x^2 rho_tip C / (2 rho_mate r_b,tip^2) with C = rho_tip + rho_mate, so the gap joins the path with
+zero slope. All differences are formed without cancellation, so single precision keeps 1e-4 um where contact is
+possible.
 
 References:
-    The geometry is that of R. G. Munro, L. Morrish, D. Palmer, Proc. IMechE C 213 (1999) 389-400; the closed form here is
-    derived from the involute's generation.
+    The geometry is that of R. G. Munro, L. Morrish, D. Palmer, Proc. IMechE C 213 (1999) 389-400; the closed form here
+    is derived from the involute's generation.
 """
 
 import jax.numpy as jnp

@@ -46,7 +46,7 @@ class MeshCycle(eqx.Module):
     @property
     def force(self) -> Scalar:
         """Total force on the line of action [N]."""
-        return 1e3 * self.torque / self.mesh.pair.pinion.base_radius
+        return _force(self.mesh, self.torque)
 
     @property
     def pair_force(self) -> Float[Array, "pairs positions"]:
@@ -101,12 +101,22 @@ def solve(
     Raises:
         ValueError: for a negative or non-finite torque.
     """
+    removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
+    return solve_removed(mesh, torque, removed)
+
+
+def solve_removed(mesh: Mesh, torque, removed: Load) -> MeshCycle:
+    """`solve` for material removed as an array: one compilation serves every kind of modification.
+
+    Args:
+        mesh: prepared mesh.
+        torque: on the pinion [N m], scalar.
+        removed: material removed from both flanks together at every contact [um], as `removed_material` gives it.
+    """
     check("solve", "torque", torque, "N m", low=0.0)
     torque = real(torque).astype(mesh.phase.dtype)
-    shape = (mesh.resolution.pairs, mesh.resolution.slices, mesh.resolution.positions)
-    force = 1e3 * torque / mesh.pair.pinion.base_radius
-    removed = _removed(mesh, force, pinion or NoModification(), wheel or NoModification())
-    gap = jnp.broadcast_to(mesh.corner_gap[:, None] + removed, shape)
+    force = _force(mesh, torque)
+    gap = mesh.corner_gap[:, None] + removed
     problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, force)
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps)
     windup = mesh.hub * force / mesh.pair.face_width
@@ -128,14 +138,32 @@ def solve(
     )
 
 
-def _removed(mesh: Mesh, force: Scalar, pinion: AbstractModification, wheel: AbstractModification) -> Load:
+def removed_material(
+    mesh: Mesh,
+    torque,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+) -> Load:
     """Material removed from both flanks, averaged over the contact with the weight of the Hertzian pressure [um].
 
-    To first order a small gap that varies across the contact acts with its pressure-weighted mean. The half width is that of
-    one pair that carries the full load. Chebyshev nodes of the second kind integrate exactly with the semi-elliptic weight.
+    To first order a small gap that varies across the contact acts with its pressure-weighted mean. The half width is
+    that of one pair that carries the full load; Chebyshev nodes of the second kind integrate with the semi-elliptic
+    weight.
+
+    Args:
+        mesh: prepared mesh.
+        torque: on the pinion [N m], scalar.
+        pinion: modification of the pinion flank; None for the nominal involute.
+        wheel: modification of the wheel flank; None for the nominal involute.
+
+    Returns:
+        shape (pairs, slices, positions).
     """
-    count = mesh.resolution.patch_nodes
-    half_width = safe_sqrt(mesh.width_factor * force / mesh.pair.face_width)
+    pinion, wheel = pinion or NoModification(), wheel or NoModification()
+    sizes = mesh.resolution
+    count = sizes.patch_nodes
+    half_width = safe_sqrt(mesh.width_factor * _force(mesh, real(torque)) / mesh.pair.face_width)
     total = jnp.zeros((), mesh.phase.dtype)
     for k in range(1, count + 1):
         angle = np.pi * k / (count + 1)
@@ -143,4 +171,9 @@ def _removed(mesh: Mesh, force: Scalar, pinion: AbstractModification, wheel: Abs
         pinion_flank, wheel_flank = mesh.flanks(offset)
         weight = float(2 / (count + 1) * np.sin(angle) ** 2)
         total = total + weight * (pinion(pinion_flank) + wheel(wheel_flank))
-    return total
+    return jnp.broadcast_to(total, (sizes.pairs, sizes.slices, sizes.positions))
+
+
+def _force(mesh: Mesh, torque: Scalar) -> Scalar:
+    """Force on the line of action [N]."""
+    return 1e3 * torque / mesh.pair.pinion.base_radius

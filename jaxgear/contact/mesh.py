@@ -23,10 +23,10 @@ class Resolution(eqx.Module):
     Attributes:
         positions: mesh positions over one base pitch.
         slices: slices over the common face width.
-        pairs: tooth pairs carried along. Pair i runs at phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two
-            base pitches on either side of the pitch point: contact ratios up to 3.
-        patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks and
-            steep flanks over its own width; 1 takes the nominal contact point alone.
+        pairs: tooth pairs carried along. Pair i runs at phase + (pairs - 1) // 2 - i base pitches, so four pairs cover
+            two base pitches on either side of the pitch point: contact ratios up to 3.
+        patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks
+            and steep flanks over its own width; 1 takes the nominal contact point alone.
         newton_steps: steps of the contact solution.
     """
 
@@ -176,8 +176,8 @@ def prepare(pair: GearPair, *, compliance: Compliance | None = None, resolution:
 def _contact_points(pair: GearPair, contact: PathOfContact, path: Field) -> tuple[Field, Field, Field, Field, Field]:
     """Roll lengths of pinion and wheel at the contact, corner gap [um], lever and distance outside the path, per pair.
 
-    `phase` is the mean position of both gears: under a transmission error d the pinion leads it by d/2 and the wheel lags
-    by d/2, so a corner is d/2 farther out than its nominal position and its gap grows by half its slope times d.
+    `phase` is the mean position of both gears: under a transmission error d the pinion leads it by d/2 and the wheel
+    lags by d/2, so a corner is d/2 farther out than its nominal position and its gap grows by half its slope times d.
     """
     pinion_base, wheel_base = contact.pinion_base_radius, contact.wheel_base_radius
     before, after = contact.start - path, path - contact.end

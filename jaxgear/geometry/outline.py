@@ -49,7 +49,8 @@ class Outline(eqx.Module):
 def outline(gear: Gear) -> Outline:
     """Generates the outline of one gear.
 
-    Equations: the trochoid of the rack's tip arc in the frame of the tooth centreline, as in ISO 6336-3 (tool tip centre
+    Equations: the trochoid of the rack's tip arc in the frame of the tooth centreline, as in ISO 6336-3 (tool tip
+        centre
     E) written as a curve; its junction angle equals the involute's half tooth angle at d_Ff (ISO 21771).
     """
     alpha = jnp.deg2rad(gear.pressure_angle)

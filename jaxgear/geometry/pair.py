@@ -17,7 +17,8 @@ class GearPair(eqx.Module):
     Attributes:
         pinion: driving gear.
         wheel: driven gear.
-        center_distance: operating centre distance [mm]; None for the backlash-free one of the nominal tooth thicknesses.
+        center_distance: operating centre distance [mm]; None for the backlash-free one of the nominal tooth
+            thicknesses.
 
     Raises:
         ValueError: for gears that do not share module or pressure angle, an impossible centre distance, a contact ratio

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
-from ..numerics import check, concrete
+from ..numerics import check
 from .involute import diameter
 from .outline import outline
 
@@ -19,7 +19,7 @@ def check_pair(pair: "GearPair") -> None:
     if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(pair)):
         return
     for name, unit in (("module", "mm"), ("pressure_angle", "deg")):
-        ours, theirs = concrete(getattr(pair.pinion, name)), concrete(getattr(pair.wheel, name))
+        ours, theirs = np.asarray(getattr(pair.pinion, name)), np.asarray(getattr(pair.wheel, name))
         if not np.array_equal(ours, theirs):
             raise ValueError(
                 f"GearPair: wheel {name} = {float(theirs.flat[0]):g} {unit} must equal the pinion's, "
@@ -48,7 +48,7 @@ def _check_contact(pair: "GearPair") -> None:
     from .path import path_of_contact
 
     path = path_of_contact(pair)
-    ratio = concrete(path.contact_ratio)
+    ratio = np.asarray(path.contact_ratio)
     if (ratio < 1).any():
         raise ValueError(
             f"GearPair: contact ratio = {float(ratio.min()):.4g} must be at least 1: raise a tip_diameter or addendum, "
@@ -63,11 +63,11 @@ def _check_contact(pair: "GearPair") -> None:
 
 
 def _check_interference(name: str, gear: "Gear", rho, mate: str) -> None:
-    form = concrete(diameter(gear, outline(gear).form_roll_length))
-    reached = concrete(diameter(gear, rho))
+    form = np.asarray(diameter(gear, outline(gear).form_roll_length))
+    reached, inside = np.asarray(diameter(gear, rho)), np.asarray(rho) < 0
     # a micrometre of the radius below the form circle is within the accuracy of any generated outline
-    if (concrete(rho) < 0).any() or (reached < form - 2e-3).any():
-        below = " (below the base circle)" if (concrete(rho) < 0).any() else ""
+    if inside.any() or (reached < form - 2e-3).any():
+        below = " (below the base circle)" if inside.any() else ""
         raise ValueError(
             f"GearPair: {mate} tip_diameter reaches the {name}'s flank at diameter {float(reached.flat[0]):.6g} mm"
             f"{below}, must be at least its form diameter {float(form.flat[0]):.6g} mm"

@@ -22,7 +22,8 @@ def flash_temperature(cycle: MeshCycle, speed, *, friction=0.06) -> Load:
     Args:
         cycle: solved mesh cycle.
         speed: of the pinion [rpm], scalar.
-        friction: mean coefficient of friction; 0.06 is the leading constant of ISO/TR 13989-1 at unit load and speed terms.
+        friction: mean coefficient of friction; 0.06 is the leading constant of ISO/TR 13989-1 at unit load and speed
+            terms.
 
     Raises:
         ValueError: for a negative speed or friction.

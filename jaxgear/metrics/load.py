@@ -32,8 +32,9 @@ def load_sharing(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
 def effective_contact_ratio(cycle: MeshCycle) -> Scalar:
     """Loaded length of the path of contact in base pitches, the mean number of loaded pairs.
 
-    A pair counts as loaded where any of its slices is. Ends of contact are interpolated linearly between positions, so the
-    value changes continuously with the design. Above the theoretical contact ratio the teeth meet with their corners.
+    A pair counts as loaded where any of its slices is. Ends of contact are interpolated linearly between positions, so
+    the value changes continuously with the design. Above the theoretical contact ratio the teeth meet with their
+    corners.
     """
     return jnp.sum(jnp.mean(_loaded_fraction(cycle), axis=-1))
 
@@ -43,8 +44,8 @@ def contact_shock(cycle: MeshCycle) -> ContactShock:
     mesh = cycle.mesh
     contact, fraction = mesh.path_of_contact, _loaded_fraction(cycle)
     step = contact.base_pitch / mesh.resolution.positions
-    # Every step [path, path + step] counts with its loaded length minus the part of it that lies on the theoretical path:
-    # contact is unbroken, so a step across an end of the path is loaded on the inside first.
+    # Every step [path, path + step] counts with its loaded length minus the part of it that lies on the theoretical
+    # path: contact is unbroken, so a step across an end of the path is loaded on the inside first.
     before = jnp.clip(contact.start - mesh.path, 0.0, step)
     after = jnp.clip(mesh.path + step - contact.end, 0.0, step)
     corner_force = jnp.where(mesh.outside > 0, cycle.pair_force, 0.0)

@@ -15,8 +15,8 @@ def loss_factor(cycle: MeshCycle) -> Scalar:
 
         H_VL = 1 / (p_et b) int int (f_N b / F_bt) (v_g / v_tb) dx dy
 
-    with the line load f_N of this cycle, the sliding speed v_g and the speed of the base circles v_tb. Corner contact counts
-    with the sliding speed at its path position. Zero at zero torque.
+    with the line load f_N of this cycle, the sliding speed v_g and the speed of the base circles v_tb. Corner contact
+    counts with the sliding speed at its path position. Zero at zero torque.
 
     References:
         A. Wimmer, Lastverluste von Stirnradverzahnungen, TU Muenchen 2006.

@@ -24,8 +24,8 @@ def flank_pressure(cycle: MeshCycle) -> Load:
 def corner_pressure(cycle: MeshCycle) -> Load:
     """Pressure of the rounded tip edge on the mate's involute [MPa]; zero on the path of contact.
 
-    1 / R = 1 / tip_edge_radius + 1 / rho_mate, taken as an elastic cylinder on the flank: 7 % (edge radius 0.2 mm) to about
-    50 % (0.002 mm) above the exact solution of a rounded edge.
+    1 / R = 1 / tip_edge_radius + 1 / rho_mate, taken as an elastic cylinder on the flank: 7 % (edge radius 0.2 mm) to
+    about 50 % (0.002 mm) above the exact solution of a rounded edge.
     """
     mesh = cycle.mesh
     before = mesh.path < mesh.path_of_contact.start

@@ -39,7 +39,8 @@ def describe(cycle: MeshCycle) -> str:
     return "\n".join(
         [
             f"MeshCycle at {float(values['torque_Nm']):g} N m, {cycle.phase.shape[0]} positions, {state}",
-            f"  transmission error   mean {float(values['mean_te_um']):.3f} um, peak to peak {float(values['ppte_um']):.3f} um",
+            f"  transmission error   mean {float(values['mean_te_um']):.3f} um, "
+            f"peak to peak {float(values['ppte_um']):.3f} um",
             f"  flank pressure       max {float(values['max_flank_pressure_MPa']):.0f} MPa",
             f"  root stress          pinion {float(values['pinion_root_stress_MPa']):.0f} MPa, "
             f"wheel {float(values['wheel_root_stress_MPa']):.0f} MPa",

@@ -1,10 +1,12 @@
 """Tooth-root stress after ISO 6336-3 Method B, at the real contact point and under the real pair load.
 
-The standard evaluates the form factor Y_F and the stress correction Y_S at the outer point of single contact with the full
-load. Here the critical section (30 degree tangent) is the same, and the lever arm follows the contact along the flank.
+The standard evaluates the form factor Y_F and the stress correction Y_S at the outer point of single contact with the
+full load. Here the critical section (30 degree tangent) is the same, and the lever arm follows the contact along the
+flank.
 
 References:
-    ISO 6336-3:2006 clause 6, with the sign of the last term of h_Fe as in the 2019 edition (the 2006 print drops a minus).
+    ISO 6336-3:2006 clause 6, with the sign of the last term of h_Fe as in the 2019 edition (the 2006 print drops a
+    minus).
 """
 
 import equinox as eqx
@@ -87,7 +89,7 @@ def root_factors(gear: Gear, roll_length: Real) -> RootFactors:
 
 
 def root_stress(cycle: MeshCycle) -> RootStress:
-    """Nominal local root stress sigma_F0 = f_t / m Y_F Y_S of both gears [MPa], f_t the tangential line load of a slice."""
+    """Nominal local root stress sigma_F0 = f_t / m Y_F Y_S of both gears [MPa], f_t tangential line load."""
     mesh = cycle.mesh
 
     def stress(gear, load):

@@ -51,7 +51,8 @@ class RootRelief(AbstractModification):
 
 
 class ProfileCrowning(AbstractModification):
-    """Profile crowning C_alpha: parabola with zero in the middle of the active profile and `amount` [um] at its ends."""
+    """Profile crowning C_alpha: parabola with zero in the middle of the active profile and `amount` [um] at its
+    ends."""
 
     amount: Float[Array, ""] = eqx.field(converter=real)
 

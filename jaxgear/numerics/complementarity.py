@@ -14,6 +14,7 @@ All arrays keep the positions innermost and the P springs are unrolled: XLA then
 """
 
 from functools import partial
+from operator import itemgetter
 from typing import NamedTuple
 
 import equinox as eqx
@@ -50,8 +51,8 @@ class ContactSolution(eqx.Module):
     Attributes:
         line_load: q, shape (pairs, slices, positions).
         approach: d, shape (positions,).
-        opening: y without the spring's own deflection, C q + gap - lever d, shape (pairs, slices, positions): the remaining gap
-            where it is positive, minus the contact deflection h(q) where the spring is loaded.
+        opening: y without the spring's own deflection, C q + gap - lever d, shape (pairs, slices, positions): the
+            remaining gap where it is positive, minus the contact deflection h(q) where the spring is loaded.
         residual: largest violation of any condition, relative to the approach and to the load, shape (positions,).
     """
 
@@ -180,7 +181,7 @@ def _eliminate(problem, state, first: Rows, second: Rows) -> tuple[Rows, Rows]:
     pivot: list[Array] = []
     a, b = list(first), list(second)
     for i in range(count):
-        row = {}
+        row: dict[int, Array] = {}
         diagonal = jnp.where(active[i], problem.compliance[i, i][None] + slopes[i], 1.0)
         for j in range(i):
             entry = jnp.where(active[i] & active[j], problem.compliance[i, j][None], 0.0)
@@ -203,7 +204,7 @@ def _eliminate(problem, state, first: Rows, second: Rows) -> tuple[Rows, Rows]:
 
 def _deflection(problem, load: Rows) -> Rows:
     """h of every spring."""
-    return [jax.tree.map(lambda leaf: leaf[i], problem.law).deflection(q) for i, q in enumerate(load)]
+    return [jax.tree.map(itemgetter(i), problem.law).deflection(q) for i, q in enumerate(load)]
 
 
 def _mismatch(problem, load: Rows, deflection: Rows, approach) -> Rows:

@@ -23,8 +23,8 @@ Parameters = Mapping[str, Float[Array, ""]]
 Design = Callable[[Parameters], tuple[AbstractModification | None, AbstractModification | None]]
 Callback = Callable[[int, int, float], None]
 
-# Widths of the soft extremes in the stages of the search, relative to the PPTE at the middle of the box: from wide, where
-# most positions pull, to narrow, where the soft PPTE is within about a percent of the true one.
+# Widths of the soft extremes in the stages of the search, relative to the PPTE at the middle of the box: from wide,
+# where most positions pull, to narrow, where the soft PPTE is within about a percent of the true one.
 _STAGE_WIDTHS = (0.3, 0.1, 0.03, 0.01, 0.003)
 _FIRST_RATE, _LAST_RATE = 0.05, 0.002  # step sizes of Adam in the unit box, first and last stage
 _CHUNK = 20  # steps between two looks at the search: progress and interruption

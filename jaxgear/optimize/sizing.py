@@ -57,7 +57,7 @@ def iso_stiffness(pair: GearPair, line_load=_LIGHT_LOAD) -> IsoStiffness:
 
 
 def long_relief_length(pair: GearPair) -> Scalar:
-    """Roll length from the outer point of single contact to the tip, p_b (eps - 1) [mm]: the whole double-contact zone."""
+    """Roll length of the double-contact zone, p_b (eps - 1) [mm]: from the outer point of single contact to the tip."""
     path = path_of_contact(pair)
     return path.base_pitch * (path.contact_ratio - 1)
 
