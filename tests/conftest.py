@@ -22,7 +22,7 @@ def _compilation_cache() -> Path:
 
 try:
     jax.config.update("jax_compilation_cache_dir", str(_compilation_cache()))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
 except OSError:  # a read-only home: the tests run all the same, only slower
     pass

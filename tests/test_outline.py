@@ -1,0 +1,109 @@
+"""The generated tooth outline: trochoid, its junction with the involute, undercut."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxgear as jg
+from jaxgear.geometry import outline
+from jaxgear.geometry.involute import half_tooth_angle
+from jaxgear.geometry.outline import involute_point, trochoid
+
+ROOT_HALF_ANGLES = {17: 0.177, 20: 0.15064, 30: 0.10043, 48: 0.063, 50: 0.06026}
+
+
+def gear(teeth, module=1.0, shift=0.0, **rack):
+    return jg.Gear(teeth, module, 20.0, shift, face_width=10.0, **rack)
+
+
+@pytest.mark.parametrize("teeth", [19, 20, 30, 43, 48])
+def test_fillet_meets_the_involute_tangentially(teeth):
+    tooth = outline(gear(teeth))
+    assert float(tooth.undercut) == 0.0
+    g = jnp.deg2rad(20.0)
+    x, y = trochoid(tooth.gear, g)
+    assert float(jnp.arctan2(x, y)) == pytest.approx(
+        float(half_tooth_angle(tooth.gear, tooth.form_roll_length)), abs=1e-12
+    )
+    np.testing.assert_allclose((x, y), involute_point(tooth.gear, tooth.form_roll_length), rtol=1e-12)
+    np.testing.assert_allclose(float(tooth.junction_height), y, rtol=1e-14)
+
+    _, fillet = jax.jvp(lambda g: trochoid(tooth.gear, g), (g,), (-jnp.ones_like(g),))
+    rho = tooth.form_roll_length
+    _, flank = jax.jvp(lambda r: involute_point(tooth.gear, r), (rho,), (jnp.ones_like(rho),))
+    assert float(jnp.arctan2(*fillet)) == pytest.approx(float(jnp.arctan2(*flank)), abs=1e-9)
+
+
+@pytest.mark.parametrize(("teeth", "angle"), ROOT_HALF_ANGLES.items())
+def test_fillet_starts_on_the_root_circle(teeth, angle):
+    tooth = outline(gear(teeth, 2.0))
+    x, y = trochoid(tooth.gear, jnp.asarray(jnp.pi / 2))
+    radius = float(tooth.gear.root_circle_radius)
+    assert float(jnp.hypot(x, y)) == pytest.approx(radius, rel=1e-14)
+    assert float(tooth.root_half_angle) == pytest.approx(angle, abs=6e-4 if angle in (0.177, 0.063) else 6e-6)
+    assert float(tooth.root_height) == pytest.approx(float(y), rel=1e-14)
+    # the root circle is the envelope of the tool tip: the fillet leaves it tangentially
+    _, direction = jax.jvp(lambda g: trochoid(tooth.gear, g), (jnp.asarray(jnp.pi / 2),), (jnp.ones(()),))
+    assert float(x * direction[0] + y * direction[1]) == pytest.approx(0.0, abs=1e-10)
+
+
+def test_form_diameter_of_iso_21771():
+    tooth = outline(gear(30, 2.0))
+    assert float(jg.diameter(tooth.gear, tooth.form_roll_length)) == pytest.approx(57.068, abs=5e-4)
+    alpha = np.deg2rad(20.0)
+    depth = 1.25 - 0.38 * (1 - np.sin(alpha))
+    printed = np.hypot(60 * np.sin(alpha) - 2 * depth * 2.0 / np.sin(alpha), 60 * np.cos(alpha))
+    assert float(jg.diameter(tooth.gear, tooth.form_roll_length)) == pytest.approx(printed, rel=1e-13)
+
+
+def undercut_limit(teeth, dedendum=1.25, radius=0.38):
+    """Least profile shift without undercut."""
+    sine = np.sin(np.deg2rad(20.0))
+    return dedendum - radius * (1 - sine) - teeth * sine**2 / 2
+
+
+@pytest.mark.parametrize("teeth", [8, 12, 16])
+def test_undercut_begins_at_the_limiting_profile_shift(teeth):
+    limit = undercut_limit(teeth)
+    assert float(outline(gear(teeth, shift=limit + 1e-6)).undercut) == 0.0
+    assert float(outline(gear(teeth, shift=limit - 1e-6)).undercut) == 1.0
+    assert float(outline(gear(teeth, shift=limit)).form_roll_length) == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(("teeth", "shift"), [(12, 0.0), (10, 0.0), (8, 0.2), (14, -0.1)])
+def test_undercut_junction_lies_on_both_curves(teeth, shift):
+    tooth = outline(gear(teeth, 3.0, shift))
+    assert float(tooth.undercut) == 1.0
+    on_fillet = trochoid(tooth.gear, tooth.junction)
+    on_flank = involute_point(tooth.gear, tooth.form_roll_length)
+    np.testing.assert_allclose(on_fillet, on_flank, atol=1e-9)
+    assert float(tooth.form_roll_length) > 0.1, "the cut lies above the base circle"
+    # the first crossing from above: everywhere higher the fillet lies outside the tooth
+    above = trochoid(tooth.gear, jnp.linspace(jnp.deg2rad(20.0), float(tooth.junction) - 1e-3, 30))
+    radius = jnp.hypot(*above)
+    valid = radius > tooth.gear.base_radius
+    rho = jnp.sqrt(jnp.maximum(radius**2 - tooth.gear.base_radius**2, 0.0))
+    excess = jnp.arctan2(*above) - half_tooth_angle(tooth.gear, rho)
+    assert bool(jnp.all(jnp.where(valid, excess, 1.0) > 0))
+
+
+def test_more_undercut_with_fewer_teeth():
+    heights = [float(jg.diameter(t.gear, t.form_roll_length)) / float(t.gear.base_radius) for t in
+               (outline(gear(z)) for z in (15, 12, 9))]  # fmt: skip
+    assert heights[0] < heights[1] < heights[2]
+
+
+@pytest.mark.parametrize(("teeth", "shift"), [(30, 0.2), (12, -0.05)])
+def test_derivatives_of_the_outline_by_module_and_shift(teeth, shift):
+    """Also through the root of the undercut junction; all lengths scale with the module."""
+
+    def numbers(x):
+        tooth = outline(jg.Gear(float(teeth), x[0], 20.0, x[1], face_width=10.0))
+        return jnp.stack([tooth.form_roll_length, tooth.root_half_angle, tooth.junction, tooth.junction_height])
+
+    x, h = jnp.asarray([2.0, shift]), 1e-6
+    around = x[None] + h * jnp.asarray([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    value, jacobian, steps = jax.jit(lambda x, a: (numbers(x), jax.jacfwd(numbers)(x), jax.vmap(numbers)(a)))(x, around)
+    np.testing.assert_allclose(jacobian.T, (steps[:2] - steps[2:]) / (2 * h), rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(jacobian[:, 0] * 2.0, value * jnp.asarray([1.0, 0.0, 0.0, 1.0]), atol=1e-9)
