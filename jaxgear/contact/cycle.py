@@ -101,8 +101,8 @@ def solve(
     Raises:
         ValueError: for a negative or non-finite torque.
     """
-    removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-    return solve_removed(mesh, torque, removed)
+    check("solve", "torque", torque, "N m", low=0.0)
+    return _solve(mesh, real(torque), pinion, wheel)
 
 
 def solve_removed(mesh: Mesh, torque, removed: Load) -> MeshCycle:
@@ -113,8 +113,18 @@ def solve_removed(mesh: Mesh, torque, removed: Load) -> MeshCycle:
         torque: on the pinion [N m], scalar.
         removed: material removed from both flanks together at every contact [um], as `removed_material` gives it.
     """
-    check("solve", "torque", torque, "N m", low=0.0)
-    torque = real(torque).astype(mesh.phase.dtype)
+    check("solve_removed", "torque", torque, "N m", low=0.0)
+    return _solve_removed(mesh, real(torque), removed)
+
+
+@eqx.filter_jit
+def _solve(mesh: Mesh, torque: Scalar, pinion, wheel) -> MeshCycle:
+    return _solve_removed(mesh, torque, removed_material(mesh, torque, pinion=pinion, wheel=wheel))
+
+
+@eqx.filter_jit
+def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> MeshCycle:
+    torque = torque.astype(mesh.phase.dtype)
     force = _force(mesh, torque)
     gap = mesh.corner_gap[:, None] + removed
     problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, force)

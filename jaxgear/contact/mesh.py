@@ -141,8 +141,13 @@ def prepare(pair: GearPair, *, compliance: Compliance | None = None, resolution:
     """
     compliance = default_compliance() if compliance is None else compliance
     resolution = Resolution() if resolution is None else resolution
+    _check_cover(path_of_contact(pair), resolution)
+    return _prepare(pair, compliance, resolution)
+
+
+@eqx.filter_jit
+def _prepare(pair: GearPair, compliance: Compliance, resolution: Resolution) -> Mesh:
     contact = path_of_contact(pair)
-    _check_cover(contact, resolution)
     dtype = jnp.result_type(contact.start)
     phase = jnp.arange(resolution.positions, dtype=dtype) / resolution.positions
     offset = resolution.leading - jnp.arange(resolution.pairs, dtype=dtype)

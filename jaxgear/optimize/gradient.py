@@ -23,9 +23,9 @@ Parameters = Mapping[str, Float[Array, ""]]
 Design = Callable[[Parameters], tuple[AbstractModification | None, AbstractModification | None]]
 Callback = Callable[[int, int, float], None]
 
-# Widths of the soft extremes in the stages of the search, relative to the PPTE at the middle of the box: from wide,
+# Widths of the soft extremes in the stages of the search, relative to the best PPTE among the start points: from wide,
 # where most positions pull, to narrow, where the soft PPTE is within about a percent of the true one.
-_STAGE_WIDTHS = (0.3, 0.1, 0.03, 0.01, 0.003)
+_STAGE_WIDTHS = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 _FIRST_RATE, _LAST_RATE = 0.05, 0.002  # step sizes of Adam in the unit box, first and last stage
 _CHUNK = 20  # steps between two looks at the search: progress and interruption
 _AT_BOUND = 1e-6  # a parameter this close to a bound, relative to its range, is at the bound
@@ -63,8 +63,8 @@ def minimize(
     *,
     mesh: Mesh,
     torque,
-    starts: int = 32,
-    steps: int = 400,
+    starts: int = 16,
+    steps: int = 300,
     callback: Callback | None = None,
 ) -> Optimum:
     """Finds the parameters of a modification with the least PPTE at one torque.
@@ -82,7 +82,7 @@ def minimize(
         callback: called as callback(step, steps, best PPTE) between chunks of steps.
 
     Returns:
-        the best design met at the end of any stage of any start.
+        the best design met at any step of any start.
 
     Raises:
         ValueError: for empty or reversed bounds, or too few starts or steps.
@@ -105,17 +105,17 @@ def minimize(
         history.append(search.best_value)
         if callback is not None:
             callback(done, steps, search.best_value)
-    x = jnp.asarray(search.best_point)
     if not np.isfinite(search.best_value):
         raise RuntimeError("minimize: no design within the bounds gave a converged contact solution")
+    x = jnp.asarray(search.best_point)
     pinion, wheel = build(x)
     return Optimum(
         parameters={name: float(value) for name, value in zip(names, low + x * (high - low))},
         pinion=pinion,
         wheel=wheel,
-        cycle=eqx.filter_jit(cycle_of)(x, mesh, torque),
+        cycle=solve(mesh, torque, pinion=pinion, wheel=wheel),
         ppte=search.best_value,
-        gradient_norm=search.projected_gradient_norm(x),
+        gradient_norm=search.projected_gradient_norm(),
         active_bounds=_active_bounds(names, np.asarray(x)),
         evaluations=search.evaluations,
         history=np.asarray(history),
@@ -123,7 +123,7 @@ def minimize(
 
 
 class _Search:
-    """All starts advancing together; keeps the best true PPTE seen at a chunk's end."""
+    """All starts advancing together; keeps the best true PPTE met at any step."""
 
     def __init__(self, cycle_of, mesh, torque, points):
         self._mesh, self._torque, self._points = mesh, torque, points
@@ -132,58 +132,63 @@ class _Search:
         def score(x, width, mesh, torque):
             cycle = cycle_of(x, mesh, torque)
             curve = cycle.transmission_error
-            true = jnp.where(jnp.all(cycle.converged), peak_to_peak(curve), jnp.inf)
-            return smooth_peak_to_peak(curve, width), jnp.where(jnp.isfinite(true), true, jnp.inf)
+            true = peak_to_peak(curve)
+            return smooth_peak_to_peak(curve, width), jnp.where(jnp.all(cycle.converged), true, jnp.nan)
 
-        def advance(points, width, rates, mesh, torque):
+        def advance(points, width, rate, mesh, torque):
             gradient = jax.vmap(jax.grad(score, has_aux=True), (0, None, None, None))
 
-            def step(carry, rate):
-                points, moments = carry
-                slopes, _ = gradient(points, width, mesh, torque)
+            def step(carry, _):
+                points, moments, best, best_points, _ = carry
+                slopes, values = gradient(points, width, mesh, torque)
                 slopes = jnp.where(jnp.isfinite(slopes), slopes, 0.0)
-                update, moments = optax.scale_by_adam().update(slopes, moments)
-                return (jnp.clip(points - rate * update, 0.0, 1.0), moments), None
+                better = values < best  # False for NaN, so a failed design is never the best
+                best, best_points = jnp.where(better, values, best), jnp.where(better[:, None], points, best_points)
+                update, moments = adam.update(slopes, moments)
+                return (jnp.clip(points - rate * update, 0.0, 1.0), moments, best, best_points, slopes), None
 
-            (points, _), _ = jax.lax.scan(step, (points, optax.scale_by_adam().init(points)), rates)
-            return points, jax.vmap(lambda x: score(x, width, mesh, torque)[1])(points)
+            adam = optax.scale_by_adam()
+            nothing = jnp.full(points.shape[0], jnp.inf, points.dtype)
+            start = (points, adam.init(points), nothing, points, jnp.zeros_like(points))
+            (points, _, best, best_points, slopes), _ = jax.lax.scan(step, start, length=_CHUNK)
+            return points, best, best_points, slopes
 
-        self._score = eqx.filter_jit(score)
-        self._slope = eqx.filter_jit(jax.grad(lambda *args: score(*args)[0]))
         self._advance = eqx.filter_jit(advance)
 
     def run(self, steps: int):
         """Runs the stages, yielding the number of steps done after every chunk."""
+        chunks = max(-(-steps // _CHUNK), len(_STAGE_WIDTHS))
         scale = self._scale()
-        chunks = max(steps // _CHUNK, len(_STAGE_WIDTHS))
-        length = max(steps // chunks, 1)
-        dtype = self._points.dtype
-        rates = np.geomspace(_FIRST_RATE, _LAST_RATE, chunks)
-        for chunk, rate in enumerate(rates):
-            stage = chunk * len(_STAGE_WIDTHS) // chunks
-            self._width = jnp.asarray(_STAGE_WIDTHS[stage] * scale, dtype)
-            ramp = jnp.full((length,), rate, dtype)
-            self._points, values = self._advance(self._points, self._width, ramp, self._mesh, self._torque)
-            self.evaluations += self._points.shape[0] * (length + 1)
-            self._keep(np.asarray(values))
-            yield (chunk + 1) * steps // chunks
+        for chunk, rate in enumerate(np.geomspace(_FIRST_RATE, _LAST_RATE, chunks)):
+            self._width = _STAGE_WIDTHS[chunk * len(_STAGE_WIDTHS) // chunks] * scale
+            self._points, _ = self._look(self._points, rate)
+            yield min((chunk + 1) * _CHUNK, steps)
 
-    def projected_gradient_norm(self, x) -> float:
-        """Gradient norm of the last stage's objective without components that push against a bound."""
-        slope = np.asarray(self._slope(x, self._width, self._mesh, self._torque))
-        x = np.asarray(x)
+    def projected_gradient_norm(self) -> float:
+        """Gradient norm of the last stage's objective at the best point, without components that push at a bound."""
+        x = self.best_point
+        _, slopes = self._look(jnp.broadcast_to(jnp.asarray(x), self._points.shape), 0.0)
+        slope = np.asarray(slopes[0])
         pushing = ((x <= _AT_BOUND) & (slope > 0)) | ((x >= 1 - _AT_BOUND) & (slope < 0))
         return float(np.linalg.norm(np.where(pushing, 0.0, slope)))
 
-    def _scale(self) -> float:
-        """PPTE in the middle of the box [um], the yardstick of the stage widths."""
-        _, value = self._score(self._points[0], jnp.ones((), self._points.dtype), self._mesh, self._torque)
-        return max(float(value), 1e-3) if np.isfinite(value) else 1.0
-
-    def _keep(self, values):
-        best = int(np.argmin(np.where(np.isfinite(values), values, np.inf)))
+    def _look(self, points, rate):
+        """A chunk of steps at one rate; at rate zero the points stay and are only evaluated."""
+        dtype = points.dtype
+        points, values, candidates, slopes = self._advance(
+            points, jnp.asarray(self._width, dtype), jnp.asarray(rate, dtype), self._mesh, self._torque
+        )
+        self.evaluations += points.shape[0] * _CHUNK
+        best = int(np.argmin(values))
         if values[best] < self.best_value:
-            self.best_value, self.best_point = float(values[best]), np.asarray(self._points[best])
+            self.best_value, self.best_point = float(values[best]), np.asarray(candidates[best])
+        return points, slopes
+
+    def _scale(self) -> float:
+        """Best PPTE among the start points [um], the yardstick of the stage widths."""
+        self._width = 1.0
+        self._look(self._points, 0.0)
+        return max(self.best_value, 1e-3) if np.isfinite(self.best_value) else 1.0
 
 
 def _box(bounds):

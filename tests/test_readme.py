@@ -1,0 +1,29 @@
+"""The README keeps its promises: its script runs and its commands are the ones that CI runs."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_script_runs_as_printed(capsys):
+    (script,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    names: dict = {}
+    exec(compile(script, "README.md", "exec"), names)
+    assert capsys.readouterr().out.count("converged") == 3
+    assert names["best"].ppte < 0.25 * float(names["jg"].peak_to_peak(names["unmodified"].transmission_error))
+
+
+def test_both_commands_stand_in_it():
+    assert (
+        "python -m venv .venv && .venv/bin/pip install . && .venv/bin/jaxgear optimize examples/spur_19_48.toml"
+        in README
+    )
+    assert "python -m venv .venv && .venv/bin/pip install -e '.[test]' && .venv/bin/pytest" in README
+
+
+def test_files_it_names_exist():
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        if not target.startswith("http"):
+            assert (ROOT / target).exists(), target
