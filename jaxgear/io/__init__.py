@@ -1,0 +1,10 @@
+"""Files: design files (TOML) in, results (JSON, CSV) out."""
+
+from .design_file import DesignFile as DesignFile
+from .design_file import load_design as load_design
+from .errors import DesignFileError as DesignFileError
+from .folder import result_folder as result_folder
+from .results import describe as describe
+from .results import flank_rows as flank_rows
+from .results import write_flanks as write_flanks
+from .results import write_summary as write_summary

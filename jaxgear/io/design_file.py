@@ -1,0 +1,237 @@
+"""Design files: a gear pair, its load, its flank modifications and their free parameters, as TOML."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from ..compliance import Beam, Compliance, ElasticRing, legacy_compliance
+from ..contact import Mesh, Resolution, prepare
+from ..geometry import Gear, GearPair, Material
+from ..microgeometry import AbstractModification
+from . import schema, template
+from .errors import DesignFileError, suggestion
+from .toml import decode, join, read
+
+T = TypeVar("T")
+
+# Torques of interest where the file names none, relative to the design torque.
+_TORQUE_RANGE = (0.5, 2.0)
+
+
+@dataclass(frozen=True)
+class DesignFile:
+    """A design file, checked: what it says is physically possible.
+
+    Attributes:
+        path: the file.
+        title: free text, the file's stem if it has none.
+        torque: design torque on the pinion [N m].
+        torque_range: lowest and highest torque of interest [N m].
+        speed: of the pinion [rpm], None if the file names none.
+        friction: mean coefficient of friction; used with a speed only, None for the library's default.
+        bounds: (low, high) of every free parameter, in its unit.
+        units: unit of every free parameter, "" for a pure number.
+        starts, steps: of the gradient search, None for the library's default.
+        application_factor: K_A of the rule-based relief.
+    """
+
+    path: Path
+    title: str
+    torque: float
+    torque_range: tuple[float, float]
+    speed: float | None
+    friction: float | None
+    bounds: dict[str, tuple[float, float]]
+    units: dict[str, str]
+    starts: int | None
+    steps: int | None
+    application_factor: float
+    _pair: GearPair
+    _compliance: Compliance
+    _resolution: Resolution
+    _parts: tuple[list[template.Part], list[template.Part]]
+
+    def pair(self) -> GearPair:
+        """The gear pair."""
+        return self._pair
+
+    def resolution(self) -> Resolution:
+        """The array sizes that the file asks for."""
+        return self._resolution
+
+    def mesh(self, resolution: Resolution | None = None) -> Mesh:
+        """The prepared mesh.
+
+        Args:
+            resolution: array sizes in place of the file's.
+
+        Raises:
+            DesignFileError: when the resolution does not cover the path of contact.
+        """
+        resolution = self._resolution if resolution is None else resolution
+        key, compliance = "resolution", self._compliance
+        return _physical(self.path, key, prepare, self._pair, compliance=compliance, resolution=resolution)
+
+    def design(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
+        """Modifications of pinion and wheel; pure and traceable.
+
+        Args:
+            parameters: value of every free parameter, scalar.
+        """
+        if set(parameters) != set(self.bounds):
+            raise ValueError(
+                f"design: parameters {', '.join(sorted(parameters)) or '(none)'} must be those of the file: "
+                f"{', '.join(sorted(self.bounds)) or '(none)'}"
+            )
+        pinion, wheel = self._parts
+        return template.build(pinion, parameters), template.build(wheel, parameters)
+
+
+def load_design(path: str | Path) -> DesignFile:
+    """Reads and checks a design file.
+
+    Args:
+        path: TOML file; the README shows its layout.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
+    """
+    file = Path(path)
+    top = decode(file, "", read(file), schema.FileSection)
+
+    def section(name: str, struct: type[T]) -> T:
+        return decode(file, name, getattr(top, name) or {}, struct)  # type: ignore[type-var]
+
+    gears, parts = [], []
+    for name in ("pinion", "wheel"):
+        gear = section(name, schema.GearSection)
+        gears.append(_gear(file, name, gear))
+        keys = [f"{name}.modification[{i}]" for i in range(len(gear.modification))]
+        parts.append([template.parse_modification(file, key, table) for key, table in zip(keys, gear.modification)])
+    pair = _physical(file, "pair", GearPair, *gears, **_given(section("pair", schema.PairSection)))
+    load = _load(file, section("load", schema.LoadSection))
+    optimize = section("optimize", schema.OptimizeSection)
+    if top.optimize is not None and not top.variables:
+        raise DesignFileError(file, "optimize", "has no effect without [variables]")
+    bounds, units = _variables(file, top.variables or {}, [*parts[0], *parts[1]])
+    factor = 1.0 if optimize.application_factor is None else optimize.application_factor
+    _number(file, "optimize.application_factor", factor, above=0.0)
+    return DesignFile(
+        path=file,
+        title=top.title or file.stem,
+        torque=load.torque,
+        torque_range=load.torque_range or tuple(share * load.torque for share in _TORQUE_RANGE),  # type: ignore[arg-type]
+        speed=load.speed,
+        friction=load.friction,
+        bounds=bounds,
+        units=units,
+        starts=optimize.starts,
+        steps=optimize.steps,
+        application_factor=factor,
+        _pair=pair,
+        _compliance=_compliance(file, section("model", schema.ModelSection)),
+        _resolution=Resolution(**_given(section("resolution", schema.ResolutionSection))),
+        _parts=(parts[0], parts[1]),
+    )
+
+
+def _gear(file: Path, name: str, section: schema.GearSection) -> Gear:
+    key = join(name, "material")
+    constants = decode(file, key, section.material or {}, schema.MaterialSection)
+    # never the library's STEEL: it was made at import, possibly in single precision
+    material = _physical(file, key, Material, **_given(constants))
+    numbers = {key: value for key, value in _given(section).items() if key not in ("material", "modification")}
+    return _physical(file, name, Gear, **{**numbers, "teeth": float(section.teeth)}, material=material)
+
+
+def _load(file: Path, load: schema.LoadSection) -> schema.LoadSection:
+    _number(file, "load.torque", load.torque, above=0.0, unit=" N m")
+    if load.torque_range is not None:
+        low, high = load.torque_range
+        _number(file, "load.torque_range[0]", low, above=0.0, unit=" N m")
+        _number(file, "load.torque_range[1]", high, above=low, unit=" N m")
+    if load.speed is not None:
+        _number(file, "load.speed", load.speed, above=0.0, unit=" rpm")
+    if load.friction is not None:
+        if load.speed is None:
+            raise DesignFileError(file, "load.friction", "has no effect without load.speed (flash temperature)")
+        _number(file, "load.friction", load.friction, above=0.0)
+    return load
+
+
+def _compliance(file: Path, model: schema.ModelSection) -> Compliance:
+    given = set(_given(model)) - {"preset"}
+    if model.preset == "legacy":
+        if given:
+            raise DesignFileError(file, f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
+        return legacy_compliance()
+    body = _choice(file, "model.body", model.body or "ring", schema.BODIES)
+    contact = _choice(file, "model.contact", model.contact or "depth", schema.CONTACTS)
+    options = {name: getattr(model, name) for name in ("hub_windup", "coupling") if name in given}
+    if options and body is not ElasticRing:
+        raise DesignFileError(file, f"model.{min(options)}", f'has no effect with body = "{model.body}"')
+    return Compliance(Beam(), body(**options), contact(), model.plane or "stress")
+
+
+def _variables(file: Path, tables: schema.Table, parts: list[template.Part]):
+    """Bounds and units of the free parameters, each declared once and used at least once."""
+    bounds: dict[str, tuple[float, float]] = {}
+    units: dict[str, str] = {}
+    for name, table in tables.items():
+        key = f"variables.{name}"
+        variable = decode(file, key, table, schema.VariableSection)
+        _number(file, f"{key}.low", variable.low)
+        _number(file, f"{key}.high", variable.high, above=variable.low)
+        bounds[name] = (variable.low, variable.high)
+    for part in parts:
+        for free, unit in part.free():
+            if free.name not in bounds:
+                known = suggestion(free.name, bounds) if bounds else "there is no [variables] table"
+                raise DesignFileError(file, free.key, f'"{free.name}" is not a variable, {known}')
+            other = units.setdefault(free.name, unit)
+            if other != unit:
+                problem = f"{free.name} stands for {_quantity(unit)} here and for {_quantity(other)} elsewhere"
+                raise DesignFileError(file, free.key, problem)
+    for name, table in tables.items():
+        if name not in units:
+            raise DesignFileError(file, f"variables.{name}", "is declared but used in no modification")
+        unit = table.get("unit")
+        if unit is not None and unit != units[name]:
+            raise DesignFileError(file, f"variables.{name}.unit", f'"{unit}" must be "{units[name]}" as it is used')
+    for part in parts:
+        for end in (0, 1):
+            _physical(file, part.key, part.build, {name: limits[end] for name, limits in bounds.items()})
+    return bounds, {name: units[name] for name in bounds}
+
+
+def _quantity(unit: str) -> str:
+    return f"a quantity in {unit}" if unit else "a pure number"
+
+
+def _choice(file: Path, key: str, name: str, known: Mapping[str, T]) -> T:
+    if name not in known:
+        raise DesignFileError(file, key, f'"{name}" is not known, {suggestion(name, known)}')
+    return known[name]
+
+
+def _number(file: Path, key: str, value: float, *, above: float | None = None, unit: str = "") -> None:
+    if not math.isfinite(value):
+        raise DesignFileError(file, key, f"{value} must be finite")
+    if above is not None and value <= above:
+        raise DesignFileError(file, key, f"{value:g}{unit} must be greater than {above:g}{unit}")
+
+
+def _physical(file: Path, key: str, make: Callable[..., T], *args, **kwargs) -> T:
+    try:
+        return make(*args, **kwargs)
+    except (ValueError, OverflowError) as error:
+        raise DesignFileError(file, key, error) from None
+
+
+def _given(section: msgspec.Struct) -> dict[str, Any]:
+    """The keys that the file sets."""
+    return {name: value for name, value in msgspec.structs.asdict(section).items() if value is not None}

@@ -1,0 +1,21 @@
+"""What can be wrong with a design file, always in one line."""
+
+import difflib
+from collections.abc import Iterable
+
+
+class DesignFileError(ValueError):
+    """A design file that cannot be used; the message is one line and names the file and the dotted key."""
+
+    def __init__(self, file, key: str, problem: object):
+        parts = [str(file), key, str(problem)]
+        super().__init__(" ".join(": ".join(part for part in parts if part).split()))
+
+
+def suggestion(name: object, valid: Iterable[str]) -> str:
+    """What to write instead of a name: the nearest valid one, or all of them where none is near."""
+    names = sorted(valid)
+    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    if near:
+        return f'did you mean "{near[0]}"?'
+    return f"must be one of {', '.join(names)}" if names else "nothing is allowed here"

@@ -1,0 +1,122 @@
+"""Result files: `summary.json` and `flanks.csv`."""
+
+import csv
+import json
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..contact import Mesh
+from ..geometry import diameter, roll_angle
+from ..microgeometry import AbstractModification, Flank, NoModification, Sum
+from .schema import CURVES, MODIFICATIONS
+
+Designs = Mapping[str, tuple[AbstractModification, AbstractModification]]
+
+_PROFILE_POINTS = 101
+_FACE_POINTS = 11  # over the face width, where the modification varies along it
+_COLUMNS = (
+    "design",
+    "gear",
+    "face_coordinate_mm",
+    "roll_angle_deg",
+    "roll_length_mm",
+    "diameter_mm",
+    "modification_um",
+)
+
+
+def describe(modification: AbstractModification) -> list[dict[str, Any]]:
+    """A concrete modification as plain data, in the words of a design file."""
+    if isinstance(modification, NoModification):
+        return []
+    terms = modification.terms if isinstance(modification, Sum) else (modification,)
+    return [_plain(term, MODIFICATIONS) for term in terms]
+
+
+def flank_rows(mesh: Mesh, designs: Designs) -> Iterator[tuple[str, str, float, float, float, float, float]]:
+    """Rows of `flanks.csv`: both gears of every design from the start of the active profile to the tip.
+
+    Rows are in the middle of the face, and on further lines across it where the modification varies along the face.
+    """
+    for design, modifications in designs.items():
+        for gear, *columns, face, removed in _profiles(mesh, *modifications):
+            lines = range(len(face)) if np.ptp(removed, axis=0).any() else [len(face) // 2]
+            for line in lines:
+                for angle, length, size, amount in zip(*columns, removed[line]):
+                    yield design, gear, float(face[line]), float(angle), float(length), float(size), float(amount)
+
+
+def write_flanks(path: Path, mesh: Mesh, designs: Designs) -> None:
+    """Writes `flank_rows` as CSV, values to a nanometre or better."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(_COLUMNS)
+        for design, gear, *values in flank_rows(mesh, designs):
+            writer.writerow([design, gear, *(f"{value:.6f}" for value in values)])
+
+
+def write_summary(path: Path, data: Mapping[str, Any]) -> None:
+    """Writes plain data, arrays and scalars as JSON; numbers that are not finite become null."""
+    path.write_text(json.dumps(_jsonable(data), indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _profiles(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification):
+    """Per gear: its name, roll angle, roll length, diameter, face coordinate and the material removed."""
+    columns = jax.tree.map(np.asarray, _evaluate(mesh, pinion, wheel))
+    return [(name, *values) for name, values in zip(("pinion", "wheel"), columns)]
+
+
+@eqx.filter_jit
+def _evaluate(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification):
+    contact, pair = mesh.path_of_contact, mesh.pair
+    sides = (
+        (pinion, pair.pinion, contact.pinion_roll_length(contact.start)),
+        (wheel, pair.wheel, contact.wheel_roll_length(contact.end)),
+    )
+    face = jnp.linspace(-0.5, 0.5, _FACE_POINTS) * pair.face_width
+    columns = []
+    for modification, gear, start in sides:
+        rho = jnp.linspace(start, gear.tip_roll_length, _PROFILE_POINTS)
+        flank = Flank(
+            roll_length=rho[None],
+            tip_roll_length=gear.tip_roll_length,
+            start_roll_length=start,
+            base_radius=gear.base_radius,
+            face_coordinate=face[:, None],
+            face_width=pair.face_width,
+        )
+        removed = jnp.broadcast_to(modification(flank), (_FACE_POINTS, _PROFILE_POINTS))
+        columns.append((roll_angle(gear, rho), rho, diameter(gear, rho), face, removed))
+    return columns
+
+
+def _plain(part: eqx.Module, known) -> dict[str, Any]:
+    name = next((name for name, (make, _) in known.items() if make is type(part)), None)
+    if name is None:
+        return {"type": type(part).__name__}
+    data: dict[str, Any] = {"type": name}
+    for field, value in vars(part).items():
+        if field == "curve":
+            data[field] = _plain(value, CURVES)
+        else:
+            data[field] = value if isinstance(value, str) else np.asarray(value).tolist()
+    return data
+
+
+def _jsonable(value):
+    if isinstance(value, Mapping):
+        return {str(key): _jsonable(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_jsonable(item) for item in value]
+    if isinstance(value, np.ndarray | np.generic | jax.Array):
+        return _jsonable(np.asarray(value).tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

@@ -1,0 +1,492 @@
+"""Design files say everything the library can do, and every slip in one is a single line that names the key."""
+
+import json
+import math
+import re
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxgear as jg
+from jaxgear.geometry import path_of_contact
+from jaxgear.io import DesignFileError, describe, flank_rows, load_design, result_folder, write_summary
+from jaxgear.microgeometry import Flank
+
+EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.toml"))
+
+PAIR = """
+[pinion]
+teeth = 19
+module = 3.0
+face_width = 20.0
+{pinion}
+[wheel]
+teeth = 48
+module = 3
+face_width = 18.0
+{wheel}
+[load]
+torque = 50.0
+{load}
+"""
+RELIEF = """
+[[pinion.modification]]
+type = "tip_relief"
+amount = "height"
+length = 3.4
+"""
+
+
+def text(*, pinion="", wheel="", load="", tail=""):
+    return PAIR.format(pinion=pinion, wheel=wheel, load=load) + tail
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Loads a design file with the given content, text or bytes."""
+
+    def write_and_load(content):
+        path = tmp_path / "gear.toml"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return load_design(path)
+
+    return write_and_load
+
+
+def flank():
+    """Points of one flank, over the profile and across the face."""
+    return Flank(
+        roll_length=jnp.linspace(2.0, 18.0, 33)[None],
+        tip_roll_length=jnp.asarray(18.0),
+        start_roll_length=jnp.asarray(2.0),
+        base_radius=jnp.asarray(26.78),
+        face_coordinate=jnp.linspace(-9.0, 9.0, 7)[:, None],
+        face_width=jnp.asarray(18.0),
+    )
+
+
+def removed(modification):
+    # interpax's splines promote both
+    with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):
+        return np.broadcast_to(modification(flank()), (7, 33))
+
+
+MODIFICATIONS = [
+    ('type = "tip_relief"\namount = 7\nlength = 3.4', jg.TipRelief(7.0, 3.4)),
+    (
+        'type = "root_relief"\namount = 5.0\nlength = 4.0\ncurve = { type = "linear" }',
+        jg.RootRelief(5.0, 4.0, jg.Linear()),
+    ),
+    ('type = "profile_crowning"\namount = 3.0', jg.ProfileCrowning(3.0)),
+    ('type = "profile_slope"\namount = -2.0', jg.ProfileSlope(-2.0)),
+    ('type = "lead_crowning"\namount = 5.0', jg.LeadCrowning(5.0)),
+    ('type = "lead_slope"\namount = 4.0', jg.LeadSlope(4.0)),
+    ('type = "end_relief"\namount = 6.0\nlength = 2.0', jg.EndRelief(6.0, 2.0)),
+    ('type = "end_relief"\namount = 6.0\nlength = 2.0\nside = "negative"', jg.EndRelief(6.0, 2.0, side="negative")),
+    (
+        'type = "tabulated_profile"\nposition = [2, 9, 18]\namount = [0.0, 1.0, 4.0]',
+        jg.TabulatedProfile([2.0, 9.0, 18.0], [0.0, 1.0, 4.0]),
+    ),
+    (
+        'type = "tabulated_profile"\nposition = [5.0, 20.0, 38.0]\namount = [0.0, 1.0, 4.0]\n'
+        'coordinate = "roll_angle"\nmethod = "monotonic"',
+        jg.TabulatedProfile([5.0, 20.0, 38.0], [0.0, 1.0, 4.0], coordinate="roll_angle", method="monotonic"),
+    ),
+]
+CURVES = [
+    ('{ type = "linear" }', jg.Linear()),
+    ('{ type = "parabolic" }', jg.Parabolic()),
+    ('{ type = "power", exponent = 1.5 }', jg.Power(1.5)),
+    ('{ type = "quadratic", b0 = 0.1, b1 = 0.4, b2 = 0.5 }', jg.Quadratic(0.1, 0.4, 0.5)),
+    ('{ type = "polynomial", coefficients = [0.0, 0.2, 0.3, 0.5] }', jg.Polynomial([0.0, 0.2, 0.3, 0.5])),
+    ('{ type = "sinusoidal", b0 = 1.5, b1 = 0.0, b2 = 3.1415 }', jg.Sinusoidal(1.5, 0.0, 3.1415)),
+    ('{ type = "spline", values = [0.0, 0.3, 0.6, 1.0] }', jg.Spline([0.0, 0.3, 0.6, 1.0])),
+]
+
+
+@pytest.mark.parametrize("table, expected", MODIFICATIONS, ids=lambda value: type(value).__name__)
+def test_every_modification_can_be_written(load, table, expected):
+    _, wheel = load(text(wheel=f"[[wheel.modification]]\n{table}")).design({})
+    assert type(wheel) is type(expected)
+    np.testing.assert_allclose(removed(wheel), removed(expected), rtol=1e-14, atol=1e-14)
+    assert np.ptp(removed(wheel)) > 1  # the comparison has something to compare
+
+
+@pytest.mark.parametrize("table, curve", CURVES, ids=lambda value: type(value).__name__)
+def test_every_curve_can_be_written(load, table, curve):
+    tail = f'[[pinion.modification]]\ntype = "tip_relief"\namount = 8.0\nlength = 5.0\ncurve = {table}\n'
+    pinion, _ = load(text(pinion=tail)).design({})
+    np.testing.assert_allclose(removed(pinion), removed(jg.TipRelief(8.0, 5.0, curve)), rtol=1e-14, atol=1e-14)
+
+
+def test_every_modification_and_curve_of_the_library_has_a_name_in_design_files():
+    from jaxgear.io.schema import CURVES as curves
+    from jaxgear.io.schema import MODIFICATIONS as modifications
+    from jaxgear.microgeometry import AbstractCurve, AbstractModification, NoModification, Sum
+
+    def of_library(base):
+        return {cls for cls in base.__subclasses__() if cls.__module__.startswith("jaxgear.microgeometry")}
+
+    assert {make for make, _ in modifications.values()} == of_library(AbstractModification) - {NoModification, Sum}
+    assert {make for make, _ in curves.values()} == of_library(AbstractCurve)
+
+
+def test_modifications_of_one_gear_add_up(load):
+    tables = "".join(f"[[pinion.modification]]\n{table}\n" for table, _ in MODIFICATIONS)
+    pinion, wheel = load(text(pinion=tables)).design({})
+    np.testing.assert_allclose(removed(pinion), sum(removed(expected) for _, expected in MODIFICATIONS), atol=1e-12)
+    assert not removed(wheel).any()
+
+
+def test_a_described_modification_reads_back_as_itself(load):
+    original = sum((expected for _, expected in MODIFICATIONS[1:]), MODIFICATIONS[0][1]) + jg.TipRelief(
+        4.0, 5.0, jg.Polynomial([0.0, 0.5, 0.5])
+    )
+
+    def toml(value):
+        if isinstance(value, dict):
+            return "{ " + ", ".join(f"{name} = {toml(item)}" for name, item in value.items()) + " }"
+        return json.dumps(value)
+
+    tables = ", ".join(toml(part) for part in describe(original))
+    pinion, _ = load(text(pinion=f"modification = [{tables}]")).design({})
+    np.testing.assert_allclose(removed(pinion), removed(original), rtol=1e-14, atol=1e-14)
+    assert eqx.tree_equal(pinion, original, rtol=1e-14)
+
+
+def test_gear_numbers_reach_the_gears(load):
+    pinion = (
+        "profile_shift = 0.3\nbore_diameter = 24.0\ntip_edge_radius = 0.05\nroot_radius = 0.3\n"
+        "material = { elastic_modulus = 71000, poisson_ratio = 0.33, density = 2700 }"
+    )
+    pair = load(text(pinion=pinion, tail="[pair]\ncenter_distance = 101.4")).pair()
+    values = {name: float(getattr(pair.pinion, name)) for name in ("teeth", "module", "face_width", "profile_shift")}
+    assert values == {"teeth": 19.0, "module": 3.0, "face_width": 20.0, "profile_shift": 0.3}
+    assert float(pair.pinion.bore_diameter) == 24.0 and float(pair.pinion.root_radius) == 0.3
+    assert float(pair.pinion.tip_edge_radius) == 0.05
+    assert float(pair.pinion.material.elastic_modulus) == 71000.0
+    assert float(pair.wheel.material.elastic_modulus) == 206000.0
+    assert float(pair.center_distance) == 101.4
+
+
+def test_defaults_are_those_of_the_library(load):
+    file = load(text())
+    pinion = jg.Gear(19, 3.0, face_width=20.0, material=jg.Material())
+    assert eqx.tree_equal(file.pair(), jg.GearPair(pinion, jg.Gear(48, 3.0, face_width=18.0, material=jg.Material())))
+    assert eqx.tree_equal(file.resolution(), jg.Resolution())
+    assert eqx.tree_equal(file._compliance, jg.default_compliance())
+    assert file.torque == 50.0 and file.torque_range == (25.0, 100.0)
+    assert file.title == "gear" and file.bounds == {} and file.starts is None and file.steps is None
+
+
+MODELS = [
+    ('preset = "legacy"', jg.legacy_compliance()),
+    ('plane = "strain"\nhub_windup = false', jg.default_compliance("strain", hub_windup=False)),
+    ("coupling = false", jg.Compliance(jg.Beam(), jg.ElasticRing(coupling=False), jg.DepthReferenced(), "stress")),
+    (
+        'body = "sainsot"\ncontact = "constant"',
+        jg.Compliance(jg.Beam(), jg.Sainsot(), jg.ConstantHertz(), "stress"),
+    ),
+    ('body = "half_plane"\ncontact = "weber"', jg.Compliance(jg.Beam(), jg.HalfPlane(), jg.Weber(), "stress")),
+    ('contact = "palmgren"', jg.Compliance(jg.Beam(), jg.ElasticRing(), jg.Palmgren(), "stress")),
+    ('contact = "power"', jg.Compliance(jg.Beam(), jg.ElasticRing(), jg.NonlinearPower(), "stress")),
+    ('contact = "center_distance"', jg.Compliance(jg.Beam(), jg.ElasticRing(), jg.CenterDistance(), "stress")),
+    ('contact = "kovalskii"', jg.Compliance(jg.Beam(), jg.ElasticRing(), jg.Kovalskii(), "stress")),
+]
+
+
+@pytest.mark.parametrize("model, expected", MODELS, ids=lambda value: value if isinstance(value, str) else "")
+def test_model_table_chooses_the_compliance(load, model, expected):
+    assert eqx.tree_equal(load(text(tail=f"[model]\n{model}"))._compliance, expected)
+
+
+def test_design_is_traceable_and_a_variable_may_serve_both_gears(load):
+    relief = '[[{}.modification]]\ntype = "tip_relief"\namount = "height"\nlength = "reach"\n'
+    variables = (
+        "[variables]\nheight = { low = 0, high = 20.0 }\nreach = { low = 1.0, high = 5.0, unit = 'mm' }\n"
+        "k = { low = 0, high = 2.0 }\n"
+    )
+    curve = 'curve = { type = "polynomial", coefficients = [0.0, "k", 0.5] }\n'
+    file = load(text(pinion=relief.format("pinion") + curve, wheel=relief.format("wheel"), tail=variables))
+    assert file.bounds == {"height": (0.0, 20.0), "reach": (1.0, 5.0), "k": (0.0, 2.0)}
+    assert file.units == {"height": "um", "reach": "mm", "k": ""}
+
+    def total(height):
+        pinion, wheel = file.design({"height": height, "reach": jnp.asarray(4.0), "k": jnp.asarray(0.5)})
+        return jnp.sum(pinion(flank())) + jnp.sum(wheel(flank()))
+
+    heights = jnp.asarray([2.0, 7.0])
+    values, slopes = jax.vmap(jax.value_and_grad(total))(heights)
+    np.testing.assert_allclose(values, slopes * heights, rtol=1e-12)  # both reliefs are proportional to the height
+    pinion, wheel = file.design({"height": 7.0, "reach": 4.0, "k": 0.5})
+    np.testing.assert_allclose(removed(pinion), removed(jg.TipRelief(7.0, 4.0, jg.Polynomial([0.0, 0.5, 0.5]))))
+    np.testing.assert_allclose(removed(wheel), removed(jg.TipRelief(7.0, 4.0)))
+    with pytest.raises(ValueError, match="must be those of the file: height, k, reach"):
+        file.design({"height": 7.0})
+
+
+VARIABLE = "[variables]\nheight = { low = 0.0, high = 20.0 }\n"
+
+# what is wrong -> content, and what the message says after the name of the file
+MALFORMED = {
+    "unknown table": (text(tail="[lode]\ntorque = 1.0"), 'lode: unknown key, did you mean "load"?'),
+    "unknown gear key": (text(pinion="face_widht = 3.0"), 'pinion.face_widht: unknown key, did you mean "face_width"?'),
+    "unknown material key": (
+        text(wheel="material = { young = 206000.0 }"),
+        "wheel.material.young: unknown key, must be one of density, elastic_modulus,",
+    ),
+    "unknown load key": (text(load="torqe = 3"), 'load.torqe: unknown key, did you mean "torque"?'),
+    "unknown modification key": (
+        text(pinion=RELIEF.replace('"height"', "1.0") + RELIEF.replace('"height"', "1.0").replace("length", "lenght")),
+        'pinion.modification[1].lenght: unknown key, did you mean "length"?',
+    ),
+    "unknown curve key": (
+        text(pinion=RELIEF.replace('"height"', "1.0") + 'curve = { type = "power", expnent = 2.0 }'),
+        'pinion.modification[0].curve.expnent: unknown key, did you mean "exponent"?',
+    ),
+    "unknown variable key": (
+        text(pinion=RELIEF, tail="[variables]\nheight = { low = 0.0, hihg = 1.0 }"),
+        'variables.height.hihg: unknown key, did you mean "high"?',
+    ),
+    "unknown modification": (
+        text(pinion='[[pinion.modification]]\ntype = "tip_releif"\namount = 1.0'),
+        'pinion.modification[0].type: "tip_releif" is not known, did you mean "tip_relief"?',
+    ),
+    "modification without type": (
+        text(pinion="[[pinion.modification]]\namount = 1.0"),
+        "pinion.modification[0].type: missing, must be one of tip_relief,",
+    ),
+    "unknown curve": (
+        text(pinion=RELIEF.replace('"height"', "1.0") + 'curve = { type = "cubic" }'),
+        'pinion.modification[0].curve.type: "cubic" is not known',
+    ),
+    "unknown plane": (
+        text(tail='[model]\nplane = "stres"'),
+        'model.plane: "stres" is not known, did you mean "stress"?',
+    ),
+    "unknown body": (text(tail='[model]\nbody = "rings"'), 'model.body: "rings" is not known, did you mean "ring"?'),
+    "unknown contact": (text(tail='[model]\ncontact = "hertz"'), 'model.contact: "hertz" is not known'),
+    "missing key": (text().replace("teeth = 48\n", ""), "wheel.teeth: missing, this key is required"),
+    "missing table": (text().partition("[load]")[0], "load: missing, this key is required"),
+    "string for a number": (
+        text().replace("module = 3.0", 'module = "3.0"'),
+        "pinion.module: must be a number, not a string",
+    ),
+    "fraction for a count": (
+        text().replace("teeth = 19", "teeth = 19.5"),
+        "pinion.teeth: must be a whole number, not a number",
+    ),
+    "list for a value": (
+        text(pinion=RELIEF.replace('"height"', "[1.0]")),
+        "pinion.modification[0].amount: must be a number or the name of a variable, not a list",
+    ),
+    "true for a number": (text(load="speed = true"), "load.speed: must be a number, not true or false"),
+    "number for a table": ("pinion = 3\n" + text().replace("[pinion]", "[other]"), "pinion: must be a table, not"),
+    "wrong length": (text(load="torque_range = [1.0]"), "load.torque_range: must be a list of length 2, not 1"),
+    "wrong list element": (
+        text(wheel='[[wheel.modification]]\ntype = "tabulated_profile"\nposition = [1.0, "x"]\namount = [1.0, 2.0]'),
+        "wheel.modification[0].position[1]: must be a number, not a string",
+    ),
+    "torque of zero": (text().replace("torque = 50.0", "torque = 0.0"), "load.torque: 0 N m must be greater than 0"),
+    "torque not a number": (text().replace("torque = 50.0", "torque = nan"), "load.torque: nan must be finite"),
+    "range reversed": (
+        text(load="torque_range = [80.0, 20.0]"),
+        "load.torque_range[1]: 20 N m must be greater than 80 N m",
+    ),
+    "friction without speed": (text(load="friction = 0.06"), "load.friction: has no effect without load.speed"),
+    "physical error of a gear": (
+        text().replace("face_width = 20.0", "face_width = -20.0"),
+        "pinion: Gear: face_width = -20 mm must be greater than 0 mm",
+    ),
+    "physical error of a material": (
+        text(pinion="material = { poisson_ratio = 0.7 }"),
+        "pinion.material: Material: poisson_ratio = 0.7 must be",
+    ),
+    "physical error of the pair": (
+        text().replace("module = 3\n", "module = 4.0\n"),
+        "pair: GearPair: wheel module = 4 mm must equal the pinion's, 3 mm",
+    ),
+    "impossible centre distance": (text(tail="[pair]\ncenter_distance = 90.0"), "pair: GearPair: center_distance = 90"),
+    "physical error of a modification": (
+        text(pinion=RELIEF.replace('"height"', "1.0").replace("3.4", "-3.4")),
+        "pinion.modification[0]: TipRelief: length = -3.4 mm must be at least 0 mm",
+    ),
+    "bound outside what is possible": (
+        text(
+            pinion=RELIEF.replace("3.4", '"height"').replace('amount = "height"', "amount = 1.0"), tail=VARIABLE
+        ).replace("low = 0.0", "low = -1.0"),
+        "pinion.modification[0]: TipRelief: length = -1 mm must be at least 0 mm",
+    ),
+    "table that does not increase": (
+        text(wheel='[[wheel.modification]]\ntype = "tabulated_profile"\nposition = [2, 1]\namount = [1.0, 2.0]'),
+        "wheel.modification[0]: TabulatedProfile: position must increase strictly",
+    ),
+    "variable not declared": (
+        text(pinion=RELIEF),
+        'pinion.modification[0].amount: "height" is not a variable, there is no [variables] table',
+    ),
+    "variable misspelt": (
+        text(pinion=RELIEF.replace('"height"', '"heigth"'), tail=VARIABLE),
+        'pinion.modification[0].amount: "heigth" is not a variable, did you mean "height"?',
+    ),
+    "variable in a list not declared": (
+        text(wheel='[[wheel.modification]]\ntype = "tabulated_profile"\nposition = [1, 2]\namount = [1.0, "h"]'),
+        'wheel.modification[0].amount[1]: "h" is not a variable',
+    ),
+    "variable not used": (text(tail=VARIABLE), "variables.height: is declared but used in no modification"),
+    "variable of two units": (
+        text(pinion=RELIEF.replace("3.4", '"height"'), tail=VARIABLE),
+        "pinion.modification[0].length: height stands for a quantity in mm here and for a quantity in um elsewhere",
+    ),
+    "unit against use": (
+        text(pinion=RELIEF, tail=VARIABLE.replace("20.0 ", '20.0, unit = "mm" ')),
+        'variables.height.unit: "mm" must be "um" as it is used',
+    ),
+    "bounds reversed": (
+        text(pinion=RELIEF, tail=VARIABLE.replace("low = 0.0", "low = 30.0")),
+        "variables.height.high: 20 must be greater than 30",
+    ),
+    "bound not finite": (
+        text(pinion=RELIEF, tail=VARIABLE.replace("high = 20.0", "high = inf")),
+        "variables.height.high: inf must be finite",
+    ),
+    "variable is a number": (
+        text(pinion=RELIEF, tail="[variables]\nheight = 3.0"),
+        "variables.height: must be a table, not a number",
+    ),
+    "optimize without variables": (text(tail="[optimize]\nstarts = 4"), "optimize: has no effect without [variables]"),
+    "legacy with options": (
+        text(tail='[model]\npreset = "legacy"\nplane = "strain"'),
+        'model.plane: cannot be combined with preset = "legacy"',
+    ),
+    "option of another body": (
+        text(tail='[model]\nbody = "sainsot"\ncoupling = false'),
+        'model.coupling: has no effect with body = "sainsot"',
+    ),
+    "resolution too coarse": (
+        text(tail="[resolution]\npositions = 3"),
+        "resolution.positions: must be a whole number >= 4",
+    ),
+    "resolution absurd": (
+        text(tail="[resolution]\nslices = 100000000"),
+        "resolution.slices: must be a whole number <=",
+    ),
+    "syntax": (text() + "[model\n", f"line {text().count(chr(10)) + 1}, column 7: "),
+    "unfinished string": (text() + 'title = "x', f"line {text().count(chr(10)) + 1}"),
+    "key twice": (text().replace("teeth = 19", "teeth = 19\nteeth = 20"), "line 4, column"),
+    "not text": (text().encode() + b"\ntitle = '\xff'", f"line {text().count(chr(10)) + 2}: not UTF-8 text"),
+    "nested absurdly": ("a = " + "[" * 100_000, "tables or lists are nested too deeply"),
+    "number beyond all bounds": (text().replace("module = 3.0", "module = 1" + "0" * 400), "pinion.module: "),
+    "empty": ("", "pinion: missing, this key is required"),
+}
+
+
+@pytest.mark.parametrize("case", MALFORMED)
+def test_a_malformed_file_is_one_line_that_names_file_and_key(load, tmp_path, case):
+    content, expected = MALFORMED[case]
+    with pytest.raises(DesignFileError) as caught:
+        load(content)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith(f"{tmp_path / 'gear.toml'}: {expected}")
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(DesignFileError, match=r"nowhere\.toml: No such file"):
+        load_design(tmp_path / "nowhere.toml")
+    with pytest.raises(DesignFileError, match="is a folder, not a file"):
+        load_design(tmp_path)
+    with pytest.raises(DesignFileError, match="null byte"):
+        load_design("gear\0.toml")
+
+
+def test_a_byte_order_mark_and_carriage_returns_are_no_error(load):
+    assert load(b"\xef\xbb\xbf" + text().replace("\n", "\r\n").encode()).torque == 50.0
+
+
+def test_a_resolution_that_misses_part_of_the_path_is_refused(load):
+    gear = "teeth = 70\nmodule = 3.0\nface_width = 20.0\naddendum = 1.3\ndedendum = 1.5\nroot_radius = 0.2\n"
+    tail = "[load]\ntorque = 50.0\n[resolution]\npositions = 4\npairs = 2\n"
+    file = load(f"[pinion]\n{gear}[wheel]\n{gear}{tail}")
+    with pytest.raises(DesignFileError, match="resolution: Resolution: pairs = 2 must be at least"):
+        file.mesh()
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_load_and_are_what_their_name_says(path):
+    file = load_design(path)
+    teeth = [int(gear.teeth) for gear in (file.pair().pinion, file.pair().wheel)]
+    assert path.stem == f"spur_{teeth[0]}_{teeth[1]}"
+    assert file.bounds and file.title
+    file.design({name: 0.5 * (low + high) for name, (low, high) in file.bounds.items()})
+
+
+def test_the_cut_tip_of_the_50_50_pair_gives_its_contact_ratio():
+    pair = load_design(next(path for path in EXAMPLES if path.stem == "spur_50_50")).pair()
+    assert float(path_of_contact(pair).contact_ratio) == pytest.approx(1.37, abs=5e-4)
+
+
+def test_summaries_hold_no_nan(tmp_path):
+    path = tmp_path / "summary.json"
+    write_summary(path, {"a": math.nan, "b": [np.float64(1.5), np.inf], "c": {"d": jnp.asarray([1.0, jnp.nan])}})
+    assert json.loads(path.read_text(), parse_constant=pytest.fail) == {
+        "a": None,
+        "b": [1.5, None],
+        "c": {"d": [1, None]},
+    }
+
+
+def test_flank_rows_run_from_the_start_of_the_active_profile_to_the_tip(load):
+    mesh = load(text(tail="[resolution]\npositions = 4")).mesh()
+    relief = jg.TipRelief(7.0, 3.0)
+    rows = list(flank_rows(mesh, {"a": (relief, jg.NoModification()), "b": (relief + jg.LeadCrowning(2.0), relief)}))
+
+    def select(design, gear):
+        return np.array([row[2:] for row in rows if row[:2] == (design, gear)])
+
+    pinion = select("a", "pinion")
+    assert not pinion[:, 0].any()  # no modification along the face: only its middle
+    face, angle, rho, size, amount = pinion.T
+    gear, contact = mesh.pair.pinion, mesh.path_of_contact
+    assert rho[0] == pytest.approx(float(contact.pinion_roll_length(contact.start)))
+    assert size[-1] == pytest.approx(2 * float(gear.tip_radius))
+    assert amount[-1] == pytest.approx(7.0) and amount[0] == 0.0
+    np.testing.assert_allclose(np.deg2rad(angle) * float(gear.base_radius), rho)
+    np.testing.assert_allclose((size / 2) ** 2 - float(gear.base_radius) ** 2, rho**2)
+    crowned = select("b", "pinion")
+    ends = crowned[np.abs(crowned[:, 0]) == 9.0]
+    np.testing.assert_allclose(ends[:, 4], np.tile(amount + 2.0, 2))
+    assert select("a", "wheel")[:, 4].tolist() == [0.0] * len(rho)
+
+
+def test_a_result_folder_is_complete_or_absent(tmp_path):
+    target = tmp_path / "deep" / "results"
+    with pytest.raises(KeyboardInterrupt), result_folder(target) as folder:
+        (folder / "summary.json").write_text("half")
+        raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+    for content in ("first", "second"):
+        with result_folder(target) as folder:
+            (folder / "summary.json").write_text(content)
+        assert [path.name for path in target.parent.iterdir()] == ["results"]
+        assert (target / "summary.json").read_text() == content
+    with pytest.raises(RuntimeError), result_folder(target) as folder:
+        (folder / "summary.json").write_text("third")
+        raise RuntimeError
+    assert (target / "summary.json").read_text() == "second"
+    assert [path.name for path in target.parent.iterdir()] == ["results"]
+
+
+def test_a_folder_of_other_things_is_never_replaced(tmp_path):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(ValueError, match=r"holds other files than results \(thesis.tex\)"), result_folder(tmp_path):
+        pytest.fail("the folder was accepted")
+    for target in (tmp_path / "thesis.tex", tmp_path / "thesis.tex" / "below"):
+        with pytest.raises(ValueError, match="is a file|cannot be written"), result_folder(target):
+            pytest.fail("the file was accepted")
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+    assert re.match("years", (tmp_path / "thesis.tex").read_text())
