@@ -1,0 +1,3 @@
+"""The command line: `jaxgear analyze FILE.toml` and `jaxgear optimize FILE.toml`."""
+
+from .app import main as main

@@ -1,0 +1,134 @@
+"""The commands, and the promise that every failure is one line."""
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import equinox as eqx
+import typer
+
+from ..io import DesignFileError
+from ..microgeometry import NoModification
+from ..optimize import iso_relief
+from . import report
+from .run import run
+
+_TORQUES, _QUICK_TORQUES = 25, 7
+_QUICK_POSITIONS, _QUICK_STARTS, _QUICK_STEPS = 16, 4, 40
+
+OK, NOT_CONVERGED, FAILED, INTERRUPTED = 0, 1, 2, 130
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Flank design of spur gears by loaded tooth contact analysis. Exit codes: 0 success, 1 a contact solution did "
+    "not converge (results are written and flagged), 2 error (nothing is written), 130 interrupted.",
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        print(f"jaxgear {report.version()}")
+        raise typer.Exit()
+
+
+File = Annotated[Path, typer.Argument(metavar="FILE.toml", help="Design file.", show_default=False)]
+Output = Annotated[
+    Path | None, typer.Option("--output", "-o", metavar="DIR", help="Result folder.", show_default="results/FILE")
+]
+NoFigures = Annotated[bool, typer.Option("--no-figures", help="Write no figures.")]
+NoCache = Annotated[
+    bool, typer.Option("--no-cache", envvar="JAXGEAR_NO_CACHE", help="Do not keep compiled programs on disk.")
+]
+Quick = Annotated[
+    bool, typer.Option("--quick", help="Coarse positions and a short search: for a first look, not for a result.")
+]
+
+
+@app.callback()
+def root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Options of the command itself."""
+
+
+@app.command()
+def analyze(file: File, output: Output = None, no_figures: NoFigures = False, no_cache: NoCache = False) -> int:
+    """Analyze the unmodified pair and the modification of the design file."""
+    with run(file, output, cache=not no_cache) as current:
+        design = current.design
+        if design.bounds:
+            free = ", ".join(design.bounds)
+            raise DesignFileError(file, "variables", f"analyze needs numbers but {free} is free; use jaxgear optimize")
+        current.prepare(torques=_TORQUES)
+        current.evaluate("unmodified", NoModification(), NoModification())
+        pinion, wheel = design.design({})
+        if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
+            current.evaluate("modified", pinion, wheel)
+        current.write(figures=not no_figures)
+    return OK if current.show() else NOT_CONVERGED
+
+
+@app.command()
+def optimize(
+    file: File,
+    output: Output = None,
+    quick: Quick = False,
+    no_figures: NoFigures = False,
+    no_cache: NoCache = False,
+) -> int:
+    """Find the variables of the design file with the least peak-to-peak transmission error (PPTE).
+
+    Compares three designs: unmodified, the rule-based tip relief of ISO 6336-1, and the optimum.
+    """
+    with run(file, output, cache=not no_cache) as current:
+        design = current.design
+        if not design.bounds:
+            raise DesignFileError(file, "variables", "missing, nothing to optimize; use jaxgear analyze")
+        if quick:
+            current.coarsen(positions=_QUICK_POSITIONS)
+        current.prepare(torques=_QUICK_TORQUES if quick else _TORQUES)
+        current.evaluate("unmodified", NoModification(), NoModification())
+        factor = design.application_factor
+        relief = eqx.filter_jit(iso_relief)(design.pair(), design.torque, application_factor=factor)
+        current.evaluate("rule-based", relief, relief)
+        starts, steps = (_QUICK_STARTS, _QUICK_STEPS) if quick else (design.starts, design.steps)
+        current.search(starts=starts, steps=steps)
+        current.write(figures=not no_figures)
+    return OK if current.show() else NOT_CONVERGED
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Entry point of the command `jaxgear`; every failure is one line on stderr."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # a title beyond the terminal's alphabet is no reason to fail
+    try:
+        code = app(args=arguments, prog_name="jaxgear", standalone_mode=False)
+        if code == INTERRUPTED:
+            raise KeyboardInterrupt
+    except (KeyboardInterrupt, typer.Abort):
+        print("jaxgear: interrupted, nothing was written", file=sys.stderr)
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # keeps the flush at exit quiet
+        sys.exit(OK)
+    except Exception as error:  # noqa: BLE001 - a user never sees a traceback
+        if os.environ.get("JAXGEAR_DEBUG"):
+            raise
+        print(f"jaxgear: error: {_one_line(error)}", file=sys.stderr)
+        sys.exit(FAILED)
+    sys.exit(code or OK)
+
+
+def _one_line(error: Exception) -> str:
+    if hasattr(error, "format_message"):  # usage errors of typer
+        return f"{' '.join(error.format_message().split())} (jaxgear --help shows the usage)"
+    message = " ".join(str(error).split())
+    if isinstance(error, ValueError | RuntimeError) and message:
+        return message
+    return f"unexpected {type(error).__name__}: {message} (JAXGEAR_DEBUG=1 shows where)"

@@ -1,0 +1,201 @@
+"""What a run says and writes: table, lines, summary and figures."""
+
+import dataclasses
+import importlib.metadata
+import platform
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from ..contact import Mesh
+from ..io import DesignFile, describe
+from ..io.schema import UNITS
+from ..optimize import Optimum
+from .study import Evaluation
+
+Evaluations = Mapping[str, Evaluation]
+
+# metric -> label and format; a metric without contact outside the path is 0 and says so
+_ROWS = {
+    "ppte_um": ("PPTE [um]", ".3f"),
+    "mean_te_um": ("mean transmission error [um]", ".3f"),
+    "max_flank_pressure_MPa": ("max flank pressure [MPa]", ".0f"),
+    "max_corner_pressure_MPa": ("max corner pressure [MPa]", ".0f"),
+    "contact_ratio": ("contact ratio", ".3f"),
+    "effective_contact_ratio": ("effective contact ratio", ".3f"),
+    "pinion_root_stress_MPa": ("pinion root stress [MPa]", ".1f"),
+    "wheel_root_stress_MPa": ("wheel root stress [MPa]", ".1f"),
+    "mesh_loss_factor": ("mesh loss factor", ".4f"),
+    "max_flash_temperature_K": ("max flash temperature [K]", ".1f"),
+}
+_HARRIS_CURVES = 7
+
+
+def table(file: DesignFile, evaluations: Evaluations) -> Table:
+    """The designs side by side at the design torque."""
+    result = Table(title=f"{file.title}, {file.torque:g} N m on the pinion", title_justify="left")
+    result.add_column("")
+    for name in evaluations:
+        result.add_column(name, justify="right", no_wrap=True)
+    for metric, (label, form) in _ROWS.items():
+        cells = [evaluation.metrics.get(metric) for evaluation in evaluations.values()]
+        if None not in cells:
+            result.add_row(label, *(format(cell, form) for cell in cells))
+    result.add_section()
+    flanks = [dict(_flank_cells(evaluation)) for evaluation in evaluations.values()]
+    for label in dict.fromkeys(label for cells in flanks for label in cells):
+        result.add_row(label, *(cells.get(label, "-") for cells in flanks))
+    if flanks and any(flanks):
+        result.add_section()
+    result.add_row("time [s]", *(f"{evaluation.seconds:.2f}" for evaluation in evaluations.values()))
+    return result
+
+
+def verdict(file: DesignFile, evaluations: Evaluations, optimum: Optimum) -> Iterator[str]:
+    """Lines under the table of an optimization."""
+    before, after = evaluations["unmodified"].metrics["ppte_um"], evaluations["optimum"].metrics["ppte_um"]
+    yield f"PPTE {before:.3f} -> {after:.3f} um: {reduction(evaluations):.1f} % less than unmodified"
+    for name, side in optimum.active_bounds.items():
+        bound = file.bounds[name][side == "upper"]
+        yield f"{name} is at its {side} bound {bound:g} {file.units[name]}".rstrip()
+    if not optimum.active_bounds:
+        yield "no variable is at a bound"
+    yield f"gradient norm at the optimum {optimum.gradient_norm:.2g} um per full range of the variables"
+    yield f"{optimum.evaluations} contact analyses with gradient"
+
+
+def failures(evaluations: Evaluations) -> Iterator[str]:
+    """A line for every design whose contact solution failed somewhere."""
+    for name, evaluation in evaluations.items():
+        if evaluation.failed_torques:
+            torques = ", ".join(f"{torque:g}" for torque in evaluation.failed_torques)
+            yield (
+                f"CONTACT SOLUTION NOT CONVERGED: {name} at {torques} N m; its numbers are not to be trusted. "
+                "Raise resolution.newton_steps."
+            )
+
+
+def reduction(evaluations: Evaluations) -> float:
+    """By how much the last design lowers the PPTE of the first [%]."""
+    values = [float(evaluation.metrics["ppte_um"]) for evaluation in evaluations.values()]
+    return 100 * (1 - values[-1] / values[0]) if values[0] else 0.0
+
+
+def summary(
+    file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray, optimum: Optimum | None
+) -> dict[str, Any]:
+    """Contents of `summary.json`."""
+    size = mesh.resolution
+    data: dict[str, Any] = {
+        "title": file.title,
+        "design_file": file.path.name,
+        "torque_Nm": file.torque,
+        "torque_range_Nm": file.torque_range,
+        "designs": {name: _design(evaluation) for name, evaluation in evaluations.items()},
+        "ppte_reduction_percent": reduction(evaluations),
+        "ppte_over_torque": {
+            "torque_Nm": torques,
+            **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
+        },
+    }
+    if optimum is not None:
+        data["optimum"] = {
+            "parameters": {_with_unit(file, name): value for name, value in optimum.parameters.items()},
+            "bounds": {_with_unit(file, name): limits for name, limits in file.bounds.items()},
+            "active_bounds": optimum.active_bounds,
+            "gradient_norm_um_per_range": optimum.gradient_norm,
+            "evaluations": optimum.evaluations,
+        }
+    data["resolution"] = {field.name: getattr(size, field.name) for field in dataclasses.fields(size)}
+    data["versions"] = {
+        "jaxgear": version(),
+        "jax": jax.__version__,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+    }
+    return data
+
+
+def write_figures(folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> None:
+    """Writes all figures; the Harris map shows the last design."""
+    import matplotlib
+
+    matplotlib.use("Agg")  # the command line never shows a window
+    from .. import plot
+
+    cycles = {name: evaluation.cycle for name, evaluation in evaluations.items()}
+    last = list(evaluations.values())[-1]
+    few = np.unique(np.linspace(0, len(torques) - 1, _HARRIS_CURVES).round().astype(int))
+    axes: dict[str, Any] = {
+        "transmission_error": plot.transmission_error(cycles),
+        "load_sharing": plot.load_sharing(cycles),
+        "pressure": plot.pressure(cycles),
+        "ppte_over_torque": plot.ppte_over_torque(
+            torques, {name: evaluation.ppte for name, evaluation in evaluations.items()}, design_torque=file.torque
+        ),
+        "harris_map": plot.harris_map(mesh.phase, torques[few], last.transmission_error[few]),
+        "k_chart": plot.k_chart(mesh, flanks(evaluations)),
+    }
+    for name, drawn in axes.items():
+        plot.save(np.ravel(drawn)[0].figure, folder / f"{name}.png")
+
+
+def flanks(evaluations: Evaluations):
+    """The modifications of every design."""
+    return {name: (evaluation.pinion, evaluation.wheel) for name, evaluation in evaluations.items()}
+
+
+def version() -> str:
+    """Version of the installed package."""
+    try:
+        return importlib.metadata.version("jaxgear")
+    except importlib.metadata.PackageNotFoundError:
+        return "unknown (not installed)"
+
+
+def console(*, stderr: bool = False) -> Console:
+    """A console that takes brackets literally; wide enough for the table when it writes into a file."""
+    made = Console(stderr=stderr, markup=False, highlight=False, emoji=False)
+    return made if made.is_terminal else Console(stderr=stderr, markup=False, highlight=False, emoji=False, width=120)
+
+
+def _design(evaluation: Evaluation) -> dict[str, Any]:
+    return {
+        **evaluation.metrics,
+        "failed_torques_Nm": evaluation.failed_torques,
+        "pinion_modification": describe(evaluation.pinion),
+        "wheel_modification": describe(evaluation.wheel),
+        "time_s": evaluation.seconds,
+    }
+
+
+def _flank_cells(evaluation: Evaluation) -> Iterator[tuple[str, str]]:
+    """Label and text of every number of both modifications."""
+    for gear, modification in (("pinion", evaluation.pinion), ("wheel", evaluation.wheel)):
+        seen: dict[str, int] = {}
+        for part in describe(modification):
+            kind = part.pop("type").replace("_", " ")
+            seen[kind] = seen.get(kind, 0) + 1
+            again = f" {seen[kind]}" if seen[kind] > 1 else ""
+            for name, value in part.items():
+                unit = f" [{UNITS[name]}]" if name in UNITS else ""
+                yield f"{gear} {kind}{again}, {name}{unit}", _text(value)
+
+
+def _text(value) -> str:
+    if isinstance(value, dict):
+        numbers = [_text(number) for name, number in value.items() if name != "type"]
+        return " ".join([value["type"], *numbers])
+    if isinstance(value, list):
+        return f"({len(value)} values)"
+    return value if isinstance(value, str) else f"{value:.3f}"
+
+
+def _with_unit(file: DesignFile, name: str) -> str:
+    unit = file.units[name]
+    return f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name

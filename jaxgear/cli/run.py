@@ -1,0 +1,148 @@
+"""One run of a command: its stages, what it has found so far, and its result folder."""
+
+import dataclasses
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import jax
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from ..contact import Mesh
+from ..io import DesignFile, load_design, result_folder, write_flanks, write_summary
+from ..microgeometry import AbstractModification
+from ..optimize import Optimum, minimize
+from . import report
+from .cache import enable_cache
+from .study import Evaluation, Evaluator
+
+
+class Run:
+    """Collects the designs of one run and writes them into `folder`."""
+
+    def __init__(self, design: DesignFile, target: Path, folder: Path, stages: "Stages"):
+        self.design = design
+        self._target, self._folder, self._stages = target, folder, stages
+        self._evaluations: dict[str, Evaluation] = {}
+        self._optimum: Optimum | None = None
+        self._resolution, self._quick = design.resolution(), False
+
+    def coarsen(self, *, positions: int) -> None:
+        """Makes the run a quick one, with at most so many mesh positions."""
+        self._quick = True
+        self._resolution = dataclasses.replace(self._resolution, positions=min(positions, self._resolution.positions))
+
+    def prepare(self, *, torques: int) -> None:
+        """Prepares the mesh.
+
+        Args:
+            torques: number of torques over the range of the file.
+        """
+        self._stages.begin("preparing the mesh")
+        self._mesh: Mesh = jax.block_until_ready(self.design.mesh(self._resolution))
+        self._torques = np.linspace(*self.design.torque_range, torques)
+        self._evaluator = Evaluator(
+            self._mesh, self.design.torque, self._torques, self.design.speed, self.design.friction
+        )
+
+    def evaluate(self, name: str, pinion: AbstractModification, wheel: AbstractModification) -> None:
+        """Evaluates a design and keeps it."""
+        self._stages.begin(f"solving the {name} design")
+        self._evaluations[name] = self._evaluator(pinion, wheel)
+
+    def search(self, *, starts: int | None, steps: int | None) -> None:
+        """Finds the optimum of the free variables; None for the defaults of `minimize`."""
+        self._stages.begin("searching the optimum")
+        began = time.perf_counter()
+        counts = {name: value for name, value in {"starts": starts, "steps": steps}.items() if value is not None}
+        optimum = minimize(
+            self.design.design,
+            self.design.bounds,
+            mesh=self._mesh,
+            torque=self.design.torque,
+            callback=self._stages.step,
+            **counts,
+        )
+        self.evaluate("optimum", *self.design.design(optimum.parameters))
+        spent = time.perf_counter() - began
+        self._evaluations["optimum"] = dataclasses.replace(self._evaluations["optimum"], seconds=spent)
+        self._optimum = optimum
+
+    def write(self, *, figures: bool) -> None:
+        """Writes the result files."""
+        self._stages.begin("writing the results")
+        data = report.summary(self.design, self._mesh, self._evaluations, self._torques, self._optimum)
+        write_summary(self._folder / "summary.json", {**data, "quick": self._quick})
+        write_flanks(self._folder / "flanks.csv", self._mesh, report.flanks(self._evaluations))
+        if figures:
+            report.write_figures(self._folder, self.design, self._mesh, self._evaluations, self._torques)
+
+    def show(self) -> bool:
+        """Prints the comparison, after the results are in place; False when a contact solution failed."""
+        out = report.console()
+        out.print(report.table(self.design, self._evaluations))
+        if self._optimum is not None:
+            for line in report.verdict(self.design, self._evaluations, self._optimum):
+                out.print(line, soft_wrap=True)
+        if self._quick:
+            out.print("quick run: coarse positions and a short search, not a result to build on", soft_wrap=True)
+        out.print(f"results in {self._target}{os.sep}, {self._stages.elapsed:.1f} s", soft_wrap=True)
+        failures = list(report.failures(self._evaluations))
+        for line in failures:
+            report.console(stderr=True).print(f"jaxgear: warning: {line}", style="bold red", soft_wrap=True)
+        return not failures
+
+
+class Stages:
+    """Progress on stderr: a bar on a terminal, a line per stage elsewhere."""
+
+    def __init__(self, console: Console):
+        self._console, self._began = console, time.perf_counter()
+        columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn()
+        self._progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        self._task = self._progress.add_task("reading the design file", total=None, note="")
+
+    def __enter__(self) -> "Stages":
+        self._progress.start()
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self._progress.stop()
+
+    @property
+    def elapsed(self) -> float:
+        """Since the start of the run [s]."""
+        return time.perf_counter() - self._began
+
+    def begin(self, stage: str) -> None:
+        """Names the next stage."""
+        self._progress.update(self._task, description=stage, total=None, completed=0, note="")
+        if not self._console.is_terminal:
+            self._console.print(f"jaxgear: {stage}")
+
+    def step(self, step: int, total: int, best: float) -> None:
+        """Callback of the search."""
+        self._progress.update(self._task, completed=step, total=total, note=f"best PPTE {best:.3f} um")
+
+
+@contextmanager
+def run(file: Path, output: Path | None, *, cache: bool) -> Iterator[Run]:
+    """Reads the design file and opens the result folder; the results appear when the block ends without an exception.
+
+    Args:
+        file: design file.
+        output: result folder, None for results/<stem of the file>.
+        cache: keep compiled programs on disk.
+    """
+    jax.config.update("jax_enable_x64", True)
+    if cache:
+        enable_cache()
+    with Stages(report.console(stderr=True)) as stages:
+        design = load_design(file)
+        target = Path("results") / file.stem if output is None else output
+        with result_folder(target) as folder:
+            yield Run(design, target, folder, stages)

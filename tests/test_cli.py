@@ -1,0 +1,358 @@
+"""The command line: what it prints and writes, and that every failure is one line that leaves nothing behind."""
+
+import contextlib
+import csv
+import io
+import json
+import os
+import re
+import stat
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import equinox as eqx
+import jax
+import pytest
+
+import jaxgear as jg
+from jaxgear.cli import cache, main, run
+from jaxgear.io import load_design
+from jaxgear.io.folder import RESULT_FILES
+
+FIXED = """
+title = "a [small] pair"
+[pinion]
+teeth = 19
+module = 3.0
+face_width = 20.0
+[wheel]
+teeth = 48
+module = 3.0
+face_width = 18.0
+[load]
+torque = 50.0
+torque_range = [30.0, 60.0]
+speed = 3000
+[resolution]
+positions = 8
+[[pinion.modification]]
+type = "tip_relief"
+amount = 6.5
+length = 5.0
+[[wheel.modification]]
+type = "tip_relief"
+amount = 7.5
+length = 5.0
+"""
+FREE = (
+    FIXED.replace("amount = 6.5", 'amount = "height"')
+    + """
+[variables]
+height = { low = 0.0, high = 20.0, unit = "um" }
+[optimize]
+starts = 2
+steps = 100
+"""
+)
+
+
+@pytest.fixture(autouse=True)
+def no_cache(monkeypatch):
+    """The tests keep their own compilation cache."""
+    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
+
+
+def call(*arguments):
+    """Exit code, stdout and stderr of the command."""
+    out, err = io.StringIO(), io.StringIO()
+    # a process of its own has JAX's defaults, and optax needs them
+    with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as exit_:
+            main([str(argument) for argument in arguments])
+    return SimpleNamespace(code=exit_.value.code, out=out.getvalue(), err=err.getvalue())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Design files, and the results of one run of each command."""
+    folder = tmp_path_factory.mktemp("cli")
+    (folder / "fixed.toml").write_text(FIXED)
+    (folder / "free.toml").write_text(FREE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def analyzed(folder):
+    os.environ["JAXGEAR_NO_CACHE"] = "1"
+    result = call("analyze", folder / "fixed.toml", "-o", folder / "analyzed", "--no-figures")
+    return SimpleNamespace(**vars(result), summary=json.loads((folder / "analyzed" / "summary.json").read_text()))
+
+
+@pytest.fixture(scope="module")
+def optimized(folder):
+    os.environ["JAXGEAR_NO_CACHE"] = "1"
+    result = call("optimize", folder / "free.toml", "--output", folder / "optimized")
+    return SimpleNamespace(**vars(result), summary=json.loads((folder / "optimized" / "summary.json").read_text()))
+
+
+def assert_refused(result, *fragments):
+    """One line on stderr, nothing on stdout, exit code 2."""
+    assert result.code == 2, result.err
+    assert result.out == ""
+    assert result.err.startswith("jaxgear: error: ") and result.err.count("\n") == 1
+    assert "Traceback" not in result.err
+    for fragment in fragments:
+        assert fragment in result.err
+
+
+def test_analyze_gives_what_the_library_gives(folder, analyzed):
+    assert analyzed.code == 0
+    file = load_design(folder / "fixed.toml")
+    pinion, wheel = file.design({})
+    solve = eqx.filter_jit(lambda mesh, torque: jg.solve(mesh, torque, pinion=pinion, wheel=wheel))
+    cycle = solve(file.mesh(), 50.0)
+    written = analyzed.summary["designs"]["modified"]
+    for metric, value in eqx.filter_jit(jg.summary)(cycle).items():
+        assert written[metric] == pytest.approx(float(value), rel=1e-9), metric
+    assert written["max_flash_temperature_K"] == pytest.approx(float(jg.flash_temperature(cycle, 3000.0).max()))
+    assert written["pinion_modification"] == [
+        {"type": "tip_relief", "amount": 6.5, "length": 5.0, "curve": {"type": "parabolic"}}
+    ]
+    table = analyzed.summary["ppte_over_torque"]
+    assert table["torque_Nm"][0] == 30.0 and table["torque_Nm"][-1] == 60.0
+    assert table["modified_um"][-1] == pytest.approx(
+        float(jg.peak_to_peak(solve(file.mesh(), 60.0).transmission_error))
+    )
+    assert table["unmodified_um"] == sorted(table["unmodified_um"])  # without relief PPTE grows with the torque
+
+
+def test_optimize_compares_three_designs_and_improves(optimized):
+    assert optimized.code == 0
+    designs = optimized.summary["designs"]
+    assert list(designs) == ["unmodified", "rule-based", "optimum"]
+    before, after = designs["unmodified"]["ppte_um"], designs["optimum"]["ppte_um"]
+    assert after < 0.5 * before
+    assert optimized.summary["ppte_reduction_percent"] == pytest.approx(100 * (1 - after / before))
+    assert list(optimized.summary["optimum"]["parameters"]) == ["height_um"]
+    height = optimized.summary["optimum"]["parameters"]["height_um"]
+    assert designs["optimum"]["pinion_modification"][0]["amount"] == height
+    assert 2.0 < height < 15.0
+    assert optimized.summary["quick"] is False
+    assert optimized.summary["versions"]["jax"] == jax.__version__
+
+
+def test_rule_based_design_is_the_iso_relief_on_both_tips(folder, optimized):
+    relief = jg.iso_relief(load_design(folder / "free.toml").pair(), 50.0)
+    for gear in ("pinion", "wheel"):
+        (part,) = optimized.summary["designs"]["rule-based"][f"{gear}_modification"]
+        assert part["amount"] == pytest.approx(float(relief.amount))
+        assert part["length"] == pytest.approx(float(relief.length))
+
+
+def test_all_result_files_are_there(folder, analyzed, optimized):
+    assert {path.name for path in (folder / "optimized").iterdir()} == RESULT_FILES
+    assert {path.name for path in (folder / "analyzed").iterdir()} == {"summary.json", "flanks.csv"}
+    for path in (folder / "optimized").glob("*.png"):
+        assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_flanks_hold_the_tip_values_of_the_designs(folder, optimized):
+    with (folder / "optimized" / "flanks.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for name, design in optimized.summary["designs"].items():
+        for gear in ("pinion", "wheel"):
+            line = [row for row in rows if row["design"] == name and row["gear"] == gear]
+            tip = float(line[-1]["modification_um"])
+            amounts = [part["amount"] for part in design[f"{gear}_modification"]]
+            assert tip == pytest.approx(sum(amounts), abs=1e-5)
+            assert float(line[-1]["diameter_mm"]) == pytest.approx({"pinion": 63.0, "wheel": 150.0}[gear])
+
+
+def test_the_table_lines_up_and_shows_what_was_asked(optimized):
+    lines = [line for line in optimized.out.splitlines() if line.startswith(("│", "┃", "|"))]
+    assert len({len(line) for line in lines}) == 1
+    for label in ("unmodified", "rule-based", "optimum", "PPTE [um]", "mean transmission error", "max flank pressure"):
+        assert label in optimized.out
+    for label in ("corner pressure", "effective contact ratio", "pinion root stress", "wheel root stress"):
+        assert label in optimized.out
+    for label in ("mesh loss factor", "pinion tip relief, amount [um]", "max flash temperature [K]", "time [s]"):
+        assert label in optimized.out
+    assert "a [small] pair, 50 N m on the pinion" in optimized.out
+    assert "gradient norm" in optimized.out and "no variable is at a bound" in optimized.out
+    ppte = optimized.summary["designs"]["optimum"]["ppte_um"]
+    assert re.search(rf"PPTE \[um\].* {ppte:.3f} ", optimized.out)
+
+
+def test_stages_are_lines_where_there_is_no_terminal(optimized):
+    assert optimized.err.splitlines()[0] == "jaxgear: preparing the mesh"
+    assert all(line.startswith("jaxgear: ") for line in optimized.err.splitlines())
+
+
+def test_a_quick_run_is_coarse_short_and_says_so(folder, tmp_path, monkeypatch):
+    asked = {}
+
+    def search(design, bounds, **options):
+        asked.update(options, bounds=bounds)
+        options["callback"](20, options["steps"], 1.0)
+        return SimpleNamespace(
+            parameters={"height": 3.0}, active_bounds={"height": "lower"}, gradient_norm=0.1, evaluations=84
+        )
+
+    monkeypatch.setattr(run, "minimize", search)
+    path = tmp_path / "fine.toml"
+    path.write_text(FREE.replace("positions = 8", "positions = 4096"))
+    result = call("optimize", path, "--quick", "--no-figures", "-o", tmp_path / "out")
+    assert result.code == 0
+    assert "quick run" in result.out and "height is at its lower bound 0 um" in result.out
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["quick"] is True and summary["resolution"]["positions"] == 16
+    assert asked["starts"] == 4 and asked["steps"] == 40 and asked["torque"] == 50.0
+    assert asked["bounds"] == {"height": (0.0, 20.0)} and asked["mesh"].resolution.positions == 16
+    assert summary["designs"]["optimum"]["pinion_modification"][0]["amount"] == 3.0
+
+
+def test_results_of_an_earlier_run_are_replaced_and_figures_are_optional(folder, tmp_path, analyzed):
+    target = tmp_path / "out"
+    target.mkdir()
+    (target / "k_chart.png").write_text("from an earlier run")
+    assert call("analyze", folder / "fixed.toml", "-o", target, "--no-figures").code == 0
+    assert {path.name for path in target.iterdir()} == {"summary.json", "flanks.csv"}
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert stat.S_IMODE(target.stat().st_mode) & 0o500 == 0o500
+
+
+def test_results_go_beside_the_caller_by_default(folder, tmp_path, monkeypatch, analyzed):
+    monkeypatch.chdir(tmp_path)
+    result = call("analyze", folder / "fixed.toml", "--no-figures")
+    assert result.code == 0 and (tmp_path / "results" / "fixed" / "summary.json").is_file()
+    assert "results in results/fixed/" in result.out
+
+
+def test_a_failed_contact_solution_is_loud(folder, tmp_path):
+    path = tmp_path / "fails.toml"
+    path.write_text(FIXED.replace("positions = 8", "positions = 8\nnewton_steps = 1"))
+    result = call("analyze", path, "--no-figures", "-o", tmp_path / "out")
+    assert result.code == 1
+    assert "CONTACT SOLUTION NOT CONVERGED: unmodified at 30" in result.err
+    designs = json.loads((tmp_path / "out" / "summary.json").read_text())["designs"]
+    assert designs["unmodified"]["converged"] is False
+    assert 50.0 in designs["unmodified"]["failed_torques_Nm"]
+
+
+@pytest.mark.parametrize(
+    "command, content, fragments",
+    [
+        ("analyze", FREE, ["gear.toml: variables: analyze needs numbers but height is free", "jaxgear optimize"]),
+        ("optimize", FIXED, ["gear.toml: variables: missing", "jaxgear analyze"]),
+        ("analyze", FIXED.replace("teeth = 19", "teth = 19"), ['pinion.teth: unknown key, did you mean "teeth"?']),
+        ("analyze", FIXED.replace("module = 3.0", "module = -3.0", 1), ["pinion: Gear: module = -3 mm must be"]),
+        ("optimize", "[pinion", ["gear.toml: line 1: Expected ']' at the end of a table declaration"]),
+        ("optimize", "", ["pinion: missing, this key is required"]),
+    ],
+)
+def test_a_wrong_design_file_is_refused(tmp_path, monkeypatch, command, content, fragments):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "gear.toml").write_text(content)
+    assert_refused(call(command, "gear.toml"), *fragments)
+    assert [path.name for path in tmp_path.iterdir()] == ["gear.toml"]
+
+
+def test_files_and_folders_that_cannot_be_used_are_refused(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fixed = folder / "fixed.toml"
+    (tmp_path / "taken").write_text("something else")
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "chapter.tex").write_text("years of work")
+    assert_refused(call("analyze", "nowhere.toml"), "nowhere.toml: No such file or directory")
+    assert_refused(call("analyze", "thesis"), "thesis: is a folder, not a file")
+    assert_refused(call("analyze", fixed, "-o", "taken"), "taken: is a file, not a folder")
+    assert_refused(call("analyze", fixed, "-o", "taken/below"), "taken/below: cannot be written")
+    assert_refused(call("analyze", fixed, "-o", "thesis"), "thesis: holds other files than results")
+    assert {path.name for path in tmp_path.rglob("*")} == {"taken", "thesis", "chapter.tex"}
+
+
+@pytest.mark.parametrize(
+    "arguments, fragment",
+    [
+        ([], "Missing command"),
+        (["analyse"], "No such command"),
+        (["analyze"], "Missing argument"),
+        (["analyze", "a.toml", "b.toml"], "unexpected extra argument"),
+        (["optimize", "a.toml", "--fast"], "No such option"),
+        (["analyze", "a.toml", "--quick"], "No such option"),
+        (["optimize", "a.toml", "--output"], "requires an argument"),
+    ],
+)
+def test_wrong_usage_is_one_line(arguments, fragment):
+    assert_refused(call(*arguments), fragment, "jaxgear --help")
+
+
+@pytest.mark.parametrize("command", ["analyze", "optimize"])
+def test_interruption_leaves_earlier_results_alone(folder, tmp_path, monkeypatch, command):
+    target = tmp_path / "out"
+    target.mkdir()
+    (target / "summary.json").write_text("earlier")
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run.Run, "prepare", lambda self, **_: None)
+    monkeypatch.setattr(run.Run, "evaluate", interrupt)
+    name = {"analyze": "fixed", "optimize": "free"}[command]
+    result = call(command, folder / f"{name}.toml", "-o", target)
+    assert result.code == 130
+    assert result.err == "jaxgear: interrupted, nothing was written\n"
+    assert (target / "summary.json").read_text() == "earlier"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_defect_of_the_program_is_one_line_too(folder, tmp_path, monkeypatch):
+    def fail(*_, **__):
+        raise TypeError("two\nlines")
+
+    monkeypatch.setattr(run.Run, "prepare", fail)
+    target = tmp_path / "out"
+    result = call("analyze", folder / "fixed.toml", "-o", target)
+    assert_refused(result, "unexpected TypeError: two lines (JAXGEAR_DEBUG=1 shows where)")
+    assert not target.exists()
+    monkeypatch.setenv("JAXGEAR_DEBUG", "1")
+    with pytest.raises(TypeError):
+        main(["analyze", str(folder / "fixed.toml"), "-o", str(target)])
+
+
+def test_the_program_starts_as_a_process_of_its_own(tmp_path):
+    command = [sys.executable, "-c", "from jaxgear.cli import main; main()"]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    result = subprocess.run(
+        [*command, "analyze", "nowhere.toml"], cwd=tmp_path, capture_output=True, text=True, env=environment
+    )
+    assert_refused(SimpleNamespace(code=result.returncode, out=result.stdout, err=result.stderr), "nowhere.toml")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_and_version_need_no_file():
+    assert "optimize" in call("--help").out and call("--help").code == 0
+    assert "Design file" in call("optimize", "--help").out
+    assert call("--version").out.startswith("jaxgear ")
+
+
+def test_the_cache_is_a_private_folder_and_never_an_obstacle(tmp_path, monkeypatch):
+    settings = {}
+    monkeypatch.setattr(cache.jax.config, "update", settings.__setitem__)
+    monkeypatch.delenv("JAX_COMPILATION_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder = cache.enable_cache()
+    assert settings["jax_compilation_cache_dir"] == str(folder) and folder.is_relative_to(tmp_path)
+    assert stat.S_IMODE(folder.stat().st_mode) & 0o077 == 0
+    settings.clear()
+    folder.chmod(0o777)  # others could place programs here
+    assert cache.enable_cache() is None
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert cache.enable_cache() is None
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder.chmod(0o700)
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "/elsewhere")
+    assert cache.enable_cache() is None
+    assert settings == {}
