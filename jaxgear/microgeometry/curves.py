@@ -108,4 +108,12 @@ class Spline(AbstractCurve):
         d = jnp.asarray(d)
         knots = jnp.linspace(0.0, 1.0, self.values.shape[0], dtype=d.dtype)
         values = self.values.astype(d.dtype)
-        return interpax.interp1d(d.reshape(-1), knots, values, method="cubic2").reshape(d.shape)
+        return natural_spline(d, knots, values)
+
+
+def natural_spline(x, knots, values) -> Float[Array, "..."]:
+    """Natural cubic spline through `values` at `knots`, at any shape of x."""
+    # interpax's own end condition is not-a-knot, which overshoots between the first knots; axis 0 because it takes the
+    # boundary values of a negative axis for a whole row
+    slopes = interpax.approx_df(knots, values, "cubic2", axis=0, bc_type="natural")
+    return interpax.interp1d(x.reshape(-1), knots, values, method="cubic2", fx=slopes).reshape(x.shape)

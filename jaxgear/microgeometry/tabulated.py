@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 
 from ..numerics import check, concrete, real
 from .base import AbstractModification, Flank
+from .curves import natural_spline
 
 
 class TabulatedProfile(AbstractModification):
@@ -50,4 +51,6 @@ class TabulatedProfile(AbstractModification):
         if self.coordinate == "roll_angle":
             x = jnp.rad2deg(x / flank.base_radius)
         x = jnp.clip(x, self.position[0], self.position[-1])
+        if self.method == "cubic2":
+            return natural_spline(x, self.position, self.amount)
         return interpax.interp1d(x.reshape(-1), self.position, self.amount, method=self.method).reshape(x.shape)
