@@ -28,6 +28,13 @@ except OSError:  # a read-only home: the tests run all the same, only slower
     pass
 
 
+@pytest.fixture
+def interpolation():
+    """Allows the promotion of ranks and dtypes that interpax's cubic splines use inside."""
+    with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):
+        yield
+
+
 @pytest.fixture(scope="session")
 def solved():
     """The coupled reference cases of the catalogue, each solved once with its own torque: {name: (case, cycle)}."""
