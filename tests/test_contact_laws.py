@@ -1,0 +1,127 @@
+"""Hertzian contact laws against textbook numbers, their limits, and what the solver needs of them."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxgear as jg
+from jaxgear.compliance.hertz import ContactGeometry, ContactSide, contact_geometry
+from jaxgear.compliance.toothload import tooth_load
+from jaxgear.geometry import outline
+
+E, NU = 206e3, 0.3
+LAWS = {
+    "constant": jg.ConstantHertz(),
+    "depth": jg.DepthReferenced(),
+    "weber": jg.Weber(),
+    "power": jg.NonlinearPower(),
+    "johnson": jg.CenterDistance(),
+    "kovalskii": jg.Kovalskii(),
+    "palmgren": jg.Palmgren(),
+}
+# total approach of two steel flanks in plane strain at 266 N/mm, radii 10.26 mm, depths 1.67 mm, face width 20 mm
+EXAMPLE = {"constant": 1.50, "weber": 4.61, "power": 4.32, "johnson": 7.93, "kovalskii": 8.25, "palmgren": 7.9}
+
+
+def side(radius, depth, plane="strain", young=E):
+    field = lambda value: jnp.full((1, 1, 1), value)  # noqa: E731
+    modulus, poisson = (young, NU) if plane == "stress" else (young / (1 - NU**2), NU / (1 - NU))
+    return ContactSide(
+        radius=field(radius), depth=field(depth), young=field(young), modulus=field(modulus), poisson=field(poisson),
+        strain_modulus=field(young / (1 - NU**2)),
+    )  # fmt: skip
+
+
+def approach(law, q, radii=(10.26, 10.26), depths=(1.67, 1.67), plane="strain", moduli=(E, E), width=20.0):
+    """Approach [um] at line loads [N/mm]."""
+    sides = (side(r, h, plane, young) for r, h, young in zip(radii, depths, moduli))
+    prepared = law.prepare(ContactGeometry(*sides, jnp.full((1, 1, 1), width)))
+    return prepared.deflection(jnp.asarray(q)[None, None])[0, 0]
+
+
+@pytest.mark.parametrize("name", EXAMPLE)
+def test_published_example(name):
+    tolerance = 0.06 if name == "palmgren" else 0.006
+    assert float(approach(LAWS[name], [266.0])[0]) == pytest.approx(EXAMPLE[name], abs=tolerance)
+
+
+def test_depth_law_is_the_integral_of_the_strain_below_the_contact():
+    """Strain along the axis of a Hertzian pressure (plane strain; McEwen), integrated from the surface to the depth."""
+    q, radius, depth = 400.0, 8.0, 1.5
+    reduced_modulus = E / (2 * (1 - NU**2))
+    a = np.sqrt(4 * q * (radius / 2) / (np.pi * reduced_modulus))
+    p0 = 2 * q / (np.pi * a)
+    z = a * np.sinh(np.linspace(0.0, np.arcsinh(depth / a), 20001))
+    root = np.sqrt(1 + (z / a) ** 2)
+    sigma_x = -p0 * ((1 + 2 * (z / a) ** 2) / root - 2 * z / a)
+    sigma_z = -p0 / root
+    strain = -(1 - NU**2) / E * (sigma_z - NU / (1 - NU) * sigma_x)
+    total = 2 * np.trapezoid(strain, z) * 1e3
+    law = approach(jg.DepthReferenced(), [q], (radius, radius), (depth, depth))
+    assert float(law[0]) == pytest.approx(total, rel=1e-6)
+
+
+def test_depth_law_turns_into_weber_for_deep_teeth():
+    q = jnp.asarray([1.0, 50.0, 500.0])
+    errors = []
+    for depth in (1.67, 5.0, 15.0):
+        exact, weber = (approach(LAWS[n], q, depths=(depth, depth)) for n in ("depth", "weber"))
+        errors.append(float(jnp.abs(exact / weber - 1).max()))
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 2e-5
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+@pytest.mark.parametrize("name", LAWS)
+def test_laws_increase_from_zero_with_finite_slope(name, plane):
+    q = jnp.concatenate([jnp.zeros(1), jnp.geomspace(1e-8, 5000.0, 60)])
+    law = lambda load: approach(LAWS[name], load, plane=plane)  # noqa: E731
+    value, slope = jax.jvp(law, (q,), (jnp.ones_like(q),))
+    curvature = jax.jvp(lambda load: jax.jvp(law, (load,), (jnp.ones_like(q),))[1], (q,), (jnp.ones_like(q),))[1]
+    assert float(value[0]) == 0.0
+    assert bool(jnp.all(jnp.diff(value) > 0))
+    assert bool(jnp.all((slope > 0) & jnp.isfinite(slope) & jnp.isfinite(curvature)))
+    if name != "constant":
+        assert bool(jnp.all(jnp.diff(slope) <= 1e-12)), "Hertzian contacts stiffen under load"
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_laws_are_symmetric_in_the_two_flanks(name):
+    q = jnp.asarray([20.0, 300.0])
+    one = approach(LAWS[name], q, (7.0, 20.0), (1.2, 1.9), moduli=(E, 0.5 * E))
+    other = approach(LAWS[name], q, (20.0, 7.0), (1.9, 1.2), moduli=(0.5 * E, E))
+    np.testing.assert_allclose(one, other, rtol=1e-13)
+
+
+def test_logarithmic_laws_differ_by_their_constants_only():
+    """Johnson - Weber = 2 q / (pi E') per body times (ln(2 R / h) - 1/2 + nu'/2), at any load."""
+    q, modulus, poisson = 266.0, E / (1 - NU**2), NU / (1 - NU)
+    difference = float((approach(LAWS["johnson"], [q]) - approach(LAWS["weber"], [q]))[0])
+    bracket = np.log(2 * 10.26 / 1.67) - 0.5 + poisson / 2
+    assert difference == pytest.approx(1e3 * 2 * 2 * q / (np.pi * modulus) * bracket, rel=1e-9)
+
+
+def test_plane_of_the_compliance_model_reaches_the_contact_law():
+    """Plane stress keeps E and nu; the constant law is plane strain in any case."""
+    q = jnp.asarray([266.0])
+    a = np.sqrt(4 * 266.0 * 5.13 / np.pi * 2 / E)
+    by_hand = 1e3 * 2 * 2 * 266.0 / (np.pi * E) * (np.log(2 * 1.67 / a) - NU / 2)
+    assert float(approach(LAWS["weber"], q, plane="stress")[0]) == pytest.approx(by_hand, rel=1e-7)
+    stress, strain = (float(approach(LAWS["constant"], q, plane=p)[0]) for p in ("stress", "strain"))
+    assert stress == strain == pytest.approx(1e3 * 4 * (1 - NU**2) * 266.0 / (np.pi * E), rel=1e-12)
+
+
+def test_local_geometry_of_a_pair():
+    """Radii, depths and moduli reach the law; width factor a^2 / q = 4 R / (pi E*)."""
+    soft = jg.Material(elastic_modulus=100e3, poisson_ratio=0.35)
+    pinion, wheel = jg.Gear(19, 3.0, face_width=10.0), jg.Gear(48, 3.0, face_width=10.0, material=soft)
+    loads = [tooth_load(outline(g), jnp.asarray([[12.0], [9.0]])) for g in (pinion, wheel)]
+    geometry = contact_geometry(*loads, "strain", jnp.asarray(10.0))
+    np.testing.assert_allclose(geometry.wheel.modulus, 100e3 / (1 - 0.35**2), rtol=1e-14)
+    np.testing.assert_allclose(geometry.wheel.poisson, 0.35 / 0.65, rtol=1e-14)
+    np.testing.assert_allclose(geometry.pinion.depth[:, 0], loads[0].depth, rtol=1e-14)
+    compliance = (1 - NU**2) / E + (1 - 0.35**2) / 100e3
+    np.testing.assert_allclose(
+        geometry.width_factor[:, 0, 0], 4 / np.pi * np.array([6.0, 4.5]) * compliance, rtol=1e-13
+    )

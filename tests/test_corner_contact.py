@@ -1,0 +1,211 @@
+"""Contact of a tip corner outside the path of contact: gap, lever, and the softening of the cut-off contact."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import gear_pair, kahraman_gear, prepare
+
+import jaxgear as jg
+from jaxgear.compliance.edge import _truncated
+from jaxgear.contact.corner import corner_gap
+
+# Gap [um] of the approach corner when the mate stays, over the distance before A in base pitches, and its parabola.
+TABLE = {
+    "30/30 m2": {0.02: (0.515, 0.507), 0.05: (3.30, 3.17), 0.10: (13.76, 12.67), 0.20: (60.1, 50.7)},
+    "50/50 m3": {0.02: (0.306, 0.303), 0.05: (1.94, 1.89), 0.10: (7.96, 7.57), 0.20: (33.5, 30.3)},
+    "19/48 m3": {0.02: (1.81, 1.90), 0.05: (10.95, 11.86), 0.10: (43.2, 47.4)},
+}
+
+
+def pair_of(name):
+    if name == "50/50 m3":
+        return jg.GearPair(kahraman_gear(156.0), kahraman_gear(156.0))
+    return gear_pair((30, 30), 2.0, bores=(None, None)) if name == "30/30 m2" else gear_pair((19, 48), 3.0)
+
+
+def ends(pair):
+    """Arguments of `corner_gap` at A, where the wheel's tip enters, and at E, where the pinion's tip leaves."""
+    path = jg.path_of_contact(pair)
+    return (
+        (
+            pair.wheel.tip_roll_length,
+            pair.wheel.base_radius,
+            path.pinion_roll_length(path.start),
+            pair.pinion.base_radius,
+        ),
+        (
+            pair.pinion.tip_roll_length,
+            pair.pinion.base_radius,
+            path.wheel_roll_length(path.end),
+            pair.wheel.base_radius,
+        ),
+    )
+
+
+def turned_corner(x, tip_rho, tip_base, mate_rho, mate_base):
+    """The corner after its gear turned back by a distance x on the line of action.
+
+    Origin in the mate's centre, the line of action parallel to the first axis at the height of the mate's base radius.
+    """
+    center = np.array([mate_rho + tip_rho, mate_base + tip_base])
+    turn = -x / tip_base
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    return center + rotation @ np.array([-tip_rho, -tip_base])
+
+
+def gap_by_turning(x, tip_rho, tip_base, mate_rho, mate_base):
+    """Gap in plain geometry: the arc by which the mate turns until its involute passes through the corner."""
+
+    def start_of_involute(point):
+        """Polar angle at which the involute through a point leaves the base circle."""
+        tangent = np.sqrt(point @ point - mate_base**2)
+        return np.arctan2(point[1], point[0]) + np.arctan2(tangent, mate_base) - tangent / mate_base
+
+    nominal = start_of_involute(np.array([mate_rho, mate_base])) + x / mate_base  # the mate turned back as well
+    return 1e3 * abs(
+        mate_base * (start_of_involute(turned_corner(x, tip_rho, tip_base, mate_rho, mate_base)) - nominal)
+    )
+
+
+@pytest.mark.parametrize("name", TABLE)
+@pytest.mark.parametrize("where", [0, 1])
+def test_gap_against_turned_gears(name, where):
+    arguments = [float(a) for a in ends(pair_of(name))[where]]
+    pitch = float(pair_of(name).base_pitch)
+    x = np.array([0.01, 0.05, 0.1, 0.2]) * pitch
+    gap, _ = corner_gap(jnp.asarray(x), *map(jnp.asarray, arguments))
+    by_hand = [gap_by_turning(distance, *arguments) for distance in x]
+    np.testing.assert_allclose(gap, by_hand, rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_gap_table(name):
+    """The table holds the mate and turns the corner: its gap S solves S = gap(x + S)."""
+    pair = pair_of(name)
+    approach = ends(pair)[0]
+    gap = jax.jit(lambda x: corner_gap(x, *approach)[0])
+    for fraction, (exact, _) in TABLE[name].items():
+        x, s = fraction * pair.base_pitch, jnp.zeros(())
+        for _ in range(60):
+            s = gap(x + 1e-3 * s)
+        assert float(s) == pytest.approx(exact, rel=0.006)
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_gap_starts_as_the_parabola_of_second_order(name):
+    pair = pair_of(name)
+    for tip_rho, tip_base, mate_rho, mate_base in ends(pair):
+        curvature = tip_rho * (tip_rho + mate_rho) / (mate_rho * tip_base**2)
+        x = jnp.asarray([1e-4, 1e-3]) * pair.base_pitch
+        gap, _ = corner_gap(x, tip_rho, tip_base, mate_rho, mate_base)
+        relative = np.asarray(gap / (1e3 * 0.5 * curvature * x**2)) - 1
+        assert abs(relative[0]) < 1e-3 and abs(relative[1]) < 1e-2
+    path = jg.path_of_contact(pair)
+    first = ends(pair)[0]
+    parabola = 1e3 * 0.5 * first[0] * (first[0] + first[2]) / (first[2] * first[1] ** 2)
+    for fraction, (_, printed) in TABLE[name].items():
+        assert float(parabola * (fraction * path.base_pitch) ** 2) == pytest.approx(printed, rel=0.005)
+
+
+def test_touched_point_lies_on_the_mate():
+    """The mate is touched at the distance of the corner from its centre."""
+    arguments = ends(pair_of("19/48 m3"))[0]
+    x = jnp.asarray([0.0, 0.3, 1.0])
+    _, rho = corner_gap(x, *arguments)
+    assert float(rho[0]) == pytest.approx(float(arguments[2]), rel=1e-14)
+    assert bool(jnp.all(jnp.diff(rho) != 0.0))
+    corner, mate_base = turned_corner(1.0, *map(float, arguments)), float(arguments[3])
+    assert float(rho[2]) == pytest.approx(np.sqrt(corner @ corner - mate_base**2), rel=1e-12)
+
+
+def test_mesh_continues_beyond_the_path_with_continuous_slope():
+    """Gap and lever over the whole cycle: zero and one on the path; value and slope continuous at its ends."""
+    mesh = prepare(gear_pair(), resolution=jg.Resolution(positions=512))
+    path, contact = np.asarray(mesh.path), mesh.path_of_contact
+    order = np.argsort(path, axis=None)
+    s, gap, lever = (np.asarray(a).ravel()[order] for a in (path, mesh.corner_gap, mesh.lever))
+    on = (s >= float(contact.start)) & (s <= float(contact.end))
+    np.testing.assert_array_equal(gap[on], 0.0)
+    np.testing.assert_array_equal(lever[on], 1.0)
+    assert (gap[~on] > 0).all() and (lever[~on] < 1).all() and (lever > 0.5).all()
+    step = s[1] - s[0]
+    slope = np.diff(gap) / step
+    bend = max(1e3 * float(t * (t + m) / (m * b**2)) for t, b, m, _ in ends(mesh.pair))  # second derivative at the ends
+    assert np.abs(np.diff(slope)).max() < 2 * bend * step
+    assert np.abs(slope[np.searchsorted(s, float(contact.end))]) < 0.05 * np.abs(slope).max()
+
+
+def test_lever_is_one_minus_half_the_slope_of_the_gap():
+    """Energy: under a transmission error d both gears turn by d/2, so the gap changes by its slope times d/2."""
+    mesh = prepare(gear_pair(), resolution=jg.Resolution(positions=512))
+    gap, lever, path = (np.asarray(a)[0] for a in (mesh.corner_gap, mesh.lever, mesh.path))
+    end, pitch = float(mesh.path_of_contact.end), float(mesh.path_of_contact.base_pitch)
+    after = (path > end) & (path < end + 0.35 * pitch)  # farther out the gap goes on along its tangent
+    slope = np.gradient(gap[after], path[after])
+    np.testing.assert_allclose(lever[after][2:-2], 1 - 0.5e-3 * slope[2:-2], atol=1e-5)
+
+
+def truncated_contact(tau, count=1200):
+    """Approach of half planes pressed by a parabola that ends at a corner, by a boundary-element method.
+
+    Units: half width of the full contact, its reduced radius and modulus are 1. The gap is x^2 / 2 and the corner
+    stands a distance tau to the left of its vertex.
+    """
+    length = max(2.5, 2.2 + tau)
+    edges = -tau + length * (0.5 - 0.5 * np.cos(np.linspace(0, np.pi, count + 1)))
+    middle, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+
+    def primitive(t):
+        return t * np.log(np.abs(t)) - t
+
+    kernel = -(primitive(edges[None, 1:] - middle[:, None]) - primitive(edges[None, :-1] - middle[:, None]))
+    # in the units a = R = 1 with E* = 1: load q = pi / 4, displacement 2 / (pi E*) int p ln(1/|x - s|) ds
+    kernel, load = 2 / np.pi * kernel, np.pi / 4
+    active = np.ones(count, bool)
+    for _ in range(100):
+        n = int(active.sum())
+        system = np.block([[kernel[np.ix_(active, active)], -np.ones((n, 1))], [width[active][None], np.zeros((1, 1))]])
+        solution = np.linalg.solve(system, np.append(-0.5 * middle[active] ** 2, load))
+        pressure = np.zeros(count)
+        pressure[active] = solution[:-1]
+        if (pressure >= 0).all():
+            break
+        active = pressure > 0
+    return solution[-1]
+
+
+@pytest.mark.parametrize("tau", [0.6, 0.2, -0.5, -1.5])
+def test_truncated_contact_against_boundary_elements(tau):
+    """The extra approach of a contact that a corner cuts off, in units of a^2 / R; beyond the corner less its gap."""
+    full = truncated_contact(3.0)
+    assert full == pytest.approx(0.5 * (0.5 + np.log(2)), abs=2e-3), "Hertz"
+    extra = truncated_contact(tau) - full
+    phi = float(_truncated(jnp.asarray(tau))[0]) + (0.5 * tau**2 if tau < 0 else 0.0)
+    assert extra == pytest.approx(phi, abs=3e-3)
+
+
+def test_truncation_begins_smoothly_where_the_contact_reaches_the_corner():
+    tau = jnp.asarray([1.0 - 1e-4, 1.0, 1.0 + 1e-4])
+    phi, _ = _truncated(tau)
+    assert float(phi[1]) == 0.0 and float(phi[2]) == 0.0
+    assert abs(float(phi[0])) < 1e-7
+
+
+def test_corner_contact_is_softer_than_the_flank_and_regular():
+    """Deflection under load grows monotonically with the load at every position, also beyond the corner."""
+    mesh = prepare(gear_pair())
+    load = jnp.concatenate([jnp.zeros(1), jnp.geomspace(1e-6, 1000.0, 40)])
+    law, flank = mesh.law, mesh.law.flank
+
+    def both(q):
+        whole = jnp.full(mesh.path.shape, q)[:, None]
+        ones = jnp.ones_like(whole)
+        return *jax.jvp(law.deflection, (whole,), (ones,)), flank.deflection(whole)
+
+    deflection, slope, uncut = jax.jit(jax.vmap(both))(load)
+    assert bool(jnp.all(jnp.isfinite(slope))) and bool(jnp.all(slope > 0))
+    assert bool(jnp.all(deflection >= uncut * (1 - 1e-12)))
+    middle = jnp.abs(mesh.path) < 0.1 * mesh.path_of_contact.base_pitch
+    ratio = (deflection / jnp.where(uncut > 0, uncut, 1.0))[:, middle[:, None]]
+    assert float(jnp.max(ratio[1:])) < 1.02, "far from the corners nothing changes"
