@@ -243,7 +243,7 @@ def test_a_failed_contact_solution_is_loud(folder, tmp_path):
 @pytest.mark.parametrize(
     "command, content, fragments",
     [
-        ("analyze", FREE, ["gear.toml: variables: analyze needs numbers but height is free", "jaxgear optimize"]),
+        ("analyze", FREE, ["gear.toml: variables: analyze needs numbers, these are free: height", "jaxgear optimize"]),
         ("optimize", FIXED, ["gear.toml: variables: missing", "jaxgear analyze"]),
         ("analyze", FIXED.replace("teeth = 19", "teth = 19"), ['pinion.teth: unknown key, did you mean "teeth"?']),
         ("analyze", FIXED.replace("module = 3.0", "module = -3.0", 1), ["pinion: Gear: module = -3 mm must be"]),

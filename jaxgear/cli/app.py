@@ -63,7 +63,9 @@ def analyze(file: File, output: Output = None, no_figures: NoFigures = False, no
         design = current.design
         if design.bounds:
             free = ", ".join(design.bounds)
-            raise DesignFileError(file, "variables", f"analyze needs numbers but {free} is free; use jaxgear optimize")
+            raise DesignFileError(
+                file, "variables", f"analyze needs numbers, these are free: {free}; use jaxgear optimize"
+            )
         current.prepare(torques=_TORQUES)
         current.evaluate("unmodified", NoModification(), NoModification())
         pinion, wheel = design.design({})

@@ -187,13 +187,13 @@ def _flank_cells(evaluation: Evaluation) -> Iterator[tuple[str, str]]:
                 yield f"{gear} {kind}{again}, {name}{unit}", _text(value)
 
 
-def _text(value) -> str:
+def _text(value, form: str = ".3f") -> str:
     if isinstance(value, dict):
-        numbers = [_text(number) for name, number in value.items() if name != "type"]
+        numbers = [_text(number, ".3g") for name, number in value.items() if name != "type"]
         return " ".join([value["type"], *numbers])
     if isinstance(value, list):
         return f"({len(value)} values)"
-    return value if isinstance(value, str) else f"{value:.3f}"
+    return value if isinstance(value, str) else format(value, form)
 
 
 def _with_unit(file: DesignFile, name: str) -> str:

@@ -95,7 +95,7 @@ def load_design(path: str | Path) -> DesignFile:
     """Reads and checks a design file.
 
     Args:
-        path: TOML file; the README shows its layout.
+        path: TOML file; examples/spur_19_48.toml shows and lists what it can say.
 
     Raises:
         DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
