@@ -13,13 +13,6 @@ def design(x):
     return jg.TipRelief(x["pinion"], x["length"]), jg.TipRelief(x["wheel"], x["length"])
 
 
-@pytest.fixture(scope="module", autouse=True)
-def standard_promotion():
-    """Optax mixes its integer step count with floats, which strict promotion forbids."""
-    with jax.numpy_dtype_promotion("standard"):
-        yield
-
-
 @pytest.fixture(scope="module")
 def mesh():
     pinion = jg.Gear(19, 3.0, face_width=20.0, bore_diameter=24.0)

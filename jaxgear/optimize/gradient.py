@@ -144,7 +144,9 @@ class _Search:
                 slopes = jnp.where(jnp.isfinite(slopes), slopes, 0.0)
                 better = values < best  # False for NaN, so a failed design is never the best
                 best, best_points = jnp.where(better, values, best), jnp.where(better[:, None], points, best_points)
-                update, moments = adam.update(slopes, moments)
+                # optax mixes its integer step count with floats, which strict promotion would forbid
+                with jax.numpy_dtype_promotion("standard"):
+                    update, moments = adam.update(slopes, moments)
                 return (jnp.clip(points - rate * update, 0.0, 1.0), moments, best, best_points, slopes), None
 
             adam = optax.scale_by_adam()
