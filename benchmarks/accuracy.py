@@ -13,6 +13,7 @@ import argparse  # noqa: E402
 import json  # noqa: E402
 import sys  # noqa: E402
 from collections.abc import Sequence  # noqa: E402
+from concurrent.futures import ThreadPoolExecutor  # noqa: E402
 from pathlib import Path  # noqa: E402
 
 from .cases import PAIRS, PLANES, Case, aligned, reference, select  # noqa: E402
@@ -35,11 +36,13 @@ def compare(models: Sequence[Model], cases: Sequence[Case]) -> Errors:
     """
     if not cases or not models:
         raise ValueError("nothing to compare: no cases or no models")
-    results = {}
-    for model in models:
-        curves = run(model, cases)
-        results[model.name] = {case: errors(case, curves[case], reference(case), aligned(case)) for case in cases}
-    return results
+    # most of the time is compilation, which runs outside Python's lock
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        curves = dict(zip((model.name for model in models), pool.map(lambda model: run(model, cases), models)))
+    return {
+        name: {case: errors(case, found[case], reference(case), aligned(case)) for case in cases}
+        for name, found in curves.items()
+    }
 
 
 def worst(results: dict[Case, dict[str, float]]) -> dict[str, dict[str, float]]:

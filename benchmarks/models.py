@@ -1,6 +1,7 @@
 """The models under comparison: jaxgear's default, the usual published model, and the default with one
 ingredient changed."""
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -70,36 +71,15 @@ def _curves(cycle: jg.MeshCycle) -> Curves:
 
 _prepare = eqx.filter_jit(jg.prepare)
 _solve = eqx.filter_jit(jg.solve)
-_PREPARED: dict[tuple[str, str, str], jg.Mesh] = {}
 
 
+@functools.cache
 def _mesh(model: Model, pair: str, plane: str) -> jg.Mesh:
-    plane = model.compliance(plane).plane  # the published model knows plane stress only
-    key = (model.name, pair, plane)
-    if key not in _PREPARED:
-        _PREPARED[key] = _with_model(_default_mesh(pair, plane), model)
-    return _PREPARED[key]
-
-
-def _default_mesh(pair: str, plane: str) -> jg.Mesh:
-    key = ("", pair, plane)
-    if key not in _PREPARED:
-        compliance, resolution = jg.default_compliance(plane), jg.Resolution(positions=POSITIONS)
-        _PREPARED[key] = strong(_prepare(gear_pair(pair), compliance=compliance, resolution=resolution))
-    return _PREPARED[key]
-
-
-def _with_model(mesh: jg.Mesh, model: Model) -> jg.Mesh:
-    """Swaps the compliance of a prepared mesh: cheaper than `prepare`, which would be compiled for every model."""
-    compliance, default = model.compliance(mesh.compliance.plane), mesh.compliance
-    if not model.corner_contact:
-        apart = jnp.where(mesh.outside > 0, _APART, mesh.corner_gap)
-        mesh = eqx.tree_at(lambda m: m.corner_gap, mesh, apart)
-    loads = mesh.pinion_load, mesh.wheel_load
-    if not eqx.tree_equal((compliance.tooth, compliance.body), (default.tooth, default.body)):
-        mesh = eqx.tree_at(lambda m: (m.structure, m.hub), mesh, (compliance.structure(*loads), compliance.hub(*loads)))
-    law = compliance.law(*loads, mesh.outside, mesh.pair.face_width)
-    return strong(eqx.tree_at(lambda m: (m.compliance, m.law), mesh, (compliance, law)))
+    compliance, resolution = model.compliance(plane), jg.Resolution(positions=POSITIONS)
+    mesh = strong(_prepare(gear_pair(pair), compliance=compliance, resolution=resolution))
+    if model.corner_contact:
+        return mesh
+    return eqx.tree_at(lambda m: m.corner_gap, mesh, jnp.where(mesh.outside > 0, _APART, mesh.corner_gap))
 
 
 def _solved(mesh: jg.Mesh, case: Case) -> jg.MeshCycle:
