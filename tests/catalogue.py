@@ -3,8 +3,10 @@
 from typing import NamedTuple
 
 import equinox as eqx
+import jax.numpy as jnp
 
 import jaxgear as jg
+from jaxgear.compliance.hertz import LinearLaw
 
 COARSE = jg.Resolution(positions=32)
 
@@ -105,3 +107,20 @@ def kahraman_gear(tip_diameter=154.5709, **changes) -> jg.Gear:
 def high_contact_ratio_pair() -> jg.GearPair:
     """Slender teeth, contact ratio between 2 and 3."""
     return gear_pair((40, 60), 2.0, bores=(40.0, 60.0), addendum=1.4, dedendum=1.65, root_radius=0.25)
+
+
+def constant_stiffness_mesh(pair: jg.GearPair, stiffness: float, resolution: jg.Resolution) -> jg.Mesh:
+    """A mesh of uncoupled tooth pairs, all of one stiffness [N/um] on the path of contact, and apart outside."""
+    mesh = prepare(pair, resolution=resolution)
+    per_width = jnp.full_like(mesh.path, pair.face_width / stiffness)[:, None]
+    return eqx.tree_at(
+        lambda m: (m.structure, m.law, m.corner_gap, m.lever, m.hub),
+        mesh,
+        (
+            jnp.zeros_like(mesh.structure),
+            LinearLaw(per_width),
+            jnp.where(mesh.outside > 0, 1e6, 0.0),
+            jnp.ones_like(mesh.lever),
+            jnp.zeros_like(mesh.hub),
+        ),
+    )
