@@ -22,6 +22,7 @@ References:
 """
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -117,9 +118,8 @@ class EdgeLaw(AbstractLaw):
         width = jnp.sqrt(self.width_factor * (line_load + LOAD_FLOOR))
         position = self.edge.distance / width
         cut, mean_log = _truncated(position)
-        span = self.edge.reach / (_APEX_DISTANCE * width) * jnp.exp(-mean_log)
-        # ln(span) where it is positive, with a smooth onset
-        wedge = 0.25 * jnp.log1p(span**4)
+        # ln(span) where it is positive, with a smooth onset: ln(1 + span^4) / 4
+        wedge = 0.25 * jax.nn.softplus(4 * (jnp.log(self.edge.reach / (_APEX_DISTANCE * width)) - mean_log))
         return self.flank.deflection(line_load) + 1e3 * line_load * (self.truncation * cut + self.edge.wedge * wedge)
 
 
