@@ -17,7 +17,8 @@ def print_summary(results: Errors) -> None:
     """Worst and mean absolute error over all cases, per quantity and model; then what misses its goal, and why."""
     console = Console(width=_WIDTH)
     count = len(next(iter(results.values())))
-    table = Table(title=f"Errors against finite elements, worst / mean of {count} mesh cycles", title_justify="left")
+    console.print(f"Errors against finite elements, worst / mean of {count} mesh cycles", highlight=False)
+    table = Table()
     table.add_column("quantity")
     table.add_column("goal", justify="right")
     for name in results:
@@ -41,7 +42,8 @@ def print_detail(results: Errors) -> None:
     console = Console(width=_WIDTH)
     for quantity in QUANTITIES:
         unit = f" [{quantity.unit}]" if quantity.unit else ""
-        table = Table(title=f"Error of {quantity.title}{unit}".replace("[", r"\["), title_justify="left")
+        console.print(f"Error of {quantity.title}{unit}", markup=False, highlight=False)
+        table = Table()
         table.add_column("case")
         for name in results:
             table.add_column(name, justify="right")
