@@ -135,8 +135,8 @@ _PRESSURE = (
     "and tip corners the difference is that of the load."
 )
 _SMALL = (
-    "A well relieved pair has a small PPTE on a large mean: there the one percent by which a pair alone is too soft counts "
-    "in full. "
+    "A well relieved pair has a small PPTE on a large mean: there the one percent by which a pair alone is too soft "
+    "counts in full. "
 )
 QUANTITIES = (
     Quantity("mean", "mean TE", "%", 2.5, _SOFT),
