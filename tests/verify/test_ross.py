@@ -116,9 +116,9 @@ def test_beam(sides):
             whole.append(gear._inv_kb(a) + gear._inv_ks(a) + gear._inv_ka(a))
             beside.append(beyond_crossing(gear, a, height))
         np.testing.assert_allclose(ours, per_width(gear, np.subtract(whole, beside)), rtol=1e-5)
-        # what lies beside the load only adds; it weighs most near the root, where the beam itself is short
+        # crossing and contact differ by x tan(angle): most where that is large against the height above the root
         share = np.array(beside) / whole
-        assert share.min() > 0 and share.max() < 0.5 and (np.diff(share[np.argsort(angles)]) < 0).all()
+        assert share.min() > 0 and share.max() < 0.45
 
 
 def beyond_crossing(gear, angle, height):
