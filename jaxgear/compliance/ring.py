@@ -5,8 +5,8 @@ uniform compression (N). Their Fourier series on the root circle meet the ring's
 plane solution); the work-conjugate displacements of any arc then give a 3 x 3 matrix K between any two teeth. K is
 exactly reciprocal, K(-phi) = K(phi)^T, and holds for self compliance (phi = 0) and neighbouring teeth alike.
 
-Lengths are relative to the root radius, stresses to the plane modulus. The rigid torsion of the ring between bore and root
-circle is left out here: it is the same for every tooth and is accounted for once, as hub wind-up.
+Lengths are relative to the root radius, stresses to the plane modulus. The rigid torsion of the ring between bore and
+root circle is left out here: it is the same for every tooth and is accounted for once, as hub wind-up.
 
 References:
     J. H. Michell, Proc. London Math. Soc. 31 (1899) 100-124; harmonic-wise ring solution and load modes after

@@ -2,15 +2,17 @@
 
 from typing import TYPE_CHECKING
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from ..numerics import check
 from .involute import diameter
 from .outline import outline
 
 if TYPE_CHECKING:
-    from .gear import Gear
     from .pair import GearPair
 
 
@@ -25,50 +27,64 @@ def check_pair(pair: "GearPair") -> None:
                 f"GearPair: wheel {name} = {float(theirs.flat[0]):g} {unit} must equal the pinion's, "
                 f"{float(ours.flat[0]):g} {unit}"
             )
-    closest = float(np.max(pair.pinion.base_radius + pair.wheel.base_radius))
-    check("GearPair", "center_distance", pair.center_distance, "mm", low=closest, open_low=True)
-    _check_thickness(pair)
-    _check_contact(pair)
-
-
-def _check_thickness(pair: "GearPair") -> None:
-    """Teeth thicker than the mate's spaces cannot be assembled on the given centre distance."""
-    if pair.center_distance is None:
-        return
-    free = float(np.max(_backlash_free(pair).working_center_distance))
+    facts = jax.tree.map(np.asarray, _facts(pair))
+    check("GearPair", "center_distance", pair.center_distance, "mm", low=facts.closest.max(), open_low=True)
     # single precision resolves a centre distance to about 1e-7 of its value
-    check("GearPair", "center_distance", pair.center_distance, "mm (backlash-free)", low=free * (1 - 1e-6))
+    free = facts.backlash_free.max() * (1 - 1e-6)
+    check("GearPair", "center_distance", pair.center_distance, "mm (backlash-free)", low=free)
+    if (facts.contact_ratio < 1).any():
+        raise ValueError(
+            f"GearPair: contact ratio = {float(facts.contact_ratio.min()):.4g} must be at least 1: raise a "
+            "tip_diameter or addendum, or lower center_distance"
+        )
+    _check_interference("pinion", "wheel", facts.pinion_reached, facts.pinion_form)
+    _check_interference("wheel", "pinion", facts.wheel_reached, facts.wheel_form)
 
 
-def _backlash_free(pair: "GearPair") -> "GearPair":
-    return type(pair)(pair.pinion, pair.wheel)
+class _Facts(eqx.Module):
+    """What decides whether a pair can run: distances and diameters in mm.
+
+    `reached` is the diameter at which the mate's tip meets the flank, negative when that is below the base circle.
+    """
+
+    closest: Array
+    backlash_free: Array
+    contact_ratio: Array
+    pinion_reached: Array
+    pinion_form: Array
+    wheel_reached: Array
+    wheel_form: Array
 
 
-def _check_contact(pair: "GearPair") -> None:
+@eqx.filter_jit
+def _facts(pair: "GearPair") -> _Facts:
     from .path import path_of_contact
 
     path = path_of_contact(pair)
-    ratio = np.asarray(path.contact_ratio)
-    if (ratio < 1).any():
-        raise ValueError(
-            f"GearPair: contact ratio = {float(ratio.min()):.4g} must be at least 1: raise a tip_diameter or addendum, "
-            "or lower center_distance"
-        )
-    active = {
-        "pinion": (pair.pinion, path.pinion_roll_length(path.start), "wheel"),
-        "wheel": (pair.wheel, path.wheel_roll_length(path.end), "pinion"),
-    }
-    for name, (gear, rho, mate) in active.items():
-        _check_interference(name, gear, rho, mate)
+    free = eqx.tree_at(lambda p: p.center_distance, pair, None, is_leaf=lambda leaf: leaf is None)
+
+    def form(gear):
+        return diameter(gear, outline(gear).form_roll_length)
+
+    def reached(gear, rho):
+        return jnp.where(rho < 0, -1.0, 1.0) * diameter(gear, rho)
+
+    return _Facts(
+        closest=pair.pinion.base_radius + pair.wheel.base_radius,
+        backlash_free=free.working_center_distance,
+        contact_ratio=path.contact_ratio,
+        pinion_reached=reached(pair.pinion, path.pinion_roll_length(path.start)),
+        pinion_form=form(pair.pinion),
+        wheel_reached=reached(pair.wheel, path.wheel_roll_length(path.end)),
+        wheel_form=form(pair.wheel),
+    )
 
 
-def _check_interference(name: str, gear: "Gear", rho, mate: str) -> None:
-    form = np.asarray(diameter(gear, outline(gear).form_roll_length))
-    reached, inside = np.asarray(diameter(gear, rho)), np.asarray(rho) < 0
+def _check_interference(name: str, mate: str, reached, form) -> None:
     # a micrometre of the radius below the form circle is within the accuracy of any generated outline
-    if inside.any() or (reached < form - 2e-3).any():
-        below = " (below the base circle)" if inside.any() else ""
+    if (reached < form - 2e-3).any():
+        below = " (below the base circle)" if (reached < 0).any() else ""
         raise ValueError(
-            f"GearPair: {mate} tip_diameter reaches the {name}'s flank at diameter {float(reached.flat[0]):.6g} mm"
+            f"GearPair: {mate} tip_diameter reaches the {name}'s flank at diameter {abs(float(reached.flat[0])):.6g} mm"
             f"{below}, must be at least its form diameter {float(form.flat[0]):.6g} mm"
         )
