@@ -13,9 +13,9 @@ from jaxtyping import Array, Float
 def real(value) -> Float[Array, "..."]:
     """Converts to an inexact array: arrays of floats keep their dtype, everything else takes JAX's default float."""
     array = jnp.asarray(value)
-    if not jnp.issubdtype(array.dtype, jnp.inexact):
-        array = array.astype(jnp.result_type(float))
-    return array
+    dtype = array.dtype if jnp.issubdtype(array.dtype, jnp.inexact) else jnp.result_type(float)
+    # the conversion also drops the weak type of Python numbers, which would retrace where an array did not
+    return jax.lax.convert_element_type(array, dtype)
 
 
 def optional_real(value) -> Float[Array, "..."] | None:
