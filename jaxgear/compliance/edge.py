@@ -15,7 +15,8 @@ soften it:
 2. The missing material. Behind the corner there is a wedge of interior angle 2 beta, not a half plane. Loaded at its
    apex it gives way by q / E' K ln(r), K = sin^2 b / (b + sin(2b)/2) + cos^2 b / (b - sin(2b)/2), against 2 / pi for
    the half plane (Flamant). The excess acts between the distance of the load from the corner and the size of the tooth
-   tip.
+   tip. Its mean is taken over a semi-ellipse on the patch: the square-root singularity of the truncated half planes does
+   not exist at the corner of a wedge, and would overstate the excess.
 
 References:
     K. L. Johnson, Contact Mechanics, 1985, sections 2.7 and 5.1 (wedge, integral equations of plane contact).
@@ -124,7 +125,10 @@ class EdgeLaw(AbstractLaw):
 
 
 def _truncated(position: Real) -> tuple[Real, Real]:
-    """Phi without the gap of the corner, and the mean of ln(distance from the corner / a) over the pressure."""
+    """Phi without the gap of the corner, and the mean of ln(distance from the corner / a) over a semi-ellipse.
+
+    The semi-ellipse spans the patch: the Hertzian pressure of a full contact, and its bounded counterpart on [0, L].
+    """
     cut_off = position < 1
     tau = jnp.where(cut_off, position, 0.0)
     root = jnp.sqrt(tau**2 + 3)
