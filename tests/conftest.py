@@ -12,9 +12,12 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 
 
 def _compilation_cache() -> Path:
-    """A folder of this user only: what is in it gets executed."""
+    """A folder of this user only, since what is in it gets executed, and of this worker only.
+
+    JAX does not write entries atomically: a worker could read what another one is still writing.
+    """
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(base) / "jaxgear" / "tests"
+    folder = Path(base) / "jaxgear" / "tests" / os.environ.get("PYTEST_XDIST_WORKER", "single")
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     folder.chmod(0o700)
     return folder

@@ -15,8 +15,8 @@ soften it:
 2. The missing material. Behind the corner there is a wedge of interior angle 2 beta, not a half plane. Loaded at its
    apex it gives way by q / E' K ln(r), K = sin^2 b / (b + sin(2b)/2) + cos^2 b / (b - sin(2b)/2), against 2 / pi for
    the half plane (Flamant). The excess acts between the distance of the load from the corner and the size of the tooth
-   tip. Its mean is taken over a semi-ellipse on the patch: the square-root singularity of the truncated half planes does
-   not exist at the corner of a wedge, and would overstate the excess.
+   tip. Its mean is taken over a semi-ellipse on the patch: the square-root singularity of the truncated half planes
+   does not exist at the corner of a wedge, and would overstate the excess.
 
 References:
     K. L. Johnson, Contact Mechanics, 1985, sections 2.7 and 5.1 (wedge, integral equations of plane contact).
