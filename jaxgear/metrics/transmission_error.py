@@ -49,9 +49,9 @@ def harmonics(curve: Curve, count: int = 5) -> Harmonics:
     if not 1 <= count < positions / 2:
         raise ValueError(f"harmonics: count = {count} must be at least 1 and less than half of {positions} positions")
     order = jnp.arange(1, count + 1, dtype=curve.dtype)
-    angle = 2 * jnp.pi * order[:, None] * jnp.arange(positions, dtype=curve.dtype) / positions
-    real = 2 * jnp.mean(curve[..., None, :] * jnp.cos(angle), axis=-1)
-    imaginary = -2 * jnp.mean(curve[..., None, :] * jnp.sin(angle), axis=-1)
+    angle = 2 * jnp.pi / positions * jnp.arange(positions, dtype=curve.dtype)[:, None] * order[None]
+    real = 2 / positions * (curve @ jnp.cos(angle))
+    imaginary = -2 / positions * (curve @ jnp.sin(angle))
     squared = real**2 + imaginary**2
     present = squared > 0
     amplitude = jnp.where(present, jnp.sqrt(jnp.where(present, squared, 1.0)), 0.0)

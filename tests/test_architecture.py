@@ -1,0 +1,79 @@
+"""Layers import only what comes before them, and importing the library has no side effects."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import jaxgear
+
+PACKAGE = Path(jaxgear.__file__).parent
+ORDER = ("numerics", "geometry", "microgeometry", "compliance", "contact", "metrics", "optimize", "io", "plot", "cli")
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+# results print themselves and carry derived pressures: inside functions, contact may ask the metrics
+LATE = {("contact", "metrics")}
+
+
+def layer(path: Path) -> str:
+    parts = path.relative_to(PACKAGE).with_suffix("").parts
+    return parts[0]
+
+
+def imported(path: Path):
+    """Layers that a file imports, with whether that happens at module level."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    package = ("jaxgear", *path.relative_to(PACKAGE).parts[:-1])
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = package[: len(package) - node.level + 1]
+            names = [node.module] if node.module else [alias.name for alias in node.names]
+            for name in names:
+                target = (*base, *name.split("."))
+                if len(target) > 1:
+                    yield target[1], node in tree.body
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "jaxgear":
+            yield (node.module or "").split(".")[1], node in tree.body
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_layers_import_only_earlier_ones(path):
+    own = layer(path)
+    if own == "__init__":
+        return
+    for other, at_top in imported(path):
+        if other == own or (not at_top and (own, other) in LATE):
+            continue
+        assert ORDER.index(other) < ORDER.index(own), f"{own} imports {other}"
+
+
+def test_the_check_sees_imports():
+    assert {"geometry", "numerics"} <= {name for name, _ in imported(PACKAGE / "contact" / "mesh.py")}
+
+
+def test_numerics_has_no_gear_word():
+    words = ("gear", "tooth", "teeth", "flank", "pinion", "wheel", "mesh")
+    for path in (PACKAGE / "numerics").glob("*.py"):
+        text = path.read_text(encoding="utf-8").lower()
+        if path.name == "__init__.py":
+            text = text.replace("without a gear word", "")
+        assert not [word for word in words if word in text], path.name
+
+
+def test_import_is_silent_and_changes_nothing():
+    script = (
+        "import jax, sys\n"
+        "before = dict(jax.config.values)\n"
+        "import jaxgear\n"
+        "assert dict(jax.config.values) == before\n"
+        "assert 'matplotlib' not in sys.modules and 'typer' not in sys.modules\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_modules_are_small_enough_to_read_in_one_go():
+    for path in FILES:
+        assert len(path.read_text(encoding="utf-8").splitlines()) <= 300, path
