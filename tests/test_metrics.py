@@ -1,0 +1,103 @@
+"""Metrics against published numbers and closed forms."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxgear as jg
+
+# FZG type C gears with untrimmed tips: published form and stress correction factors and loss factor
+FZG = jg.GearPair(
+    jg.Gear(16, 4.5, profile_shift=0.1817, face_width=14.0, tip_diameter=82.636, root_radius=0.375),
+    jg.Gear(24, 4.5, profile_shift=0.1715, face_width=14.0, tip_diameter=118.544, root_radius=0.375),
+    91.5,
+)
+
+
+def test_ohlendorf_loss_factor():
+    assert float(jg.ohlendorf_loss_factor(FZG)) == pytest.approx(0.1986, abs=5e-5)
+
+
+def test_root_factors_at_the_outer_point_of_single_contact():
+    beyond = 0.4624 * FZG.base_pitch  # the published contact ratio, 1.4624, fixes the load point
+    pinion = jg.root_factors(FZG.pinion, FZG.pinion.tip_roll_length - beyond)
+    wheel = jg.root_factors(FZG.wheel, FZG.wheel.tip_roll_length - beyond)
+    np.testing.assert_allclose([pinion.form, wheel.form], [1.6889, 1.5832], atol=1e-4)
+    np.testing.assert_allclose([pinion.correction, wheel.correction], [1.8514, 1.9165], atol=1e-4)
+    np.testing.assert_allclose([pinion.lever_arm, wheel.lever_arm], [5.0586, 5.2769], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("teeth", "single", "mesh"),
+    [
+        ((17, 43), 12.5049, 18.3300),
+        ((19, 48), 12.8315, 19.0448),
+        ((20, 30), 12.2637, 17.8299),
+        ((23, 23), 11.9623, 17.2700),
+        ((30, 30), 12.7846, 19.0509),
+        ((50, 50), 14.0545, 22.0094),
+    ],
+)
+def test_iso_stiffness(teeth, single, mesh):
+    pair = jg.GearPair(*(jg.Gear(z, 3.0, face_width=20.0) for z in teeth))
+    stiffness = jg.iso_stiffness(pair)
+    np.testing.assert_allclose([stiffness.single, stiffness.mesh], [single, mesh], rtol=5e-5)
+
+
+def test_harmonics_of_a_known_curve():
+    psi = jnp.arange(32.0) / 32.0
+    angle = 2 * jnp.pi * psi
+    curve = 4.0 + 3.0 * jnp.cos(angle + jnp.deg2rad(40.0)) + 0.5 * jnp.cos(3 * angle - jnp.deg2rad(100.0))
+    found = jg.harmonics(curve, 4)
+    np.testing.assert_allclose(found.amplitude, [3.0, 0.0, 0.5, 0.0], atol=1e-12)
+    np.testing.assert_allclose(found.phase[jnp.asarray([0, 2])], [40.0, -100.0], atol=1e-9)
+
+
+def test_peak_to_peak_does_not_hide_a_failure():
+    assert jnp.isnan(jg.peak_to_peak(jnp.full(8192, jnp.nan)))
+    assert float(jg.peak_to_peak(jnp.asarray([1.0, 4.0, 2.0]))) == 3.0
+
+
+def test_smooth_peak_to_peak_rises_to_the_true_one():
+    curve = jnp.sin(2 * jnp.pi * jnp.arange(64.0) / 64.0)
+    values = [float(jg.smooth_peak_to_peak(curve, width)) for width in (1.0, 0.1, 0.01, 0.001)]
+    assert np.all(np.diff(values) > 0)
+    assert values[-1] == pytest.approx(2.0, abs=0.01)
+
+
+@pytest.fixture(scope="module")
+def cycle():
+    gears = jg.Gear(19, 3.0, face_width=20.0, bore_diameter=24.0), jg.Gear(48, 3.0, face_width=18.0, bore_diameter=70.0)
+    mesh = jg.prepare(
+        jg.GearPair(*gears), compliance=jg.default_compliance("strain"), resolution=jg.Resolution(positions=32)
+    )
+    return jg.solve(mesh, 50.0)
+
+
+def test_pressure_at_the_pitch_point_is_hertz(cycle):
+    """One pair, 103.7 N/mm, R = 6.98 mm, steel in plane strain: 731 MPa."""
+    pressure = float(cycle.contact_pressure[:, 0, 0].max())
+    line_load, radius, modulus = 103.72, 6.984, 206e3 / (2 * (1 - 0.3**2))
+    assert pressure == pytest.approx(np.sqrt(line_load * modulus / (np.pi * radius)), rel=2e-3)
+    assert pressure == pytest.approx(700.0, abs=40.0)
+
+
+def test_stiffness_definitions(cycle):
+    secant = jg.secant_stiffness(cycle)
+    np.testing.assert_allclose(secant * cycle.transmission_error, float(cycle.force), rtol=1e-12)
+    more = jg.solve(cycle.mesh, 50.01)
+    slope = (more.force - cycle.force) / (more.transmission_error - cycle.transmission_error)
+    np.testing.assert_allclose(cycle.tangent_stiffness, slope, rtol=2e-3)
+
+
+def test_loaded_teeth_touch_beyond_the_theoretical_path(cycle):
+    ratio = float(cycle.mesh.path_of_contact.contact_ratio)
+    assert float(jg.effective_contact_ratio(cycle)) > ratio + 0.05
+    shock = jg.contact_shock(cycle)
+    assert float(shock.approach) > 0.0 and float(shock.recess) > 0.0 and float(shock.force) > 0.0
+
+
+def test_flash_temperature_vanishes_at_the_pitch_point_and_grows_with_the_root_of_speed(cycle):
+    slow, fast = (jg.flash_temperature(cycle, speed).max(axis=(0, 1)) for speed in (1000.0, 4000.0))
+    assert float(slow[0]) == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(fast, 2 * slow, rtol=1e-9, atol=1e-9)
