@@ -48,3 +48,10 @@ def test_results_converge_with_slices():
     # midpoint rule: each halving of the slices quarters the error
     assert abs(mean[2] - mean[1]) < 0.4 * abs(mean[1] - mean[0])
     assert abs(mean[2] - mean[1]) < 0.005 * mean[2]
+
+
+def test_results_converge_with_positions(cycle):
+    fine = jg.solve(mesh_of(positions=128), 150.0)
+    coarse = float(jg.peak_to_peak(cycle.transmission_error))
+    assert coarse == pytest.approx(float(jg.peak_to_peak(fine.transmission_error)), rel=0.01)
+    assert float(cycle.transmission_error.mean()) == pytest.approx(float(fine.transmission_error.mean()), rel=1e-3)
