@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import constant_stiffness_mesh, high_contact_ratio_pair, kahraman_gear, solve
+from catalogue import constant_stiffness_mesh, flank, high_contact_ratio_pair, kahraman_gear, solve
 
 import jaxgear as jg
 
@@ -43,10 +43,10 @@ def torque(mesh, load):
     return load * STIFFNESS * DELTA0 * mesh.pair.pinion.base_radius * 1e-3
 
 
-def relieved(mesh, depth, extent, load=1.0, curve=None):
-    """Mesh cycle with both tips relieved by depth * delta0 over extent * p_b."""
-    relief = jg.TipRelief(depth * DELTA0, extent * mesh.pair.base_pitch, jg.Linear() if curve is None else curve)
-    return solve(mesh, torque(mesh, load), pinion=relief, wheel=relief)
+def relieved(mesh, depth, extent, load=1.0, curve=(1.0, 0.0)):
+    """Mesh cycle with both tips relieved by depth * delta0 over extent * p_b, linear by default."""
+    relief = flank(tip=depth * DELTA0, tip_length=extent * mesh.pair.base_pitch, curve=curve)
+    return solve(mesh, torque(mesh, load), relief, relief)
 
 
 def ppte(cycle):
@@ -122,7 +122,7 @@ def test_relief_that_reaches_into_single_contact(fine):
 
 def test_parabolic_relief(fine):
     """Pure parabola over the double-contact zone: PPTE is least, delta0 / 8, at twice the depth; 1/4 at delta0."""
-    values = [ppte(relieved(fine, depth, L, curve=jg.Quadratic(0.0, 0.0, 1.0))) for depth in (1.0, 1.8, 2.0, 2.2)]
+    values = [ppte(relieved(fine, depth, L, curve=(0.0, 1.0))) for depth in (1.0, 1.8, 2.0, 2.2)]
     assert values[0] == pytest.approx(0.25, abs=2e-3)
     assert values[2] == pytest.approx(0.125, abs=2e-3)
     assert values[2] < min(values[1], values[3])

@@ -1,0 +1,231 @@
+"""Equilibrium, symmetries, invariances and convergence of the solved mesh cycle."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import (
+    FINITE_ELEMENT_CASES,
+    SLICED,
+    flank,
+    gear_pair,
+    high_contact_ratio_pair,
+    kahraman_gear,
+    prepare,
+    solve,
+)
+
+import jaxgear as jg
+
+CASES = pytest.mark.parametrize("name", [case.name for case in FINITE_ELEMENT_CASES])
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return prepare(gear_pair())
+
+
+@pytest.fixture(scope="module")
+def sliced():
+    return prepare(gear_pair(), resolution=SLICED)
+
+
+@CASES
+def test_forces_balance_the_torque(name, solved):
+    case, cycle = solved[name]
+    force = 1e3 * case.torque / float(cycle.mesh.pair.pinion.base_radius)
+    assert float(cycle.force) == pytest.approx(force, rel=1e-14)
+    assert force / case.face_width == pytest.approx(case.line_load, abs=6e-3)
+    np.testing.assert_allclose(jnp.sum(cycle.pair_force, axis=0), force, rtol=1e-13)
+    np.testing.assert_allclose(jnp.sum(jg.load_sharing(cycle), axis=0), 1.0, rtol=1e-13)
+    assert bool(jnp.all(cycle.converged)) and cycle.converged.dtype == bool
+
+
+@CASES
+def test_contact_conditions(name, solved):
+    """No tension, no penetration, no load across a gap; loads and gaps exclude each other."""
+    _, cycle = solved[name]
+    assert float(cycle.line_load.min()) >= 0.0
+    loaded = cycle.line_load > 0
+    assert float(jnp.max(jnp.where(loaded, cycle.opening, -1.0))) < 0
+    assert float(jnp.min(jnp.where(loaded, 1.0, cycle.opening))) > -1e-12
+    assert float(cycle.residual.max()) < 1e-13
+
+
+@CASES
+def test_pairs_follow_each_other(name, solved):
+    """After a base pitch every pair takes the place of its predecessor: force and path continue across the cycle."""
+    _, cycle = solved[name]
+    force, path = np.asarray(cycle.pair_force), np.asarray(cycle.mesh.path)
+    pitch = float(cycle.mesh.path_of_contact.base_pitch)
+    step = pitch / cycle.phase.shape[0]
+    np.testing.assert_allclose(path[1:, -1] + step, path[:-1, 0], atol=1e-12)
+    whole = force[::-1].ravel()  # one pair over the whole path
+    jump = np.abs(np.diff(whole))
+    seams = np.arange(1, force.shape[0]) * force.shape[1] - 1
+    assert jump[seams].max() <= np.delete(jump, seams).max() * 1.05
+
+
+def test_axes_and_shapes(sliced):
+    cycle = solve(sliced, 50.0, flank(crowning=6.0))
+    assert cycle.phase.shape == cycle.transmission_error.shape == cycle.unloaded_transmission_error.shape == (32,)
+    assert cycle.line_load.shape == cycle.contact_pressure.shape == cycle.corner_pressure.shape == (4, 7, 32)
+    assert cycle.pair_force.shape == (4, 32)
+    np.testing.assert_allclose(cycle.phase, np.arange(32) / 32, atol=1e-16)
+    np.testing.assert_allclose(cycle.mesh.path[1, 0], 0.0, atol=1e-15)
+
+
+def test_equal_gears_are_symmetric_about_the_pitch_point():
+    """Driving and driven gear change places at psi -> 1 - psi: the transmission error and the shares mirror."""
+    gear = kahraman_gear(156.0)
+    relief = flank(tip=4.0, tip_length=2.0, root=2.0, root_length=1.5, barrel=1.5, crowning=3.0)
+    mesh = prepare(jg.GearPair(gear, gear), resolution=SLICED)
+    cycle = solve(mesh, 200.0, relief, relief)
+
+    def mirrored(curve):
+        return np.asarray(curve)[..., 1:][..., ::-1]
+
+    np.testing.assert_allclose(mirrored(cycle.transmission_error), cycle.transmission_error[1:], rtol=1e-12)
+    unloaded = cycle.unloaded_transmission_error
+    np.testing.assert_allclose(mirrored(unloaded), unloaded[1:], atol=1e-12)
+    # pair i at phase psi stands where pair 3 - i stands at 1 - psi, on the other side of the pitch point
+    share = np.asarray(jg.load_sharing(cycle))
+    np.testing.assert_allclose(mirrored(share[::-1]), share[:, 1:], atol=1e-10)
+    # the modification on one gear only does the same as on the other only, mirrored
+    one, other = solve(mesh, 200.0, pinion=relief), solve(mesh, 200.0, wheel=relief)
+    np.testing.assert_allclose(mirrored(other.transmission_error), one.transmission_error[1:], rtol=1e-12)
+
+
+@CASES
+def test_hub_windup_shifts_the_mean_and_nothing_else(name, solved):
+    case, cycle = solved[name]
+    rigid = solve(prepare(case.pair(), jg.default_compliance(hub_windup=False)), case.torque)
+    c_hub = 0.0
+    for z, bore in zip(case.teeth, case.bores):
+        root = case.module * (z - 2.5)
+        base = case.module * z * np.cos(np.deg2rad(20.0))
+        c_hub += 1.3 * ((root / bore) ** 2 - 1) / (2 * np.pi * 206e3) * (base / root) ** 2
+    shift = cycle.transmission_error - rigid.transmission_error
+    np.testing.assert_allclose(shift, 1e3 * c_hub * case.line_load, rtol=1e-4)
+    assert float(jg.peak_to_peak(shift)) < 1e-12
+    np.testing.assert_allclose(cycle.pair_force, rigid.pair_force, rtol=1e-11, atol=1e-9)
+    np.testing.assert_allclose(
+        1 / cycle.tangent_stiffness - 1 / rigid.tangent_stiffness, 1e3 * c_hub / case.face_width, rtol=1e-6
+    )
+
+
+def test_slices_without_lead_modification_are_all_alike(mesh, sliced):
+    relief = flank(tip=5.0, tip_length=3.0)
+    one, many = solve(mesh, 50.0, relief), solve(sliced, 50.0, relief)
+    np.testing.assert_allclose(many.transmission_error, one.transmission_error, rtol=1e-12)
+    np.testing.assert_allclose(many.line_load, jnp.broadcast_to(one.line_load, (4, 7, 32)), rtol=1e-10, atol=1e-10)
+
+
+def test_lead_slope_of_either_sign_gives_mirror_images(sliced):
+    up, down = (solve(sliced, 50.0, flank(lead_slope=amount)) for amount in (8.0, -8.0))
+    np.testing.assert_allclose(up.transmission_error, down.transmission_error, rtol=1e-12)
+    np.testing.assert_allclose(up.line_load, down.line_load[:, ::-1], atol=1e-9)
+    assert float(up.line_load[1, 0, 0]) > float(up.line_load[1, -1, 0]), "material is gone at positive face coordinates"
+
+
+def resliced(mesh, slices):
+    """The same mesh with another number of slices."""
+    width = mesh.pair.face_width
+    return dataclasses.replace(
+        mesh,
+        resolution=dataclasses.replace(mesh.resolution, slices=slices),
+        face_coordinate=((jnp.arange(slices, dtype=width.dtype) + 0.5) / slices - 0.5) * width,
+        slice_width=jnp.full((slices,), width / slices),
+    )
+
+
+def test_lead_crowning_converges_with_slices(mesh, sliced):
+    """Midpoint rule over the face: the error falls with the square of the number of slices."""
+    np.testing.assert_allclose(resliced(mesh, 7).face_coordinate, sliced.face_coordinate, atol=1e-14)
+    curves = {n: solve(resliced(mesh, n), 50.0, flank(crowning=4.0)).transmission_error for n in (5, 10, 80)}
+    errors = {n: float(jnp.abs(jnp.mean(curves[n] - curves[80]))) for n in (5, 10)}
+    assert 1e-4 < errors[5] < 0.1
+    assert errors[5] / errors[10] == pytest.approx(4.0, rel=0.25)
+
+
+def test_converges_with_positions(mesh):
+    """The same curve at common positions whatever the resolution, and a PPTE that settles."""
+    coarse = solve(mesh, 50.0).transmission_error
+    fine = solve(prepare(gear_pair(), resolution=jg.Resolution(positions=256)), 50.0).transmission_error
+    np.testing.assert_allclose(coarse, fine[::8], rtol=1e-12)
+    ppte = [float(jg.peak_to_peak(curve)) for curve in (coarse, fine[::4], fine[::2], fine)]
+    assert (np.diff(ppte) > -1e-12).all(), "positions are nested"
+    assert ppte[3] < 1.03 * ppte[0] and ppte[3] - ppte[2] < 0.005 * ppte[3]
+
+
+def test_fewer_pairs_suffice_for_a_short_path(mesh):
+    four = solve(mesh, 50.0)
+    three = solve(prepare(gear_pair(), resolution=jg.Resolution(positions=32, pairs=3)), 50.0)
+    np.testing.assert_allclose(three.transmission_error, four.transmission_error, rtol=1e-12)
+    np.testing.assert_allclose(three.line_load, four.line_load[:3], atol=1e-9)
+
+
+def test_high_contact_ratio_needs_three_pairs():
+    cycle = solve(prepare(high_contact_ratio_pair()), 60.0)
+    loaded = jnp.sum(cycle.line_load[:, 0] > 0, axis=0)
+    assert int(loaded.min()) == 2 and int(loaded.max()) == 3
+    assert bool(jnp.all(cycle.converged))
+    normal = solve(prepare(gear_pair((40, 60), 2.0, bores=(40.0, 60.0))), 60.0)
+    assert float(jg.peak_to_peak(cycle.transmission_error)) < float(jg.peak_to_peak(normal.transmission_error))
+
+
+def test_unloaded_transmission_error_is_the_limit_of_light_load(mesh):
+    pinion, wheel = flank(tip=5.0, tip_length=3.0, barrel=2.0), flank(profile_slope=3.0)
+    light, none = (solve(mesh, torque, pinion, wheel) for torque in (1e-6, 0.0))
+    np.testing.assert_allclose(light.transmission_error, light.unloaded_transmission_error, atol=1e-5)
+    np.testing.assert_allclose(none.transmission_error, none.unloaded_transmission_error, atol=1e-13)
+    np.testing.assert_allclose(none.pair_force, 0.0, atol=1e-12)
+    assert bool(jnp.all(none.converged)) and bool(jnp.all(light.converged))
+    smallest = jnp.min(none.gap / none.mesh.lever[:, None], axis=(0, 1))
+    np.testing.assert_allclose(none.unloaded_transmission_error, smallest, rtol=1e-14)
+
+
+def test_common_material_removal_shifts_the_transmission_error(mesh):
+    """A constant thickness off a whole flank: the wheel lags by it where no corner is in contact."""
+    plain, thin = solve(mesh, 50.0), solve(mesh, 50.0, wheel=flank(constant=7.0))
+    corner = jnp.any((thin.line_load[:, 0] > 0) & (mesh.outside > 0), axis=0)
+    shift = np.asarray(thin.transmission_error - plain.transmission_error)[~np.asarray(corner)]
+    assert 8 < shift.size < 32
+    np.testing.assert_allclose(shift, 7.0, atol=1e-11)
+
+
+def test_more_torque_deflects_and_presses_more(mesh):
+    cycles = [solve(mesh, torque, flank(tip=6.0, tip_length=4.0)) for torque in (5.0, 20.0, 80.0)]
+    for light, heavy in zip(cycles, cycles[1:]):
+        assert bool(jnp.all(heavy.transmission_error > light.transmission_error))
+        assert float(heavy.contact_pressure.max()) > float(light.contact_pressure.max())
+        assert float(jg.effective_contact_ratio(heavy)) > float(jg.effective_contact_ratio(light))
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+def test_structure_matrix_is_symmetric_positive_definite(plane):
+    structure = np.asarray(prepare(gear_pair(), jg.default_compliance(plane)).structure).transpose(2, 0, 1)
+    np.testing.assert_allclose(structure, structure.transpose(0, 2, 1), rtol=1e-10, atol=1e-16)
+    assert np.linalg.eigvalsh(structure).min() > 0
+
+
+def test_plane_strain_is_stiffer(mesh):
+    strain = solve(prepare(gear_pair(), jg.default_compliance("strain")), 50.0)
+    ratio = solve(mesh, 50.0).transmission_error / strain.transmission_error
+    assert bool(jnp.all((ratio > 1.02) & (ratio < 1.10)))
+
+
+def test_nan_never_passes_for_a_good_design(mesh):
+    from jaxgear.contact import solve_removed
+
+    removed = jnp.zeros((4, 1, 32)).at[1, 0, 3].set(jnp.nan)
+    broken = solve_removed(mesh, 50.0, removed)
+    assert bool(broken.converged[2]) and not bool(broken.converged[3])
+    assert bool(jnp.isnan(jg.peak_to_peak(broken.transmission_error)))
+
+
+def test_defaults(mesh):
+    assert jg.Resolution() == jg.Resolution(positions=64, slices=1, pairs=4)
+    explicit = prepare(gear_pair(), jg.default_compliance("stress"))
+    np.testing.assert_array_equal(mesh.structure, explicit.structure)
