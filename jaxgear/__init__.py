@@ -7,6 +7,7 @@ The pipeline in reading order, every step differentiable and vmappable:
     default_compliance          teeth, gear bodies with coupled neighbours, Hertzian contact
     prepare, solve              loaded tooth contact over one base pitch -> MeshCycle
     peak_to_peak, ...           metrics on the MeshCycle
+    monte_carlo                 what manufacturing tolerances make of it
     minimize                    the best modification by gradient
 
 Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in
@@ -80,3 +81,15 @@ from .optimize import long_relief_length as long_relief_length
 from .optimize import minimize as minimize
 from .optimize import relief_amount as relief_amount
 from .optimize import short_relief_length as short_relief_length
+from .tolerance import Deviation as Deviation
+from .tolerance import GearDeviation as GearDeviation
+from .tolerance import GearTolerance as GearTolerance
+from .tolerance import Scatter as Scatter
+from .tolerance import Tolerance as Tolerance
+from .tolerance import ToleranceClass as ToleranceClass
+from .tolerance import TruncatedNormal as TruncatedNormal
+from .tolerance import Uniform as Uniform
+from .tolerance import deviated_material as deviated_material
+from .tolerance import iso_rounded as iso_rounded
+from .tolerance import monte_carlo as monte_carlo
+from .tolerance import sample_deviations as sample_deviations

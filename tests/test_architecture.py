@@ -10,7 +10,19 @@ import pytest
 import jaxgear
 
 PACKAGE = Path(jaxgear.__file__).parent
-ORDER = ("numerics", "geometry", "microgeometry", "compliance", "contact", "metrics", "optimize", "io", "plot", "cli")
+ORDER = (
+    "numerics",
+    "geometry",
+    "microgeometry",
+    "compliance",
+    "contact",
+    "metrics",
+    "tolerance",
+    "optimize",
+    "io",
+    "plot",
+    "cli",
+)
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 # results print themselves and carry derived pressures: inside functions, contact may ask the metrics

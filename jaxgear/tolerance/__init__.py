@@ -1,0 +1,20 @@
+"""What manufacturing deviations make of a design: tolerances, random deviations and their Monte Carlo analysis.
+
+Deviations are material removed in um like every modification: positive into the flank, of either sign. Slopes turn
+about the middle of the profile or the face, as `ProfileSlope` and `LeadSlope` do, and the waviness has neither mean nor
+slope, so that each deviation is what a gear measuring machine reports under that name.
+"""
+
+from .deviation import Deviation as Deviation
+from .deviation import GearDeviation as GearDeviation
+from .deviation import deviated_material as deviated_material
+from .deviation import sample_deviations as sample_deviations
+from .distribution import AbstractDistribution as AbstractDistribution
+from .distribution import TruncatedNormal as TruncatedNormal
+from .distribution import Uniform as Uniform
+from .iso_1328 import ToleranceClass as ToleranceClass
+from .iso_1328 import iso_rounded as iso_rounded
+from .limits import GearTolerance as GearTolerance
+from .limits import Tolerance as Tolerance
+from .monte_carlo import Scatter as Scatter
+from .monte_carlo import monte_carlo as monte_carlo

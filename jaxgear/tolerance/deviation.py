@@ -1,0 +1,207 @@
+"""Random deviations between tolerance limits, and the material they remove at the contacts of a mesh."""
+
+from functools import cache
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from ..contact import Mesh, removed_material
+from ..microgeometry import AbstractModification, Flank, LeadSlope, ProfileSlope
+from ..numerics import real
+from .distribution import AbstractDistribution
+from .limits import GearTolerance, Tolerance, check_slices
+
+Real = Float[Array, "*samples"]
+Load = Float[Array, "pairs slices positions"]
+
+# Whole waves over the active profile. Shorter ones are smoothed away by the width of the contact.
+HARMONICS = 4
+_SHAPE_POINTS = 129  # at which the height of a waviness is taken: 32 per shortest wave, 0.5 % of it at most
+
+
+class GearDeviation(eqx.Module):
+    """Deviations of one gear [um, positive where material is missing]; a leading axis for several samples.
+
+    Attributes:
+        profile_slope: as the amount of `ProfileSlope`, shape (*samples,).
+        waviness: coefficients of the profile form deviation, shape (*samples, 2 * HARMONICS); see `Waviness`.
+        pitch: displacement of the tooth of every pair, shape (*samples, pairs).
+        helix_slope: as the amount of `LeadSlope`, shape (*samples,).
+    """
+
+    profile_slope: Real
+    waviness: Float[Array, "*samples waves"]
+    pitch: Float[Array, "*samples pairs"]
+    helix_slope: Real
+
+
+class Deviation(eqx.Module):
+    """Deviations of a gear pair, made by `sample_deviations`; a leading axis for several samples.
+
+    Attributes:
+        pinion, wheel: deviations of the two gears.
+        misalignment: lead slope of the contact of all pairs [um over the face width], shape (*samples,).
+    """
+
+    pinion: GearDeviation
+    wheel: GearDeviation
+    misalignment: Real
+
+
+class Waviness(AbstractModification):
+    """Profile form deviation: waves over the active profile without mean and without slope.
+
+    w = sum_k c_k cos(2 pi k x) + s_k (sin(2 pi k x) + 6 / (pi k) (x - 1/2)), x from 0 at the start of the active
+    profile to 1 at the tip. The straight line makes the sine waves orthogonal to the mean profile line: a least-squares
+    slope through sin(2 pi k x) is -6 / (pi k).
+
+    Attributes:
+        coefficients: c_1 ... c_n, s_1 ... s_n [um], shape (2 n,).
+    """
+
+    coefficients: Float[Array, " waves"]
+
+    def __call__(self, flank: Flank):
+        x = (flank.roll_length - flank.start_roll_length) / (flank.tip_roll_length - flank.start_roll_length)
+        x = jnp.clip(x, 0.0, 1.0)
+        waves = _waves(x[..., None], self.coefficients.shape[0] // 2, jnp)
+        return jnp.sum(waves * self.coefficients.astype(waves.dtype).reshape((1,) * x.ndim + (-1,)), axis=-1)
+
+
+def sample_deviations(tolerance: Tolerance, mesh: Mesh, samples: int, seed) -> Deviation:
+    """Random deviations of manufactured gears within a tolerance.
+
+    Sample i depends on the seed and on i alone, not on the number of samples, and is a smooth function of the limits:
+    the same seed gives common random numbers for every design and every tolerance.
+
+    Args:
+        tolerance: limits and distribution.
+        mesh: its number of pairs and its floating-point type count, nothing else.
+        samples: how many, at least 1.
+        seed: whole number.
+
+    Returns:
+        deviations with a leading axis (samples,).
+
+    Raises:
+        ValueError: for lead deviations on a mesh of one slice, or less than one sample.
+    """
+    check_slices("sample_deviations", tolerance, mesh)
+    if not isinstance(samples, int) or samples < 1:
+        raise ValueError(f"sample_deviations: samples = {samples!r} must be a whole number of at least 1")
+    return _sample(tolerance, mesh, jax.random.key(seed), samples)
+
+
+@eqx.filter_jit
+def _sample(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, samples: int) -> Deviation:
+    return jax.vmap(lambda number: deviation_of(tolerance, mesh, key, number))(jnp.arange(samples))
+
+
+def deviation_of(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, number) -> Deviation:
+    """One sample, of the given number."""
+    pinion, wheel, shafts = jax.random.split(jax.random.fold_in(key, number), 3)
+    draw, dtype = tolerance.distribution, mesh.phase.dtype
+    return Deviation(
+        pinion=_gear_deviation(tolerance.pinion, draw, mesh, pinion),
+        wheel=_gear_deviation(tolerance.wheel, draw, mesh, wheel),
+        misalignment=_within(tolerance.misalignment, draw(shafts, (), dtype)),
+    )
+
+
+@eqx.filter_jit
+def deviated_material(
+    mesh: Mesh,
+    torque,
+    deviation: Deviation,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+) -> Load:
+    """Material removed from both flanks of one manufactured pair, for `solve_removed`: design plus deviations [um].
+
+    Differentiable with respect to design and deviation, hence to the tolerance limits behind it.
+
+    Args:
+        mesh: prepared mesh.
+        torque: on the pinion [N m], scalar.
+        deviation: one sample; `jax.vmap` for several, which then share everything that depends on the mesh alone.
+        pinion: modification of the pinion flank; None for the nominal involute.
+        wheel: modification of the wheel flank; None for the nominal involute.
+
+    Returns:
+        shape (pairs, slices, positions).
+    """
+    design = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
+    return design + deviation_field(deviation, flank_basis(mesh, torque))
+
+
+def deviation_field(deviation: Deviation, basis: Float[Array, "terms pairs slices positions"]) -> Load:
+    """Material that the deviations of one sample remove [um], from the `flank_basis` of its mesh."""
+    pitch = deviation.pinion.pitch + deviation.wheel.pitch
+    return jnp.tensordot(_coefficients(deviation), basis, 1) + pitch[:, None, None]
+
+
+def flank_basis(mesh: Mesh, torque) -> Float[Array, "terms pairs slices positions"]:
+    """Material that every flank deviation of unit size removes [um per um].
+
+    The removed material is linear in the modification, so that samples differ by their coefficients only.
+    """
+    unit = real(1.0).astype(mesh.phase.dtype)
+    waves = jnp.eye(2 * HARMONICS, dtype=mesh.phase.dtype)
+
+    def removed(side: str, modification: AbstractModification) -> Load:
+        return removed_material(mesh, torque, **{side: modification})
+
+    def terms(side: str):
+        yield removed(side, ProfileSlope(unit))[None]
+        yield jax.vmap(lambda row: removed(side, Waviness(row)))(waves)
+
+    lead = removed("pinion", LeadSlope(unit))[None]
+    return jnp.concatenate([*terms("pinion"), *terms("wheel"), lead])
+
+
+def _coefficients(deviation: Deviation) -> Float[Array, " terms"]:
+    """In the order of `flank_basis`. Helix slopes and misalignment add up to one slope of the contact."""
+    pinion, wheel = deviation.pinion, deviation.wheel
+    profiles = [part for gear in (pinion, wheel) for part in (gear.profile_slope[None], gear.waviness)]
+    lead = pinion.helix_slope + wheel.helix_slope + deviation.misalignment
+    return jnp.concatenate([*profiles, lead[None]])
+
+
+def _gear_deviation(limits: GearTolerance, draw: AbstractDistribution, mesh: Mesh, key) -> GearDeviation:
+    slope, height, shape, pitch, helix = jax.random.split(key, 5)
+    dtype = mesh.phase.dtype
+    return GearDeviation(
+        profile_slope=_within(limits.profile_slope, draw(slope, (), dtype)),
+        waviness=_within(limits.profile_form, draw(height, (), dtype)) * _random_shape(shape, dtype),
+        pitch=_within(0.5 * limits.pitch, draw(pitch, (mesh.resolution.pairs,), dtype)),
+        helix_slope=_within(limits.helix_slope, draw(helix, (), dtype)),
+    )
+
+
+def _within(limit, draws):
+    return jnp.zeros_like(draws) if limit is None else limit.astype(draws.dtype) * draws
+
+
+def _random_shape(key: PRNGKeyArray, dtype) -> Float[Array, " waves"]:
+    """Coefficients of a waviness of unit height from peak to valley: random phases, amplitudes falling as 1 / k."""
+    angle = jax.random.uniform(key, (HARMONICS,), dtype, 0.0, 2 * np.pi)
+    order = jnp.arange(1, HARMONICS + 1, dtype=dtype)
+    shape = jnp.concatenate([jnp.cos(angle) / order, jnp.sin(angle) / order])
+    heights = jnp.asarray(_grid(), dtype) @ shape
+    return shape / (jnp.max(heights) - jnp.min(heights))
+
+
+@cache
+def _grid() -> np.ndarray:
+    return _waves(np.linspace(0.0, 1.0, _SHAPE_POINTS)[:, None], HARMONICS, np)
+
+
+def _waves(x, count: int, xp):
+    """Cosine and sine waves of `Waviness` at x of shape (..., 1), with jnp or np as xp; shape (..., 2 * count)."""
+    order = xp.arange(1, count + 1, dtype=x.dtype).reshape((1,) * (x.ndim - 1) + (-1,))
+    angle = 2 * np.pi * order * x
+    return xp.concatenate([xp.cos(angle), xp.sin(angle) + 6 / (np.pi * order) * (x - 0.5)], axis=-1)
