@@ -8,6 +8,7 @@ The pipeline in reading order, every step differentiable and vmappable:
     prepare, solve              loaded tooth contact over one base pitch -> MeshCycle
     peak_to_peak, ...           metrics on the MeshCycle
     monte_carlo                 what manufacturing tolerances make of it
+    sweep                       any number of modifications -> SweepTable
     minimize                    the best modification by gradient
 
 Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in
@@ -81,6 +82,14 @@ from .optimize import long_relief_length as long_relief_length
 from .optimize import minimize as minimize
 from .optimize import relief_amount as relief_amount
 from .optimize import short_relief_length as short_relief_length
+from .sweep import FullFactorial as FullFactorial
+from .sweep import LatinHypercube as LatinHypercube
+from .sweep import LoadSpectrum as LoadSpectrum
+from .sweep import Sobol as Sobol
+from .sweep import SweepTable as SweepTable
+from .sweep import VariantList as VariantList
+from .sweep import open_sweep as open_sweep
+from .sweep import sweep as sweep
 from .tolerance import Deviation as Deviation
 from .tolerance import GearDeviation as GearDeviation
 from .tolerance import GearTolerance as GearTolerance

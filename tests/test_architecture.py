@@ -18,6 +18,7 @@ ORDER = (
     "contact",
     "metrics",
     "tolerance",
+    "sweep",
     "optimize",
     "io",
     "plot",
@@ -81,6 +82,7 @@ def test_import_is_silent_and_changes_nothing():
         "import jaxgear\n"
         "assert dict(jax.config.values) == before\n"
         "assert 'matplotlib' not in sys.modules and 'typer' not in sys.modules\n"
+        "assert 'pyarrow' not in sys.modules\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -9,6 +9,9 @@ from .loss import loss_factor as loss_factor
 from .loss import ohlendorf_loss_factor as ohlendorf_loss_factor
 from .pressure import corner_pressure as corner_pressure
 from .pressure import flank_pressure as flank_pressure
+from .registry import RESULTS as RESULTS
+from .registry import Result as Result
+from .registry import result_key as result_key
 from .report import summary as summary
 from .root_stress import RootFactors as RootFactors
 from .root_stress import RootStress as RootStress

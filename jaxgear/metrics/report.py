@@ -4,30 +4,31 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from .load import contact_shock, effective_contact_ratio
-from .loss import loss_factor
-from .root_stress import root_stress
-from .transmission_error import peak_to_peak
+from .registry import RESULTS, result_key
+
+
+_SUMMARY = (
+    "ppte",
+    "mean_te",
+    "unloaded_ppte",
+    "max_flank_pressure",
+    "max_corner_pressure",
+    "max_line_load",
+    "contact_ratio",
+    "effective_contact_ratio",
+    "corner_contact_length",
+    "corner_force",
+    "pinion_root_stress",
+    "wheel_root_stress",
+    "mesh_loss_factor",
+)
 
 
 def summary(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
     """The numbers that engineers ask for first, by name and unit; traceable, so it can be vmapped."""
-    shock, stress = contact_shock(cycle), root_stress(cycle)
     return {
         "torque_Nm": cycle.torque,
-        "ppte_um": peak_to_peak(cycle.transmission_error),
-        "mean_te_um": jnp.mean(cycle.transmission_error),
-        "unloaded_ppte_um": peak_to_peak(cycle.unloaded_transmission_error),
-        "max_flank_pressure_MPa": jnp.max(cycle.contact_pressure),
-        "max_corner_pressure_MPa": jnp.max(cycle.corner_pressure),
-        "max_line_load_N_per_mm": jnp.max(cycle.line_load),
-        "contact_ratio": cycle.mesh.path_of_contact.contact_ratio,
-        "effective_contact_ratio": effective_contact_ratio(cycle),
-        "corner_contact_length_mm": shock.approach + shock.recess,
-        "corner_force_N": shock.force,
-        "pinion_root_stress_MPa": jnp.max(stress.pinion),
-        "wheel_root_stress_MPa": jnp.max(stress.wheel),
-        "mesh_loss_factor": loss_factor(cycle),
+        **{result_key(name): RESULTS[name].of(cycle) for name in _SUMMARY},
         "converged": jnp.all(cycle.converged),
     }
 

@@ -1,0 +1,213 @@
+"""The table of a sweep, read part by part."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from .columns import CONVERGED, VARIANT, Column
+from .selection import front, smallest
+from .store import Store, load_manifest, write_durably
+
+_SHOWN = 5  # rows of the printed table
+
+
+class SweepTable:
+    """Result of `sweep`: one row per variant, in the order of the plan.
+
+    Every method but `column` holds one part of the table at a time, whatever its size. Failed variants stay in the
+    table: their `converged` is False and their results are NaN.
+
+    Attributes:
+        title: of the sweep.
+        columns: all columns with their units.
+    """
+
+    def __init__(self, title: str, columns: Sequence[Column], parts: int, read: Callable):
+        """Made by `sweep` and `open_sweep`.
+
+        Args:
+            title: of the sweep.
+            columns: all columns.
+            parts: number of parts.
+            read: read(part, names) gives these columns of a part as an Arrow table, all columns for None.
+        """
+        self.title, self.columns = title, tuple(columns)
+        self._parts, self._read = parts, read
+
+    def __len__(self) -> int:
+        """Number of variants."""
+        return sum(len(self._read(part, [VARIANT])) for part in range(self._parts))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(column.name for column in self.columns)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the columns that hold the parameters of the variants."""
+        return tuple(column.name for column in self.columns if column.kind == "parameter")
+
+    @property
+    def results(self) -> tuple[str, ...]:
+        """Names of the columns that hold results."""
+        return tuple(column.name for column in self.columns if column.kind == "result")
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every column, "" for a pure number."""
+        return {column.name: column.unit for column in self.columns}
+
+    def batches(self, names: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
+        """The columns, part by part.
+
+        Args:
+            names: of the columns wanted, None for all.
+
+        Raises:
+            ValueError: for an unknown column.
+        """
+        wanted = [self._column(name).name for name in (self.names if names is None else names)]
+        for part in range(self._parts):
+            table = self._read(part, wanted)
+            yield {name: table[name].to_numpy() for name in wanted}
+
+    def column(self, name: str) -> np.ndarray:
+        """A whole column, shape (variants,).
+
+        Raises:
+            ValueError: for an unknown column.
+        """
+        return np.concatenate([batch[name] for batch in self.batches([name])])
+
+    def failures(self) -> int:
+        """Number of variants that failed."""
+        return sum(int(np.sum(~batch[CONVERGED])) for batch in self.batches([CONVERGED]))
+
+    def best(self, count: int = 10, *, by: str | None = None) -> "SweepTable":
+        """The best variants, best first, without failed ones.
+
+        Args:
+            count: how many at most.
+            by: column to rank by; None for the first result. Large values are better for columns that say so.
+
+        Raises:
+            ValueError: for an unknown column.
+        """
+        column = self._column(self.results[0] if by is None else by)
+        ranked = ((numbers, values[:, 0]) for numbers, values in self._ranked([column]))
+        return self._rows(smallest(ranked, count))
+
+    def pareto(self, by: Sequence[str]) -> "SweepTable":
+        """The variants that no other variant beats in all of the columns, sorted by the first column.
+
+        Args:
+            by: two or three columns. Of variants with equal values in all of them the first is kept.
+
+        Raises:
+            ValueError: for an unknown column, or another number of them.
+        """
+        if len(set(by)) != len(by) or not 2 <= len(by) <= 3:
+            raise ValueError("SweepTable.pareto: needs two or three different columns")
+        return self._rows(front(self._ranked([self._column(name) for name in by])))
+
+    def designs(self) -> list[dict[str, float]]:
+        """Parameters of every row, ready for the `design` of the sweep."""
+        rows = zip(*(self.column(name).tolist() for name in self.parameters))
+        return [dict(zip(self.parameters, row)) for row in rows]
+
+    def to_csv(self, path: str | Path) -> None:
+        """Writes all rows as CSV with the units in the header; cells of failed results are empty."""
+        from pyarrow import csv
+
+        header = ",".join(f'"{_heading(column)}"' for column in self.columns)
+
+        def write(file):
+            file.write(f"{header}\n".encode())
+            for part in range(self._parts):
+                csv.write_csv(self._read(part, None), file, csv.WriteOptions(include_header=False))
+
+        write_durably(Path(path), write)
+
+    def __str__(self) -> str:
+        count = len(self)
+        lines = [f"SweepTable {self.title}: {count} variants, {self.failures()} failed"]
+        head = next(self.batches(), {}) if count else {}
+        cells = [[_heading(c), *(_text(value) for value in head[c.name][:_SHOWN])] for c in self.columns if head]
+        widths = [max(map(len, column)) for column in cells]
+        lines += ["  ".join(cell.rjust(width) for cell, width in zip(row, widths)) for row in zip(*cells)]
+        return "\n".join([*lines, "..."] if count > _SHOWN else lines)
+
+    def _column(self, name: str) -> Column:
+        for column in self.columns:
+            if column.name == name:
+                return column
+        raise ValueError(f'SweepTable: "{name}" is not a column, must be one of {", ".join(self.names)}')
+
+    def _ranked(self, columns: Sequence[Column]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Row numbers and values of the columns, turned so that small is better, NaN where the variant failed."""
+        signs = np.array([-1.0 if column.better == "larger" else 1.0 for column in columns])
+        first = 0
+        for batch in self.batches([*dict.fromkeys([*(column.name for column in columns), CONVERGED])]):
+            values = np.stack([batch[column.name].astype(float) for column in columns], axis=1) * signs
+            values[~batch[CONVERGED]] = math.nan
+            yield first + np.arange(len(values)), values
+            first += len(values)
+
+    def _rows(self, numbers: np.ndarray) -> "SweepTable":
+        """These rows, in this order, as a table in memory."""
+        import pyarrow
+
+        pieces, first = [], 0
+        for part in range(self._parts):
+            count = len(self._read(part, [VARIANT]))
+            inside = np.sort(numbers[(numbers >= first) & (numbers < first + count)])
+            if len(inside) or part == 0:
+                pieces.append(self._read(part, None).take(inside - first))
+            first += count
+        table = pyarrow.concat_tables(pieces).take(np.argsort(np.argsort(numbers)))
+        return in_memory(self.title, self.columns, [table])
+
+
+def in_memory(title: str, columns: Sequence[Column], tables: Sequence) -> SweepTable:
+    """A table of Arrow tables."""
+    return SweepTable(
+        title, columns, len(tables), lambda part, names: tables[part] if names is None else tables[part].select(names)
+    )
+
+
+def open_sweep(folder: str | Path) -> SweepTable:
+    """Opens the table of a finished sweep.
+
+    Args:
+        folder: the output of a sweep.
+
+    Raises:
+        ValueError: when the folder holds no sweep, or one that is not complete.
+    """
+    import pyarrow.parquet as parquet
+
+    folder = Path(folder)
+    manifest = load_manifest(folder)
+    store = Store(folder, manifest)
+    missing = sum(not store.is_there(part) for part in range(store.parts))
+    if missing:
+        raise ValueError(f"{folder}: is not complete, {missing} of {store.parts} parts are missing: resume the sweep")
+    columns = [Column(**column) for column in manifest["columns"]]
+    return SweepTable(
+        manifest["title"],
+        columns,
+        store.parts,
+        lambda part, names: parquet.read_table(store.path(part), columns=names, page_checksum_verification=True),
+    )
+
+
+def _heading(column: Column) -> str:
+    """Name with the unit, once: the names of results end with theirs."""
+    return f"{column.name} [{column.unit}]" if column.unit and column.kind == "parameter" else column.name
+
+
+def _text(value) -> str:
+    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
