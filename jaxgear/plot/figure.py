@@ -16,7 +16,7 @@ from ..geometry import PathOfContact
 _INCH = 25.4  # mm
 _POINTS_PER_INCH = 72
 WIDTH, HEIGHT = 120.0, 75.0  # of a figure in a report [mm]
-_FONT = 9.0  # [pt]
+FONT = 9.0  # [pt]
 _DPI = 200
 
 # Okabe and Ito's colours, which stay apart for every kind of colour vision, without the yellow that pales on paper;
@@ -33,16 +33,17 @@ _DASHES = (
 )
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 GREY = "#595959"
+PALE = "#D9D9D9"
 ABOVE_MARKS = 16.0  # [pt]; clears a line of text that stands on the Axes
 
 _STYLE = {
-    "font.size": _FONT,
-    "axes.labelsize": _FONT,
+    "font.size": FONT,
+    "axes.labelsize": FONT,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.linewidth": 0.6,
     "axes.axisbelow": True,
-    "legend.fontsize": _FONT - 1,
+    "legend.fontsize": FONT - 1,
     "mathtext.default": "regular",
 }
 
@@ -69,14 +70,20 @@ def report_axes(ax: Axes | None, *, columns: int = 1, width: float = WIDTH, heig
     if ax is not None:
         yield ax
         return
-    with matplotlib.rc_context(_STYLE):
-        figure = plt.figure(figsize=(width / _INCH, height / _INCH), layout="constrained")
+    with report_figure(width, height) as figure:
         panels = figure.subplots(1, columns, sharey=True, squeeze=False)[0]
         for panel in panels:
             # ticks are made when the figure is drawn, long after the style has gone: they need their own sizes
-            panel.tick_params(labelsize=_FONT, width=0.6, length=3)
-            panel.grid(True, color="#D9D9D9", linewidth=0.5)
+            panel.tick_params(labelsize=FONT, width=0.6, length=3)
+            panel.grid(True, color=PALE, linewidth=0.5)
         yield panels if columns > 1 else panels[0]
+
+
+@contextmanager
+def report_figure(width: float, height: float) -> Iterator[Figure]:
+    """A new, empty figure [mm] in report style; the style is off again after the `with` block."""
+    with matplotlib.rc_context(_STYLE):
+        yield plt.figure(figsize=(width / _INCH, height / _INCH), layout="constrained")
 
 
 def legend_above(ax: Axes, *, distance: float = 4.0) -> None:

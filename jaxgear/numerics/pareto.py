@@ -1,0 +1,86 @@
+"""Pareto fronts: the rows that no other row beats in every objective."""
+
+from bisect import bisect_left, bisect_right
+
+import numpy as np
+
+
+def pareto_front(values) -> np.ndarray:
+    """Rows that no other row dominates, where smaller is better in every objective (negate what is to be large).
+
+    A row dominates another one if it is nowhere worse and somewhere better; equal rows do not dominate each other. Rows
+    that are not finite are never on the front. Sorting and a staircase of the best seen so far (Kung, Luccio and
+    Preparata 1975, doi 10.1145/321906.321910): O(n log n).
+
+    Args:
+        values: shape (rows, objectives), 1 to 3 objectives.
+
+    Returns:
+        bool, shape (rows,).
+
+    Raises:
+        ValueError: for another number of axes or objectives.
+    """
+    values = np.asarray(values, float)
+    if values.ndim != 2 or not 1 <= values.shape[1] <= 3:
+        raise ValueError(f"pareto_front: values has shape {values.shape}, must be (rows, 1 to 3 objectives)")
+    front = np.zeros(len(values), bool)
+    rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+    if rows.size == 0:
+        return front
+    rows = rows[_not_beaten_by_few(values[rows])]
+    rows = rows[np.lexsort(values[rows].T[::-1])]
+    ordered = values[rows]
+    # of equal rows, neighbours after sorting, the first one stands for all
+    first = np.r_[True, (ordered[1:] != ordered[:-1]).any(axis=1)]
+    best = _SWEEPS[values.shape[1]](ordered[first])
+    front[rows] = best[np.cumsum(first) - 1]
+    return front
+
+
+_RULERS = 32  # well placed rows that sort out most others before anything is sorted
+
+
+def _not_beaten_by_few(values: np.ndarray) -> np.ndarray:
+    """Rows that the rows of the smallest scaled sums leave; these beat nearly all rows of a usual table."""
+    low, high = values.min(axis=0), values.max(axis=0)
+    total = ((values - low) / np.where(high > low, high - low, 1.0)).sum(axis=1)
+    left = np.arange(len(values))
+    if left.size <= _RULERS:
+        return left
+    for ruler in np.argpartition(total, _RULERS)[:_RULERS]:
+        rest = values[left]
+        beaten = (rest >= values[ruler]).all(axis=1) & (rest > values[ruler]).any(axis=1)
+        left = left[~beaten]
+    return left
+
+
+def _sweep_one(ordered: np.ndarray) -> np.ndarray:
+    return np.arange(len(ordered)) == 0
+
+
+def _sweep_two(ordered: np.ndarray) -> np.ndarray:
+    """In ascending order of the first objective, a row is good if its second one is the smallest so far."""
+    second = ordered[:, 1]
+    return second < np.r_[np.inf, np.minimum.accumulate(second)[:-1]]
+
+
+def _sweep_three(ordered: np.ndarray) -> np.ndarray:
+    """In ascending order of the first objective, a row is good if it lies below the staircase of the other two."""
+    good = np.zeros(len(ordered), bool)
+    # corners of the staircase: seconds ascend, thirds descend
+    seconds: list[float] = []
+    thirds: list[float] = []
+    for i, (_, second, third) in enumerate(ordered.tolist()):
+        at = bisect_right(seconds, second)
+        if at and thirds[at - 1] <= third:
+            continue
+        good[i] = True
+        start = end = bisect_left(seconds, second)
+        while end < len(thirds) and thirds[end] >= third:
+            end += 1
+        seconds[start:end], thirds[start:end] = [second], [third]
+    return good
+
+
+_SWEEPS = {1: _sweep_one, 2: _sweep_two, 3: _sweep_three}

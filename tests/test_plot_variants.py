@@ -1,0 +1,300 @@
+"""Pictures of many variants and of manufactured gears show the table's numbers, name units and hide no failure."""
+
+import time
+
+import matplotlib
+import numpy as np
+import pytest
+
+matplotlib.use("Agg")
+
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+
+import jaxgear as jg
+from jaxgear import plot
+from jaxgear.numerics.pareto import pareto_front
+from jaxgear.plot.variants import label
+
+ROWS = 60
+COLUMNS = ("ppte_um", "mesh_loss_factor", "max_flank_pressure_MPa", "effective_contact_ratio")
+NAMES = ("unmodified", "rule", "optimum")
+
+
+@pytest.fixture
+def table():
+    """Sixty variants over one relief, the last one failed."""
+    relief = np.linspace(0.0, 12.0, ROWS)
+    table = {
+        "relief_um": relief,
+        "ppte_um": 0.5 + 0.08 * (relief - 6.0) ** 2,
+        "mesh_loss_factor": 0.16 - 0.003 * relief,
+        "max_flank_pressure_MPa": 730 + 0.9 * relief**2,
+        "effective_contact_ratio": 1.75 - 0.03 * relief,
+    }
+    table["ppte_um"][-1] = np.nan
+    return table
+
+
+@pytest.fixture(scope="module")
+def scatter():
+    random = np.random.default_rng(0)
+    phase = np.arange(16) / 16
+    nominal = 8 + 0.5 * np.sin(2 * np.pi * phase)
+    curves = nominal + random.normal(size=(400, 1)) + 0.2 * random.normal(size=(400, 16))
+    ppte = np.ptp(curves, axis=1)
+    levels = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
+    values = {
+        "ppte": ppte,
+        "converged": np.ones(400, bool),
+        "nominal_ppte": np.ptp(nominal),
+        "mean": ppte.mean(),
+        "std": ppte.std(),
+        "ppte_quantile95": np.quantile(ppte, 0.95),
+        "phase": phase,
+        "nominal_transmission_error": nominal,
+        "quantiles": levels,
+        "transmission_error_quantiles": np.quantile(curves, levels, axis=0),
+    }
+    return jg.Scatter(**{name: jnp.asarray(value) for name, value in values.items()})
+
+
+def failing(scatter, count):
+    """The same scatter with so many failed samples that the outer quantiles have no bound."""
+    ppte = np.array(scatter.ppte)
+    ppte[:count] = np.nan
+    quantiles = np.array(scatter.transmission_error_quantiles)
+    quantiles[0], quantiles[-1] = -np.inf, np.inf
+    changes = {
+        "ppte": jnp.asarray(ppte),
+        "converged": jnp.asarray(np.isfinite(ppte)),
+        "mean": jnp.asarray(np.nan),
+        "ppte_quantile95": jnp.asarray(np.inf),
+        "transmission_error_quantiles": jnp.asarray(quantiles),
+    }
+    kept = {name: getattr(scatter, name) for name in scatter.__dataclass_fields__}
+    return jg.Scatter(**{**kept, **changes})
+
+
+@pytest.fixture(autouse=True)
+def clean_figures():
+    before = dict(matplotlib.rcParams)
+    yield
+    plt.close("all")
+    assert dict(matplotlib.rcParams) == before
+
+
+@pytest.fixture
+def draw(table, scatter):
+    """Every picture of one Axes by name, as a function of the Axes to draw into."""
+    three = ("ppte_um", "mesh_loss_factor", "max_flank_pressure_MPa")
+    return {
+        "pareto": lambda ax=None: plot.pareto(table, "ppte_um", "max_flank_pressure_MPa", ax=ax),
+        "pareto of three": lambda ax=None: plot.pareto(table, *three, ax),
+        "parallel": lambda ax=None: plot.parallel_coordinates(table, ("relief_um", *COLUMNS), "ppte_um", ax),
+        "fan": lambda ax=None: plot.fan(scatter, ax),
+        "histogram": lambda ax=None: plot.ppte_histogram(scatter, ax),
+    }
+
+
+UNITS = {
+    "pareto": ("PPTE [µm]", "max flank pressure [MPa]"),
+    "pareto of three": ("PPTE [µm]", "mesh loss factor [-]"),
+    "fan": ("mesh phase [base pitches]", "transmission error [µm]"),
+    "histogram": ("peak-to-peak transmission error [µm]", "share of the gears [%]"),
+}
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_axes_name_their_units(draw, name):
+    ax = draw[name]()
+    assert (ax.get_xlabel(), ax.get_ylabel()) == UNITS[name]
+
+
+@pytest.mark.parametrize("name", [*UNITS, "parallel"])
+def test_a_given_ax_is_used_and_legends_cover_no_data(draw, name):
+    figure, ax = plt.subplots()
+    assert draw[name](ax) is ax and plt.get_fignums() == [figure.number]
+    own = draw[name]()
+    own.figure.draw_without_rendering()
+    legend = own.get_legend().get_window_extent()
+    assert legend.y0 >= own.get_window_extent().y1
+    assert legend.y1 <= own.figure.bbox.y1 + 1 and legend.x1 <= own.figure.bbox.x1 + 1
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    {
+        "ppte_um": "PPTE [µm]",
+        "max_line_load_N_per_mm": "max line load [N/mm]",
+        "min_tangent_stiffness_N_per_um": "min tangent stiffness [N/µm]",
+        "mesh_loss_factor": "mesh loss factor [-]",
+        "ppte_um_50Nm_q95": "PPTE at 50 N m q95 [µm]",
+        "ppte_um_12.5Nm": "PPTE at 12.5 N m [µm]",
+        "corner_force_N_worst": "corner force worst [N]",
+        "number": "number [-]",
+    }.items(),
+)
+def test_labels_follow_from_the_names_of_columns(name, expected):
+    assert label(name) == expected
+    assert label(name, {name: "own [kN]"}) == "own [kN]"
+
+
+def test_radar_runs_from_the_worst_to_the_best_of_the_variants_shown(table):
+    rows = [0, 20, 30]
+    panels = plot.radar(table, COLUMNS, rows, NAMES, maximize=("effective_contact_ratio",))
+    assert [panel.get_title() for panel in panels] == list(NAMES)
+    shape = {name: np.asarray(panel.lines[-1].get_ydata()) for name, panel in zip(NAMES, panels)}
+    radius = np.stack([shape[name][:-1] for name in NAMES])
+    np.testing.assert_allclose(radius.max(axis=0), 1.0)
+    np.testing.assert_allclose(radius.min(axis=0), radius.min())
+    # the unmodified variant has the highest PPTE and loss, the lowest pressure and the largest contact ratio
+    np.testing.assert_array_equal(radius[0] == 1.0, [False, False, True, True])
+    # in between, in proportion: relief 4.07 um of 0 to 6.10 um decides the loss
+    worst = radius.min()
+    assert radius[1, 1] == pytest.approx(worst + (1 - worst) * 20 / 30)
+
+
+def test_radar_writes_values_and_units_and_marks_the_best(table):
+    panels = plot.radar(table, COLUMNS, [0, 30], ["a", "b"], labels={"ppte_um": "noise [dB]"})
+    first, second = ([text for text in panel.texts] for panel in panels)
+    assert [text.get_text().replace("\n", " ") for text in first] == [
+        "noise 3.38 dB",
+        "mesh loss factor 0.160",
+        "max flank pressure 730 MPa",
+        "effective contact ratio 1.75",
+    ]
+    assert [text.get_fontweight() for text in first] == ["normal", "normal", "bold", "normal"]
+    assert [text.get_fontweight() for text in second] == ["bold", "bold", "normal", "bold"]
+
+
+def test_radar_labels_stay_apart_and_in_the_figure(table):
+    many = {**table, **{f"result_{i}_N": np.linspace(i, 9.0, ROWS) for i in range(2)}}
+    panels = plot.radar(many, [*COLUMNS, "result_0_N", "result_1_N"], range(4), list("abcd"))
+    figure = panels[0].figure
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for panel in panels for text in (*panel.texts, panel.title)]
+    for i, box in enumerate(boxes):
+        assert 0 <= box.x0 and box.x1 <= figure.bbox.x1 and 0 <= box.y0 and box.y1 <= figure.bbox.y1
+        assert not any(box.overlaps(other) for other in boxes[i + 1 :])
+
+
+def test_radar_takes_given_axes(table):
+    figure, axes = plt.subplots(1, 2, subplot_kw={"projection": "polar"})
+    assert plot.radar(table, COLUMNS, [0, 30], ["a", "b"], axes) is axes
+    assert plt.get_fignums() == [figure.number]
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "names", "message"),
+    [
+        (COLUMNS[:2], [0], None, "columns has 2 names, must have at least 3"),
+        ((*COLUMNS, "mass"), [0], None, '"mass" is not a column of the table, must be one of relief_um'),
+        (COLUMNS, [0, 59], None, "ppte_um of variant 59 is nan, must be finite"),
+        (COLUMNS, [0, 1], ["a"], "names has 1 entries, must have one for each of 2 variants"),
+    ],
+)
+def test_radar_refuses_what_it_cannot_show(table, columns, rows, names, message):
+    with pytest.raises(ValueError, match=f"^radar: {message}"):
+        plot.radar(table, columns, rows, names)
+
+
+def test_parallel_coordinates_show_the_best_over_a_stated_share(table):
+    ax = plot.parallel_coordinates(table, ("relief_um", *COLUMNS), "ppte_um", shown=25, best=2)
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    # the smallest PPTE lies between variants 29 and 30, of relief 5.90 and 6.10 um
+    assert {text.split(":")[0] for text in texts[:2]} == {"variant 29", "variant 30"}
+    assert texts[2] == "25 of 59 variants, 1 failed"
+    assert len(ax.collections[0].get_segments()) == 25
+    assert [tick.get_text() for tick in ax.get_xticklabels()][:2] == ["relief\n[µm]", "PPTE\n[µm]"]
+    for line in (line for line in ax.lines if line.get_label().startswith("variant")):
+        row = int(line.get_label().split(":")[0].split()[1])
+        assert line.get_ydata()[0] == pytest.approx(row / 58)  # of the 59 variants that did not fail
+
+
+def test_parallel_coordinates_follow_the_better_way(table):
+    ax = plot.parallel_coordinates(table, COLUMNS, "effective_contact_ratio", maximize=("effective_contact_ratio",))
+    assert ax.get_legend().get_texts()[0].get_text() == "variant 0: effective contact ratio 1.75"
+
+
+def test_pareto_draws_every_variant_once(table):
+    ax = plot.pareto(table, "ppte_um", "max_flank_pressure_MPa", marked={"rule": 3})
+    cloud, steps, front, rule = ax.lines
+    # pressure rises with the relief and PPTE falls up to 6 um: variants 0 to 29 are the front, 30 is beaten by 29
+    assert len(front.get_xdata()) == 30 and len(cloud.get_xdata()) == ROWS - 1 - 30
+    assert (np.diff(front.get_xdata()) > 0).all() and (np.diff(front.get_ydata()) < 0).all()
+    assert rule.get_xdata()[0] == table["ppte_um"][3] and rule.get_label() == "rule"
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert texts[:2] == ["59 variants, 1 failed", "Pareto front, 30 variants"]
+    assert steps.get_drawstyle() == "steps-post"
+
+
+def test_pareto_counts_many_variants_in_hexagons():
+    random = np.random.default_rng(0)
+    table = {"ppte_um": random.random(20_000), "corner_force_N": random.random(20_000)}
+    ax = plot.pareto(table, "ppte_um", "corner_force_N")
+    front = pareto_front(np.stack(list(table.values()), axis=1)).sum()
+    assert np.sum(ax.collections[0].get_array()) == pytest.approx(20_000 - front)
+    assert len(ax.lines[0].get_xdata()) == 0  # no dot per variant
+
+
+def test_fan_bands_hold_the_quantiles(scatter):
+    ax = plot.fan(scatter)
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert texts == ["90 % of the gears", "50 % of the gears", "median", "nominal"]
+    quantiles = np.asarray(scatter.transmission_error_quantiles)
+    for band, low, high in zip(ax.collections, quantiles[:2], quantiles[:2:-1]):
+        heights = band.get_paths()[0].vertices[:, 1]
+        assert heights.min() == pytest.approx(low.min()) and heights.max() == pytest.approx(high.max())
+    np.testing.assert_array_equal(ax.lines[0].get_ydata()[:16], quantiles[2])
+    np.testing.assert_array_equal(ax.lines[1].get_ydata()[16:32], scatter.nominal_transmission_error)
+
+
+def test_histogram_marks_nominal_mean_and_quantile(scatter):
+    ax = plot.ppte_histogram(scatter)
+    marks = {line.get_label().rsplit(" ", 2)[0]: line.get_xdata()[0] for line in ax.lines}
+    expected = (scatter.nominal_ppte, scatter.mean, scatter.ppte_quantile95)
+    assert marks == dict(zip(("nominal", "mean", "95 % quantile"), map(float, expected)))
+    assert sum(bar.get_height() for bar in ax.patches) == pytest.approx(100.0)
+
+
+def test_failed_samples_show(scatter):
+    ax = plot.ppte_histogram(failing(scatter, 40))
+    assert ax.get_xlabel() == "peak-to-peak transmission error, 40 of 400 failed [µm]"
+    assert [line.get_label() for line in ax.lines] == [f"nominal {float(scatter.nominal_ppte):.2f} µm"]
+    assert sum(bar.get_height() for bar in ax.patches) == pytest.approx(90.0)
+    plot.fan(failing(scatter, 40)).figure.draw_without_rendering()
+
+
+def brute_force(values):
+    return np.array([not ((values <= row).all(axis=1) & (values < row).any(axis=1)).any() for row in values])
+
+
+@pytest.mark.parametrize("objectives", [1, 2, 3])
+@pytest.mark.parametrize("levels", [4, 10_000])
+def test_pareto_front_is_what_nothing_beats(objectives, levels):
+    random = np.random.default_rng(objectives)
+    for rows in (1, 2, 31, 300):
+        values = random.integers(0, levels, size=(rows, objectives)).astype(float)
+        np.testing.assert_array_equal(pareto_front(values), brute_force(values))
+
+
+def test_pareto_front_leaves_out_failures_and_keeps_equals():
+    values = np.array([[1.0, 2.0], [np.nan, 0.0], [1.0, 2.0], [-np.inf, 5.0], [2.0, 1.0], [2.0, 2.0]])
+    assert pareto_front(values).tolist() == [True, False, True, False, True, False]
+    assert not pareto_front(np.full((3, 2), np.nan)).any()
+    with pytest.raises(ValueError, match="1 to 3 objectives"):
+        pareto_front(np.zeros((3, 4)))
+
+
+@pytest.mark.parametrize("objectives", [2, 3])
+def test_pareto_front_of_a_million_rows(objectives):
+    values = np.random.default_rng(0).random((1_000_000, objectives))
+    start = time.perf_counter()
+    front = pareto_front(values)
+    assert time.perf_counter() - start < 5.0
+    assert 5 < front.sum() < 300
+    # nobody beats the front, and the front beats everybody else: checked on a sample
+    some = values[~front][:500]
+    best = values[front]
+    assert all(((best <= row).all(axis=1) & (best < row).any(axis=1)).any() for row in some)
