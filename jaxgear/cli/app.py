@@ -13,7 +13,9 @@ from ..io import DesignFileError
 from ..microgeometry import NoModification
 from ..optimize import iso_relief
 from . import report
+from .devices import join_processes, use_all_cores
 from .run import run
+from .sweep import Interrupted, run_sweep
 
 _TORQUES, _QUICK_TORQUES = 25, 7
 _QUICK_POSITIONS, _QUICK_STARTS, _QUICK_STEPS = 16, 4, 40
@@ -24,7 +26,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     help="Flank design of spur gears by loaded tooth contact analysis. Exit codes: 0 success, 1 a contact solution did "
-    "not converge (results are written and flagged), 2 error (nothing is written), 130 interrupted.",
+    "not converge (results are written and flagged), 2 error (nothing is written), 130 interrupted (a sweep resumes).",
 )
 
 
@@ -104,6 +106,38 @@ def optimize(
     return OK if current.show() else NOT_CONVERGED
 
 
+@app.command()
+def sweep(
+    file: File,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Folder of the table.", show_default="results/FILE"),
+    ] = None,
+    samples: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Number of variants in place of the file's.")
+    ] = None,
+    best: Annotated[int, typer.Option(min=1, metavar="N", help="How many of the best designs to list.")] = 10,
+    coordinator: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Share the sweep among processes: where number 0 listens.")
+    ] = None,
+    processes: Annotated[int | None, typer.Option(min=1, metavar="N", help="How many processes there are.")] = None,
+    process: Annotated[int | None, typer.Option(min=0, metavar="I", help="Number of this one, from 0.")] = None,
+    distributed: Annotated[
+        bool, typer.Option("--distributed", help="Share the sweep among the processes of a cluster job (Slurm, MPI).")
+    ] = False,
+    quick: Quick = False,
+    no_cache: NoCache = False,
+) -> int:
+    """Evaluate the variants that the design file asks for, any number of them, into a table of Parquet files.
+
+    An interrupted sweep goes on where it was when the command is repeated.
+    """
+    use_all_cores()
+    join_processes(coordinator, processes, process, automatic=distributed)
+    fine = run_sweep(file, output, samples=samples, best=best, quick=quick, cache=not no_cache)
+    return OK if fine else NOT_CONVERGED
+
+
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Entry point of the command `jaxgear`; every failure is one line on stderr."""
     for stream in (sys.stdout, sys.stderr):
@@ -113,6 +147,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         code = app(args=arguments, prog_name="jaxgear", standalone_mode=False)
         if code == INTERRUPTED:
             raise KeyboardInterrupt
+    except Interrupted as interrupted:
+        print(f"jaxgear: interrupted, {interrupted}", file=sys.stderr)
+        sys.exit(INTERRUPTED)
     except (KeyboardInterrupt, typer.Abort):
         print("jaxgear: interrupted, nothing was written", file=sys.stderr)
         sys.exit(INTERRUPTED)

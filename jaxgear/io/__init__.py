@@ -8,3 +8,6 @@ from .results import describe as describe
 from .results import flank_rows as flank_rows
 from .results import write_flanks as write_flanks
 from .results import write_summary as write_summary
+from .sweep_request import SweepRequest as SweepRequest
+from .sweep_request import sweep_request as sweep_request
+from .variants import read_variants as read_variants

@@ -37,6 +37,8 @@ class DesignFile:
         units: unit of every free parameter, "" for a pure number.
         starts, steps: of the gradient search, None for the library's default.
         application_factor: K_A of the rule-based relief.
+        sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
+        tolerance: likewise, see `sweep_request`.
     """
 
     path: Path
@@ -50,6 +52,8 @@ class DesignFile:
     starts: int | None
     steps: int | None
     application_factor: float
+    sweep: schema.SweepSection | None
+    tolerance: schema.ToleranceSection | None
     _pair: GearPair
     _compliance: Compliance
     _resolution: Resolution
@@ -118,6 +122,8 @@ def load_design(path: str | Path) -> DesignFile:
     if top.optimize is not None and not top.variables:
         raise DesignFileError(file, "optimize", "has no effect without [variables]")
     bounds, units = _variables(file, top.variables or {}, [*parts[0], *parts[1]])
+    if top.sweep is not None and not top.variables:
+        raise DesignFileError(file, "sweep", "has no effect without [variables]")
     factor = 1.0 if optimize.application_factor is None else optimize.application_factor
     _number(file, "optimize.application_factor", factor, above=0.0)
     return DesignFile(
@@ -132,6 +138,8 @@ def load_design(path: str | Path) -> DesignFile:
         starts=optimize.starts,
         steps=optimize.steps,
         application_factor=factor,
+        sweep=None if top.sweep is None else section("sweep", schema.SweepSection),
+        tolerance=None if top.tolerance is None else section("tolerance", schema.ToleranceSection),
         _pair=pair,
         _compliance=_compliance(file, section("model", schema.ModelSection)),
         _resolution=Resolution(**_given(section("resolution", schema.ResolutionSection))),

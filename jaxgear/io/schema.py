@@ -32,6 +32,8 @@ class FileSection(Section):
     resolution: Table | None = None
     variables: Table | None = None
     optimize: Table | None = None
+    sweep: Table | None = None
+    tolerance: Table | None = None
 
 
 class MaterialSection(Section):
@@ -97,6 +99,25 @@ class OptimizeSection(Section):
     starts: Annotated[int, Meta(ge=1, le=4096)] | None = None
     steps: Annotated[int, Meta(ge=10, le=100_000)] | None = None
     application_factor: float | None = None
+
+
+class SweepSection(Section):
+    sampling: Literal["sobol", "latin_hypercube", "full_factorial", "list"] = "sobol"
+    samples: Annotated[int, Meta(ge=1, le=2**40)] | None = None
+    seed: Annotated[int, Meta(ge=0)] | None = None
+    levels: int | dict[str, int | list[float]] | None = None
+    file: str | None = None
+    torques: list[float] | None = None
+    weights: list[float] | None = None
+    results: list[str] | None = None
+    part_rows: Annotated[int, Meta(ge=1, le=2**24)] | None = None
+
+
+class ToleranceSection(Section):
+    quality_class: int | tuple[int, int]
+    misalignment: float | None = None
+    samples: Annotated[int, Meta(ge=2, le=100_000)] = 64
+    seed: Annotated[int, Meta(ge=0)] = 0
 
 
 class _Plain(Section):

@@ -19,6 +19,8 @@ _MISSING = re.compile(r"Object missing required field `(?P<name>.*)`")
 # the words of TOML for the types in msgspec's messages
 _WORDS = {
     "float | str": "a number or the name of a variable",
+    "int | object": "a whole number, or a table with one entry per variable",
+    "int | array": "a whole number or a list",
     "float": "a number",
     "int": "a whole number",
     "str": "a string",

@@ -6,7 +6,6 @@ from jaxtyping import Array, Float
 from ..contact import MeshCycle
 from .registry import RESULTS, result_key
 
-
 _SUMMARY = (
     "ppte",
     "mean_te",

@@ -46,7 +46,7 @@ def parameter_columns(plan: AbstractPlan, units: Mapping[str, str], taken: Seque
 def result_columns(results: Sequence[str], torques: Sequence[float], *, scattered: bool) -> list[Column]:
     """The columns of every result, in the order in which the evaluation gives them.
 
-    One torque makes one column, several make one each and then the weighted mean and the worst. Random deviations
+    One torque makes one column, several make their weighted mean, the worst and one each. Random deviations
     split each of these into its mean and its 95 % quantile over the samples.
 
     Args:
@@ -59,7 +59,7 @@ def result_columns(results: Sequence[str], torques: Sequence[float], *, scattere
     """
     if not results or len(set(results)) != len(results):
         raise ValueError("sweep: results must be different and at least one")
-    loads = [""] if len(torques) == 1 else [*(f"_{torque:.12g}Nm" for torque in torques), "_mean", "_worst"]
+    loads = [""] if len(torques) == 1 else ["_mean", "_worst", *(f"_{torque:.12g}Nm" for torque in torques)]
     scatter = ["_mean", "_q95"] if scattered else [""]
     columns = []
     for result in results:

@@ -123,9 +123,7 @@ def _evaluate(program: _Program, rows, data):
         return jax.lax.map(partial(_numbers, program, *data), rows, batch_size=program.batch)
 
     # without the check of replication, which the loops of the contact solution do not pass
-    run = jax.shard_map(
-        on_device, mesh=program.devices, in_specs=(split, everywhere), out_specs=split, check_vma=False
-    )
+    run = jax.shard_map(on_device, mesh=program.devices, in_specs=(split, everywhere), out_specs=split, check_vma=False)
     return run(rows, data)
 
 
@@ -159,14 +157,14 @@ def _numbers(program: _Program, mesh: Mesh, load: LoadSpectrum, deviations, valu
 
 
 def _over_torques(cycle_numbers, load: LoadSpectrum, deviation, results):
-    """Numbers at one torque; or at every torque, their weighted mean and the worst."""
+    """Numbers at one torque; or the weighted mean, the worst, and those at every torque."""
     if len(load.torques) == 1:
         return cycle_numbers(load.torques[0], deviation)
     numbers, fine = jax.vmap(lambda torque: cycle_numbers(torque, deviation))(load.torques)
     flat = []
     for name, values in zip(results, numbers):
         worst = jnp.max(values) if RESULTS[name].worst == "max" else jnp.min(values)
-        flat += [*values, jnp.sum(load.weights * values), worst]
+        flat += [jnp.sum(load.weights * values), worst, *values]
     return flat, jnp.all(fine)
 
 

@@ -13,6 +13,7 @@ from ..numerics import check
 Bounds = Mapping[str, tuple[float, float]]
 
 _MOST_VARIANTS = 2**53  # row numbers stay exact in every reader of the table
+_PIECE = 2**16
 
 
 class AbstractPlan(ABC):
@@ -115,18 +116,21 @@ class VariantList(AbstractPlan):
             raise ValueError(f"VariantList: names {', '.join(names) or '(none)'} must be different and at least one")
         if table.ndim != 2 or table.shape[1] != len(names) or not len(table):
             raise ValueError(f"VariantList: values of shape {table.shape} must be (variants, {len(names)})")
-        finite = np.where(np.isfinite(table), table, np.nan)
-        with np.errstate(all="ignore"):
-            low, high = (tuple(map(float, extreme(finite, axis=0))) for extreme in (np.fmin.reduce, np.fmax.reduce))
-        super().__init__(tuple(names), low, high, len(table))
+        # in pieces: the values may lie in a file
+        pieces = [table[start : start + _PIECE] for start in range(0, len(table), _PIECE)]
+        low = np.fmin.reduce([np.fmin.reduce(_finite(piece), axis=0) for piece in pieces])
+        high = np.fmax.reduce([np.fmax.reduce(_finite(piece), axis=0) for piece in pieces])
+        super().__init__(tuple(names), tuple(low.tolist()), tuple(high.tolist()), len(table))
         self.values = table
 
     def _rows(self, start, stop):
         return self.values[start:stop]
 
     def describe(self):
-        digest = hashlib.sha256(self.values.tobytes()).hexdigest()
-        return {"sampling": "list", "names": list(self.names), "variants": self.size, "sha256": digest}
+        digest = hashlib.sha256()
+        for start in range(0, self.size, _PIECE):
+            digest.update(self.values[start : start + _PIECE].tobytes())
+        return {"sampling": "list", "names": list(self.names), "sha256": digest.hexdigest()}
 
 
 def box(owner: str, bounds: Bounds) -> tuple[tuple[str, ...], tuple[float, ...], tuple[float, ...]]:
@@ -136,8 +140,8 @@ def box(owner: str, bounds: Bounds) -> tuple[tuple[str, ...], tuple[float, ...],
     for name, (low, high) in bounds.items():
         check(owner, f"lower bound of {name}", low, "")
         check(owner, f"upper bound of {name}", high, "", low=low, open_low=True)
-    low, high = zip(*((float(low), float(high)) for low, high in bounds.values()))
-    return tuple(bounds), low, high
+    limits = bounds.values()
+    return tuple(bounds), tuple(float(low) for low, _ in limits), tuple(float(high) for _, high in limits)
 
 
 def whole(owner: str, name: str, value, *, least: int = 1) -> int:
@@ -145,6 +149,10 @@ def whole(owner: str, name: str, value, *, least: int = 1) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= _MOST_VARIANTS:
         raise ValueError(f"{owner}: {name} = {value!r} must be a whole number from {least} to 2^53")
     return int(value)
+
+
+def _finite(values: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 def _levels(name: str, given, low: float, high: float) -> np.ndarray:

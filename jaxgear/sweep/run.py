@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -68,7 +69,8 @@ def sweep(
         part_rows: variants per file.
         title: of the table.
         units: of the parameters, for the table.
-        callback: called as callback(variants done, variants of this process) after every part.
+        callback: called as callback(variants done, variants of this process) before the first part, when those of an
+            earlier call are done already, and after every part.
 
     Returns:
         the table. A variant whose modification is impossible or whose contact solution failed is a row with
@@ -101,7 +103,8 @@ def sweep(
         if jax.process_count() > 1:
             raise ValueError("sweep: output = None cannot gather the rows of several processes, name a shared folder")
         store, tables = Store("", manifest), []
-        _run(evaluator, plan, store, range(store.parts), lambda *part: tables.append(store.table(*part)), callback)
+        all_missing = dict.fromkeys(range(store.parts), True)
+        _run(evaluator, plan, store, all_missing, lambda *part: tables.append(store.table(*part)), callback)
         return in_memory(title, columns, tables)
     store = Store(output, manifest)
     _fill(evaluator, plan, store, callback)
@@ -116,15 +119,18 @@ def _fill(evaluator: Evaluator, plan: AbstractPlan, store: Store, callback: Call
         _wait((store.folder / MANIFEST).exists)
         store.claim(leader=False)
     store.remove_leftovers(own)
-    _run(evaluator, plan, store, own, store.write, callback, is_there=store.is_there)
+    _run(evaluator, plan, store, {part: not store.is_there(part) for part in own}, store.write, callback)
     if jax.process_count() > 1:
         for part in range(store.parts):
-            _wait(lambda part=part: store.is_there(part))
+            _wait(partial(store.is_there, part))
 
 
-def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts, keep, callback, is_there=lambda _: False):
-    """Evaluates the parts that are not there and hands them to `keep(part, columns)` in order."""
-    done, total = 0, sum(stop - start for start, stop in map(store.span, parts))
+def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts: dict[int, bool], keep, callback) -> None:
+    """Evaluates parts and hands them to `keep(part, columns)` in order; `parts` tells of each whether it is missing."""
+    rows = {part: store.span(part)[1] - store.span(part)[0] for part in parts}
+    done, total = sum(rows[part] for part in parts if not parts[part]), sum(rows.values())
+    report = callback or (lambda done, total: None)
+    report(done, total)
     writer = ThreadPoolExecutor(1)
     under_way: deque[tuple[int, Future]] = deque()
 
@@ -133,20 +139,15 @@ def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts, keep, ca
 
     def settle() -> None:
         nonlocal done
-        rows, future = under_way.popleft()
+        part, future = under_way.popleft()
         future.result()
-        done += rows
-        if callback is not None:
-            callback(done, total)
+        done += rows[part]
+        report(done, total)
 
     try:
-        for part in parts:
-            start, stop = store.span(part)
-            if is_there(part):
-                done += stop - start
-                continue
-            pending = evaluator(plan.rows(start, stop))
-            under_way.append((stop - start, writer.submit(finish, part, pending)))
+        for part in (part for part in parts if parts[part]):
+            pending = evaluator(plan.rows(*store.span(part)))
+            under_way.append((part, writer.submit(finish, part, pending)))
             if len(under_way) >= _IN_FLIGHT:
                 settle()
         while under_way:

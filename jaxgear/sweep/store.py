@@ -102,8 +102,9 @@ class Store:
             write_durably(
                 self.path(part),
                 # random numbers repeat never and hardly compress: a fast codec, no dictionary
-                lambda file: parquet.write_table(table, file, compression="zstd", compression_level=1,
-                                                 use_dictionary=False, write_page_checksum=True),  # fmt: skip
+                lambda file: parquet.write_table(
+                    table, file, compression="zstd", compression_level=1, use_dictionary=False, write_page_checksum=True
+                ),  # fmt: skip
             )
         except OSError as error:
             raise ValueError(f"{self.path(part)}: cannot be written: {error.strerror or error}") from None

@@ -1,0 +1,161 @@
+"""The command `jaxgear sweep`: from a design file to a table of variants."""
+
+import dataclasses
+import os
+import time
+from pathlib import Path
+
+import jax
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from ..io import DesignFile, load_design, sweep_request
+from ..sweep import SweepTable, sweep
+from . import report
+from .cache import enable_cache
+
+_QUICK_POSITIONS, _QUICK_SAMPLES = 16, 4096
+_BEST_FILE = "best.csv"
+_LABEL_WIDTH, _CELL_WIDTH = 32, 10  # of the table of the best designs
+_LINES = 10  # of progress, where there is no terminal
+
+
+class Interrupted(Exception):
+    """Ctrl-C while parts of the table were being written."""
+
+
+def run_sweep(file: Path, output: Path | None, *, samples: int | None, best: int, quick: bool, cache: bool) -> bool:
+    """Evaluates the variants of a design file and shows the best.
+
+    Args:
+        file: design file.
+        output: folder of the table, None for results/<stem of the file>.
+        samples: number of variants, None for the file's.
+        best: how many designs to list.
+        quick: coarse positions and few samples.
+        cache: keep compiled programs on disk.
+
+    Returns:
+        False when a variant failed.
+
+    Raises:
+        Interrupted: when the rows so far are kept.
+    """
+    jax.config.update("jax_enable_x64", True)
+    if cache:
+        enable_cache()
+    design = load_design(file)
+    request = sweep_request(design, samples=samples, most=_QUICK_SAMPLES if quick else None)
+    size = design.resolution()
+    if quick:
+        size = dataclasses.replace(size, positions=min(size.positions, _QUICK_POSITIONS))
+    target = Path("results") / (f"{file.stem}-quick" if quick else file.stem) if output is None else output
+    options = {} if request.part_rows is None else {"part_rows": request.part_rows}
+    if request.tolerance is not None:
+        options |= {"samples": request.samples, "seed": request.seed}
+    with Meter(report.console(stderr=True)) as meter:
+        try:
+            table = sweep(
+                design.design,
+                request.plan,
+                mesh=design.mesh(size),
+                torque=request.load,
+                results=request.results,
+                output=target,
+                tolerance=request.tolerance,
+                title=design.title,
+                units=design.units,
+                callback=meter,
+                **options,
+            )
+        except KeyboardInterrupt:
+            if meter.done is None:
+                raise
+            kept = f"{meter.done:,} of {meter.total:,} variants are in {target}{os.sep}"
+            raise Interrupted(f"{kept}, resume with the same command") from None
+    if jax.process_index() > 0:  # the first process speaks for all
+        return table.failures() == 0
+    return _show(table, design, target, best, meter, quick=quick)
+
+
+def _show(table: SweepTable, design: DesignFile, target: Path, best: int, meter: "Meter", *, quick: bool) -> bool:
+    chosen = table.best(best)
+    chosen.to_csv(target / _BEST_FILE)
+    out = report.console()
+    out.print(_side_by_side(chosen, design.title, (out.width - _LABEL_WIDTH) // _CELL_WIDTH))
+    if quick:
+        out.print("quick run: coarse positions and few samples, not a result to build on", soft_wrap=True)
+    out.print(f"best {len(chosen)} in {target / _BEST_FILE}, table in {target}{os.sep}", soft_wrap=True)
+    rate = f", {meter.rate:,.0f}/s" if meter.rate else ""
+    out.print(f"{len(table):,} variants{rate}, {meter.elapsed:.1f} s", soft_wrap=True)
+    failures = table.failures()
+    if failures:
+        line = f"jaxgear: warning: {failures:,} variants failed (column converged)"
+        report.console(stderr=True).print(line, style="bold red", soft_wrap=True)
+    return failures == 0
+
+
+def _side_by_side(table: SweepTable, title: str, count: int) -> Table:
+    """The first rows as columns."""
+    result = Table(title=f"{title}, best first by {table.results[0]}", title_justify="left", box=SIMPLE_HEAD)
+    result.add_column("variant")
+    columns = {name: table.column(name)[: max(count, 1)] for name in table.names}
+    for number in columns["variant"]:
+        result.add_column(str(number), justify="right", no_wrap=True)
+    units = table.units
+    for name in (*table.parameters, *table.results):
+        label = f"{name} [{units[name]}]" if units[name] and name in table.parameters else name
+        result.add_row(label, *(f"{value:.4g}" for value in columns[name]))
+    return result
+
+
+class Meter:
+    """Progress on stderr: a bar on a terminal, now and then a line elsewhere.
+
+    Attributes:
+        done, total: variants of this process, None before the first.
+    """
+
+    def __init__(self, console: Console):
+        self.done: int | None = None
+        self.total = 0
+        self._console, self._began = console, time.perf_counter()
+        self._first, self._since, self._lines = 0, self._began, 0
+        columns = TextColumn("{task.fields[note]}"), BarColumn(), TextColumn("{task.percentage:.0f} %")
+        self._progress = Progress(
+            *columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal
+        )
+        self._task = self._progress.add_task("", total=None, note="preparing")
+
+    def __enter__(self) -> "Meter":
+        self._progress.start()
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self._progress.stop()
+
+    def __call__(self, done: int, total: int) -> None:
+        """Callback of the sweep."""
+        if self.done is None:
+            self._first, self._since = done, time.perf_counter()
+            if done:
+                self._console.print(f"jaxgear: resuming, {done:,} of {total:,} variants are there", soft_wrap=True)
+        self.done, self.total = done, total
+        note = f"{done:,} of {total:,} variants" + (f", {self.rate:,.0f}/s" if self.rate else "")
+        self._progress.update(self._task, completed=done, total=total, note=note)
+        if not self._console.is_terminal and done * _LINES // total > self._lines:
+            self._lines = done * _LINES // total
+            self._console.print(f"jaxgear: {note}", soft_wrap=True)
+
+    @property
+    def elapsed(self) -> float:
+        """Since the start of the command [s]."""
+        return time.perf_counter() - self._began
+
+    @property
+    def rate(self) -> float:
+        """Variants per second of this process, with the compilation of its program."""
+        spent = time.perf_counter() - self._since
+        return ((self.done or 0) - self._first) / spent if spent > 0 else 0.0

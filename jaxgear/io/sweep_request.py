@@ -1,0 +1,138 @@
+"""What the tables [sweep] and [tolerance] of a design file ask for."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from ..metrics import RESULTS
+from ..sweep import AbstractPlan, FullFactorial, LatinHypercube, LoadSpectrum, Sobol
+from ..tolerance import Tolerance
+from . import schema
+from .design_file import DesignFile
+from .errors import DesignFileError, suggestion
+from .variants import read_variants
+
+T = TypeVar("T")
+
+# The keys that a kind of sampling takes; what another kind takes has no effect and is refused.
+_KEYS = {
+    "sobol": ("samples", "seed"),
+    "latin_hypercube": ("samples", "seed"),
+    "full_factorial": ("levels",),
+    "list": ("file",),
+}
+_OPTIONAL = ("seed",)
+_RESULTS = ("ppte", "max_flank_pressure", "effective_contact_ratio")
+
+
+@dataclasses.dataclass(frozen=True)
+class SweepRequest:
+    """A sweep, checked.
+
+    Attributes:
+        plan: the variants.
+        load: torques and their weights.
+        results: names of results.
+        part_rows: variants per file of the table, None for the library's default.
+        tolerance: of the gears, None where the file has none.
+        samples, seed: of the tolerance's deviations.
+    """
+
+    plan: AbstractPlan
+    load: LoadSpectrum
+    results: tuple[str, ...]
+    part_rows: int | None
+    tolerance: Tolerance | None
+    samples: int
+    seed: int
+
+
+def sweep_request(design: DesignFile, *, samples: int | None = None, most: int | None = None) -> SweepRequest:
+    """Checks what a design file says about a sweep.
+
+    Args:
+        design: the design file.
+        samples: number of variants in place of the file's.
+        most: upper limit of a number of samples, for a quick look.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
+    """
+    section = design.sweep
+    if section is None:
+        raise DesignFileError(design.path, "sweep", "missing, nothing says which variants to evaluate")
+    if samples is not None:
+        if "samples" not in _KEYS[section.sampling]:
+            problem = f'"{section.sampling}" takes no number of samples from the command line'
+            raise DesignFileError(design.path, "sweep.sampling", problem)
+        section = _with(section, samples=samples)
+    if most is not None and section.samples is not None:
+        section = _with(section, samples=min(section.samples, most))
+    wanted = tuple(section.results or _RESULTS)
+    for index, name in enumerate(wanted):
+        if name not in RESULTS:
+            key = f"sweep.results[{index}]"
+            raise DesignFileError(design.path, key, f'"{name}" is not known, {suggestion(name, RESULTS)}')
+        if name in wanted[:index]:
+            raise DesignFileError(design.path, f"sweep.results[{index}]", f'"{name}" is there twice')
+    tolerance = design.tolerance
+    return SweepRequest(
+        plan=_plan(design, section),
+        load=_load(design, section),
+        results=wanted,
+        part_rows=section.part_rows,
+        tolerance=None if tolerance is None else _tolerance(design, tolerance),
+        samples=0 if tolerance is None else tolerance.samples,
+        seed=0 if tolerance is None else tolerance.seed,
+    )
+
+
+def _plan(design: DesignFile, section: schema.SweepSection) -> AbstractPlan:
+    kind = section.sampling
+    for key in ("samples", "seed", "levels", "file"):
+        given = getattr(section, key) is not None
+        if given and key not in _KEYS[kind]:
+            raise DesignFileError(design.path, f"sweep.{key}", f'has no effect with sampling = "{kind}"')
+        if not given and key in _KEYS[kind] and key not in _OPTIONAL:
+            raise DesignFileError(design.path, f"sweep.{key}", f'missing, sampling = "{kind}" needs it')
+    bounds, seed = design.bounds, section.seed or 0
+    if kind == "list":
+        return read_variants(design.path.parent / str(section.file), tuple(bounds))
+    if kind == "full_factorial":
+        return _refused(design, "sweep.levels", lambda: FullFactorial(bounds, section.levels or 0))
+    make = Sobol if kind == "sobol" else LatinHypercube
+    return _refused(design, "sweep.samples", lambda: make(bounds, section.samples or 0, seed=seed))
+
+
+def _load(design: DesignFile, section: schema.SweepSection) -> LoadSpectrum:
+    if section.torques is None:
+        if section.weights is not None:
+            raise DesignFileError(design.path, "sweep.weights", "has no effect without sweep.torques")
+        return LoadSpectrum([design.torque])
+    key = "sweep.torques" if section.weights is None else "sweep.weights"
+    _refused(design, "sweep.torques", lambda: LoadSpectrum(section.torques))
+    return _refused(design, key, lambda: LoadSpectrum(section.torques, section.weights))
+
+
+def _tolerance(design: DesignFile, section: schema.ToleranceSection) -> Tolerance:
+    def make():
+        return Tolerance.from_class(design.pair(), section.quality_class, misalignment=section.misalignment)
+
+    tolerance = _refused(design, "tolerance", make)
+    if design.resolution().slices > 1:
+        return tolerance
+    if section.misalignment is not None:
+        problem = "needs resolution.slices of at least 2, one slice cannot show it"
+        raise DesignFileError(design.path, "tolerance.misalignment", problem)
+    return tolerance.without_lead()
+
+
+def _with(section: schema.SweepSection, **changes: Any) -> schema.SweepSection:
+    return type(section)(**{name: changes.get(name, getattr(section, name)) for name in section.__struct_fields__})
+
+
+def _refused(design: DesignFile, key: str, make: Callable[[], T]) -> T:
+    try:
+        return make()
+    except (ValueError, OverflowError) as error:
+        raise DesignFileError(design.path, key, error) from None
