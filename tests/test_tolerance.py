@@ -1,5 +1,7 @@
 """Tolerances are those of the standard, deviations what their names say, and the scatter follows from the contact."""
 
+import importlib
+import os
 import subprocess
 import sys
 
@@ -283,6 +285,18 @@ def test_monte_carlo_holds_the_samples_of_its_seed(mesh, tolerance, solve):
     assert str(scatter).startswith("Scatter of 20 samples, 0 failed")
 
 
+def test_one_compilation_serves_every_number(mesh, tolerance, monkeypatch):
+    module, traces = importlib.import_module("jaxgear.tolerance.monte_carlo"), []
+    solve_numbers = module._solve_numbers
+    monkeypatch.setattr(module, "_solve_numbers", lambda *task: traces.append(0) or solve_numbers(*task))
+    gear = tolerance.without_lead().pinion
+    for amount in (1.0, 2.0, 3.0):
+        design = {"pinion": jg.TipRelief(amount, 3.0), "wheel": jg.TipRelief(5.0, 3.0)}
+        limits = jg.Tolerance(gear, jg.GearTolerance(amount, 2 * amount, 3 * amount))
+        jg.monte_carlo(mesh, 40.0 + amount, tolerance=limits, samples=20, seed=int(amount), **design)
+    assert len(traces) <= 1  # none if an earlier test has compiled it
+
+
 def test_failed_samples_count_against_the_design():
     phase = jnp.arange(4) / 4
     curves = np.arange(101.0)[:, None] * np.array([1.0, 0.0, 0.5, 0.2]) + 1.0
@@ -352,7 +366,15 @@ relief = {"pinion": jg.TipRelief(7.0, 4.0), "wheel": jg.TipRelief(6.0, 4.0)}
 scatter = jg.monte_carlo(mesh, 50.0, tolerance=tolerance, samples=20, seed=1, **relief)
 print(len(jax.devices()), *(float(value) for value in scatter.ppte))
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=300)
+    cache = {"JAX_COMPILATION_CACHE_DIR": str(jax.config.jax_compilation_cache_dir or "")}
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+        env={**os.environ, **cache, "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"},
+    )
     assert done.returncode == 0, done.stderr
     devices, *ppte = map(float, done.stdout.split())
     assert devices == 2

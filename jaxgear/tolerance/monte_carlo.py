@@ -168,8 +168,7 @@ def _solve_numbers(task, numbers):
 
 
 def _scatter(phase, curves: np.ndarray, converged: np.ndarray, levels: np.ndarray) -> Scatter:
-    """Statistics of the solved samples, on the host: its reductions pass NaN on and its quantiles only partition."""
-    # not through the reductions of the device, which drop NaN from large arrays
+    """Statistics of the solved samples, on the host: reductions of the device drop NaN from large arrays."""
     spread = np.ptp(curves, axis=1)
     converged = converged & np.isfinite(curves).all(axis=1)
     nominal, ppte, fine = curves[0], np.where(converged, spread, np.nan)[1:], converged[1:]
@@ -183,18 +182,24 @@ def _scatter(phase, curves: np.ndarray, converged: np.ndarray, levels: np.ndarra
         nominal_ppte=array(np.where(converged[0], spread[0], np.nan)),
         mean=array(np.mean(ppte, dtype=float)),
         std=array(np.std(ppte, ddof=1, dtype=float)),
-        ppte_quantile95=array(_quantile(ppte, fine, 0.95)),
+        ppte_quantile95=array(_quantiles(ppte, fine, np.array(0.95))),
         phase=phase,
         nominal_transmission_error=array(nominal),
         quantiles=array(levels),
-        transmission_error_quantiles=array(np.stack([_quantile(curves[1:], fine, level) for level in levels])),
+        transmission_error_quantiles=array(_quantiles(curves[1:], fine, levels)),
     )
 
 
-def _quantile(values: np.ndarray, fine: np.ndarray, level: float) -> np.ndarray:
-    """Quantile over the samples of the first axis in which failed ones rank beyond all others, on either side."""
-    upwards = level >= 0.5
-    fine = fine.reshape((-1,) + (1,) * (values.ndim - 1))
-    ranked = np.where(fine, values, np.inf if upwards else -np.inf)
-    # a value of the sample, since interpolation towards an infinite neighbour gives NaN
-    return np.quantile(ranked, level, axis=0, method="higher" if upwards else "lower")
+def _quantiles(values: np.ndarray, fine: np.ndarray, levels: np.ndarray) -> np.ndarray:
+    """Quantiles over the samples of the first axis in which failed ones rank beyond all others, on either side.
+
+    Each is the value of a sample, the outer one of the two at the level: interpolation towards an infinite neighbour
+    would give NaN. Shape (levels, ...).
+    """
+    ordered = np.sort(np.ascontiguousarray(values[fine].T), axis=-1)
+    count, failed = ordered.shape[-1], len(values) - ordered.shape[-1]
+    place = levels * (len(values) - 1)
+    pick = np.where(levels >= 0.5, np.ceil(place), np.floor(place) - failed).astype(int)
+    ends = [np.full((*ordered.shape[:-1], 1), end, ordered.dtype) for end in (-np.inf, np.inf)]
+    bounded = np.concatenate([ends[0], ordered, ends[1]], axis=-1)
+    return bounded[..., np.clip(pick, -1, count) + 1].T
