@@ -96,6 +96,7 @@ def sweep(
     columns = _columns(plan, units or {}, evaluator)
     settings = {
         **_settings(design, example, plan, mesh, load, results),
+        "columns": [column.name for column in columns],
         "tolerance": None if tolerance is None else {"limits": _digest(tolerance), "samples": samples, "seed": seed},
     }
     manifest = make_manifest(columns, title=title, variants=plan.size, part_rows=part_rows, settings=settings)

@@ -9,7 +9,7 @@ import hashlib
 import json
 import os
 import uuid
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -83,10 +83,11 @@ class Store:
         start, stop = self.span(part)
         return found.num_rows == stop - start and (found.metadata or {}).get(b"fingerprint") == self._fingerprint
 
-    def remove_leftovers(self, parts: Iterable[int]) -> None:
+    def remove_leftovers(self, parts: range) -> None:
         """Deletes what killed processes left of parts that are this process's to write."""
-        for part in parts:
-            for path in self.folder.glob(f".{self.path(part).name}.*{_TEMPORARY}"):
+        for path in self.folder.glob(f".part-*{_TEMPORARY}"):
+            number = path.name[len(".part-") :].partition(".")[0]
+            if number.isdigit() and int(number) in parts:
                 path.unlink(missing_ok=True)
 
     def write(self, part: int, columns: Mapping[str, np.ndarray]) -> None:
@@ -101,10 +102,10 @@ class Store:
         try:
             write_durably(
                 self.path(part),
-                # random numbers repeat never and hardly compress: a fast codec, no dictionary
+                # these numbers never repeat and hardly compress: a fast codec, no dictionary
                 lambda file: parquet.write_table(
                     table, file, compression="zstd", compression_level=1, use_dictionary=False, write_page_checksum=True
-                ),  # fmt: skip
+                ),
             )
         except OSError as error:
             raise ValueError(f"{self.path(part)}: cannot be written: {error.strerror or error}") from None

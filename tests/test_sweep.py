@@ -1,0 +1,328 @@
+"""Sweeps: rows are those of `solve`, failures stay, selections are exact, and a folder resumes or is refused."""
+
+import csv
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pyarrow.parquet as parquet
+import pytest
+
+import jaxgear as jg
+from jaxgear.metrics import RESULTS, result_key
+from jaxgear.sweep.selection import front, smallest
+
+BOUNDS = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.5)}
+FEW = ("ppte", "max_flank_pressure", "effective_contact_ratio")
+PLAN = jg.Sobol(BOUNDS, 40, seed=5)
+
+
+def design(x):
+    return jg.TipRelief(x["pinion"], x["length"]), jg.TipRelief(x["wheel"], x["length"])
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    pinion = jg.Gear(teeth=19, module=3.0, face_width=20.0)
+    wheel = jg.Gear(teeth=48, module=3.0, face_width=18.0)
+    return jg.prepare(jg.GearPair(pinion, wheel), resolution=jg.Resolution(positions=8, patch_nodes=2))
+
+
+@pytest.fixture(scope="module")
+def numbers(mesh):
+    """All results of one variant, straight from `solve`."""
+
+    @eqx.filter_jit
+    def evaluate(x, torque):
+        pinion, wheel = design(x)
+        cycle = jg.solve(mesh, torque, pinion=pinion, wheel=wheel)
+        return {name: result.of(cycle) for name, result in RESULTS.items()}
+
+    return lambda row, torque=50.0: evaluate(dict(zip(BOUNDS, jnp.asarray(row))), jnp.asarray(torque))
+
+
+def run(mesh, plan=PLAN, **options):
+    """A sweep of the few results; all calls share one compiled program."""
+    return jg.sweep(design, plan, **{"mesh": mesh, "torque": 50.0, "results": FEW, "part_rows": 16, **options})
+
+
+@pytest.fixture(scope="module")
+def table(mesh):
+    return run(mesh)
+
+
+@pytest.fixture
+def folder(mesh, tmp_path):
+    run(mesh, output=tmp_path / "out", title="a title", units={"length": "mm"})
+    return tmp_path / "out"
+
+
+def content(table):
+    return {name: table.column(name) for name in table.names}
+
+
+def assert_same(first, second):
+    """To the last bit."""
+    assert first.names == second.names
+    for name in first.names:
+        np.testing.assert_array_equal(first.column(name), second.column(name), err_msg=name)
+
+
+def test_every_result_is_that_of_solve(mesh, numbers):
+    table = run(mesh, results=tuple(RESULTS))
+    assert table.names == ("variant", *BOUNDS, *map(result_key, RESULTS), "converged")
+    columns = content(table)
+    np.testing.assert_array_equal(columns["variant"], np.arange(40))
+    assert columns["converged"].all() and len(table) == 40
+    for row in (0, 17, 39):
+        values = PLAN.rows(row, row + 1)[0]
+        assert [columns[name][row] for name in BOUNDS] == list(values)
+        for name, expected in numbers(values).items():
+            assert columns[result_key(name)][row] == pytest.approx(float(expected), rel=1e-9, abs=1e-9), name
+
+
+def test_a_load_spectrum_gives_mean_worst_and_every_torque(mesh, numbers):
+    spectrum = jg.LoadSpectrum([25.0, 62.5], [3.0, 1.0])
+    table = run(mesh, torque=spectrum, results=("ppte", "effective_contact_ratio"))
+    assert table.results[:4] == ("ppte_um_mean", "ppte_um_worst", "ppte_um_25Nm", "ppte_um_62.5Nm")
+    columns = content(table)
+    for name, worst in (("ppte", np.maximum), ("effective_contact_ratio", np.minimum)):
+        key = result_key(name)
+        low, high = columns[f"{key}_25Nm"], columns[f"{key}_62.5Nm"]
+        np.testing.assert_allclose(columns[f"{key}_mean"], 0.75 * low + 0.25 * high, rtol=1e-13)
+        np.testing.assert_array_equal(columns[f"{key}_worst"], worst(low, high))
+        row = PLAN.rows(3, 4)[0]
+        assert low[3] == pytest.approx(float(numbers(row, 25.0)[name]), rel=1e-9)
+        assert high[3] == pytest.approx(float(numbers(row, 62.5)[name]), rel=1e-9)
+
+
+def test_a_tolerance_gives_mean_and_quantile_over_common_deviations(mesh):
+    tolerance = jg.Tolerance.from_class(mesh.pair, 6).without_lead()
+    table = run(mesh, tolerance=tolerance, samples=4, seed=9, results=("ppte", "effective_contact_ratio"))
+    assert table.results[:2] == ("ppte_um_mean", "ppte_um_q95")
+    deviations = jg.sample_deviations(tolerance, mesh, 4, seed=9)
+    pinion, wheel = design(dict(zip(BOUNDS, PLAN.rows(7, 8)[0])))
+
+    @eqx.filter_jit
+    def sampled(deviation):
+        removed = jg.deviated_material(mesh, 50.0, deviation, pinion=pinion, wheel=wheel)
+        cycle = jg.solve_removed(mesh, 50.0, removed)
+        return jg.peak_to_peak(cycle.transmission_error), jg.effective_contact_ratio(cycle)
+
+    ppte, ratio = map(np.asarray, jax.vmap(sampled)(deviations))
+    assert np.ptp(ppte) > 0.1
+    assert table.column("ppte_um_mean")[7] == pytest.approx(ppte.mean())
+    assert table.column("ppte_um_q95")[7] == pytest.approx(np.quantile(ppte, 0.95))
+    assert table.column("effective_contact_ratio_q95")[7] == pytest.approx(np.quantile(ratio, 0.05))
+
+
+def test_impossible_variants_are_rows(mesh, table):
+    good = PLAN.rows(0, 5)
+    rows = np.repeat(good, 2, axis=0)
+    rows[1, 2], rows[4, 0], rows[9, 1] = -1.0, np.nan, np.inf
+    mixed = run(mesh, jg.VariantList(tuple(BOUNDS), rows))
+    failed = np.isin(np.arange(10), [1, 4, 9])
+    np.testing.assert_array_equal(mixed.column("converged"), ~failed)
+    np.testing.assert_array_equal(np.isnan(mixed.column("ppte_um")), failed)
+    np.testing.assert_array_equal(mixed.column("ppte_um")[~failed], np.repeat(table.column("ppte_um")[:5], 2)[~failed])
+    assert mixed.failures() == 3 and len(mixed.best(10)) == 7
+
+
+def test_unsolved_variants_are_rows(mesh, tmp_path):
+    coarse = jg.prepare(mesh.pair, resolution=jg.Resolution(positions=8, patch_nodes=2, newton_steps=1))
+    table = run(coarse, output=tmp_path / "out", results=("ppte",))
+    assert len(table) == 40 and not table.column("converged").any()
+    assert np.isnan(table.column("ppte_um")).all()
+    assert len(table.best(3)) == 0 and len(table.pareto(["ppte_um", "length"])) == 0
+    stored = parquet.read_table(tmp_path / "out" / "part-0000000.parquet")
+    assert stored["ppte_um"].null_count == 16  # null, which statistics leave out, not NaN
+    table.to_csv(tmp_path / "table.csv")
+    with (tmp_path / "table.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 40 and rows[0]["ppte_um"] == "" and rows[0]["converged"] == "false"
+
+
+def test_the_size_of_the_parts_changes_nothing(mesh, table, folder):
+    assert_same(table, run(mesh, part_rows=40))
+    assert_same(table, jg.open_sweep(folder))
+
+
+def test_a_design_is_traced_once_for_all_parts(mesh):
+    traced = []
+
+    def counting(x):
+        traced.append(isinstance(x["length"], jax.core.Tracer))
+        return design(x)
+
+    first = jg.sweep(counting, PLAN, mesh=mesh, torque=50.0, results=("ppte",), part_rows=10)
+    few = sum(traced)
+    assert len(first) == 40 and few <= 3  # for its shapes, to compile it and, with a folder, to identify it
+    jg.sweep(counting, PLAN, mesh=mesh, torque=40.0, results=("ppte",), part_rows=5)
+    assert sum(traced) - few <= 2  # not compiled again
+
+
+def test_best_is_sorted_and_large_where_large_is_better(table):
+    columns = content(table)
+    best = table.best(7)
+    np.testing.assert_array_equal(best.column("variant"), np.argsort(columns["ppte_um"])[:7])
+    assert best.designs()[0] == {name: columns[name][best.column("variant")[0]] for name in BOUNDS}
+    ratio = table.best(1, by="effective_contact_ratio").column("effective_contact_ratio")
+    assert ratio == columns["effective_contact_ratio"].max()
+    assert len(table.best(100)) == 40 and "40 variants, 0 failed" in str(table)
+    with pytest.raises(ValueError, match='"ppte" is not a column, must be one of variant, pinion'):
+        table.best(1, by="ppte")
+
+
+@pytest.mark.parametrize("by", [("ppte_um", "max_flank_pressure_MPa"), ("ppte_um", "effective_contact_ratio", "length")])
+def test_pareto_is_what_comparing_all_pairs_gives(table, by):
+    signs = [-1.0 if name == "effective_contact_ratio" else 1.0 for name in by]
+    values = np.stack([table.column(name) for name in by], axis=1) * signs
+    beats = (values[:, None] <= values[None]).all(axis=2) & (values[:, None] < values[None]).any(axis=2)
+    chosen = table.pareto(by)
+    assert set(chosen.column("variant")) == set(np.flatnonzero(~beats.any(axis=0)))
+    assert (np.diff(chosen.column(by[0])) >= 0).all()
+
+
+def test_selections_of_a_stream_are_those_of_the_whole():
+    random = np.random.default_rng(0)
+    values = random.integers(0, 30, (3000, 2)).astype(float)  # many equal ones
+    values[random.integers(0, 3000, 100), 0] = math.nan
+    numbers = np.arange(3000)
+    cuts = [slice(start, start + 7) for start in range(0, 3000, 7)]
+    stable = np.argsort(values[:, 0], kind="stable")[:50]
+    np.testing.assert_array_equal(smallest([(numbers[c], values[c, 0]) for c in cuts], 50), stable)
+    whole = front([(numbers, values)])
+    np.testing.assert_array_equal(front([(numbers[c], values[c]) for c in cuts]), whole)
+    assert len(np.unique(values[whole], axis=0)) == len(whole)  # of equal rows one
+    assert all((numbers[(values == values[i]).all(axis=1)] >= i).all() for i in whole)  # the first
+
+
+def test_units_ranges_and_settings_are_in_the_files(folder):
+    schema = parquet.read_schema(folder / "part-0000002.parquet")
+    field = schema.field("max_flank_pressure_MPa")
+    assert field.metadata == {b"unit": b"MPa", b"kind": b"result", b"better": b"smaller"}
+    field = schema.field("length")
+    assert (field.metadata[b"unit"], field.metadata[b"low"], field.metadata[b"high"]) == (b"mm", b"1.0", b"5.5")
+    assert schema.metadata[b"title"] == b"a title" and schema.metadata[b"torques_Nm"] == b"[50.0]"
+    assert {b"jaxgear", b"plan", b"weights", b"fingerprint"} <= set(schema.metadata)
+    table = jg.open_sweep(folder)
+    assert table.units["ppte_um"] == "um" and table.units["effective_contact_ratio"] == ""
+    table.to_csv(folder / "table.csv")
+    header, first, *_ = (folder / "table.csv").read_text().splitlines()
+    assert header.split(",")[3:5] == ['"length [mm]"', '"ppte_um"']
+    assert float(first.split(",")[4]) == table.column("ppte_um")[0]
+
+
+def test_a_resumed_sweep_computes_what_is_missing_and_only_that(mesh, table, folder):
+    parts = sorted(folder.glob("*.parquet"))
+    assert [path.name for path in parts] == [f"part-000000{i}.parquet" for i in range(3)]
+    before = parts[0].stat().st_mtime_ns
+    parts[1].write_bytes(parts[1].read_bytes()[:-100])  # torn
+    parts[2].unlink()
+    for leftover in (".part-0000001.parquet.0f.tmp", ".part-0000000.parquet.12.tmp"):
+        (folder / leftover).write_bytes(b"PAR1")
+    with pytest.raises(ValueError, match="is not complete, 2 of 3 parts are missing: resume"):
+        jg.open_sweep(folder)
+    seen = []
+    resumed = run(mesh, output=folder, callback=lambda *progress: seen.append(progress))
+    assert_same(table, resumed)
+    assert parts[0].stat().st_mtime_ns == before
+    assert seen == [(16, 40), (32, 40), (40, 40)]
+    assert {path.name for path in folder.iterdir()} == {*(path.name for path in parts), "sweep.json"}
+
+
+@pytest.mark.parametrize(
+    "changes, named",
+    [
+        ({"plan": jg.Sobol(BOUNDS, 40, seed=6)}, "plan"),
+        ({"torque": 51.0}, "design, torques_Nm"),  # the width of the contact depends on the torque
+        ({"results": FEW[:2]}, "columns, results"),
+        ({"part_rows": 20}, "part_rows"),
+    ],
+)
+def test_a_folder_of_another_sweep_is_refused(mesh, folder, changes, named):
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(ValueError, match=rf"out: holds a sweep of other settings \({named}\), delete it or choose"):
+        run(mesh, output=folder, **changes)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_another_design_or_mesh_is_another_sweep(mesh, folder):
+    def other(x):
+        return jg.TipRelief(x["pinion"], x["length"]), jg.TipRelief(x["wheel"], x["length"], jg.Linear())
+
+    with pytest.raises(ValueError, match=r"other settings \(design\)"):
+        jg.sweep(other, PLAN, mesh=mesh, torque=50.0, results=FEW, part_rows=16, output=folder)
+    softer = eqx.tree_at(lambda m: m.structure, mesh, mesh.structure * (1 + 1e-12))
+    with pytest.raises(ValueError, match=r"other settings \(mesh\)"):
+        run(softer, output=folder)
+
+
+@pytest.mark.parametrize(
+    "options, problem",
+    [
+        ({"results": ()}, "results must be different and at least one"),
+        ({"results": ("ppte", "ppte")}, "results must be different"),
+        ({"results": ("noise",)}, '"noise" is not a result, must be one of ppte, mean_te'),
+        ({"part_rows": 0}, "part_rows = 0 must be a whole number from 1"),
+        ({"torque": -1.0}, "LoadSpectrum: torques = -1 N m must be at least 0"),
+    ],
+)
+def test_wrong_arguments_are_refused_before_anything_is_written(mesh, tmp_path, options, problem):
+    with pytest.raises(ValueError, match=problem):
+        run(mesh, output=tmp_path / "out", **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_parameter_may_not_have_the_name_of_another_column(mesh):
+    plan = jg.Sobol({"ppte_um": (0.0, 1.0)}, 4, seed=0)
+    with pytest.raises(ValueError, match='parameter "ppte_um" has the name of another column'):
+        jg.sweep(lambda x: (jg.TipRelief(x["ppte_um"], 2.0), None), plan, mesh=mesh, torque=50.0)
+
+
+@pytest.mark.parametrize(
+    "torques, weights, problem",
+    [
+        ([], None, "at least one torque"),
+        ([50.0, 50.0], None, "torques must be different"),
+        ([50.0, 60.0], [1.0], "1 weights must be as many as the 2 torques"),
+        ([50.0, 60.0], [1.0, -1.0], "weights = -1 must be at least 0"),
+        ([50.0, 60.0], [0.0, 0.0], "sum of the weights = 0 must be greater than 0"),
+    ],
+)
+def test_wrong_load_spectra_are_refused(torques, weights, problem):
+    with pytest.raises(ValueError, match=problem):
+        jg.LoadSpectrum(torques, weights)
+
+
+def test_folders_that_cannot_be_used_are_refused(mesh, tmp_path):
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "chapter.tex").write_text("years of work")
+    (tmp_path / "file").write_text("")
+    for target, problem in (
+        ("thesis", "holds other files than a sweep"),
+        ("file", "is a file"),
+        ("file/x", "cannot be"),
+    ):
+        with pytest.raises(ValueError, match=problem):
+            run(mesh, output=tmp_path / target)
+    with pytest.raises(ValueError, match="is not a sweep: sweep.json: No such file"):
+        jg.open_sweep(tmp_path)
+    (tmp_path / "sweep.json").write_text('{"title": ')
+    with pytest.raises(ValueError, match="is not a sweep: sweep.json is not readable"):
+        jg.open_sweep(tmp_path)
+
+
+def test_summary_is_made_of_the_named_results(mesh):
+    summary = jax.eval_shape(lambda mesh: jg.summary(jg.solve(mesh, 50.0)), mesh)
+    assert set(summary) - {result_key(name) for name in RESULTS} == {"torque_Nm", "converged"}
+    assert {"ppte_um", "max_line_load_N_per_mm", "mesh_loss_factor", "corner_contact_length_mm"} <= set(summary)
+
+
+def test_removed_material_is_the_mean_over_the_path(mesh):
+    inside = np.asarray(mesh.outside <= 0)
+    removed = np.random.default_rng(0).random((4, 1, 8))
+    cycle = jg.solve_removed(mesh, 50.0, jnp.asarray(removed))
+    assert float(RESULTS["removed_material"].of(cycle)) == pytest.approx(removed[:, 0][inside].mean())
