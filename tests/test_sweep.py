@@ -175,7 +175,9 @@ def test_best_is_sorted_and_large_where_large_is_better(table):
         table.best(1, by="ppte")
 
 
-@pytest.mark.parametrize("by", [("ppte_um", "max_flank_pressure_MPa"), ("ppte_um", "effective_contact_ratio", "length")])
+@pytest.mark.parametrize(
+    "by", [("ppte_um", "max_flank_pressure_MPa"), ("ppte_um", "effective_contact_ratio", "length")]
+)
 def test_pareto_is_what_comparing_all_pairs_gives(table, by):
     signs = [-1.0 if name == "effective_contact_ratio" else 1.0 for name in by]
     values = np.stack([table.column(name) for name in by], axis=1) * signs

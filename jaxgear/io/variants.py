@@ -27,19 +27,19 @@ def read_variants(path: Path, names: Sequence[str]) -> VariantList:
     """
     import pyarrow
 
-    scratch = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the array on it
     rows = 0
-    try:
-        for piece in (_parquet if path.suffix.lower() == ".parquet" else _csv)(path, names):
-            scratch.write(np.ascontiguousarray(piece, np.float64).tobytes())
-            rows += len(piece)
-    except (OSError, pyarrow.ArrowException) as error:
-        problem = getattr(error, "strerror", None) or str(error).partition("\n")[0]
-        raise DesignFileError(path, "", problem) from None
-    if not rows:
-        raise DesignFileError(path, "", "holds no variants")
-    scratch.flush()
-    return VariantList(names, np.memmap(scratch, np.float64, "r", shape=(rows, len(names))))
+    with tempfile.TemporaryFile() as scratch:  # the array on it outlives it
+        try:
+            for piece in (_parquet if path.suffix.lower() == ".parquet" else _csv)(path, names):
+                scratch.write(np.ascontiguousarray(piece, np.float64).tobytes())
+                rows += len(piece)
+        except (OSError, pyarrow.ArrowException) as error:
+            problem = getattr(error, "strerror", None) or str(error).partition("\n")[0]
+            raise DesignFileError(path, "", problem) from None
+        if not rows:
+            raise DesignFileError(path, "", "holds no variants")
+        scratch.flush()
+        return VariantList(names, np.memmap(scratch, np.float64, "r", shape=(rows, len(names))))
 
 
 def _csv(path: Path, names: Sequence[str]) -> Iterator[np.ndarray]:

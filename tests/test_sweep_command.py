@@ -1,0 +1,228 @@
+"""The command `jaxgear sweep`: what it prints and writes, how it resumes, and that every failure is one line."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from test_cli import FREE, assert_refused, call
+
+import jaxgear as jg
+from jaxgear.cli import devices
+from jaxgear.io import load_design, read_variants, sweep_request
+
+SWEEP = (
+    FREE.replace("[optimize]\nstarts = 2\nsteps = 100\n", "")
+    + """
+[sweep]
+sampling = "latin_hypercube"
+samples = 60
+part_rows = 25
+results = ["ppte", "effective_contact_ratio"]
+"""
+)
+
+
+@pytest.fixture(autouse=True)
+def no_cache(monkeypatch):
+    """The tests keep their own compilation cache, and the devices that there are."""
+    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A design file and its sweep."""
+    folder = tmp_path_factory.mktemp("sweep")
+    (folder / "gear.toml").write_text(SWEEP)
+    os.environ["JAXGEAR_NO_CACHE"] = "1"
+    result = call("sweep", folder / "gear.toml", "-o", folder / "out", "--best", "5")
+    assert result.code == 0, result.err
+    return folder, result
+
+
+def test_the_table_is_that_of_the_library(folder):
+    folder, _ = folder
+    table = jg.open_sweep(folder / "out")
+    assert table.names == ("variant", "height", "ppte_um", "effective_contact_ratio", "converged")
+    assert table.units["height"] == "um" and len(table) == 60 and table.title == "a [small] pair"
+    np.testing.assert_array_equal(
+        table.column("height"), jg.LatinHypercube({"height": (0.0, 20.0)}, 60, seed=0).rows(0, 60)[:, 0]
+    )
+    file = load_design(folder / "gear.toml")
+    plan = sweep_request(file).plan
+    direct = jg.sweep(file.design, plan, mesh=file.mesh(), torque=50.0, results=("ppte", "effective_contact_ratio"))
+    np.testing.assert_array_equal(table.column("ppte_um"), direct.column("ppte_um"))
+
+
+def test_the_best_are_printed_and_written(folder):
+    folder, result = folder
+    best = jg.open_sweep(folder / "out").best(5)
+    assert "a [small] pair, best first by ppte_um" in result.out and "height [um]" in result.out
+    for name in ("ppte_um", "height"):
+        assert f"{best.column(name)[0]:.4g}" in result.out
+    assert f"table in {folder / 'out'}{os.sep}" in result.out and "60 variants, " in result.out
+    read = read_variants(folder / "out" / "best.csv", ["height"])
+    np.testing.assert_array_equal(read.rows(0, 5)[:, 0], best.column("height"))
+    assert "jaxgear: 60 of 60 variants" in result.err.splitlines()[-1]
+
+
+def test_repeated_it_finds_everything_there(folder):
+    folder, _ = folder
+    before = {path.name: path.stat().st_mtime_ns for path in (folder / "out").glob("part-*")}
+    result = call("sweep", folder / "gear.toml", "-o", folder / "out")
+    assert result.code == 0 and "resuming, 60 of 60 variants are there" in result.err
+    assert {path.name: path.stat().st_mtime_ns for path in (folder / "out").glob("part-*")} == before
+    other = call("sweep", folder / "gear.toml", "-o", folder / "out", "--samples", "61")
+    assert_refused(other, "out: holds a sweep of other settings (plan, variants)")
+
+
+def test_a_list_of_variants_may_be_the_best_of_a_sweep(folder, tmp_path):
+    folder, _ = folder
+    listed = SWEEP.replace("samples = 60", 'file = "best.csv"').replace("latin_hypercube", "list")
+    (tmp_path / "listed.toml").write_text(listed)
+    (tmp_path / "best.csv").write_bytes((folder / "out" / "best.csv").read_bytes())
+    assert call("sweep", tmp_path / "listed.toml", "-o", tmp_path / "out").code == 0
+    again, best = (
+        jg.open_sweep(tmp_path / "out"),
+        jg.open_sweep(folder / "out").best(len(jg.open_sweep(tmp_path / "out"))),
+    )
+    np.testing.assert_array_equal(again.column("ppte_um"), best.column("ppte_um"))
+
+
+def test_a_quick_sweep_is_coarse_short_and_says_so(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "gear.toml").write_text(SWEEP.replace("samples = 60", "samples = 5000").replace("part_rows = 25", ""))
+    result = call("sweep", "gear.toml", "--quick")
+    assert result.code == 0 and "quick run" in result.out
+    assert len(jg.open_sweep("results/gear-quick")) == 4096
+
+
+def test_failed_variants_are_loud(folder, tmp_path):
+    (tmp_path / "gear.toml").write_text(SWEEP.replace("positions = 8", "positions = 8\nnewton_steps = 1"))
+    result = call("sweep", tmp_path / "gear.toml", "-o", tmp_path / "out")
+    assert result.code == 1 and "60 variants failed" in result.err
+    assert len(jg.open_sweep(tmp_path / "out")) == 60
+
+
+def test_an_interrupted_sweep_says_how_to_go_on_and_does(tmp_path):
+    content = SWEEP.replace("samples = 60", "samples = 6000").replace("part_rows = 25", "part_rows = 100")
+    (tmp_path / "gear.toml").write_text(content)
+    command = [sys.executable, "-c", "from jaxgear.cli import main; main()", "sweep", "gear.toml", "-o", "out"]
+    kept = {name: value for name, value in os.environ.items() if name != "JAXGEAR_NO_CACHE"}
+    environment = {**kept, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "XDG_CACHE_HOME": str(tmp_path)}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(command, cwd=tmp_path, env=environment, **pipes)
+    try:
+        while len(list((tmp_path / "out").glob("part-*"))) < 3 and process.poll() is None:
+            time.sleep(0.001)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 130 and out == ""
+    assert err.splitlines()[-1].startswith("jaxgear: interrupted, ")
+    assert err.endswith(f" of 6,000 variants are in out{os.sep}, resume with the same command\n")
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "jaxgear: resuming, " in done.stderr
+    assert len(jg.open_sweep(tmp_path / "out")) == 6000
+
+
+@pytest.mark.parametrize(
+    "old, new, fragments",
+    [
+        ("[sweep]", "[swep]", ['gear.toml: swep: unknown key, did you mean "sweep"?']),
+        ("samples = 60", "", ['sweep.samples: missing, sampling = "latin_hypercube" needs it']),
+        ("samples = 60", "samples = 0", ["sweep.samples: must be"]),
+        ("samples = 60", "samples = 60\nlevels = 3", ['sweep.levels: has no effect with sampling = "latin_hypercube"']),
+        ('"latin_hypercube"', '"sobbol"', ['sweep.sampling: "sobbol" is not known, did you mean "sobol"?']),
+        ('"ppte"', '"pte"', ['sweep.results[0]: "pte" is not known, did you mean "ppte"?']),
+        ('"ppte"', '"effective_contact_ratio"', ['sweep.results[1]: "effective_contact_ratio" is there twice']),
+        ('"ppte"', '"te_harmonic_3", "ppte"', None),
+        ("part_rows = 25", "weights = [1.0]", ["sweep.weights: has no effect without sweep.torques"]),
+        ("part_rows = 25", "torques = [-1.0]", ["sweep.torques: LoadSpectrum: torques = -1 N m"]),
+        ("part_rows = 25", "torques = [1, 2]\nweights = [1]", ["sweep.weights: LoadSpectrum: 1 weights must be"]),
+        ("part_rows = 25", "part_rows = 0", ["sweep.part_rows: must be"]),
+        ('"latin_hypercube"\nsamples = 60', '"full_factorial"', ["sweep.levels: missing"]),
+        ('"latin_hypercube"\nsamples = 60', '"full_factorial"\nlevels = 1', ["sweep.levels: FullFactorial: levels of"]),
+        ('"latin_hypercube"\nsamples = 60', '"full_factorial"\nlevels = "3"', ["sweep.levels: must be a whole number"]),
+        ('"latin_hypercube"\nsamples = 60', '"list"', ["sweep.file: missing"]),
+        ('"latin_hypercube"\nsamples = 60', '"list"\nfile = "no.csv"', ["no.csv: No such file or directory"]),
+        ('"latin_hypercube"\nsamples = 60', '"list"\nfile = "bad.csv"', ["bad.csv: ", "tall"]),
+        ('"latin_hypercube"\nsamples = 60', '"list"\nfile = "other.csv"', ["other.csv: has no column height"]),
+        ('"latin_hypercube"\nsamples = 60', '"list"\nfile = "empty.csv"', ["empty.csv: holds no variants"]),
+        ('"latin_hypercube"\nsamples = 60', '"list"\nfile = "bad.parquet"', ["bad.parquet: "]),
+        ("[sweep]", "[tolerance]\nquality_class = 99\n[sweep]", ["tolerance: ", "99"]),
+        ("[sweep]", "[tolerance]\nquality_class = 5\nmisalignment = 3.0\n[sweep]", ["tolerance.misalignment: needs"]),
+    ],
+)
+def test_a_wrong_sweep_is_refused_before_anything_is_written(tmp_path, monkeypatch, old, new, fragments):
+    monkeypatch.chdir(tmp_path)
+    assert old in SWEEP
+    (tmp_path / "gear.toml").write_text(SWEEP.replace(old, new))
+    (tmp_path / "bad.csv").write_text("height\n1.0\ntall\n")
+    (tmp_path / "other.csv").write_text("width\n1.0\n")
+    (tmp_path / "empty.csv").write_text("height\n")
+    (tmp_path / "bad.parquet").write_text("no")
+    if fragments is None:
+        sweep_request(load_design("gear.toml"))  # the control: this one is right
+    else:
+        assert_refused(call("sweep", "gear.toml"), *fragments)
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_file_without_a_sweep_or_variables_is_refused(tmp_path):
+    (tmp_path / "free.toml").write_text(FREE)
+    assert_refused(call("sweep", tmp_path / "free.toml"), "free.toml: sweep: missing, nothing says which variants")
+    fixed = SWEEP.replace('"height"', "6.5").partition("[variables]")
+    (tmp_path / "fixed.toml").write_text(fixed[0] + fixed[2].partition('unit = "um" }')[2])
+    assert_refused(call("sweep", tmp_path / "fixed.toml"), "fixed.toml: sweep: has no effect without [variables]")
+
+
+def test_requests_cover_all_that_a_file_can_say(tmp_path):
+    def request(old, new):
+        (tmp_path / "gear.toml").write_text(SWEEP.replace(old, new))
+        return sweep_request(load_design(tmp_path / "gear.toml"))
+
+    assert request('"latin_hypercube"', '"sobol"\nseed = 4').plan.describe()["seed"] == 4
+    factorial = request('"latin_hypercube"\nsamples = 60', '"full_factorial"\nlevels = { height = [3.0, 5.0] }').plan
+    assert factorial.rows(0, 2).tolist() == [[3.0], [5.0]]
+    assert request('"latin_hypercube"\nsamples = 60', '"full_factorial"\nlevels = 7').plan.size == 7
+    load = request("part_rows = 25", "torques = [25.0, 50.0]\nweights = [3, 1]").load
+    assert load.weights.tolist() == [0.75, 0.25]
+    tolerance = request("[sweep]", "[tolerance]\nquality_class = [5, 6]\nsamples = 8\nseed = 2\n[sweep]")
+    assert (tolerance.samples, tolerance.seed) == (8, 2) and tolerance.tolerance.pinion.helix_slope is None
+    assert request("[sweep]", "[sweep]").tolerance is None
+
+
+@pytest.mark.parametrize(
+    "arguments, fragment",
+    [
+        (["--coordinator", "localhost:1"], "--coordinator, --processes and --process go together"),
+        (["--coordinator", "localhost", "--processes", "2", "--process", "0"], "localhost must be HOST:PORT"),
+        (["--coordinator", "h:1", "--processes", "2", "--process", "2"], "--process 2 must be less than --processes 2"),
+        (["--distributed", "--process", "0"], "--distributed finds"),
+        (["--samples", "0"], "--samples"),
+    ],
+)
+def test_wrong_options_are_one_line(folder, arguments, fragment):
+    assert_refused(call("sweep", folder[0] / "gear.toml", *arguments), fragment)
+
+
+def test_every_usable_core_becomes_a_device_unless_told_otherwise(monkeypatch):
+    settings = {}
+    monkeypatch.setattr(devices.jax.config, "update", settings.__setitem__)
+    monkeypatch.delenv("JAX_NUM_CPU_DEVICES", raising=False)
+    monkeypatch.setenv("XLA_FLAGS", "")
+    for cores, wanted in ((1, 2), (2, 2), (48, 48)):
+        monkeypatch.setattr(devices, "usable_cores", lambda cores=cores: cores)
+        devices.use_all_cores()
+        assert settings.pop("jax_num_cpu_devices") == wanted
+    monkeypatch.setenv("JAX_NUM_CPU_DEVICES", "3")
+    devices.use_all_cores()
+    monkeypatch.delenv("JAX_NUM_CPU_DEVICES")
+    monkeypatch.setenv("XLA_FLAGS", "--xla_force_host_platform_device_count=5")
+    devices.use_all_cores()
+    assert not settings
