@@ -6,12 +6,13 @@ import subprocess
 import sys
 import time
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from test_cli import FREE, assert_refused, call
 
 import jaxgear as jg
-from jaxgear.cli import devices
+from jaxgear.cli import devices, sweep_figures
 from jaxgear.io import load_design, read_variants, sweep_request
 
 SWEEP = (
@@ -24,6 +25,10 @@ part_rows = 25
 results = ["ppte", "effective_contact_ratio"]
 """
 )
+
+
+def sweep(file, *arguments):
+    return call("sweep", file, "--no-figures", *arguments)
 
 
 @pytest.fixture(autouse=True)
@@ -69,13 +74,25 @@ def test_the_best_are_printed_and_written(folder):
     assert "jaxgear: 60 of 60 variants" in result.err.splitlines()[-1]
 
 
+def test_pictures_show_every_variant_or_an_even_share(folder, tmp_path, monkeypatch):
+    folder, _ = folder
+    assert {path.stem for path in (folder / "out").glob("*.png")} == {"pareto", "parallel_coordinates"}
+    monkeypatch.setattr(sweep_figures, "_DRAWN", 20)
+    drawn = {}
+    monkeypatch.setattr("jaxgear.plot.pareto", lambda table, *names, **_: drawn.update(table) or plt.subplots()[1])
+    table = jg.open_sweep(folder / "out")
+    sweep_figures.write_figures(tmp_path, table, ("ppte", "effective_contact_ratio"))
+    front = table.pareto(["ppte_um", "effective_contact_ratio"]).column("ppte_um")
+    assert set(drawn["ppte_um"]) == {*table.column("ppte_um")[::3], *front}
+
+
 def test_repeated_it_finds_everything_there(folder):
     folder, _ = folder
     before = {path.name: path.stat().st_mtime_ns for path in (folder / "out").glob("part-*")}
-    result = call("sweep", folder / "gear.toml", "-o", folder / "out")
+    result = sweep(folder / "gear.toml", "-o", folder / "out")
     assert result.code == 0 and "resuming, 60 of 60 variants are there" in result.err
     assert {path.name: path.stat().st_mtime_ns for path in (folder / "out").glob("part-*")} == before
-    other = call("sweep", folder / "gear.toml", "-o", folder / "out", "--samples", "61")
+    other = sweep(folder / "gear.toml", "-o", folder / "out", "--samples", "61")
     assert_refused(other, "out: holds a sweep of other settings (plan, variants)")
 
 
@@ -84,7 +101,7 @@ def test_a_list_of_variants_may_be_the_best_of_a_sweep(folder, tmp_path):
     listed = SWEEP.replace("samples = 60", 'file = "best.csv"').replace("latin_hypercube", "list")
     (tmp_path / "listed.toml").write_text(listed)
     (tmp_path / "best.csv").write_bytes((folder / "out" / "best.csv").read_bytes())
-    assert call("sweep", tmp_path / "listed.toml", "-o", tmp_path / "out").code == 0
+    assert sweep(tmp_path / "listed.toml", "-o", tmp_path / "out").code == 0
     again, best = (
         jg.open_sweep(tmp_path / "out"),
         jg.open_sweep(folder / "out").best(len(jg.open_sweep(tmp_path / "out"))),
@@ -95,14 +112,14 @@ def test_a_list_of_variants_may_be_the_best_of_a_sweep(folder, tmp_path):
 def test_a_quick_sweep_is_coarse_short_and_says_so(folder, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "gear.toml").write_text(SWEEP.replace("samples = 60", "samples = 5000").replace("part_rows = 25", ""))
-    result = call("sweep", "gear.toml", "--quick")
+    result = sweep("gear.toml", "--quick")
     assert result.code == 0 and "quick run" in result.out
     assert len(jg.open_sweep("results/gear-quick")) == 4096
 
 
 def test_failed_variants_are_loud(folder, tmp_path):
     (tmp_path / "gear.toml").write_text(SWEEP.replace("positions = 8", "positions = 8\nnewton_steps = 1"))
-    result = call("sweep", tmp_path / "gear.toml", "-o", tmp_path / "out")
+    result = sweep(tmp_path / "gear.toml", "-o", tmp_path / "out")
     assert result.code == 1 and "60 variants failed" in result.err
     assert len(jg.open_sweep(tmp_path / "out")) == 60
 
@@ -110,7 +127,16 @@ def test_failed_variants_are_loud(folder, tmp_path):
 def test_an_interrupted_sweep_says_how_to_go_on_and_does(tmp_path):
     content = SWEEP.replace("samples = 60", "samples = 6000").replace("part_rows = 25", "part_rows = 100")
     (tmp_path / "gear.toml").write_text(content)
-    command = [sys.executable, "-c", "from jaxgear.cli import main; main()", "sweep", "gear.toml", "-o", "out"]
+    command = [
+        sys.executable,
+        "-c",
+        "from jaxgear.cli import main; main()",
+        "sweep",
+        "gear.toml",
+        "-o",
+        "out",
+        "--no-figures",
+    ]
     kept = {name: value for name, value in os.environ.items() if name != "JAXGEAR_NO_CACHE"}
     environment = {**kept, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "XDG_CACHE_HOME": str(tmp_path)}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
@@ -169,16 +195,16 @@ def test_a_wrong_sweep_is_refused_before_anything_is_written(tmp_path, monkeypat
     if fragments is None:
         sweep_request(load_design("gear.toml"))  # the control: this one is right
     else:
-        assert_refused(call("sweep", "gear.toml"), *fragments)
+        assert_refused(sweep("gear.toml"), *fragments)
     assert not (tmp_path / "results").exists()
 
 
 def test_a_file_without_a_sweep_or_variables_is_refused(tmp_path):
     (tmp_path / "free.toml").write_text(FREE)
-    assert_refused(call("sweep", tmp_path / "free.toml"), "free.toml: sweep: missing, nothing says which variants")
+    assert_refused(sweep(tmp_path / "free.toml"), "free.toml: sweep: missing, nothing says which variants")
     fixed = SWEEP.replace('"height"', "6.5").partition("[variables]")
     (tmp_path / "fixed.toml").write_text(fixed[0] + fixed[2].partition('unit = "um" }')[2])
-    assert_refused(call("sweep", tmp_path / "fixed.toml"), "fixed.toml: sweep: has no effect without [variables]")
+    assert_refused(sweep(tmp_path / "fixed.toml"), "fixed.toml: sweep: has no effect without [variables]")
 
 
 def test_requests_cover_all_that_a_file_can_say(tmp_path):
@@ -208,7 +234,7 @@ def test_requests_cover_all_that_a_file_can_say(tmp_path):
     ],
 )
 def test_wrong_options_are_one_line(folder, arguments, fragment):
-    assert_refused(call("sweep", folder[0] / "gear.toml", *arguments), fragment)
+    assert_refused(sweep(folder[0] / "gear.toml", *arguments), fragment)
 
 
 def test_every_usable_core_becomes_a_device_unless_told_otherwise(monkeypatch):

@@ -126,6 +126,7 @@ def sweep(
         bool, typer.Option("--distributed", help="Share the sweep among the processes of a cluster job (Slurm, MPI).")
     ] = False,
     quick: Quick = False,
+    no_figures: NoFigures = False,
     no_cache: NoCache = False,
 ) -> int:
     """Evaluate the variants that the design file asks for, any number of them, into a table of Parquet files.
@@ -134,7 +135,7 @@ def sweep(
     """
     use_all_cores()
     join_processes(coordinator, processes, process, automatic=distributed)
-    fine = run_sweep(file, output, samples=samples, best=best, quick=quick, cache=not no_cache)
+    fine = run_sweep(file, output, samples=samples, best=best, quick=quick, figures=not no_figures, cache=not no_cache)
     return OK if fine else NOT_CONVERGED
 
 

@@ -11,10 +11,11 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from ..io import DesignFile, load_design, sweep_request
+from ..io import load_design, sweep_request
 from ..sweep import SweepTable, sweep
 from . import report
 from .cache import enable_cache
+from .sweep_figures import write_figures
 
 _QUICK_POSITIONS, _QUICK_SAMPLES = 16, 4096
 _BEST_FILE = "best.csv"
@@ -26,7 +27,9 @@ class Interrupted(Exception):
     """Ctrl-C while parts of the table were being written."""
 
 
-def run_sweep(file: Path, output: Path | None, *, samples: int | None, best: int, quick: bool, cache: bool) -> bool:
+def run_sweep(
+    file: Path, output: Path | None, *, samples: int | None, best: int, quick: bool, figures: bool, cache: bool
+) -> bool:
     """Evaluates the variants of a design file and shows the best.
 
     Args:
@@ -35,6 +38,7 @@ def run_sweep(file: Path, output: Path | None, *, samples: int | None, best: int
         samples: number of variants, None for the file's.
         best: how many designs to list.
         quick: coarse positions and few samples.
+        figures: draw the results.
         cache: keep compiled programs on disk.
 
     Returns:
@@ -77,14 +81,16 @@ def run_sweep(file: Path, output: Path | None, *, samples: int | None, best: int
             raise Interrupted(f"{kept}, resume with the same command") from None
     if jax.process_index() > 0:  # the first process speaks for all
         return table.failures() == 0
-    return _show(table, design, target, best, meter, quick=quick)
-
-
-def _show(table: SweepTable, design: DesignFile, target: Path, best: int, meter: "Meter", *, quick: bool) -> bool:
     chosen = table.best(best)
     chosen.to_csv(target / _BEST_FILE)
+    if figures and len(chosen):
+        write_figures(target, table, request.results)
+    return _show(table, chosen, target, meter, quick=quick)
+
+
+def _show(table: SweepTable, chosen: SweepTable, target: Path, meter: "Meter", *, quick: bool) -> bool:
     out = report.console()
-    out.print(_side_by_side(chosen, design.title, (out.width - _LABEL_WIDTH) // _CELL_WIDTH))
+    out.print(_side_by_side(chosen, (out.width - _LABEL_WIDTH) // _CELL_WIDTH))
     if quick:
         out.print("quick run: coarse positions and few samples, not a result to build on", soft_wrap=True)
     out.print(f"best {len(chosen)} in {target / _BEST_FILE}, table in {target}{os.sep}", soft_wrap=True)
@@ -97,9 +103,9 @@ def _show(table: SweepTable, design: DesignFile, target: Path, best: int, meter:
     return failures == 0
 
 
-def _side_by_side(table: SweepTable, title: str, count: int) -> Table:
+def _side_by_side(table: SweepTable, count: int) -> Table:
     """The first rows as columns."""
-    result = Table(title=f"{title}, best first by {table.results[0]}", title_justify="left", box=SIMPLE_HEAD)
+    result = Table(title=f"{table.title}, best first by {table.results[0]}", title_justify="left", box=SIMPLE_HEAD)
     result.add_column("variant")
     columns = {name: table.column(name)[: max(count, 1)] for name in table.names}
     for number in columns["variant"]:

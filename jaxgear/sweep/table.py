@@ -98,7 +98,7 @@ class SweepTable:
         """
         column = self._column(self.results[0] if by is None else by)
         ranked = ((numbers, values[:, 0]) for numbers, values in self._ranked([column]))
-        return self._rows(smallest(ranked, count))
+        return self.take(smallest(ranked, count))
 
     def pareto(self, by: Sequence[str]) -> "SweepTable":
         """The variants that no other variant beats in all of the columns, sorted by the first column.
@@ -111,7 +111,22 @@ class SweepTable:
         """
         if len(set(by)) != len(by) or not 2 <= len(by) <= 3:
             raise ValueError("SweepTable.pareto: needs two or three different columns")
-        return self._rows(front(self._ranked([self._column(name) for name in by])))
+        return self.take(front(self._ranked([self._column(name) for name in by])))
+
+    def take(self, numbers) -> "SweepTable":
+        """Some rows, in the order of their numbers given, as a table in memory."""
+        import pyarrow
+
+        numbers = np.asarray(numbers, np.int64)
+        pieces, first = [], 0
+        for part in range(self._parts):
+            count = len(self._read(part, [VARIANT]))
+            inside = np.sort(numbers[(numbers >= first) & (numbers < first + count)])
+            if len(inside) or part == 0:
+                pieces.append(self._read(part, None).take(inside - first))
+            first += count
+        table = pyarrow.concat_tables(pieces).take(np.argsort(np.argsort(numbers)))
+        return in_memory(self.title, self.columns, [table])
 
     def designs(self) -> list[dict[str, float]]:
         """Parameters of every row, ready for the `design` of the sweep."""
@@ -155,20 +170,6 @@ class SweepTable:
             values[~batch[CONVERGED]] = math.nan
             yield first + np.arange(len(values)), values
             first += len(values)
-
-    def _rows(self, numbers: np.ndarray) -> "SweepTable":
-        """These rows, in this order, as a table in memory."""
-        import pyarrow
-
-        pieces, first = [], 0
-        for part in range(self._parts):
-            count = len(self._read(part, [VARIANT]))
-            inside = np.sort(numbers[(numbers >= first) & (numbers < first + count)])
-            if len(inside) or part == 0:
-                pieces.append(self._read(part, None).take(inside - first))
-            first += count
-        table = pyarrow.concat_tables(pieces).take(np.argsort(np.argsort(numbers)))
-        return in_memory(self.title, self.columns, [table])
 
 
 def in_memory(title: str, columns: Sequence[Column], tables: Sequence) -> SweepTable:

@@ -1,0 +1,60 @@
+"""Pictures of a sweep: what its results cost each other, and where the good designs are."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..metrics import result_key
+from ..sweep import SweepTable
+
+_DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory does not grow with the table
+_CHARTS = 6  # radar charts
+
+
+def write_figures(folder: Path, table: SweepTable, results: Sequence[str]) -> None:
+    """Writes all figures that the results allow.
+
+    Args:
+        folder: of the table.
+        table: the table, with at least one variant that did not fail.
+        results: names of its results.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")  # the command line never shows a window
+    from .. import plot
+
+    # of a load spectrum or a tolerance, the first column of every result: its mean
+    heads = [next(name for name in table.results if name.startswith(result_key(result))) for result in results]
+    maximize = [column.name for column in table.columns if column.better == "larger"]
+    units = {**table.units, **{name: "µm" for name, unit in table.units.items() if unit == "um"}}
+    labels = {name: f"{name.replace('_', ' ')} [{units[name] or '-'}]" for name in table.parameters}
+    options: dict[str, Any] = {"labels": labels, "maximize": maximize}
+    size = len(table)
+    step = -(-size // _DRAWN)
+    axes: dict[str, Any] = {}
+    if len(heads) > 1:
+        rows = np.arange(0, size, step)
+        if step > 1:  # the front is that of all variants, whichever of the others are drawn
+            rows = np.union1d(rows, table.pareto(heads[:3]).column("variant"))
+        axes["pareto"] = plot.pareto(_columns(table.take(rows), heads[:3]), *heads[:3], **options)
+    lines = _columns(table.take(np.arange(0, size, step)), [*table.parameters, *heads])
+    axes["parallel_coordinates"] = plot.parallel_coordinates(
+        lines, list(lines), heads[0], best=3 if step == 1 else 0, **options
+    )
+    best = table.best(_CHARTS)
+    if len(heads) > 2:
+        names = [f"variant {number}" for number in best.column("variant")]
+        axes["radar"] = plot.radar(_columns(best, heads), heads, names=names, **options)
+    for name, drawn in axes.items():
+        axis = np.ravel(drawn)[0]
+        if step > 1 and name != "radar":
+            note = f"1 in {step} of {size:,} variants".replace(",", "\u2009")
+            axis.set_title(note, loc="left", pad=32, fontsize=axis.xaxis.label.get_fontsize())
+        plot.save(axis.figure, folder / f"{name}.png")
+
+
+def _columns(table: SweepTable, names: Sequence[str]) -> dict[str, np.ndarray]:
+    return {name: table.column(name) for name in names}
