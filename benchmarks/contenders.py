@@ -42,7 +42,7 @@ class Contender:
     @property
     def name(self) -> str:
         """What the table calls it."""
-        return f"{self.kind} {self.precision}" + (" with gradient" if self.gradient else "")
+        return f"{self.kind} {self.precision}" + (" + gradient" if self.gradient else "")
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,8 @@ class Process:
         """PPTE and, if the contender computes it, its gradient."""
         return self._ask("results", variants)
 
-    def rate(self, seconds: float) -> float:
-        """Variants per second, over the given time or one chunk, whichever is longer."""
+    def rate(self, seconds: float) -> tuple[float, float]:
+        """Variants per second and per second of processor time, over the given time or one chunk if that is longer."""
         return self._ask("rate", seconds)
 
     def peak_memory(self) -> float:
@@ -145,14 +145,16 @@ def _serve(connection: Connection, contender: Contender, positions: int, problem
         connection.send(error)
 
 
-def _rate(evaluate, variants: np.ndarray, seconds: float) -> float:
-    calls, begin = 0, time.perf_counter()
+def _rate(evaluate, variants: np.ndarray, seconds: float) -> tuple[float, float]:
+    # the processor time of all threads does not count what other programs take from this one
+    calls, begin, busy = 0, time.perf_counter(), time.process_time()
     while True:
         evaluate(variants)
         calls += 1
         elapsed = time.perf_counter() - begin
         if elapsed >= seconds:
-            return calls * len(variants) / elapsed
+            count = calls * len(variants)
+            return count / elapsed, count / (time.process_time() - busy)
 
 
 def _make(contender: Contender, positions: int, problem: Problem | None):
@@ -180,7 +182,7 @@ def _make(contender: Contender, positions: int, problem: Problem | None):
     if contender.kind == "NumPy":
         from .baselines.numpy_kernel import NumpyKernel
 
-        return NumpyKernel(problem, threads=contender.threads, batch=contender.batch), versions
+        return NumpyKernel(problem, batch=contender.batch), versions
     import scipy
 
     from .baselines.scipy_kernel import ScipyKernel

@@ -1,4 +1,4 @@
-"""PPTE with hand-written C: `kernel.c`, compiled on the fly for this machine and called through ctypes."""
+"""PPTE with hand-written C: `kernel.c` and `law.h`, compiled on the fly for this machine and called through ctypes."""
 
 import ctypes
 import os

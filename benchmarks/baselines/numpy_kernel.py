@@ -1,6 +1,5 @@
 """PPTE of a batch of variants in pure NumPy: Newton's method on the active set, all variants and positions at once."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 
 import numpy as np
@@ -14,22 +13,23 @@ _SMALL = 1e-9
 
 
 class NumpyKernel:
-    """Evaluates variants in batches whose arrays fit the cache, on one or several threads."""
+    """Evaluates variants in batches whose arrays fit the cache.
 
-    def __init__(self, problem: Problem, *, batch: int = 16, threads: int = 1):
+    On one core: threads do not help, since Python's lock is held between the many short operations.
+    """
+
+    def __init__(self, problem: Problem, *, batch: int = 64):
         """Prepares the two candidate pairs of every position; `batch` variants share one NumPy call."""
         self._problem = two_candidates(problem)
         self._batch = batch
         # arrays (pairs, variants, slices, positions)
         law = self._problem.law
         self._law = Law(**{field.name: getattr(law, field.name)[..., None, None, :] for field in fields(Law)})
-        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def ppte(self, variants: np.ndarray) -> np.ndarray:
         """Peak-to-peak transmission error [um], shape (variants,)."""
         batches = [variants[i : i + self._batch] for i in range(0, len(variants), self._batch)]
-        run = self._pool.map if self._pool else map
-        return np.concatenate([np.ptp(approach, axis=-1) for approach in run(self._approach, batches)])
+        return np.concatenate([np.ptp(self._approach(batch), axis=-1) for batch in batches])
 
     def _approach(self, variants: np.ndarray) -> np.ndarray:
         problem = self._problem
