@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import jax
 import numpy as np
 import pytest
 
@@ -21,10 +22,10 @@ PARTS = 40
 
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory):
-    """All processes keep their compiled programs in one folder: only the first of a kind compiles."""
+    """All processes keep their compiled programs in the folder of the tests: only the first of a kind compiles."""
     added = {
         "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
-        "JAX_COMPILATION_CACHE_DIR": str(tmp_path_factory.mktemp("compiled")),
+        "JAX_COMPILATION_CACHE_DIR": str(jax.config.jax_compilation_cache_dir or tmp_path_factory.mktemp("compiled")),
         "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
         "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
     }
