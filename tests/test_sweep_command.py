@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import jax
 import matplotlib.pyplot as plt
@@ -203,6 +204,12 @@ def test_a_wrong_sweep_is_refused_before_anything_is_written(tmp_path, monkeypat
     else:
         assert_refused(sweep("gear.toml"), *fragments)
     assert not (tmp_path / "results").exists()
+
+
+def test_the_example_asks_for_a_million():
+    example = Path(__file__).parents[1] / "examples" / "sweep_19_48.toml"
+    request = sweep_request(load_design(example))
+    assert request.plan.size == 1_000_000 and request.load.torques.tolist() == [50.0]
 
 
 def test_a_file_without_a_sweep_or_variables_is_refused(tmp_path):

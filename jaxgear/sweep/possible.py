@@ -12,7 +12,13 @@ class Possible:
     """
 
     def __init__(self, design, names, example: np.ndarray):
-        """Args: the design, the names of its parameters, and the values of one variant."""
+        """Makes the check.
+
+        Args:
+            design: of the sweep.
+            names: of its parameters.
+            example: values of one variant, by which to tell whether the design takes arrays.
+        """
         self._design, self._names = design, names
         self._checks = _outcome(lambda: self._build(example)) == _outcome(lambda: self._build(np.stack([example] * 2)))
 

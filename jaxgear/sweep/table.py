@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .columns import CONVERGED, VARIANT, Column
+from .columns import CONVERGED, Column
 from .selection import front, smallest
 from .store import Store, load_manifest, write_durably
 
@@ -24,21 +24,21 @@ class SweepTable:
         columns: all columns with their units.
     """
 
-    def __init__(self, title: str, columns: Sequence[Column], parts: int, read: Callable):
+    def __init__(self, title: str, columns: Sequence[Column], sizes: Sequence[int], read: Callable):
         """Made by `sweep` and `open_sweep`.
 
         Args:
             title: of the sweep.
             columns: all columns.
-            parts: number of parts.
+            sizes: number of rows of every part.
             read: read(part, names) gives these columns of a part as an Arrow table, all columns for None.
         """
         self.title, self.columns = title, tuple(columns)
-        self._parts, self._read = parts, read
+        self._sizes, self._read = tuple(sizes), read
 
     def __len__(self) -> int:
         """Number of variants."""
-        return sum(len(self._read(part, [VARIANT])) for part in range(self._parts))
+        return sum(self._sizes)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -70,7 +70,7 @@ class SweepTable:
             ValueError: for an unknown column.
         """
         wanted = [self._column(name).name for name in (self.names if names is None else names)]
-        for part in range(self._parts):
+        for part in range(len(self._sizes)):
             table = self._read(part, wanted)
             yield {name: table[name].to_numpy() for name in wanted}
 
@@ -119,8 +119,7 @@ class SweepTable:
 
         numbers = np.asarray(numbers, np.int64)
         pieces, first = [], 0
-        for part in range(self._parts):
-            count = len(self._read(part, [VARIANT]))
+        for part, count in enumerate(self._sizes):
             inside = np.sort(numbers[(numbers >= first) & (numbers < first + count)])
             if len(inside) or part == 0:
                 pieces.append(self._read(part, None).take(inside - first))
@@ -141,7 +140,7 @@ class SweepTable:
 
         def write(file):
             file.write(f"{header}\n".encode())
-            for part in range(self._parts):
+            for part in range(len(self._sizes)):
                 csv.write_csv(self._read(part, None), file, csv.WriteOptions(include_header=False))
 
         write_durably(Path(path), write)
@@ -174,8 +173,9 @@ class SweepTable:
 
 def in_memory(title: str, columns: Sequence[Column], tables: Sequence) -> SweepTable:
     """A table of Arrow tables."""
+    sizes = [len(table) for table in tables]
     return SweepTable(
-        title, columns, len(tables), lambda part, names: tables[part] if names is None else tables[part].select(names)
+        title, columns, sizes, lambda part, names: tables[part] if names is None else tables[part].select(names)
     )
 
 
@@ -200,7 +200,7 @@ def open_sweep(folder: str | Path) -> SweepTable:
     return SweepTable(
         manifest["title"],
         columns,
-        store.parts,
+        [stop - start for start, stop in map(store.span, range(store.parts))],
         lambda part, names: parquet.read_table(store.path(part), columns=names, page_checksum_verification=True),
     )
 
