@@ -6,36 +6,36 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from jaxgear.numerics import ContactProblem
+from jaxgear.numerics import AbstractSpring, ContactProblem
 
 
-class LinearSpring(eqx.Module):
+class LinearSpring(AbstractSpring):
     """h = c q"""
 
     c: Array
 
-    def deflection(self, q):
-        return self.c * q
+    def secant(self, load):
+        return self.c + 0 * load
 
 
-class SofteningSpring(eqx.Module):
-    """h = q (a - b log(q + floor)), as Hertzian line contact: it stiffens under load and has a finite slope at zero."""
+class SofteningSpring(AbstractSpring):
+    """h = q (a - b log(q)), as Hertzian line contact: it stiffens under load."""
 
     a: Array
     b: Array
 
-    def deflection(self, q):
-        return q * (self.a - self.b * jnp.log(q + 1e-6))
+    def secant(self, load):
+        return self.a - self.b * jnp.log(load)
 
 
-class PowerSpring(eqx.Module):
-    """h = a q (q + floor)^(n - 1)"""
+class PowerSpring(AbstractSpring):
+    """h = a q^n"""
 
     a: Array
     n: Array
 
-    def deflection(self, q):
-        return self.a * q * (q + 1e-6) ** (self.n - 1)
+    def secant(self, load):
+        return self.a * load ** (self.n - 1)
 
 
 def problem(compliance, law, gap, *, lever=None, weight=(1.0,), load=1.0) -> ContactProblem:

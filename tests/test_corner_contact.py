@@ -7,7 +7,7 @@ import pytest
 from catalogue import gear_pair, kahraman_gear, prepare
 
 import jaxgear as jg
-from jaxgear.compliance.edge import _truncated
+from jaxgear.compliance.edge import cut_off
 from jaxgear.contact.corner import corner_gap
 
 # Gap [um] of the approach corner when the mate stays, over the distance before A in base pitches, and its parabola.
@@ -181,15 +181,18 @@ def test_truncated_contact_against_boundary_elements(tau):
     full = truncated_contact(3.0)
     assert full == pytest.approx(0.5 * (0.5 + np.log(2)), abs=2e-3), "Hertz"
     extra = truncated_contact(tau) - full
-    phi = float(_truncated(jnp.asarray(tau))[0]) + (0.5 * tau**2 if tau < 0 else 0.0)
+    patch = cut_off(jnp.asarray(tau), jnp.asarray(1.0))
+    phi = float(patch.bending - 0.25 * jnp.log(patch.squared_extent)) + (0.5 * tau**2 if tau < 0 else 0.0)
     assert extra == pytest.approx(phi, abs=3e-3)
 
 
 def test_truncation_begins_smoothly_where_the_contact_reaches_the_corner():
     tau = jnp.asarray([1.0 - 1e-4, 1.0, 1.0 + 1e-4])
-    phi, _ = _truncated(tau)
+    patch = cut_off(tau, jnp.ones(3))
+    phi = patch.bending - 0.25 * jnp.log(patch.squared_extent)
     assert float(phi[1]) == 0.0 and float(phi[2]) == 0.0
     assert abs(float(phi[0])) < 1e-7
+    np.testing.assert_allclose(patch.mean_distance, 0.5 * np.exp(0.5), rtol=1e-3)
 
 
 def test_corner_contact_is_softer_than_the_flank_and_regular():

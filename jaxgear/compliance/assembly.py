@@ -50,7 +50,7 @@ class Compliance(eqx.Module):
         law = self.contact.prepare(geometry)
         if not self.edge_softening:
             return law
-        truncation = 4 / jnp.pi * geometry.compliance
+        truncation = 4e3 / jnp.pi * geometry.compliance
         return EdgeLaw(law, geometry.width_factor, truncation, edge(pinion, wheel, outside, geometry))
 
 

@@ -22,13 +22,15 @@ References:
     K. L. Johnson, Contact Mechanics, 1985, sections 2.7 and 5.1 (wedge, integral equations of plane contact).
 """
 
+from typing import NamedTuple
+
 import equinox as eqx
-import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import safe_sqrt
-from .hertz import LOAD_FLOOR, AbstractLaw, ContactGeometry
+from ..numerics import log
+from .hertz import AbstractLaw, ContactGeometry, LogarithmicLaw, polynomial
 from .toothload import ToothLoad
 
 Field = Float[Array, "pairs 1 positions"]
@@ -41,6 +43,9 @@ _WEDGE_REACH = 0.25
 # Point load at unit distance from the apex of a wedge: its apex solution holds from 1.82 times that distance on (Mellin
 # transform of the wedge, interior angles of 110 to 130 degrees: 1.77 ... 1.88).
 _APEX_DISTANCE = 1.82
+# Distances from the corner below this one [mm] count as this one: no contact is as small.
+_SHORTEST = 1e-6
+_FULL_TERMS = 10  # of a polynomial that is exact to 1e-7
 
 
 class Edge(eqx.Module):
@@ -48,7 +53,7 @@ class Edge(eqx.Module):
 
     Attributes:
         distance: of the contact's centre from the corner along the tip's flank [mm], negative beyond the corner.
-        wedge: excess apex compliance of the tip wedge over the half plane, K - 2 / pi, over its modulus [1/MPa].
+        wedge: excess apex compliance of the tip wedge over the half plane, (K - 2 / pi) / E' [um per N/mm].
         reach: distance from the corner at which that excess ends [mm].
     """
 
@@ -85,8 +90,8 @@ def edge(
     return Edge(
         distance=near[:, None],
         wedge=choose(
-            _wedge_excess(pinion) / geometry.pinion.modulus,
-            _wedge_excess(wheel) / geometry.wheel.modulus,
+            1e3 * _wedge_excess(pinion) / geometry.pinion.modulus,
+            1e3 * _wedge_excess(wheel) / geometry.wheel.modulus,
         ),
         reach=_WEDGE_REACH * choose(geometry.pinion.depth, geometry.wheel.depth),
     )
@@ -106,7 +111,7 @@ class EdgeLaw(AbstractLaw):
     Attributes:
         flank: law of the uninterrupted flank.
         width_factor: a^2 / q [mm^2 per N/mm].
-        truncation: a^2 / R per q, 4 / (pi E*) [mm per N/mm].
+        truncation: a^2 / R per q, 4 / (pi E*) [um per N/mm].
         edge: the corner.
     """
 
@@ -115,30 +120,89 @@ class EdgeLaw(AbstractLaw):
     truncation: Field
     edge: Edge
 
-    def deflection(self, line_load: Real) -> Real:
-        width = jnp.sqrt(self.width_factor * (line_load + LOAD_FLOOR))
-        position = self.edge.distance / width
-        cut, mean_log = _truncated(position)
+    def secant(self, load: Real) -> Real:
+        squared = self.width_factor * load
+        patch = cut_off(self.edge.distance, squared)
+        if isinstance(self.flank, LogarithmicLaw):
+            # Phi's logarithm replaces the half width by half the extent of the patch
+            flank = self.flank.logarithmic_secant(load, patch.squared_extent)
+        else:
+            flank = self.flank.secant(load) + 0.25 * self.truncation * log(squared / patch.squared_extent)
         # ln(span) where it is positive, with a smooth onset: ln(1 + span^4) / 4
-        wedge = 0.25 * jax.nn.softplus(4 * (jnp.log(self.edge.reach / (_APEX_DISTANCE * width)) - mean_log))
-        return self.flank.deflection(line_load) + 1e3 * line_load * (self.truncation * cut + self.edge.wedge * wedge)
+        softer = self.edge.wedge * 0.25 * log(1 + self._span(patch) ** 4)
+        # the division at the end is what a compiler stores, instead of evaluating all of this wherever it is used
+        return ((flank + softer) * squared + self.truncation * patch.bending) / squared
+
+    def slope(self, load: Real, secant: Real) -> Real:
+        squared = self.width_factor * load
+        patch = cut_off(self.edge.distance, squared)
+        if isinstance(self.flank, LogarithmicLaw):
+            change = self.flank.secant_change(load, patch.widening)
+        else:
+            flank = self.flank.secant(load)
+            change = self.flank.slope(load, flank) - flank + 0.25 * self.truncation * (1 - patch.widening)
+        share = 1 / (1 + self._span(patch) ** 4) - 1  # -d (softer) / d ln(mean distance), over the wedge's compliance
+        change = change + self.edge.wedge * share * patch.mean_slope * squared * (1 / patch.mean_distance)
+        bending = self.truncation * (patch.bending_slope * squared - patch.bending)
+        return ((secant + change) * squared + bending) / squared
+
+    def _span(self, patch: "Patch") -> Real:
+        return self.edge.reach / _APEX_DISTANCE * (1 / patch.mean_distance)
 
 
-def _truncated(position: Real) -> tuple[Real, Real]:
-    """Phi without the gap of the corner, and the mean of ln(distance from the corner / a) over a semi-ellipse.
+class Patch(NamedTuple):
+    """What a corner leaves of a contact; slopes are derivatives with respect to a^2.
 
-    The semi-ellipse spans the patch: the Hertzian pressure of a full contact, and its bounded counterpart on [0, L].
+    Attributes:
+        squared_extent: (L / 2)^2 where the corner cuts the contact off, a^2 elsewhere [mm^2].
+        widening: d ln(squared_extent) / d ln(a^2).
+        bending, bending_slope: a^2 (Phi - ln(2 / l) / 2) without the gap of the corner; zero where nothing is cut off
+            [mm^2].
+        mean_distance, mean_slope: exponential of the mean of ln(distance from the corner) over a semi-ellipse on the
+            patch [mm]: the Hertzian pressure of a full contact, and its bounded counterpart on [0, L].
     """
-    cut_off = position < 1
-    tau = jnp.where(cut_off, position, 0.0)
-    root = jnp.sqrt(tau**2 + 3)
-    # the second form avoids the cancellation beyond the corner
-    length = jnp.where(tau > 0, 2 / 3 * (jnp.maximum(tau, 0.0) + root), 2 / (root - jnp.minimum(tau, 0.0)))
-    # (l/2 - tau)^2 minus tau^2 beyond the corner, where the corner gap accounts for it
-    sagitta = jnp.where(tau > 0, (0.5 * length - tau) ** 2, length * (0.25 * length - tau))
-    phi = 0.5 * sagitta + length**2 / 16 + 0.5 * jnp.log(2 / length) - 0.25
-    cut_log = jnp.log(0.25 * length) + 0.5
-    full = jnp.where(cut_off, 2.0, position)
-    growth = full + safe_sqrt(full**2 - 1)
-    full_log = jnp.log(0.5 * growth) + 0.5 / growth**2
-    return jnp.where(cut_off, phi, 0.0), jnp.where(cut_off, cut_log, full_log)
+
+    squared_extent: Real
+    widening: Real
+    bending: Real
+    bending_slope: Real
+    mean_distance: Real
+    mean_slope: Real
+
+
+def cut_off(distance: Real, squared: Real) -> Patch:
+    """The patch of a contact whose centre has a given distance from the corner.
+
+    Args:
+        distance: t [mm], negative beyond the corner.
+        squared: a^2 of the full contact [mm^2], positive.
+    """
+    inside = jnp.maximum(distance, 0.0)
+    cut = squared > inside**2
+    root = jnp.sqrt(jnp.where(cut, distance**2 + 3 * squared, jnp.maximum(distance**2 - squared, _SHORTEST**2)))
+    inverse = 1 / root
+    length = jnp.maximum(2 / 3 * (distance + root), _SHORTEST)
+    # without distance^2 / 2 beyond the corner, where the corner gap accounts for it
+    sagitta = 0.5 * length * (0.25 * length - distance) + 0.5 * inside**2
+    relative = root * (1 / jnp.maximum(inside, _SHORTEST))
+    full_mean = inside * polynomial(_FULL_MEAN, relative)
+    return Patch(
+        squared_extent=jnp.where(cut, 0.25 * length**2, squared),
+        widening=jnp.where(cut, 1 - distance * inverse, 1.0),
+        bending=jnp.where(cut, sagitta + length**2 / 16 - 0.25 * squared, 0.0),
+        bending_slope=jnp.where(cut, inverse * (0.375 * length - 0.5 * distance) - 0.25, 0.0),
+        mean_distance=jnp.maximum(jnp.where(cut, _CUT_MEAN * length, full_mean), _SHORTEST),
+        mean_slope=inverse * jnp.where(cut, _CUT_MEAN, -0.5 * polynomial(_FULL_MEAN_SLOPE, relative)),
+    )
+
+
+def _full_mean(relative):
+    """Mean distance over t of a full contact, at sqrt(t^2 - a^2) / t: g / 2 exp(a^2 / (2 g^2)), g = t + sqrt(...)."""
+    return 0.5 * (1 + relative) * np.exp(0.5 * (1 - relative) / (1 + relative))
+
+
+_CUT_MEAN = 0.25 * float(np.exp(0.5))  # mean distance over L
+# through Chebyshev-Lobatto nodes: exact where the patch reaches the corner, so that nothing jumps there
+_FULL_NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(_FULL_TERMS) / (_FULL_TERMS - 1))
+_FULL_MEAN = np.linalg.solve(np.vander(_FULL_NODES, increasing=True), _full_mean(_FULL_NODES)).tolist()
+_FULL_MEAN_SLOPE = [power * coefficient for power, coefficient in enumerate(_FULL_MEAN)][1:]

@@ -13,16 +13,18 @@ from abc import abstractmethod
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
+from ..numerics import AbstractSpring, log
 from .plane import Plane, plane_modulus, plane_poisson
 from .toothload import ToothLoad
 
 Field = Float[Array, "pairs 1 positions"]
 Real = Float[Array, "..."]
 
-# Line load that keeps the logarithm finite at separation [N/mm]: its effect at 1 N/mm is below 1e-6 of the deflection.
-LOAD_FLOOR = 1e-6
+# Terms of the depth-referenced law up to a half width of the depth itself: 2e-9 of the deflection.
+_DEPTH_TERMS = 9
 
 
 class ContactSide(eqx.Module):
@@ -90,12 +92,8 @@ def contact_geometry(pinion: ToothLoad, wheel: ToothLoad, plane: Plane, face_wid
     return ContactGeometry(side(pinion), side(wheel), field(face_width))
 
 
-class AbstractLaw(eqx.Module):
-    """A prepared contact law."""
-
-    @abstractmethod
-    def deflection(self, line_load: Real) -> Real:
-        """Approach of the two flanks [um] under a line load [N/mm], elementwise; increasing, zero at zero."""
+class AbstractLaw(AbstractSpring):
+    """A prepared contact law: approach of the two flanks [um] under a line load [N/mm]."""
 
 
 class AbstractContact(eqx.Module):
@@ -107,51 +105,64 @@ class AbstractContact(eqx.Module):
 
 
 class LinearLaw(AbstractLaw):
-    """deflection = compliance * q"""
+    """approach = compliance * q"""
 
     compliance: Field
 
-    def deflection(self, line_load: Real) -> Real:
-        return self.compliance * line_load
-
-
-class LogarithmicLaw(AbstractLaw):
-    """deflection = q (constant - slope ln(q + floor)): every law with the half width a ~ sqrt(q) under a logarithm."""
-
-    constant: Field
-    slope: Field
-
-    def deflection(self, line_load: Real) -> Real:
-        return line_load * (self.constant - self.slope * jnp.log(line_load + LOAD_FLOOR))
+    def secant(self, load: Real) -> Real:
+        return jnp.broadcast_to(self.compliance, jnp.broadcast_shapes(self.compliance.shape, load.shape))
 
 
 class PowerLaw(AbstractLaw):
-    """deflection = factor q^exponent, with a finite slope at zero load."""
+    """approach = factor q^exponent"""
 
     factor: Field
     exponent: Field
 
-    def deflection(self, line_load: Real) -> Real:
-        return self.factor * line_load * (line_load + LOAD_FLOOR) ** (self.exponent - 1)
+    def secant(self, load: Real) -> Real:
+        return self.factor * load ** (self.exponent - 1)
 
 
-class DepthLaw(AbstractLaw):
-    """Exact depth-referenced law, see `DepthReferenced`; tuples hold pinion and wheel."""
+class LogarithmicLaw(AbstractLaw):
+    """approach = q (series(a^2) - factor ln a), a^2 = width_factor q: every law with the half width in a logarithm.
 
-    compliance: tuple[Field, Field]
-    depth: tuple[Field, Field]
-    poisson: tuple[Field, Field]
+    Attributes:
+        factor: 2 / (pi E*) [um per N/mm].
+        width_factor: a^2 / q [mm^2 per N/mm].
+        span: a^2 at which the series ends [mm^2]; it stays constant beyond.
+        series: coefficients over powers of 2 a^2 / span - 1, lowest first [um per N/mm].
+    """
+
+    factor: Field
     width_factor: Field
+    span: Field
+    series: tuple[Field, ...]
 
-    def deflection(self, line_load: Real) -> Real:
-        squared = self.width_factor * (line_load + LOAD_FLOOR)
-        log_width = 0.5 * jnp.log(squared)
-        total = jnp.zeros_like(line_load)
-        for compliance, depth, poisson in zip(self.compliance, self.depth, self.poisson):
-            reach = jnp.sqrt(depth**2 + squared) + depth
-            # asinh(h / a) = ln((h + sqrt(h^2 + a^2)) / a)
-            total = total + compliance * (jnp.log(reach) - log_width - poisson * depth / reach)
-        return line_load * total
+    def secant(self, load: Real) -> Real:
+        return self.logarithmic_secant(load, self.width_factor * load)
+
+    def slope(self, load: Real, secant: Real) -> Real:
+        return secant + self.secant_change(load)
+
+    def logarithmic_secant(self, load: Real, squared_extent: Real) -> Real:
+        """`secant` with the square of another half extent in place of a^2 in the logarithm [mm^2]."""
+        place = jnp.minimum(2 * self.width_factor * load / self.span - 1, 1.0)
+        return polynomial(self.series, place) - 0.5 * self.factor * log(squared_extent)
+
+    def secant_change(self, load: Real, widening: Real | float = 1.0) -> Real:
+        """load d secant / d load [um per N/mm], with widening = d ln(squared_extent) / d ln(load)."""
+        place = 2 * self.width_factor * load / self.span - 1
+        derivative = [power * coefficient for power, coefficient in enumerate(self.series)][1:]
+        stretch = jnp.where(place < 1, polynomial(derivative, place), 0.0) * (place + 1)
+        return stretch - 0.5 * self.factor * widening
+
+
+def polynomial(coefficients, x: Real) -> Real:
+    """Coefficients with the lowest power first; zero without any."""
+    value = jnp.zeros_like(x)
+    for coefficient in reversed(coefficients):
+        value = value * x + coefficient
+    return value
 
 
 class ConstantHertz(AbstractContact):
@@ -180,13 +191,13 @@ class DepthReferenced(AbstractContact):
     """
 
     def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        pinion, wheel = geometry.sides
-        return DepthLaw(
-            compliance=(2e3 / (jnp.pi * pinion.modulus), 2e3 / (jnp.pi * wheel.modulus)),
-            depth=(pinion.depth, wheel.depth),
-            poisson=(pinion.poisson, wheel.poisson),
-            width_factor=geometry.width_factor,
-        )
+        def brackets(squared):
+            reaches = [jnp.sqrt(side.depth**2 + squared) + side.depth for side in geometry.sides]
+            # asinh(h / a) = ln((h + sqrt(h^2 + a^2)) / a)
+            return [jnp.log(reach) - side.poisson * side.depth / reach for side, reach in zip(geometry.sides, reaches)]
+
+        span = jnp.minimum(geometry.pinion.depth, geometry.wheel.depth) ** 2
+        return _logarithmic(geometry, brackets, span, terms=_DEPTH_TERMS)
 
 
 class Weber(AbstractContact):
@@ -197,7 +208,7 @@ class Weber(AbstractContact):
     """
 
     def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        return _logarithmic(geometry, [jnp.log(2 * side.depth) - side.poisson / 2 for side in geometry.sides])
+        return _logarithmic(geometry, lambda _: [jnp.log(2 * side.depth) - side.poisson / 2 for side in geometry.sides])
 
 
 class CenterDistance(AbstractContact):
@@ -208,7 +219,7 @@ class CenterDistance(AbstractContact):
     """
 
     def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        return _logarithmic(geometry, [jnp.log(4 * side.radius) - 0.5 for side in geometry.sides])
+        return _logarithmic(geometry, lambda _: [jnp.log(4 * side.radius) - 0.5 for side in geometry.sides])
 
 
 class Kovalskii(AbstractContact):
@@ -219,7 +230,7 @@ class Kovalskii(AbstractContact):
     """
 
     def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        return _logarithmic(geometry, [jnp.log(2 * side.radius) + 0.407 for side in geometry.sides])
+        return _logarithmic(geometry, lambda _: [jnp.log(2 * side.radius) + 0.407 for side in geometry.sides])
 
 
 class Palmgren(AbstractContact):
@@ -248,11 +259,17 @@ class NonlinearPower(AbstractContact):
         return PowerLaw(factor, jnp.full_like(factor, 0.9))
 
 
-def _logarithmic(geometry: ContactGeometry, brackets: list[Field]) -> LogarithmicLaw:
-    """sum_k 2 q / (pi E'_k) [ bracket_k - ln a ] with a = sqrt(width_factor q)."""
-    half_log = 0.5 * jnp.log(geometry.width_factor)
-    pinion, wheel = (
-        2 / (jnp.pi * side.modulus) * (bracket - half_log)
-        for side, bracket in zip(geometry.sides, brackets, strict=True)
-    )
-    return LogarithmicLaw(1e3 * (pinion + wheel), 1e3 / jnp.pi * geometry.compliance)
+def _logarithmic(geometry: ContactGeometry, brackets, span: Real | float = 1.0, terms: int = 1) -> LogarithmicLaw:
+    """sum_k 2 q / (pi E'_k) [ bracket_k(a^2) - ln a ] with a = sqrt(width_factor q).
+
+    The brackets become a polynomial through Chebyshev nodes in 0 <= a^2 <= span: the contact solution evaluates the
+    law far more often than anything else.
+    """
+    weights = [2e3 / (jnp.pi * side.modulus) for side in geometry.sides]
+    span = jnp.broadcast_to(span, geometry.width_factor.shape)
+    nodes = np.cos(np.pi * (np.arange(terms) + 0.5) / terms)
+    squared = span * jnp.asarray(0.5 * (nodes + 1), span.dtype)[None, :, None]
+    values = sum(weight * bracket for weight, bracket in zip(weights, brackets(squared)))
+    powers = jnp.asarray(np.linalg.inv(np.vander(nodes, increasing=True)), span.dtype)
+    series = jnp.einsum("kn,pns->kps", powers, jnp.broadcast_to(values, squared.shape), precision="highest")
+    return LogarithmicLaw(weights[0] + weights[1], geometry.width_factor, span, tuple(series[:, :, None]))

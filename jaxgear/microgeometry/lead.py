@@ -56,10 +56,10 @@ class EndRelief(AbstractModification):
             raise ValueError(f'EndRelief: side = {self.side!r} must be "both", "negative" or "positive"')
 
     def __call__(self, flank: Flank):
-        start = 0.5 * flank.face_width - self.length
+        end = 0.5 * flank.face_width
         total = jnp.zeros_like(flank.face_coordinate)
         if self.side != "negative":
-            total = total + relief(flank.face_coordinate - start, self.amount, self.length, self.curve)
+            total = total + relief(end - flank.face_coordinate, self.amount, self.length, self.curve)
         if self.side != "positive":
-            total = total + relief(-flank.face_coordinate - start, self.amount, self.length, self.curve)
+            total = total + relief(end + flank.face_coordinate, self.amount, self.length, self.curve)
         return total

@@ -9,10 +9,10 @@ from .base import AbstractModification, Flank
 from .curves import AbstractCurve, Linear, Parabolic
 
 
-def relief(depth, amount, length, curve: AbstractCurve) -> Float[Array, "..."]:
-    """Relief [um] at a depth [mm] beyond its start; zero before the start, and everywhere for a length of zero."""
-    d = jnp.clip(safe_divide(depth, length), 0.0, 1.0)
-    return amount * jnp.where((depth > 0) & (length > 0), curve(d), 0.0)
+def relief(distance, amount, length, curve: AbstractCurve) -> Float[Array, "..."]:
+    """Relief [um] at a distance from its end [mm]; zero beyond its start, and everywhere for a length of zero."""
+    d = jnp.maximum(1 - jnp.maximum(distance, 0.0) * safe_divide(1.0, length), 0.0)
+    return jnp.where(length > 0, amount, 0.0) * jnp.where(d > 0, curve(d), 0.0)
 
 
 class TipRelief(AbstractModification):
@@ -30,8 +30,7 @@ class TipRelief(AbstractModification):
         check("TipRelief", "length", self.length, "mm", low=0.0)
 
     def __call__(self, flank: Flank):
-        depth = flank.roll_length - (flank.tip_roll_length - self.length)
-        return relief(depth, self.amount, self.length, self.curve)
+        return relief(flank.tip_roll_length - flank.roll_length, self.amount, self.length, self.curve)
 
 
 class RootRelief(AbstractModification):
@@ -46,8 +45,7 @@ class RootRelief(AbstractModification):
         check("RootRelief", "length", self.length, "mm", low=0.0)
 
     def __call__(self, flank: Flank):
-        depth = flank.start_roll_length + self.length - flank.roll_length
-        return relief(depth, self.amount, self.length, self.curve)
+        return relief(flank.roll_length - flank.start_roll_length, self.amount, self.length, self.curve)
 
 
 class ProfileCrowning(AbstractModification):

@@ -8,9 +8,11 @@ from .fields import check as check
 from .fields import concrete as concrete
 from .fields import optional_real as optional_real
 from .fields import real as real
+from .logarithm import log as log
 from .quadrature import gauss_legendre as gauss_legendre
 from .root import bracketed_root as bracketed_root
 from .safe import safe_divide as safe_divide
 from .safe import safe_log as safe_log
 from .safe import safe_power as safe_power
 from .safe import safe_sqrt as safe_sqrt
+from .spring import AbstractSpring as AbstractSpring

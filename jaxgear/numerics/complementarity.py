@@ -10,19 +10,31 @@ programme: the solution exists and is unique. It is found by Newton's method on 
 so each step is P x P eliminations and one scalar equation. Derivatives of any order come from the implicit function
 theorem at the final active set, never from the iteration.
 
-All arrays keep the positions innermost and the P springs are unrolled: XLA then fuses a step into few loop nests.
+The iterate v holds the load of every spring in contact, and of every other one minus the load that would open it as far
+as it is open: its sign is the active set. All arrays keep the positions innermost and the P springs of an elimination
+are unrolled, so that a compiler fuses a step into few loops. Intermediate results that several loops need end with a
+division: compilers store those, but evaluate cheaper expressions again in every loop.
 """
 
-from functools import partial
+from functools import partial, reduce
 from operator import itemgetter
-from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jax.custom_derivatives import SymbolicZero
+from jaxtyping import Array, Bool, Float
+
+from .elimination import balance, factorize, product
+from .spring import LOAD_FLOOR, AbstractSpring
 
 Rows = list[Float[Array, "slices positions"]]
+Curve = Float[Array, " positions"]
+
+# Steps with the secants of the springs under equal loads: they find most of the active set at a tenth of the cost.
+_SECANT_STEPS = 3
+# The iteration ends when the residual is this many rounding errors: sums over many slices leave a few.
+_ROUNDING_STEPS = 50.0
 
 
 class ContactProblem(eqx.Module):
@@ -30,7 +42,7 @@ class ContactProblem(eqx.Module):
 
     Attributes:
         compliance: C, shape (pairs, pairs, positions).
-        law: Module with `deflection(q)`; every leaf has shape (pairs, 1, positions).
+        law: h(q) of every spring.
         gap: shape (pairs, slices, positions).
         lever: what a spring closes per unit of common approach, positive, shape (pairs, positions).
         weight: width of each slice, shape (slices,).
@@ -38,7 +50,7 @@ class ContactProblem(eqx.Module):
     """
 
     compliance: Float[Array, "pairs pairs positions"]
-    law: eqx.Module
+    law: AbstractSpring
     gap: Float[Array, "pairs slices positions"]
     lever: Float[Array, "pairs positions"]
     weight: Float[Array, " slices"]
@@ -53,193 +65,204 @@ class ContactSolution(eqx.Module):
         approach: d, shape (positions,).
         opening: y without the spring's own deflection, C q + gap - lever d, shape (pairs, slices, positions): the
             remaining gap where it is positive, minus the contact deflection h(q) where the spring is loaded.
+        in_contact: which springs carry load, shape (pairs, slices, positions).
         residual: largest violation of any condition, relative to the approach and to the load, shape (positions,).
     """
 
     line_load: Float[Array, "pairs slices positions"]
     approach: Float[Array, " positions"]
     opening: Float[Array, "pairs slices positions"]
+    in_contact: Bool[Array, "pairs slices positions"]
     residual: Float[Array, " positions"]
 
 
 def solve_contact(problem: ContactProblem, *, steps: int) -> ContactSolution:
-    """Solves the contact problem with a fixed number of Newton steps.
+    """Solves the contact problem by at most a given number of Newton steps.
 
     Args:
         problem: the data.
-        steps: Newton steps; the residual tells whether they were enough.
+        steps: largest number of Newton steps; the residual tells whether they were enough.
 
     Returns:
         the solution; it is differentiable with respect to every leaf of `problem`. Where a spring is just touching the
         derivative is one-sided.
     """
     # a gap common to all springs only shifts the approach: without it light loads lose no digits to wide gaps
-    common = jax.lax.stop_gradient(jnp.min(problem.gap / problem.lever[:, None], axis=(0, 1)))
-    problem = eqx.tree_at(lambda p: p.gap, problem, problem.gap - (problem.lever * common[None])[:, None])
-    line_load, approach = _solve(steps, problem)
-    state = _evaluate(problem, list(line_load), approach)
-    opening = jnp.stack([y - h for y, h in zip(state.mismatch, state.deflection)])
-    return ContactSolution(line_load, approach + common, opening, _residual(problem, state, common))
+    closing = problem.gap / problem.lever[:, None]
+    common = jax.lax.stop_gradient(jnp.min(closing, axis=(0, 1)))
+    problem = eqx.tree_at(lambda p: p.gap, problem, problem.lever[:, None] * (closing - common[None, None]))
+    v, approach, residual = _solve(steps, problem, common)
+    load = _carried(v)
+    return ContactSolution(
+        line_load=jnp.stack(load),
+        approach=approach + common,
+        opening=jnp.stack(_opening(problem, load, approach)),
+        in_contact=jnp.stack(_active(v)),
+        residual=residual,
+    )
 
 
-def tangent_stiffness(problem: ContactProblem, solution: ContactSolution) -> Float[Array, " positions"]:
+def tangent_stiffness(problem: ContactProblem, solution: ContactSolution) -> Curve:
     """d load / d approach at the solution, for the springs in contact."""
-    state = _evaluate(problem, list(solution.line_load), solution.approach)
-    levers = _levers(problem, state)
-    unit, _ = _eliminate(problem, state, levers, levers)
-    return _total(problem, unit)
-
-
-class _State(NamedTuple):
-    """An iterate with everything that follows from it, a list over the springs in every field but one."""
-
-    load: Rows
-    approach: Float[Array, " positions"]
-    deflection: Rows  # h
-    slope: Rows  # dh/dq
-    mismatch: Rows  # y
-    active: Rows  # in contact
+    load = list(solution.line_load)
+    factors = factorize(
+        problem.compliance, problem.lever, list(solution.in_contact), _slopes(problem, load, _secants(problem, load))
+    )
+    return product(problem.weight, factors, factors.lever, factors.lever)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _solve(steps: int, problem: ContactProblem):
-    state = jax.lax.fori_loop(0, steps, lambda _, state: _newton(problem, state), _start(problem))
-    return jnp.stack(state.load), state.approach
+def _solve(steps: int, problem: ContactProblem, common: Curve) -> tuple[Rows, Curve, Curve]:
+    """The iterate v, the approach and the residual; `common` is what has been taken out of the gaps."""
+    single, single_common = _cast((problem, common), jnp.float32)
+    v, secant = _start(single)
+
+    def with_secants(_, state):
+        return _newton(single, state[0], secant, secant)
+
+    v, approach = jax.lax.fori_loop(0, _SECANT_STEPS, with_secants, (v, jnp.zeros_like(single_common)))
+    result = _iterate(steps, single, single, single_common, v, approach)
+    if common.dtype == jnp.float32:
+        return result
+    return _iterate(steps, problem, single, common, *_cast(result[:2], common.dtype))
 
 
-@_solve.defjvp
+def _iterate(steps: int, problem: ContactProblem, single: ContactProblem, common: Curve, v: Rows, approach: Curve):
+    """Newton steps until the residual is down to rounding.
+
+    The slopes come from the problem in single precision whatever the precision of the solution: a step then still gains
+    six digits, at half the cost.
+    """
+    dtype = common.dtype
+
+    def evaluated(v, approach):
+        secant = _secants(problem, _carried(v))
+        return v, approach, secant, _residual(problem, v, approach, secant, common)
+
+    def advance(state):
+        step, (v, _, secant, _) = state
+        slope = _slopes(single, *_cast((_carried(v), secant), jnp.float32))
+        return step + 1, evaluated(*_newton(problem, v, secant, _cast(slope, dtype)))
+
+    def unfinished(state):
+        step, (*_, residual) = state
+        return (step < steps) & ~jnp.all(residual < _ROUNDING_STEPS * jnp.finfo(dtype).eps)
+
+    _, (v, approach, _, residual) = jax.lax.while_loop(unfinished, advance, (0, evaluated(v, approach)))
+    return v, approach, residual
+
+
+def _cast(tree, dtype):
+    return jax.tree.map(lambda leaf: leaf.astype(dtype), tree)
+
+
+@partial(_solve.defjvp, symbolic_zeros=True)
 def _solve_jvp(steps, primals, tangents):
-    (problem,), (problem_dot,) = primals, tangents
-    line_load, approach = _solve(steps, problem)
-    state = _evaluate(problem, list(line_load), approach)
+    (problem, common), (problem_dot, _) = primals, tangents
+    v, approach, residual = _solve(steps, problem, common)
+    load = _carried(v)
 
     def conditions(data):
-        return _mismatch(data, state.load, _deflection(data, state.load), approach), _total(
-            data, state.load
-        ) - data.load
+        mismatch = [y + law.deflection(q) for y, law, q in zip(_opening(data, load, approach), _laws(data), load)]
+        return mismatch, _total(data, load) - data.load
 
-    _, (mismatch_dot, total_dot) = jax.jvp(conditions, (problem,), (problem_dot,))
-    load_dot, approach_dot = _balance(problem, state, [-dot for dot in mismatch_dot], -total_dot)
-    return (line_load, approach), (jnp.stack(load_dot), approach_dot)
+    _, (mismatch_dot, total_dot) = _jvp_of_given(conditions, problem, problem_dot)
+    factors = factorize(problem.compliance, problem.lever, _active(v), _slopes(problem, load, _secants(problem, load)))
+    v_dot, approach_dot = balance(problem.weight, factors, [-dot for dot in mismatch_dot], -total_dot)
+    return (v, approach, residual), (v_dot, approach_dot, jnp.zeros_like(residual))
 
 
-def _start(problem: ContactProblem) -> _State:
-    """Equal loads on every spring that can be in contact at all.
+def _jvp_of_given(function, primal, tangent):
+    """`jax.jvp` along those leaves of the tangent that are not symbolically zero: the others cost nothing."""
+    tangents, structure = jax.tree.flatten(tangent, is_leaf=lambda leaf: isinstance(leaf, SymbolicZero))
+    primals = jax.tree.leaves(primal)
+    given = [i for i, leaf in enumerate(tangents) if not isinstance(leaf, SymbolicZero)]
 
-    Gaps wider than the approach of any one spring that bears the load alone stay open.
+    def of_given(leaves):
+        everything = list(primals)
+        for i, leaf in zip(given, leaves):
+            everything[i] = leaf
+        return function(jax.tree.unflatten(structure, everything))
+
+    return jax.jvp(of_given, ([primals[i] for i in given],), ([tangents[i] for i in given],))
+
+
+def _start(problem: ContactProblem) -> tuple[Rows, Rows]:
+    """Equal loads on every spring that can be in contact at all, and the secants of the springs under them.
+
+    The secants do not depend on the gaps: for many problems that differ in their gaps alone they are evaluated once.
     """
-    load = [jnp.broadcast_to(problem.load / jnp.sum(problem.weight), gap.shape) for gap in problem.gap]
-    state = _evaluate(problem, load, jnp.zeros(problem.gap.shape[-1], problem.gap.dtype))
+    even = problem.load / jnp.sum(problem.weight)
+    secant = _secants(problem, [jnp.broadcast_to(even, lever[None].shape) for lever in problem.lever])
+    # gaps wider than the approach of any one spring that bears the load alone stay open
     alone = [
-        jnp.max(gap + h + problem.compliance[i, i][None] * q / problem.lever[i][None], axis=0) / problem.lever[i]
-        for i, (gap, h, q) in enumerate(zip(problem.gap, state.deflection, load))
+        jnp.max(gap + (c + problem.compliance[i, i][None]) * even, axis=0) / lever
+        for i, (gap, c, lever) in enumerate(zip(problem.gap, secant, problem.lever))
     ]
     bound = jnp.min(jnp.stack(alone), axis=0)
-    signal = [(lever * bound)[None] - gap for lever, gap in zip(problem.lever, problem.gap)]
-    return state._replace(active=_positive(signal, bound))
+    return [(lever * bound)[None] - gap for lever, gap in zip(problem.lever, problem.gap)], secant
 
 
-def _newton(problem: ContactProblem, state: _State) -> _State:
-    """One Newton step on the active set, followed by the new set."""
-    known = [-gap - (h - slope * q) for gap, h, slope, q in zip(problem.gap, state.deflection, state.slope, state.load)]
-    load, approach = _balance(problem, state, known, problem.load)
-    return _evaluate(problem, [jnp.maximum(q, 0.0) for q in load], approach)
+def _active(v: Rows) -> list[Bool[Array, "slices positions"]]:
+    """Where the iterate is not negative; if it is everywhere, the largest counts, so that the system stays regular."""
+    floor = jnp.minimum(reduce(jnp.maximum, [jnp.max(row, axis=0) for row in v]), 0.0)
+    return [row >= floor[None] for row in v]
 
 
-def _evaluate(problem: ContactProblem, load: Rows, approach) -> _State:
-    deflection, slope = jax.jvp(lambda rows: _deflection(problem, rows), (load,), ([jnp.ones_like(q) for q in load],))
-    mismatch = _mismatch(problem, load, deflection, approach)
-    signal = [(problem.compliance[i, i][None] + slope[i]) * load[i] - mismatch[i] for i in range(len(load))]
-    return _State(load, approach, deflection, slope, mismatch, _positive(signal, approach))
+def _carried(v: Rows) -> Rows:
+    """Line loads of an iterate; differentiable at zero, where a spring in contact carries no load yet."""
+    return [jnp.where(row >= 0, row, 0.0) for row in v]
 
 
-def _positive(signal: Rows, approach) -> Rows:
-    """Where the signal is positive; at zero load the largest counts, so that the system stays regular."""
-    largest, smallest = (
-        extreme(jnp.stack([extreme(s, axis=0) for s in signal]), axis=0) for extreme in (jnp.max, jnp.min)
-    )
-    # A compiler may evaluate the signal twice, for the maximum and for the comparison, with different rounding: without
-    # this margin no spring at all might be left.
-    size = jnp.maximum(jnp.abs(largest), jnp.abs(smallest)) + jnp.abs(approach)
-    floor = jnp.minimum(largest - 8 * jnp.finfo(size.dtype).eps * size, 0.0)[None]
-    return [s >= floor for s in signal]
+def _laws(problem: ContactProblem) -> list[AbstractSpring]:
+    """The law of every spring."""
+    return [jax.tree.map(itemgetter(i), problem.law) for i in range(problem.lever.shape[0])]
 
 
-def _balance(problem, state, known, load):
-    """Solves (C + slope) q = known + lever d on the active rows, q = 0 on the others, with sum lever w q = load."""
-    levers = _levers(problem, state)
-    unit, part = _eliminate(problem, state, levers, [jnp.where(mask, k, 0.0) for mask, k in zip(state.active, known)])
-    approach = (load - _total(problem, part)) / _total(problem, unit)
-    return [u * approach[None] + p for u, p in zip(unit, part)], approach
+def _secants(problem: ContactProblem, load: Rows) -> Rows:
+    return [law.secant(jnp.maximum(q, LOAD_FLOOR)) for law, q in zip(_laws(problem), load)]
 
 
-def _eliminate(problem, state, first: Rows, second: Rows) -> tuple[Rows, Rows]:
-    """LDL^T solution of the active P x P systems for two right-hand sides, unrolled over the springs."""
-    active, slopes = state.active, state.slope
-    count = len(active)
-    lower: dict[tuple[int, int], Array] = {}
-    pivot: list[Array] = []
-    a, b = list(first), list(second)
-    for i in range(count):
-        row: dict[int, Array] = {}
-        diagonal = jnp.where(active[i], problem.compliance[i, i][None] + slopes[i], 1.0)
-        for j in range(i):
-            entry = jnp.where(active[i] & active[j], problem.compliance[i, j][None], 0.0)
-            for k in range(j):
-                entry = entry - row[k] * lower[j, k]
-            row[j] = entry
-        for j in range(i):
-            lower[i, j] = row[j] / pivot[j]
-            diagonal = diagonal - row[j] * lower[i, j]
-            a[i] = a[i] - lower[i, j] * a[j]
-            b[i] = b[i] - lower[i, j] * b[j]
-        pivot.append(diagonal)
-    for i in reversed(range(count)):
-        a[i], b[i] = a[i] / pivot[i], b[i] / pivot[i]
-        for k in range(i + 1, count):
-            a[i] = a[i] - lower[k, i] * a[k]
-            b[i] = b[i] - lower[k, i] * b[k]
-    return a, b
+def _slopes(problem: ContactProblem, load: Rows, secant: Rows) -> Rows:
+    return [law.slope(jnp.maximum(q, LOAD_FLOOR), c) for law, q, c in zip(_laws(problem), load, secant)]
 
 
-def _deflection(problem, load: Rows) -> Rows:
-    """h of every spring."""
-    return [jax.tree.map(itemgetter(i), problem.law).deflection(q) for i, q in enumerate(load)]
+def _newton(problem: ContactProblem, v: Rows, secant: Rows, slope: Rows) -> tuple[Rows, Curve]:
+    """One Newton step on the active set; `secant` and `slope` belong to the loads of v."""
+    active, carried = _active(v), _carried(v)
+    factors = factorize(problem.compliance, problem.lever, active, slope)
+    known = [-gap - (c - s) * q for gap, c, s, q in zip(problem.gap, secant, slope, carried)]
+    load, approach = balance(problem.weight, factors, known, problem.load)
+    opening = _opening(problem, load, approach)
+    return [
+        jnp.where(flag, q, -y * inverse) for flag, q, y, inverse in zip(active, load, opening, factors.inverse)
+    ], approach
 
 
-def _mismatch(problem, load: Rows, deflection: Rows, approach) -> Rows:
-    """y of every spring."""
+def _opening(problem, load: Rows, approach: Curve) -> Rows:
+    """y without the springs' own deflection."""
     result = []
-    for i, elastic in enumerate(deflection):
-        for j, q in enumerate(load):
-            elastic = elastic + problem.compliance[i, j][None] * q
-        result.append(elastic + problem.gap[i] - (problem.lever[i] * approach)[None])
+    for row, gap, lever in zip(problem.compliance, problem.gap, problem.lever):
+        result.append(sum(c[None] * q for c, q in zip(row, load)) + gap - (lever * approach)[None])
     return result
 
 
-def _total(problem, load: Rows) -> Float[Array, " positions"]:
+def _total(problem, load: Rows) -> Curve:
     return sum(lever * jnp.sum(problem.weight[:, None] * q, axis=0) for lever, q in zip(problem.lever, load))
 
 
-def _levers(problem, state) -> Rows:
-    """Levers of the springs in contact, zero elsewhere."""
-    return [jnp.where(mask, lever[None], 0.0) for mask, lever in zip(state.active, problem.lever)]
-
-
-def _residual(problem: ContactProblem, state: _State, common) -> Float[Array, " positions"]:
-    """Largest violation; `common` is the part of the approach that has been taken out of the gaps."""
-    problem, state = jax.lax.stop_gradient((problem, state))
-    worst, scale = jnp.zeros_like(state.approach), jnp.abs(common)
-    softest = jnp.zeros_like(state.approach)
-    for i, (q, y, slope) in enumerate(zip(state.load, state.mismatch, state.slope)):
-        closed = q > 0
-        violation = jnp.where(closed, jnp.abs(y), jnp.maximum(-y, 0.0))
-        closing = (problem.lever[i] * state.approach)[None]
-        worst = jnp.maximum(worst, jnp.max(violation, axis=0))
-        scale = jnp.maximum(scale, jnp.max(jnp.where(closed, jnp.abs(y + closing), 0.0), axis=0))
-        softest = jnp.maximum(softest, problem.compliance[i, i] + jnp.max(slope, axis=0))
+def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Rows, common: Curve) -> Curve:
+    """Largest violation of any condition, relative to the approach and to the load."""
+    load = _carried(v)
+    worst, scale, softest = jnp.zeros_like(approach), jnp.abs(common), jnp.zeros_like(approach)
+    for i, (q, y, c, lever) in enumerate(zip(load, _opening(problem, load, approach), secant, problem.lever)):
+        mismatch = y + c * q
+        closing = jnp.abs(mismatch + (lever * approach)[None])
+        worst = jnp.maximum(worst, jnp.max(jnp.where(q > 0, jnp.abs(mismatch), -mismatch), axis=0))
+        scale = jnp.maximum(scale, jnp.max(jnp.where(q > 0, closing, 0.0), axis=0))
+        softest = jnp.maximum(softest, problem.compliance[i, i] + jnp.max(c, axis=0))
     tiny, eps = jnp.finfo(worst.dtype).tiny, jnp.finfo(worst.dtype).eps
     # the load that a rounding error of the approach makes, so that zero load is not measured against zero
     rounding = eps * jnp.abs(common) * jnp.sum(problem.weight) / softest
-    balance = jnp.abs(_total(problem, state.load) - problem.load) / (jnp.abs(problem.load) + rounding + tiny)
+    balance = jnp.abs(_total(problem, load) - problem.load) / (jnp.abs(problem.load) + rounding + tiny)
     return jnp.maximum(worst / (scale + tiny), balance)

@@ -1,0 +1,87 @@
+"""Elimination of a few unknowns at many positions at once, unrolled so that a compiler fuses it into few loops."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+Rows = list[Float[Array, "slices positions"]]
+Curve = Float[Array, " positions"]
+
+
+class Factors(NamedTuple):
+    """L D L^T of the active systems C + slope, with rows and columns of springs that are apart set to zero.
+
+    Attributes:
+        rows: D L^T below the diagonal.
+        diagonal, inverse: D and 1 / D.
+        lever: L^-1 lever, zero for springs that are apart.
+        active: 1 for springs in contact, else 0.
+    """
+
+    rows: list[Rows]
+    diagonal: Rows
+    inverse: Rows
+    lever: Rows
+    active: Rows
+
+
+def factorize(
+    compliance: Float[Array, "pairs pairs positions"], lever: Float[Array, "pairs positions"], active: list, slope: Rows
+) -> Factors:
+    """Eliminates the active springs from C + slope.
+
+    Args:
+        compliance: C.
+        lever: what a spring closes per unit of common approach.
+        active: which springs are in contact, (slices, positions) each.
+        slope: dh/dq of every spring, (slices, positions) each.
+    """
+    mask = [row.astype(compliance.dtype) for row in active]
+    rows: list[Rows] = []
+    diagonal: Rows = []
+    inverse: Rows = []
+    for i in range(len(mask)):
+        row = [mask[i] * mask[j] * compliance[i, j][None] for j in range(i)]
+        for j in range(i):
+            for k in range(j):
+                row[j] = row[j] - row[k] * rows[j][k] * inverse[k]
+        pivot = compliance[i, i][None] + slope[i]
+        for j in range(i):
+            pivot = pivot - row[j] * row[j] * inverse[j]
+        rows.append(row)
+        diagonal.append(pivot)
+        inverse.append(1 / pivot)
+    levers = [flag * row[None] for flag, row in zip(mask, lever)]
+    return Factors(rows, diagonal, inverse, _forward(rows, inverse, levers), mask)
+
+
+def _forward(rows: list[Rows], inverse: Rows, right: Rows) -> Rows:
+    """L^-1 right"""
+    result: Rows = []
+    for i, value in enumerate(right):
+        for j in range(i):
+            value = value - rows[i][j] * inverse[j] * result[j]
+        result.append(value)
+    return result
+
+
+def product(weight: Float[Array, " slices"], factors: Factors, first: Rows, second: Rows) -> Curve:
+    """sum_{p, s} w first D^-1 second"""
+    terms = sum(a * b * inverse for a, b, inverse in zip(first, second, factors.inverse))
+    return jnp.sum(weight[:, None] * terms, axis=0)
+
+
+def balance(weight: Float[Array, " slices"], factors: Factors, known: Rows, load) -> tuple[Rows, Curve]:
+    """Solves (C + slope) q = known + lever d on the active rows, q = 0 on the others, with sum lever w q = load."""
+    part = _forward(factors.rows, factors.inverse, [flag * row for flag, row in zip(factors.active, known)])
+    stiffness = product(weight, factors, factors.lever, factors.lever)
+    approach = (load - product(weight, factors, factors.lever, part)) / stiffness
+    count = len(part)
+    result: dict[int, Array] = {}
+    for i in reversed(range(count)):
+        value = factors.lever[i] * approach[None] + part[i]
+        for k in range(i + 1, count):
+            value = value - factors.rows[k][i] * result[k]
+        result[i] = value / factors.diagonal[i]
+    return [result[i] for i in range(count)], approach
