@@ -33,11 +33,11 @@ from .compliance import legacy_compliance as legacy_compliance
 from .contact import Mesh as Mesh
 from .contact import MeshCycle as MeshCycle
 from .contact import Resolution as Resolution
+from .contact import fewest_pairs as fewest_pairs
 from .contact import prepare as prepare
 from .contact import removed_material as removed_material
 from .contact import solve as solve
 from .contact import solve_removed as solve_removed
-from .geometry import STEEL as STEEL
 from .geometry import Gear as Gear
 from .geometry import GearPair as GearPair
 from .geometry import Material as Material
@@ -102,3 +102,13 @@ from .tolerance import deviated_material as deviated_material
 from .tolerance import iso_rounded as iso_rounded
 from .tolerance import monte_carlo as monte_carlo
 from .tolerance import sample_deviations as sample_deviations
+
+STEEL: Material
+
+
+def __getattr__(name: str):
+    if name == "STEEL":  # made when it is asked for, see `jaxgear.geometry.material`
+        from .geometry import STEEL
+
+        return STEEL
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

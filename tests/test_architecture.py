@@ -88,6 +88,18 @@ def test_import_is_silent_and_changes_nothing():
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
+def test_import_leaves_the_choice_of_devices_to_the_user():
+    script = (
+        "import jax, jaxgear, jaxgear.cli\n"
+        "jax.config.update('jax_num_cpu_devices', 3)\n"
+        "jax.config.update('jax_enable_x64', True)\n"
+        "assert jax.device_count() == 3\n"
+        "assert jaxgear.STEEL.density.dtype == 'float64'\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_modules_are_small_enough_to_read_in_one_go():
     for path in FILES:
         assert len(path.read_text(encoding="utf-8").splitlines()) <= 300, path

@@ -76,7 +76,7 @@ def test_random_coupled_problems_satisfy_all_conditions(springs, slices, steps, 
     data = random_problem(7 * springs + slices, springs, slices, 400, law)
     loads = LOADS * jnp.sum(data.weight)
     solutions = eqx.filter_jit(
-        lambda data: jax.vmap(lambda load: solve_contact(with_load(data, load), steps=steps))(loads)
+        lambda data: jax.vmap(lambda load: solve_contact(with_load(data, load), steps=steps, tolerance=1e-14))(loads)
     )(data)
     assert float(jnp.max(solutions.residual)) < 2e-14
     for k, load in enumerate(loads):

@@ -177,7 +177,7 @@ def test_defaults_are_those_of_the_library(load):
     file = load(text())
     pinion = jg.Gear(19, 3.0, face_width=20.0, material=jg.Material())
     assert eqx.tree_equal(file.pair(), jg.GearPair(pinion, jg.Gear(48, 3.0, face_width=18.0, material=jg.Material())))
-    assert eqx.tree_equal(file.resolution(), jg.Resolution())
+    assert eqx.tree_equal(file.resolution(), jg.Resolution(pairs=2))
     assert eqx.tree_equal(file._compliance, jg.default_compliance())
     assert file.torque == 50.0 and file.torque_range == (25.0, 100.0)
     assert file.title == "gear" and file.bounds == {} and file.starts is None and file.steps is None

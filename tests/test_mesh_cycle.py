@@ -166,6 +166,24 @@ def test_fewer_pairs_suffice_for_a_short_path(mesh):
     np.testing.assert_allclose(three.line_load, four.line_load[:3], atol=1e-9)
 
 
+def test_fewest_pairs_give_the_same_results(mesh):
+    few = jg.fewest_pairs(mesh.pair, deflection=40.0)
+    assert few == 2 and jg.fewest_pairs(high_contact_ratio_pair(), deflection=40.0) > few
+    narrow = prepare(mesh.pair, resolution=jg.Resolution(positions=mesh.resolution.positions, pairs=few))
+    relief = flank(tip=15.0, tip_length=4.0)
+    wide, same = (solve(m, 100.0, pinion=relief, wheel=relief) for m in (mesh, narrow))
+    assert bool(jnp.all(same.converged))
+    np.testing.assert_allclose(same.transmission_error, wide.transmission_error, atol=1e-9)
+
+
+def test_contact_beyond_the_pairs_carried_along_is_not_converged(mesh):
+    narrow = prepare(mesh.pair, resolution=jg.Resolution(positions=mesh.resolution.positions, pairs=2))
+    torque = 50.0 * float(narrow.outer_gap) / 4.0  # 4 um is less than the deflection at 50 N m
+    cycle = solve(narrow, torque)
+    assert not bool(jnp.all(cycle.converged)) and float(jnp.max(cycle.residual)) < 1e-10
+    assert bool(jnp.all(solve(mesh, torque).converged))
+
+
 def test_high_contact_ratio_needs_three_pairs():
     cycle = solve(prepare(high_contact_ratio_pair()), 60.0)
     loaded = jnp.sum(cycle.line_load[:, 0] > 0, axis=0)

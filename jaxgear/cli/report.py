@@ -76,7 +76,7 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
             torques = ", ".join(f"{torque:g}" for torque in evaluation.failed_torques)
             yield (
                 f"CONTACT SOLUTION NOT CONVERGED: {name} at {torques} N m; its numbers are not to be trusted. "
-                "Raise resolution.newton_steps."
+                "Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
             )
 
 

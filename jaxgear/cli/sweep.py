@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 import jax
+import jax.numpy as jnp
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -52,7 +53,7 @@ def run_sweep(
         enable_cache()
     design = load_design(file)
     request = sweep_request(design, samples=samples, most=_QUICK_SAMPLES if quick else None)
-    size = design.resolution()
+    size = design.resolution(float(jnp.max(request.load.torques)))
     if quick:
         size = dataclasses.replace(size, positions=min(size.positions, _QUICK_POSITIONS))
     target = Path("results") / (f"{file.stem}-quick" if quick else file.stem) if output is None else output

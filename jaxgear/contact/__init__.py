@@ -6,4 +6,5 @@ from .cycle import solve as solve
 from .cycle import solve_removed as solve_removed
 from .mesh import Mesh as Mesh
 from .mesh import Resolution as Resolution
+from .mesh import fewest_pairs as fewest_pairs
 from .mesh import prepare as prepare

@@ -2,10 +2,9 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
-from ..microgeometry import AbstractModification, NoModification
+from ..microgeometry import AbstractModification, NoModification, terms
 from ..numerics import ContactProblem, check, real, safe_sqrt, solve_contact, tangent_stiffness
 from .mesh import Mesh
 
@@ -28,7 +27,8 @@ class MeshCycle(eqx.Module):
         gap: gap of the undeformed flanks at zero transmission error [um]: corner gap plus both modifications.
         tangent_stiffness: d force / d transmission error at fixed position [N/um].
         residual: largest relative violation of the contact conditions, shape (positions,).
-        converged: 1 where the residual is at the level of the floating-point type (bool, shape (positions,)).
+        converged: where the residual is below the resolution's tolerance and no pair beyond those carried along could
+            touch, shape (positions,).
     """
 
     mesh: Mesh
@@ -74,10 +74,6 @@ class MeshCycle(eqx.Module):
         from ..metrics.report import describe
 
         return describe(self)
-
-
-# Residuals stay below a few rounding errors of the largest term; the factor leaves room for sums over slices.
-_ROUNDING_STEPS = 1e3
 
 
 def solve(
@@ -128,11 +124,10 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> MeshCycle:
     force = _force(mesh, torque)
     gap = mesh.corner_gap[:, None] + removed
     problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, force)
-    solution = solve_contact(problem, steps=mesh.resolution.newton_steps)
+    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.tolerance)
     windup = mesh.hub * force / mesh.pair.face_width
     contact_stiffness = tangent_stiffness(problem, solution)
     unloaded = jnp.min(gap / mesh.lever[:, None], axis=(0, 1))
-    tolerance = _ROUNDING_STEPS * jnp.finfo(gap.dtype).eps
     return MeshCycle(
         mesh=mesh,
         torque=torque,
@@ -144,7 +139,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> MeshCycle:
         gap=gap,
         tangent_stiffness=1 / (1 / contact_stiffness + mesh.hub / mesh.pair.face_width),
         residual=solution.residual,
-        converged=solution.residual <= tolerance,
+        converged=solution.solved & (solution.approach - unloaded < mesh.outer_gap),
     )
 
 
@@ -158,8 +153,7 @@ def removed_material(
     """Material removed from both flanks, averaged over the contact with the weight of the Hertzian pressure [um].
 
     To first order a small gap that varies across the contact acts with its pressure-weighted mean. The half width is
-    that of one pair that carries the full load; Chebyshev nodes of the second kind integrate with the semi-elliptic
-    weight.
+    that of one pair that carries the full load.
 
     Args:
         mesh: prepared mesh.
@@ -170,18 +164,16 @@ def removed_material(
     Returns:
         shape (pairs, slices, positions).
     """
-    pinion, wheel = pinion or NoModification(), wheel or NoModification()
-    sizes = mesh.resolution
-    count = sizes.patch_nodes
     half_width = safe_sqrt(mesh.width_factor * _force(mesh, real(torque)) / mesh.pair.face_width)
-    total = jnp.zeros((), mesh.phase.dtype)
-    for k in range(1, count + 1):
-        angle = np.pi * k / (count + 1)
-        offset = float(np.cos(angle)) * half_width
-        pinion_flank, wheel_flank = mesh.flanks(offset)
-        weight = float(2 / (count + 1) * np.sin(angle) ** 2)
-        total = total + weight * (pinion(pinion_flank) + wheel(wheel_flank))
-    return jnp.broadcast_to(total, (sizes.pairs, sizes.slices, sizes.positions))
+    weights = list(mesh.patch_weight)
+    flanks = [mesh.flanks(place * half_width) for place in mesh.patch_place]
+    sizes = mesh.resolution
+    total = jnp.zeros((sizes.pairs, sizes.slices, sizes.positions), mesh.phase.dtype)
+    for modification, points in zip((pinion, wheel), zip(*flanks)):
+        # every term on its own, since most vary along the profile or along the face only
+        for term in terms(modification or NoModification()):
+            total = total + sum(weight * term(point) for weight, point in zip(weights, points)) / sum(weights)
+    return total
 
 
 def _force(mesh: Mesh, torque: Scalar) -> Scalar:

@@ -3,6 +3,7 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..compliance import Compliance, default_compliance
@@ -23,11 +24,14 @@ class Resolution(eqx.Module):
     Attributes:
         positions: mesh positions over one base pitch.
         slices: slices over the common face width.
-        pairs: tooth pairs carried along. Pair i runs at phase + (pairs - 1) // 2 - i base pitches, so four pairs cover
-            two base pitches on either side of the pitch point: contact ratios up to 3.
+        pairs: tooth pairs carried along; `fewest_pairs` tells how few suffice. Pair i runs at
+            phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two base pitches on either side of the pitch
+            point: contact ratios up to 3.
         patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks
             and steep flanks over its own width; 1 takes the nominal contact point alone.
-        newton_steps: steps of the contact solution.
+        newton_steps: largest number of steps of the contact solution.
+        tolerance: residual at which the contact solution ends, relative to the transmission error and to the force;
+            None for 1e-11 in double and 5e-6 in single precision.
     """
 
     positions: int = eqx.field(static=True, default=64)
@@ -35,17 +39,25 @@ class Resolution(eqx.Module):
     pairs: int = eqx.field(static=True, default=4)
     patch_nodes: int = eqx.field(static=True, default=4)
     newton_steps: int = eqx.field(static=True, default=8)
+    tolerance: float | None = eqx.field(static=True, default=None)
 
     def __check_init__(self):
         for name, low in (("positions", 4), ("slices", 1), ("pairs", 2), ("patch_nodes", 1), ("newton_steps", 1)):
             value = getattr(self, name)
             if not isinstance(value, int) or value < low:
                 raise ValueError(f"Resolution: {name} = {value!r} must be a whole number of at least {low}")
+        if self.tolerance is not None and not (isinstance(self.tolerance, float) and 0 < self.tolerance < 1):
+            raise ValueError(f"Resolution: tolerance = {self.tolerance!r} must be a number between 0 and 1, or None")
 
     @property
     def leading(self) -> int:
         """Base pitches by which the first pair leads the reference pair."""
         return (self.pairs - 1) // 2
+
+    @property
+    def reach(self) -> tuple[int, int]:
+        """Base pitches behind and ahead of the pitch point that the pairs cover."""
+        return self.pairs - 1 - self.leading, self.leading + 1
 
 
 class Mesh(eqx.Module):
@@ -63,9 +75,13 @@ class Mesh(eqx.Module):
         corner_gap: gap of the unmodified flanks there [um].
         lever: what a pair closes per unit of transmission error; 1 on the path of contact, less beyond it, because the
             corner's gap opens while the gears turn on.
+        outer_gap: smallest transmission error, beyond the unloaded one, at which pairs that are not carried along could
+            touch [um].
         structure: compliance of both gears, (pairs, pairs, positions) [um per N/mm].
         law: prepared contact law.
         width_factor: squared half width of the contact per line load [mm^2 per N/mm].
+        patch_place, patch_weight: points across the contact, relative to its half width, and their weights, shape
+            (patch_nodes,).
         hub: common wind-up of the gear bodies [um per N/mm].
         face_coordinate: middle of every slice [mm], shape (slices,).
         slice_width: [mm], shape (slices,).
@@ -82,9 +98,12 @@ class Mesh(eqx.Module):
     outside: Field
     corner_gap: Field
     lever: Field
+    outer_gap: Scalar
     structure: Float[Array, "pairs pairs positions"]
     law: AbstractLaw
     width_factor: Field
+    patch_place: Float[Array, " patch_nodes"]
+    patch_weight: Float[Array, " patch_nodes"]
     hub: Scalar
     face_coordinate: Float[Array, " slices"]
     slice_width: Float[Array, " slices"]
@@ -157,6 +176,8 @@ def _prepare(pair: GearPair, compliance: Compliance, resolution: Resolution) -> 
     slices, width = resolution.slices, pair.face_width
     geometry = contact_geometry(pinion, wheel, compliance.plane, width)
     centre = (jnp.arange(slices, dtype=dtype) + 0.5) / slices - 0.5
+    # Chebyshev nodes of the second kind integrate with the weight of the semi-elliptic pressure
+    angle = jnp.pi * jnp.arange(1, resolution.patch_nodes + 1, dtype=dtype) / (resolution.patch_nodes + 1)
     return Mesh(
         pair=pair,
         compliance=compliance,
@@ -169,9 +190,12 @@ def _prepare(pair: GearPair, compliance: Compliance, resolution: Resolution) -> 
         outside=outside,
         corner_gap=gap,
         lever=lever,
+        outer_gap=jnp.min(_gaps_of_next_pairs(pair, contact, jnp.asarray([resolution.reach], dtype))),
         structure=compliance.structure(pinion, wheel),
         law=compliance.law(geometry, pinion, wheel, outside),
         width_factor=geometry.width_factor[:, 0],
+        patch_place=jnp.cos(angle),
+        patch_weight=jnp.sin(angle) ** 2,
         hub=compliance.hub(pinion, wheel),
         face_coordinate=centre * width,
         slice_width=jnp.full((slices,), 1.0 / slices, dtype) * width,
@@ -218,11 +242,46 @@ def _corner(x, reach, tip_rho, tip_base, mate_rho, mate_base):
     )
 
 
+def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
+    """The fewest pairs for `Resolution` that contain every contact up to a deflection; work grows with their square.
+
+    Args:
+        pair: gear pair with concrete numbers.
+        deflection: largest transmission error under load, beyond the unloaded one [um].
+
+    Returns:
+        the number of pairs, at least 2.
+
+    Raises:
+        ValueError: when more than 12 pairs would be needed.
+    """
+    candidates = range(2, 13)
+    reaches = [Resolution(pairs=pairs).reach for pairs in candidates]
+    gaps = np.asarray(_gaps_at(pair, reaches))
+    for pairs, gap in zip(candidates, gaps):
+        if gap.min() > deflection:
+            return pairs
+    raise ValueError(f"fewest_pairs: 12 pairs do not contain every contact up to deflection = {deflection:g} um")
+
+
+@eqx.filter_jit
+def _gaps_at(pair: GearPair, reaches):
+    contact = path_of_contact(pair)
+    return _gaps_of_next_pairs(pair, contact, jnp.asarray(reaches, jnp.result_type(contact.start)))
+
+
+def _gaps_of_next_pairs(pair: GearPair, contact: PathOfContact, reach) -> Float[Array, "windows 2"]:
+    """Closing of the first pairs beyond windows of (behind, ahead) base pitches, zero on the path of contact [um]."""
+    path = jnp.stack([-reach[:, 0], reach[:, 1]], axis=1) * contact.base_pitch
+    _, _, gap, lever, _ = _contact_points(pair, contact, path)
+    return gap / lever
+
+
 def _check_cover(contact: PathOfContact, resolution: Resolution) -> None:
     start, end = concrete(contact.start / contact.base_pitch), concrete(contact.end / contact.base_pitch)
     if start is None or end is None:
         return
-    ahead, behind = resolution.leading + 1, resolution.pairs - 1 - resolution.leading
+    behind, ahead = resolution.reach
     if (end > ahead).any() or (-start > behind).any():
         needed = max(2 * int(float(end.max()) // 1) + 1, 2 * int(float(-start.min()) // 1) + 2)
         raise ValueError(

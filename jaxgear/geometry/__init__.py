@@ -14,10 +14,19 @@ from .gear import Gear as Gear
 from .involute import diameter as diameter
 from .involute import roll_angle as roll_angle
 from .involute import roll_length as roll_length
-from .material import STEEL as STEEL
 from .material import Material as Material
 from .outline import Outline as Outline
 from .outline import outline as outline
 from .pair import GearPair as GearPair
 from .path import PathOfContact as PathOfContact
 from .path import path_of_contact as path_of_contact
+
+STEEL: Material
+
+
+def __getattr__(name: str):
+    if name == "STEEL":  # made when it is asked for, see `material`
+        from .material import STEEL
+
+        return STEEL
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..numerics import check, concrete, optional_real, real
-from .material import STEEL, Material
+from .material import Material
 
 Scalar = Float[Array, ""]
 
@@ -43,7 +43,7 @@ class Gear(eqx.Module):
     tip_diameter: Scalar | None = eqx.field(converter=optional_real, default=None, kw_only=True)
     bore_diameter: Scalar | None = eqx.field(converter=optional_real, default=None, kw_only=True)
     tip_edge_radius: Scalar = eqx.field(converter=real, default=0.1, kw_only=True)
-    material: Material = eqx.field(default=STEEL, kw_only=True)
+    material: Material = eqx.field(default_factory=Material, kw_only=True)
 
     def __check_init__(self):
         _check_numbers(self)

@@ -30,4 +30,12 @@ class Material(eqx.Module):
         check("Material", name, self.thermal_contact_coefficient, "N/(m s^0.5 K)", low=0.0, open_low=True)
 
 
-STEEL = Material()
+STEEL: Material  # constants of gear steel
+
+
+def __getattr__(name: str):
+    # Made when it is asked for: arrays made at import would start JAX before its devices, processes and precision can
+    # be chosen.
+    if name == "STEEL":
+        return Material()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

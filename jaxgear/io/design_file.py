@@ -2,22 +2,25 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
 from ..compliance import Beam, Compliance, ElasticRing, legacy_compliance
-from ..contact import Mesh, Resolution, prepare
+from ..contact import Mesh, Resolution, fewest_pairs, prepare
 from ..geometry import Gear, GearPair, Material
 from ..microgeometry import AbstractModification
+from ..optimize import iso_stiffness
 from . import schema, template
 from .errors import DesignFileError, suggestion
 from .toml import decode, join, read
 
 T = TypeVar("T")
 
+# Tooth pairs are carried along up to this many times the deflection of a single pair after ISO 6336-1.
+_DEFLECTIONS = 2.0
 # Torques of interest where the file names none, relative to the design torque.
 _TORQUE_RANGE = (0.5, 2.0)
 
@@ -57,15 +60,25 @@ class DesignFile:
     _pair: GearPair
     _compliance: Compliance
     _resolution: Resolution
+    _pairs_given: bool
     _parts: tuple[list[template.Part], list[template.Part]]
 
     def pair(self) -> GearPair:
         """The gear pair."""
         return self._pair
 
-    def resolution(self) -> Resolution:
-        """The array sizes that the file asks for."""
-        return self._resolution
+    def resolution(self, torque: float | None = None) -> Resolution:
+        """The array sizes that the file asks for, with as few tooth pairs as the load needs where it names none.
+
+        Args:
+            torque: largest torque on the pinion [N m], None for the largest that the file names.
+        """
+        if self._pairs_given:
+            return self._resolution
+        torque = max(self.torque, self.torque_range[1]) if torque is None else torque
+        line_load = 1e3 * torque / float(self._pair.pinion.base_radius * self._pair.face_width)
+        deflection = _DEFLECTIONS * line_load / float(iso_stiffness(self._pair, line_load).single)
+        return replace(self._resolution, pairs=fewest_pairs(self._pair, deflection=deflection))
 
     def mesh(self, resolution: Resolution | None = None) -> Mesh:
         """The prepared mesh.
@@ -76,7 +89,7 @@ class DesignFile:
         Raises:
             DesignFileError: when the resolution does not cover the path of contact.
         """
-        resolution = self._resolution if resolution is None else resolution
+        resolution = self.resolution() if resolution is None else resolution
         key, compliance = "resolution", self._compliance
         return _physical(self.path, key, prepare, self._pair, compliance=compliance, resolution=resolution)
 
@@ -143,6 +156,7 @@ def load_design(path: str | Path) -> DesignFile:
         _pair=pair,
         _compliance=_compliance(file, section("model", schema.ModelSection)),
         _resolution=Resolution(**_given(section("resolution", schema.ResolutionSection))),
+        _pairs_given=bool(top.resolution and "pairs" in top.resolution),
         _parts=(parts[0], parts[1]),
     )
 

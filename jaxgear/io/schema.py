@@ -87,6 +87,7 @@ class ResolutionSection(Section):
     pairs: Annotated[int, Meta(ge=2, le=12)] | None = None
     patch_nodes: Annotated[int, Meta(ge=1, le=64)] | None = None
     newton_steps: Annotated[int, Meta(ge=1, le=100)] | None = None
+    tolerance: Annotated[float, Meta(gt=0, lt=1)] | None = None
 
 
 class VariableSection(Section):

@@ -9,6 +9,7 @@ from .base import AbstractModification as AbstractModification
 from .base import Flank as Flank
 from .base import NoModification as NoModification
 from .base import Sum as Sum
+from .base import terms as terms
 from .curves import AbstractCurve as AbstractCurve
 from .curves import Linear as Linear
 from .curves import Parabolic as Parabolic

@@ -37,7 +37,7 @@ class AbstractModification(eqx.Module):
     def __add__(self, other: "AbstractModification") -> "Sum":
         if not isinstance(other, AbstractModification):
             return NotImplemented
-        return Sum((*_terms(self), *_terms(other)))
+        return Sum((*terms(self), *terms(other)))
 
 
 class Sum(AbstractModification):
@@ -59,5 +59,6 @@ class NoModification(AbstractModification):
         return jnp.zeros_like(flank.roll_length)
 
 
-def _terms(modification):
+def terms(modification: AbstractModification) -> tuple[AbstractModification, ...]:
+    """The modifications of a sum, or the modification alone."""
     return modification.terms if isinstance(modification, Sum) else (modification,)

@@ -9,8 +9,8 @@ from jaxtyping import Array, Float
 
 Real = Float[Array, "..."]
 
-# Springs are linear below this line load, where those of elastic contacts would have infinite slopes.
-LOAD_FLOOR = 1e-6
+# Springs are linear below this load (of a contact: 0.01 N/mm), where those of elastic contacts have no finite slope.
+LOAD_FLOOR = 1e-2
 
 
 class AbstractSpring(eqx.Module):

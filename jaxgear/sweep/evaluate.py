@@ -23,7 +23,7 @@ Design = Callable[[Mapping[str, Any]], tuple[AbstractModification | None, Abstra
 _AXIS = "designs"
 _SHARE = 0.95  # of the manufactured gears that are no worse than the quantile
 # Contact points that advance side by side: on a CPU their arrays fit the cache, an accelerator needs many to be busy.
-_SIDE_BY_SIDE = {"cpu": 2**15}
+_SIDE_BY_SIDE = {"cpu": 2**12}
 _SIDE_BY_SIDE_ELSEWHERE = 2**20
 _MOST_DESIGNS = {"cpu": 512}
 # A loop of one step is unrolled by the compiler and rounds differently: with two or more, the rows do not depend on how
