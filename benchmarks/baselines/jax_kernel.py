@@ -8,7 +8,7 @@ from .problem import CROWNING, TORQUE, Problem, plain, prepare
 class JaxKernel:
     """Chunks of `batch` variants that stay in the cache, one after the other on each core."""
 
-    def __init__(self, *, positions: int = 64, slices: int = 1, batch: int = 32, gradient: bool = False):
+    def __init__(self, *, positions: int = 64, slices: int = 1, batch: int = 64, gradient: bool = False):
         """Prepares the mesh; compiles nothing of the solution yet."""
         import jax
         import jax.numpy as jnp

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 TORQUE = 50.0
+DEFLECTION = 40.0  # [um], beyond what any variant reaches
 # one parabolic tip relief per gear: amount [um] and length [mm], of the pinion and of the wheel
 LOWER = np.array([0.0, 1.0, 0.0, 1.0])
 UPPER = np.array([20.0, 5.0, 20.0, 5.0])
@@ -68,11 +69,15 @@ def prepare(positions: int = 64, slices: int = 1):
 
     pinion = jg.Gear(teeth=19, module=3.0, face_width=20.0, bore_diameter=24.0)
     wheel = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=70.0)
-    return jg.prepare(jg.GearPair(pinion, wheel), resolution=jg.Resolution(positions=positions, slices=slices))
+    pair = jg.GearPair(pinion, wheel)
+    pairs = jg.fewest_pairs(pair, deflection=DEFLECTION)
+    return jg.prepare(pair, resolution=jg.Resolution(positions=positions, slices=slices, pairs=pairs))
 
 
 def plain(mesh) -> Problem:
     """The numbers of a prepared mesh with the default compliance model, under the benchmark's torque."""
+    from jaxgear.compliance.hertz import contact_geometry
+
     gears = mesh.pair.pinion, mesh.pair.wheel
     force = 1e3 * TORQUE / float(gears[0].base_radius)
     half_width = np.sqrt(np.asarray(mesh.width_factor) * force / float(mesh.pair.face_width))
@@ -85,15 +90,21 @@ def plain(mesh) -> Problem:
         np.maximum(roll + sign * offset * float(gear.base_radius) / roll, 0.0) - float(gear.tip_roll_length)
         for roll, gear, sign in zip(rolls, gears, (+1, -1))
     ]
-    flank, edge = mesh.law.flank, mesh.law.edge
+    geometry = contact_geometry(mesh.pinion_load, mesh.wheel_load, mesh.compliance.plane, mesh.pair.face_width)
+    edge = mesh.law.edge
+
+    def of_both(value):
+        """Shape (2, pairs, positions)."""
+        return np.stack([np.asarray(value(side))[:, 0] for side in geometry.sides])
+
     law = Law(
-        compliance=np.stack(flank.compliance)[:, :, 0],
-        depth=np.stack(flank.depth)[:, :, 0],
-        poisson=np.stack(flank.poisson)[:, :, 0],
+        compliance=of_both(lambda side: 2e3 / (np.pi * side.modulus)),
+        depth=of_both(lambda side: side.depth),
+        poisson=of_both(lambda side: side.poisson),
         width_factor=np.asarray(mesh.law.width_factor)[:, 0],
-        truncation=np.asarray(mesh.law.truncation)[:, 0],
+        truncation=1e-3 * np.asarray(mesh.law.truncation)[:, 0],
         distance=np.asarray(edge.distance)[:, 0],
-        wedge=np.asarray(edge.wedge)[:, 0],
+        wedge=1e-3 * np.asarray(edge.wedge)[:, 0],
         reach=np.asarray(edge.reach)[:, 0],
     )
     slices = mesh.resolution.slices
