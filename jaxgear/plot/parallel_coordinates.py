@@ -1,5 +1,6 @@
 """Many variants over parallel axes."""
 
+import textwrap
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -13,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from .figure import FONT, HEIGHT, legend_above, line_style, report_axes
 from .variants import Labels, Table, columns_of, costs, label, parts, share_text, subsample
 
+_LABEL_ROOM = 88  # characters that fit side by side under the axes
 _WIDTH = 160.0  # [mm]
 _DARK, _LIGHT = 0.0, 0.72  # part of the colour map that shows on white
 _BEST_STYLES = (1, 3, 0, 5, 4)  # line styles that stand apart from the blues of the cloud
@@ -88,7 +90,7 @@ def _axes(ax: Axes, low: np.ndarray, high: np.ndarray, names: Sequence[str]) -> 
     ax.set(xlim=(-0.15, len(names) - 0.6), ylim=(-0.03, 1.03), yticks=[])
     ax.grid(False)
     ax.spines[["left", "bottom"]].set_visible(False)
-    ax.set_xticks(range(len(names)), [_two_lines(name) for name in names])
+    ax.set_xticks(range(len(names)), [_wrapped(name, _LABEL_ROOM // len(names)) for name in names])
     ax.tick_params(axis="x", length=0)
     for place, (bottom, top) in enumerate(zip(low, high)):
         ax.axvline(place, color="black", linewidth=0.7, zorder=3)
@@ -115,12 +117,8 @@ def _number(ax: Axes, place: int, height: float, text: str) -> None:
     )
 
 
-def _two_lines(name: str) -> str:
-    """Name over unit, and a long name over two lines."""
+def _wrapped(name: str, room: int) -> str:
+    """Name over unit, the name in lines of at most `room` characters where its words allow it."""
     what, _, unit = name.rpartition(" [")
-    words, lines = (what or name).split(" "), [""]
-    for word in words:
-        if lines[-1] and len(lines[-1]) + len(word) > 12:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
+    lines = textwrap.wrap(what or name, max(room, 1), break_long_words=False)
     return "\n".join([*lines, f"[{unit}"] if what else lines)
