@@ -31,6 +31,13 @@ except OSError:  # a read-only home: the tests run all the same, only slower
     pass
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _forget_compiled_programs():
+    """Drops what a file of tests compiled: a process holds some ten thousand programs before the system refuses more."""
+    yield
+    jax.clear_caches()
+
+
 @pytest.fixture
 def interpolation():
     """Allows the promotion of ranks and dtypes that interpax's cubic splines use inside."""

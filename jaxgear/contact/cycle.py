@@ -16,6 +16,8 @@ Load = Float[Array, "pairs slices positions"]
 class MeshCycle(eqx.Module):
     """Result of `solve`: one modification under one torque, over one base pitch.
 
+    Of many cycles made by `jax.vmap`, take properties and metrics under `jax.vmap` too: they know one cycle's axes.
+
     Attributes:
         mesh: the prepared mesh.
         torque: on the pinion [N m].
