@@ -231,7 +231,7 @@ def test_results_go_beside_the_caller_by_default(folder, tmp_path, monkeypatch, 
 
 def test_a_failed_contact_solution_is_loud(folder, tmp_path):
     path = tmp_path / "fails.toml"
-    path.write_text(FIXED.replace("positions = 8", "positions = 8\nnewton_steps = 1"))
+    path.write_text(FIXED.replace("positions = 8", "positions = 8\ntolerance = 1e-30"))
     result = call("analyze", path, "--no-figures", "-o", tmp_path / "out")
     assert result.code == 1
     assert "CONTACT SOLUTION NOT CONVERGED: unmodified at 30" in result.err
