@@ -80,12 +80,13 @@ def test_law_has_the_slope_of_its_deflection(problem):
     np.testing.assert_allclose((higher - lower) / (2e-5 * load), slope, rtol=1e-6)
 
 
-def test_what_a_baseline_cannot_do_is_refused(problem):
+def test_what_a_baseline_cannot_do_is_refused(mesh, problem):
     sliced = replace(problem, slice_width=np.full(3, 6.0), crowning=np.zeros(3))
     with pytest.raises(ValueError, match="one slice"):
         ScipyKernel(sliced)
+    many = case.plain(jg.prepare(mesh.pair, resolution=jg.Resolution(positions=POSITIONS, pairs=4)))
     with pytest.raises(ValueError, match="more than two pairs"):
-        NumpyKernel(replace(problem, corner_gap=np.zeros_like(problem.corner_gap)))
+        NumpyKernel(replace(many, corner_gap=np.zeros_like(many.corner_gap)))
 
 
 def test_contenders_take_turns_and_agree(capsys):

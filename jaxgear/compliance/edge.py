@@ -45,7 +45,7 @@ _WEDGE_REACH = 0.25
 _APEX_DISTANCE = 1.82
 # Distances from the corner below this one [mm] count as this one: no contact is as small.
 _SHORTEST = 1e-6
-_FULL_TERMS = 10  # of a polynomial that is exact to 1e-7
+_FULL_TERMS = 12  # of a polynomial that is exact to 1e-8
 
 
 class Edge(eqx.Module):

@@ -23,8 +23,8 @@ from .toothload import ToothLoad
 Field = Float[Array, "pairs 1 positions"]
 Real = Float[Array, "..."]
 
-# Terms of the depth-referenced law up to a half width of the depth itself: 2e-9 of the deflection.
-_DEPTH_TERMS = 9
+# Terms of the depth-referenced law up to a half width of the depth itself: 3e-10 of the deflection.
+_DEPTH_TERMS = 10
 
 
 class ContactSide(eqx.Module):
