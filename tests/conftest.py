@@ -33,7 +33,7 @@ except OSError:  # a read-only home: the tests run all the same, only slower
 
 @pytest.fixture(scope="module", autouse=True)
 def _forget_compiled_programs():
-    """Drops what a file of tests compiled: a process holds some ten thousand programs before the system refuses more."""
+    """Drops what a file of tests compiled: the system refuses a process that holds too many programs."""
     yield
     jax.clear_caches()
 
