@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import importlib
 import io
 import json
 import os
@@ -151,7 +152,8 @@ def test_rule_based_design_is_the_iso_relief_on_both_tips(folder, optimized):
 
 
 def test_all_result_files_are_there(folder, analyzed, optimized):
-    assert {path.name for path in (folder / "optimized").iterdir()} == RESULT_FILES
+    of_others = {"front.csv", "front.png", "iterations_relief.png", "iterations_transmission_error.png"}
+    assert {path.name for path in (folder / "optimized").iterdir()} == RESULT_FILES - of_others
     assert {path.name for path in (folder / "analyzed").iterdir()} == {"summary.json", "flanks.csv"}
     for path in (folder / "optimized").glob("*.png"):
         assert path.read_bytes().startswith(b"\x89PNG")
@@ -189,27 +191,46 @@ def test_stages_are_lines_where_there_is_no_terminal(optimized):
     assert all(line.startswith("jaxgear: ") for line in optimized.err.splitlines())
 
 
-def test_a_quick_run_is_coarse_short_and_says_so(folder, tmp_path, monkeypatch):
+def test_a_quick_run_is_coarse_and_short(folder, tmp_path, monkeypatch):
     asked = {}
+
+    class Searched(Exception):
+        pass
 
     def search(design, bounds, **options):
         asked.update(options, bounds=bounds)
-        options["callback"](20, options["steps"], 1.0)
-        return SimpleNamespace(
-            parameters={"height": 3.0}, active_bounds={"height": "lower"}, gradient_norm=0.1, evaluations=84
-        )
+        raise Searched
 
-    monkeypatch.setattr(run, "minimize", search)
+    monkeypatch.setattr(importlib.import_module("jaxgear.io.optimize_request"), "minimize", search)
+    monkeypatch.setenv("JAXGEAR_DEBUG", "1")
     path = tmp_path / "fine.toml"
     path.write_text(FREE.replace("positions = 8", "positions = 4096"))
-    result = call("optimize", path, "--quick", "--no-figures", "-o", tmp_path / "out")
-    assert result.code == 0
-    assert "quick run" in result.out and "height is at its lower bound 0 um" in result.out
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert summary["quick"] is True and summary["resolution"]["positions"] == 16
-    assert asked["starts"] == 4 and asked["steps"] == 40 and asked["torque"] == 50.0
+    with pytest.raises(Searched), jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
+        main(["optimize", str(path), "--quick", "--no-figures", "-o", str(tmp_path / "out")])
+    assert asked["method"] == jg.Minimax(starts=4, steps=10) and float(asked["torque"].torques[0]) == 50.0
     assert asked["bounds"] == {"height": (0.0, 20.0)} and asked["mesh"].resolution.positions == 16
-    assert summary["designs"]["optimum"]["pinion_modification"][0]["amount"] == 3.0
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture(scope="module")
+def iterated(folder):
+    """A quick run of another method on the same file."""
+    os.environ["JAXGEAR_NO_CACHE"] = "1"
+    result = call("optimize", folder / "free.toml", "--quick", "-m", "te_iteration", "-o", folder / "iterated")
+    return SimpleNamespace(**vars(result), summary=json.loads((folder / "iterated" / "summary.json").read_text()))
+
+
+def test_another_method_reports_like_every_other(folder, iterated):
+    assert iterated.code == 0 and "quick run" in iterated.out
+    optimum, designs = iterated.summary["optimum"], iterated.summary["designs"]
+    assert iterated.summary["quick"] is True and optimum["method"] == "te_iteration"
+    assert list(designs) == ["unmodified", "rule-based", "optimum", "as cubic"]
+    assert designs["optimum"]["ppte_um"] == pytest.approx(optimum["ppte_um"])
+    assert designs["as cubic"]["ppte_um"] == pytest.approx(optimum["projection"]["ppte_um"])
+    assert optimum["iterations"][0]["ppte"] == pytest.approx(designs["unmodified"]["ppte_um"])
+    assert f"{len(optimum['iterations'])} contact analyses by method te_iteration" in iterated.out
+    names = {path.name for path in (folder / "iterated").iterdir()}
+    assert {"convergence.png", "response_surface.png", "iterations_relief.png"} <= names <= RESULT_FILES
 
 
 def test_results_of_an_earlier_run_are_replaced_and_figures_are_optional(folder, tmp_path, analyzed):
@@ -245,6 +266,16 @@ def test_a_failed_contact_solution_is_loud(folder, tmp_path):
     [
         ("analyze", FREE, ["gear.toml: variables: analyze needs numbers, these are free: height", "jaxgear optimize"]),
         ("optimize", FIXED, ["gear.toml: variables: missing", "jaxgear analyze"]),
+        ("optimize", FREE + 'method = "simplex"', ['optimize.method: "simplex" is not known, must be one of']),
+        ("optimize", FREE + 'objective = "noise"', ['optimize.objective: "noise" is not known']),
+        ("optimize", FREE + 'method = "genetic"', ['optimize.starts: has no effect with method "genetic"']),
+        ("optimize", FREE + 'measure = "worst"', ["optimize.measure: has no effect on a single case"]),
+        ("optimize", FREE + "manufactured = 4", ["optimize.manufactured: needs the table [tolerance]"]),
+        ("optimize", FREE + "torques = [30.0, 30.0]", ["optimize.torques: LoadSpectrum: torques must be different"]),
+        ("optimize", FREE + 'constraint = [{ of = "ppte" }]', ["optimize.constraint[0]: Constraint: low or high"]),
+        ("optimize", FREE + "constraint = [{ variables = { width = 1.0 }, low = 0.0 }]", ['"width" is not a variable']),
+        ("optimize", FREE + 'objective = ["ppte", "mean_te"]', ["optimize.objective: 2 with method", "pareto"]),
+        ("optimize", FREE + "genetic = { population = 2 }", ["optimize.genetic.population: must be"]),
         ("analyze", FIXED.replace("teeth = 19", "teth = 19"), ['pinion.teth: unknown key, did you mean "teeth"?']),
         ("analyze", FIXED.replace("module = 3.0", "module = -3.0", 1), ["pinion: Gear: module = -3 mm must be"]),
         ("optimize", "[pinion", ["gear.toml: line 1: Expected ']' at the end of a table declaration"]),

@@ -14,7 +14,7 @@ import pytest
 import jaxgear as jg
 from jaxgear.geometry import path_of_contact
 from jaxgear.io import DesignFileError, describe, flank_rows, load_design, result_folder, write_summary
-from jaxgear.microgeometry import Flank
+from jaxgear.microgeometry import Flank, ParabolicLinear
 
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.toml"))
 
@@ -100,6 +100,7 @@ MODIFICATIONS = [
 CURVES = [
     ('{ type = "linear" }', jg.Linear()),
     ('{ type = "parabolic" }', jg.Parabolic()),
+    ('{ type = "parabolic_linear", node = 0.3 }', ParabolicLinear(0.3)),
     ('{ type = "power", exponent = 1.5 }', jg.Power(1.5)),
     ('{ type = "quadratic", b0 = 0.1, b1 = 0.4, b2 = 0.5 }', jg.Quadratic(0.1, 0.4, 0.5)),
     ('{ type = "polynomial", coefficients = [0.0, 0.2, 0.3, 0.5] }', jg.Polynomial([0.0, 0.2, 0.3, 0.5])),
@@ -180,7 +181,7 @@ def test_defaults_are_those_of_the_library(load):
     assert eqx.tree_equal(file.resolution(), jg.Resolution(pairs=2))
     assert eqx.tree_equal(file._compliance, jg.default_compliance())
     assert file.torque == 50.0 and file.torque_range == (25.0, 100.0)
-    assert file.title == "gear" and file.bounds == {} and file.starts is None and file.steps is None
+    assert file.title == "gear" and file.bounds == {} and file.optimize.starts is None and file.optimize.method is None
 
 
 MODELS = [

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 
 import jaxgear as jg
-from jaxgear.microgeometry import Flank
+from jaxgear.microgeometry import Flank, ParabolicLinear
 
 START, TIP, WIDTH, BASE = 4.0, 12.0, 20.0, 30.0
 
 CURVES = {
     "linear": (jg.Linear(), lambda d: d),
     "parabolic": (jg.Parabolic(), lambda d: 0.44 * d + 0.56 * d**2),
+    "parabola and tangent": (
+        ParabolicLinear(0.4), lambda d: np.where(d < 0.4, d**2, 0.16 + 0.8 * (d - 0.4)) / 0.64
+    ),
     "power": (jg.Power(1.5), lambda d: d**1.5),
     "quadratic": (jg.Quadratic(0.0, 0.3, 0.7), lambda d: 0.3 * d + 0.7 * d**2),
     "polynomial": (jg.Polynomial([0.0, 0.2, 0.0, 0.8]), lambda d: 0.2 * d + 0.8 * d**3),
@@ -47,7 +50,7 @@ def test_curves_follow_their_formula(name):
     assert curve(jnp.asarray(0.5)).shape == ()
 
 
-@pytest.mark.parametrize("name", ["linear", "parabolic", "power", "quadratic", "polynomial", "step"])
+@pytest.mark.parametrize("name", [n for n in CURVES if n != "sinusoidal"])
 def test_curves_reach_one_at_the_tip(name):
     assert float(CURVES[name][0](jnp.asarray(1.0))) == pytest.approx(1.0, rel=1e-15)
 
@@ -56,6 +59,42 @@ def test_sinusoidal_curve_that_starts_from_zero_and_ends_at_one():
     """sin(b1) = -cos(b2) makes the start zero."""
     curve = jg.Sinusoidal(np.pi / 3, 0.0, -np.pi / 2)
     np.testing.assert_allclose(curve(jnp.asarray([0.0, 1.0])), [0.0, 2 * np.sin(np.pi / 3)], atol=1e-15)
+
+
+def test_parabola_goes_on_along_its_tangent():
+    """Continuous value and slope at the node, straight beyond it, and one at the tip for every node."""
+    slope = jax.vmap(jax.grad(lambda d, n: ParabolicLinear(n)(d)), (0, None))
+    for node in (0.05, 0.5, 0.9):
+        curve, h = ParabolicLinear(node), 1e-9
+        before, after = curve(jnp.asarray([node - h, node + h]))
+        assert float(after - before) == pytest.approx(2 * h * 2 / (2 - node), rel=1e-6)
+        np.testing.assert_allclose(slope(jnp.asarray([0.0, node, 1.0]), node), np.array([0, 2, 2]) / (2 - node))
+        assert float(curve(jnp.asarray(1.0))) == pytest.approx(1.0, rel=1e-15)
+
+
+def test_parabola_and_tangent_between_its_limits():
+    """Node 1 is the pure parabola; towards node 0 it is the straight line, from below."""
+    d = jnp.linspace(0.0, 1.0, 21)
+    np.testing.assert_allclose(ParabolicLinear(1.0)(d), d**2, atol=1e-15)
+    np.testing.assert_allclose(ParabolicLinear(1e-9)(d), d, atol=1e-9)
+    between = ParabolicLinear(0.5)(d)
+    assert bool(jnp.all((d**2 <= between) & (between <= d)))
+    for node in (0.0, 1.01, np.nan):
+        with pytest.raises(ValueError, match="ParabolicLinear: node"):
+            ParabolicLinear(node)
+
+
+def test_derivative_by_the_node_is_continuous_and_finite():
+    """Also at the node itself, where the branches meet, and at a traced node of zero."""
+    by_node = jax.vmap(jax.grad(lambda n, d: ParabolicLinear(n)(d)), (None, 0))
+    d, h = jnp.linspace(0.0, 1.0, 41), 1e-6
+    for node in (0.3, 0.5):
+        central = (ParabolicLinear(node + h)(d) - ParabolicLinear(node - h)(d)) / (2 * h)
+        np.testing.assert_allclose(by_node(node, d), central, atol=1e-6)
+        np.testing.assert_allclose(
+            by_node(node, jnp.asarray([node - 1e-9, node + 1e-9])), -2 * (1 - node) / (2 - node) ** 2, rtol=1e-7
+        )
+    assert bool(jnp.all(jnp.isfinite(by_node(0.0, d))))
 
 
 @pytest.mark.usefixtures("interpolation")

@@ -112,9 +112,9 @@ def test_legend_and_marks_cover_no_data(draw, name):
     assert legend.y1 <= ax.figure.bbox.y1 + 1 and legend.x1 <= ax.figure.bbox.x1 + 1
 
 
-def test_seven_designs_differ_in_colour_and_without():
-    styles = [line_style(index) for index in range(7)]
-    assert len({style["color"] for style in styles}) == len({style["linestyle"] for style in styles}) == 7
+def test_eight_designs_differ_in_colour_and_without():
+    styles = [line_style(index) for index in range(8)]
+    assert len({style["color"] for style in styles}) == len({style["linestyle"] for style in styles}) == 8
 
 
 def test_transmission_error_repeats_one_base_pitch(cycles):

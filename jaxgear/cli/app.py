@@ -9,16 +9,19 @@ from typing import Annotated, NoReturn
 import equinox as eqx
 import typer
 
-from ..io import DesignFileError
+from ..io import DesignFileError, optimize_request
+from ..io.schema import METHODS_WITHOUT_VARIABLES
 from ..microgeometry import NoModification
-from ..optimize import iso_relief
+from ..optimize import METHODS, iso_relief
 from . import report
 from .devices import join_processes, use_all_cores
 from .run import run
 from .sweep import Interrupted, run_sweep
 
 _TORQUES, _QUICK_TORQUES = 25, 7
-_QUICK_POSITIONS, _QUICK_STARTS, _QUICK_STEPS = 16, 4, 40
+_QUICK_POSITIONS = 16
+
+_METHODS = ", ".join((*METHODS, *METHODS_WITHOUT_VARIABLES))
 
 OK, NOT_CONVERGED, FAILED, INTERRUPTED = 0, 1, 2, 130
 
@@ -81,18 +84,21 @@ def analyze(file: File, output: Output = None, no_figures: NoFigures = False, no
 def optimize(
     file: File,
     output: Output = None,
+    method: Annotated[
+        str | None, typer.Option("--method", "-m", metavar="NAME", help=f"In place of the file's: {_METHODS}.")
+    ] = None,
     quick: Quick = False,
     no_figures: NoFigures = False,
     no_cache: NoCache = False,
 ) -> int:
-    """Find the variables of the design file with the least peak-to-peak transmission error (PPTE).
+    """Find the best variables or flanks by the method and for the objective of the design file.
 
-    Compares three designs: unmodified, the rule-based tip relief of ISO 6336-1, and the optimum.
+    Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
+    the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
     """
     with run(file, output, cache=not no_cache) as current:
         design = current.design
-        if not design.bounds:
-            raise DesignFileError(file, "variables", "missing, nothing to optimize; use jaxgear analyze")
+        request = optimize_request(design, method=method, quick=quick)
         if quick:
             current.coarsen(positions=_QUICK_POSITIONS)
         current.prepare(torques=_QUICK_TORQUES if quick else _TORQUES)
@@ -100,8 +106,7 @@ def optimize(
         factor = design.application_factor
         relief = eqx.filter_jit(iso_relief)(design.pair(), design.torque, application_factor=factor)
         current.evaluate("rule-based", relief, relief)
-        starts, steps = (_QUICK_STARTS, _QUICK_STEPS) if quick else (design.starts, design.steps)
-        current.search(starts=starts, steps=steps)
+        current.search(request)
         current.write(figures=not no_figures)
     return OK if current.show() else NOT_CONVERGED
 

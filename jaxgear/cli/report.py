@@ -15,7 +15,6 @@ from rich.table import Table
 from ..contact import Mesh
 from ..io import DesignFile, describe
 from ..io.schema import UNITS
-from ..optimize import Optimum
 from .study import Evaluation
 
 Evaluations = Mapping[str, Evaluation]
@@ -56,19 +55,6 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
     return result
 
 
-def verdict(file: DesignFile, evaluations: Evaluations, optimum: Optimum) -> Iterator[str]:
-    """Lines under the table of an optimization."""
-    before, after = evaluations["unmodified"].metrics["ppte_um"], evaluations["optimum"].metrics["ppte_um"]
-    yield f"PPTE {before:.3f} -> {after:.3f} um: {reduction(evaluations):.1f} % less than unmodified"
-    for name, side in optimum.active_bounds.items():
-        bound = file.bounds[name][side == "upper"]
-        yield f"{name} is at its {side} bound {bound:g} {file.units[name]}".rstrip()
-    if not optimum.active_bounds:
-        yield "no variable is at a bound"
-    yield f"gradient norm at the optimum {optimum.gradient_norm:.2g} um per full range of the variables"
-    yield f"{optimum.evaluations} contact analyses with gradient"
-
-
 def failures(evaluations: Evaluations) -> Iterator[str]:
     """A line for every design whose contact solution failed somewhere."""
     for name, evaluation in evaluations.items():
@@ -81,14 +67,17 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
 
 
 def reduction(evaluations: Evaluations) -> float:
-    """By how much the last design lowers the PPTE of the first [%]."""
-    values = [float(evaluation.metrics["ppte_um"]) for evaluation in evaluations.values()]
-    return 100 * (1 - values[-1] / values[0]) if values[0] else 0.0
+    """By how much the main design lowers the PPTE of the first [%]."""
+    before = float(next(iter(evaluations.values())).metrics["ppte_um"])
+    return 100 * (1 - float(main(evaluations).metrics["ppte_um"]) / before) if before else 0.0
 
 
-def summary(
-    file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray, optimum: Optimum | None
-) -> dict[str, Any]:
+def main(evaluations: Evaluations) -> Evaluation:
+    """The design that the run is about: the optimum where there is one, else the last."""
+    return evaluations.get("optimum", list(evaluations.values())[-1])
+
+
+def summary(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
     """Contents of `summary.json`."""
     size = mesh.resolution
     data: dict[str, Any] = {
@@ -103,14 +92,6 @@ def summary(
             **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
         },
     }
-    if optimum is not None:
-        data["optimum"] = {
-            "parameters": {_with_unit(file, name): value for name, value in optimum.parameters.items()},
-            "bounds": {_with_unit(file, name): limits for name, limits in file.bounds.items()},
-            "active_bounds": optimum.active_bounds,
-            "gradient_norm_um_per_range": optimum.gradient_norm,
-            "evaluations": optimum.evaluations,
-        }
     data["resolution"] = {field.name: getattr(size, field.name) for field in dataclasses.fields(size)}
     data["versions"] = {
         "jaxgear": version(),
@@ -122,14 +103,13 @@ def summary(
 
 
 def write_figures(folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> None:
-    """Writes all figures; the Harris map shows the last design."""
+    """Writes the figures of the designs; the Harris map shows the main one."""
     import matplotlib
 
     matplotlib.use("Agg")  # the command line never shows a window
     from .. import plot
 
     cycles = {name: evaluation.cycle for name, evaluation in evaluations.items()}
-    last = list(evaluations.values())[-1]
     few = np.unique(np.linspace(0, len(torques) - 1, _HARRIS_CURVES).round().astype(int))
     axes: dict[str, Any] = {
         "transmission_error": plot.transmission_error(cycles),
@@ -138,7 +118,7 @@ def write_figures(folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evalu
         "ppte_over_torque": plot.ppte_over_torque(
             torques, {name: evaluation.ppte for name, evaluation in evaluations.items()}, design_torque=file.torque
         ),
-        "harris_map": plot.harris_map(mesh.phase, torques[few], last.transmission_error[few]),
+        "harris_map": plot.harris_map(mesh.phase, torques[few], main(evaluations).transmission_error[few]),
         "k_chart": plot.k_chart(mesh, flanks(evaluations)),
     }
     for name, drawn in axes.items():
@@ -192,10 +172,5 @@ def _text(value, form: str = ".3f") -> str:
         numbers = [_text(number, ".3g") for name, number in value.items() if name != "type"]
         return " ".join([value["type"], *numbers])
     if isinstance(value, list):
-        return f"({len(value)} values)"
+        return " ".join(_text(number, ".3g") for number in value) if len(value) <= 4 else f"({len(value)} values)"
     return value if isinstance(value, str) else format(value, form)
-
-
-def _with_unit(file: DesignFile, name: str) -> str:
-    unit = file.units[name]
-    return f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name

@@ -13,10 +13,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from ..contact import Mesh
-from ..io import DesignFile, load_design, result_folder, write_flanks, write_summary
+from ..io import DesignFile, OptimizeRequest, load_design, result_folder, write_flanks, write_front, write_summary
 from ..microgeometry import AbstractModification
-from ..optimize import Optimum, minimize
-from . import report
+from ..optimize import Optimum, Projection, project
+from . import optimum_report, report
 from .cache import enable_cache
 from .study import Evaluation, Evaluator
 
@@ -29,6 +29,7 @@ class Run:
         self._target, self._folder, self._stages = target, folder, stages
         self._evaluations: dict[str, Evaluation] = {}
         self._optimum: Optimum | None = None
+        self._projection: Projection | None = None
         self._resolution, self._quick = design.resolution(), False
 
     def coarsen(self, *, positions: int) -> None:
@@ -54,39 +55,42 @@ class Run:
         self._stages.begin(f"solving the {name} design")
         self._evaluations[name] = self._evaluator(pinion, wheel)
 
-    def search(self, *, starts: int | None, steps: int | None) -> None:
-        """Finds the optimum of the free variables; None for the defaults of `minimize`."""
-        self._stages.begin("searching the optimum")
+    def search(self, request: OptimizeRequest) -> None:
+        """Finds the optimum, and for flanks without parameters the named curve in their place."""
+        self._stages.begin(f"searching the optimum ({request.method})")
         began = time.perf_counter()
-        counts = {name: value for name, value in {"starts": starts, "steps": steps}.items() if value is not None}
-        optimum = minimize(
-            self.design.design,
-            self.design.bounds,
-            mesh=self._mesh,
-            torque=self.design.torque,
-            callback=self._stages.step,
-            **counts,
-        )
-        self.evaluate("optimum", *self.design.design(optimum.parameters))
+        self._optimum = optimum = request(self._mesh, self._stages.step)
+        self.evaluate("optimum", optimum.pinion, optimum.wheel)
         spent = time.perf_counter() - began
         self._evaluations["optimum"] = dataclasses.replace(self._evaluations["optimum"], seconds=spent)
-        self._optimum = optimum
+        if request.curve is not None:
+            self._stages.begin(f"projecting the flanks on a {request.curve} curve")
+            self._projection = projection = project(optimum, request.curve)
+            self.evaluate(f"as {request.curve}", projection.pinion, projection.wheel)
 
     def write(self, *, figures: bool) -> None:
         """Writes the result files."""
         self._stages.begin("writing the results")
-        data = report.summary(self.design, self._mesh, self._evaluations, self._torques, self._optimum)
+        data = report.summary(self.design, self._mesh, self._evaluations, self._torques)
+        if self._optimum is not None:
+            data["optimum"] = optimum_report.summary(self.design, self._optimum, self._projection)
         write_summary(self._folder / "summary.json", {**data, "quick": self._quick})
         write_flanks(self._folder / "flanks.csv", self._mesh, report.flanks(self._evaluations))
+        if self._optimum is not None and self._optimum.front is not None:
+            write_front(self._folder / "front.csv", self._optimum.front)
         if figures:
             report.write_figures(self._folder, self.design, self._mesh, self._evaluations, self._torques)
+            if self._optimum is not None:
+                surface = self._evaluator.response_surface(self._optimum.pinion, self._optimum.wheel)
+                optimum_report.write_figures(self._folder, self._mesh, self._optimum, surface)
 
     def show(self) -> bool:
         """Prints the comparison, after the results are in place; False when a contact solution failed."""
         out = report.console()
         out.print(report.table(self.design, self._evaluations))
         if self._optimum is not None:
-            for line in report.verdict(self.design, self._evaluations, self._optimum):
+            reduction = report.reduction(self._evaluations)
+            for line in optimum_report.verdict(self.design, self._optimum, self._projection, reduction):
                 out.print(line, soft_wrap=True)
         if self._quick:
             out.print("quick run: coarse positions and a short search, not a result to build on", soft_wrap=True)
@@ -126,7 +130,7 @@ class Stages:
 
     def step(self, step: int, total: int, best: float) -> None:
         """Callback of the search."""
-        self._progress.update(self._task, completed=step, total=total, note=f"best PPTE {best:.3f} um")
+        self._progress.update(self._task, completed=step, total=total, note=f"best {best:.4g}")
 
 
 @contextmanager

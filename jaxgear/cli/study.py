@@ -14,6 +14,8 @@ from ..microgeometry import AbstractModification
 
 Metrics = dict[str, float | bool]
 
+_SURFACE_REACH, _SURFACE_TORQUES = 2.0, 21
+
 
 @dataclass(frozen=True)
 class Evaluation:
@@ -71,6 +73,17 @@ class Evaluator:
             failed_torques=sorted({float(torque) for torque in self._torques[~converged.all(axis=1)]}),
             seconds=seconds,
         )
+
+    def response_surface(self, pinion: AbstractModification, wheel: AbstractModification):
+        """Transmission error from zero load to twice the design torque.
+
+        Returns:
+            the torques [N m], shape (torques,), and the transmission error [um], shape (torques, positions).
+        """
+        torques = np.linspace(0.0, _SURFACE_REACH * self._torques[0], _SURFACE_TORQUES)
+        removed = np.asarray(_removed_material(self._mesh, jnp.asarray(torques), pinion, wheel))
+        cycles = [solve_removed(self._mesh, float(t), jnp.asarray(r)) for t, r in zip(torques, removed)]
+        return torques, np.asarray([cycle.transmission_error for cycle in cycles])
 
     def _solve(self, removed: np.ndarray, index: int) -> MeshCycle:
         return solve_removed(self._mesh, float(self._torques[index]), jnp.asarray(removed[index]))

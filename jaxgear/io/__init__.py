@@ -4,9 +4,12 @@ from .design_file import DesignFile as DesignFile
 from .design_file import load_design as load_design
 from .errors import DesignFileError as DesignFileError
 from .folder import result_folder as result_folder
+from .optimize_request import OptimizeRequest as OptimizeRequest
+from .optimize_request import optimize_request as optimize_request
 from .results import describe as describe
 from .results import flank_rows as flank_rows
 from .results import write_flanks as write_flanks
+from .results import write_front as write_front
 from .results import write_summary as write_summary
 from .sweep_request import SweepRequest as SweepRequest
 from .sweep_request import sweep_request as sweep_request

@@ -38,8 +38,8 @@ class DesignFile:
         friction: mean coefficient of friction; used with a speed only, None for the library's default.
         bounds: (low, high) of every free parameter, in its unit.
         units: unit of every free parameter, "" for a pure number.
-        starts, steps: of the gradient search, None for the library's default.
         application_factor: K_A of the rule-based relief.
+        optimize: the table of that name; `optimize_request` makes sense of it.
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
     """
@@ -52,9 +52,8 @@ class DesignFile:
     friction: float | None
     bounds: dict[str, tuple[float, float]]
     units: dict[str, str]
-    starts: int | None
-    steps: int | None
     application_factor: float
+    optimize: schema.OptimizeSection
     sweep: schema.SweepSection | None
     tolerance: schema.ToleranceSection | None
     _pair: GearPair
@@ -132,7 +131,7 @@ def load_design(path: str | Path) -> DesignFile:
     pair = _physical(file, "pair", GearPair, *gears, **_given(section("pair", schema.PairSection)))
     load = _load(file, section("load", schema.LoadSection))
     optimize = section("optimize", schema.OptimizeSection)
-    if top.optimize is not None and not top.variables:
+    if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
         raise DesignFileError(file, "optimize", "has no effect without [variables]")
     bounds, units = _variables(file, top.variables or {}, [*parts[0], *parts[1]])
     if top.sweep is not None and not top.variables:
@@ -148,9 +147,8 @@ def load_design(path: str | Path) -> DesignFile:
         friction=load.friction,
         bounds=bounds,
         units=units,
-        starts=optimize.starts,
-        steps=optimize.steps,
         application_factor=factor,
+        optimize=optimize,
         sweep=None if top.sweep is None else section("sweep", schema.SweepSection),
         tolerance=None if top.tolerance is None else section("tolerance", schema.ToleranceSection),
         _pair=pair,

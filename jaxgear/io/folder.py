@@ -12,6 +12,12 @@ RESULT_FILES = frozenset(
     {
         "summary.json",
         "flanks.csv",
+        "front.csv",
+        "front.png",
+        "convergence.png",
+        "iterations_relief.png",
+        "iterations_transmission_error.png",
+        "response_surface.png",
         "transmission_error.png",
         "load_sharing.png",
         "pressure.png",

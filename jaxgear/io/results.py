@@ -1,4 +1,4 @@
-"""Result files: `summary.json` and `flanks.csv`."""
+"""Result files: `summary.json`, `flanks.csv` and `front.csv`."""
 
 import csv
 import json
@@ -15,6 +15,7 @@ import numpy as np
 from ..contact import Mesh
 from ..geometry import diameter, roll_angle
 from ..microgeometry import AbstractModification, Flank, NoModification, Sum
+from ..optimize import Front
 from .schema import CURVES, MODIFICATIONS
 
 Designs = Mapping[str, tuple[AbstractModification, AbstractModification]]
@@ -60,6 +61,16 @@ def write_flanks(path: Path, mesh: Mesh, designs: Designs) -> None:
         writer.writerow(_COLUMNS)
         for design, gear, *values in flank_rows(mesh, designs):
             writer.writerow([design, gear, *(f"{value:.6f}" for value in values)])
+
+
+def write_front(path: Path, front: Front) -> None:
+    """Writes a Pareto front as CSV: objectives and parameters of every design."""
+    names = [f"{name}_{unit}" if unit else name for name, unit in zip(front.objectives, front.units)]
+    columns = [*front.values.T, *front.parameters.values()]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*names, *front.parameters])
+        writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns))
 
 
 def write_summary(path: Path, data: Mapping[str, Any]) -> None:

@@ -97,9 +97,88 @@ class VariableSection(Section):
 
 
 class OptimizeSection(Section):
+    method: str | None = None
+    objective: str | list[str] | None = None
+    measure: Literal["mean", "worst", "quantile", "cvar"] | None = None
+    level: Annotated[float, Meta(gt=0, lt=1)] | None = None
+    torques: list[float] | None = None
+    weights: list[float] | None = None
+    manufactured: Annotated[int, Meta(ge=1, le=10_000)] | None = None
+    seed: Annotated[int, Meta(ge=0)] | None = None
     starts: Annotated[int, Meta(ge=1, le=4096)] | None = None
     steps: Annotated[int, Meta(ge=10, le=100_000)] | None = None
     application_factor: float | None = None
+    constraint: list[Table] = []
+    genetic: Table | None = None
+    cma_es: Table | None = None
+    differential_evolution: Table | None = None
+    factorial: Table | None = None
+    pareto: Table | None = None
+    te_iteration: Table | None = None
+    free_form: Table | None = None
+
+
+class ConstraintSection(Section):
+    of: str | None = None
+    variables: dict[str, float] | None = None
+    low: float | None = None
+    high: float | None = None
+
+
+class _EvolutionOptions(Section):
+    population: Annotated[int, Meta(ge=4, le=100_000)] | None = None
+    generations: Annotated[int, Meta(ge=1, le=100_000)] | None = None
+
+
+class GeneticOptions(_EvolutionOptions):
+    crossover: Annotated[float, Meta(ge=0, le=1)] | None = None
+
+
+class CMAESOptions(_EvolutionOptions):
+    spread: Annotated[float, Meta(gt=0, le=1)] | None = None
+
+
+class DifferentialEvolutionOptions(_EvolutionOptions):
+    pass
+
+
+class FactorialOptions(Section):
+    levels: int | dict[str, int] | None = None
+
+
+class ParetoOptions(Section):
+    points: Annotated[int, Meta(ge=2, le=4096)] | None = None
+    steps: Annotated[int, Meta(ge=10, le=100_000)] | None = None
+
+
+class IterationOptions(Section):
+    start: Literal["unmodified", "given", "low_pressure"] = "unmodified"
+    max_relief: Annotated[float, Meta(gt=0)] | None = None
+    tolerance: Annotated[float, Meta(gt=0)] | None = None
+    steps: Annotated[int, Meta(ge=1, le=1000)] | None = None
+    curve: str | None = None
+
+
+class FreeFormOptions(Section):
+    points: Annotated[int, Meta(ge=4, le=500)] | None = None
+    max_relief: Annotated[float, Meta(gt=0)] | None = None
+    curvature: Annotated[float, Meta(ge=0)] | None = None
+    steps: Annotated[int, Meta(ge=1, le=10_000)] | None = None
+    curve: str | None = None
+
+
+# They seek the flanks themselves.
+METHODS_WITHOUT_VARIABLES = ("te_iteration", "free_form")
+# The tables [optimize.<method>] of the methods that have one.
+METHOD_OPTIONS: dict[str, type[Section]] = {
+    "genetic": GeneticOptions,
+    "cma_es": CMAESOptions,
+    "differential_evolution": DifferentialEvolutionOptions,
+    "factorial": FactorialOptions,
+    "pareto": ParetoOptions,
+    "te_iteration": IterationOptions,
+    "free_form": FreeFormOptions,
+}
 
 
 class SweepSection(Section):
@@ -139,6 +218,10 @@ class _PolynomialCurve(Section):
     coefficients: list[Value]
 
 
+class _ParabolicLinearCurve(Section):
+    node: Value
+
+
 class _SplineCurve(Section):
     values: list[Value]
 
@@ -168,6 +251,7 @@ class _TabulatedProfile(Section):
 CURVES: dict[str, tuple[type[microgeometry.AbstractCurve], type[Section]]] = {
     "linear": (microgeometry.Linear, _Plain),
     "parabolic": (microgeometry.Parabolic, _Plain),
+    "parabolic_linear": (microgeometry.ParabolicLinear, _ParabolicLinearCurve),
     "power": (microgeometry.Power, _PowerCurve),
     "quadratic": (microgeometry.Quadratic, _ThreeCoefficients),
     "polynomial": (microgeometry.Polynomial, _PolynomialCurve),

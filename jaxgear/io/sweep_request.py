@@ -81,7 +81,7 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
         load=_load(design, section),
         results=wanted,
         part_rows=section.part_rows,
-        tolerance=None if tolerance is None else _tolerance(design, tolerance),
+        tolerance=None if tolerance is None else tolerance_of(design, tolerance),
         samples=0 if tolerance is None else tolerance.samples,
         seed=0 if tolerance is None else tolerance.seed,
     )
@@ -114,7 +114,9 @@ def _load(design: DesignFile, section: schema.SweepSection) -> LoadSpectrum:
     return _refused(design, key, lambda: LoadSpectrum(section.torques, section.weights))
 
 
-def _tolerance(design: DesignFile, section: schema.ToleranceSection) -> Tolerance:
+def tolerance_of(design: DesignFile, section: schema.ToleranceSection) -> Tolerance:
+    """The tolerance of the table [tolerance]; without lead deviations on a mesh of one slice."""
+
     def make():
         return Tolerance.from_class(design.pair(), section.quality_class, misalignment=section.misalignment)
 

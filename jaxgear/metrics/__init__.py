@@ -1,5 +1,13 @@
-"""Free functions on a `MeshCycle`: what the loaded mesh means for noise, strength and losses."""
+"""Free functions on a `MeshCycle`: what the loaded mesh means for noise, strength and losses.
 
+Those of `flank` take a prepared `Mesh` and the modifications instead: what has to be ground.
+"""
+
+from .flank import max_relief as max_relief
+from .flank import profile_relief as profile_relief
+from .flank import relief_reversal as relief_reversal
+from .flank import removed_at as removed_at
+from .flank import removed_volume as removed_volume
 from .flash import flash_temperature as flash_temperature
 from .load import ContactShock as ContactShock
 from .load import contact_shock as contact_shock

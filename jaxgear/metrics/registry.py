@@ -87,6 +87,11 @@ RESULTS: Mapping[str, Result] = MappingProxyType(
         "te_harmonic_3": _te_harmonic(3),
         "max_flank_pressure": Result(lambda c: jnp.max(c.contact_pressure), "MPa", "largest Hertzian flank pressure"),
         "max_corner_pressure": Result(lambda c: jnp.max(c.corner_pressure), "MPa", "largest pressure of a tip edge"),
+        "max_contact_pressure": Result(
+            lambda c: jnp.max(jnp.maximum(c.contact_pressure, c.corner_pressure)),
+            "MPa",
+            "largest pressure of flanks and tip edges",
+        ),
         "max_line_load": Result(lambda c: jnp.max(c.line_load), "N/mm", "largest line load"),
         "contact_ratio": Result(
             lambda c: c.mesh.path_of_contact.contact_ratio, "", "theoretical contact ratio", worst="min"

@@ -13,6 +13,7 @@ from .base import terms as terms
 from .curves import AbstractCurve as AbstractCurve
 from .curves import Linear as Linear
 from .curves import Parabolic as Parabolic
+from .curves import ParabolicLinear as ParabolicLinear
 from .curves import Polynomial as Polynomial
 from .curves import Power as Power
 from .curves import Quadratic as Quadratic

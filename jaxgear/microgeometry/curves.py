@@ -2,7 +2,8 @@
 
 Sources: the linear and the 0.44/0.56 parabolic forms are the usual tip-relief forms of the literature on genetic
 optimisation of spur gears; power, quadratic, polynomial and sinusoidal forms are those compared for dynamic relief
-design, with their coefficients b_i as free parameters.
+design, with their coefficients b_i as free parameters; the parabola that goes on along its tangent is the single-node
+spline of ground flanks that are designed from the static transmission error.
 """
 
 from abc import abstractmethod
@@ -12,7 +13,7 @@ import interpax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import check, real, safe_power
+from ..numerics import check, real, safe_divide, safe_power
 
 
 class AbstractCurve(eqx.Module):
@@ -77,6 +78,23 @@ class Polynomial(AbstractCurve):
         for power in reversed(range(self.coefficients.shape[0])):
             value = value * d + self.coefficients[power]
         return value
+
+
+class ParabolicLinear(AbstractCurve):
+    """Parabola c d^2 up to the node n, from there on its tangent c n (2 d - n), with c = 1 / (2 n - n^2).
+
+    Value and slope are continuous in the depth and in the node. A node of 1 is the pure parabola; towards 0 the curve
+    becomes the straight line.
+    """
+
+    node: Float[Array, ""] = eqx.field(converter=real)
+
+    def __check_init__(self):
+        check("ParabolicLinear", "node", self.node, "", low=0.0, open_low=True, high=1.0)
+
+    def __call__(self, d):
+        tangent = 2 * d - self.node
+        return jnp.where(d < self.node, safe_divide(d * d, self.node), tangent) / (2 - self.node)
 
 
 class Sinusoidal(AbstractCurve):

@@ -1,4 +1,4 @@
-"""Numerical tools without a gear word in them: fields, safe functions, quadrature, roots, complementarity."""
+"""Numerical tools without a gear word in them: fields, safe functions, quadrature, roots, complementarity, risk."""
 
 from .complementarity import ContactProblem as ContactProblem
 from .complementarity import ContactSolution as ContactSolution
@@ -10,6 +10,11 @@ from .fields import optional_real as optional_real
 from .fields import real as real
 from .logarithm import log as log
 from .quadrature import gauss_legendre as gauss_legendre
+from .risk import AbstractMeasure as AbstractMeasure
+from .risk import CVaR as CVaR
+from .risk import Mean as Mean
+from .risk import Quantile as Quantile
+from .risk import Worst as Worst
 from .root import bracketed_root as bracketed_root
 from .safe import safe_divide as safe_divide
 from .safe import safe_log as safe_log

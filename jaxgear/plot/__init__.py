@@ -1,19 +1,25 @@
-"""Pictures of mesh cycles, flank modifications, many variants and manufactured gears, one file per kind.
+"""Pictures of mesh cycles, flanks, many variants, manufactured gears and optimizations, one file per kind.
 
 Every function draws into the Axes `ax`, or into a new figure of report size when `ax` is None, and returns the Axes.
 None shows a window or changes matplotlib's settings; `save` writes the file.
 """
 
+from .convergence import convergence as convergence
 from .fan import fan as fan
 from .fan import ppte_histogram as ppte_histogram
 from .figure import save as save
+from .iterations import iterations_relief as iterations_relief
+from .iterations import iterations_transmission_error as iterations_transmission_error
 from .k_chart import k_chart as k_chart
 from .load_sharing import load_sharing as load_sharing
+from .optimizer_comparison import optimizer_comparison as optimizer_comparison
+from .optimum_front import optimum_front as optimum_front
 from .parallel_coordinates import parallel_coordinates as parallel_coordinates
 from .pareto import pareto as pareto
 from .pressure import pressure as pressure
 from .pressure_map import pressure_map as pressure_map
 from .radar import radar as radar
+from .response_surface import response_surface as response_surface
 from .torque import harris_map as harris_map
 from .torque import ppte_over_torque as ppte_over_torque
 from .transmission_error import transmission_error as transmission_error

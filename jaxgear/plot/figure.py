@@ -19,9 +19,9 @@ WIDTH, HEIGHT = 120.0, 75.0  # of a figure in a report [mm]
 FONT = 9.0  # [pt]
 _DPI = 200
 
-# Okabe and Ito's colours, which stay apart for every kind of colour vision, without the yellow that pales on paper;
-# each comes with its own dashes for a black-and-white print.
-_COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+# Okabe and Ito's colours, which stay apart for every kind of colour vision, with a grey for the yellow that pales on
+# paper; each comes with its own dashes for a black-and-white print.
+_COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C8C8C")
 _DASHES = (
     "-",
     (0, (6, 1.5)),
@@ -30,10 +30,12 @@ _DASHES = (
     (0, (3, 1.5)),
     (0, (9, 2, 2, 2, 2, 2)),
     (0, (1, 2)),
+    (0, (12, 2)),
 )
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")
 GREY = "#595959"
 PALE = "#D9D9D9"
+_LEGEND_LINE = 12.0  # [pt]
 ABOVE_MARKS = 16.0  # [pt]; clears a line of text that stands on the Axes
 
 _STYLE = {
@@ -56,6 +58,21 @@ def line_style(index: int) -> dict:
 def marker_style(index: int) -> dict:
     """`line_style` with a marker on every point."""
     return {**line_style(index), "marker": _MARKERS[index % len(_MARKERS)], "markersize": 3.5}
+
+
+def point_style(index: int) -> dict:
+    """Colour and marker of the points with this number, without a line; sixteen differ, the second eight hollow."""
+    colour = _COLOURS[index % len(_COLOURS)]
+    hollow = index // len(_COLOURS) % 2 == 1
+    return {
+        "color": colour,
+        "marker": _MARKERS[index % len(_MARKERS)],
+        "linestyle": "",
+        "markersize": 5.5 if hollow else 6.5,
+        "markerfacecolor": "white" if hollow else colour,
+        "markeredgecolor": colour if hollow else "white",
+        "markeredgewidth": 1.2 if hollow else 0.5,
+    }
 
 
 @contextmanager
@@ -86,16 +103,19 @@ def report_figure(width: float, height: float) -> Iterator[Figure]:
         yield plt.figure(figsize=(width / _INCH, height / _INCH), layout="constrained")
 
 
-def legend_above(ax: Axes, *, distance: float = 4.0) -> None:
+def legend_above(ax: Axes, *, distance: float = 4.0) -> int:
     """Legend over the Axes, where it covers no data, in as many columns as fit.
 
     Args:
         ax: Axes with labelled artists.
         distance: between Axes and legend [pt]; `ABOVE_MARKS` where letters stand in between.
+
+    Returns:
+        its number of lines.
     """
     handles, labels = ax.get_legend_handles_labels()
     if not handles:
-        return
+        return 0
     room = laid_out_size(ax)[0]
     lift = ScaledTranslation(0, distance / _POINTS_PER_INCH, _root(ax).dpi_scale_trans)
     for columns in range(len(labels), 0, -1):
@@ -113,7 +133,32 @@ def legend_above(ax: Axes, *, distance: float = 4.0) -> None:
             columnspacing=1.5,
         )
         if _in_points(ax, legend.get_window_extent().width) <= room:
-            return
+            break
+    return -(-len(labels) // columns)
+
+
+def legend_over_panels(figure: Figure, panel: Axes) -> int:
+    """Legend of one panel over all panels of a new figure, in as many columns as fit.
+
+    Returns:
+        its number of lines.
+    """
+    handles, labels = panel.get_legend_handles_labels()
+    for columns in range(len(labels), 0, -1):
+        legend = figure.legend(
+            handles, labels, loc="outside upper center", ncols=columns, handlelength=2.6, frameon=False
+        )
+        figure.draw_without_rendering()
+        if legend.get_window_extent().width <= figure.bbox.width or columns == 1:
+            return -(-len(labels) // columns)
+        legend.remove()
+    return 0
+
+
+def grow(ax: Axes, lines: int) -> None:
+    """Makes a new figure higher by the lines of a long legend, which would else take their room from the Axes."""
+    figure = _root(ax)
+    figure.set_figheight(figure.get_figheight() + lines * _LEGEND_LINE / _POINTS_PER_INCH)
 
 
 def laid_out_size(ax: Axes) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from ..contact import Mesh
 from ..geometry import Gear, roll_angle
 from ..microgeometry import AbstractModification, Flank, NoModification
-from .figure import HEIGHT, legend_above, line_style, report_axes
+from .figure import HEIGHT, legend_above, legend_over_panels, line_style, report_axes
 
 _POINTS = 201  # over the active profile
 _WIDTH = 150.0  # of the two panels together [mm]
@@ -52,11 +52,7 @@ def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray:
         panels[0].set_ylabel("material removed [µm]")
         _downwards(panels)
         if own:
-            handles, labels = panels[0].get_legend_handles_labels()
-            columns = min(len(labels), 4) or 1
-            panels[0].figure.legend(
-                handles, labels, loc="outside upper center", ncols=columns, handlelength=2.6, frameon=False
-            )
+            legend_over_panels(panels[0].figure, panels[0])
         else:
             legend_above(panels[0], distance=_ABOVE_DIAMETERS)
     return np.asarray(panels)

@@ -54,13 +54,14 @@ def pareto(
         _cloud(ax, values[others], share_text(total, total, len(values) - total))
         best = values[front][np.argsort(values[front, 0], kind="stable")]
         if colour is None:
-            _steps(ax, best, names, maximize)
+            # along x, the next variant is better in y: where x is to be small the old y holds until there
+            where = "pre" if x in maximize else "post"
+            front_steps(ax, best, f"Pareto front, {len(best)} variants", where=where)
         else:
-            _coloured(ax, best, label(colour, labels), turned=colour in maximize)
+            text = f"Pareto front of three, {len(best)} variants"
+            front_dots(ax, best, text, label(colour, labels), turned=colour in maximize)
         for index, (name, row) in enumerate((marked or {}).items()):
-            style = line_style(index + 2)
-            ax.plot(*values[row, :2], marker="*", markersize=11, linestyle="", color=style["color"], label=name,
-                    markeredgecolor="white", zorder=5)  # fmt: skip
+            front_star(ax, values[row], name, index)
         ax.set(xlabel=label(x, labels), ylabel=label(y, labels))
         legend_above(ax)
     return ax
@@ -75,17 +76,22 @@ def _cloud(ax: Axes, others: np.ndarray, text: str) -> None:
     ax.plot([], [], "h", markersize=6, color="#A6A6A6", label=f"{text}, darker where there are more")
 
 
-def _steps(ax: Axes, best: np.ndarray, names, maximize: Collection[str]) -> None:
-    """The border of what is beaten: from every variant of the front straight on to where the next one takes over."""
-    # along x, the next variant is better in y: where x is to be small the old y holds until there, else the new one
-    where = "pre" if names[0] in maximize else "post"
+def front_steps(ax: Axes, best: np.ndarray, text: str, *, where: str = "post") -> None:
+    """The border of what is beaten: from every design of the front straight on to where the next one takes over.
+
+    Args:
+        ax: Axes to draw into.
+        best: the front, ascending in the first column.
+        text: its label.
+        where: "post" where the first column is to be small, "pre" where it is to be large.
+    """
     style = line_style(1)
     ax.step(*best[:, :2].T, where=where, color=style["color"], linewidth=1.0)
-    text = f"Pareto front, {len(best)} variants"
     ax.plot(*best[:, :2].T, "o", markersize=4, color=style["color"], label=text, zorder=4)
 
 
-def _coloured(ax: Axes, best: np.ndarray, text: str, *, turned: bool) -> None:
+def front_dots(ax: Axes, best: np.ndarray, text: str, bar_text: str, *, turned: bool = False) -> None:
+    """A front of three with the third column as colour; `turned` where large values are the better ones."""
     image = ax.scatter(
         *best[:, :2].T,
         c=best[:, 2],
@@ -94,8 +100,14 @@ def _coloured(ax: Axes, best: np.ndarray, text: str, *, turned: bool) -> None:
         edgecolors=GREY,
         linewidths=0.4,
         zorder=4,
-        label=f"Pareto front of three, {len(best)} variants",
+        label=text,
     )
     bar = ax.figure.colorbar(image, ax=ax, pad=0.03)
-    bar.set_label(text)
+    bar.set_label(bar_text)
     bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
+
+
+def front_star(ax: Axes, values: np.ndarray, text: str, index: int = 0) -> None:
+    """A star at a design that is pointed out."""
+    style = {"color": line_style(index + 2)["color"], "markeredgecolor": "white"}
+    ax.plot(*values[:2], marker="*", markersize=11, linestyle="", label=text, zorder=5, **style)

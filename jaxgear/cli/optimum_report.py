@@ -1,0 +1,113 @@
+"""What a run says and writes about its optimum, alike for every method."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..contact import Mesh
+from ..io import DesignFile, describe
+from ..optimize import QUANTITIES, Optimum, Projection
+
+_SHOWN_BOUNDS = 8
+
+
+def verdict(file: DesignFile, optimum: Optimum, projection: Projection | None, reduction: float) -> Iterator[str]:
+    """Lines under the table of an optimization."""
+    ppte = optimum.ppte
+    before = ppte / (1 - reduction / 100) if reduction < 100 else float("nan")
+    yield f"PPTE {before:.3f} -> {ppte:.3f} um: {reduction:.1f} % less than unmodified"
+    if optimum.objective_name != "ppte":
+        yield f"{optimum.objective_name}: {optimum.objective:.4g}"
+    yield from _bounds(file, optimum)
+    for name, value in optimum.constraints.items():
+        unit = QUANTITIES[name].unit if name in QUANTITIES else ""
+        yield f"{name} {value:.4g} {unit}".rstrip()
+    if optimum.violation > 0:
+        yield f"constraints are passed by {100 * optimum.violation:.2g} % of their limit"
+    for step, state in enumerate(optimum.iterations):
+        yield (
+            f"iteration {step}: PPTE {state.ppte:.3f} um (lower limit {state.limit:.3f}), up to "
+            f"{state.max_relief:.2f} um removed, {state.max_flank_pressure:.0f} MPa on the flank, "
+            f"{state.max_corner_pressure:.0f} at the corner"
+        )
+    if projection is not None:
+        yield from str(projection).splitlines()
+    if optimum.front is not None:
+        yield f"{len(optimum.front.values)} designs on the Pareto front, in front.csv; the optimum is the compromise"
+    if np.isfinite(optimum.gradient_norm):
+        yield f"gradient norm at the optimum {optimum.gradient_norm:.2g} per full range of the variables"
+    yield f"{optimum.evaluations} contact analyses by method {optimum.method} (one with gradient counts as three)"
+
+
+def summary(file: DesignFile, optimum: Optimum, projection: Projection | None) -> dict[str, Any]:
+    """The optimum as plain data."""
+    data = optimum.summary()
+    data["parameters"] = {_with_unit(file, name): value for name, value in optimum.parameters.items()}
+    if set(optimum.parameters) == set(file.bounds):
+        data["bounds"] = {_with_unit(file, name): limits for name, limits in file.bounds.items()}
+    if optimum.iterations:
+        names = ("ppte", "limit", "max_relief", "max_flank_pressure", "max_corner_pressure")
+        data["iterations"] = [{name: getattr(state, name) for name in names} for state in optimum.iterations]
+    if projection is not None:
+        data["projection"] = {
+            "curve": projection.curve,
+            "ppte_um": projection.ppte,
+            "loss_um": projection.loss,
+            "misfit_um": projection.misfit,
+            "pinion_modification": describe(projection.pinion),
+            "wheel_modification": describe(projection.wheel),
+        }
+    return data
+
+
+def write_figures(folder: Path, mesh: Mesh, optimum: Optimum, surface: tuple[np.ndarray, np.ndarray]) -> None:
+    """Writes the figures of the search and of the optimum over all loads."""
+    from .. import plot
+
+    torques, errors = surface
+    unloaded = optimum.cycle.unloaded_transmission_error
+    axes: dict[str, Any] = {
+        "convergence": plot.convergence({optimum.method: optimum}),
+        "response_surface": plot.response_surface(
+            mesh.phase, torques, errors, unloaded, design_torque=float(optimum.cycle.torque)
+        ),
+    }
+    if optimum.iterations:
+        axes["iterations_relief"] = plot.iterations_relief(mesh, optimum)
+        axes["iterations_transmission_error"] = plot.iterations_transmission_error(optimum, mesh.phase)
+    if optimum.front is not None:
+        axes["front"] = plot.optimum_front(optimum.front, chosen=_chosen(optimum))
+    for name, drawn in axes.items():
+        plot.save(np.ravel(drawn)[0].figure, folder / f"{name}.png")
+
+
+def _chosen(optimum: Optimum) -> int:
+    """Row of the front that the optimum is."""
+    front = optimum.front
+    assert front is not None
+    table = np.stack([front.parameters[name] for name in optimum.parameters], axis=1)
+    values = np.asarray(list(optimum.parameters.values()))
+    return int(np.abs(table - values).max(axis=1).argmin())
+
+
+def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[str]:
+    if not optimum.parameters:
+        return
+    free = {name: side for name, side in optimum.active_bounds.items() if name in file.bounds}
+    if set(optimum.parameters) != set(file.bounds):
+        yield f"{len(optimum.parameters)} values of the flanks, {len(optimum.active_bounds)} of them at a bound"
+        return
+    for name, side in list(free.items())[:_SHOWN_BOUNDS]:
+        bound = file.bounds[name][side == "upper"]
+        yield f"{name} is at its {side} bound {bound:g} {file.units[name]}".rstrip()
+    if len(free) > _SHOWN_BOUNDS:
+        yield f"and {len(free) - _SHOWN_BOUNDS} more variables are at a bound"
+    if not free:
+        yield "no variable is at a bound"
+
+
+def _with_unit(file: DesignFile, name: str) -> str:
+    unit = file.units.get(name, "")
+    return f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name

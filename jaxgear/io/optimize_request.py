@@ -1,0 +1,245 @@
+"""What the table [optimize] of a design file asks for."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+import jax.numpy as jnp
+import msgspec
+
+from ..contact import Mesh
+from ..numerics import AbstractMeasure, CVaR, Mean, Quantile, Worst
+from ..optimize import METHODS, QUANTITIES, Constraint, Optimum, free_form, iterate_transmission_error, minimize
+from ..optimize.projection import CURVES
+from ..optimize.search import Callback
+from ..sweep import LoadSpectrum
+from ..tolerance import Tolerance
+from . import schema
+from .design_file import DesignFile
+from .errors import DesignFileError, suggestion
+from .sweep_request import tolerance_of
+from .toml import decode
+
+T = TypeVar("T")
+
+_DEFAULT_METHOD = "minimax"
+_CURVE = "cubic"  # on which flanks without parameters are projected
+_KNOWN = (*METHODS, *schema.METHODS_WITHOUT_VARIABLES)
+_STARTS = ("minimax", "adam", "lbfgs")  # methods of `starts` and `steps`
+_MEASURES: Mapping[str, Callable[..., AbstractMeasure]] = {
+    "mean": Mean,
+    "worst": Worst,
+    "quantile": Quantile,
+    "cvar": CVaR,
+}
+_WITH_LEVEL = ("quantile", "cvar")
+# Options of a quick look.
+_QUICK: Mapping[str, dict[str, Any]] = {
+    "minimax": {"starts": 4, "steps": 10},
+    "adam": {"starts": 4, "steps": 40},
+    "lbfgs": {"starts": 4, "steps": 12},
+    "genetic": {"population": 20, "generations": 10},
+    "cma_es": {"population": 8, "generations": 20},
+    "differential_evolution": {"population": 20, "generations": 10},
+    "factorial": {"levels": 3},
+    "pareto": {"points": 8, "steps": 40},
+    "te_iteration": {},
+    "free_form": {"points": 12, "steps": 10},
+}
+_QUICK_GEARS = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class OptimizeRequest:
+    """An optimization, checked; call it to run it.
+
+    Attributes:
+        method: its name.
+        curve: named curve on which the flanks of a method without parameters are projected; None for the others.
+    """
+
+    method: str
+    curve: str | None
+    _design: DesignFile
+    _options: dict[str, Any]
+    _common: dict[str, Any]
+
+    def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum:
+        """Runs it on a prepared mesh."""
+        design = self._design
+        if self.method == "free_form":
+            return free_form(mesh, callback=callback, **self._common, **self._options)
+        if self.method == "te_iteration":
+            return self._iterate(mesh, callback)
+        kind = METHODS[self.method](**self._options)
+        return minimize(design.design, design.bounds, mesh=mesh, method=kind, callback=callback, **self._common)
+
+    def _iterate(self, mesh: Mesh, callback: Callback | None) -> Optimum:
+        design, options = self._design, dict(self._options)
+        start, spent = options.pop("start"), 0
+        pinion, wheel = None, None
+        if start == "given":
+            pinion, wheel = design.design({})
+        elif start == "low_pressure":
+            most = options.get("max_relief")
+            limits = (Constraint("max_relief", high=most),) if most is not None else ()
+            first = minimize(
+                design.design,
+                design.bounds,
+                mesh=mesh,
+                torque=design.torque,
+                objective="max_contact_pressure",
+                constraints=limits,
+            )
+            pinion, wheel, spent = first.pinion, first.wheel, first.evaluations
+        found = iterate_transmission_error(
+            mesh, jnp.asarray(design.torque), pinion=pinion, wheel=wheel, callback=callback, **options
+        )
+        return dataclasses.replace(
+            found, evaluations=found.evaluations + spent, history_evaluations=found.history_evaluations + spent
+        )
+
+
+def optimize_request(design: DesignFile, *, method: str | None = None, quick: bool = False) -> OptimizeRequest:
+    """Checks what a design file says about an optimization.
+
+    Args:
+        design: the design file.
+        method: in place of the file's.
+        quick: few starts, steps and designs, for a first look.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
+    """
+    section = design.optimize
+    name = method or section.method or _DEFAULT_METHOD
+    if name not in _KNOWN:
+        raise DesignFileError(design.path, "optimize.method", f'"{name}" is not known, {suggestion(name, _KNOWN)}')
+    if not design.bounds and name not in schema.METHODS_WITHOUT_VARIABLES:
+        raise DesignFileError(design.path, "variables", "missing, nothing to optimize; use jaxgear analyze")
+    options = {key: _options(design, key) for key in schema.METHOD_OPTIONS}.get(name, {})
+    for key in ("starts", "steps"):
+        value = getattr(section, key)
+        if value is not None and name in _STARTS:
+            options[key] = value
+        elif value is not None and method is None:
+            raise DesignFileError(design.path, f"optimize.{key}", f'has no effect with method "{name}"')
+    curve = options.pop("curve", _CURVE) if name in schema.METHODS_WITHOUT_VARIABLES else None
+    if curve is not None and curve not in CURVES:
+        raise DesignFileError(
+            design.path, f"optimize.{name}.curve", f'"{curve}" is not known, {suggestion(curve, CURVES)}'
+        )
+    if name in ("genetic", "cma_es", "differential_evolution"):
+        options["seed"] = section.seed or 0
+    common = _common(design, section, name, quick)
+    if name == "te_iteration":
+        _check_iteration(design, options["start"], section)
+        common = {}
+    elif name != "free_form":
+        _refused(design, f"optimize.{name}", lambda: METHODS[name](**options))
+    if quick:
+        options = {**options, **_QUICK[name]}
+    return OptimizeRequest(name, curve, design, options, common)
+
+
+def _options(design: DesignFile, name: str) -> dict[str, Any]:
+    """The table of one method."""
+    table = getattr(design.optimize, name) or {}
+    options = decode(design.path, f"optimize.{name}", table, schema.METHOD_OPTIONS[name])
+    return {key: value for key, value in msgspec.structs.asdict(options).items() if value is not None}
+
+
+def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
+    """Objective, cases and constraints."""
+    objectives = section.objective if isinstance(section.objective, list) else [section.objective or "ppte"]
+    for objective in objectives:
+        if objective not in QUANTITIES:
+            problem = f'"{objective}" is not known, {suggestion(objective, QUANTITIES)}'
+            raise DesignFileError(design.path, "optimize.objective", problem)
+    if (len(objectives) > 1) != (name == "pareto"):
+        problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
+        raise DesignFileError(design.path, "optimize.objective", problem)
+    if objectives != ["ppte"] and name in schema.METHODS_WITHOUT_VARIABLES:
+        raise DesignFileError(design.path, "optimize.objective", f'must be "ppte" with method "{name}"')
+    found: dict[str, Any] = {
+        "torque": _load(design, section),
+        "measure": _measure(design, section),
+        "constraints": _constraints(design, section),
+        "seed": section.seed or 0,
+        **_gears(design, section, quick),
+    }
+    return found if name == "free_form" else {**found, "objective": tuple(objectives)}
+
+
+def _constraints(design: DesignFile, section: schema.OptimizeSection) -> tuple[Constraint, ...]:
+    tables = enumerate(section.constraint)
+    return tuple(_constraint(design, f"optimize.constraint[{number}]", table) for number, table in tables)
+
+
+def _load(design: DesignFile, section: schema.OptimizeSection) -> LoadSpectrum:
+    if section.torques is None:
+        if section.weights is not None:
+            raise DesignFileError(design.path, "optimize.weights", "has no effect without optimize.torques")
+        return LoadSpectrum([design.torque])
+    _refused(design, "optimize.torques", lambda: LoadSpectrum(section.torques))
+    return _refused(design, "optimize.weights", lambda: LoadSpectrum(section.torques, section.weights))
+
+
+def _measure(design: DesignFile, section: schema.OptimizeSection) -> AbstractMeasure:
+    kind = section.measure or "mean"
+    if section.measure is not None and section.torques is None and section.manufactured is None:
+        problem = "has no effect on a single case: give optimize.torques or optimize.manufactured"
+        raise DesignFileError(design.path, "optimize.measure", problem)
+    if section.level is None:
+        return _MEASURES[kind]()
+    if kind not in _WITH_LEVEL:
+        raise DesignFileError(design.path, "optimize.level", f'has no effect with measure = "{kind}"')
+    return _MEASURES[kind](section.level)
+
+
+def _gears(design: DesignFile, section: schema.OptimizeSection, quick: bool) -> dict[str, Any]:
+    if section.manufactured is None:
+        return {}
+    if design.tolerance is None:
+        raise DesignFileError(design.path, "optimize.manufactured", "needs the table [tolerance]")
+    tolerance: Tolerance = tolerance_of(design, design.tolerance)
+    samples = min(section.manufactured, _QUICK_GEARS) if quick else section.manufactured
+    return {"tolerance": tolerance, "samples": samples}
+
+
+def _constraint(design: DesignFile, key: str, table: schema.Table) -> Constraint:
+    section = decode(design.path, key, table, schema.ConstraintSection)
+    if (section.of is None) == (section.variables is None):
+        raise DesignFileError(design.path, key, "needs either of = a quantity or variables = a table of coefficients")
+    if section.of is not None and section.of not in QUANTITIES:
+        raise DesignFileError(
+            design.path, f"{key}.of", f'"{section.of}" is not known, {suggestion(section.of, QUANTITIES)}'
+        )
+    for name in section.variables or {}:
+        if name not in design.bounds:
+            problem = f'"{name}" is not a variable, {suggestion(name, design.bounds)}'
+            raise DesignFileError(design.path, f"{key}.variables", problem)
+    of = section.of if section.of is not None else section.variables
+    return _refused(design, key, lambda: Constraint(of, low=section.low, high=section.high))  # type: ignore[arg-type]
+
+
+def _check_iteration(design: DesignFile, start: str, section: schema.OptimizeSection) -> None:
+    """The iteration levels the transmission error at the design torque and knows nothing else."""
+    for key in ("measure", "level", "torques", "weights", "manufactured"):
+        if getattr(section, key) is not None:
+            raise DesignFileError(design.path, f"optimize.{key}", 'has no effect with method "te_iteration"')
+    if section.constraint:
+        raise DesignFileError(design.path, "optimize.constraint", 'has no effect with method "te_iteration"')
+    if start == "given" and design.bounds:
+        problem = '"given" needs numbers in the modifications, these are free: ' + ", ".join(design.bounds)
+        raise DesignFileError(design.path, "optimize.te_iteration.start", problem)
+    if start == "low_pressure" and not design.bounds:
+        problem = '"low_pressure" needs [variables], of which the relief of the start is designed'
+        raise DesignFileError(design.path, "optimize.te_iteration.start", problem)
+
+
+def _refused(design: DesignFile, key: str, make: Callable[[], T]) -> T:
+    try:
+        return make()
+    except (ValueError, OverflowError) as error:
+        raise DesignFileError(design.path, key, error) from None

@@ -1,0 +1,87 @@
+"""One number for many values of different weight: mean, worst, quantile, conditional value at risk.
+
+Every measure is a spectral one (Acerbi 2002, doi 10.1016/S0378-4266(02)00281-9): a weighted mean of the sorted values.
+Its gradient passes through the values, with the weights of their ranks.
+"""
+
+from abc import abstractmethod
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax.scipy.special import betainc
+from jaxtyping import Array, Float
+
+from .fields import check, real
+
+Scalar = Float[Array, ""]
+Values = Float[Array, " values"]
+
+
+class AbstractMeasure(eqx.Module):
+    """A number that stands for many."""
+
+    @abstractmethod
+    def spread(self, share: Float[Array, " edges"], count: Scalar) -> Float[Array, " edges"]:
+        """How much of the result the lowest values up to a `share` of all weights carry, from 0 to 1.
+
+        Args:
+            share: ascending shares, 0 first, 1 last.
+            count: effective number of values.
+        """
+
+    def shares(self, values: Values, weights: Values) -> Values:
+        """What every value contributes to the result, in the order of the values; they sum to 1."""
+        order = jnp.argsort(values)
+        cumulative = jnp.cumsum(weights[order])
+        edges = jnp.concatenate([jnp.zeros_like(cumulative[:1]), cumulative / cumulative[-1]])
+        count = jnp.sum(weights) ** 2 / jnp.sum(weights**2)
+        return jnp.zeros_like(values).at[order].set(jnp.diff(self.spread(edges, count)))
+
+    def __call__(self, values: Values, weights: Values) -> Scalar:
+        """The number. Values that are not finite count where they carry a share."""
+        shares = self.shares(values, weights)
+        return jnp.sum(jnp.where(shares > 0, shares * values, 0.0))
+
+
+class Mean(AbstractMeasure):
+    """Weighted mean."""
+
+    def spread(self, share, count):
+        return share
+
+
+class Worst(AbstractMeasure):
+    """Largest value."""
+
+    def spread(self, share, count):
+        return jnp.where(share >= 1, 1.0, 0.0).astype(share.dtype)
+
+
+class CVaR(AbstractMeasure):
+    """Conditional value at risk: mean of the worst 1 - level of all values (Rockafellar and Uryasev 2000)."""
+
+    level: Scalar = eqx.field(converter=real, default=0.95)
+
+    def __check_init__(self):
+        check("CVaR", "level", self.level, "", low=0.0, high=1.0, open_high=True)
+
+    def spread(self, share, count):
+        level = self.level.astype(share.dtype)
+        return jnp.maximum(share - level, 0.0) / (1 - level)
+
+
+class Quantile(AbstractMeasure):
+    """Quantile after Harrell and Davis (1982, doi 10.1093/biomet/69.3.635).
+
+    It weighs the sorted values with a beta distribution, so that its gradient follows many values and not the one that
+    happens to stand at the level.
+    """
+
+    level: Scalar = eqx.field(converter=real, default=0.95)
+
+    def __check_init__(self):
+        check("Quantile", "level", self.level, "", low=0.0, high=1.0, open_low=True, open_high=True)
+
+    def spread(self, share, count):
+        level = self.level.astype(share.dtype)
+        return betainc((count + 1) * level, (count + 1) * (1 - level), share)

@@ -1,0 +1,153 @@
+"""Evolutionary search, by evosax: what to compare gradient methods with."""
+
+import importlib
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .evaluate import fitness, scores
+from .problem import Problem
+from .search import AbstractMethod, Record, whole
+
+_LEAST_POPULATION = 4
+# Mutation of the genetic algorithm: standard deviation in the unit box, falling geometrically over the generations so
+# that it explores first and refines then.
+_FIRST_MUTATION, _LAST_MUTATION = 0.2, 0.002
+
+
+class _Evolution(AbstractMethod):
+    """Generations of a population in the unit box; individuals outside it are moved to its surface.
+
+    Attributes:
+        population: designs per generation.
+        generations: how many.
+        seed: of the random numbers.
+    """
+
+    population: int = eqx.field(static=True, default=100)
+    generations: int = eqx.field(static=True, default=100)
+    seed: int = eqx.field(static=True, default=0)
+
+    def __check_init__(self):
+        owner = type(self).__name__
+        whole(owner, "population", self.population, _LEAST_POPULATION)
+        whole(owner, "generations", self.generations, 1)
+        whole(owner, "seed", self.seed, 0)
+
+    def search(self, problem: Problem, record: Record) -> None:
+        """Runs the generations."""
+        algorithm, parameters = self._algorithm(jnp.full_like(problem.low, 0.5))
+        key, first = jax.random.split(jax.random.key(self.seed))
+        state, rest = self._begin(algorithm, parameters, problem, record, first)
+        for generation in range(1, rest + 1):
+            key, ask, tell = jax.random.split(key, 3)
+            with _relaxed():
+                points, state = algorithm.ask(ask, state, parameters)
+                points = jnp.clip(points, 0.0, 1.0).astype(problem.low.dtype)
+            ranks = _judge(problem, record, points)
+            with _relaxed():
+                state, _ = algorithm.tell(tell, points, ranks, state, parameters)
+            record.look(generation + self.generations - rest, self.generations)
+
+    def _begin(self, algorithm, parameters, problem, record, key):
+        """State before the next generation, and how many generations are left."""
+        points = jax.random.uniform(key, (self.population, len(problem.names)), problem.low.dtype)
+        ranks = _judge(problem, record, points)
+        record.look(1, self.generations)
+        with _relaxed():
+            return algorithm.init(key, points, ranks, parameters), self.generations - 1
+
+    def _algorithm(self, example):
+        raise NotImplementedError
+
+
+class Genetic(_Evolution):
+    """Genetic algorithm with real genes (evosax.SimpleGA): uniform crossover, Gaussian mutation, the better half mates.
+
+    The defaults are the population, the generations and the crossover rate of the genetic-algorithm study of the 19/48
+    pair, which coded its genes in bits; its mutation rate of one half per individual is a random search, so that
+    mutation shrinks here instead.
+
+    Attributes:
+        crossover: share of the genes that come from the second parent.
+    """
+
+    crossover: float = eqx.field(static=True, default=0.5)
+
+    def __check_init__(self):
+        if not 0 <= self.crossover <= 1:
+            raise ValueError(f"Genetic: crossover = {self.crossover!r} must be from 0 to 1")
+
+    @property
+    def name(self) -> str:
+        return "genetic"
+
+    def _algorithm(self, example):
+        last = max(self.generations - 1, 1)
+
+        def mutation(generation):
+            return _FIRST_MUTATION * (_LAST_MUTATION / _FIRST_MUTATION) ** (generation / last)
+
+        made = _evosax().SimpleGA(self.population, example, std_schedule=mutation)
+        return made, made.default_params.replace(crossover_rate=self.crossover)
+
+
+class DifferentialEvolution(_Evolution):
+    """Differential evolution (Storn and Price 1997; evosax.DifferentialEvolution), about the best individual."""
+
+    @property
+    def name(self) -> str:
+        return "differential_evolution"
+
+    def _algorithm(self, example):
+        made = _evosax().DifferentialEvolution(self.population, example)
+        return made, made.default_params
+
+
+class CMAES(_Evolution):
+    """Covariance matrix adaptation (Hansen and Ostermeier 2001; evosax.CMA_ES), from the middle of the box.
+
+    Attributes:
+        spread: standard deviation of the first generation in the unit box.
+    """
+
+    population: int = eqx.field(static=True, default=16)
+    spread: float = eqx.field(static=True, default=0.3)
+
+    def __check_init__(self):
+        if not 0 < self.spread <= 1:
+            raise ValueError(f"CMAES: spread = {self.spread!r} must be above 0 and at most 1")
+
+    @property
+    def name(self) -> str:
+        return "cma_es"
+
+    def _algorithm(self, example):
+        made = _evosax().CMA_ES(self.population, example)
+        return made, made.default_params.replace(std_init=self.spread)
+
+    def _begin(self, algorithm, parameters, problem, record, key):
+        with _relaxed():
+            return algorithm.init(key, jnp.full_like(problem.low, 0.5), parameters), self.generations
+
+
+def _judge(problem: Problem, record: Record, points):
+    """Ranks of designs, which are also counted and offered."""
+    score = scores(problem, points)
+    record.spend(len(points))
+    record.offer(np.asarray(points), np.asarray(score.value)[:, 0], np.asarray(score.violation))
+    return fitness(score)
+
+
+def _relaxed():
+    """evosax mixes floating-point types, which strict promotion would forbid."""
+    return jax.numpy_dtype_promotion("standard")
+
+
+def _evosax():
+    try:
+        return importlib.import_module("evosax.algorithms")
+    except ImportError:
+        raise ValueError("evolutionary methods need the library evosax: pip install 'jaxgear[evolution]'") from None

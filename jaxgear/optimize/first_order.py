@@ -1,0 +1,82 @@
+"""First-order search from many points at once."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+
+from .problem import GRADIENT_COST, Problem
+from .search import AbstractMethod, Record, whole
+from .smooth import STAGE_WIDTHS, Multipliers, lagrangian, merged, stage_width, yardstick
+from .starts import real_points, start_points
+
+_FIRST_RATE, _LAST_RATE = 0.05, 0.002  # step sizes in the unit box, first and last chunk
+_CHUNK = 20  # steps between two looks at the search: progress and interruption
+
+
+class Adam(AbstractMethod):
+    """Adam (optax) on a soft objective whose width shrinks in stages, projected onto the box.
+
+    All starts advance together under `jax.vmap`. Other constraints enter by an augmented Lagrangian, whose multipliers
+    follow once per chunk of steps.
+
+    Attributes:
+        starts: number of start points; the first is the middle of the box.
+        steps: gradient steps of every start, over all stages.
+    """
+
+    starts: int = eqx.field(static=True, default=16)
+    steps: int = eqx.field(static=True, default=300)
+
+    def __check_init__(self):
+        whole("Adam", "starts", self.starts, 1)
+        whole("Adam", "steps", self.steps, len(STAGE_WIDTHS))
+
+    @property
+    def name(self) -> str:
+        return "adam"
+
+    def search(self, problem: Problem, record: Record) -> None:
+        """Runs the stages."""
+        points = real_points(problem, start_points(problem, self.starts))
+        multipliers = Multipliers.zeros(problem, self.starts)
+
+        def advance(width, rate, scale, count):
+            made = [jnp.asarray(value, points.dtype) for value in (width, rate, scale)]
+            moved, followed, best, values, violations = _advance(
+                problem, points, multipliers, jnp.asarray(count), *made
+            )
+            record.spend(self.starts * count, analyses=GRADIENT_COST)
+            record.offer(best, values, violations)
+            return moved, followed, values
+
+        scale = yardstick(advance(1.0, 0.0, 1.0, 1)[2])  # a step of length zero judges the start points
+        chunks = max(-(-self.steps // _CHUNK), len(STAGE_WIDTHS))
+        for chunk, rate in enumerate(np.geomspace(_FIRST_RATE, _LAST_RATE, chunks)):
+            width = stage_width(chunk, chunks, scale)
+            points, multipliers, _ = advance(width, rate, scale, _CHUNK)
+            record.look(min((chunk + 1) * _CHUNK, self.steps), self.steps)
+
+
+@eqx.filter_jit
+def _advance(problem: Problem, points, multipliers: Multipliers, count, width, rate, scale):
+    """A chunk of steps; returns the points, the multipliers and the best true design of every start on the way."""
+    dtype = points.dtype
+    gradient = jax.vmap(jax.grad(lagrangian, argnums=1, has_aux=True), (None, 0, 0, None, None))
+    adam = optax.scale_by_adam()
+
+    def step(_, carry):
+        points, moments, best, values, violations, _ = carry
+        slopes, (value, violation, excess) = gradient(problem, points, multipliers, width, scale)
+        best, values, violations = merged((best, values, violations), (points, value, violation))
+        slopes = jnp.where(jnp.isfinite(slopes), slopes, 0.0)
+        # optax mixes its integer step count with floats, which strict promotion would forbid
+        with jax.numpy_dtype_promotion("standard"):
+            update, moments = adam.update(slopes, moments)
+        return (jnp.clip(points - rate * update, 0.0, 1.0), moments, best, values, violations, excess)
+
+    nothing = jnp.full(points.shape[0], jnp.inf, dtype)
+    start = (points, adam.init(points), points, nothing, nothing, jnp.zeros_like(multipliers.value))
+    points, _, best, values, violations, excess = jax.lax.fori_loop(0, count, step, start)
+    return points, multipliers.follow(excess, scale), best, values, violations

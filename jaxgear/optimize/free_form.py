@@ -1,0 +1,155 @@
+"""Flanks of free form: every value of a table is a parameter."""
+
+import time
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..contact import Mesh
+from ..metrics import removed_at
+from ..microgeometry import AbstractModification, TabulatedProfile
+from ..numerics import AbstractMeasure, Mean, check
+from ..tolerance import Tolerance
+from .cases import cases
+from .goal import Constraint
+from .minimax import follow
+from .minimize import optimum_of
+from .problem import Problem, Roughness
+from .result import Optimum
+from .search import Callback, Record, whole
+from .sizing import iso_relief
+
+_FEWEST = 4  # values per flank
+_TOLERANCE = 1e-3  # a search ends where the predicted decrease is below this part of the objective
+
+
+class _FreeFlanks(Problem):
+    """The tables of both flanks, from the pitch point to the tip; the parameters are their values.
+
+    Attributes:
+        roll: roll lengths of pinion and wheel [mm], shape (2, points).
+    """
+
+    roll: Float[Array, "2 points"] | None = None
+
+    def modifications(self, x):
+        """Both tables."""
+        roll = self.roll
+        assert roll is not None
+        values = self.low + x * (self.high - self.low)
+        return TabulatedProfile(roll[0], values[: roll.shape[1]]), TabulatedProfile(roll[1], values[roll.shape[1] :])
+
+
+def free_form(
+    mesh: Mesh,
+    torque,
+    *,
+    points: int = 40,
+    max_relief: float = 20.0,
+    curvature: float = 1e-3,
+    measure: AbstractMeasure | None = None,
+    constraints: Sequence[Constraint] = (),
+    tolerance: Tolerance | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    start: tuple[AbstractModification, AbstractModification] | None = None,
+    steps: int = 60,
+    callback: Callback | None = None,
+) -> Optimum:
+    """Finds the flanks with the least PPTE, whatever their form, by sequential linear programming.
+
+    Each flank is a table of material removed from the pitch point to the tip, linear in between. What pinion and wheel
+    remove where they touch adds up, so that two addenda reach every point of the path of contact. The penalty on the
+    largest curvature keeps the flanks smooth and the local contact pressure down: 1 um/mm^2 is 0.001 / mm, to be
+    compared with the curvature of the pair, 1 / R.
+
+    Args:
+        mesh: prepared mesh.
+        torque: on the pinion [N m], or a `LoadSpectrum`.
+        points: values per flank.
+        max_relief: largest material removed [um].
+        curvature: penalty on the largest second derivative of either table, PPTE in um per um/mm^2.
+        measure: of the PPTE over torques and manufactured gears: `Mean()`, `Worst()` or `CVaR(level)`; None for the
+            mean.
+        constraints: limits that hold in every case; they can name no single parameter.
+        tolerance, samples, seed: of manufactured gears, as for `minimize`.
+        start: modifications to start from besides unmodified flanks; None for the rule-based relief.
+        steps: most steps.
+        callback: called as callback(step, steps, best objective).
+
+    Returns:
+        the optimum; its objective includes the penalty, its parameters are the values of both tables. What both flanks
+        have in common, and no transmission error shows, is not removed.
+
+    Raises:
+        ValueError: for numbers outside their range.
+        RuntimeError: when no design gave a converged contact solution.
+    """
+    whole("free_form", "points", points, _FEWEST)
+    whole("free_form", "steps", steps, 1)
+    check("free_form", "max_relief", max_relief, "um", low=0.0, open_low=True)
+    check("free_form", "curvature", curvature, "um/(um/mm^2)", low=0.0)
+    if any(limit.linear for limit in constraints):
+        raise ValueError("free_form: a linear constraint names parameters, and the values of a table have no names")
+    began = time.perf_counter()
+    judged = cases(mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
+    problem = _problem(mesh, judged, points, max_relief, curvature, measure, constraints)
+    heaviest = float(judged.torque[int(np.argmax(judged.weight))])
+    if start is None:
+        relief = iso_relief(mesh.pair, heaviest)
+        start = relief, relief
+    record = Record(problem, callback)
+    unmodified = np.zeros(2 * points)
+    follow(problem, record, np.stack([unmodified, _table(problem, start)]), steps=steps, tolerance=_TOLERANCE)
+    flanks = record.point.reshape(2, points)
+    record.point = (flanks - flanks.min(axis=1, keepdims=True)).ravel()
+    return optimum_of(problem, record, "free_form", began)
+
+
+def _no_design(parameters):
+    raise NotImplementedError("free flanks are made from the values of their tables")
+
+
+def _problem(mesh, judged, points, max_relief, curvature, measure, constraints) -> _FreeFlanks:
+    contact, pair, dtype = mesh.path_of_contact, mesh.pair, mesh.phase.dtype
+    roll = jnp.stack(
+        [
+            jnp.linspace(contact.pinion_pitch_roll_length, pair.pinion.tip_roll_length, points),
+            jnp.linspace(contact.wheel_pitch_roll_length, pair.wheel.tip_roll_length, points),
+        ]
+    ).astype(dtype)
+    second = np.diff(np.eye(points), 2, axis=0) * max_relief
+    steps = np.asarray(roll[:, 1] - roll[:, 0])
+    empty = np.zeros_like(second)
+    forms = np.block([[second / steps[0] ** 2, empty], [empty, second / steps[1] ** 2]])
+    width = len(str(points))
+    names = tuple(f"{gear} {number:0{width}d}" for gear in ("pinion", "wheel") for number in range(1, points + 1))
+    return _FreeFlanks(
+        design=_no_design,
+        names=names,
+        low=jnp.zeros(2 * points, dtype),
+        high=jnp.full(2 * points, max_relief, dtype),
+        mesh=mesh,
+        cases=judged,
+        objectives=("ppte",),
+        measure=Mean() if measure is None else measure,
+        constraints=tuple(constraints),
+        roughness=Roughness(jnp.asarray(forms, dtype), jnp.asarray(curvature, dtype)),
+        roll=roll,
+    )
+
+
+def _table(problem: _FreeFlanks, start) -> np.ndarray:
+    """Point of the unit box of the modifications to start from."""
+    pinion, wheel = start
+    values = _removed(problem.mesh, pinion, wheel, problem.roll)
+    return np.clip(np.asarray(values).ravel() / np.asarray(problem.high), 0.0, 1.0)
+
+
+@eqx.filter_jit
+def _removed(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, roll):
+    sides = ((pinion, roll[0], True), (wheel, roll[1], False))
+    return jnp.stack([removed_at(mesh, one, where, of_pinion=side) for one, where, side in sides])

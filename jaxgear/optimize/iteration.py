@@ -1,0 +1,220 @@
+"""The transmission error taken off the flank, again and again, until it is level."""
+
+import time
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..contact import Mesh, MeshCycle, removed_material, solve_removed
+from ..metrics import max_relief as largest_relief
+from ..metrics import removed_at
+from ..microgeometry import AbstractModification, NoModification, TabulatedProfile
+from ..numerics import check
+from .result import Iterate, Optimum
+from .search import Callback, whole
+
+_UNTOUCHED = 0.05  # [um]: a flank with less relief than this counts as unmodified
+_LOADED = 1e-6  # a pair with less than this share of the force carries none
+
+
+class _State(NamedTuple):
+    """What the next step needs of a solved cycle."""
+
+    cycle: MeshCycle
+    ppte: float
+    alone: np.ndarray  # positions where one pair alone carries the load, on unmodified flank
+
+
+def iterate_transmission_error(
+    mesh: Mesh,
+    torque,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+    max_relief: float = 7.0,
+    tolerance: float = 0.1,
+    steps: int = 5,
+    callback: Callback | None = None,
+) -> Optimum:
+    """Levels the transmission error by taking it off the flanks.
+
+    While one pair alone carries the load its deflection is given. Where two pairs share it the gears lag less, by
+    h = q_max - q: that much is taken off both flanks there, off the pinion in recess and off the wheel in approach, so
+    that both pairs give way by it. It starts where the transmission error leaves its single-contact extreme, and is
+    repeated with the flanks so made, because pairs that meet beyond the path of contact come in later the more is
+    taken off.
+
+    Source: eq. (1) and the algorithm of "Design for manufacturing of a spur gears profile modification based on the
+    static transmission error for improving the dynamic behavior", Int J Adv Manuf Technol 2023,
+    doi 10.1007/s00170-023-12340-x, with the sign of its q_0 turned. There the total h is cut off at zero, and so it is
+    here: where a step has taken off too much, the next one gives back. The level q_max is that of the first state,
+    since the single contact of unmodified flanks does not change; the study takes its lower limit of the PPTE from
+    there as well.
+
+    Args:
+        mesh: prepared mesh.
+        torque: on the pinion, at which the transmission error is levelled [N m].
+        pinion, wheel: modifications to start from (the study's type 2); None for the nominal involute (its type 1).
+        max_relief: most that is left removed anywhere [um].
+        tolerance: ends the iteration where PPTE is within this part of its lower limit, or has fallen by less than
+            this part of itself.
+        steps: most steps.
+        callback: called as callback(step, steps, best PPTE).
+
+    Returns:
+        the state with the least PPTE; `iterations` has all of them.
+
+    Raises:
+        ValueError: for numbers outside their range.
+        RuntimeError: when a contact solution does not converge.
+    """
+    check("iterate_transmission_error", "torque", torque, "N m", low=0.0, open_low=True)
+    check("iterate_transmission_error", "max_relief", max_relief, "um", low=0.0, open_low=True)
+    check("iterate_transmission_error", "tolerance", tolerance, "", low=0.0, open_low=True)
+    whole("iterate_transmission_error", "steps", steps, 1)
+    began = time.perf_counter()
+    flanks = _Flanks(mesh, pinion or NoModification(), wheel or NoModification(), float(max_relief))
+    states, iterates = [], []
+    level = float("nan")
+    for step in range(steps + 1):
+        state = _solve(mesh, torque, *flanks.modifications())
+        states.append(state)
+        iterates.append(_iterate(mesh, state, *flanks.modifications()))
+        if callback is not None:
+            callback(step, steps, min(iterate.ppte for iterate in iterates))
+        if step == 0:
+            level = float(np.asarray(state.cycle.transmission_error)[state.alone].max())
+        if step == steps or _ended(iterates, tolerance):
+            break
+        flanks.take_off(level - np.asarray(state.cycle.transmission_error), state.alone)
+    best = int(np.argmin([iterate.ppte for iterate in iterates]))
+    return Optimum(
+        method="te_iteration",
+        objective_name="ppte",
+        parameters={},
+        pinion=iterates[best].pinion,
+        wheel=iterates[best].wheel,
+        cycle=states[best].cycle,
+        ppte=iterates[best].ppte,
+        objective=iterates[best].ppte,
+        gradient_norm=float("nan"),
+        active_bounds={},
+        constraints={"max_relief": iterates[best].max_relief},
+        violation=0.0,
+        evaluations=len(states),
+        history=np.minimum.accumulate([iterate.ppte for iterate in iterates]),
+        history_evaluations=np.arange(1, len(states) + 1),
+        seconds=time.perf_counter() - began,
+        iterations=tuple(iterates),
+    )
+
+
+def _ended(iterates: list[Iterate], tolerance: float) -> bool:
+    last = iterates[-1]
+    if last.ppte - last.limit <= tolerance * last.limit:
+        return True
+    return len(iterates) > 2 and iterates[-2].ppte - last.ppte < tolerance * iterates[-2].ppte
+
+
+class _Flanks:
+    """Both flanks: the modifications of the start, and what is taken off beside them in the contact points."""
+
+    def __init__(self, mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, most: float):
+        contact = mesh.path_of_contact
+        pitch, self._most = float(contact.base_pitch), most
+        start, end = float(contact.start), float(contact.end)
+        positions = mesh.resolution.positions
+        first, last = np.ceil(start / pitch * positions), np.floor(end / pitch * positions)
+        # the profile points are those that touch at a mesh position, and the ends of the path
+        number = np.arange(first, last + 1)
+        self._path = np.unique(np.concatenate([[start], number * pitch / positions, [end]]))
+        self._phase = np.asarray(mesh.phase)
+        self._pitch, self._start = pitch, (pinion, wheel)
+        self._roll = (
+            np.asarray(contact.pinion_roll_length(jnp.asarray(self._path))),
+            np.asarray(contact.wheel_roll_length(jnp.asarray(self._path))),
+        )
+        self._given = tuple(
+            np.asarray(_removed(mesh, modification, jnp.asarray(roll), of_pinion))
+            for modification, roll, of_pinion in zip(self._start, self._roll, (True, False))
+        )
+        self._extra = [np.zeros_like(self._path), np.zeros_like(self._path)]
+
+    def modifications(self) -> tuple[AbstractModification, AbstractModification]:
+        """Of pinion and wheel."""
+        made = []
+        for given, roll, extra in zip(self._start, self._roll, self._extra):
+            order = np.argsort(roll)
+            table = TabulatedProfile(jnp.asarray(roll[order]), jnp.asarray(extra[order]))
+            made.append(table if isinstance(given, NoModification) else given + table)
+        return made[0], made[1]
+
+    def take_off(self, missing: np.ndarray, alone: np.ndarray) -> None:
+        """Takes off what is missing to the level at every position [um]; where there is too much, gives back."""
+        at_path = np.interp(self._path / self._pitch, *_periodic(self._phase, missing))
+        for index, outwards in enumerate((1.0, -1.0)):
+            depth = outwards * self._path
+            outer = depth >= self._onset(missing, alone, outwards)
+            total = np.clip(self._given[index] + self._extra[index] + at_path, 0.0, self._most)
+            self._extra[index] = np.where(outer, total - self._given[index], self._extra[index])
+
+    def _onset(self, missing: np.ndarray, alone: np.ndarray, outwards: float) -> float:
+        """Distance from the pitch point at which the transmission error leaves its extreme in single contact [mm]."""
+        # phases as distances on the way out, half a base pitch to either side of the pitch point
+        distance = outwards * ((self._phase + 0.5) % 1 - 0.5) * self._pitch
+        side = alone & (distance >= 0)
+        if not side.any():
+            return 0.0
+        return float(distance[side][np.argmin(missing[side])])
+
+
+def _periodic(phase: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Phase and values over the base pitches that a path of contact can have."""
+    shifts = np.arange(-3, 4)
+    return (phase[None] + shifts[:, None]).ravel(), np.tile(values, len(shifts))
+
+
+def _solve(mesh: Mesh, torque, pinion, wheel) -> _State:
+    cycle = solve_removed(mesh, torque, _material(mesh, jnp.asarray(torque), pinion, wheel))
+    error = np.asarray(cycle.transmission_error)
+    if not (np.asarray(cycle.converged).all() and np.isfinite(error).all()):
+        raise RuntimeError("iterate_transmission_error: a contact solution did not converge")
+    loaded = np.asarray(cycle.pair_force) > _LOADED * float(cycle.force)
+    single = loaded.sum(axis=0) == 1
+    untouched = (np.asarray(cycle.gap).min(axis=1) < _UNTOUCHED) | ~loaded
+    # a relief over the whole profile leaves no such position, and a high contact ratio no single contact at all
+    choices = single & untouched.all(axis=0), single, error == error.max()
+    alone = next(choice for choice in choices if choice.any())
+    return _State(cycle, float(np.ptp(error)), alone)
+
+
+def _iterate(mesh: Mesh, state: _State, pinion, wheel) -> Iterate:
+    error = np.asarray(state.cycle.transmission_error)
+    return Iterate(
+        pinion=pinion,
+        wheel=wheel,
+        transmission_error=error,
+        ppte=state.ppte,
+        limit=float(np.ptp(error[state.alone])),
+        max_relief=float(_largest(mesh, pinion, wheel)),
+        max_flank_pressure=float(np.max(np.asarray(state.cycle.contact_pressure))),
+        max_corner_pressure=float(np.max(np.asarray(state.cycle.corner_pressure))),
+    )
+
+
+@eqx.filter_jit
+def _material(mesh: Mesh, torque, pinion, wheel):
+    return removed_material(mesh, torque, pinion=pinion, wheel=wheel)
+
+
+@eqx.filter_jit
+def _largest(mesh: Mesh, pinion, wheel):
+    return largest_relief(mesh, pinion, wheel)
+
+
+@eqx.filter_jit
+def _removed(mesh: Mesh, modification: AbstractModification, roll, of_pinion: bool) -> jax.Array:
+    return removed_at(mesh, modification, roll, of_pinion=of_pinion)

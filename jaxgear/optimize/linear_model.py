@@ -1,0 +1,201 @@
+"""The best step of a linearized problem, as a linear program.
+
+A peak-to-peak value is the largest minus the smallest of many smooth values. Linearized one by one, their extremes stay
+exact extremes, so that kinks, which stop a gradient method, are part of the model (K. Madsen, J. Inst. Maths Applics 16
+(1975) 321). Mean, worst case and conditional value at risk over the cases are linear programs too (Rockafellar and
+Uryasev 2000, doi 10.21314/JOR.2000.038); other measures keep the shares that the cases have at the point.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from scipy.optimize import linprog
+from scipy.sparse import coo_array
+
+from ..numerics import CVaR, Worst
+from .problem import Linearization, Problem
+
+# Weight of a relative violation of 1 against an objective of 1 in its own unit: above the multiplier of any sensible
+# constraint, so that the penalty is exact.
+PENALTY = 100.0
+
+
+class _OnHost(NamedTuple):
+    """A `Linearization` in NumPy."""
+
+    upper: np.ndarray
+    lower: np.ndarray
+    slope: np.ndarray
+    lower_slope: np.ndarray
+    excess: np.ndarray
+    excess_slope: np.ndarray
+    fine: np.ndarray
+
+
+class Step(NamedTuple):
+    """Solution of the linear program.
+
+    Attributes:
+        step: in the unit box, shape (parameters,).
+        decrease: of the penalized objective that the model predicts.
+    """
+
+    step: np.ndarray
+    decrease: float
+
+
+class Model:
+    """A linearization on the host with what the problem says about it.
+
+    Args:
+        problem: the problem.
+        x: point of the unit box.
+        linearization: of the problem at that point.
+    """
+
+    def __init__(self, problem: Problem, x: np.ndarray, linearization: Linearization):
+        self._lin = _OnHost(*(np.asarray(part, float) for part in linearization))
+        self._measure, self._weights = problem.measure, np.asarray(problem.cases.weights, float)
+        self._values = self._lin.upper.max(axis=1) - self._lin.lower.min(axis=1)
+        self._x, roughness = np.asarray(x, float), problem.roughness
+        self._forms = np.zeros((0, len(x))) if roughness is None else np.asarray(roughness.forms, float)
+        self._rough_weight = 0.0 if roughness is None else float(roughness.weight)
+
+    @property
+    def fine(self) -> bool:
+        """Whether every contact solution behind it converged."""
+        return bool(self._lin.fine)
+
+    @property
+    def value(self) -> float:
+        """Objective at the point, with the penalty of the roughness."""
+        if not self.fine:
+            return np.inf
+        rough = np.abs(self._forms @ self._x).max(initial=0.0)
+        return float(self._shares() @ self._values) + self._rough_weight * float(rough)
+
+    @property
+    def violation(self) -> float:
+        """Largest relative excess over a constraint."""
+        return float(np.maximum(self._lin.excess, 0.0).max(initial=0.0))
+
+    @property
+    def merit(self) -> float:
+        """Objective plus penalty."""
+        return self.value + PENALTY * self.violation
+
+    def best_step(self, radius: float) -> Step:
+        """The step of the largest predicted decrease within a distance in every parameter and within the unit box."""
+        x = self._x
+        low, high = np.maximum(-radius, -x), np.minimum(radius, 1 - x)
+        program = _Program(len(x))
+        weights = self._weights if isinstance(self._measure, Worst | CVaR) else self._shares()
+        carrying = np.flatnonzero(weights > 0)
+        spans = self._spans(program, carrying, low, high)
+        cost = self._cost(program, spans, weights[carrying])
+        if len(self._lin.excess):
+            (slack,) = program.variables(1, low=0.0)  # the largest violation
+            program.at_most(self._lin.excess_slope, -self._lin.excess, {slack: -1.0})
+            cost[slack] = PENALTY
+        if len(self._forms):
+            (rough,) = program.variables(1)
+            for sign in (1.0, -1.0):
+                program.at_most(sign * self._forms, -sign * (self._forms @ x), {rough: -1.0})
+            cost[rough] = self._rough_weight
+        found = program.solve(cost, low, high)
+        if found is None:
+            return Step(np.zeros_like(x), 0.0)
+        step, predicted = found
+        return Step(step, self.merit - predicted)
+
+    def _shares(self) -> np.ndarray:
+        return np.asarray(self._measure.shares(jnp.asarray(self._values), jnp.asarray(self._weights)))
+
+    def _spans(self, program: "_Program", cases: np.ndarray, low, high) -> list[tuple[int, int]]:
+        """Variables above all upper and below all lower pieces of every case."""
+        lin, spans = self._lin, []
+        for case in cases:
+            top, bottom = program.variables(2)
+            for sign, values, slope, bound in (
+                (1.0, lin.upper[case], lin.slope[case], top),
+                (-1.0, -lin.lower[case], -lin.lower_slope[case], bottom),
+            ):
+                # a piece that no step within reach makes the extreme one is left out
+                most = values + np.maximum(slope * low, slope * high).sum(axis=1)
+                least = values + np.minimum(slope * low, slope * high).sum(axis=1)
+                near = most >= least.max()
+                program.at_most(slope[near], -values[near], {bound: -sign})
+            spans.append((top, bottom))
+        return spans
+
+    def _cost(self, program: "_Program", spans: list[tuple[int, int]], weights: np.ndarray) -> dict[int, float]:
+        """Coefficients of the objective in the variables, with the rows that the measure needs."""
+        measure, cost = self._measure, {}
+        nothing = np.zeros((1, program.parameters))
+        if isinstance(measure, Worst):
+            (worst,) = program.variables(1)
+            for top, bottom in spans:
+                program.at_most(nothing, np.zeros(1), {top: 1.0, bottom: -1.0, worst: -1.0})
+            return {worst: 1.0}
+        if isinstance(measure, CVaR):
+            (threshold,) = program.variables(1)
+            cost[threshold] = 1.0
+            tail = weights / weights.sum() / (1 - float(measure.level))
+            for (top, bottom), weight in zip(spans, tail):
+                (beyond,) = program.variables(1, low=0.0)
+                program.at_most(nothing, np.zeros(1), {top: 1.0, bottom: -1.0, threshold: -1.0, beyond: -1.0})
+                cost[beyond] = weight
+            return cost
+        for (top, bottom), weight in zip(spans, weights):
+            cost[top], cost[bottom] = weight, -weight
+        return cost
+
+
+class _Program:
+    """A linear program over the step and further variables, built row by row."""
+
+    def __init__(self, parameters: int):
+        self.parameters = parameters
+        self._lows: list[float | None] = []
+        self._rows: list[tuple[np.ndarray, dict[int, float]]] = []
+        self._limits: list[np.ndarray] = []
+
+    def variables(self, count: int, low: float | None = None) -> list[int]:
+        """Numbers of new variables, free or bounded from below."""
+        first = self.parameters + len(self._lows)
+        self._lows += [low] * count
+        return list(range(first, first + count))
+
+    def at_most(self, slope: np.ndarray, limit: np.ndarray, others: dict[int, float]) -> None:
+        """Rows slope @ step + sum of the other variables times their coefficients <= limit."""
+        self._rows.append((slope, others))
+        self._limits.append(limit)
+
+    def solve(self, cost: dict[int, float], low, high) -> tuple[np.ndarray, float] | None:
+        """The step and the optimal cost; None when the solver gives up."""
+        rows, columns, values, start = [], [], [], 0
+        for slope, others in self._rows:
+            count = len(slope)
+            here = np.arange(start, start + count)
+            for column in range(self.parameters):
+                rows.append(here)
+                columns.append(np.full(count, column))
+                values.append(slope[:, column])
+            for column, value in others.items():
+                rows.append(here)
+                columns.append(np.full(count, column))
+                values.append(np.full(count, value))
+            start += count
+        size = self.parameters + len(self._lows)
+        matrix = coo_array(
+            (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(start, size)
+        ).tocsr()
+        coefficients = np.zeros(size)
+        for column, value in cost.items():
+            coefficients[column] = value
+        bounds = [*zip(low, high), *((lowest, None) for lowest in self._lows)]
+        found = linprog(coefficients, A_ub=matrix, b_ub=np.concatenate(self._limits), bounds=bounds, method="highs")
+        if not found.success:
+            return None
+        return np.clip(found.x[: self.parameters], low, high), float(found.fun)

@@ -1,0 +1,49 @@
+"""The methods of optimization by name."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from types import MappingProxyType
+
+from .evolution import CMAES, DifferentialEvolution, Genetic
+from .factorial import Factorial
+from .first_order import Adam
+from .minimax import Minimax
+from .pareto import Pareto
+from .quasi_newton import LBFGS
+from .search import AbstractMethod
+
+METHODS: Mapping[str, type[AbstractMethod]] = MappingProxyType(
+    {
+        "minimax": Minimax,
+        "adam": Adam,
+        "lbfgs": LBFGS,
+        "genetic": Genetic,
+        "cma_es": CMAES,
+        "differential_evolution": DifferentialEvolution,
+        "factorial": Factorial,
+        "pareto": Pareto,
+    }
+)
+
+
+def method_named(
+    method: str | AbstractMethod, *, starts: int | None = None, steps: int | None = None, seed: int = 0
+) -> AbstractMethod:
+    """A method from its name, with the options that it has.
+
+    Raises:
+        ValueError: for an unknown name, or starts or steps where they cannot be given.
+    """
+    given = {name: value for name, value in {"starts": starts, "steps": steps}.items() if value is not None}
+    if not isinstance(method, str):
+        if given:
+            raise ValueError(f"minimize: {min(given)} must be given to the method, {type(method).__name__}(...)")
+        return method
+    if method not in METHODS:
+        raise ValueError(f'minimize: method "{method}" is not known, must be one of {", ".join(METHODS)}')
+    make = METHODS[method]
+    options = {field.name for field in fields(make)}
+    for name in given:
+        if name not in options:
+            raise ValueError(f'minimize: {name} has no effect with method "{method}"')
+    return make(**given, **({"seed": seed} if "seed" in options else {}))

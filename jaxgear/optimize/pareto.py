@@ -1,0 +1,160 @@
+"""Pareto fronts of several objectives by one batched gradient run."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from scipy.stats import qmc
+
+from ..numerics.pareto import pareto_front
+from .goal import FEASIBLE, QUANTITIES
+from .problem import GRADIENT_COST, Problem
+from .result import Front
+from .search import AbstractMethod, Record, whole
+from .smooth import STAGE_WIDTHS, stage_width, yardstick
+from .starts import real_points, start_points
+
+_FIRST_RATE, _LAST_RATE = 0.05, 0.002  # step sizes in the unit box, first and last chunk
+_CHUNK = 20
+_SUM = 0.05  # part of the plain sum in the scalarization, which keeps weakly dominated designs away
+_PENALTY = 10.0  # of a squared relative violation against a scaled objective of 1
+_SPAN = 1e-6  # least span of an objective over the designs
+
+
+class Pareto(AbstractMethod):
+    """Pareto front by the augmented Chebyshev scalarization (Steuer and Choo 1983), one weight per start.
+
+    Every start minimizes the largest weighted distance from the ideal point, which reaches concave parts of the front
+    too. Weights are spread evenly; ideal and nadir follow the designs that have been met. All starts advance together
+    with Adam under `jax.vmap`.
+
+    Attributes:
+        points: designs that are sought on the front.
+        steps: gradient steps of every one.
+    """
+
+    points: int = eqx.field(static=True, default=32)
+    steps: int = eqx.field(static=True, default=240)
+
+    def __check_init__(self):
+        whole("Pareto", "points", self.points, 2)
+        whole("Pareto", "steps", self.steps, len(STAGE_WIDTHS))
+
+    @property
+    def name(self) -> str:
+        return "pareto"
+
+    def search(self, problem: Problem, record: Record) -> Front:
+        """Runs the stages, then sorts out the front of all designs met at the looks."""
+        points = real_points(problem, start_points(problem, self.points))
+        weights = real_points(problem, _weights(self.points, len(problem.objectives)))
+        met = _Met(points, len(problem.objectives))
+
+        def advance(width, rate, count):
+            made = [real_points(problem, value) for value in (*met.frame(), width, rate)]
+            found = _advance(problem, points, weights, jnp.asarray(count), *made)
+            record.spend(self.points * count, analyses=GRADIENT_COST)
+            met.add(*found[1:])
+            return found[0]
+
+        advance(1.0, 0.0, 1)
+        scale = yardstick(met.soft_scale(problem))
+        chunks = max(-(-self.steps // _CHUNK), len(STAGE_WIDTHS))
+        for chunk, rate in enumerate(np.geomspace(_FIRST_RATE, _LAST_RATE, chunks)):
+            points = advance(stage_width(chunk, chunks, scale), rate, _CHUNK)
+            record.report(min((chunk + 1) * _CHUNK, self.steps), self.steps, met.compromise()[1])
+        place, distance = met.compromise()
+        if np.isfinite(distance):
+            record.offer(place, distance, 0.0)
+        return met.front(problem)
+
+
+class _Met:
+    """Designs met so far."""
+
+    def __init__(self, points, objectives: int):
+        self._points = np.empty((0, points.shape[1]))
+        self._values = np.empty((0, objectives))
+
+    def add(self, points, values, violations) -> None:
+        """Keeps those that are not dominated and violate nothing."""
+        points, values = np.asarray(points), np.asarray(values)
+        good = np.isfinite(values).all(axis=1) & (np.asarray(violations) <= FEASIBLE)
+        points, values = np.concatenate([self._points, points[good]]), np.concatenate([self._values, values[good]])
+        if len(values):
+            best = pareto_front(values)
+            points, values = points[best], values[best]
+        self._points, self._values = points, values
+
+    def frame(self) -> tuple[np.ndarray, np.ndarray]:
+        """Ideal point, and the span from it to the nadir."""
+        if len(self._values) < 2:
+            return np.zeros(self._values.shape[1]), np.ones(self._values.shape[1])
+        low, high = self._values.min(axis=0), self._values.max(axis=0)
+        return low, np.maximum(high - low, _SPAN * np.maximum(np.abs(high), 1.0))
+
+    def soft_scale(self, problem: Problem):
+        """Values of the objective that is softened, else of the first."""
+        index = problem.objectives.index("ppte") if "ppte" in problem.objectives else 0
+        return self._values[:, index]
+
+    def compromise(self) -> tuple[np.ndarray, float]:
+        """The design whose worst scaled distance from the ideal is the least, and that distance."""
+        if not len(self._values):
+            return np.full(self._points.shape[1], 0.5), np.inf
+        low, span = self.frame()
+        distance = ((self._values - low) / span).max(axis=1)
+        best = int(distance.argmin())
+        return self._points[best], float(distance[best])
+
+    def front(self, problem: Problem) -> Front:
+        """Ascending in the first objective."""
+        order = np.argsort(self._values[:, 0])
+        low, high = np.asarray(problem.low), np.asarray(problem.high)
+        parameters = low + self._points[order] * (high - low)
+        return Front(
+            objectives=tuple(of if isinstance(of, str) else of.__name__ for of in problem.objectives),
+            units=tuple(QUANTITIES[of].unit if isinstance(of, str) else "" for of in problem.objectives),
+            values=self._values[order],
+            parameters={name: parameters[:, index] for index, name in enumerate(problem.names)},
+        )
+
+
+def _weights(count: int, objectives: int) -> np.ndarray:
+    """Weights that sum to 1: evenly along the line of two objectives, of a low-discrepancy sequence for more."""
+    if objectives == 2:
+        first = np.linspace(0.0, 1.0, count + 2)[1:-1]
+        return np.stack([first, 1 - first], axis=1)
+    # spacings of sorted uniform numbers are uniform on the simplex
+    cuts = np.sort(qmc.Halton(objectives - 1, scramble=False).random(count + 1)[1:], axis=1)
+    return np.diff(np.concatenate([np.zeros((count, 1)), cuts, np.ones((count, 1))], axis=1), axis=1)
+
+
+@eqx.filter_jit
+def _advance(problem: Problem, points, weights, count, low, span, width, rate):
+    """Steps of all starts; returns the points, and the last designs that were judged with values and violations."""
+
+    def loss(x, weight):
+        soft, true, excess, fine = problem.soft_and_true(x, width)
+        scaled = weight * (soft - low) / span
+        penalty = _PENALTY * jnp.sum(jnp.maximum(excess, 0.0) ** 2)
+        good = fine & jnp.isfinite(jnp.sum(soft))
+        violation = jnp.maximum(jnp.max(excess, initial=0.0), 0.0)
+        return jnp.max(scaled) + _SUM * jnp.sum(scaled) + penalty, (jnp.where(good, true, jnp.inf), violation)
+
+    gradient = jax.vmap(jax.grad(loss, has_aux=True))
+    adam = optax.scale_by_adam()
+
+    def step(_, carry):
+        points, moments, *_ = carry
+        slopes, (values, violations) = gradient(points, weights)
+        slopes = jnp.where(jnp.isfinite(slopes), slopes, 0.0)
+        with jax.numpy_dtype_promotion("standard"):
+            update, moments = adam.update(slopes, moments)
+        return jnp.clip(points - rate * update, 0.0, 1.0), moments, points, values, violations
+
+    values = jnp.full(weights.shape, jnp.inf, points.dtype)
+    start = (points, adam.init(points), points, values, jnp.zeros_like(values[:, 0]))
+    points, _, judged, values, violations = jax.lax.fori_loop(0, count, step, start)
+    return points, judged, values, violations

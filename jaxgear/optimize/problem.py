@@ -1,0 +1,261 @@
+"""The optimization problem that all methods share: a box of parameters, cases, objectives and constraints."""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from ..contact import Mesh, MeshCycle, removed_material, solve_removed
+from ..metrics import smooth_peak_to_peak
+from ..microgeometry import AbstractModification, NoModification
+from ..numerics import AbstractMeasure, check, real
+from .cases import Cases
+from .goal import PPTE, Candidate, Constraint, Number, known, number
+
+Scalar = Float[Array, ""]
+Vector = Float[Array, " parameters"]
+Parameters = Mapping[str, Scalar]
+Modifications = tuple[AbstractModification | None, AbstractModification | None]
+Design = Callable[[Parameters], Modifications]
+
+# Contact analyses that a value with its gradient counts for.
+GRADIENT_COST = 3
+
+
+class Score(NamedTuple):
+    """A design judged.
+
+    Attributes:
+        value: the true objectives, shape (objectives,); inf where a contact solution failed.
+        violation: largest relative excess over a constraint, 0 where all are kept.
+    """
+
+    value: Float[Array, " objectives"]
+    violation: Scalar
+
+
+class Linearization(NamedTuple):
+    """Objective and constraints at a point with their slopes over the unit box.
+
+    The objective of case k is max(upper[k]) - min(lower[k]).
+
+    Attributes:
+        upper, lower: shape (cases, pieces).
+        slope: of `upper` and `lower`, shape (cases, pieces, parameters).
+        excess: of the constraints, shape (constraints,), with `excess_slope`, shape (constraints, parameters).
+        fine: whether all contact solutions converged.
+    """
+
+    upper: Float[Array, "cases pieces"]
+    lower: Float[Array, "cases pieces"]
+    slope: Float[Array, "cases pieces parameters"]
+    lower_slope: Float[Array, "cases pieces parameters"]
+    excess: Float[Array, " constraints"]
+    excess_slope: Float[Array, "constraints parameters"]
+    fine: Bool[Array, ""]
+
+
+class Roughness(eqx.Module):
+    """Penalty on the largest absolute value of linear forms of the parameters, such as the curvature of a table.
+
+    The method "minimax" alone follows it.
+
+    Attributes:
+        forms: coefficients over the unit box, shape (forms, parameters).
+        weight: of the largest absolute value, in units of the objective.
+    """
+
+    forms: Float[Array, "forms parameters"]
+    weight: Scalar
+
+
+class Problem(eqx.Module):
+    """Minimize measures of numbers over cases, within a box and constraints; parameters live in the unit box.
+
+    Attributes:
+        design: makes (pinion, wheel) modifications from the named parameters.
+        names: of the parameters.
+        low, high: their bounds, shape (parameters,).
+        mesh: prepared mesh.
+        cases: loads and manufactured gears.
+        objectives: names of quantities or functions of a `Candidate`.
+        measure: turns the numbers of the cases into one.
+        constraints: limits that hold in every case.
+        roughness: penalty on the parameters, None without.
+    """
+
+    design: Design
+    names: tuple[str, ...] = eqx.field(static=True)
+    low: Vector
+    high: Vector
+    mesh: Mesh
+    cases: Cases
+    objectives: tuple[str | Number, ...] = eqx.field(static=True)
+    measure: AbstractMeasure
+    constraints: tuple[Constraint, ...] = ()
+    roughness: Roughness | None = None
+
+    def parameters(self, x: Vector) -> dict[str, Scalar]:
+        """Parameters at a point of the unit box."""
+        values = self.low + x * (self.high - self.low)
+        return dict(zip(self.names, values))
+
+    def modifications(self, x: Vector) -> tuple[AbstractModification, AbstractModification]:
+        """Modifications at a point of the unit box."""
+        pinion, wheel = self.design(self.parameters(x))
+        return pinion or NoModification(), wheel or NoModification()
+
+    def score(self, x: Vector) -> Score:
+        """True objectives and violation."""
+
+        def of_case(candidate: Candidate):
+            return self._numbers(candidate, None), self._excess(candidate), _fine(candidate.cycle)
+
+        numbers, excess, fine = self.over_cases(x, of_case)
+        values = self._measured(numbers)
+        good = jnp.all(fine) & jnp.isfinite(jnp.sum(values)) & jnp.isfinite(jnp.sum(excess))
+        return Score(jnp.where(good, values, jnp.inf), jnp.maximum(jnp.max(excess, initial=0.0), 0.0))
+
+    def soft_and_true(self, x: Vector, width):
+        """What gradient methods need of one analysis.
+
+        Args:
+            x: point of the unit box.
+            width: of the soft extremes of PPTE [um].
+
+        Returns:
+            the objectives with soft extremes, the true ones, the worst excess over every constraint, and whether all
+            contact solutions converged.
+        """
+
+        def of_case(candidate: Candidate):
+            numbers = self._numbers(candidate, width), self._numbers(candidate, None)
+            return *numbers, self._excess(candidate), _fine(candidate.cycle)
+
+        soft, true, excess, fine = self.over_cases(x, of_case)
+        return self._measured(soft), self._measured(true), jnp.max(excess, axis=0), jnp.all(fine)
+
+    def linearize(self, x: Vector) -> Linearization:
+        """The first objective and the constraints with their slopes, for the price of one gradient per case."""
+        if self.objectives[0] == PPTE:
+            upper, slope, fine = self._curves(x)
+            lower, lower_slope = upper, slope
+        else:
+            upper, fine = self.over_cases(x, lambda c: (self._numbers(c, None)[:1], _fine(c.cycle)))
+            slope = jax.jacrev(lambda x: self.over_cases(x, lambda c: self._numbers(c, None)[:1]))(x)
+            lower, lower_slope = jnp.zeros_like(upper), jnp.zeros_like(slope)
+
+        def excess(x):
+            return self.over_cases(x, self._excess).reshape(-1)
+
+        if self.constraints:
+            limits, limit_slope = excess(x), jax.jacrev(excess)(x)
+        else:
+            limits, limit_slope = jnp.zeros((0,), x.dtype), jnp.zeros((0, x.shape[0]), x.dtype)
+        good = jnp.all(fine) & jnp.isfinite(jnp.sum(slope)) & jnp.isfinite(jnp.sum(limit_slope))
+        return Linearization(upper, lower, slope, lower_slope, limits, limit_slope, good)
+
+    def _curves(self, x: Vector):
+        """Transmission error of every case and its slopes.
+
+        The transmission error at a position depends on the material removed at that position alone, by as much as the
+        contacts share the load: one gradient of the contact analysis gives the slopes at all positions.
+        """
+        slopes = jax.jacfwd(lambda x: self._removed(x))(x)
+
+        def at(torque, deviations, removed, slope):
+            def one(deviation):
+                def curve(removed):
+                    cycle = solve_removed(self.mesh, torque, removed)
+                    return cycle.transmission_error, _fine(cycle)
+
+                error, back, fine = jax.vjp(curve, removed + deviation, has_aux=True)
+                (share,) = back(jnp.ones_like(error))
+                return error, jnp.einsum("isp,ispx->px", share, slope), fine
+
+            return jax.vmap(one)(deviations)
+
+        found = jax.vmap(at)(self.cases.torque, self.cases.removed, self._removed(x), slopes)
+        return tuple(part.reshape(self.cases.count, *part.shape[2:]) for part in found)
+
+    def _removed(self, x: Vector):
+        """Material that the design removes under every torque, (torques, pairs, slices, positions)."""
+        pinion, wheel = self.modifications(x)
+        return jax.vmap(lambda torque: removed_material(self.mesh, torque, pinion=pinion, wheel=wheel))(
+            self.cases.torque
+        )
+
+    def over_cases(self, x: Vector, of_case):
+        """A function of a candidate in every case, cases leading."""
+        pinion, wheel = self.modifications(x)
+        parameters = self.parameters(x)
+
+        def at(torque, deviations, removed):
+            def one(deviation):
+                cycle = solve_removed(self.mesh, torque, removed + deviation)
+                return of_case(Candidate(parameters, pinion, wheel, cycle))
+
+            return jax.vmap(one)(deviations)
+
+        found = jax.vmap(at)(self.cases.torque, self.cases.removed, self._removed(x))
+        return jax.tree.map(lambda part: part.reshape(self.cases.count, *part.shape[2:]), found)
+
+    def _numbers(self, candidate: Candidate, width):
+        """Objectives of a case, with soft extremes where a width is given."""
+        values = []
+        for of in self.objectives:
+            if of == PPTE and width is not None:
+                values.append(smooth_peak_to_peak(candidate.cycle.transmission_error, width))
+            else:
+                values.append(number(of)(candidate))
+        return jnp.stack(values)
+
+    def _excess(self, candidate: Candidate):
+        over = [excess for limit in self.constraints for excess in limit.excess(limit.value(candidate))]
+        return jnp.stack(over) if over else jnp.zeros((0,), self.low.dtype)
+
+    def _measured(self, numbers):
+        return jax.vmap(lambda column: self.measure(column, self.cases.weights), 1)(numbers)
+
+
+def _fine(cycle: MeshCycle):
+    return jnp.all(cycle.converged) & jnp.isfinite(jnp.sum(cycle.transmission_error))
+
+
+def make_problem(
+    design: Design,
+    bounds: Mapping[str, tuple[float, float]],
+    mesh: Mesh,
+    cases: Cases,
+    objectives,
+    measure: AbstractMeasure,
+    constraints,
+) -> Problem:
+    """Checks and collects a problem.
+
+    Raises:
+        ValueError: for empty or reversed bounds, and unknown names of objectives or constrained parameters.
+    """
+    names, low, high = box(bounds)
+    for objective in objectives:
+        if isinstance(objective, str):
+            known("minimize", objective)
+    for constraint in constraints:
+        for name in constraint.parameters:
+            if name not in names:
+                raise ValueError(f'minimize: "{name}" of a constraint must be one of {", ".join(names)}')
+    return Problem(design, names, low, high, mesh, cases, tuple(objectives), measure, tuple(constraints))
+
+
+def box(bounds: Mapping[str, tuple[float, float]]):
+    """Names, lower and upper bounds."""
+    if not bounds:
+        raise ValueError("minimize: bounds must name at least one free parameter")
+    for name, (low, high) in bounds.items():
+        check("minimize", f"lower bound of {name}", low, "")
+        check("minimize", f"upper bound of {name}", high, "", low=low, open_low=True)
+    pairs = jnp.stack([jnp.stack([real(low), real(high)]) for low, high in bounds.values()])
+    return tuple(bounds), pairs[:, 0], pairs[:, 1]

@@ -1,0 +1,154 @@
+"""A free flank replaced by a named curve, and what that costs."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..contact import Mesh, MeshCycle, removed_material, solve_removed
+from ..metrics import peak_to_peak, removed_at
+from ..microgeometry import (
+    AbstractCurve,
+    AbstractModification,
+    Linear,
+    ParabolicLinear,
+    Polynomial,
+    Power,
+    TipRelief,
+)
+from ..numerics import real
+from .result import Optimum
+
+_SAMPLES = 201  # points of the fit, from the pitch point to the tip
+_LENGTHS = (0.3, 0.5, 0.7, 0.9)  # of the relief, relative to the addendum, from which the fits start
+_LEAST_LENGTH = 0.02
+
+# Shape parameters of a curve: how to make it, where the fit starts, and its bounds. Polynomials keep their amount in
+# their coefficients.
+_Shape = tuple[Callable[..., AbstractCurve], tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+CURVES: Mapping[str, _Shape] = MappingProxyType(
+    {
+        "linear": (Linear, (), (), ()),
+        "power": (Power, (1.5,), (0.3,), (6.0,)),
+        "parabolic_linear": (ParabolicLinear, (0.5,), (0.01,), (1.0,)),
+        "quadratic": (lambda b: Polynomial(jnp.stack([0.0 * b, b, 1 - b])), (0.5,), (-6.0,), (6.0,)),
+        "cubic": (
+            lambda b, c: Polynomial(jnp.stack([0.0 * b, b, c, 1 - b - c])),
+            (0.5, 0.5),
+            (-12.0, -12.0),
+            (12.0, 12.0),
+        ),
+    }
+)
+
+
+class Projection(eqx.Module):
+    """Flanks of a named curve in place of others.
+
+    Attributes:
+        curve: its name.
+        pinion, wheel: tip reliefs.
+        cycle: mesh cycle with them, under the torque of the original.
+        ppte: peak-to-peak transmission error [um].
+        loss: by how much it is larger than that of the original flanks [um].
+        misfit: largest distance from the original flanks, from the pitch points to the tips [um].
+    """
+
+    curve: str = eqx.field(static=True)
+    pinion: TipRelief
+    wheel: TipRelief
+    cycle: MeshCycle
+    ppte: float
+    loss: float
+    misfit: float
+
+    def __str__(self) -> str:
+        lines = [f"{self.curve}: PPTE {self.ppte:.3f} um, {self.loss:+.3f} um; misfit {self.misfit:.2f} um"]
+        for name, relief in (("pinion", self.pinion), ("wheel", self.wheel)):
+            lines.append(f"  {name} {float(relief.amount):.2f} um over {float(relief.length):.2f} mm")
+        return "\n".join(lines)
+
+
+def project(optimum: Optimum, curve: str = "power") -> Projection:
+    """Fits a tip relief of a named curve to each flank of an optimum, by least squares from the pitch point to the tip.
+
+    This is what grinding and drawings need of a free-form or iterated flank: an amount, a length and a form. The fit
+    minimizes the distance of the flanks, not the PPTE: `minimize` with the same curve finds a better one.
+
+    Args:
+        optimum: of `free_form` or `iterate_transmission_error`.
+        curve: "linear", "power", "parabolic_linear", "quadratic" or "cubic".
+
+    Raises:
+        ValueError: for an unknown curve.
+    """
+    if curve not in CURVES:
+        raise ValueError(f'project: curve = "{curve}" is not known, must be one of {", ".join(CURVES)}')
+    mesh, torque = optimum.cycle.mesh, optimum.cycle.torque
+    fits = [_fit(mesh, optimum.pinion, True, curve), _fit(mesh, optimum.wheel, False, curve)]
+    pinion, wheel = (relief for relief, _ in fits)
+    cycle = solve_removed(mesh, torque, _material(mesh, torque, pinion, wheel))
+    ppte = float(peak_to_peak(cycle.transmission_error))
+    misfit = max(distance for _, distance in fits)
+    return Projection(curve, pinion, wheel, cycle, ppte, ppte - optimum.ppte, misfit)
+
+
+def _fit(mesh: Mesh, modification: AbstractModification, of_pinion: bool, curve: str):
+    """The best relief of one gear, and its largest distance from the flank."""
+    _, first, low, high = CURVES[curve]
+    roll = _roll_lengths(mesh, of_pinion)
+    addendum = float(roll[-1] - roll[0])
+    flank = np.asarray(_removed(mesh, modification, roll, of_pinion))
+    most = max(float(flank.max()), 1e-3)
+
+    def residual(values):
+        return np.asarray(_distance(mesh, jnp.asarray(values), jnp.asarray(flank), roll, of_pinion, curve)) / most
+
+    def slope(values):
+        return np.asarray(_slope(mesh, jnp.asarray(values), jnp.asarray(flank), roll, of_pinion, curve)) / most
+
+    bounds = [0.0, _LEAST_LENGTH * addendum, *low], [3 * most, addendum, *high]
+    starts = [[most, share * addendum, *first] for share in _LENGTHS]
+    fits = [least_squares(residual, values, jac=slope, bounds=bounds) for values in starts]
+    best = min(fits, key=lambda fit: fit.cost)
+    return _relief(jnp.asarray(best.x), curve), float(np.abs(best.fun).max()) * most
+
+
+def _relief(values, curve: str) -> TipRelief:
+    amount, length, *shape = values
+    return TipRelief(real(amount), real(length), CURVES[curve][0](*shape))
+
+
+def _roll_lengths(mesh: Mesh, of_pinion: bool):
+    contact, pair = mesh.path_of_contact, mesh.pair
+    pitch = contact.pinion_pitch_roll_length if of_pinion else contact.wheel_pitch_roll_length
+    gear = pair.pinion if of_pinion else pair.wheel
+    return jnp.linspace(pitch, gear.tip_roll_length, _SAMPLES)
+
+
+def _difference(values, mesh, flank, roll, of_pinion, curve):
+    return removed_at(mesh, _relief(values, curve), roll, of_pinion=of_pinion) - flank
+
+
+@eqx.filter_jit
+def _distance(mesh: Mesh, values, flank, roll, of_pinion: bool, curve: str):
+    return _difference(values, mesh, flank, roll, of_pinion, curve)
+
+
+@eqx.filter_jit
+def _slope(mesh: Mesh, values, flank, roll, of_pinion: bool, curve: str):
+    return jax.jacfwd(_difference)(values, mesh, flank, roll, of_pinion, curve)
+
+
+@eqx.filter_jit
+def _removed(mesh: Mesh, modification: AbstractModification, roll, of_pinion: bool):
+    return removed_at(mesh, modification, roll, of_pinion=of_pinion)
+
+
+@eqx.filter_jit
+def _material(mesh: Mesh, torque, pinion: AbstractModification, wheel: AbstractModification):
+    return removed_material(mesh, torque, pinion=pinion, wheel=wheel)

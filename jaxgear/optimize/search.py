@@ -1,0 +1,75 @@
+"""What a method of optimization is, and the record that it keeps."""
+
+from abc import abstractmethod
+from collections.abc import Callable
+
+import equinox as eqx
+import numpy as np
+
+from .goal import FEASIBLE
+from .linear_model import Model
+from .problem import Problem
+from .result import Front
+
+Callback = Callable[[int, int, float], None]
+
+
+class Record:
+    """The best design met so far, what it cost, and who wants to know.
+
+    A design that keeps the constraints beats one that does not; among those that do not, the least violation wins.
+    """
+
+    def __init__(self, problem: Problem, callback: Callback | None):
+        self.problem = problem
+        self.evaluations = 0
+        self.point = np.full(len(problem.names), 0.5)
+        self.value, self.violation = float("inf"), float("inf")
+        self.model: Model | None = None  # linearization at the best design, where the method made one
+        self.history: list[tuple[int, float]] = []
+        self._callback = callback
+
+    def spend(self, designs: int, *, analyses: int = 1) -> None:
+        """Counts contact analyses: of so many designs in every case, each worth so many."""
+        self.evaluations += designs * analyses * self.problem.cases.count
+
+    def offer(self, points, values, violations, model: Model | None = None) -> None:
+        """Designs with their true objective and violation; anything that is not finite is no candidate."""
+        points, values, violations = np.atleast_2d(points), np.ravel(values), np.ravel(violations)
+        excess = np.where(violations <= FEASIBLE, 0.0, violations)
+        good = np.isfinite(values) & np.isfinite(excess)
+        if not good.any():
+            return
+        best = np.lexsort((np.where(good, values, np.inf), np.where(good, excess, np.inf)))[0]
+        if (excess[best], values[best]) < (0.0 if self.violation <= FEASIBLE else self.violation, self.value):
+            self.point, self.value, self.violation = points[best].copy(), float(values[best]), float(violations[best])
+            self.model = model
+
+    def look(self, step: int, steps: int) -> None:
+        """Marks the progress: after `step` of `steps`."""
+        self.report(step, steps, self.value)
+
+    def report(self, step: int, steps: int, value: float) -> None:
+        """Marks the progress of a method that keeps its own best design."""
+        self.history.append((self.evaluations, value))
+        if self._callback is not None:
+            self._callback(step, steps, value)
+
+
+class AbstractMethod(eqx.Module):
+    """A method of optimization; its fields are its options."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """As design files and tables call it."""
+
+    @abstractmethod
+    def search(self, problem: Problem, record: Record) -> Front | None:
+        """Searches, leaving the best design in the record; of several objectives, returns their front."""
+
+
+def whole(owner: str, name: str, value, least: int) -> None:
+    """Raises a `ValueError` unless the value is a whole number of at least `least`."""
+    if not isinstance(value, int) or isinstance(value, bool) or value < least:
+        raise ValueError(f"{owner}: {name} = {value!r} must be a whole number of at least {least}")

@@ -1,0 +1,78 @@
+"""The smooth problem that gradient methods follow: soft extremes, augmented Lagrangian, start values."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .goal import FEASIBLE
+from .problem import Problem
+
+Scalar = Float[Array, ""]
+
+# Widths of the soft extremes in the stages of a search, relative to the best objective among the start points: from
+# wide, where most positions pull, to narrow, where the soft objective is within about a percent of the true one.
+STAGE_WIDTHS = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
+_LEAST_SCALE = 1e-3  # [um] of the objective, where the start is perfect already
+_STIFFNESS = 10.0  # of the penalty: objective per squared relative violation, relative to the scale
+
+
+class Multipliers(eqx.Module):
+    """Multipliers of the constraints, of every start.
+
+    Attributes:
+        value: shape (starts, constraints).
+    """
+
+    value: Float[Array, "starts constraints"]
+
+    @classmethod
+    def zeros(cls, problem: Problem, starts: int) -> "Multipliers":
+        """No multiplier yet."""
+        count = sum((limit.low is not None) + (limit.high is not None) for limit in problem.constraints)
+        return cls(jnp.zeros((starts, count), problem.low.dtype))
+
+    def follow(self, excess, scale) -> "Multipliers":
+        """First-order update of the augmented Lagrangian (Hestenes 1969, Powell 1969)."""
+        return Multipliers(jnp.maximum(self.value + _STIFFNESS * scale * excess, 0.0))
+
+
+def lagrangian(problem: Problem, x, multipliers: Multipliers, width, scale):
+    """Augmented Lagrangian of the soft problem at one point, with its true value, violation and excess."""
+    values, violation, excess = both(problem, x, width)
+    stiffness = _STIFFNESS * scale
+    pushed = jnp.maximum(multipliers.value + stiffness * excess, 0.0)
+    penalty = jnp.sum(pushed**2 - multipliers.value**2) / (2 * stiffness)
+    return values[0] + penalty, (*violation, excess)
+
+
+def both(problem: Problem, x, width):
+    """Soft objectives, then the true first objective and violation, then the worst excess over every constraint."""
+    values, true, excess, fine = problem.soft_and_true(x, width)
+    good = fine & jnp.isfinite(jnp.sum(values))
+    violation = jnp.maximum(jnp.max(excess, initial=0.0), 0.0)
+    return values, (jnp.where(good, true[0], jnp.inf), violation), excess
+
+
+def merged(best, new):
+    """The better of two designs of every start: (points, values, violations) each."""
+    (points, values, violations), (other, value, violation) = best, new
+    excess, others = (jnp.where(v <= FEASIBLE, 0.0, v) for v in (violations, violation))
+    better = (others < excess) | ((others == excess) & (value < values))
+    better = better & jnp.isfinite(value)
+    return (
+        jnp.where(better[:, None], other, points),
+        jnp.where(better, value, values),
+        jnp.where(better, violation, violations),
+    )
+
+
+def stage_width(step: int, steps: int, scale: float) -> float:
+    """Width of the soft extremes [um] at a step of a search."""
+    return STAGE_WIDTHS[step * len(STAGE_WIDTHS) // steps] * scale
+
+
+def yardstick(values) -> float:
+    """Scale of the stage widths [um], from the true objective of the start points."""
+    known = np.abs(np.asarray(values)[np.isfinite(values)])
+    return max(float(known.min()), _LEAST_SCALE) if len(known) else 1.0

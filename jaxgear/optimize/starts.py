@@ -1,0 +1,20 @@
+"""Start points of a search."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.stats import qmc
+
+from .problem import Problem
+
+
+def start_points(problem: Problem, count: int) -> np.ndarray:
+    """The middle of the box, then a Halton sequence: deterministic, so that a design file always gives one answer."""
+    points = qmc.Halton(len(problem.names), scramble=False).random(count)
+    points[0] = 0.5
+    return points.astype(np.dtype(problem.low.dtype))
+
+
+def real_points(problem: Problem, points) -> jax.Array:
+    """Points of the unit box in the type of the problem."""
+    return jnp.asarray(points, problem.low.dtype)
