@@ -9,7 +9,7 @@ The pipeline in reading order, every step differentiable and vmappable:
     peak_to_peak, ...           metrics on the MeshCycle
     monte_carlo                 what manufacturing tolerances make of it
     sweep                       any number of modifications -> SweepTable
-    minimize                    the best modification by gradient
+    minimize, free_form         the best modification, by gradient and by other methods
 
 Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in
     constructors.

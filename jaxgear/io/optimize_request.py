@@ -24,6 +24,7 @@ T = TypeVar("T")
 
 _DEFAULT_METHOD = "minimax"
 _CURVE = "cubic"  # on which flanks without parameters are projected
+_FRONT = ("ppte", "max_contact_pressure")  # of a Pareto front where the file names no objectives
 _KNOWN = (*METHODS, *schema.METHODS_WITHOUT_VARIABLES)
 _STARTS = ("minimax", "adam", "lbfgs")  # methods of `starts` and `steps`
 _MEASURES: Mapping[str, Callable[..., AbstractMeasure]] = {
@@ -151,7 +152,7 @@ def _options(design: DesignFile, name: str) -> dict[str, Any]:
 
 def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
     """Objective, cases and constraints."""
-    objectives = section.objective if isinstance(section.objective, list) else [section.objective or "ppte"]
+    objectives = _objectives(section, name)
     for objective in objectives:
         if objective not in QUANTITIES:
             problem = f'"{objective}" is not known, {suggestion(objective, QUANTITIES)}'
@@ -169,6 +170,12 @@ def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quic
         **_gears(design, section, quick),
     }
     return found if name == "free_form" else {**found, "objective": tuple(objectives)}
+
+
+def _objectives(section: schema.OptimizeSection, name: str) -> list[str]:
+    if section.objective is None:
+        return list(_FRONT) if name == "pareto" else ["ppte"]
+    return section.objective if isinstance(section.objective, list) else [section.objective]
 
 
 def _constraints(design: DesignFile, section: schema.OptimizeSection) -> tuple[Constraint, ...]:

@@ -34,8 +34,12 @@ class AbstractMeasure(eqx.Module):
         order = jnp.argsort(values)
         cumulative = jnp.cumsum(weights[order])
         edges = jnp.concatenate([jnp.zeros_like(cumulative[:1]), cumulative / cumulative[-1]])
+        # compiled, the quotient of two equal numbers can be just below 1, and the worst value then has no share
+        rounding = 4 * values.shape[0] * jnp.finfo(edges.dtype).eps
+        edges = jnp.where(edges > 1 - rounding, 1.0, edges)
         count = jnp.sum(weights) ** 2 / jnp.sum(weights**2)
-        return jnp.zeros_like(values).at[order].set(jnp.diff(self.spread(edges, count)))
+        carried = jnp.where(weights[order] > 0, jnp.diff(self.spread(edges, count)), 0.0)
+        return jnp.zeros_like(values).at[order].set(carried)
 
     def __call__(self, values: Values, weights: Values) -> Scalar:
         """The number. Values that are not finite count where they carry a share."""

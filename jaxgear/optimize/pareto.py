@@ -16,10 +16,10 @@ from .smooth import STAGE_WIDTHS, stage_width, yardstick
 from .starts import real_points, start_points
 
 _FIRST_RATE, _LAST_RATE = 0.05, 0.002  # step sizes in the unit box, first and last chunk
-_CHUNK = 20
+_CHUNK = 8  # steps between two looks, at which the front is brought up to date
 _SUM = 0.05  # part of the plain sum in the scalarization, which keeps weakly dominated designs away
 _PENALTY = 10.0  # of a squared relative violation against a scaled objective of 1
-_SPAN = 1e-6  # least span of an objective over the designs
+_SPAN = 1e-3  # least span of an objective over the designs, relative to its ideal
 
 
 class Pareto(AbstractMethod):
@@ -76,11 +76,15 @@ class _Met:
     def __init__(self, points, objectives: int):
         self._points = np.empty((0, points.shape[1]))
         self._values = np.empty((0, objectives))
+        self._worst = np.ones(objectives)
 
     def add(self, points, values, violations) -> None:
         """Keeps those that are not dominated and violate nothing."""
         points, values = np.asarray(points), np.asarray(values)
-        good = np.isfinite(values).all(axis=1) & (np.asarray(violations) <= FEASIBLE)
+        finite = np.isfinite(values).all(axis=1)
+        good = finite & (np.asarray(violations) <= FEASIBLE)
+        if finite.any():
+            self._worst = values[finite].max(axis=0)
         points, values = np.concatenate([self._points, points[good]]), np.concatenate([self._values, values[good]])
         if len(values):
             best = pareto_front(values)
@@ -88,11 +92,11 @@ class _Met:
         self._points, self._values = points, values
 
     def frame(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ideal point, and the span from it to the nadir."""
-        if len(self._values) < 2:
-            return np.zeros(self._values.shape[1]), np.ones(self._values.shape[1])
-        low, high = self._values.min(axis=0), self._values.max(axis=0)
-        return low, np.maximum(high - low, _SPAN * np.maximum(np.abs(high), 1.0))
+        """Ideal point, and the span from it to the worst values that the starts have at the moment."""
+        if not len(self._values):
+            return np.zeros_like(self._worst), np.ones_like(self._worst)
+        low = self._values.min(axis=0)
+        return low, np.maximum(self._worst - low, _SPAN * np.maximum(np.abs(low), 1.0))
 
     def soft_scale(self, problem: Problem):
         """Values of the objective that is softened, else of the first."""

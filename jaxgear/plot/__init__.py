@@ -6,6 +6,7 @@ None shows a window or changes matplotlib's settings; `save` writes the file.
 
 from .convergence import convergence as convergence
 from .fan import fan as fan
+from .fan import ppte_distribution as ppte_distribution
 from .fan import ppte_histogram as ppte_histogram
 from .figure import save as save
 from .iterations import iterations_relief as iterations_relief

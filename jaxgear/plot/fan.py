@@ -1,10 +1,12 @@
 """Scatter of the transmission error over manufactured gears."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.axes import Axes
 
 from ..tolerance import Scatter
-from .figure import legend_above, line_style, report_axes
+from .figure import GREY, legend_above, line_style, report_axes
 from .history import PHASE_LABEL, two_pitches
 
 _BANDS = ("#C6DBEF", "#6BAED6", "#3182BD")  # from the outside in; further bands repeat the last
@@ -72,5 +74,29 @@ def ppte_histogram(scatter: Scatter, ax: Axes | None = None) -> Axes:
         failed = f", {scatter.failed} of {ppte.size} failed" if scatter.failed else ""
         ax.set_xlim(left=0)
         ax.set(xlabel=f"peak-to-peak transmission error{failed} [µm]", ylabel="share of the gears [%]")
+        legend_above(ax)
+    return ax
+
+
+def ppte_distribution(samples: Mapping[str, np.ndarray], ax: Axes | None = None, level: float = 0.95) -> Axes:
+    """Share of the manufactured gears whose PPTE stays below a value, of several designs.
+
+    Args:
+        samples: PPTE of every sample [um] by the name of the design; those that failed, NaN, stay below no value.
+        ax: Axes to draw into; None for a new figure.
+        level: share that a line marks, with each design's quantile in the legend.
+    """
+    with report_axes(ax) as ax:
+        for index, (name, values) in enumerate(samples.items()):
+            values = np.asarray(values)
+            ordered = np.sort(values[np.isfinite(values)])
+            share = 100 * np.arange(1, ordered.size + 1) / values.size
+            place = int(np.searchsorted(share, 100 * level))
+            reached = f", {100 * level:g} % below {ordered[place]:.2f} µm" if place < ordered.size else ""
+            ax.plot(ordered, share, label=f"{name}{reached}", **line_style(index))
+        ax.axhline(100 * level, color=GREY, linewidth=0.8, zorder=0.5)
+        ax.set_xlim(left=0)
+        ax.set_ylim(0, 100)
+        ax.set(xlabel="peak-to-peak transmission error [µm]", ylabel="share of the gears below [%]")
         legend_above(ax)
     return ax
