@@ -11,10 +11,17 @@ _POINTS_SIDE_BY_SIDE = 2**12  # contact points that advance together, whose arra
 _INFEASIBLE = 1e6  # rank of a design that passes a limit, above any objective
 
 
-@eqx.filter_jit
 def scores(problem: Problem, points) -> Score:
     """Scores of points of the unit box, leading axis (points,), in batches that fit the cache."""
-    return jax.lax.map(problem.score, points, batch_size=batch_size(problem))
+    count, batch = len(points), min(batch_size(problem), len(points))
+    # whole batches only: the rest would be a program of its own, compiled for the length of the contact solution
+    padded = jnp.concatenate([points, jnp.repeat(points[-1:], -count % batch, axis=0)])
+    return jax.tree.map(lambda part: part[:count], _scores(problem, padded, batch))
+
+
+@eqx.filter_jit
+def _scores(problem: Problem, points, batch: int) -> Score:
+    return jax.lax.map(problem.score, points, batch_size=batch)
 
 
 def batch_size(problem: Problem) -> int:

@@ -38,7 +38,8 @@ class _Evolution(AbstractMethod):
 
     def search(self, problem: Problem, record: Record) -> None:
         """Runs the generations."""
-        algorithm, parameters = self._algorithm(jnp.full_like(problem.low, 0.5))
+        with _relaxed():
+            algorithm, parameters = self._algorithm(jnp.full_like(problem.low, 0.5))
         key, first = jax.random.split(jax.random.key(self.seed))
         state, rest = self._begin(algorithm, parameters, problem, record, first)
         for generation in range(1, rest + 1):

@@ -6,14 +6,14 @@ import equinox as eqx
 import numpy as np
 
 from ..sweep import FullFactorial
-from .evaluate import batch_size, scores
+from .evaluate import scores
 from .problem import Problem
 from .search import AbstractMethod, Record, whole
 from .starts import real_points
 
 _LEVELS = 5
 _MOST_DESIGNS = 10**7
-_CHUNK = 2048  # designs between two looks, at least
+_CHUNK = 2048  # designs between two looks
 
 
 class Factorial(AbstractMethod):
@@ -43,8 +43,7 @@ class Factorial(AbstractMethod):
         plan = FullFactorial({name: (0.0, 1.0) for name in problem.names}, levels)
         if plan.size > _MOST_DESIGNS:
             raise ValueError(f"Factorial: {plan.size} designs must be at most {_MOST_DESIGNS}; take fewer levels")
-        batch = batch_size(problem)
-        chunk = -(-min(_CHUNK, plan.size) // batch) * batch
+        chunk = min(_CHUNK, plan.size)
         for start in range(0, plan.size, chunk):
             rows = np.asarray(plan.rows(start, min(start + chunk, plan.size)), float)
             padded = np.concatenate([rows, np.repeat(rows[-1:], chunk - len(rows), axis=0)])
