@@ -139,6 +139,23 @@ def test_worst_case_over_a_torque_range(mesh):
     assert worst(0.9) > worst(1.0) < worst(1.1)
 
 
+def test_transmission_error_taken_off_the_flanks(mesh):
+    """Both pairs give way by what they lag, delta0 / 2: the first step levels double contact, and none has to follow.
+
+    Pairs that carry no load outside the path of contact make it exact.
+    """
+    result = jg.iterate_transmission_error(mesh, torque(mesh, 1.0))
+    first, second = result.iterations
+    assert first.ppte / DELTA0 == pytest.approx(0.5, rel=1e-12)
+    assert second.ppte / DELTA0 < 1e-9
+    assert second.limit / DELTA0 < 1e-9
+    np.testing.assert_allclose(result.cycle.transmission_error, DELTA0, rtol=1e-9)
+    assert second.max_relief == pytest.approx(0.5 * DELTA0, rel=1e-9)
+    # half of it only: both pairs give way by a quarter of delta0, and half of the variation is left
+    capped = jg.iterate_transmission_error(mesh, torque(mesh, 1.0), max_relief=0.25 * DELTA0)
+    assert capped.ppte / DELTA0 == pytest.approx(0.25, abs=1e-9)
+
+
 def test_gradient_of_the_closed_forms(mesh):
     """Slope of PPTE over the depth: (2 - L / G) / 2 past the curve, its negative before it; over load 1 / (2 k)."""
     extent = 0.8 * L

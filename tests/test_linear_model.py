@@ -1,131 +1,259 @@
-"""The linearized problem: its slopes are those of the contact analysis, its best step is that of the exact extremes."""
+"""Sequential linear programming: slopes of the linearized problem, and the best step of the linear program."""
 
 from types import SimpleNamespace
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from catalogue import gear_pair, solve_any
 
 import jaxgear as jg
 from jaxgear.optimize.cases import cases
-from jaxgear.optimize.linear_model import Model
+from jaxgear.optimize.linear_model import PENALTY, Model
 from jaxgear.optimize.problem import Linearization, Roughness, make_problem
+from jaxgear.tolerance import GearTolerance
+
+TORQUES = (50.0, 30.0)
+BOX = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.7), "exponent": (1.0, 3.0)}
+POINT = np.array([0.31, 0.46, 0.72, 0.22])
+STEP = 1e-5  # of the central differences, in the unit box
 
 
-def problem_of(measure, weights, roughness=None):
-    """What a model asks of a problem."""
-    return SimpleNamespace(measure=measure, cases=SimpleNamespace(weights=np.asarray(weights)), roughness=roughness)
+def design(x):
+    curve = jg.Power(x["exponent"])
+    return jg.TipRelief(x["pinion"], x["length"], curve), jg.TipRelief(x["wheel"], x["length"], curve)
 
 
-def linear(upper, slope, excess=(), excess_slope=None):
-    """A linearization of a peak-to-peak value; leading axis cases."""
-    upper, slope = np.atleast_2d(upper).astype(float), np.asarray(slope, float)
-    count = slope.shape[-1]
-    slopes = np.zeros((0, count)) if excess_slope is None else np.asarray(excess_slope, float)
-    return Linearization(upper, upper, slope, slope, np.asarray(excess, float), slopes, np.asarray(True))
+@pytest.fixture(scope="module")
+def mesh():
+    pair = gear_pair()
+    return jg.prepare(pair, resolution=jg.Resolution(positions=24, pairs=jg.fewest_pairs(pair, deflection=40.0)))
 
 
-def test_the_best_line_through_a_parabola_equioscillates():
-    """Chebyshev: the straight line with the least range of t^2 - c t over [0, 1] is c = 1, with the range 1/4."""
-    t = np.linspace(0.0, 1.0, 101)
-    start = 0.5
-    model = Model(problem_of(jg.Mean(), [1.0]), np.array([start]), linear(t**2 - 2 * start * t, -2 * t[None, :, None]))
-    step = model.best_step(1.0)
-    # the parameter is half the slope of the line; 1/2 is best already
-    assert step.step == pytest.approx([0.0], abs=1e-9) and step.decrease == pytest.approx(0.0, abs=1e-9)
-    start = 0.1
-    model = Model(problem_of(jg.Mean(), [1.0]), np.array([start]), linear(t**2 - 2 * start * t, -2 * t[None, :, None]))
-    step = model.best_step(1.0)
-    assert start + step.step[0] == pytest.approx(0.5, abs=1e-9)
-    assert step.decrease == pytest.approx(model.value - 0.25, abs=1e-9)
-    assert start + model.best_step(0.2).step[0] == pytest.approx(0.3, abs=1e-9)
+def problem_of(mesh, loads=TORQUES, objective="ppte", constraints=(), **deviations):
+    judged = cases(mesh, jg.LoadSpectrum(loads), **deviations)
+    return make_problem(design, BOX, mesh, judged, (objective,), jg.Mean(), constraints)
 
 
-def two_cases():
-    """Case 0 has the range |x - 0.2|, case 1 has 3 |x - 0.8|; linearized at x = 0.5."""
-    upper = np.array([[0.0, 0.3], [0.0, 0.9]])
-    slope = np.array([[[0.0], [1.0]], [[0.0], [-3.0]]])
-    return linear(upper, slope)
+@eqx.filter_jit
+def linearize(problem, x):
+    return problem.linearize(x)
+
+
+def differences(function):
+    """Central differences over the unit box, parameters last."""
+    steps = STEP * np.eye(len(POINT))
+    return np.stack([(function(POINT + s) - function(POINT - s)) / (2 * STEP) for s in steps], axis=-1)
+
+
+def reliefs(x):
+    return design(dict(zip(BOX, [low + at * (high - low) for at, (low, high) in zip(x, BOX.values())])))
+
+
+def test_slopes_of_the_transmission_error(mesh):
+    """One gradient of the sum over the positions gives the slope at each of them, for torques and manufactured gears.
+
+    Nonlinear compliance, coupled tooth pairs and corner contact are all in it.
+    """
+    tolerance = jg.Tolerance(pinion=GearTolerance(profile_slope=5.0, pitch=4.0))
+    problem = problem_of(mesh, tolerance=tolerance, samples=2, seed=1)
+    found = linearize(problem, jnp.asarray(POINT))
+    assert bool(found.fine)
+    np.testing.assert_array_equal(found.upper, found.lower)
+    np.testing.assert_array_equal(found.slope, found.lower_slope)
+    for case, (torque, sample) in enumerate((t, s) for t in range(2) for s in range(2)):
+        deviation = problem.cases.removed[torque, sample]
+
+        def curve(x):
+            cycle = solve_any(mesh, TORQUES[torque], *reliefs(x), deviation)
+            return np.asarray(cycle.transmission_error)
+
+        np.testing.assert_allclose(found.upper[case], curve(POINT), atol=1e-8)
+        expected = differences(curve)
+        assert np.abs(expected).max() > 1.0  # [um over the full range]
+        np.testing.assert_allclose(found.slope[case], expected, atol=2e-4 * np.abs(expected).max())
+
+
+def effort(candidate):
+    return candidate.parameters["pinion"] ** 2 * candidate.parameters["length"]
+
+
+def test_slopes_of_another_objective_and_of_constraints(mesh):
+    linear = jg.Constraint({"pinion": 2.0, "length": -1.0}, low=3.0, high=5.0)
+    limits = (jg.Constraint("removed_volume", high=40.0), linear)
+    problem = problem_of(mesh, loads=TORQUES[:1], objective=effort, constraints=limits)
+    found = linearize(problem, jnp.asarray(POINT))
+    assert bool(found.fine)
+
+    def value(x):
+        return np.array([(20.0 * x[0]) ** 2 * (1.0 + 4.7 * x[2])])
+
+    # the objective is the single upper piece, above nothing
+    np.testing.assert_allclose(found.upper[0], value(POINT), rtol=1e-12)
+    np.testing.assert_array_equal(found.lower, 0.0)
+    np.testing.assert_array_equal(found.lower_slope, 0.0)
+    np.testing.assert_allclose(found.slope[0], differences(value), atol=1e-5)
+
+    volume = eqx.filter_jit(jg.removed_volume)
+
+    def excess(x):
+        combined = 2.0 * 20.0 * x[0] - (1.0 + 4.7 * x[2])
+        return np.array([float(volume(mesh, *reliefs(x))) / 40.0 - 1, combined / 5.0 - 1, 1 - combined / 3.0])
+
+    np.testing.assert_allclose(found.excess, excess(POINT), rtol=1e-9)
+    np.testing.assert_allclose(found.excess_slope, differences(excess), atol=1e-4)
+
+
+def model(values, slope, x, *, measure=None, weights=None, excess=None, excess_slope=None, forms=None, weight=0.0):
+    """Model of hand-made pieces, shapes (cases, pieces) and (cases, pieces, parameters)."""
+    values, slope, x = np.asarray(values, float), np.asarray(slope, float), np.asarray(x, float)
+    weights = np.full(len(values), 1 / len(values)) if weights is None else np.asarray(weights)
+    rough = None if forms is None else Roughness(jnp.asarray(forms), jnp.asarray(weight))
+    problem = SimpleNamespace(
+        measure=measure or jg.Mean(), cases=SimpleNamespace(weights=jnp.asarray(weights)), roughness=rough
+    )
+    excess = np.zeros(0) if excess is None else np.asarray(excess, float)
+    excess_slope = np.zeros((0, len(x))) if excess_slope is None else np.asarray(excess_slope, float)
+    return Model(problem, x, Linearization(values, values, slope, slope, excess, excess_slope, np.True_))
+
+
+def test_chebyshev_polynomial():
+    """t^3 + b t^2 + c t with the least variation on [0, 1] is the Chebyshev polynomial, which touches its extremes four
+    times: b = -3/2, c = 9/16, variation 1/16."""
+    t = np.linspace(0.0, 1.0, 17)
+    x = np.array([0.2, 0.1])  # b = x1 - 2, c = x2
+    curve = t**3 + (x[0] - 2) * t**2 + x[1] * t
+    slope = np.stack([t**2, t], axis=-1)
+    made = model([curve], [slope], x)
+    assert made.value == pytest.approx(np.ptp(curve), rel=1e-14)
+    found = made.best_step(1.0)
+    np.testing.assert_allclose(x + found.step, [0.5, 9 / 16], atol=1e-9)
+    assert found.decrease == pytest.approx(np.ptp(curve) - 1 / 16, abs=1e-9)
+    level = curve + slope @ found.step
+    touched = np.isclose(level, level.max(), atol=1e-9) | np.isclose(level, level.min(), atol=1e-9)
+    np.testing.assert_allclose(t[touched], [0.0, 0.25, 0.75, 1.0])
+    # there no step is left, although no slope is zero
+    again = model([level], [slope], x + found.step).best_step(0.1)
+    assert again.decrease == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(again.step, 0.0, atol=1e-9)
+
+
+def random_problem(seed, cases=5, pieces=12, parameters=3, limits=4):
+    rng = np.random.default_rng(seed)
+    return {
+        "values": rng.normal(size=(cases, pieces)),
+        "slope": 3 * rng.normal(size=(cases, pieces, parameters)),
+        "x": rng.uniform(0.0, 1.0, parameters),
+        "weights": rng.dirichlet(np.ones(cases)),
+        "excess": rng.normal(-0.4, 0.3, size=limits),
+        "excess_slope": rng.normal(size=(limits, parameters)),
+        "forms": rng.normal(size=(6, parameters)),
+        "weight": 0.3,
+    }
+
+
+def merit(data, measure, steps):
+    """What the model predicts after steps (steps, parameters), computed apart from it."""
+    pieces = data["values"] + np.einsum("kip,sp->ski", data["slope"], steps)
+    spans = np.ptp(pieces, axis=-1)
+    if isinstance(measure, jg.Quantile):  # keeps the shares that the cases have at the point
+        shares = np.asarray(measure.shares(jnp.asarray(np.ptp(data["values"], axis=1)), jnp.asarray(data["weights"])))
+        objective = spans @ shares
+    else:
+        objective = np.asarray(jax.vmap(measure, (0, None))(jnp.asarray(spans), jnp.asarray(data["weights"])))
+    violation = np.maximum(data["excess"] + steps @ data["excess_slope"].T, 0.0).max(axis=-1)
+    rough = np.abs((data["x"] + steps) @ data["forms"].T).max(axis=-1)
+    return objective + PENALTY * violation + data["weight"] * rough
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("radius", [0.1, 0.6])
+@pytest.mark.parametrize(
+    "measure", [jg.Mean(), jg.Worst(), jg.CVaR(0.7), jg.Quantile(0.7)], ids=["mean", "worst", "cvar", "quantile"]
+)
+def test_no_step_within_reach_is_better(measure, radius, seed):
+    """The linear program against an evaluation of the same convex function at many steps."""
+    data = random_problem(seed)
+    made = model(**data, measure=measure)
+    at_point = merit(data, measure, np.zeros((1, 3)))[0]
+    assert made.merit == pytest.approx(at_point, rel=1e-12)
+    found = made.best_step(radius)
+    assert np.all(np.abs(found.step) <= radius + 1e-12)
+    assert np.all((data["x"] + found.step >= 0) & (data["x"] + found.step <= 1))
+    best = merit(data, measure, found.step[None])[0]
+    assert found.decrease == pytest.approx(at_point - best, abs=1e-7)
+    assert found.decrease >= 0.0
+    rng = np.random.default_rng(seed + 10)
+    low, high = np.maximum(-radius, -data["x"]), np.minimum(radius, 1 - data["x"])
+    anywhere = rng.uniform(low, high, (20_000, 3))
+    near = np.clip(found.step + 1e-3 * rng.normal(size=(20_000, 3)), low, high)
+    assert merit(data, measure, np.concatenate([anywhere, near])).min() >= best - 1e-7
+
+
+def test_bounds_and_radius_end_a_step():
+    """A single falling piece against a constant one: as far as it may go."""
+    pieces, slope = [[2.0, 0.0]], [[[-1.0], [0.0]]]
+    assert model(pieces, slope, [0.2]).best_step(0.3).step == pytest.approx([0.3])
+    assert model(pieces, slope, [0.9]).best_step(0.3).step == pytest.approx([0.1])
+    assert model(pieces, slope, [1.0]).best_step(0.3).decrease == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_constraint_ends_a_step_and_a_violation_comes_first():
+    pieces, slope = [[2.0, 0.0]], [[[-1.0], [0.0]]]
+    kept = model(pieces, slope, [0.2], excess=[-0.1], excess_slope=[[1.0]])
+    assert kept.violation == 0.0
+    assert kept.best_step(0.5).step == pytest.approx([0.1])
+    # already passed by 0.1: back to the limit, although the objective rises
+    passed = model(pieces, slope, [0.2], excess=[0.1], excess_slope=[[1.0]])
+    assert passed.violation == pytest.approx(0.1)
+    assert passed.merit == pytest.approx(2.0 + 0.1 * PENALTY)
+    step = passed.best_step(0.5)
+    assert step.step == pytest.approx([-0.1])
+    assert step.decrease == pytest.approx(0.1 * PENALTY - 0.1)
 
 
 @pytest.mark.parametrize(
-    "measure, weights, best, value",
+    ("measure", "weights", "step", "value"),
     [
-        (jg.Mean(), [0.5, 0.5], 0.8, 0.3),  # the steeper case wins
-        (jg.Mean(), [0.9, 0.1], 0.2, 0.18),  # unless it is rare
-        (jg.Worst(), [0.9, 0.1], 0.65, 0.45),  # both equal
-        (jg.CVaR(0.5), [0.5, 0.5], 0.65, 0.45),  # the worse half
-        (jg.CVaR(0.0), [0.5, 0.5], 0.8, 0.3),  # all of it: the mean
+        # the worst of 1 + d and 2 - d
+        (jg.Worst(), [0.5, 0.5], 0.5, 1.5),
+        (jg.Worst(), [0.9, 0.1], 0.5, 1.5),
+        # the tail is one case alone, and both where they are equal
+        (jg.CVaR(0.5), [0.5, 0.5], 0.5, 1.5),
+        # 2/3 of the worse and 1/3 of the better: still the worse one pulls
+        (jg.CVaR(0.25), [0.5, 0.5], 0.5, 1.5),
+        # the second weighs so little that the mean of the tail is that of the first
+        (jg.CVaR(0.1), [0.9, 0.1], -0.5, 1 / 9 * 2.5 + 8 / 9 * 0.5),
+        (jg.Mean(), [0.9, 0.1], -0.5, 0.9 * 0.5 + 0.1 * 2.5),
+        (jg.Mean(), [0.1, 0.9], 0.5, 1.5),
     ],
 )
-def test_measures_over_cases(measure, weights, best, value):
-    model = Model(problem_of(measure, weights), np.array([0.5]), two_cases())
-    step = model.best_step(0.5)
-    assert 0.5 + step.step[0] == pytest.approx(best, abs=1e-8)
-    assert model.value - step.decrease == pytest.approx(value, abs=1e-8)
+def test_measures_of_two_opposed_cases(measure, weights, step, value):
+    pieces, slope = [[1.0, 0.0], [2.0, 0.0]], [[[1.0], [0.0]], [[-1.0], [0.0]]]
+    made = model(pieces, slope, [0.5], measure=measure, weights=weights)
+    found = made.best_step(0.5)
+    assert found.step == pytest.approx([step], abs=1e-9)
+    assert made.value - found.decrease == pytest.approx(value, rel=1e-9)
 
 
-def test_bounds_and_constraints_stop_the_step():
-    upper, slope = np.array([[0.0, 1.0]]), np.array([[[0.0, 0.0], [-1.0, -1.0]]])
-    free = Model(problem_of(jg.Mean(), [1.0]), np.array([0.9, 0.2]), linear(upper, slope)).best_step(0.3)
-    assert free.step == pytest.approx([0.1, 0.3]) and free.decrease == pytest.approx(0.4)
-    # first parameter at most 0.95: (x - 0.95) / 0.95
-    limited = linear(upper, slope, excess=[-0.05 / 0.95], excess_slope=[[1 / 0.95, 0.0]])
-    step = Model(problem_of(jg.Mean(), [1.0]), np.array([0.9, 0.2]), limited).best_step(0.3)
-    assert step.step == pytest.approx([0.05, 0.3], abs=1e-7)
-    # from outside, the step goes back inside first
-    outside = linear(upper, slope, excess=[0.05], excess_slope=[[1.0, 0.0]])
-    model = Model(problem_of(jg.Mean(), [1.0]), np.array([0.9, 0.2]), outside)
-    step = model.best_step(0.3)
-    assert model.violation == pytest.approx(0.05)
-    assert step.step == pytest.approx([-0.05, 0.3], abs=1e-7)
-    assert step.decrease == pytest.approx(0.25 + 100 * 0.05, rel=1e-6)
+def test_a_penalty_on_roughness_stops_a_step():
+    """The penalty grows by as much as the objective falls, or by more: nothing is gained."""
+    pieces, slope = [[2.0, 0.0]], [[[-1.0], [0.0]]]
+    for weight, step in ((0.9, 0.5), (1.1, -0.2)):
+        made = model(pieces, slope, [0.2], forms=[[1.0]], weight=weight)
+        assert made.value == pytest.approx(2.0 + 0.2 * weight)
+        assert made.best_step(0.5).step == pytest.approx([step])
 
 
-def test_roughness_is_weighed_against_the_objective():
-    """One parameter lowers the objective by 1, and a penalty on its size costs its weight."""
-    upper, slope = np.array([[0.0, 1.0]]), np.array([[[0.0], [-1.0]]])
-    for weight, end in ((0.5, 1.0), (1.5, 0.0)):
-        rough = Roughness(jnp.asarray([[1.0]]), jnp.asarray(weight))
-        model = Model(problem_of(jg.Mean(), [1.0], rough), np.array([0.2]), linear(upper, slope))
-        step = model.best_step(1.0)
-        assert model.value == pytest.approx(1.0 + 0.2 * weight)
-        assert 0.2 + step.step[0] == pytest.approx(end)
-        assert step.decrease == pytest.approx((1 - weight) * (end - 0.2))
-
-
-def test_a_failed_contact_solution_is_no_candidate():
-    failed = two_cases()._replace(fine=np.asarray(False))
-    model = Model(problem_of(jg.Mean(), [0.5, 0.5]), np.array([0.5]), failed)
-    assert not model.fine and model.value == np.inf
-
-
-def test_slopes_at_all_positions_come_from_one_gradient():
-    """The transmission error at a position depends on the material removed there alone."""
-    gears = [jg.Gear(teeth, 3.0, face_width=18.0, bore_diameter=bore) for teeth, bore in ((19, 24.0), (48, 70.0))]
-    pair = jg.GearPair(*gears)
-    mesh = jg.prepare(pair, resolution=jg.Resolution(positions=24, pairs=jg.fewest_pairs(pair)))
-
-    def design(x):
-        return jg.TipRelief(x["amount"], x["length"], jg.Power(x["exponent"])), jg.TipRelief(x["amount"], 4.0)
-
-    bounds = {"amount": (0.0, 12.0), "length": (1.0, 6.0), "exponent": (1.0, 3.0)}
-    load = jg.LoadSpectrum([40.0, 60.0])
-    problem = make_problem(design, bounds, mesh, cases(mesh, load), ("ppte",), jg.Mean(), ())
-    x = jnp.asarray([0.5, 0.7, 0.4])
-
-    @jax.jit
-    def curves(x):
-        pinion, wheel = problem.modifications(x)
-        solve = lambda torque: jg.solve(mesh, torque, pinion=pinion, wheel=wheel).transmission_error  # noqa: E731
-        return jax.vmap(solve)(load.torques)
-
-    found = jax.jit(lambda x: problem.linearize(x))(x)
-    np.testing.assert_allclose(found.upper, curves(x), rtol=1e-12)
-    step = 1e-5
-    for index in range(3):
-        offset = step * jnp.eye(3)[index]
-        difference = (curves(x + offset) - curves(x - offset)) / (2 * step)
-        np.testing.assert_allclose(found.slope[:, :, index], difference, rtol=1e-5, atol=1e-6)
-    assert bool(found.fine)
+def test_a_failed_solution_has_no_value():
+    made = model([[2.0, 0.0]], [[[-1.0], [0.0]]], [0.2])
+    assert made.fine and np.isfinite(made.value)
+    problem = SimpleNamespace(measure=jg.Mean(), cases=SimpleNamespace(weights=jnp.ones(1)), roughness=None)
+    pieces, slope, nothing = np.zeros((1, 2)), np.zeros((1, 2, 1)), np.zeros((0, 1))
+    failed = Model(
+        problem, np.array([0.2]), Linearization(pieces, pieces, slope, slope, np.zeros(0), nothing, np.False_)
+    )
+    assert not failed.fine
+    assert failed.value == np.inf

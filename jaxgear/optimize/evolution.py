@@ -1,6 +1,7 @@
 """Evolutionary search, by evosax: what to compare gradient methods with."""
 
 import importlib
+from contextlib import contextmanager
 
 import equinox as eqx
 import jax
@@ -142,9 +143,11 @@ def _judge(problem: Problem, record: Record, points):
     return fitness(score)
 
 
+@contextmanager
 def _relaxed():
-    """evosax mixes floating-point types, which strict promotion would forbid."""
-    return jax.numpy_dtype_promotion("standard")
+    """evosax mixes floating-point types and ranks, which strict promotion would forbid."""
+    with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
+        yield
 
 
 def _evosax():

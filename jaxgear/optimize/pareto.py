@@ -17,6 +17,7 @@ from .starts import real_points, start_points
 
 _FIRST_RATE, _LAST_RATE = 0.05, 0.002  # step sizes in the unit box, first and last chunk
 _CHUNK = 8  # steps between two looks, at which the front is brought up to date
+_END = 1e-3  # least weight of two objectives: the ends of the front are nearly the optima of one objective alone
 _SUM = 0.05  # part of the plain sum in the scalarization, which keeps weakly dominated designs away
 _PENALTY = 10.0  # of a squared relative violation against a scaled objective of 1
 _SPAN = 1e-3  # least span of an objective over the designs, relative to its ideal
@@ -114,7 +115,7 @@ class _Met:
 
     def front(self, problem: Problem) -> Front:
         """Ascending in the first objective."""
-        order = np.argsort(self._values[:, 0])
+        _, order = np.unique(self._values, axis=0, return_index=True)  # equal designs once, in ascending order
         low, high = np.asarray(problem.low), np.asarray(problem.high)
         parameters = low + self._points[order] * (high - low)
         return Front(
@@ -128,7 +129,7 @@ class _Met:
 def _weights(count: int, objectives: int) -> np.ndarray:
     """Weights that sum to 1: evenly along the line of two objectives, of a low-discrepancy sequence for more."""
     if objectives == 2:
-        first = np.linspace(0.0, 1.0, count + 2)[1:-1]
+        first = np.linspace(_END, 1 - _END, count)
         return np.stack([first, 1 - first], axis=1)
     # spacings of sorted uniform numbers are uniform on the simplex
     cuts = np.sort(qmc.Halton(objectives - 1, scramble=False).random(count + 1)[1:], axis=1)

@@ -1,0 +1,144 @@
+"""Flanks from the transmission error itself, on the pair and at the torque of the study that they come from."""
+
+import numpy as np
+import pytest
+from catalogue import kahraman_gear, ppte
+
+import jaxgear as jg
+
+TORQUE = 200.0  # [N m]
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    pair = jg.GearPair(kahraman_gear(), kahraman_gear())
+    return jg.prepare(pair, resolution=jg.Resolution(positions=32, pairs=jg.fewest_pairs(pair, deflection=30.0)))
+
+
+@pytest.fixture(scope="module")
+def nominal(mesh):
+    """From the nominal involute, and what was reported on the way."""
+    looks = []
+    return jg.iterate_transmission_error(mesh, TORQUE, callback=lambda *args: looks.append(args)), looks
+
+
+@pytest.fixture(scope="module")
+def relieved(mesh):
+    """From a tip relief of the form that the study's second type starts with: a parabola that goes on straight."""
+    tip = jg.TipRelief(7.0, 3.27, jg.ParabolicLinear(0.5))
+    return jg.iterate_transmission_error(mesh, TORQUE, pinion=tip, wheel=tip)
+
+
+def test_five_steps_take_three_quarters_off(nominal):
+    result, _ = nominal
+    first = result.iterations[0]
+    assert first.max_relief == 0.0
+    assert result.ppte < 0.25 * first.ppte
+    # a single-pair deflection of a few um is all that there is to take off
+    assert max(state.max_relief for state in result.iterations) <= 7.0
+    assert len(result.iterations) <= 6
+
+
+def test_result_is_the_best_state(mesh, nominal):
+    result, looks = nominal
+    reached = [state.ppte for state in result.iterations]
+    assert result.ppte == result.objective == min(reached)
+    assert ppte(mesh, TORQUE, result.pinion, result.wheel) == pytest.approx(result.ppte, abs=1e-9)
+    assert result.evaluations == len(reached)
+    np.testing.assert_array_equal(result.history, np.minimum.accumulate(reached))
+    assert [best for *_, best in looks] == list(result.history)
+    assert [(step, steps) for step, steps, _ in looks] == [(step, 5) for step in range(len(reached))]
+    assert result.method == "te_iteration" and result.violation == 0.0
+    for state, error in zip(result.iterations, (state.transmission_error for state in result.iterations)):
+        assert np.ptp(error) == pytest.approx(state.ppte, rel=1e-12)
+
+
+def test_levelled_at_its_own_torque(mesh, nominal):
+    """The least variation stands at the torque of the design; far below it relief only does harm, above it helps."""
+    result, _ = nominal
+    torques = TORQUE * np.array([0.5, 0.75, 0.9, 1.0, 1.1, 1.25, 1.5])
+    values = [ppte(mesh, torque, result.pinion, result.wheel) for torque in torques]
+    assert 0.9 * TORQUE <= torques[np.argmin(values)] <= 1.1 * TORQUE
+    assert ppte(mesh, 50.0, result.pinion, result.wheel) > 2 * ppte(mesh, 50.0)
+    assert ppte(mesh, 300.0, result.pinion, result.wheel) < 0.5 * ppte(mesh, 300.0)
+
+
+def test_single_contact_stays_as_it_was(nominal):
+    """Around the pitch point one pair carries the load on unmodified flank: its deflection cannot change."""
+    result, _ = nominal
+    before, after = result.iterations[0].transmission_error, np.asarray(result.cycle.transmission_error)
+    middle = np.r_[:4, -3:0]
+    np.testing.assert_allclose(after[middle], before[middle], atol=2e-3)
+    # and double contact has come to that level
+    level = before[middle].max()
+    double = np.arange(10, 23)
+    assert np.all(before[double] < level - 2.0)
+    assert np.all(np.abs(after[double] - level) < 0.25)
+
+
+def test_nothing_is_removed_below_the_pitch_point(mesh, nominal):
+    result, _ = nominal
+    contact, tip = mesh.path_of_contact, float(mesh.pair.pinion.tip_roll_length)
+    start, pitch = float(contact.pinion_roll_length(contact.start)), float(contact.pinion_pitch_roll_length)
+    roll = np.linspace(start, tip, 101)
+    for relief in jg.profile_relief(mesh, result.pinion, result.wheel):
+        relief = np.asarray(relief)
+        assert np.all(relief[roll < pitch] == 0.0)
+        assert np.all(relief >= 0.0)
+        assert relief[-1] > 2.0
+
+
+def test_equal_gears_get_equal_flanks(mesh, nominal):
+    result, _ = nominal
+    for state in result.iterations:
+        pinion, wheel = jg.profile_relief(mesh, state.pinion, state.wheel)
+        np.testing.assert_allclose(pinion, wheel, atol=1e-9)
+        # approach mirrors recess
+        error = state.transmission_error
+        np.testing.assert_allclose(error[1:], error[:0:-1], atol=1e-9)
+
+
+def test_the_largest_relief_is_kept_in_every_state(mesh, nominal):
+    result, _ = nominal
+    capped = jg.iterate_transmission_error(mesh, TORQUE, max_relief=2.0)
+    assert max(state.max_relief for state in capped.iterations) == pytest.approx(2.0, abs=1e-9)
+    assert capped.constraints["max_relief"] <= 2.0 + 1e-9
+    assert result.ppte < capped.ppte < 0.75 * capped.iterations[0].ppte
+
+
+def test_a_relief_to_start_from_also_softens_the_entry(nominal, relieved):
+    """From a gradual relief the level is reached as well, and the tips no longer come in as sharp edges."""
+    result, _ = nominal
+    unmodified = result.iterations[0]
+    assert relieved.ppte <= 0.25 * unmodified.ppte
+    assert relieved.ppte < relieved.iterations[0].ppte
+    best = min(relieved.iterations, key=lambda state: state.ppte)
+    # taking off what two pairs lag leaves the tip edges as they are; the gradual relief takes the load off them
+    assert min(state.max_corner_pressure for state in result.iterations) > 0.9 * unmodified.max_corner_pressure
+    assert best.max_corner_pressure < 0.6 * unmodified.max_corner_pressure
+    assert best.max_relief <= 7.0 + 1e-9
+
+
+def test_a_loose_tolerance_ends_early(mesh, nominal):
+    result, _ = nominal
+    hasty = jg.iterate_transmission_error(mesh, TORQUE, tolerance=20.0)
+    assert len(hasty.iterations) < len(result.iterations)
+    last = hasty.iterations[-1]
+    assert last.ppte - last.limit <= 20.0 * last.limit
+    assert jg.iterate_transmission_error(mesh, TORQUE, steps=1).evaluations == 2
+
+
+@pytest.mark.parametrize(
+    ("torque", "options", "words"),
+    [
+        (0.0, {}, "torque"),
+        (float("nan"), {}, "torque"),
+        (TORQUE, {"max_relief": 0.0}, "max_relief"),
+        (TORQUE, {"tolerance": -0.1}, "tolerance"),
+        (TORQUE, {"steps": 0}, "steps = 0"),
+        (TORQUE, {"steps": 2.5}, "steps = 2.5"),
+    ],
+)
+def test_refuses_numbers_outside_their_range(mesh, torque, options, words):
+    with pytest.raises(ValueError, match=words):
+        jg.iterate_transmission_error(mesh, torque, **options)
