@@ -66,7 +66,7 @@ def test_slopes_of_the_transmission_error(mesh):
     for case, (torque, sample) in enumerate((t, s) for t in range(2) for s in range(2)):
         deviation = problem.cases.removed[torque, sample]
 
-        def curve(x):
+        def curve(x, torque=torque, deviation=deviation):
             cycle = solve_any(mesh, TORQUES[torque], *reliefs(x), deviation)
             return np.asarray(cycle.transmission_error)
 
