@@ -421,7 +421,7 @@ def test_a_resolution_that_misses_part_of_the_path_is_refused(load):
 def test_examples_load_and_are_what_their_name_says(path):
     file = load_design(path)
     teeth = [int(gear.teeth) for gear in (file.pair().pinion, file.pair().wheel)]
-    kind = "spur" if file.sweep is None else "sweep"
+    kind = "sweep" if file.sweep is not None else "robust" if file.optimize.manufactured else "spur"
     assert path.stem == f"{kind}_{teeth[0]}_{teeth[1]}"
     assert file.bounds and file.title
     file.design({name: 0.5 * (low + high) for name, (low, high) in file.bounds.items()})
