@@ -30,7 +30,7 @@ def study(fast=False):
     file = load_design(FILE)
     mesh = file.mesh()
     tolerance = jg.Tolerance.from_class(mesh.pair, file.tolerance.quality_class).without_lead()
-    nominal = jg.minimize(file.design, file.bounds, mesh=mesh, torque=file.torque, starts=8 if fast else 16)
+    nominal = jg.minimize(file.design, file.bounds, mesh=mesh, torque=file.torque)
     robust = optimize_request(file)(mesh)
     nothing = jg.NoModification()
     designs = {"unmodified": (nothing, nothing)}
