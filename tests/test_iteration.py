@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from catalogue import kahraman_gear, ppte
+from catalogue import TWO_PAIRS, gear_pair, kahraman_gear, ppte
 
 import jaxgear as jg
 
@@ -11,8 +11,11 @@ TORQUE = 200.0  # [N m]
 
 @pytest.fixture(scope="module")
 def mesh():
-    pair = jg.GearPair(kahraman_gear(), kahraman_gear())
-    return jg.prepare(pair, resolution=jg.Resolution(positions=32, pairs=jg.fewest_pairs(pair, deflection=30.0)))
+    # the gears of `kahraman_gear`, with the tree of all others
+    tip = float(kahraman_gear().tip_diameter)
+    pair = gear_pair((50, 50), face_width=20.0, bores=(50.0, 50.0), tips=(tip, tip))
+    assert jg.fewest_pairs(pair, deflection=40.0) == TWO_PAIRS.pairs
+    return jg.prepare(pair, resolution=TWO_PAIRS)
 
 
 @pytest.fixture(scope="module")

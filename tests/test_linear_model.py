@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import gear_pair, solve_any
+from catalogue import TWO_PAIRS, gear_pair, solve_any
 
 import jaxgear as jg
 from jaxgear.optimize.cases import cases
@@ -28,8 +28,7 @@ def design(x):
 
 @pytest.fixture(scope="module")
 def mesh():
-    pair = gear_pair()
-    return jg.prepare(pair, resolution=jg.Resolution(positions=24, pairs=jg.fewest_pairs(pair, deflection=40.0)))
+    return jg.prepare(gear_pair(), resolution=TWO_PAIRS)
 
 
 def problem_of(mesh, loads=TORQUES, objective="ppte", constraints=(), **deviations):

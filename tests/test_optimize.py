@@ -1,27 +1,19 @@
-"""Search for the best modification: known optima, constraints, several loads and gears, honest reports, refusals.
-
-Optima are known on the pair whose tooth pairs have one constant stiffness, without corner contact: where gaps h1 and h2
-are relative to the deflection of one pair, the transmission error is min((1 + h1 + h2) / 2, 1 + h1, 1 + h2).
-"""
+"""Search for the best modification: known optima, constraints, several loads and gears, honest reports, refusals."""
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import constant_stiffness_mesh, gear_pair, ppte
+from catalogue import TWO_PAIRS, gear_pair, ppte
+from known_optimum import BOX as TALL
+from known_optimum import DELTA0, Known, depth, grid, ppte_of, ppte_of_parabolas
 
 import jaxgear as jg
 from jaxgear.optimize.cases import cases
 from jaxgear.tolerance import GearTolerance
 
-# two pairs reach far enough under these loads; one patch node keeps the closed form exact
-RESOLUTION = jg.Resolution(positions=32, pairs=2, patch_nodes=1)
 TORQUE = 50.0
 BOX = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.7)}
-
-STIFFNESS, DELTA0 = 300.0, 10.0  # stiffness of a pair [N/um], its deflection [um]
-DOUBLE = 12  # steps from position to position in double contact
-TALL = {"pinion": (0.0, 40.0), "wheel": (0.0, 40.0)}
 
 
 def design(x):
@@ -30,9 +22,7 @@ def design(x):
 
 @pytest.fixture(scope="module")
 def mesh():
-    pair = gear_pair()
-    assert jg.fewest_pairs(pair, deflection=40.0) == RESOLUTION.pairs
-    return jg.prepare(pair, resolution=RESOLUTION)
+    return jg.prepare(gear_pair(), resolution=TWO_PAIRS)
 
 
 @pytest.fixture(scope="module")
@@ -40,41 +30,6 @@ def optimum(mesh):
     looks = []
     result = jg.minimize(design, BOX, mesh=mesh, torque=TORQUE, starts=4, callback=lambda *args: looks.append(args))
     return result, looks
-
-
-class Known:
-    """The pair of constant stiffness: positions stand on both ends of double contact."""
-
-    def __init__(self):
-        double = DOUBLE / RESOLUTION.positions
-        gear = gear_pair((50, 50)).pinion
-        rho = gear.base_radius * jnp.tan(jnp.deg2rad(20.0)) + 0.5 * (1 + double) * gear.base_pitch
-        tip = float(2 * jnp.sqrt(gear.base_radius**2 + rho**2))
-        pair = gear_pair((50, 50), tips=(tip, tip))
-        self.mesh = constant_stiffness_mesh(pair, STIFFNESS, RESOLUTION)
-        self.torque = 1e-3 * STIFFNESS * DELTA0 * float(gear.base_radius)
-        self.extent = float(gear.base_pitch) * double
-
-    def parabolas(self, x):
-        """Parabolic reliefs over double contact."""
-        curve = jg.Quadratic(0.0, 0.0, 1.0)
-        return jg.TipRelief(x["pinion"], self.extent, curve), jg.TipRelief(x["wheel"], self.extent, curve)
-
-    def quadratics(self, x):
-        """The same quadratic relief on both."""
-        relief = jg.TipRelief(DELTA0, self.extent, jg.Quadratic(0.0, x["b1"], x["b2"]))
-        return relief, relief
-
-    def lines(self, x):
-        """The same linear relief on both."""
-        relief = jg.TipRelief(x["amount"], self.extent, jg.Linear())
-        return relief, relief
-
-    def minimize(self, design, box, **options):
-        options = {"torque": self.torque, "starts": 4} | options
-        if "method" in options:
-            del options["starts"]
-        return jg.minimize(design, box, mesh=self.mesh, **options)
 
 
 @pytest.fixture(scope="module")
@@ -86,26 +41,6 @@ def known():
 def best(known):
     """Without constraints."""
     return known.minimize(known.parabolas, TALL)
-
-
-def closed_form(pinion, wheel):
-    """PPTE [um] of reliefs h(s) [um], s from 0 to 1 over double contact; the last axis is that of the positions."""
-    h1, h2 = pinion / DELTA0, wheel[..., ::-1] / DELTA0
-    error = np.minimum(np.minimum((1 + h1 + h2) / 2, 1 + h1), 1 + h2)
-    return DELTA0 * (np.maximum(error.max(axis=-1), 1.0) - np.minimum(error.min(axis=-1), 1.0))
-
-
-def depth():
-    return np.arange(DOUBLE + 1) / DOUBLE
-
-
-def of_parabolas(pinion, wheel):
-    pinion, wheel = np.broadcast_arrays(pinion, wheel)
-    return closed_form(pinion[..., None] * depth() ** 2, wheel[..., None] * depth() ** 2)
-
-
-def grid(high=40.0, count=801):
-    return np.meshgrid(np.linspace(0.0, high, count), np.linspace(0.0, high, count))
 
 
 def test_cuts_the_variation_to_an_eighth(mesh, optimum):
@@ -170,7 +105,7 @@ def test_reaches_the_closed_form(known, best):
     assert best.parameters["pinion"] == pytest.approx(DELTA0 * amount, rel=1e-6)
     assert best.parameters["wheel"] == pytest.approx(DELTA0 * amount, rel=1e-6)
     assert best.ppte == pytest.approx(DELTA0 * (0.5 + amount / 36 - amount / 4), rel=1e-6)
-    assert best.ppte <= of_parabolas(*grid()).min()
+    assert best.ppte <= ppte_of_parabolas(*grid()).min()
     # at a kink the plain gradient is far from zero, the linear program knows that no step is left
     assert best.gradient_norm < 1e-6
     assert best.evaluations < 250
@@ -190,7 +125,7 @@ def test_every_method_finds_the_same_optimum(known, best, method):
     result = known.minimize(known.parabolas, TALL, method=method)
     assert result.method == method.name
     assert best.ppte <= result.ppte < 1.01 * best.ppte
-    assert of_parabolas(result.parameters["pinion"], result.parameters["wheel"]) == pytest.approx(result.ppte, abs=1e-9)
+    assert ppte_of_parabolas(*result.parameters.values()) == pytest.approx(result.ppte, abs=1e-9)
     assert result.evaluations > best.evaluations
     assert np.all(np.diff(result.history) <= 0)
     if hasattr(method, "population"):
@@ -210,7 +145,7 @@ def test_chance_is_seeded(known):
 def test_a_table_of_variants_is_searched_whole(known):
     result = known.minimize(known.parabolas, TALL, method=jg.Factorial({"pinion": 4, "wheel": 6}))
     pinion, wheel = np.meshgrid(np.linspace(0.0, 40.0, 4), np.linspace(0.0, 40.0, 6))
-    values = of_parabolas(pinion, wheel)
+    values = ppte_of_parabolas(pinion, wheel)
     assert result.evaluations == 24 + 3
     assert result.ppte == pytest.approx(values.min(), abs=1e-9)
     index = values.argmin()
@@ -218,7 +153,7 @@ def test_a_table_of_variants_is_searched_whole(known):
     # no optimum, and it says so: a hundredth of the range would already help
     assert result.gradient_norm > 0.5
     step = 0.01 * 40.0 * np.array([-1.0, 0.0, 1.0])
-    near = of_parabolas(*np.meshgrid(pinion.flat[index] + step, wheel.flat[index] + step))
+    near = ppte_of_parabolas(*np.meshgrid(pinion.flat[index] + step, wheel.flat[index] + step))
     assert near.min() < result.ppte - 0.005
 
 
@@ -237,7 +172,7 @@ def test_constraints_are_kept(known, best):
 
     result = known.minimize(known.parabolas, TALL, constraints=limits)
     assert result.violation <= 1e-3
-    assert result.objective == pytest.approx(of_parabolas(pinion, wheel)[kept].min(), rel=3e-3)
+    assert result.objective == pytest.approx(ppte_of_parabolas(pinion, wheel)[kept].min(), rel=3e-3)
     assert result.objective > 1.5 * best.objective
     assert result.constraints["1 pinion + -1 wheel"] == pytest.approx(-3.0, rel=2e-3)
     assert result.constraints["removed_volume"] == pytest.approx(most * per_amount, rel=2e-3)
@@ -248,7 +183,7 @@ def test_constraints_are_kept(known, best):
     # a narrower box, in which the third limit is in the way
     result = known.minimize(known.parabolas, TALL | {"pinion": (0.0, 5.0)}, constraints=limits)
     assert result.violation <= 1e-3
-    assert result.objective == pytest.approx(of_parabolas(pinion, wheel)[kept & (pinion <= 5.0)].min(), rel=3e-3)
+    assert result.objective == pytest.approx(ppte_of_parabolas(pinion, wheel)[kept & (pinion <= 5.0)].min(), rel=3e-3)
     assert result.constraints["max_relief"] == pytest.approx(11.5, rel=2e-3)
     assert result.active_bounds == {"pinion": "upper"}
 
@@ -265,7 +200,7 @@ def test_a_relief_that_must_not_dip(known):
     box = {"b1": (2.5, 3.5), "b2": (-3.0, 1.0)}
     b1, b2 = np.meshgrid(np.linspace(2.5, 3.5, 201), np.linspace(-3.0, 1.0, 801))
     relief = DELTA0 * (b1[..., None] * depth() + b2[..., None] * depth() ** 2)
-    values, monotone = closed_form(relief, relief), b2 >= -b1 / 2
+    values, monotone = ppte_of(relief, relief), b2 >= -b1 / 2
     assert values.min() < 0.9 * values[monotone].min()
     limit = jg.Constraint("relief_reversal", high=0.0)
     result = known.minimize(known.quadratics, box, constraints=[limit])

@@ -1,0 +1,198 @@
+"""Flanks without a given form, and the named curves that stand in for them."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import TWO_PAIRS, gear_pair, ppte
+
+import jaxgear as jg
+from jaxgear.metrics import removed_at
+
+TORQUE, POINTS, SMOOTHNESS = 50.0, 24, 1e-3
+BOX = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.7), "exponent": (1.0, 3.0)}
+
+
+def design(x):
+    curve = jg.Power(x["exponent"])
+    return jg.TipRelief(x["pinion"], x["length"], curve), jg.TipRelief(x["wheel"], x["length"], curve)
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return jg.prepare(gear_pair(), resolution=TWO_PAIRS)
+
+
+@pytest.fixture(scope="module")
+def named(mesh):
+    """The best relief of a power curve."""
+    return jg.minimize(design, BOX, mesh=mesh, torque=TORQUE)
+
+
+def free(mesh, **options):
+    return jg.free_form(mesh, TORQUE, points=POINTS, **{"curvature": SMOOTHNESS} | options)
+
+
+@pytest.fixture(scope="module")
+def optimum(mesh):
+    return free(mesh)
+
+
+def tables(result):
+    """Values of pinion and wheel [um], pitch point first."""
+    return np.array(list(result.parameters.values())).reshape(2, POINTS)
+
+
+def rolls(mesh, count):
+    """Roll lengths of pinion and wheel from the pitch point to the tip [mm]."""
+    contact, pair = mesh.path_of_contact, mesh.pair
+    return (
+        jnp.linspace(contact.pinion_pitch_roll_length, pair.pinion.tip_roll_length, count),
+        jnp.linspace(contact.wheel_pitch_roll_length, pair.wheel.tip_roll_length, count),
+    )
+
+
+def curvature(mesh, result):
+    """Largest second derivative of either table [um/mm^2]."""
+    steps = np.array([float(roll[1] - roll[0]) for roll in rolls(mesh, POINTS)])
+    return np.abs(np.diff(tables(result), 2, axis=1) / steps[:, None] ** 2).max()
+
+
+def test_beats_the_best_named_curve(mesh, named, optimum):
+    assert optimum.method == "free_form"
+    assert optimum.ppte < 0.7 * named.ppte
+    # next to nothing is left of the variation
+    assert optimum.ppte < 0.01 * ppte(mesh, TORQUE)
+    assert ppte(mesh, TORQUE, optimum.pinion, optimum.wheel) == pytest.approx(optimum.ppte, abs=1e-9)
+
+
+def test_is_level_between_its_own_positions_too(named, optimum):
+    """On a mesh four times as fine."""
+    fine = jg.prepare(gear_pair(), resolution=replace(TWO_PAIRS, positions=128))
+    left = ppte(fine, TORQUE, optimum.pinion, optimum.wheel)
+    assert left < 0.7 * ppte(fine, TORQUE, named.pinion, named.wheel)
+    assert left < 0.02 * ppte(fine, TORQUE)
+
+
+def test_removes_nothing_in_common(mesh, optimum):
+    """What both flanks of a gear pair lose everywhere shifts the transmission error and is not ground off."""
+    values = tables(optimum)
+    np.testing.assert_array_equal(values.min(axis=1), 0.0)
+    assert values.max() <= 20.0
+    assert len(optimum.parameters) == 2 * POINTS
+    assert "48 values" in str(optimum)
+    np.testing.assert_allclose(optimum.pinion.amount, values[0], rtol=1e-12)
+    # tips are relieved, pitch points are not
+    assert np.all(values[:, -1] > 5.0)
+    assert np.all(values[:, : POINTS // 4] < 1.0)
+    thicker = jg.TabulatedProfile(optimum.pinion.position, optimum.pinion.amount + 3.0)
+    assert ppte(mesh, TORQUE, thicker, optimum.wheel) == pytest.approx(optimum.ppte, abs=1e-9)
+
+
+def test_objective_is_the_variation_and_the_penalty(mesh, optimum):
+    expected = optimum.ppte + SMOOTHNESS * curvature(mesh, optimum)
+    assert optimum.objective == pytest.approx(expected, rel=1e-6)
+    assert np.all(np.diff(optimum.history) <= 0)
+
+
+def test_a_larger_penalty_makes_smoother_flanks(mesh, optimum):
+    smooth = free(mesh, curvature=0.5)
+    assert curvature(mesh, smooth) < 0.9 * curvature(mesh, optimum)
+    assert smooth.ppte > optimum.ppte
+    # each is the better one by its own measure
+    assert smooth.objective < optimum.ppte + 0.5 * curvature(mesh, optimum)
+    assert optimum.objective < smooth.ppte + SMOOTHNESS * curvature(mesh, smooth)
+
+
+def test_largest_relief_is_kept(mesh, optimum):
+    capped = free(mesh, max_relief=3.0)
+    assert tables(capped).max() <= 3.0 + 1e-12
+    assert tables(optimum).max() > 3.0
+    assert optimum.ppte < capped.ppte < ppte(mesh, TORQUE)
+
+
+def test_a_flank_to_start_from_does_not_get_worse(mesh, named):
+    """One step from the best named curve, as the table samples it."""
+    start = named.pinion, named.wheel
+    sampled = [
+        jg.TabulatedProfile(roll, removed_at(mesh, flank, roll, of_pinion=index == 0))
+        for index, (flank, roll) in enumerate(zip(start, rolls(mesh, POINTS)))
+    ]
+    started = free(mesh, start=start, steps=1, curvature=0.0)
+    assert started.ppte <= ppte(mesh, TORQUE, *sampled) + 1e-9
+    # two searches, of one linearization each before and after the step
+    assert started.evaluations <= 2 * 2 * 3
+
+
+def distances(mesh, first, second):
+    """Largest distance of two pairs of flanks from the pitch points to the tips [um]."""
+    far = 0.0
+    for index, roll in enumerate(rolls(mesh, 1001)):
+        one, other = (removed_at(mesh, flanks[index], roll, of_pinion=index == 0) for flanks in (first, second))
+        far = max(far, float(jnp.abs(one - other).max()))
+    return far
+
+
+def test_projection_says_what_it_costs(mesh, optimum):
+    made = jg.project(optimum, "power")
+    assert made.curve == "power"
+    assert made.ppte == pytest.approx(ppte(mesh, TORQUE, made.pinion, made.wheel), abs=1e-9)
+    assert made.loss == pytest.approx(made.ppte - optimum.ppte, abs=1e-12)
+    assert made.loss > 0
+    expected = distances(mesh, (made.pinion, made.wheel), (optimum.pinion, optimum.wheel))
+    assert made.misfit == pytest.approx(expected, rel=0.02)
+    assert made.misfit < 0.2 * tables(optimum).max()
+    # every cubic can be a quadratic, and that a line
+    misfits = [jg.project(optimum, curve).misfit for curve in ("cubic", "quadratic", "linear")]
+    assert misfits[0] < misfits[1] < misfits[2]
+
+
+def test_projection_of_a_named_curve_is_that_curve(mesh, named):
+    made = jg.project(named, "power")
+    assert made.misfit < 1e-3
+    assert abs(made.loss) < 1e-3
+    for relief, gear in ((made.pinion, "pinion"), (made.wheel, "wheel")):
+        assert float(relief.amount) == pytest.approx(named.parameters[gear], rel=1e-3)
+        assert float(relief.length) == pytest.approx(named.parameters["length"], rel=1e-3)
+        assert float(relief.curve.exponent) == pytest.approx(named.parameters["exponent"], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("curve", "shape"),
+    [
+        ("linear", jg.Linear()),
+        ("parabolic_linear", jg.ParabolicLinear(0.35)),
+        ("quadratic", jg.Polynomial([0.0, 0.7, 0.3])),
+    ],
+)
+def test_projection_recovers_other_curves(named, curve, shape):
+    reliefs = jg.TipRelief(8.0, 3.1, shape), jg.TipRelief(5.0, 2.2, shape)
+    made = jg.project(eqx.tree_at(lambda o: (o.pinion, o.wheel), named, reliefs), curve)
+    assert made.misfit < 0.01
+    for found, relief in zip((made.pinion, made.wheel), reliefs):
+        assert float(found.length) == pytest.approx(float(relief.length), rel=0.01)
+        # the amount at the tip, whatever the parameters of the curve
+        assert float(found.amount * found.curve(jnp.ones(()))) == pytest.approx(float(relief.amount), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"points": 3}, "points = 3"),
+        ({"steps": 0}, "steps = 0"),
+        ({"max_relief": 0.0}, "max_relief"),
+        ({"curvature": -1.0}, "curvature"),
+        ({"constraints": [jg.Constraint({"pinion": 1.0}, high=5.0)]}, "linear constraint"),
+        ({"samples": 4}, "samples = 4"),
+    ],
+)
+def test_refuses_what_it_cannot_search(mesh, options, words):
+    with pytest.raises(ValueError, match=words):
+        jg.free_form(mesh, TORQUE, **options)
+
+
+def test_refuses_an_unknown_curve(optimum):
+    with pytest.raises(ValueError, match='"parabola" is not known'):
+        jg.project(optimum, "parabola")

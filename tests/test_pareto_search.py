@@ -1,0 +1,118 @@
+"""Fronts of several objectives, on the pair whose front can be read off a grid of closed forms."""
+
+import equinox as eqx
+import numpy as np
+import pytest
+from known_optimum import BOX, DELTA0, Known, grid, ppte_of_parabolas
+
+import jaxgear as jg
+
+VOLUME = ("ppte", "removed_volume")
+
+
+@pytest.fixture(scope="module")
+def known():
+    return Known()
+
+
+@pytest.fixture(scope="module")
+def searched(known):
+    """PPTE against the material to grind off."""
+    return known.minimize(known.parabolas, BOX, objective=VOLUME, method=jg.Pareto(points=12, steps=240))
+
+
+@pytest.fixture(scope="module")
+def volume_per_amount(known):
+    """[mm3/um] of the sum of both amounts: the gears are equal."""
+    both = known.parabolas({"pinion": 0.5, "wheel": 0.5})
+    return float(eqx.filter_jit(jg.removed_volume)(known.mesh, *both))
+
+
+def dominated(values):
+    """Rows that another row beats."""
+    worse = (values[:, None] >= values[None]).all(axis=-1) & (values[:, None] > values[None]).any(axis=-1)
+    return worse.any(axis=1)
+
+
+def test_no_design_beats_another(searched):
+    front = searched.front
+    assert front.objectives == VOLUME
+    assert front.units == ("um", "mm3")
+    assert len(front.values) >= 12
+    assert not dominated(front.values).any()
+    # what is gained in one objective is lost in the other
+    assert np.all(np.diff(front.values[:, 0]) > 0)
+    assert np.all(np.diff(front.values[:, 1]) < 0)
+
+
+def test_parameters_reproduce_the_values(searched, volume_per_amount):
+    front = searched.front
+    pinion, wheel = front.parameters["pinion"], front.parameters["wheel"]
+    assert len(pinion) == len(front.values)
+    for amounts in (pinion, wheel):
+        assert np.all((amounts >= 0.0) & (amounts <= 40.0))
+    np.testing.assert_allclose(front.values[:, 0], ppte_of_parabolas(pinion, wheel), atol=1e-9)
+    np.testing.assert_allclose(front.values[:, 1], volume_per_amount * (pinion + wheel), atol=1e-6)
+
+
+def test_ends_are_the_optima_of_either_objective(searched):
+    """The least PPTE, of which test_optimize tells the closed form; and nothing removed at all."""
+    front = searched.front
+    amount = 0.5 / (5 / 16 - 1 / 36)
+    assert front.values[0, 0] == pytest.approx(DELTA0 * (0.5 + amount / 36 - amount / 4), rel=0.05)
+    assert front.values[-1] == pytest.approx([0.5 * DELTA0, 0.0], abs=1e-3)
+
+
+def test_front_is_the_true_one(searched, volume_per_amount):
+    """At every volume, the least PPTE of all amounts whose volume is not larger."""
+    pinion, wheel = grid()
+    volume, values = (volume_per_amount * (pinion + wheel)).ravel(), ppte_of_parabolas(pinion, wheel).ravel()
+    order = np.argsort(volume)
+    volume, least = volume[order], np.minimum.accumulate(values[order])
+    true = least[np.searchsorted(volume, searched.front.values[:, 1] + 1e-9, side="right") - 1]
+    lost = searched.front.values[:, 0] / true - 1
+    assert np.all(lost > -0.01)  # the grid is not finer
+    assert np.median(lost) < 0.002
+    # and it leaves no wide gap
+    assert np.diff(searched.front.values[:, 0]).max() < 0.15 * np.ptp(searched.front.values[:, 0])
+
+
+def test_compromise_is_a_design_of_the_front_next_to_the_ideal(searched):
+    front = searched.front
+    (index,) = np.flatnonzero(np.isclose(front.values[:, 0], searched.ppte, atol=1e-9))
+    for name, value in searched.parameters.items():
+        assert value == pytest.approx(front.parameters[name][index], rel=1e-12)
+    low, high = front.values.min(axis=0), front.values.max(axis=0)
+    distance = ((front.values - low) / (high - low)).max(axis=1)
+    assert distance[index] < 1.05 * distance.min()
+    assert searched.objective == pytest.approx(distance[index], rel=0.05)
+    assert searched.objective_name == "distance from the ideal of ppte and removed_volume"
+    assert np.isnan(searched.gradient_norm)
+    # steps and the first look, each with its gradient
+    assert searched.evaluations == 3 * 12 * (240 + 1)
+
+
+def test_three_objectives_within_a_limit(known, volume_per_amount):
+    limit = jg.Constraint({"pinion": 1.0, "wheel": -1.0}, high=-4.0)
+    result = known.minimize(
+        known.parabolas,
+        BOX,
+        objective=(*VOLUME, "max_relief"),
+        constraints=[limit],
+        method=jg.Pareto(points=12, steps=60),
+    )
+    front = result.front
+    assert front.values.shape[1] == 3
+    assert not dominated(front.values).any()
+    assert np.all(np.diff(front.values[:, 0]) >= 0)
+    pinion, wheel = front.parameters["pinion"], front.parameters["wheel"]
+    assert np.all(pinion - wheel <= -4.0 * (1 - 1e-3))
+    expected = ppte_of_parabolas(pinion, wheel), volume_per_amount * (pinion + wheel), np.maximum(pinion, wheel)
+    np.testing.assert_allclose(front.values, np.stack(expected, axis=1), atol=1e-5)
+    assert result.violation <= 1e-3
+
+
+@pytest.mark.parametrize(("options", "words"), [({"points": 1}, "points = 1"), ({"steps": 2}, "steps = 2")])
+def test_refuses_what_makes_no_front(options, words):
+    with pytest.raises(ValueError, match=words):
+        jg.Pareto(**options)
