@@ -38,7 +38,7 @@ _WITH_LEVEL = ("quantile", "cvar")
 _QUICK: Mapping[str, dict[str, Any]] = {
     "minimax": {"starts": 4, "steps": 10},
     "adam": {"starts": 4, "steps": 40},
-    "lbfgs": {"starts": 4, "steps": 12},
+    "lbfgs": {"starts": 4, "steps": 30},
     "genetic": {"population": 20, "generations": 10},
     "cma_es": {"population": 8, "generations": 20},
     "differential_evolution": {"population": 20, "generations": 10},

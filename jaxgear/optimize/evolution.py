@@ -1,6 +1,8 @@
 """Evolutionary search, by evosax: what to compare gradient methods with."""
 
+import functools
 import importlib
+from abc import abstractmethod
 from contextlib import contextmanager
 
 import equinox as eqx
@@ -40,7 +42,7 @@ class _Evolution(AbstractMethod):
     def search(self, problem: Problem, record: Record) -> None:
         """Runs the generations."""
         with _relaxed():
-            algorithm, parameters = self._algorithm(jnp.full_like(problem.low, 0.5))
+            algorithm, parameters = _made(self, len(problem.names), problem.low.dtype)
         key, first = jax.random.split(jax.random.key(self.seed))
         state, rest = self._begin(algorithm, parameters, problem, record, first)
         for generation in range(1, rest + 1):
@@ -61,8 +63,9 @@ class _Evolution(AbstractMethod):
         with _relaxed():
             return algorithm.init(key, points, ranks, parameters), self.generations - 1
 
+    @abstractmethod
     def _algorithm(self, example):
-        raise NotImplementedError
+        """The algorithm and its parameters, for designs such as the example."""
 
 
 class Genetic(_Evolution):
@@ -133,6 +136,12 @@ class CMAES(_Evolution):
     def _begin(self, algorithm, parameters, problem, record, key):
         with _relaxed():
             return algorithm.init(key, jnp.full_like(problem.low, 0.5), parameters), self.generations
+
+
+@functools.lru_cache(maxsize=16)
+def _made(method: _Evolution, parameters: int, dtype):
+    """Made once: algorithms hash by identity, and a new one would compile all its functions anew."""
+    return method._algorithm(jnp.full(parameters, 0.5, dtype))
 
 
 def _judge(problem: Problem, record: Record, points):

@@ -3,23 +3,21 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 import optax
 
 from .problem import GRADIENT_COST, Problem
 from .search import AbstractMethod, Record, whole
-from .smooth import STAGE_WIDTHS, Multipliers, lagrangian, merged, stage_width, yardstick
+from .smooth import STAGE_WIDTHS, Multipliers, lagrangian, merged, stages, yardstick
 from .starts import real_points, start_points
 
-_FIRST_RATE, _LAST_RATE = 0.05, 0.002  # step sizes in the unit box, first and last chunk
-_CHUNK = 20  # steps between two looks at the search: progress and interruption
+_LOOK = 20  # most steps between two looks at the search: progress and interruption
 
 
 class Adam(AbstractMethod):
     """Adam (optax) on a soft objective whose width shrinks in stages, projected onto the box.
 
     All starts advance together under `jax.vmap`. Other constraints enter by an augmented Lagrangian, whose multipliers
-    follow once per chunk of steps.
+    follow once per stage.
 
     Attributes:
         starts: number of start points; the first is the middle of the box.
@@ -52,31 +50,54 @@ class Adam(AbstractMethod):
             return moved, followed, values
 
         scale = yardstick(advance(1.0, 0.0, 1.0, 1)[2])  # a step of length zero judges the start points
-        chunks = max(-(-self.steps // _CHUNK), len(STAGE_WIDTHS))
-        for chunk, rate in enumerate(np.geomspace(_FIRST_RATE, _LAST_RATE, chunks)):
-            width = stage_width(chunk, chunks, scale)
-            points, multipliers, _ = advance(width, rate, scale, _CHUNK)
-            record.look(min((chunk + 1) * _CHUNK, self.steps), self.steps)
+        for stage in stages(self.steps, _LOOK):
+            points, multipliers, _ = advance(stage.width * scale, stage.rate, scale, stage.steps)
+            record.look(stage.done, self.steps)
 
 
-@eqx.filter_jit
-def _advance(problem: Problem, points, multipliers: Multipliers, count, width, rate, scale):
-    """A chunk of steps; returns the points, the multipliers and the best true design of every start on the way."""
-    dtype = points.dtype
-    gradient = jax.vmap(jax.grad(lagrangian, argnums=1, has_aux=True), (None, 0, 0, None, None))
+def adam_steps(gradient, points, count, rate, keep, kept):
+    """Steps of Adam, projected onto the unit box; traced.
+
+    Args:
+        gradient: of points, shape (starts, parameters), their slopes and what is seen there.
+        points: first points.
+        count: number of steps.
+        rate: step size.
+        keep: collects what the steps see, as keep(kept, step, points, seen).
+        kept: what is collected before the first step.
+
+    Returns:
+        the points after the steps, and what was collected.
+    """
     adam = optax.scale_by_adam()
 
-    def step(_, carry):
-        points, moments, best, values, violations, _ = carry
-        slopes, (value, violation, excess) = gradient(problem, points, multipliers, width, scale)
-        best, values, violations = merged((best, values, violations), (points, value, violation))
+    def step(number, carry):
+        points, moments, kept = carry
+        slopes, seen = gradient(points)
+        kept = keep(kept, number, points, seen)
         slopes = jnp.where(jnp.isfinite(slopes), slopes, 0.0)
         # optax mixes its integer step count with floats, which strict promotion would forbid
         with jax.numpy_dtype_promotion("standard"):
             update, moments = adam.update(slopes, moments)
-        return (jnp.clip(points - rate * update, 0.0, 1.0), moments, best, values, violations, excess)
+        return jnp.clip(points - rate * update, 0.0, 1.0), moments, kept
 
-    nothing = jnp.full(points.shape[0], jnp.inf, dtype)
-    start = (points, adam.init(points), points, nothing, nothing, jnp.zeros_like(multipliers.value))
-    points, _, best, values, violations, excess = jax.lax.fori_loop(0, count, step, start)
-    return points, multipliers.follow(excess, scale), best, values, violations
+    points, _, kept = jax.lax.fori_loop(0, count, step, (points, adam.init(points), kept))
+    return points, kept
+
+
+@eqx.filter_jit
+def _advance(problem: Problem, points, multipliers: Multipliers, count, width, rate, scale):
+    """A stage; returns the points, the multipliers and the best true design of every start on the way."""
+    gradient = jax.vmap(jax.grad(lagrangian, argnums=1, has_aux=True), (None, 0, 0, None, None))
+
+    def keep(kept, _, points, seen):
+        best, _ = kept
+        value, violation, excess = seen
+        return merged(best, (points, value, violation)), excess
+
+    nothing = jnp.full(points.shape[0], jnp.inf, points.dtype)
+    kept = (points, nothing, nothing), jnp.zeros_like(multipliers.value)
+    points, (best, excess) = adam_steps(
+        lambda points: gradient(problem, points, multipliers, width, scale), points, count, rate, keep, kept
+    )
+    return points, multipliers.follow(excess, scale), *best

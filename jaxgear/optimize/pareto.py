@@ -4,19 +4,18 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optax
 from scipy.stats import qmc
 
 from ..numerics.pareto import pareto_front
+from .first_order import adam_steps
 from .goal import FEASIBLE, QUANTITIES
 from .problem import GRADIENT_COST, Problem
 from .result import Front
 from .search import AbstractMethod, Record, whole
-from .smooth import STAGE_WIDTHS, stage_width, yardstick
+from .smooth import STAGE_WIDTHS, stages, yardstick
 from .starts import real_points, start_points
 
-_FIRST_RATE, _LAST_RATE = 0.05, 0.002  # step sizes in the unit box, first and last chunk
-_CHUNK = 8  # steps between two looks, at which the front is brought up to date
+_LOOK = 8  # most steps between two looks, at which the front is brought up to date
 _END = 1e-3  # least weight of two objectives: the ends of the front are nearly the optima of one objective alone
 _SUM = 0.05  # part of the plain sum in the scalarization, which keeps weakly dominated designs away
 _PENALTY = 10.0  # of a squared relative violation against a scaled objective of 1
@@ -47,7 +46,7 @@ class Pareto(AbstractMethod):
         return "pareto"
 
     def search(self, problem: Problem, record: Record) -> Front:
-        """Runs the stages, then sorts out the front of all designs met at the looks."""
+        """Runs the stages, then sorts out the front of all designs met."""
         points = real_points(problem, start_points(problem, self.points))
         weights = real_points(problem, _weights(self.points, len(problem.objectives)))
         met = _Met(points, len(problem.objectives))
@@ -61,10 +60,9 @@ class Pareto(AbstractMethod):
 
         advance(1.0, 0.0, 1)
         scale = yardstick(met.soft_scale(problem))
-        chunks = max(-(-self.steps // _CHUNK), len(STAGE_WIDTHS))
-        for chunk, rate in enumerate(np.geomspace(_FIRST_RATE, _LAST_RATE, chunks)):
-            points = advance(stage_width(chunk, chunks, scale), rate, _CHUNK)
-            record.report(min((chunk + 1) * _CHUNK, self.steps), self.steps, met.compromise()[1])
+        for stage in stages(self.steps, _LOOK):
+            points = advance(stage.width * scale, stage.rate, stage.steps)
+            record.report(stage.done, self.steps, met.compromise()[1])
         place, distance = met.compromise()
         if np.isfinite(distance):
             record.offer(place, distance, 0.0)
@@ -97,7 +95,7 @@ class _Met:
         if not len(self._values):
             return np.zeros_like(self._worst), np.ones_like(self._worst)
         low = self._values.min(axis=0)
-        return low, np.maximum(self._worst - low, _SPAN * np.maximum(np.abs(low), 1.0))
+        return low, _span(low, self._worst)
 
     def soft_scale(self, problem: Problem):
         """Values of the objective that is softened, else of the first."""
@@ -105,11 +103,11 @@ class _Met:
         return self._values[:, index]
 
     def compromise(self) -> tuple[np.ndarray, float]:
-        """The design whose worst scaled distance from the ideal is the least, and that distance."""
+        """The design whose worst distance from the ideal, in spans of the front, is the least; and that distance."""
         if not len(self._values):
             return np.full(self._points.shape[1], 0.5), np.inf
-        low, span = self.frame()
-        distance = ((self._values - low) / span).max(axis=1)
+        low = self._values.min(axis=0)
+        distance = ((self._values - low) / _span(low, self._values.max(axis=0))).max(axis=1)
         best = int(distance.argmin())
         return self._points[best], float(distance[best])
 
@@ -126,6 +124,10 @@ class _Met:
         )
 
 
+def _span(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    return np.maximum(high - low, _SPAN * np.maximum(np.abs(low), 1.0))
+
+
 def _weights(count: int, objectives: int) -> np.ndarray:
     """Weights that sum to 1: evenly along the line of two objectives, of a low-discrepancy sequence for more."""
     if objectives == 2:
@@ -138,7 +140,7 @@ def _weights(count: int, objectives: int) -> np.ndarray:
 
 @eqx.filter_jit
 def _advance(problem: Problem, points, weights, count, low, span, width, rate):
-    """Steps of all starts; returns the points, and the last designs that were judged with values and violations."""
+    """A stage of all starts; returns the points, and all designs that were judged with values and violations."""
 
     def loss(x, weight):
         soft, true, excess, fine = problem.soft_and_true(x, width)
@@ -148,18 +150,12 @@ def _advance(problem: Problem, points, weights, count, low, span, width, rate):
         violation = jnp.maximum(jnp.max(excess, initial=0.0), 0.0)
         return jnp.max(scaled) + _SUM * jnp.sum(scaled) + penalty, (jnp.where(good, true, jnp.inf), violation)
 
+    def keep(kept, number, points, seen):
+        return jax.tree.map(lambda all, new: all.at[number].set(new), kept, (points, *seen))
+
     gradient = jax.vmap(jax.grad(loss, has_aux=True))
-    adam = optax.scale_by_adam()
-
-    def step(_, carry):
-        points, moments, *_ = carry
-        slopes, (values, violations) = gradient(points, weights)
-        slopes = jnp.where(jnp.isfinite(slopes), slopes, 0.0)
-        with jax.numpy_dtype_promotion("standard"):
-            update, moments = adam.update(slopes, moments)
-        return jnp.clip(points - rate * update, 0.0, 1.0), moments, points, values, violations
-
-    values = jnp.full(weights.shape, jnp.inf, points.dtype)
-    start = (points, adam.init(points), points, values, jnp.zeros_like(values[:, 0]))
-    points, _, judged, values, violations = jax.lax.fori_loop(0, count, step, start)
-    return points, judged, values, violations
+    met = jnp.full((_LOOK, *points.shape[:1]), jnp.inf, points.dtype)
+    values = jnp.full((_LOOK, *weights.shape), jnp.inf, points.dtype)
+    kept = jnp.zeros((_LOOK, *points.shape), points.dtype), values, met
+    points, kept = adam_steps(lambda points: gradient(points, weights), points, count, rate, keep, kept)
+    return points, *jax.tree.map(lambda all: all.reshape(-1, *all.shape[2:]), kept)

@@ -8,26 +8,29 @@ import optax
 
 from .problem import GRADIENT_COST, Problem
 from .search import AbstractMethod, Record, whole
-from .smooth import STAGE_WIDTHS, Multipliers, lagrangian, merged, stage_width, yardstick
+from .smooth import STAGE_WIDTHS, Multipliers, lagrangian, merged, stages, yardstick
 from .starts import real_points, start_points
 
-_LINE_SEARCH_STEPS = 10  # at most, per step
 _INSIDE = 0.01  # start points keep this distance from the bounds, where the map of the box is flat
+_DECREASE = 1e-4  # least decrease relative to that of the slope (Armijo; Nocedal and Wright 2006, eq. (3.4))
+_SHORTER = 0.3  # step after one that does not decrease enough, relative to it
+_LONGEST = 1.0  # step: a third of the way from one bound to the other
 
 
 class LBFGS(AbstractMethod):
-    """Limited-memory BFGS with a zoom line search (optax) on a soft objective whose width shrinks in stages.
+    """Limited-memory BFGS (optax) with a backtracking line search on a soft objective whose width shrinks in stages.
 
     The box is the image of the whole space under x = (1 + sin(t)) / 2; other constraints enter by an augmented
-    Lagrangian, whose multipliers follow once per stage. All starts advance together under `jax.vmap`.
+    Lagrangian, whose multipliers follow once per stage. All starts advance together under `jax.vmap`: each step judges
+    one trial point of every start, which ends the line search or shortens its step.
 
     Attributes:
         starts: number of start points; the first is the middle of the box.
-        steps: steps of every start, over all stages.
+        steps: trial points of every start, over all stages.
     """
 
     starts: int = eqx.field(static=True, default=16)
-    steps: int = eqx.field(static=True, default=60)
+    steps: int = eqx.field(static=True, default=150)
 
     def __check_init__(self):
         whole("LBFGS", "starts", self.starts, 1)
@@ -45,60 +48,75 @@ class LBFGS(AbstractMethod):
 
         def advance(width, scale, count):
             made = [jnp.asarray(value, angles.dtype) for value in (width, scale)]
-            found = _advance(problem, angles, multipliers, jnp.asarray(count), *made)
-            moved, followed, best, values, violations, spent = found
-            record.spend(int(np.sum(spent)))
-            record.offer(best, values, violations)
-            return moved, followed, values
+            moved, followed, *best = _advance(problem, angles, multipliers, jnp.asarray(count), *made)
+            record.spend(self.starts * (count + 1), analyses=GRADIENT_COST)
+            record.offer(*best)
+            return moved, followed, best[1]
 
         scale = yardstick(advance(1.0, 1.0, 0)[2])
-        done = np.linspace(0, self.steps, len(STAGE_WIDTHS) + 1).astype(int)
-        for stage, (before, after) in enumerate(zip(done[:-1], done[1:])):
-            width = stage_width(stage, len(STAGE_WIDTHS), scale)
-            angles, multipliers, _ = advance(width, scale, int(after - before))
-            record.look(int(after), self.steps)
+        for stage in stages(self.steps, self.steps):
+            angles, multipliers, _ = advance(stage.width * scale, scale, stage.steps)
+            record.look(stage.done, self.steps)
+
+
+class _Trial(eqx.Module):
+    """One start: where it is, and the point that it tries next."""
+
+    angle: jax.Array
+    value: jax.Array
+    slope: jax.Array
+    direction: jax.Array
+    stretch: jax.Array
+    memory: optax.OptState
+
+    @property
+    def next(self) -> jax.Array:
+        """The trial point."""
+        return self.angle + self.stretch[..., None] * self.direction
+
+    def take(self, method, angle, value, slope) -> "_Trial":
+        """Goes to the trial point if the loss there is low enough, and tries a shorter step if it is not."""
+        wanted = _DECREASE * self.stretch * jnp.sum(self.slope * self.direction)
+        low = value <= self.value + wanted
+        # optax mixes its integer step count with floats, which strict promotion would forbid
+        with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
+            uphill, memory = method.update(slope, self.memory, angle)
+        # without the curvature that a full line search guarantees, the memory may point uphill
+        direction = jnp.where(jnp.sum(uphill * slope) > 0, -uphill, -slope)
+        reach = jnp.max(jnp.abs(direction))
+        direction = direction * jnp.where(reach > _LONGEST, _LONGEST / reach, 1.0)
+        taken = _Trial(angle, value, slope, direction, jnp.ones_like(value), memory)
+        shorter = eqx.tree_at(lambda trial: trial.stretch, self, _SHORTER * self.stretch)
+        return jax.tree.map(lambda new, old: jnp.where(low, new.astype(old.dtype), old), taken, shorter)
 
 
 @eqx.filter_jit
 def _advance(problem: Problem, angles, multipliers: Multipliers, count, width, scale):
-    """A stage: angles, multipliers, best true design of every start, and the analyses that every start spent."""
+    """A stage: angles, multipliers and the best true design of every start on the way."""
+    method = optax.scale_by_lbfgs()
 
-    def value(angle, rest):
+    def loss(angle, rest):
         return lagrangian(problem, _box(angle), Multipliers(rest), width, scale)
 
-    def run(angle, rest):
-        def loss(angle):
-            return value(angle, rest)[0]
+    gradient = jax.vmap(jax.value_and_grad(loss, has_aux=True))
 
-        search = optax.scale_by_zoom_linesearch(max_linesearch_steps=_LINE_SEARCH_STEPS)
-        method = optax.lbfgs(linesearch=search)
+    def step(_, carry):
+        trial, best, excess = carry
+        angles = trial.next
+        (values, (true, violation, new)), slopes = gradient(angles, multipliers.value)
+        best = merged(best, (_box(angles), true, violation))
+        finite = jnp.isfinite(slopes).all(axis=1, keepdims=True)
+        values, slopes = jnp.where(finite[:, 0], values, jnp.inf), jnp.where(finite, slopes, 0.0)
+        moved = jax.vmap(lambda trial, *seen: trial.take(method, *seen))(trial, angles, values, slopes)
+        return moved, best, jnp.where((moved.value < trial.value)[:, None], new, excess)
 
-        def step(_, carry):
-            angle, state, best, spent = carry
-            # optax mixes its integer step count with floats, which strict promotion would forbid
-            with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
-                before, slope = optax.value_and_grad_from_state(loss)(angle, state=state)
-                slope = jnp.where(jnp.isfinite(slope), slope, 0.0)
-                update, state = method.update(slope, state, angle, value=before, grad=slope, value_fn=loss)
-            angle = angle + update
-            trials = state[-1].info.num_linesearch_steps
-            return angle, state, judged(angle, best), spent + GRADIENT_COST * trials + 1
-
-        def judged(angle, best):
-            _, (true, violation, _) = value(angle, rest)
-            lanes = merged(
-                jax.tree.map(lambda part: part[None], best), (_box(angle)[None], true[None], violation[None])
-            )
-            return jax.tree.map(lambda part: part[0], lanes)
-
-        nothing = jnp.asarray(jnp.inf, angle.dtype)
-        best = judged(angle, (_box(angle), nothing, nothing))
-        start = (angle, method.init(angle), best, jnp.asarray(1 + GRADIENT_COST))
-        angle, _, best, spent = jax.lax.fori_loop(0, count, step, start)
-        return angle, best, spent, value(angle, rest)[1][2]
-
-    angles, (best, values, violations), spent, excess = jax.vmap(run)(angles, multipliers.value)
-    return angles, multipliers.follow(excess, scale), best, values, violations, spent
+    nothing = jnp.full(angles.shape[0], jnp.inf, angles.dtype)
+    zero = jnp.zeros_like(angles)
+    first = _Trial(angles, nothing, zero, zero, jnp.ones_like(nothing), jax.vmap(method.init)(angles))
+    start = first, (_box(angles), nothing, nothing), jnp.zeros_like(multipliers.value)
+    # one more: the first trial is the point itself
+    trial, best, excess = jax.lax.fori_loop(0, count + 1, step, start)
+    return trial.angle, multipliers.follow(excess, scale), *best
 
 
 def _box(angle):

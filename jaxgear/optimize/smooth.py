@@ -1,4 +1,7 @@
-"""The smooth problem that gradient methods follow: soft extremes, augmented Lagrangian, start values."""
+"""The smooth problem that gradient methods follow: soft extremes, augmented Lagrangian, stages."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -13,6 +16,7 @@ Scalar = Float[Array, ""]
 # Widths of the soft extremes in the stages of a search, relative to the best objective among the start points: from
 # wide, where most positions pull, to narrow, where the soft objective is within about a percent of the true one.
 STAGE_WIDTHS = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
+_FIRST_RATE, _LAST_RATE = 0.05, 0.002  # step sizes in the unit box, first and last stage
 _LEAST_SCALE = 1e-3  # [um] of the objective, where the start is perfect already
 _STIFFNESS = 10.0  # of the penalty: objective per squared relative violation, relative to the scale
 
@@ -39,19 +43,13 @@ class Multipliers(eqx.Module):
 
 def lagrangian(problem: Problem, x, multipliers: Multipliers, width, scale):
     """Augmented Lagrangian of the soft problem at one point, with its true value, violation and excess."""
-    values, violation, excess = both(problem, x, width)
-    stiffness = _STIFFNESS * scale
-    pushed = jnp.maximum(multipliers.value + stiffness * excess, 0.0)
-    penalty = jnp.sum(pushed**2 - multipliers.value**2) / (2 * stiffness)
-    return values[0] + penalty, (*violation, excess)
-
-
-def both(problem: Problem, x, width):
-    """Soft objectives, then the true first objective and violation, then the worst excess over every constraint."""
     values, true, excess, fine = problem.soft_and_true(x, width)
     good = fine & jnp.isfinite(jnp.sum(values))
     violation = jnp.maximum(jnp.max(excess, initial=0.0), 0.0)
-    return values, (jnp.where(good, true[0], jnp.inf), violation), excess
+    stiffness = _STIFFNESS * scale
+    pushed = jnp.maximum(multipliers.value + stiffness * excess, 0.0)
+    penalty = jnp.sum(pushed**2 - multipliers.value**2) / (2 * stiffness)
+    return values[0] + penalty, (jnp.where(good, true[0], jnp.inf), violation, excess)
 
 
 def merged(best, new):
@@ -67,9 +65,30 @@ def merged(best, new):
     )
 
 
-def stage_width(step: int, steps: int, scale: float) -> float:
-    """Width of the soft extremes [um] at a step of a search."""
-    return STAGE_WIDTHS[step * len(STAGE_WIDTHS) // steps] * scale
+class Stage(NamedTuple):
+    """Some steps of a search between two looks at it.
+
+    Attributes:
+        steps: how many.
+        done: how many are done after them.
+        width: of the soft extremes, relative to the scale of the objective.
+        rate: step size in the unit box.
+    """
+
+    steps: int
+    done: int
+    width: float
+    rate: float
+
+
+def stages(steps: int, most: int) -> Iterator[Stage]:
+    """Stages of a search of so many steps, each of about as many as `most`; widths and rates fall."""
+    count = max(-(-steps // most), len(STAGE_WIDTHS))
+    ends = np.linspace(0, steps, count + 1).astype(int)
+    rates = np.geomspace(_FIRST_RATE, _LAST_RATE, count)
+    for index, rate in enumerate(rates):
+        before, after = int(ends[index]), int(ends[index + 1])
+        yield Stage(after - before, after, STAGE_WIDTHS[index * len(STAGE_WIDTHS) // count], float(rate))
 
 
 def yardstick(values) -> float:
