@@ -84,7 +84,7 @@ def solve_any(mesh: jg.Mesh, torque, pinion=None, wheel=None, deviation=0.0) -> 
 
     The contact solution compiles once for all kinds of modifications.
     """
-    removed = _removed(mesh, jnp.asarray(torque), pinion, wheel) + deviation
+    removed = removed_material(mesh, jnp.asarray(torque), pinion=pinion, wheel=wheel) + deviation
     cycle = solve_removed(mesh, jnp.asarray(torque), removed)
     assert bool(jnp.all(cycle.converged))
     return cycle
@@ -93,11 +93,6 @@ def solve_any(mesh: jg.Mesh, torque, pinion=None, wheel=None, deviation=0.0) -> 
 def ppte(mesh: jg.Mesh, torque, pinion=None, wheel=None, deviation=0.0) -> float:
     """PPTE [um] of `solve_any`."""
     return float(jg.peak_to_peak(solve_any(mesh, torque, pinion, wheel, deviation).transmission_error))
-
-
-@eqx.filter_jit
-def _removed(mesh, torque, pinion, wheel):
-    return removed_material(mesh, torque, pinion=pinion, wheel=wheel)
 
 
 class Point(NamedTuple):

@@ -39,6 +39,18 @@ def _forget_compiled_programs():
 
 
 @pytest.fixture
+def clean_figures():
+    """Closes the figures of a test, which must not have changed anybody's settings."""
+    import matplotlib
+    import matplotlib.pyplot as plt
+
+    before = dict(matplotlib.rcParams)
+    yield
+    plt.close("all")
+    assert dict(matplotlib.rcParams) == before
+
+
+@pytest.fixture
 def interpolation():
     """Allows the promotion of ranks and dtypes that interpax's cubic splines use inside."""
     with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):

@@ -13,10 +13,13 @@ import pytest
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
+from catalogue import gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear import plot
 from jaxgear.plot.figure import line_style
+
+pytestmark = pytest.mark.usefixtures("clean_figures")
 
 TORQUE, AMOUNT, LENGTH = 50.0, 8.0, 5.0
 TORQUES = np.array([10.0, 30.0, 50.0, 80.0])
@@ -24,10 +27,7 @@ TORQUES = np.array([10.0, 30.0, 50.0, 80.0])
 
 @pytest.fixture(scope="module")
 def mesh():
-    pinion = jg.Gear(teeth=19, module=3.0, face_width=20.0)
-    wheel = jg.Gear(teeth=48, module=3.0, face_width=18.0)
-    resolution = jg.Resolution(positions=24, slices=3)
-    return eqx.filter_jit(lambda pair: jg.prepare(pair, resolution=resolution))(jg.GearPair(pinion, wheel))
+    return prepare(gear_pair(), resolution=jg.Resolution(positions=24, slices=3))
 
 
 @pytest.fixture(scope="module")
@@ -49,14 +49,6 @@ def curves(mesh, designs):
     at = eqx.filter_jit(lambda mesh, torque, pinion, wheel: jg.solve(mesh, torque, pinion=pinion, wheel=wheel))
     every = jax.vmap(lambda torque, design: at(mesh, torque, *design).transmission_error, (0, None))
     return {name: every(jnp.asarray(TORQUES), design) for name, design in designs.items()}
-
-
-@pytest.fixture(autouse=True)
-def clean_figures():
-    before = dict(matplotlib.rcParams)
-    yield
-    plt.close("all")
-    assert dict(matplotlib.rcParams) == before
 
 
 @pytest.fixture

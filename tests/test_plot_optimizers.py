@@ -8,14 +8,16 @@ import pytest
 
 matplotlib.use("Agg")
 
-import equinox as eqx
 import matplotlib.pyplot as plt
+from catalogue import gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear import plot
 from jaxgear.optimize import Front, Iterate, Optimum
 from jaxgear.plot.figure import point_style
 from jaxgear.plot.objectives import objective_label
+
+pytestmark = pytest.mark.usefixtures("clean_figures")
 
 PHASE = np.arange(16) / 16
 TORQUES = np.linspace(20.0, 400.0, 20)
@@ -59,10 +61,7 @@ def state(amount):
 
 @pytest.fixture(scope="module")
 def mesh():
-    pinion = jg.Gear(teeth=19, module=3.0, face_width=20.0)
-    wheel = jg.Gear(teeth=48, module=3.0, face_width=18.0)
-    resolution = jg.Resolution(positions=16, slices=3)
-    return eqx.filter_jit(lambda pair: jg.prepare(pair, resolution=resolution))(jg.GearPair(pinion, wheel))
+    return prepare(gear_pair(), resolution=jg.Resolution(positions=16, slices=3))
 
 
 @pytest.fixture(scope="module")
@@ -131,14 +130,6 @@ LABELS = {
 
 def plain(text):
     return " ".join(text.split())
-
-
-@pytest.fixture(autouse=True)
-def clean_figures():
-    before = dict(matplotlib.rcParams)
-    yield
-    plt.close("all")
-    assert dict(matplotlib.rcParams) == before
 
 
 @pytest.mark.parametrize("name", LABELS)

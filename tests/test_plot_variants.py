@@ -16,6 +16,8 @@ from jaxgear import plot
 from jaxgear.numerics.pareto import pareto_front
 from jaxgear.plot.variants import label
 
+pytestmark = pytest.mark.usefixtures("clean_figures")
+
 ROWS = 60
 COLUMNS = ("ppte_um", "mesh_loss_factor", "max_flank_pressure_MPa", "effective_contact_ratio")
 NAMES = ("unmodified", "rule", "optimum")
@@ -74,14 +76,6 @@ def failing(scatter, count):
     }
     kept = {name: getattr(scatter, name) for name in scatter.__dataclass_fields__}
     return jg.Scatter(**{**kept, **changes})
-
-
-@pytest.fixture(autouse=True)
-def clean_figures():
-    before = dict(matplotlib.rcParams)
-    yield
-    plt.close("all")
-    assert dict(matplotlib.rcParams) == before
 
 
 @pytest.fixture

@@ -45,7 +45,9 @@ class Judge:
 
     def __call__(self, found: Found) -> Verdict:
         """Judges a design; a contact solution that fails makes its PPTE infinite."""
-        removed, relief = _flanks(self._mesh, self._torques, found.pinion, found.wheel)
+        flanks = {"pinion": found.pinion, "wheel": found.wheel}
+        removed = jnp.stack([jg.removed_material(self._mesh, torque, **flanks) for torque in self._torques])
+        relief = jg.max_relief(self._mesh, **flanks)
         ppte, pressure = (np.asarray(part) for part in _solved(self._mesh, self._torques, removed, self._deviations))
         count = len(_TORQUES)
         # the value of a sample: interpolation towards an infinite neighbour would give NaN
@@ -58,14 +60,6 @@ class Judge:
 def _fields(mesh: jg.Mesh, torque, samples: jg.Deviation):
     """Material that the deviations of every sample remove, shape (gears, pairs, slices, positions)."""
     return jax.vmap(lambda one: jg.deviated_material(mesh, torque, one))(samples)
-
-
-@eqx.filter_jit
-def _flanks(mesh: jg.Mesh, torques, pinion, wheel):
-    def removed(torque):
-        return jg.removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-
-    return jax.vmap(removed)(torques), jg.max_relief(mesh, pinion, wheel)
 
 
 @eqx.filter_jit

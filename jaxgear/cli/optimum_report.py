@@ -13,11 +13,11 @@ from ..optimize import QUANTITIES, Optimum, Projection
 _SHOWN_BOUNDS = 8
 
 
-def verdict(file: DesignFile, optimum: Optimum, projection: Projection | None, reduction: float) -> Iterator[str]:
-    """Lines under the table of an optimization."""
-    ppte = optimum.ppte
-    before = ppte / (1 - reduction / 100) if reduction < 100 else float("nan")
-    yield f"PPTE {before:.3f} -> {ppte:.3f} um: {reduction:.1f} % less than unmodified"
+def verdict(
+    file: DesignFile, optimum: Optimum, projection: Projection | None, *, unmodified: float, reduction: float
+) -> Iterator[str]:
+    """Lines under the table of an optimization; the PPTE without modifications [um], and by how much it fell [%]."""
+    yield f"PPTE {unmodified:.3f} -> {optimum.ppte:.3f} um: {reduction:.1f} % less than unmodified"
     if optimum.objective_name != "ppte":
         yield f"{optimum.objective_name}: {optimum.objective:.4g}"
     yield from _bounds(file, optimum)

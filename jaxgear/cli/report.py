@@ -66,9 +66,14 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
             )
 
 
+def unmodified(evaluations: Evaluations) -> float:
+    """PPTE of the first design, which is unmodified [um]."""
+    return float(next(iter(evaluations.values())).metrics["ppte_um"])
+
+
 def reduction(evaluations: Evaluations) -> float:
     """By how much the main design lowers the PPTE of the first [%]."""
-    before = float(next(iter(evaluations.values())).metrics["ppte_um"])
+    before = unmodified(evaluations)
     return 100 * (1 - float(main(evaluations).metrics["ppte_um"]) / before) if before else 0.0
 
 

@@ -89,8 +89,14 @@ class Run:
         out = report.console()
         out.print(report.table(self.design, self._evaluations))
         if self._optimum is not None:
-            reduction = report.reduction(self._evaluations)
-            for line in optimum_report.verdict(self.design, self._optimum, self._projection, reduction):
+            lines = optimum_report.verdict(
+                self.design,
+                self._optimum,
+                self._projection,
+                unmodified=report.unmodified(self._evaluations),
+                reduction=report.reduction(self._evaluations),
+            )
+            for line in lines:
                 out.print(line, soft_wrap=True)
         if self._quick:
             out.print("quick run: coarse positions and a short search, not a result to build on", soft_wrap=True)

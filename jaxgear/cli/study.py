@@ -55,7 +55,7 @@ class Evaluator:
 
     def __call__(self, pinion: AbstractModification, wheel: AbstractModification) -> Evaluation:
         """Evaluates one design."""
-        removed = np.asarray(_removed_material(self._mesh, jnp.asarray(self._torques), pinion, wheel))
+        removed = self._removed(self._torques, pinion, wheel)
         cycle = self._solve(removed, 0)  # compiles, where it has to
         metrics = jax.tree.map(np.asarray, _numbers(cycle, *self._heat))
         began = time.perf_counter()
@@ -81,18 +81,18 @@ class Evaluator:
             the torques [N m], shape (torques,), and the transmission error [um], shape (torques, positions).
         """
         torques = np.linspace(0.0, _SURFACE_REACH * self._torques[0], _SURFACE_TORQUES)
-        removed = np.asarray(_removed_material(self._mesh, jnp.asarray(torques), pinion, wheel))
+        removed = self._removed(torques, pinion, wheel)
         cycles = [solve_removed(self._mesh, float(t), jnp.asarray(r)) for t, r in zip(torques, removed)]
         return torques, np.asarray([cycle.transmission_error for cycle in cycles])
 
+    def _removed(self, torques: np.ndarray, pinion: AbstractModification, wheel: AbstractModification):
+        """Material removed from both flanks [um], (torques, pairs, slices, positions)."""
+        return np.asarray(
+            [removed_material(self._mesh, torque, pinion=pinion, wheel=wheel) for torque in jnp.asarray(torques)]
+        )
+
     def _solve(self, removed: np.ndarray, index: int) -> MeshCycle:
         return solve_removed(self._mesh, float(self._torques[index]), jnp.asarray(removed[index]))
-
-
-@eqx.filter_jit
-def _removed_material(mesh: Mesh, torques, pinion: AbstractModification, wheel: AbstractModification):
-    """Material removed from both flanks [um], (torques, pairs, slices, positions)."""
-    return jax.vmap(lambda torque: removed_material(mesh, torque, pinion=pinion, wheel=wheel))(torques)
 
 
 @eqx.filter_jit

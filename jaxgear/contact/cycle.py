@@ -145,6 +145,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> MeshCycle:
     )
 
 
+@eqx.filter_jit
 def removed_material(
     mesh: Mesh,
     torque,

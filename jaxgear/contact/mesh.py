@@ -11,7 +11,7 @@ from ..compliance.hertz import AbstractLaw, contact_geometry
 from ..compliance.toothload import ToothLoad, tooth_load
 from ..geometry import GearPair, PathOfContact, outline, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import concrete
+from ..numerics import concrete, whole
 from .corner import REACH, corner_gap
 
 Scalar = Float[Array, ""]
@@ -43,9 +43,7 @@ class Resolution(eqx.Module):
 
     def __check_init__(self):
         for name, low in (("positions", 4), ("slices", 1), ("pairs", 2), ("patch_nodes", 1), ("newton_steps", 1)):
-            value = getattr(self, name)
-            if not isinstance(value, int) or value < low:
-                raise ValueError(f"Resolution: {name} = {value!r} must be a whole number of at least {low}")
+            whole("Resolution", name, getattr(self, name), low)
         if self.tolerance is not None and not (isinstance(self.tolerance, float) and 0 < self.tolerance < 1):
             raise ValueError(f"Resolution: tolerance = {self.tolerance!r} must be a number between 0 and 1, or None")
 

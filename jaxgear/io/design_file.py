@@ -1,7 +1,7 @@
 """Design files: a gear pair, its load, its flank modifications and their free parameters, as TOML."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,7 +14,7 @@ from ..geometry import Gear, GearPair, Material
 from ..microgeometry import AbstractModification
 from ..optimize import iso_stiffness
 from . import schema, template
-from .errors import DesignFileError, suggestion
+from .errors import DesignFileError, refused, suggestion
 from .toml import decode, join, read
 
 T = TypeVar("T")
@@ -90,7 +90,7 @@ class DesignFile:
         """
         resolution = self.resolution() if resolution is None else resolution
         key, compliance = "resolution", self._compliance
-        return _physical(self.path, key, prepare, self._pair, compliance=compliance, resolution=resolution)
+        return refused(self.path, key, prepare, self._pair, compliance=compliance, resolution=resolution)
 
     def design(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
         """Modifications of pinion and wheel; pure and traceable.
@@ -128,7 +128,7 @@ def load_design(path: str | Path) -> DesignFile:
         gears.append(_gear(file, name, gear))
         keys = [f"{name}.modification[{i}]" for i in range(len(gear.modification))]
         parts.append([template.parse_modification(file, key, table) for key, table in zip(keys, gear.modification)])
-    pair = _physical(file, "pair", GearPair, *gears, **_given(section("pair", schema.PairSection)))
+    pair = refused(file, "pair", GearPair, *gears, **_given(section("pair", schema.PairSection)))
     load = _load(file, section("load", schema.LoadSection))
     optimize = section("optimize", schema.OptimizeSection)
     if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
@@ -163,9 +163,9 @@ def _gear(file: Path, name: str, section: schema.GearSection) -> Gear:
     key = join(name, "material")
     constants = decode(file, key, section.material or {}, schema.MaterialSection)
     # never the library's STEEL: it was made at import, possibly in single precision
-    material = _physical(file, key, Material, **_given(constants))
+    material = refused(file, key, Material, **_given(constants))
     numbers = {key: value for key, value in _given(section).items() if key not in ("material", "modification")}
-    return _physical(file, name, Gear, **{**numbers, "teeth": float(section.teeth)}, material=material)
+    return refused(file, name, Gear, **{**numbers, "teeth": float(section.teeth)}, material=material)
 
 
 def _load(file: Path, load: schema.LoadSection) -> schema.LoadSection:
@@ -224,7 +224,7 @@ def _variables(file: Path, tables: schema.Table, parts: list[template.Part]):
             raise DesignFileError(file, f"variables.{name}.unit", f'"{unit}" must be "{units[name]}" as it is used')
     for part in parts:
         for end in (0, 1):
-            _physical(file, part.key, part.build, {name: limits[end] for name, limits in bounds.items()})
+            refused(file, part.key, part.build, {name: limits[end] for name, limits in bounds.items()})
     return bounds, {name: units[name] for name in bounds}
 
 
@@ -243,13 +243,6 @@ def _number(file: Path, key: str, value: float, *, above: float | None = None, u
         raise DesignFileError(file, key, f"{value} must be finite")
     if above is not None and value <= above:
         raise DesignFileError(file, key, f"{value:g}{unit} must be greater than {above:g}{unit}")
-
-
-def _physical(file: Path, key: str, make: Callable[..., T], *args, **kwargs) -> T:
-    try:
-        return make(*args, **kwargs)
-    except (ValueError, OverflowError) as error:
-        raise DesignFileError(file, key, error) from None
 
 
 def _given(section: msgspec.Struct) -> dict[str, Any]:

@@ -1,7 +1,10 @@
 """What can be wrong with a design file, always in one line."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+T = TypeVar("T")
 
 
 class DesignFileError(ValueError):
@@ -10,6 +13,14 @@ class DesignFileError(ValueError):
     def __init__(self, file, key: str, problem: object):
         parts = [str(file), key, str(problem)]
         super().__init__(" ".join(": ".join(part for part in parts if part).split()))
+
+
+def refused(file, key: str, make: Callable[..., T], *args, **kwargs) -> T:
+    """What `make` returns; what it refuses is wrong with the key of the design file."""
+    try:
+        return make(*args, **kwargs)
+    except (ValueError, OverflowError) as error:
+        raise DesignFileError(file, key, error) from None
 
 
 def suggestion(name: object, valid: Iterable[str]) -> str:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import Any
 
 import jax.numpy as jnp
 import msgspec
@@ -12,15 +12,12 @@ from ..numerics import AbstractMeasure, CVaR, Mean, Quantile, Worst
 from ..optimize import METHODS, QUANTITIES, Constraint, Optimum, free_form, iterate_transmission_error, minimize
 from ..optimize.projection import CURVES
 from ..optimize.search import Callback
-from ..sweep import LoadSpectrum
 from ..tolerance import Tolerance
 from . import schema
+from .cases import load_of, tolerance_of
 from .design_file import DesignFile
-from .errors import DesignFileError, suggestion
-from .sweep_request import tolerance_of
+from .errors import DesignFileError, refused, suggestion
 from .toml import decode
-
-T = TypeVar("T")
 
 _DEFAULT_METHOD = "minimax"
 _CURVE = "cubic"  # on which flanks without parameters are projected
@@ -137,7 +134,7 @@ def optimize_request(design: DesignFile, *, method: str | None = None, quick: bo
         _check_iteration(design, options["start"], section)
         common = {}
     elif name != "free_form":
-        _refused(design, f"optimize.{name}", lambda: METHODS[name](**options))
+        refused(design.path, f"optimize.{name}", lambda: METHODS[name](**options))
     if quick:
         options = {**options, **_QUICK[name]}
     return OptimizeRequest(name, curve, design, options, common)
@@ -163,7 +160,7 @@ def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quic
     if objectives != ["ppte"] and name in schema.METHODS_WITHOUT_VARIABLES:
         raise DesignFileError(design.path, "optimize.objective", f'must be "ppte" with method "{name}"')
     found: dict[str, Any] = {
-        "torque": _load(design, section),
+        "torque": load_of(design, "optimize", section.torques, section.weights),
         "measure": _measure(design, section),
         "constraints": _constraints(design, section),
         "seed": section.seed or 0,
@@ -181,15 +178,6 @@ def _objectives(section: schema.OptimizeSection, name: str) -> list[str]:
 def _constraints(design: DesignFile, section: schema.OptimizeSection) -> tuple[Constraint, ...]:
     tables = enumerate(section.constraint)
     return tuple(_constraint(design, f"optimize.constraint[{number}]", table) for number, table in tables)
-
-
-def _load(design: DesignFile, section: schema.OptimizeSection) -> LoadSpectrum:
-    if section.torques is None:
-        if section.weights is not None:
-            raise DesignFileError(design.path, "optimize.weights", "has no effect without optimize.torques")
-        return LoadSpectrum([design.torque])
-    _refused(design, "optimize.torques", lambda: LoadSpectrum(section.torques))
-    return _refused(design, "optimize.weights", lambda: LoadSpectrum(section.torques, section.weights))
 
 
 def _measure(design: DesignFile, section: schema.OptimizeSection) -> AbstractMeasure:
@@ -227,7 +215,7 @@ def _constraint(design: DesignFile, key: str, table: schema.Table) -> Constraint
             problem = f'"{name}" is not a variable, {suggestion(name, design.bounds)}'
             raise DesignFileError(design.path, f"{key}.variables", problem)
     of = section.of if section.of is not None else section.variables
-    return _refused(design, key, lambda: Constraint(of, low=section.low, high=section.high))  # type: ignore[arg-type]
+    return refused(design.path, key, lambda: Constraint(of, low=section.low, high=section.high))  # type: ignore[arg-type]
 
 
 def _check_iteration(design: DesignFile, start: str, section: schema.OptimizeSection) -> None:
@@ -243,10 +231,3 @@ def _check_iteration(design: DesignFile, start: str, section: schema.OptimizeSec
     if start == "low_pressure" and not design.bounds:
         problem = '"low_pressure" needs [variables], of which the relief of the start is designed'
         raise DesignFileError(design.path, "optimize.te_iteration.start", problem)
-
-
-def _refused(design: DesignFile, key: str, make: Callable[[], T]) -> T:
-    try:
-        return make()
-    except (ValueError, OverflowError) as error:
-        raise DesignFileError(design.path, key, error) from None

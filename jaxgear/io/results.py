@@ -14,7 +14,8 @@ import numpy as np
 
 from ..contact import Mesh
 from ..geometry import diameter, roll_angle
-from ..microgeometry import AbstractModification, Flank, NoModification, Sum
+from ..metrics import removed_at
+from ..microgeometry import AbstractModification, NoModification, Sum
 from ..optimize import Front
 from .schema import CURVES, MODIFICATIONS
 
@@ -88,22 +89,14 @@ def _profiles(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModificat
 def _evaluate(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification):
     contact, pair = mesh.path_of_contact, mesh.pair
     sides = (
-        (pinion, pair.pinion, contact.pinion_roll_length(contact.start)),
-        (wheel, pair.wheel, contact.wheel_roll_length(contact.end)),
+        (pinion, pair.pinion, contact.pinion_roll_length(contact.start), True),
+        (wheel, pair.wheel, contact.wheel_roll_length(contact.end), False),
     )
     face = jnp.linspace(-0.5, 0.5, _FACE_POINTS) * pair.face_width
     columns = []
-    for modification, gear, start in sides:
+    for modification, gear, start, of_pinion in sides:
         rho = jnp.linspace(start, gear.tip_roll_length, _PROFILE_POINTS)
-        flank = Flank(
-            roll_length=rho[None],
-            tip_roll_length=gear.tip_roll_length,
-            start_roll_length=start,
-            base_radius=gear.base_radius,
-            face_coordinate=face[:, None],
-            face_width=pair.face_width,
-        )
-        removed = jnp.broadcast_to(modification(flank), (_FACE_POINTS, _PROFILE_POINTS))
+        removed = removed_at(mesh, modification, rho, face, of_pinion=of_pinion)
         columns.append((roll_angle(gear, rho), rho, diameter(gear, rho), face, removed))
     return columns
 

@@ -1,18 +1,16 @@
 """What the tables [sweep] and [tolerance] of a design file ask for."""
 
 import dataclasses
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 from ..metrics import RESULTS
 from ..sweep import AbstractPlan, FullFactorial, LatinHypercube, LoadSpectrum, Sobol
 from ..tolerance import Tolerance
 from . import schema
+from .cases import load_of, tolerance_of
 from .design_file import DesignFile
-from .errors import DesignFileError, suggestion
+from .errors import DesignFileError, refused, suggestion
 from .variants import read_variants
-
-T = TypeVar("T")
 
 # The keys that a kind of sampling takes; what another kind takes has no effect and is refused.
 _KEYS = {
@@ -78,7 +76,7 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
     tolerance = design.tolerance
     return SweepRequest(
         plan=_plan(design, section),
-        load=_load(design, section),
+        load=load_of(design, "sweep", section.torques, section.weights),
         results=wanted,
         part_rows=section.part_rows,
         tolerance=None if tolerance is None else tolerance_of(design, tolerance),
@@ -99,42 +97,10 @@ def _plan(design: DesignFile, section: schema.SweepSection) -> AbstractPlan:
     if kind == "list":
         return read_variants(design.path.parent / str(section.file), tuple(bounds))
     if kind == "full_factorial":
-        return _refused(design, "sweep.levels", lambda: FullFactorial(bounds, section.levels or 0))
+        return refused(design.path, "sweep.levels", lambda: FullFactorial(bounds, section.levels or 0))
     make = Sobol if kind == "sobol" else LatinHypercube
-    return _refused(design, "sweep.samples", lambda: make(bounds, section.samples or 0, seed=seed))
-
-
-def _load(design: DesignFile, section: schema.SweepSection) -> LoadSpectrum:
-    if section.torques is None:
-        if section.weights is not None:
-            raise DesignFileError(design.path, "sweep.weights", "has no effect without sweep.torques")
-        return LoadSpectrum([design.torque])
-    key = "sweep.torques" if section.weights is None else "sweep.weights"
-    _refused(design, "sweep.torques", lambda: LoadSpectrum(section.torques))
-    return _refused(design, key, lambda: LoadSpectrum(section.torques, section.weights))
-
-
-def tolerance_of(design: DesignFile, section: schema.ToleranceSection) -> Tolerance:
-    """The tolerance of the table [tolerance]; without lead deviations on a mesh of one slice."""
-
-    def make():
-        return Tolerance.from_class(design.pair(), section.quality_class, misalignment=section.misalignment)
-
-    tolerance = _refused(design, "tolerance", make)
-    if design.resolution().slices > 1:
-        return tolerance
-    if section.misalignment is not None:
-        problem = "needs resolution.slices of at least 2, one slice cannot show it"
-        raise DesignFileError(design.path, "tolerance.misalignment", problem)
-    return tolerance.without_lead()
+    return refused(design.path, "sweep.samples", lambda: make(bounds, section.samples or 0, seed=seed))
 
 
 def _with(section: schema.SweepSection, **changes: Any) -> schema.SweepSection:
     return type(section)(**{name: changes.get(name, getattr(section, name)) for name in section.__struct_fields__})
-
-
-def _refused(design: DesignFile, key: str, make: Callable[[], T]) -> T:
-    try:
-        return make()
-    except (ValueError, OverflowError) as error:
-        raise DesignFileError(design.path, key, error) from None

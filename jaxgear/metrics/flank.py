@@ -2,11 +2,12 @@
 
 All functions take a prepared mesh and the modifications of both gears (None for the nominal involute). They look at the
 active profile, from its start to the tip, and across the common face width. They need no solution of the contact, are
-differentiable, and work under `jit` and `vmap`.
+differentiable, compiled, and work under `vmap`.
 """
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -34,6 +35,7 @@ class _Side(NamedTuple):
     pitch: Scalar
 
 
+@eqx.filter_jit
 def profile_relief(
     mesh: Mesh,
     pinion: AbstractModification | None = None,
@@ -59,6 +61,7 @@ def profile_relief(
     return on_pinion, on_wheel
 
 
+@eqx.filter_jit
 def max_relief(
     mesh: Mesh, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None
 ) -> Scalar:
@@ -74,6 +77,7 @@ def max_relief(
     return jnp.where(jnp.isfinite(jnp.sum(removed)), jnp.max(removed), jnp.nan)
 
 
+@eqx.filter_jit
 def relief_reversal(
     mesh: Mesh, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None
 ) -> Scalar:
@@ -86,6 +90,7 @@ def relief_reversal(
     return jnp.maximum(*worst)
 
 
+@eqx.filter_jit
 def removed_volume(
     mesh: Mesh, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None
 ) -> Scalar:
@@ -109,10 +114,27 @@ def removed_volume(
     return total
 
 
-def removed_at(mesh: Mesh, modification: AbstractModification, roll_length: Profile, *, of_pinion: bool) -> Profile:
-    """Material that a modification of one gear removes at roll lengths [mm], in the middle of the face [um]."""
-    sides = _sides(mesh, modification, modification)
-    return _profile(mesh, sides[0 if of_pinion else 1], roll_length)
+@eqx.filter_jit
+def removed_at(
+    mesh: Mesh, modification: AbstractModification, roll_length: Profile, face_coordinate=None, *, of_pinion: bool
+) -> Float[Array, "*lines points"]:
+    """Material that a modification of one gear removes at given places [um].
+
+    Args:
+        mesh: prepared mesh.
+        modification: of the pinion or the wheel.
+        roll_length: shape (points,) [mm].
+        face_coordinate: lines along the profile, from the middle of the face, shape (lines,) [mm]; None for one line in
+            the middle.
+        of_pinion: whether it is the pinion's.
+
+    Returns:
+        shape (lines, points), or (points,) without a face coordinate.
+    """
+    side = _sides(mesh, modification, modification)[0 if of_pinion else 1]
+    if face_coordinate is None:
+        return _profile(mesh, side, roll_length)
+    return _removed(mesh, side, roll_length, face_coordinate)
 
 
 def _sides(mesh: Mesh, pinion: AbstractModification | None, wheel: AbstractModification | None) -> tuple[_Side, _Side]:

@@ -8,6 +8,7 @@ from .fields import check as check
 from .fields import concrete as concrete
 from .fields import optional_real as optional_real
 from .fields import real as real
+from .fields import whole as whole
 from .logarithm import log as log
 from .quadrature import gauss_legendre as gauss_legendre
 from .risk import AbstractMeasure as AbstractMeasure

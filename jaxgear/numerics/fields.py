@@ -9,6 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+_MOST = 2**53  # whole numbers up to here are exact as floating-point numbers too, in every reader of a table
+
 
 def real(value) -> Float[Array, "..."]:
     """Converts to an inexact array: arrays of floats keep their dtype, everything else takes JAX's default float."""
@@ -56,6 +58,15 @@ def check(
     raise ValueError(
         f"{owner}: {name} = {float(shown):g}{unit_text} {_range(low, high, open_low, open_high, unit_text)}"
     )
+
+
+def whole(owner: str, name: str, value, low: int = 1) -> int:
+    """The value as an int; raises a one-line `ValueError` unless it is a whole number of at least `low`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
+        raise ValueError(f"{owner}: {name} = {value!r} must be a whole number of at least {low}")
+    if value > _MOST:
+        raise ValueError(f"{owner}: {name} = {value!r} must be at most 2^53")
+    return int(value)
 
 
 def _range(low, high, open_low, open_high, unit_text) -> str:

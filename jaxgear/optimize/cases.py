@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import Mesh
-from ..numerics import check, real
+from ..numerics import check, real, whole
 from ..sweep import LoadSpectrum
 from ..tolerance import Tolerance, sample_deviations
 from ..tolerance.deviation import deviation_field, flank_basis
@@ -71,8 +71,7 @@ def cases(
     if tolerance is None or samples is None:
         removed = jnp.zeros((count, 1, size.pairs, size.slices, size.positions), dtype)
         return Cases(torques, weights, removed)
-    if not isinstance(samples, int) or samples < 1:
-        raise ValueError(f"minimize: samples = {samples!r} must be a whole number of at least 1")
+    whole("minimize", "samples", samples)
     deviations = sample_deviations(tolerance, mesh, count * samples, seed)
     deviations = jax.tree.map(lambda leaf: leaf.reshape(count, samples, *leaf.shape[1:]), deviations)
     return Cases(torques, weights, _removed(mesh, torques, deviations))

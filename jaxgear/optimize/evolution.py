@@ -10,9 +10,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..numerics import whole
 from .evaluate import fitness, scores
 from .problem import Problem
-from .search import AbstractMethod, Record, whole
+from .search import AbstractMethod, Record
 
 _LEAST_POPULATION = 4
 # Mutation of the genetic algorithm: standard deviation in the unit box, falling geometrically over the generations so

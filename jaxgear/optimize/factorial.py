@@ -5,10 +5,11 @@ from collections.abc import Mapping
 import equinox as eqx
 import numpy as np
 
+from ..numerics import whole
 from ..sweep import FullFactorial
 from .evaluate import scores
 from .problem import Problem
-from .search import AbstractMethod, Record, whole
+from .search import AbstractMethod, Record
 from .starts import real_points
 
 _LEVELS = 5

@@ -5,8 +5,9 @@ import jax
 import jax.numpy as jnp
 import optax
 
+from ..numerics import whole
 from .problem import GRADIENT_COST, Problem
-from .search import AbstractMethod, Record, whole
+from .search import AbstractMethod, Record
 from .smooth import STAGE_WIDTHS, Multipliers, lagrangian, merged, stages, yardstick
 from .starts import real_points, start_points
 

@@ -11,36 +11,34 @@ from jaxtyping import Array, Float
 from ..contact import Mesh
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, TabulatedProfile
-from ..numerics import AbstractMeasure, Mean, check
+from ..numerics import AbstractMeasure, Mean, check, whole
 from ..tolerance import Tolerance
 from .cases import cases
 from .goal import Constraint
 from .minimax import follow
 from .minimize import optimum_of
-from .problem import Problem, Roughness
+from .problem import Parameters, Problem, Roughness
 from .result import Optimum
-from .search import Callback, Record, whole
+from .search import Callback, Record
 from .sizing import iso_relief
 
 _FEWEST = 4  # values per flank
 _TOLERANCE = 1e-3  # a search ends where the predicted decrease is below this part of the objective
 
 
-class _FreeFlanks(Problem):
-    """The tables of both flanks, from the pitch point to the tip; the parameters are their values.
+class _Tables(eqx.Module):
+    """Design of two tables, from the pitch points to the tips; the parameters are their values.
 
     Attributes:
         roll: roll lengths of pinion and wheel [mm], shape (2, points).
     """
 
-    roll: Float[Array, "2 points"] | None = None
+    roll: Float[Array, "2 points"]
 
-    def modifications(self, x):
-        """Both tables."""
-        roll = self.roll
-        assert roll is not None
-        values = self.low + x * (self.high - self.low)
-        return TabulatedProfile(roll[0], values[: roll.shape[1]]), TabulatedProfile(roll[1], values[roll.shape[1] :])
+    def __call__(self, parameters: Parameters):
+        """Both tables, of the parameters in the order of their names."""
+        values = jnp.stack(list(parameters.values())).reshape(self.roll.shape)
+        return TabulatedProfile(self.roll[0], values[0]), TabulatedProfile(self.roll[1], values[1])
 
 
 def free_form(
@@ -96,39 +94,38 @@ def free_form(
         raise ValueError("free_form: a linear constraint names parameters, and the values of a table have no names")
     began = time.perf_counter()
     judged = cases(mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
-    problem = _problem(mesh, judged, points, max_relief, curvature, measure, constraints)
+    roll = _roll_lengths(mesh, points)
+    problem = _problem(mesh, judged, roll, max_relief, curvature, measure, constraints)
     heaviest = float(judged.torque[int(np.argmax(judged.weight))])
     if start is None:
         relief = iso_relief(mesh.pair, heaviest)
         start = relief, relief
     record = Record(problem, callback)
     unmodified = np.zeros(2 * points)
-    follow(problem, record, np.stack([unmodified, _table(problem, start)]), steps=steps, tolerance=_TOLERANCE)
+    given = np.clip(_values(mesh, roll, start) / max_relief, 0.0, 1.0)
+    follow(problem, record, np.stack([unmodified, given]), steps=steps, tolerance=_TOLERANCE)
     flanks = record.point.reshape(2, points)
     record.point = (flanks - flanks.min(axis=1, keepdims=True)).ravel()
     return optimum_of(problem, record, "free_form", began)
 
 
-def _no_design(parameters):
-    raise NotImplementedError("free flanks are made from the values of their tables")
+def _roll_lengths(mesh: Mesh, points: int):
+    contact, pair = mesh.path_of_contact, mesh.pair
+    first = jnp.stack([contact.pinion_pitch_roll_length, contact.wheel_pitch_roll_length])
+    last = jnp.stack([pair.pinion.tip_roll_length, pair.wheel.tip_roll_length])
+    return jnp.linspace(first, last, points, axis=1).astype(mesh.phase.dtype)
 
 
-def _problem(mesh, judged, points, max_relief, curvature, measure, constraints) -> _FreeFlanks:
-    contact, pair, dtype = mesh.path_of_contact, mesh.pair, mesh.phase.dtype
-    roll = jnp.stack(
-        [
-            jnp.linspace(contact.pinion_pitch_roll_length, pair.pinion.tip_roll_length, points),
-            jnp.linspace(contact.wheel_pitch_roll_length, pair.wheel.tip_roll_length, points),
-        ]
-    ).astype(dtype)
+def _problem(mesh, judged, roll, max_relief, curvature, measure, constraints) -> Problem:
+    points, dtype = roll.shape[1], roll.dtype
     second = np.diff(np.eye(points), 2, axis=0) * max_relief
     steps = np.asarray(roll[:, 1] - roll[:, 0])
     empty = np.zeros_like(second)
     forms = np.block([[second / steps[0] ** 2, empty], [empty, second / steps[1] ** 2]])
     width = len(str(points))
     names = tuple(f"{gear} {number:0{width}d}" for gear in ("pinion", "wheel") for number in range(1, points + 1))
-    return _FreeFlanks(
-        design=_no_design,
+    return Problem(
+        design=_Tables(roll),
         names=names,
         low=jnp.zeros(2 * points, dtype),
         high=jnp.full(2 * points, max_relief, dtype),
@@ -138,18 +135,10 @@ def _problem(mesh, judged, points, max_relief, curvature, measure, constraints) 
         measure=Mean() if measure is None else measure,
         constraints=tuple(constraints),
         roughness=Roughness(jnp.asarray(forms, dtype), jnp.asarray(curvature, dtype)),
-        roll=roll,
     )
 
 
-def _table(problem: _FreeFlanks, start) -> np.ndarray:
-    """Point of the unit box of the modifications to start from."""
-    pinion, wheel = start
-    values = _removed(problem.mesh, pinion, wheel, problem.roll)
-    return np.clip(np.asarray(values).ravel() / np.asarray(problem.high), 0.0, 1.0)
-
-
-@eqx.filter_jit
-def _removed(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, roll):
-    sides = ((pinion, roll[0], True), (wheel, roll[1], False))
-    return jnp.stack([removed_at(mesh, one, where, of_pinion=side) for one, where, side in sides])
+def _values(mesh: Mesh, roll, start) -> np.ndarray:
+    """Values of the tables of the modifications to start from [um]."""
+    sides = zip(start, roll, (True, False))
+    return np.concatenate([removed_at(mesh, flank, where, of_pinion=of_pinion) for flank, where, of_pinion in sides])

@@ -3,8 +3,6 @@
 import time
 from typing import NamedTuple
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -12,9 +10,9 @@ from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..metrics import max_relief as largest_relief
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, NoModification, TabulatedProfile
-from ..numerics import check
+from ..numerics import check, whole
 from .result import Iterate, Optimum
-from .search import Callback, whole
+from .search import Callback
 
 _UNTOUCHED = 0.05  # [um]: a flank with less relief than this counts as unmodified
 _LOADED = 1e-6  # a pair with less than this share of the force carries none
@@ -138,7 +136,7 @@ class _Flanks:
             np.asarray(contact.wheel_roll_length(jnp.asarray(self._path))),
         )
         self._given = tuple(
-            np.asarray(_removed(mesh, modification, jnp.asarray(roll), of_pinion))
+            np.asarray(removed_at(mesh, modification, jnp.asarray(roll), of_pinion=of_pinion))
             for modification, roll, of_pinion in zip(self._start, self._roll, (True, False))
         )
         self._extra = [np.zeros_like(self._path), np.zeros_like(self._path)]
@@ -178,7 +176,7 @@ def _periodic(phase: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _solve(mesh: Mesh, torque, pinion, wheel) -> _State:
-    cycle = solve_removed(mesh, torque, _material(mesh, jnp.asarray(torque), pinion, wheel))
+    cycle = solve_removed(mesh, torque, removed_material(mesh, jnp.asarray(torque), pinion=pinion, wheel=wheel))
     error = np.asarray(cycle.transmission_error)
     if not (np.asarray(cycle.converged).all() and np.isfinite(error).all()):
         raise RuntimeError("iterate_transmission_error: a contact solution did not converge")
@@ -199,22 +197,7 @@ def _iterate(mesh: Mesh, state: _State, pinion, wheel) -> Iterate:
         transmission_error=error,
         ppte=state.ppte,
         limit=float(np.ptp(error[state.alone])),
-        max_relief=float(_largest(mesh, pinion, wheel)),
+        max_relief=float(largest_relief(mesh, pinion, wheel)),
         max_flank_pressure=float(np.max(np.asarray(state.cycle.contact_pressure))),
         max_corner_pressure=float(np.max(np.asarray(state.cycle.corner_pressure))),
     )
-
-
-@eqx.filter_jit
-def _material(mesh: Mesh, torque, pinion, wheel):
-    return removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-
-
-@eqx.filter_jit
-def _largest(mesh: Mesh, pinion, wheel):
-    return largest_relief(mesh, pinion, wheel)
-
-
-@eqx.filter_jit
-def _removed(mesh: Mesh, modification: AbstractModification, roll, of_pinion: bool) -> jax.Array:
-    return removed_at(mesh, modification, roll, of_pinion=of_pinion)

@@ -98,7 +98,7 @@ def optimum_of(problem: Problem, record: Record, method: str, began: float, fron
     parameters, (pinion, wheel) = problem.parameters(x), problem.modifications(x)
     heaviest = problem.cases.torque[int(np.argmax(problem.cases.weight))]
     # the removed material as an array: the program that solves for it is the one that every other design uses
-    removed = _removed_material(problem.mesh, heaviest, pinion, wheel)
+    removed = removed_material(problem.mesh, heaviest, pinion=pinion, wheel=wheel)
     cycle = solve_removed(problem.mesh, heaviest, removed)
     left = float("nan") if front is not None else _decrease_left(problem, record)
     return Optimum(
@@ -173,11 +173,6 @@ def _numbers(problem: Problem, x):
         return jnp.stack([constraint.value(candidate) for constraint in problem.constraints])
 
     return problem.over_cases(x, of_case)
-
-
-@eqx.filter_jit
-def _removed_material(mesh: Mesh, torque, pinion, wheel):
-    return removed_material(mesh, torque, pinion=pinion, wheel=wheel)
 
 
 @eqx.filter_jit

@@ -6,12 +6,13 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.stats import qmc
 
+from ..numerics import whole
 from ..numerics.pareto import pareto_front
 from .first_order import adam_steps
 from .goal import FEASIBLE, QUANTITIES
 from .problem import GRADIENT_COST, Problem
 from .result import Front
-from .search import AbstractMethod, Record, whole
+from .search import AbstractMethod, Record
 from .smooth import STAGE_WIDTHS, stages, yardstick
 from .starts import real_points, start_points
 

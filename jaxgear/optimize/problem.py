@@ -144,15 +144,20 @@ class Problem(eqx.Module):
             upper, slope, fine = self._curves(x)
             lower, lower_slope = upper, slope
         else:
-            upper, fine = self.over_cases(x, lambda c: (self._numbers(c, None)[:1], _fine(c.cycle)))
-            slope = jax.jacrev(lambda x: self.over_cases(x, lambda c: self._numbers(c, None)[:1]))(x)
+
+            def number(x):
+                upper, fine = self.over_cases(x, lambda c: (self._numbers(c, None)[:1], _fine(c.cycle)))
+                return upper, (upper, fine)
+
+            slope, (upper, fine) = jax.jacrev(number, has_aux=True)(x)
             lower, lower_slope = jnp.zeros_like(upper), jnp.zeros_like(slope)
 
         def excess(x):
-            return self.over_cases(x, self._excess).reshape(-1)
+            values = self.over_cases(x, self._excess).reshape(-1)
+            return values, values
 
         if self.constraints:
-            limits, limit_slope = excess(x), jax.jacrev(excess)(x)
+            limit_slope, limits = jax.jacrev(excess, has_aux=True)(x)
         else:
             limits, limit_slope = jnp.zeros((0,), x.dtype), jnp.zeros((0, x.shape[0]), x.dtype)
         good = jnp.all(fine) & jnp.isfinite(jnp.sum(slope)) & jnp.isfinite(jnp.sum(limit_slope))
@@ -164,7 +169,12 @@ class Problem(eqx.Module):
         The transmission error at a position depends on the material removed at that position alone, by as much as the
         contacts share the load: one gradient of the contact analysis gives the slopes at all positions.
         """
-        slopes = jax.jacfwd(lambda x: self._removed(x))(x)
+
+        def removed(x):
+            material = self._removed(x)
+            return material, material
+
+        slopes, material = jax.jacfwd(removed, has_aux=True)(x)
 
         def at(torque, deviations, removed, slope):
             def one(deviation):
@@ -178,7 +188,7 @@ class Problem(eqx.Module):
 
             return jax.vmap(one)(deviations)
 
-        found = jax.vmap(at)(self.cases.torque, self.cases.removed, self._removed(x), slopes)
+        found = jax.vmap(at)(self.cases.torque, self.cases.removed, material, slopes)
         return tuple(part.reshape(self.cases.count, *part.shape[2:]) for part in found)
 
     def _removed(self, x: Vector):

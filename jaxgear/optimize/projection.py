@@ -91,7 +91,7 @@ def project(optimum: Optimum, curve: str = "power") -> Projection:
     mesh, torque = optimum.cycle.mesh, optimum.cycle.torque
     fits = [_fit(mesh, optimum.pinion, True, curve), _fit(mesh, optimum.wheel, False, curve)]
     pinion, wheel = (relief for relief, _ in fits)
-    cycle = solve_removed(mesh, torque, _material(mesh, torque, pinion, wheel))
+    cycle = solve_removed(mesh, torque, removed_material(mesh, torque, pinion=pinion, wheel=wheel))
     ppte = float(peak_to_peak(cycle.transmission_error))
     misfit = max(distance for _, distance in fits)
     return Projection(curve, pinion, wheel, cycle, ppte, ppte - optimum.ppte, misfit)
@@ -102,7 +102,7 @@ def _fit(mesh: Mesh, modification: AbstractModification, of_pinion: bool, curve:
     _, first, low, high = CURVES[curve]
     roll = _roll_lengths(mesh, of_pinion)
     addendum = float(roll[-1] - roll[0])
-    flank = np.asarray(_removed(mesh, modification, roll, of_pinion))
+    flank = np.asarray(removed_at(mesh, modification, roll, of_pinion=of_pinion))
     most = max(float(flank.max()), 1e-3)
 
     def residual(values):
@@ -142,13 +142,3 @@ def _distance(mesh: Mesh, values, flank, roll, of_pinion: bool, curve: str):
 @eqx.filter_jit
 def _slope(mesh: Mesh, values, flank, roll, of_pinion: bool, curve: str):
     return jax.jacfwd(_difference)(values, mesh, flank, roll, of_pinion, curve)
-
-
-@eqx.filter_jit
-def _removed(mesh: Mesh, modification: AbstractModification, roll, of_pinion: bool):
-    return removed_at(mesh, modification, roll, of_pinion=of_pinion)
-
-
-@eqx.filter_jit
-def _material(mesh: Mesh, torque, pinion: AbstractModification, wheel: AbstractModification):
-    return removed_material(mesh, torque, pinion=pinion, wheel=wheel)

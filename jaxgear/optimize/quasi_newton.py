@@ -6,8 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
+from ..numerics import whole
 from .problem import GRADIENT_COST, Problem
-from .search import AbstractMethod, Record, whole
+from .search import AbstractMethod, Record
 from .smooth import STAGE_WIDTHS, Multipliers, lagrangian, merged, stages, yardstick
 from .starts import real_points, start_points
 

@@ -67,9 +67,3 @@ class AbstractMethod(eqx.Module):
     @abstractmethod
     def search(self, problem: Problem, record: Record) -> Front | None:
         """Searches, leaving the best design in the record; of several objectives, returns their front."""
-
-
-def whole(owner: str, name: str, value, least: int) -> None:
-    """Raises a `ValueError` unless the value is a whole number of at least `least`."""
-    if not isinstance(value, int) or isinstance(value, bool) or value < least:
-        raise ValueError(f"{owner}: {name} = {value!r} must be a whole number of at least {least}")

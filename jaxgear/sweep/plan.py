@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..numerics import check
+from ..numerics import check, whole
 
 Bounds = Mapping[str, tuple[float, float]]
 
-_MOST_VARIANTS = 2**53  # row numbers stay exact in every reader of the table
 _PIECE = 2**16
 
 
@@ -144,20 +143,13 @@ def box(owner: str, bounds: Bounds) -> tuple[tuple[str, ...], tuple[float, ...],
     return tuple(bounds), tuple(float(low) for low, _ in limits), tuple(float(high) for _, high in limits)
 
 
-def whole(owner: str, name: str, value, *, least: int = 1) -> int:
-    """A checked count."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= _MOST_VARIANTS:
-        raise ValueError(f"{owner}: {name} = {value!r} must be a whole number from {least} to 2^53")
-    return int(value)
-
-
 def _finite(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values), values, np.nan)
 
 
 def _levels(name: str, given, low: float, high: float) -> np.ndarray:
     if isinstance(given, int | np.integer):
-        return np.linspace(low, high, whole("FullFactorial", f"levels of {name}", given, least=2))
+        return np.linspace(low, high, whole("FullFactorial", f"levels of {name}", given, low=2))
     values = np.asarray(given, np.float64)
     if values.ndim != 1 or not len(values) or len(np.unique(values)) != len(values):
         raise ValueError(f"FullFactorial: levels of {name} must be a count or a list of different values")

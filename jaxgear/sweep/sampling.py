@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from .plan import AbstractPlan, Bounds, box, whole
+from ..numerics import whole
+from .plan import AbstractPlan, Bounds, box
 
 _ROUNDS = 8  # of the Feistel network; four already make a pseudo-random permutation (Luby and Rackoff 1988)
 _SOBOL_BITS = 30  # scipy's default: 2^30 points
@@ -39,7 +40,7 @@ class LatinHypercube(AbstractPlan):
         """
         names, low, high = box("LatinHypercube", bounds)
         super().__init__(names, low, high, whole("LatinHypercube", "samples", samples))
-        self.seed = whole("LatinHypercube", "seed", seed, least=0)
+        self.seed = whole("LatinHypercube", "seed", seed, low=0)
         streams = np.random.SeedSequence(self.seed).spawn(len(names) + 1)
         self._permutations = [Permutation(self.size, stream) for stream in streams[1:]]
         self._key = streams[0].generate_state(2, np.uint64)
@@ -115,7 +116,7 @@ class Sobol(AbstractPlan):
         if whole("Sobol", "samples", samples) > 2**_SOBOL_BITS:
             raise ValueError(f"Sobol: samples = {samples} must be at most 2^{_SOBOL_BITS} = {2**_SOBOL_BITS}")
         super().__init__(names, low, high, int(samples))
-        self.seed = whole("Sobol", "seed", seed, least=0)
+        self.seed = whole("Sobol", "seed", seed, low=0)
         self._engine: qmc.Sobol | None = None
 
     def _rows(self, start, stop):

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from ..contact import Mesh, removed_material
 from ..microgeometry import AbstractModification, Flank, LeadSlope, ProfileSlope
-from ..numerics import real
+from ..numerics import real, whole
 from .distribution import AbstractDistribution
 from .limits import GearTolerance, Tolerance, check_slices
 
@@ -90,8 +90,7 @@ def sample_deviations(tolerance: Tolerance, mesh: Mesh, samples: int, seed) -> D
         ValueError: for lead deviations on a mesh of one slice, or less than one sample.
     """
     check_slices("sample_deviations", tolerance, mesh)
-    if not isinstance(samples, int) or samples < 1:
-        raise ValueError(f"sample_deviations: samples = {samples!r} must be a whole number of at least 1")
+    whole("sample_deviations", "samples", samples)
     return _sample(tolerance, mesh, jax.random.key(seed), samples)
 
 

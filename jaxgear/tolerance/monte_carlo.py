@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..contact import Mesh, removed_material, solve_removed
 from ..microgeometry import AbstractModification
-from ..numerics import check, real
+from ..numerics import check, real, whole
 from .deviation import deviation_field, deviation_of, flank_basis
 from .limits import Tolerance, check_slices
 
@@ -116,8 +116,7 @@ def monte_carlo(
     check("monte_carlo", "torque", torque, "N m", low=0.0)
     levels = np.sort(np.asarray(quantiles, float))
     check("monte_carlo", "quantiles", levels, "", low=0.0, high=1.0)
-    if not isinstance(samples, int) or samples < 2:
-        raise ValueError(f"monte_carlo: samples = {samples!r} must be a whole number of at least 2")
+    whole("monte_carlo", "samples", samples, 2)
     check_slices("monte_carlo", tolerance, mesh)
     task = (mesh, real(torque), tolerance, pinion, wheel, jax.random.key(seed))
     curves, converged = _run(task, samples + 1)
