@@ -40,7 +40,7 @@ class Effort:
     cma_generations: int = 100
     starts: int = 16
     steps: int = 300
-    lbfgs_steps: int = 60
+    lbfgs_steps: int = 150
     minimax_starts: int = 4
     points: int = 40
     samples: int = 16
