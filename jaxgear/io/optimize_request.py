@@ -33,7 +33,7 @@ _MEASURES: Mapping[str, Callable[..., AbstractMeasure]] = {
 _WITH_LEVEL = ("quantile", "cvar")
 # Options of a quick look.
 _QUICK: Mapping[str, dict[str, Any]] = {
-    "minimax": {"starts": 4, "steps": 10},
+    "minimax": {"starts": 4, "rounds": 1, "steps": 10},
     "adam": {"starts": 4, "steps": 40},
     "lbfgs": {"starts": 4, "steps": 30},
     "genetic": {"population": 20, "generations": 10},

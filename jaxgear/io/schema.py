@@ -109,6 +109,7 @@ class OptimizeSection(Section):
     steps: Annotated[int, Meta(ge=10, le=100_000)] | None = None
     application_factor: float | None = None
     constraint: list[Table] = []
+    minimax: Table | None = None
     genetic: Table | None = None
     cma_es: Table | None = None
     differential_evolution: Table | None = None
@@ -123,6 +124,10 @@ class ConstraintSection(Section):
     variables: dict[str, float] | None = None
     low: float | None = None
     high: float | None = None
+
+
+class MinimaxOptions(Section):
+    rounds: Annotated[int, Meta(ge=1, le=1000)] | None = None
 
 
 class _EvolutionOptions(Section):
@@ -171,6 +176,7 @@ class FreeFormOptions(Section):
 METHODS_WITHOUT_VARIABLES = ("te_iteration", "free_form")
 # The tables [optimize.<method>] of the methods that have one.
 METHOD_OPTIONS: dict[str, type[Section]] = {
+    "minimax": MinimaxOptions,
     "genetic": GeneticOptions,
     "cma_es": CMAESOptions,
     "differential_evolution": DifferentialEvolutionOptions,
