@@ -81,6 +81,7 @@ def test_alignment_moves_by_half_the_transmission_error():
     np.testing.assert_allclose(moved.force.sum(axis=0), truth.force.sum(axis=0), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_solution_is_that_of_the_public_functions():
     """The benchmark solves all models under one compliance label to save compilations: that must change nothing."""
     model = next(model for model in models.MODELS if model.name == "constant Hertz")

@@ -207,7 +207,7 @@ def test_a_quick_run_is_coarse_and_short(folder, tmp_path, monkeypatch):
     path.write_text(FREE.replace("positions = 8", "positions = 4096"))
     with pytest.raises(Searched), jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
         main(["optimize", str(path), "--quick", "--no-figures", "-o", str(tmp_path / "out")])
-    assert asked["method"] == jg.Minimax(starts=4, steps=10) and float(asked["torque"].torques[0]) == 50.0
+    assert asked["method"] == jg.Minimax(starts=4, rounds=1, steps=10) and float(asked["torque"].torques[0]) == 50.0
     assert asked["bounds"] == {"height": (0.0, 20.0)} and asked["mesh"].resolution.positions == 16
     assert not (tmp_path / "out").exists()
 

@@ -92,6 +92,7 @@ def test_modifications_and_torque():
         compare(exact, central_differences(lambda x: value(x, mesh), start, 1e-4))
 
 
+@pytest.mark.slow
 def test_module_shift_and_bore():
     start = jnp.asarray(list(MACRO.values()))
     value, slope = eqx.filter_jit(of_macro), eqx.filter_jit(lambda x, v: jax.jvp(of_macro, (x,), (v,))[1])
@@ -99,6 +100,7 @@ def test_module_shift_and_bore():
     compare(exact, central_differences(value, start, 1e-5))
 
 
+@pytest.mark.slow
 def test_new_numbers_do_not_retrace():
     traces = []
 
@@ -114,6 +116,7 @@ def test_new_numbers_do_not_retrace():
     assert len(traces) == 1
 
 
+@pytest.mark.slow
 def test_single_precision_agrees_to_a_nanometre():
     script = (
         "import jaxgear as jg\n"

@@ -10,6 +10,8 @@ import pytest
 
 matplotlib.use("Agg")
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = (
     "how_much_relief",
     "what_does_coupling_buy",

@@ -39,6 +39,7 @@ def test_hub_windup_shifts_the_mean_only(cycle):
     assert windup > 5.0
 
 
+@pytest.mark.slow
 def test_results_converge_with_slices():
     crowning = jg.LeadCrowning(8.0)
     mean = [
@@ -50,6 +51,7 @@ def test_results_converge_with_slices():
     assert abs(mean[2] - mean[1]) < 0.005 * mean[2]
 
 
+@pytest.mark.slow
 def test_results_converge_with_positions(cycle):
     fine = jg.solve(mesh_of(positions=128), 150.0)
     coarse = float(jg.peak_to_peak(cycle.transmission_error))

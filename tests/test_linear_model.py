@@ -12,7 +12,7 @@ from catalogue import TWO_PAIRS, gear_pair, solve_any
 import jaxgear as jg
 from jaxgear.optimize.cases import cases
 from jaxgear.optimize.linear_model import PENALTY, Model
-from jaxgear.optimize.problem import Linearization, Roughness, make_problem
+from jaxgear.optimize.problem import Linearization, Pieces, Roughness, make_problem
 from jaxgear.tolerance import GearTolerance
 
 TORQUES = (50.0, 30.0)
@@ -60,8 +60,9 @@ def test_slopes_of_the_transmission_error(mesh):
     problem = problem_of(mesh, tolerance=tolerance, samples=2, seed=1)
     found = linearize(problem, jnp.asarray(POINT))
     assert bool(found.fine)
-    np.testing.assert_array_equal(found.upper, found.lower)
-    np.testing.assert_array_equal(found.slope, found.lower_slope)
+    (pieces,) = found.objectives
+    np.testing.assert_array_equal(pieces.upper, pieces.lower)
+    np.testing.assert_array_equal(pieces.slope, pieces.lower_slope)
     for case, (torque, sample) in enumerate((t, s) for t in range(2) for s in range(2)):
         deviation = problem.cases.removed[torque, sample]
 
@@ -69,10 +70,10 @@ def test_slopes_of_the_transmission_error(mesh):
             cycle = solve_any(mesh, TORQUES[torque], *reliefs(x), deviation)
             return np.asarray(cycle.transmission_error)
 
-        np.testing.assert_allclose(found.upper[case], curve(POINT), atol=1e-8)
+        np.testing.assert_allclose(pieces.upper[case], curve(POINT), atol=1e-8)
         expected = differences(curve)
         assert np.abs(expected).max() > 1.0  # [um over the full range]
-        np.testing.assert_allclose(found.slope[case], expected, atol=2e-4 * np.abs(expected).max())
+        np.testing.assert_allclose(pieces.slope[case], expected, atol=2e-4 * np.abs(expected).max())
 
 
 def effort(candidate):
@@ -90,10 +91,11 @@ def test_slopes_of_another_objective_and_of_constraints(mesh):
         return np.array([(20.0 * x[0]) ** 2 * (1.0 + 4.7 * x[2])])
 
     # the objective is the single upper piece, above nothing
-    np.testing.assert_allclose(found.upper[0], value(POINT), rtol=1e-12)
-    np.testing.assert_array_equal(found.lower, 0.0)
-    np.testing.assert_array_equal(found.lower_slope, 0.0)
-    np.testing.assert_allclose(found.slope[0], differences(value), atol=1e-5)
+    (pieces,) = found.objectives
+    np.testing.assert_allclose(pieces.upper[0], value(POINT), rtol=1e-12)
+    np.testing.assert_array_equal(pieces.lower, 0.0)
+    np.testing.assert_array_equal(pieces.lower_slope, 0.0)
+    np.testing.assert_allclose(pieces.slope[0], differences(value), atol=1e-5)
 
     volume = eqx.filter_jit(jg.removed_volume)
 
@@ -115,7 +117,7 @@ def model(values, slope, x, *, measure=None, weights=None, excess=None, excess_s
     )
     excess = np.zeros(0) if excess is None else np.asarray(excess, float)
     excess_slope = np.zeros((0, len(x))) if excess_slope is None else np.asarray(excess_slope, float)
-    return Model(problem, x, Linearization(values, values, slope, slope, excess, excess_slope, np.True_))
+    return Model(problem, x, Linearization((Pieces(values, values, slope, slope),), excess, excess_slope, np.True_))
 
 
 def test_chebyshev_polynomial():
@@ -252,7 +254,9 @@ def test_a_failed_solution_has_no_value():
     problem = SimpleNamespace(measure=jg.Mean(), cases=SimpleNamespace(weights=jnp.ones(1)), roughness=None)
     pieces, slope, nothing = np.zeros((1, 2)), np.zeros((1, 2, 1)), np.zeros((0, 1))
     failed = Model(
-        problem, np.array([0.2]), Linearization(pieces, pieces, slope, slope, np.zeros(0), nothing, np.False_)
+        problem,
+        np.array([0.2]),
+        Linearization((Pieces(pieces, pieces, slope, slope),), np.zeros(0), nothing, np.False_),
     )
     assert not failed.fine
     assert failed.value == np.inf

@@ -140,6 +140,7 @@ def resliced(mesh, slices):
     )
 
 
+@pytest.mark.slow
 def test_lead_crowning_converges_with_slices(mesh, sliced):
     """Midpoint rule over the face: the error falls with the square of the number of slices."""
     np.testing.assert_allclose(resliced(mesh, 7).face_coordinate, sliced.face_coordinate, atol=1e-14)
@@ -149,6 +150,7 @@ def test_lead_crowning_converges_with_slices(mesh, sliced):
     assert errors[5] / errors[10] == pytest.approx(4.0, rel=0.25)
 
 
+@pytest.mark.slow
 def test_converges_with_positions(mesh):
     """The same curve at common positions whatever the resolution, and a PPTE that settles."""
     coarse = solve(mesh, 50.0).transmission_error
@@ -159,6 +161,7 @@ def test_converges_with_positions(mesh):
     assert ppte[3] < 1.03 * ppte[0] and ppte[3] - ppte[2] < 0.005 * ppte[3]
 
 
+@pytest.mark.slow
 def test_fewer_pairs_suffice_for_a_short_path(mesh):
     four = solve(mesh, 50.0)
     three = solve(prepare(gear_pair(), resolution=jg.Resolution(positions=32, pairs=3)), 50.0)

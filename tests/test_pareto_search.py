@@ -18,7 +18,7 @@ def known():
 @pytest.fixture(scope="module")
 def searched(known):
     """PPTE against the material to grind off."""
-    return known.minimize(known.parabolas, BOX, objective=VOLUME, method=jg.Pareto(points=12, steps=240))
+    return known.minimize(known.parabolas, BOX, objective=VOLUME, method=jg.Pareto(points=12))
 
 
 @pytest.fixture(scope="module")
@@ -88,8 +88,9 @@ def test_compromise_is_a_design_of_the_front_next_to_the_ideal(searched):
     assert searched.objective == pytest.approx(distance[index], rel=0.05)
     assert searched.objective_name == "distance from the ideal of ppte and removed_volume"
     assert np.isnan(searched.gradient_norm)
-    # steps and the first look, each with its gradient
-    assert searched.evaluations == 3 * 12 * (240 + 1)
+    # a contact analysis with two gradients counts as five; every design is linearized at the start of each round
+    linearized, rest = divmod(searched.evaluations, 5)
+    assert rest == 0 and 3 * 12 <= linearized < 3 * 12 * 20
 
 
 def test_three_objectives_within_a_limit(known, volume_per_amount):
@@ -99,7 +100,7 @@ def test_three_objectives_within_a_limit(known, volume_per_amount):
         BOX,
         objective=(*VOLUME, "max_relief"),
         constraints=[limit],
-        method=jg.Pareto(points=12, steps=60),
+        method=jg.Pareto(points=12),
     )
     front = result.front
     assert front.values.shape[1] == 3
@@ -112,7 +113,7 @@ def test_three_objectives_within_a_limit(known, volume_per_amount):
     assert result.violation <= 1e-3
 
 
-@pytest.mark.parametrize(("options", "words"), [({"points": 1}, "points = 1"), ({"steps": 2}, "steps = 2")])
+@pytest.mark.parametrize(("options", "words"), [({"points": 1}, "points = 1"), ({"steps": 0}, "steps = 0")])
 def test_refuses_what_makes_no_front(options, words):
     with pytest.raises(ValueError, match=words):
         jg.Pareto(**options)

@@ -126,6 +126,7 @@ def test_failed_variants_are_loud(folder, tmp_path):
     assert len(jg.open_sweep(tmp_path / "out")) == 60
 
 
+@pytest.mark.slow
 def test_an_interrupted_sweep_says_how_to_go_on_and_does(tmp_path):
     content = SWEEP.replace("samples = 60", "samples = 6000").replace("part_rows = 25", "part_rows = 100")
     (tmp_path / "gear.toml").write_text(content)

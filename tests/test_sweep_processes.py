@@ -66,6 +66,7 @@ def assert_same(table, complete):
         np.testing.assert_array_equal(table.column(name), complete.column(name), err_msg=name)
 
 
+@pytest.mark.slow
 def test_killed_again_and_again_on_other_devices_it_has_the_rows_of_an_uninterrupted_one(
     environment, complete, tmp_path
 ):

@@ -67,7 +67,7 @@ def _solved(mesh: jg.Mesh, torques, designs, deviations):
     """PPTE and largest pressure at every torque, then of every manufactured gear at the design torque."""
     gears = len(deviations)
     loads = jnp.concatenate([torques, jnp.full((gears,), torques[_DESIGN])])
-    removed = jnp.concatenate([designs, designs[_DESIGN] + deviations])
+    removed = jnp.concatenate([designs, designs[_DESIGN][None] + deviations])
 
     def one(case):
         cycle = jg.solve_removed(mesh, *case)

@@ -40,7 +40,7 @@ _QUICK: Mapping[str, dict[str, Any]] = {
     "cma_es": {"population": 8, "generations": 20},
     "differential_evolution": {"population": 20, "generations": 10},
     "factorial": {"levels": 3},
-    "pareto": {"points": 8, "steps": 40},
+    "pareto": {"points": 8, "steps": 5},
     "te_iteration": {},
     "free_form": {"points": 12, "steps": 10},
 }

@@ -153,7 +153,7 @@ class FactorialOptions(Section):
 
 class ParetoOptions(Section):
     points: Annotated[int, Meta(ge=2, le=4096)] | None = None
-    steps: Annotated[int, Meta(ge=10, le=100_000)] | None = None
+    steps: Annotated[int, Meta(ge=1, le=100_000)] | None = None
 
 
 class IterationOptions(Section):

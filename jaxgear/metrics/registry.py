@@ -99,8 +99,8 @@ RESULTS: Mapping[str, Result] = MappingProxyType(
         "effective_contact_ratio": Result(effective_contact_ratio, "", "mean number of loaded pairs", worst="min"),
         "corner_contact_length": Result(_corner_length, "mm", "loaded path beyond the theoretical path of contact"),
         "corner_force": Result(lambda c: contact_shock(c).force, "N", "largest force on a pair there"),
-        "pinion_root_stress": Result(lambda c: jnp.max(root_stress(c).pinion), "MPa", "largest root stress of the pinion"),
-        "wheel_root_stress": Result(lambda c: jnp.max(root_stress(c).wheel), "MPa", "largest root stress of the wheel"),
+        "pinion_root_stress": Result(lambda c: jnp.max(root_stress(c).pinion), "MPa", "largest root stress, pinion"),
+        "wheel_root_stress": Result(lambda c: jnp.max(root_stress(c).wheel), "MPa", "largest root stress, wheel"),
         "mesh_loss_factor": Result(loss_factor, "", "loss power per input power and coefficient of friction"),
         "min_tangent_stiffness": Result(
             lambda c: jnp.min(c.tangent_stiffness), "N/um", "smallest mesh stiffness", worst="min"

@@ -56,49 +56,23 @@ class Adam(AbstractMethod):
             record.look(stage.done, self.steps)
 
 
-def adam_steps(gradient, points, count, rate, keep, kept):
-    """Steps of Adam, projected onto the unit box; traced.
-
-    Args:
-        gradient: of points, shape (starts, parameters), their slopes and what is seen there.
-        points: first points.
-        count: number of steps.
-        rate: step size.
-        keep: collects what the steps see, as keep(kept, step, points, seen).
-        kept: what is collected before the first step.
-
-    Returns:
-        the points after the steps, and what was collected.
-    """
-    adam = optax.scale_by_adam()
-
-    def step(number, carry):
-        points, moments, kept = carry
-        slopes, seen = gradient(points)
-        kept = keep(kept, number, points, seen)
-        slopes = jnp.where(jnp.isfinite(slopes), slopes, 0.0)
-        # optax mixes its integer step count with floats, which strict promotion would forbid
-        with jax.numpy_dtype_promotion("standard"):
-            update, moments = adam.update(slopes, moments)
-        return jnp.clip(points - rate * update, 0.0, 1.0), moments, kept
-
-    points, _, kept = jax.lax.fori_loop(0, count, step, (points, adam.init(points), kept))
-    return points, kept
-
-
 @eqx.filter_jit
 def _advance(problem: Problem, points, multipliers: Multipliers, count, width, rate, scale):
     """A stage; returns the points, the multipliers and the best true design of every start on the way."""
     gradient = jax.vmap(jax.grad(lagrangian, argnums=1, has_aux=True), (None, 0, 0, None, None))
+    adam = optax.scale_by_adam()
 
-    def keep(kept, _, points, seen):
-        best, _ = kept
-        value, violation, excess = seen
-        return merged(best, (points, value, violation)), excess
+    def step(_, carry):
+        points, moments, best, _ = carry
+        slopes, (value, violation, excess) = gradient(problem, points, multipliers, width, scale)
+        best = merged(best, (points, value, violation))
+        slopes = jnp.where(jnp.isfinite(slopes), slopes, 0.0)
+        # optax mixes its integer step count with floats, which strict promotion would forbid
+        with jax.numpy_dtype_promotion("standard"):
+            update, moments = adam.update(slopes, moments)
+        return jnp.clip(points - rate * update, 0.0, 1.0), moments, best, excess
 
     nothing = jnp.full(points.shape[0], jnp.inf, points.dtype)
-    kept = (points, nothing, nothing), jnp.zeros_like(multipliers.value)
-    points, (best, excess) = adam_steps(
-        lambda points: gradient(problem, points, multipliers, width, scale), points, count, rate, keep, kept
-    )
+    start = points, adam.init(points), (points, nothing, nothing), jnp.zeros_like(multipliers.value)
+    points, _, best, excess = jax.lax.fori_loop(0, count, step, start)
     return points, multipliers.follow(excess, scale), *best

@@ -15,7 +15,7 @@ from ..numerics import AbstractMeasure, Mean, check, whole
 from ..tolerance import Tolerance
 from .cases import cases
 from .goal import Constraint
-from .minimax import follow
+from .minimax import Search, follow
 from .minimize import optimum_of
 from .problem import Parameters, Problem, Roughness
 from .result import Optimum
@@ -103,7 +103,7 @@ def free_form(
     record = Record(problem, callback)
     unmodified = np.zeros(2 * points)
     given = np.clip(_values(mesh, roll, start) / max_relief, 0.0, 1.0)
-    follow(problem, record, np.stack([unmodified, given]), steps=steps, tolerance=_TOLERANCE)
+    follow(problem, record, [Search(unmodified), Search(given)], steps=steps, tolerance=_TOLERANCE)
     flanks = record.point.reshape(2, points)
     record.point = (flanks - flanks.min(axis=1, keepdims=True)).ravel()
     return optimum_of(problem, record, "free_form", began)

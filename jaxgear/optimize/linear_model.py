@@ -6,31 +6,21 @@ exact extremes, so that kinks, which stop a gradient method, are part of the mod
 Uryasev 2000, doi 10.21314/JOR.2000.038); other measures keep the shares that the cases have at the point.
 """
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple, Protocol
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
 from ..numerics import CVaR, Worst
-from .problem import Linearization, Problem
+from .problem import Linearization, Pieces, Problem
 
 # Weight of a relative violation of 1 against an objective of 1 in its own unit: above the multiplier of any sensible
 # constraint, so that the penalty is exact.
 PENALTY = 100.0
-
-
-class _OnHost(NamedTuple):
-    """A `Linearization` in NumPy."""
-
-    upper: np.ndarray
-    lower: np.ndarray
-    slope: np.ndarray
-    lower_slope: np.ndarray
-    excess: np.ndarray
-    excess_slope: np.ndarray
-    fine: np.ndarray
 
 
 class Step(NamedTuple):
@@ -45,6 +35,19 @@ class Step(NamedTuple):
     decrease: float
 
 
+class Scalarization(Protocol):
+    """Makes one number of several objectives: the largest of scaled ones, plus a part of the sum of all.
+
+    Attributes:
+        part: of the sum.
+    """
+
+    part: float
+
+    def scales(self) -> tuple[np.ndarray, np.ndarray]:
+        """Factor and offset of every objective."""
+
+
 class Model:
     """A linearization on the host with what the problem says about it.
 
@@ -52,12 +55,16 @@ class Model:
         problem: the problem.
         x: point of the unit box.
         linearization: of the problem at that point.
+        scalarization: of several objectives; None for one.
     """
 
-    def __init__(self, problem: Problem, x: np.ndarray, linearization: Linearization):
-        self._lin = _OnHost(*(np.asarray(part, float) for part in linearization))
+    def __init__(
+        self, problem: Problem, x: np.ndarray, linearization: Linearization, scalarization: Scalarization | None = None
+    ):
+        self._lin: Linearization = jax.tree.map(lambda part: np.asarray(part, float), linearization)
         self._measure, self._weights = problem.measure, np.asarray(problem.cases.weights, float)
-        self._values = self._lin.upper.max(axis=1) - self._lin.lower.min(axis=1)
+        self._cases = [pieces.upper.max(axis=1) - pieces.lower.min(axis=1) for pieces in self._lin.objectives]
+        self._scalarization = scalarization
         self._x, roughness = np.asarray(x, float), problem.roughness
         self._forms = np.zeros((0, len(x))) if roughness is None else np.asarray(roughness.forms, float)
         self._rough_weight = 0.0 if roughness is None else float(roughness.weight)
@@ -68,12 +75,19 @@ class Model:
         return bool(self._lin.fine)
 
     @property
+    def values(self) -> np.ndarray:
+        """Objectives at the point."""
+        if not self.fine:
+            return np.full(len(self._cases), np.inf)
+        return np.asarray([self._shares(cases) @ cases for cases in self._cases])
+
+    @property
     def value(self) -> float:
-        """Objective at the point, with the penalty of the roughness."""
+        """The one number at the point, with the penalty of the roughness."""
         if not self.fine:
             return np.inf
         rough = np.abs(self._forms @ self._x).max(initial=0.0)
-        return float(self._shares() @ self._values) + self._rough_weight * float(rough)
+        return self._joined(self.values) + self._rough_weight * float(rough)
 
     @property
     def violation(self) -> float:
@@ -90,10 +104,7 @@ class Model:
         x = self._x
         low, high = np.maximum(-radius, -x), np.minimum(radius, 1 - x)
         program = _Program(len(x))
-        weights = self._weights if isinstance(self._measure, Worst | CVaR) else self._shares()
-        carrying = np.flatnonzero(weights > 0)
-        spans = self._spans(program, carrying, low, high)
-        cost = self._cost(program, spans, weights[carrying])
+        cost, offset = self._cost(program, low, high)
         if len(self._lin.excess):
             (slack,) = program.variables(1, low=0.0)  # the largest violation
             program.at_most(self._lin.excess_slope, -self._lin.excess, {slack: -1.0})
@@ -107,49 +118,71 @@ class Model:
         if found is None:
             return Step(np.zeros_like(x), 0.0)
         step, predicted = found
-        return Step(step, self.merit - predicted)
+        return Step(step, self.merit - predicted - offset)
 
-    def _shares(self) -> np.ndarray:
-        return np.asarray(self._measure.shares(jnp.asarray(self._values), jnp.asarray(self._weights)))
+    def _shares(self, cases: np.ndarray) -> np.ndarray:
+        return np.asarray(self._measure.shares(jnp.asarray(cases), jnp.asarray(self._weights)))
 
-    def _spans(self, program: "_Program", cases: np.ndarray, low, high) -> list[tuple[int, int]]:
-        """Variables above all upper and below all lower pieces of every case."""
-        lin, spans = self._lin, []
-        for case in cases:
-            top, bottom = program.variables(2)
-            for sign, values, slope, bound in (
-                (1.0, lin.upper[case], lin.slope[case], top),
-                (-1.0, -lin.lower[case], -lin.lower_slope[case], bottom),
-            ):
-                # a piece that no step within reach makes the extreme one is left out
-                most = values + np.maximum(slope * low, slope * high).sum(axis=1)
-                least = values + np.minimum(slope * low, slope * high).sum(axis=1)
-                near = most >= least.max()
-                program.at_most(slope[near], -values[near], {bound: -sign})
-            spans.append((top, bottom))
-        return spans
+    def _joined(self, values: np.ndarray) -> float:
+        if self._scalarization is None:
+            return float(values[0])
+        factor, offset = self._scalarization.scales()
+        scaled = factor * values + offset
+        return float(scaled.max() + self._scalarization.part * scaled.sum())
 
-    def _cost(self, program: "_Program", spans: list[tuple[int, int]], weights: np.ndarray) -> dict[int, float]:
-        """Coefficients of the objective in the variables, with the rows that the measure needs."""
-        measure, cost = self._measure, {}
-        nothing = np.zeros((1, program.parameters))
+    def _cost(self, program: "_Program", low, high) -> tuple[dict[int, float], float]:
+        """Coefficients of the one number in the variables, and its constant."""
+        pairs = zip(self._lin.objectives, self._cases)
+        each = [self._measured(program, pieces, cases, low, high) for pieces, cases in pairs]
+        if self._scalarization is None:
+            return each[0], 0.0
+        (largest,) = program.variables(1)
+        cost, constant = {largest: 1.0}, 0.0
+        part = self._scalarization.part
+        for expression, factor, offset in zip(each, *self._scalarization.scales()):
+            scaled = {column: factor * value for column, value in expression.items()}
+            program.at_most(program.nothing, np.array([-offset]), {**scaled, largest: -1.0})
+            cost |= {column: part * value for column, value in scaled.items()}
+            constant += part * offset
+        return cost, constant
+
+    def _measured(self, program: "_Program", pieces: Pieces, cases: np.ndarray, low, high) -> dict[int, float]:
+        """Coefficients of an objective in the variables, with the rows that the measure needs."""
+        measure = self._measure
+        weights = self._weights if isinstance(measure, Worst | CVaR) else self._shares(cases)
+        carrying = np.flatnonzero(weights > 0)
+        spans = [_span(program, pieces, case, low, high) for case in carrying]
+        weights = weights[carrying]
         if isinstance(measure, Worst):
             (worst,) = program.variables(1)
-            for top, bottom in spans:
-                program.at_most(nothing, np.zeros(1), {top: 1.0, bottom: -1.0, worst: -1.0})
+            for span in spans:
+                program.at_most(program.nothing, np.zeros(1), {**span, worst: -1.0})
             return {worst: 1.0}
         if isinstance(measure, CVaR):
             (threshold,) = program.variables(1)
-            cost[threshold] = 1.0
+            cost = {threshold: 1.0}
             tail = weights / weights.sum() / (1 - float(measure.level))
-            for (top, bottom), weight in zip(spans, tail):
+            for span, weight in zip(spans, tail):
                 (beyond,) = program.variables(1, low=0.0)
-                program.at_most(nothing, np.zeros(1), {top: 1.0, bottom: -1.0, threshold: -1.0, beyond: -1.0})
+                program.at_most(program.nothing, np.zeros(1), {**span, threshold: -1.0, beyond: -1.0})
                 cost[beyond] = weight
             return cost
-        for (top, bottom), weight in zip(spans, weights):
-            cost[top], cost[bottom] = weight, -weight
-        return cost
+        return {column: weight * sign for span, weight in zip(spans, weights) for column, sign in span.items()}
+
+
+def _span(program: "_Program", pieces: Pieces, case: np.integer, low, high) -> Mapping[int, float]:
+    """Variables above all upper and below all lower pieces of a case, with their signs in the objective."""
+    top, bottom = program.variables(2)
+    for sign, values, slope, bound in (
+        (1.0, pieces.upper[case], pieces.slope[case], top),
+        (-1.0, -pieces.lower[case], -pieces.lower_slope[case], bottom),
+    ):
+        # a piece that no step within reach makes the extreme one is left out
+        most = values + np.maximum(slope * low, slope * high).sum(axis=1)
+        least = values + np.minimum(slope * low, slope * high).sum(axis=1)
+        near = most >= least.max()
+        program.at_most(slope[near], -values[near], {bound: -sign})
+    return {top: 1.0, bottom: -1.0}
 
 
 class _Program:
@@ -157,6 +190,7 @@ class _Program:
 
     def __init__(self, parameters: int):
         self.parameters = parameters
+        self.nothing = np.zeros((1, parameters))  # a row in which the step has no part
         self._lows: list[float | None] = []
         self._rows: list[tuple[np.ndarray, dict[int, float]]] = []
         self._limits: list[np.ndarray] = []
@@ -167,10 +201,10 @@ class _Program:
         self._lows += [low] * count
         return list(range(first, first + count))
 
-    def at_most(self, slope: np.ndarray, limit: np.ndarray, others: dict[int, float]) -> None:
+    def at_most(self, slope: np.ndarray | jax.Array, limit: np.ndarray | jax.Array, others: dict[int, float]) -> None:
         """Rows slope @ step + sum of the other variables times their coefficients <= limit."""
-        self._rows.append((slope, others))
-        self._limits.append(limit)
+        self._rows.append((np.asarray(slope), others))
+        self._limits.append(np.asarray(limit))
 
     def solve(self, cost: dict[int, float], low, high) -> tuple[np.ndarray, float] | None:
         """The step and the optimal cost; None when the solver gives up."""

@@ -1,12 +1,15 @@
 """Sequential linear programming for peak-to-peak objectives."""
 
+from collections.abc import Sequence
+from typing import Protocol
+
 import equinox as eqx
 import jax
 import numpy as np
 
 from ..numerics import whole
-from .linear_model import Model
-from .problem import GRADIENT_COST, Linearization, Problem
+from .linear_model import Model, Scalarization
+from .problem import Linearization, Problem, gradient_cost
 from .search import AbstractMethod, Record
 from .starts import points_nearby, real_points, start_points
 
@@ -56,40 +59,39 @@ class Minimax(AbstractMethod):
         for number in range(self.rounds):
             if number:
                 points = points_nearby(record.point, self.starts, reach=_NEARBY, seed=number)
-            follow(problem, record, points, steps=self.steps, tolerance=self.tolerance)
+            follow(
+                problem,
+                record,
+                [Search(point) for point in points],
+                steps=self.steps,
+                tolerance=self.tolerance,
+                round_of=(number, self.rounds),
+            )
 
 
-def follow(problem: Problem, record: Record, points: np.ndarray, *, steps: int, tolerance: float) -> None:
-    """Searches from given points of the unit box, shape (starts, parameters)."""
-    searches = [_Search(point) for point in points]
-    _linearize(problem, record, searches, batch=len(points))
-    for step in range(steps):
-        record.look(step, steps)
-        moving = [search for search in searches if search.propose(tolerance)]
-        if not moving:
-            break
-        _linearize(problem, record, moving, batch=len(points))
-    record.look(steps, steps)
+class Ledger(Protocol):
+    """Who keeps the designs of a search; a `Record` is one."""
+
+    def spend(self, designs: int, *, analyses: int) -> None:
+        """Counts contact analyses."""
+
+    def take(self, point: np.ndarray, model: Model) -> None:
+        """Is told of a design."""
+
+    def look(self, step: int, steps: int) -> None:
+        """Marks the progress before a step."""
 
 
-def _linearize(problem: Problem, record: Record, searches: "list[_Search]", *, batch: int) -> None:
-    """Linearizes at the points that the searches propose; the batch keeps its size, so that nothing is compiled anew
-    when a search has ended."""
-    rows = [search.trial for search in searches]
-    padded = np.stack(rows + [rows[-1]] * (batch - len(rows)))
-    found = jax.tree.map(np.asarray, _linearizations(problem, real_points(problem, padded)))
-    record.spend(len(rows), analyses=GRADIENT_COST)
-    for index, search in enumerate(searches):
-        model = Model(problem, search.trial, Linearization(*(part[index] for part in found)))
-        record.offer(search.trial, model.value, model.violation, model)
-        search.take(model)
+class Search:
+    """One search: where it is, and how far it trusts its model.
 
+    Args:
+        point: of the unit box, where it starts.
+        scalarization: of several objectives.
+    """
 
-class _Search:
-    """One search: where it is, and how far it trusts its model."""
-
-    def __init__(self, point: np.ndarray):
-        self.trial = point
+    def __init__(self, point: np.ndarray, scalarization: Scalarization | None = None):
+        self.trial, self.scalarization = point, scalarization
         self._point = point
         self._model: Model | None = None
         self._radius, self._predicted = _FIRST_RADIUS, 0.0
@@ -115,6 +117,40 @@ class _Search:
             self._radius = min(_GROW * self._radius, 1.0)
         if gain > _ACCEPT:
             self._point, self._model = self.trial, model
+
+
+def follow(
+    problem: Problem,
+    ledger: Ledger,
+    searches: Sequence[Search],
+    *,
+    steps: int,
+    tolerance: float,
+    round_of: tuple[int, int] = (0, 1),
+) -> None:
+    """Advances searches until none finds a better step; `round_of` tells the progress which round of how many it is."""
+    (done, rounds), batch = round_of, len(searches)
+    _linearize(problem, ledger, searches, batch)
+    for step in range(steps):
+        ledger.look(done * steps + step, rounds * steps)
+        moving = [search for search in searches if search.propose(tolerance)]
+        if not moving:
+            break
+        _linearize(problem, ledger, moving, batch)
+    ledger.look((done + 1) * steps, rounds * steps)
+
+
+def _linearize(problem: Problem, ledger: Ledger, searches: Sequence[Search], batch: int) -> None:
+    """Linearizes at the points that the searches propose; the batch keeps its size, so that nothing is compiled anew
+    when a search has ended."""
+    rows = [search.trial for search in searches]
+    padded = np.stack(rows + [rows[-1]] * (batch - len(rows)))
+    leaves, tree = jax.tree.flatten(_linearizations(problem, real_points(problem, padded)))
+    ledger.spend(len(rows), analyses=gradient_cost(len(problem.objectives)))
+    for search, *parts in zip(searches, *map(np.asarray, leaves)):
+        model = Model(problem, search.trial, jax.tree.unflatten(tree, parts), search.scalarization)
+        ledger.take(search.trial, model)
+        search.take(model)
 
 
 @eqx.filter_jit

@@ -1,119 +1,151 @@
-"""Pareto fronts of several objectives by one batched gradient run."""
+"""Pareto fronts of several objectives."""
+
+from collections.abc import Callable
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy.stats import qmc
 
 from ..numerics import whole
 from ..numerics.pareto import pareto_front
-from .first_order import adam_steps
 from .goal import FEASIBLE, QUANTITIES
-from .problem import GRADIENT_COST, Problem
+from .linear_model import Model
+from .minimax import Search, follow
+from .problem import Problem
 from .result import Front
 from .search import AbstractMethod, Record
-from .smooth import STAGE_WIDTHS, stages, yardstick
-from .starts import real_points, start_points
+from .starts import start_points
 
-_LOOK = 8  # most steps between two looks, at which the front is brought up to date
-_END = 1e-3  # least weight of two objectives: the ends of the front are nearly the optima of one objective alone
+_ROUNDS = 3
+_TOLERANCE = 1e-3  # a search ends where the predicted decrease is below this part of its distance from the ideal
+_END = 1e-6  # weight of the other objectives at the ends of the front: too small to bend the way there
 _SUM = 0.05  # part of the plain sum in the scalarization, which keeps weakly dominated designs away
-_PENALTY = 10.0  # of a squared relative violation against a scaled objective of 1
 _SPAN = 1e-3  # least span of an objective over the designs, relative to its ideal
 
 
 class Pareto(AbstractMethod):
-    """Pareto front by the augmented Chebyshev scalarization (Steuer and Choo 1983), one weight per start.
+    """Pareto front by the augmented Chebyshev scalarization (Steuer and Choo 1983), one weight per design.
 
-    Every start minimizes the largest weighted distance from the ideal point, which reaches concave parts of the front
-    too. Weights are spread evenly; ideal and nadir follow the designs that have been met. All starts advance together
-    with Adam under `jax.vmap`.
+    Every design minimizes the largest weighted distance from the ideal point, which reaches concave parts of the front
+    too, by sequential linear programming as in `Minimax`: all of them advance together. Ideal and nadir follow the
+    designs that have been met. The first round seeks the ends of the front, the best designs of one objective each,
+    from start points all over the box. The others seek the designs of evenly spread weights, each from the best one
+    that has been met for its weight.
 
     Attributes:
         points: designs that are sought on the front.
-        steps: gradient steps of every one.
+        steps: most steps of every one in each round.
     """
 
     points: int = eqx.field(static=True, default=32)
-    steps: int = eqx.field(static=True, default=240)
+    steps: int = eqx.field(static=True, default=20)
 
     def __check_init__(self):
         whole("Pareto", "points", self.points, 2)
-        whole("Pareto", "steps", self.steps, len(STAGE_WIDTHS))
+        whole("Pareto", "steps", self.steps, 1)
 
     @property
     def name(self) -> str:
         return "pareto"
 
     def search(self, problem: Problem, record: Record) -> Front:
-        """Runs the stages, then sorts out the front of all designs met."""
-        points = real_points(problem, start_points(problem, self.points))
-        weights = real_points(problem, _weights(self.points, len(problem.objectives)))
-        met = _Met(points, len(problem.objectives))
+        """Runs the rounds, then sorts out the front of all designs met."""
+        met, objectives = _Met(problem, record), len(problem.objectives)
+        # in blocks: every other point of the Halton sequence covers half of the box only
+        ends = _ends(objectives)[np.arange(self.points) * objectives // self.points]
+        spread = _weights(self.points, objectives)
+        points = list(start_points(problem, self.points))
+        for number in range(_ROUNDS):
+            ways = [_Chebyshev(weight, met.frame) for weight in (spread if number else ends)]
+            if number and met.found:
+                points = [met.best(way) for way in ways]
+            searches = [Search(point, way) for point, way in zip(points, ways)]
+            follow(problem, met, searches, steps=self.steps, tolerance=_TOLERANCE, round_of=(number, _ROUNDS))
+        if met.found:
+            record.offer(*met.compromise(), 0.0)
+        return met.front()
 
-        def advance(width, rate, count):
-            made = [real_points(problem, value) for value in (*met.frame(), width, rate)]
-            found = _advance(problem, points, weights, jnp.asarray(count), *made)
-            record.spend(self.points * count, analyses=GRADIENT_COST)
-            met.add(*found[1:])
-            return found[0]
 
-        advance(1.0, 0.0, 1)
-        scale = yardstick(met.soft_scale(problem))
-        for stage in stages(self.steps, _LOOK):
-            points = advance(stage.width * scale, stage.rate, stage.steps)
-            record.report(stage.done, self.steps, met.compromise()[1])
-        place, distance = met.compromise()
-        if np.isfinite(distance):
-            record.offer(place, distance, 0.0)
-        return met.front(problem)
+class _Chebyshev:
+    """Largest weighted distance from the ideal point, in spans of the objectives."""
+
+    part = _SUM
+
+    def __init__(self, weight: np.ndarray, frame: Callable[[], tuple[np.ndarray, np.ndarray]]):
+        self._weight, self._frame = weight, frame
+
+    def scales(self) -> tuple[np.ndarray, np.ndarray]:
+        """Factor and offset of every objective."""
+        low, span = self._frame()
+        factor = self._weight / span
+        return factor, -factor * low
+
+    def distance(self, values: np.ndarray) -> np.ndarray:
+        """Of designs, shape (designs, objectives)."""
+        factor, offset = self.scales()
+        scaled = factor * values + offset
+        return scaled.max(axis=1) + self.part * scaled.sum(axis=1)
 
 
 class _Met:
-    """Designs met so far."""
+    """Designs met so far that keep the constraints and that no other one beats."""
 
-    def __init__(self, points, objectives: int):
-        self._points = np.empty((0, points.shape[1]))
+    def __init__(self, problem: Problem, record: Record):
+        objectives = len(problem.objectives)
+        self._problem, self._record = problem, record
+        self._points = np.empty((0, len(problem.names)))
         self._values = np.empty((0, objectives))
-        self._worst = np.ones(objectives)
+        self._new: list[tuple[np.ndarray, np.ndarray]] = []
+        self._low, self._span = np.zeros(objectives), np.ones(objectives)
 
-    def add(self, points, values, violations) -> None:
-        """Keeps those that are not dominated and violate nothing."""
-        points, values = np.asarray(points), np.asarray(values)
-        finite = np.isfinite(values).all(axis=1)
-        good = finite & (np.asarray(violations) <= FEASIBLE)
-        if finite.any():
-            self._worst = values[finite].max(axis=0)
-        points, values = np.concatenate([self._points, points[good]]), np.concatenate([self._values, values[good]])
-        if len(values):
+    @property
+    def found(self) -> bool:
+        """Whether there are any."""
+        return len(self._values) > 0
+
+    def spend(self, designs: int, *, analyses: int) -> None:
+        """Counts contact analyses."""
+        self._record.spend(designs, analyses=analyses)
+
+    def take(self, point: np.ndarray, model: Model) -> None:
+        """Keeps a design until the next look."""
+        if np.isfinite(model.values).all() and model.violation <= FEASIBLE:
+            self._new.append((point, model.values))
+
+    def look(self, step: int, steps: int) -> None:
+        """Sorts out what is new; ideal and span stay the same in between, so that steps can be compared."""
+        if self._new:
+            points, values = (np.stack(part) for part in zip(*self._new))
+            self._new = []
+            worst = values.max(axis=0)
+            points, values = np.concatenate([self._points, points]), np.concatenate([self._values, values])
             best = pareto_front(values)
-            points, values = points[best], values[best]
-        self._points, self._values = points, values
+            self._points, self._values = points[best], values[best]
+            self._low = self._values.min(axis=0)
+            # as long as one design beats all others, the front has no span of its own
+            high = self._values.max(axis=0) if len(self._values) > len(self._low) else worst
+            self._span = np.maximum(high - self._low, _SPAN * np.maximum(np.abs(self._low), 1.0))
+        self._record.report(step, steps, self.compromise()[1])
 
     def frame(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ideal point, and the span from it to the worst values that the starts have at the moment."""
-        if not len(self._values):
-            return np.zeros_like(self._worst), np.ones_like(self._worst)
-        low = self._values.min(axis=0)
-        return low, _span(low, self._worst)
+        """Ideal point, and the span of the objectives."""
+        return self._low, self._span
 
-    def soft_scale(self, problem: Problem):
-        """Values of the objective that is softened, else of the first."""
-        index = problem.objectives.index("ppte") if "ppte" in problem.objectives else 0
-        return self._values[:, index]
+    def best(self, way: _Chebyshev) -> np.ndarray:
+        """The design of the least distance."""
+        return self._points[way.distance(self._values).argmin()]
 
     def compromise(self) -> tuple[np.ndarray, float]:
         """The design whose worst distance from the ideal, in spans of the front, is the least; and that distance."""
-        if not len(self._values):
+        if not self.found:
             return np.full(self._points.shape[1], 0.5), np.inf
-        low = self._values.min(axis=0)
-        distance = ((self._values - low) / _span(low, self._values.max(axis=0))).max(axis=1)
+        distance = ((self._values - self._low) / self._span).max(axis=1)
         best = int(distance.argmin())
         return self._points[best], float(distance[best])
 
-    def front(self, problem: Problem) -> Front:
+    def front(self) -> Front:
         """Ascending in the first objective."""
+        problem = self._problem
         _, order = np.unique(self._values, axis=0, return_index=True)  # equal designs once, in ascending order
         low, high = np.asarray(problem.low), np.asarray(problem.high)
         parameters = low + self._points[order] * (high - low)
@@ -125,8 +157,9 @@ class _Met:
         )
 
 
-def _span(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    return np.maximum(high - low, _SPAN * np.maximum(np.abs(low), 1.0))
+def _ends(objectives: int) -> np.ndarray:
+    """Weights of one objective each, with next to nothing for the others."""
+    return np.where(np.eye(objectives, dtype=bool), 1 - (objectives - 1) * _END, _END)
 
 
 def _weights(count: int, objectives: int) -> np.ndarray:
@@ -137,26 +170,3 @@ def _weights(count: int, objectives: int) -> np.ndarray:
     # spacings of sorted uniform numbers are uniform on the simplex
     cuts = np.sort(qmc.Halton(objectives - 1, scramble=False).random(count + 1)[1:], axis=1)
     return np.diff(np.concatenate([np.zeros((count, 1)), cuts, np.ones((count, 1))], axis=1), axis=1)
-
-
-@eqx.filter_jit
-def _advance(problem: Problem, points, weights, count, low, span, width, rate):
-    """A stage of all starts; returns the points, and all designs that were judged with values and violations."""
-
-    def loss(x, weight):
-        soft, true, excess, fine = problem.soft_and_true(x, width)
-        scaled = weight * (soft - low) / span
-        penalty = _PENALTY * jnp.sum(jnp.maximum(excess, 0.0) ** 2)
-        good = fine & jnp.isfinite(jnp.sum(soft))
-        violation = jnp.maximum(jnp.max(excess, initial=0.0), 0.0)
-        return jnp.max(scaled) + _SUM * jnp.sum(scaled) + penalty, (jnp.where(good, true, jnp.inf), violation)
-
-    def keep(kept, number, points, seen):
-        return jax.tree.map(lambda all, new: all.at[number].set(new), kept, (points, *seen))
-
-    gradient = jax.vmap(jax.grad(loss, has_aux=True))
-    met = jnp.full((_LOOK, *points.shape[:1]), jnp.inf, points.dtype)
-    values = jnp.full((_LOOK, *weights.shape), jnp.inf, points.dtype)
-    kept = jnp.zeros((_LOOK, *points.shape), points.dtype), values, met
-    points, kept = adam_steps(lambda points: gradient(points, weights), points, count, rate, keep, kept)
-    return points, *jax.tree.map(lambda all: all.reshape(-1, *all.shape[2:]), kept)

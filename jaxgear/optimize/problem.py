@@ -21,8 +21,14 @@ Parameters = Mapping[str, Scalar]
 Modifications = tuple[AbstractModification | None, AbstractModification | None]
 Design = Callable[[Parameters], Modifications]
 
-# Contact analyses that a value with its gradient counts for.
+# Contact analyses that a value with its gradient counts for, and the gradient of every further objective.
 GRADIENT_COST = 3
+_FURTHER_GRADIENT = 2
+
+
+def gradient_cost(objectives: int) -> int:
+    """Contact analyses that so many objectives of a design with their gradients count for."""
+    return GRADIENT_COST + _FURTHER_GRADIENT * (objectives - 1)
 
 
 class Score(NamedTuple):
@@ -37,22 +43,30 @@ class Score(NamedTuple):
     violation: Scalar
 
 
-class Linearization(NamedTuple):
-    """Objective and constraints at a point with their slopes over the unit box.
-
-    The objective of case k is max(upper[k]) - min(lower[k]).
+class Pieces(NamedTuple):
+    """An objective in every case, max(upper) - min(lower), with its slopes over the unit box.
 
     Attributes:
         upper, lower: shape (cases, pieces).
-        slope: of `upper` and `lower`, shape (cases, pieces, parameters).
-        excess: of the constraints, shape (constraints,), with `excess_slope`, shape (constraints, parameters).
-        fine: whether all contact solutions converged.
+        slope, lower_slope: of `upper` and `lower`, shape (cases, pieces, parameters).
     """
 
     upper: Float[Array, "cases pieces"]
     lower: Float[Array, "cases pieces"]
     slope: Float[Array, "cases pieces parameters"]
     lower_slope: Float[Array, "cases pieces parameters"]
+
+
+class Linearization(NamedTuple):
+    """Objectives and constraints at a point with their slopes over the unit box.
+
+    Attributes:
+        objectives: of every objective its pieces.
+        excess: of the constraints, shape (constraints,), with `excess_slope`, shape (constraints, parameters).
+        fine: whether all contact solutions converged.
+    """
+
+    objectives: tuple[Pieces, ...]
     excess: Float[Array, " constraints"]
     excess_slope: Float[Array, "constraints parameters"]
     fine: Bool[Array, ""]
@@ -139,29 +153,39 @@ class Problem(eqx.Module):
         return self._measured(soft), self._measured(true), jnp.max(excess, axis=0), jnp.all(fine)
 
     def linearize(self, x: Vector) -> Linearization:
-        """The first objective and the constraints with their slopes, for the price of one gradient per case."""
-        if self.objectives[0] == PPTE:
-            upper, slope, fine = self._curves(x)
-            lower, lower_slope = upper, slope
-        else:
+        """The objectives and the constraints with their slopes."""
+        fine = jnp.asarray(True)
+        found: dict[str | Number, Pieces] = {}
+        if PPTE in self.objectives:
+            curve, slope, fine = self._curves(x)
+            found[PPTE] = Pieces(curve, curve, slope, slope)
+        others = tuple(of for of in self.objectives if of != PPTE)
+        excess, excess_slope = jnp.zeros((0,), x.dtype), jnp.zeros((0, x.shape[0]), x.dtype)
+        if others or self.constraints:
+            values, slopes, converged = self._numbers_and_slopes(x, others)
+            fine = jnp.append(fine, converged)
+            for index, of in enumerate(others):
+                piece, slope = values[:, index, None], slopes[:, index, None]
+                found[of] = Pieces(piece, jnp.zeros_like(piece), slope, jnp.zeros_like(slope))
+            excess = values[:, len(others) :].reshape(-1)
+            excess_slope = slopes[:, len(others) :].reshape(-1, x.shape[0])
+        objectives = tuple(found[of] for of in self.objectives)
+        known = sum((jnp.sum(pieces.slope) for pieces in objectives), jnp.sum(excess_slope))
+        return Linearization(objectives, excess, excess_slope, jnp.all(fine) & jnp.isfinite(known))
 
-            def number(x):
-                upper, fine = self.over_cases(x, lambda c: (self._numbers(c, None)[:1], _fine(c.cycle)))
-                return upper, (upper, fine)
+    def _numbers_and_slopes(self, x: Vector, objectives: tuple[str | Number, ...]):
+        """Objectives and excesses of every case with their slopes, and whether the contact solutions converged."""
 
-            slope, (upper, fine) = jax.jacrev(number, has_aux=True)(x)
-            lower, lower_slope = jnp.zeros_like(upper), jnp.zeros_like(slope)
+        def of_case(candidate: Candidate):
+            numbers = [number(of)(candidate) for of in objectives]
+            return jnp.concatenate([jnp.asarray(numbers, x.dtype), self._excess(candidate)]), _fine(candidate.cycle)
 
-        def excess(x):
-            values = self.over_cases(x, self._excess).reshape(-1)
-            return values, values
+        def numbers(x):
+            values, fine = self.over_cases(x, of_case)
+            return values, (values, fine)
 
-        if self.constraints:
-            limit_slope, limits = jax.jacrev(excess, has_aux=True)(x)
-        else:
-            limits, limit_slope = jnp.zeros((0,), x.dtype), jnp.zeros((0, x.shape[0]), x.dtype)
-        good = jnp.all(fine) & jnp.isfinite(jnp.sum(slope)) & jnp.isfinite(jnp.sum(limit_slope))
-        return Linearization(upper, lower, slope, lower_slope, limits, limit_slope, good)
+        slopes, (values, fine) = jax.jacrev(numbers, has_aux=True)(x)
+        return values, slopes, fine
 
     def _curves(self, x: Vector):
         """Transmission error of every case and its slopes.

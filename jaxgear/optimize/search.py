@@ -45,6 +45,10 @@ class Record:
             self.point, self.value, self.violation = points[best].copy(), float(values[best]), float(violations[best])
             self.model = model
 
+    def take(self, point, model: Model) -> None:
+        """A design with its linearization."""
+        self.offer(point, model.value, model.violation, model)
+
     def look(self, step: int, steps: int) -> None:
         """Marks the progress: after `step` of `steps`."""
         self.report(step, steps, self.value)
