@@ -70,6 +70,7 @@ def test_every_method_of_the_library_takes_part():
     assert {name.replace("cma_es", "cmaes") for name in of_one_objective} <= names
 
 
+@pytest.mark.slow
 def test_the_judge_sees_what_the_contact_analysis_says():
     """Of a design that no search has touched: PPTE and pressure at the design torque, and the worst of all torques."""
     task = tasks.tasks()[0]

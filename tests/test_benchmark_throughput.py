@@ -89,6 +89,7 @@ def test_what_a_baseline_cannot_do_is_refused(mesh, problem):
         NumpyKernel(replace(many, corner_gap=np.zeros_like(many.corner_gap)))
 
 
+@pytest.mark.slow
 def test_contenders_take_turns_and_agree(capsys):
     chosen = [
         Contender("jaxgear", 64, slices=3, threads=2, batch=8),

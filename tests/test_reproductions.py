@@ -8,13 +8,14 @@ import pytest
 
 from benchmarks import cases
 
+pytestmark = pytest.mark.slow
+
 
 @functools.cache
 def found(name):
     return importlib.import_module(f"examples.{name}").main(fast=True)
 
 
-@pytest.mark.slow
 def test_19_48_stiffness_of_the_published_kind_of_model():
     """Beam, Sainsot's foundation and constant Hertz; the study gives no bores."""
     study = found("reproduce_19_48_study")
@@ -75,7 +76,6 @@ def test_20_30_against_finite_elements():
     assert study["double_stiffness_20_30"] == pytest.approx(force[pairs == 2].max(), rel=0.03)
 
 
-@pytest.mark.slow
 def test_50_50_relief_from_the_transmission_error():
     study = found("reproduce_50_50_study")
     assert study["contact_ratio"] == pytest.approx(1.37, abs=0.0005)

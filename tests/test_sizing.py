@@ -118,6 +118,7 @@ def test_dynamic_relief_levels_the_load_that_it_is_made_for(uniform):
     np.testing.assert_allclose(ppte, [0.0, 0.5 * 0.3 * DELTA0], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_dynamic_relief_of_a_real_mesh():
     """Without further forces it is the largest deflection; its slope over the force is the compliance there."""
     cycle = jg.solve(prepare(PAIR), 50.0)

@@ -16,6 +16,8 @@ import pytest
 
 import jaxgear as jg
 
+pytestmark = pytest.mark.slow
+
 SCRIPT = Path(__file__).with_name("sweep_process.py")
 PARTS = 40
 
@@ -66,7 +68,6 @@ def assert_same(table, complete):
         np.testing.assert_array_equal(table.column(name), complete.column(name), err_msg=name)
 
 
-@pytest.mark.slow
 def test_killed_again_and_again_on_other_devices_it_has_the_rows_of_an_uninterrupted_one(
     environment, complete, tmp_path
 ):

@@ -351,6 +351,7 @@ def test_gradients_of_the_mean_scatter_agree_with_differences(mesh, tolerance):
     assert abs(float(by_amount)) > 1e-3 and float(by_pitch) > 1e-3
 
 
+@pytest.mark.slow
 def test_two_devices_give_the_samples_of_one(mesh, tolerance):
     one = jg.monte_carlo(mesh, TORQUE, tolerance=tolerance.without_lead(), samples=20, seed=1, **RELIEF)
     program = """

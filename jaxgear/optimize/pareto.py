@@ -136,12 +136,15 @@ class _Met:
         return self._points[way.distance(self._values).argmin()]
 
     def compromise(self) -> tuple[np.ndarray, float]:
-        """The design whose worst distance from the ideal, in spans of the front, is the least; and that distance."""
+        """The design whose worst distance from the ideal, in spans of the front, is about the least; and that distance.
+
+        The part of the sum decides between designs that hardly differ in the worst.
+        """
         if not self.found:
             return np.full(self._points.shape[1], 0.5), np.inf
-        distance = ((self._values - self._low) / self._span).max(axis=1)
-        best = int(distance.argmin())
-        return self._points[best], float(distance[best])
+        scaled = (self._values - self._low) / self._span
+        best = int((scaled.max(axis=1) + _SUM * scaled.sum(axis=1)).argmin())
+        return self._points[best], float(scaled[best].max())
 
     def front(self) -> Front:
         """Ascending in the first objective."""
