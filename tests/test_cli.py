@@ -275,6 +275,12 @@ def test_a_failed_contact_solution_is_loud(folder, tmp_path):
         ("optimize", FREE + 'constraint = [{ of = "ppte" }]', ["optimize.constraint[0]: Constraint: low or high"]),
         ("optimize", FREE + "constraint = [{ variables = { width = 1.0 }, low = 0.0 }]", ['"width" is not a variable']),
         ("optimize", FREE + 'objective = ["ppte", "mean_te"]', ["optimize.objective: 2 with method", "pareto"]),
+        ("optimize", FREE + "seed = 1", ["optimize.seed: has no effect", "minimax", "perfect gears"]),
+        (
+            "optimize",
+            FREE.replace("starts = 2\nsteps = 100", 'method = "factorial"') + "factorial = { levels = { width = 3 } }",
+            ["optimize.factorial.levels: must name all variables and nothing else: height"],
+        ),
         ("optimize", FREE + "genetic = { population = 2 }", ["optimize.genetic.population: must be"]),
         ("analyze", FIXED.replace("teeth = 19", "teth = 19"), ['pinion.teth: unknown key, did you mean "teeth"?']),
         ("analyze", FIXED.replace("module = 3.0", "module = -3.0", 1), ["pinion: Gear: module = -3 mm must be"]),

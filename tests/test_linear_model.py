@@ -117,7 +117,8 @@ def model(values, slope, x, *, measure=None, weights=None, excess=None, excess_s
     )
     excess = np.zeros(0) if excess is None else np.asarray(excess, float)
     excess_slope = np.zeros((0, len(x))) if excess_slope is None else np.asarray(excess_slope, float)
-    return Model(problem, x, Linearization((Pieces(values, values, slope, slope),), excess, excess_slope, np.True_))
+    objective = Pieces(values, values, slope, slope)
+    return Model(problem, x, Linearization((objective,), excess, excess_slope, np.True_), penalty=PENALTY)
 
 
 def test_chebyshev_polynomial():
@@ -215,6 +216,13 @@ def test_a_constraint_ends_a_step_and_a_violation_comes_first():
     assert step.decrease == pytest.approx(0.1 * PENALTY - 0.1)
 
 
+@pytest.mark.parametrize("excess", [-1e-2, 0.0, 9e-4])
+def test_a_limit_that_is_reached_leaves_no_decrease(excess):
+    """A falling objective against a rising constraint; what passes the limit within the tolerance is no gain."""
+    at_limit = model([[2.0, 0.0]], [[[-1.0], [0.0]]], [0.5], excess=[excess], excess_slope=[[10.0]])
+    assert at_limit.decrease_left(1e-3) == pytest.approx(1.0 if excess == -1e-2 else 0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("measure", "weights", "step", "value"),
     [
@@ -259,4 +267,5 @@ def test_a_failed_solution_has_no_value():
         Linearization((Pieces(pieces, pieces, slope, slope),), np.zeros(0), nothing, np.False_),
     )
     assert not failed.fine
+    assert np.isnan(failed.decrease_left(1e-3))
     assert failed.value == np.inf

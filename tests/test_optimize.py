@@ -194,6 +194,49 @@ def test_constraints_are_kept(known, best):
     assert "violation" in str(result)
 
 
+def test_a_limit_holds_against_an_objective_of_large_numbers(known):
+    """Its multiplier is 5e4 per relative violation: a penalty of fixed size would give way."""
+
+    def missing(candidate):
+        return 1e4 * (30.0 - candidate.parameters["pinion"])
+
+    limit = jg.Constraint({"pinion": 1.0}, high=5.0)
+    result = known.minimize(known.parabolas, TALL, objective=missing, constraints=[limit])
+    assert result.parameters["pinion"] == pytest.approx(5.0, rel=2e-3)
+    assert result.violation <= 1e-3
+
+
+def test_designs_without_a_finite_value_are_avoided(known):
+    def short(candidate):
+        amount = candidate.parameters["pinion"]
+        return jnp.where(amount > 25.0, jnp.inf, (30.0 - amount) ** 2)
+
+    result = known.minimize(known.parabolas, TALL, objective=short)
+    assert 24.9 < result.parameters["pinion"] <= 25.0
+
+
+def test_limits_of_one_quantity_are_told_apart(known):
+    limits = [jg.Constraint("max_relief", low=1.0), jg.Constraint("max_relief", high=11.5)]
+    result = known.minimize(known.parabolas, TALL, constraints=limits)
+    assert list(result.constraints) == ["max_relief", "max_relief (2)"]
+
+
+def test_another_limit_traces_nothing_anew(known):
+    traced = []
+
+    def parabolas(x):
+        traced.append(1)
+        return known.parabolas(x)
+
+    def search(high):
+        known.minimize(parabolas, TALL, constraints=[jg.Constraint("max_relief", high=high)])
+        return len(traced)
+
+    first, second = search(11.5), search(11.4)
+    # once for the modifications of the optimum, which are made outside of any compiled program
+    assert second - first == 1
+
+
 def test_a_relief_that_must_not_dip(known):
     """h = b1 s + b2 s^2 with b1 >= 2.5 levels best when it falls again towards the tip; monotone is b2 >= -b1 / 2."""
     reversal = eqx.filter_jit(jg.relief_reversal)

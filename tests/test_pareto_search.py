@@ -113,6 +113,20 @@ def test_three_objectives_within_a_limit(known, volume_per_amount):
     assert result.violation <= 1e-3
 
 
+def test_four_objectives(known):
+    names = ("ppte", "removed_volume", "max_relief", "mesh_loss_factor")
+    front = known.minimize(known.parabolas, BOX, objective=names, method=jg.Pareto(points=8, steps=5)).front
+    assert front.objectives == names
+    assert front.values.shape[1] == 4 and np.isfinite(front.values).all()
+    assert not dominated(front.values).any()
+
+
+def test_limits_that_no_design_keeps(known):
+    limit = jg.Constraint({"pinion": 1.0}, low=41.0)
+    with pytest.raises(RuntimeError, match="keeps the constraints"):
+        known.minimize(known.parabolas, BOX, objective=VOLUME, constraints=[limit], method=jg.Pareto(points=4, steps=2))
+
+
 @pytest.mark.parametrize(("options", "words"), [({"points": 1}, "points = 1"), ({"steps": 0}, "steps = 0")])
 def test_refuses_what_makes_no_front(options, words):
     with pytest.raises(ValueError, match=words):

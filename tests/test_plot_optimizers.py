@@ -161,6 +161,7 @@ def test_legends_cover_no_data(draw, name):
     [
         ("ppte", "um", "peak-to-peak transmission error [µm]"),
         ("95 % CVaR of ppte", None, "95 % CVaR of peak-to-peak transmission error [µm]"),
+        ("ppte with curvature penalty", None, "peak-to-peak transmission error with curvature penalty [µm]"),
         ("worst max_flank_pressure", None, "worst largest Hertzian flank pressure [MPa]"),
         ("mesh_loss_factor", "", "loss power per input power and coefficient of friction [-]"),
         ("removed_volume", None, "material ground off all flanks [mm³]"),

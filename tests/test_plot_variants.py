@@ -264,7 +264,7 @@ def brute_force(values):
     return np.array([not ((values <= row).all(axis=1) & (values < row).any(axis=1)).any() for row in values])
 
 
-@pytest.mark.parametrize("objectives", [1, 2, 3])
+@pytest.mark.parametrize("objectives", [1, 2, 3, 4, 5])
 @pytest.mark.parametrize("levels", [4, 10_000])
 def test_pareto_front_is_what_nothing_beats(objectives, levels):
     random = np.random.default_rng(objectives)
@@ -277,8 +277,8 @@ def test_pareto_front_leaves_out_failures_and_keeps_equals():
     values = np.array([[1.0, 2.0], [np.nan, 0.0], [1.0, 2.0], [-np.inf, 5.0], [2.0, 1.0], [2.0, 2.0]])
     assert pareto_front(values).tolist() == [True, False, True, False, True, False]
     assert not pareto_front(np.full((3, 2), np.nan)).any()
-    with pytest.raises(ValueError, match="1 to 3 objectives"):
-        pareto_front(np.zeros((3, 4)))
+    with pytest.raises(ValueError, match="at least 1 objective"):
+        pareto_front(np.zeros((3, 0)))
 
 
 @pytest.mark.parametrize("objectives", [2, 3])

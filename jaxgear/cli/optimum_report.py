@@ -38,7 +38,8 @@ def verdict(
         yield f"{len(optimum.front.values)} designs on the Pareto front, in front.csv; the optimum is the compromise"
     if np.isfinite(optimum.gradient_norm):
         yield f"gradient norm at the optimum {optimum.gradient_norm:.2g} per full range of the variables"
-    yield f"{optimum.evaluations} contact analyses by method {optimum.method} (one with gradient counts as three)"
+    price = "one with gradient counts as three, each further gradient as two"
+    yield f"{optimum.evaluations} contact analyses by method {optimum.method} ({price})"
 
 
 def summary(file: DesignFile, optimum: Optimum, projection: Projection | None) -> dict[str, Any]:

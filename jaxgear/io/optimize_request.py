@@ -30,6 +30,7 @@ _MEASURES: Mapping[str, Callable[..., AbstractMeasure]] = {
     "quantile": Quantile,
     "cvar": CVaR,
 }
+_WITH_SEED = ("genetic", "cma_es", "differential_evolution")
 _WITH_LEVEL = ("quantile", "cvar")
 # Options of a quick look.
 _QUICK: Mapping[str, dict[str, Any]] = {
@@ -61,6 +62,7 @@ class OptimizeRequest:
     _design: DesignFile
     _options: dict[str, Any]
     _common: dict[str, Any]
+    _first: dict[str, Any]  # options of the search for a relief to start from
 
     def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum:
         """Runs it on a prepared mesh."""
@@ -74,27 +76,30 @@ class OptimizeRequest:
 
     def _iterate(self, mesh: Mesh, callback: Callback | None) -> Optimum:
         design, options = self._design, dict(self._options)
-        start, spent = options.pop("start"), 0
+        start, spent, seconds = options.pop("start"), 0, 0.0
         pinion, wheel = None, None
         if start == "given":
             pinion, wheel = design.design({})
         elif start == "low_pressure":
-            most = options.get("max_relief")
-            limits = (Constraint("max_relief", high=most),) if most is not None else ()
             first = minimize(
                 design.design,
                 design.bounds,
                 mesh=mesh,
                 torque=design.torque,
                 objective="max_contact_pressure",
-                constraints=limits,
+                constraints=(Constraint("max_relief", high=options["max_relief"]),),
+                method=METHODS[_DEFAULT_METHOD](**self._first),
+                callback=callback,
             )
-            pinion, wheel, spent = first.pinion, first.wheel, first.evaluations
+            pinion, wheel, spent, seconds = first.pinion, first.wheel, first.evaluations, first.seconds
         found = iterate_transmission_error(
             mesh, jnp.asarray(design.torque), pinion=pinion, wheel=wheel, callback=callback, **options
         )
         return dataclasses.replace(
-            found, evaluations=found.evaluations + spent, history_evaluations=found.history_evaluations + spent
+            found,
+            evaluations=found.evaluations + spent,
+            history_evaluations=found.history_evaluations + spent,
+            seconds=found.seconds + seconds,
         )
 
 
@@ -127,17 +132,26 @@ def optimize_request(design: DesignFile, *, method: str | None = None, quick: bo
         raise DesignFileError(
             design.path, f"optimize.{name}.curve", f'"{curve}" is not known, {suggestion(curve, CURVES)}'
         )
-    if name in ("genetic", "cma_es", "differential_evolution"):
+    if name in _WITH_SEED:
         options["seed"] = section.seed or 0
+    elif section.seed is not None and section.manufactured is None and method is None:
+        raise DesignFileError(design.path, "optimize.seed", f'has no effect with method "{name}" and perfect gears')
     common = _common(design, section, name, quick)
     if name == "te_iteration":
         _check_iteration(design, options["start"], section)
         common = {}
     elif name != "free_form":
+        _check_levels(design, options.get("levels"))
         refused(design.path, f"optimize.{name}", lambda: METHODS[name](**options))
     if quick:
         options = {**options, **_QUICK[name]}
-    return OptimizeRequest(name, curve, design, options, common)
+    return OptimizeRequest(name, curve, design, options, common, _QUICK[_DEFAULT_METHOD] if quick else {})
+
+
+def _check_levels(design: DesignFile, levels) -> None:
+    if isinstance(levels, dict) and set(levels) != set(design.bounds):
+        problem = f"must name all variables and nothing else: {', '.join(design.bounds)}"
+        raise DesignFileError(design.path, "optimize.factorial.levels", problem)
 
 
 def _options(design: DesignFile, name: str) -> dict[str, Any]:

@@ -158,7 +158,7 @@ class ParetoOptions(Section):
 
 class IterationOptions(Section):
     start: Literal["unmodified", "given", "low_pressure"] = "unmodified"
-    max_relief: Annotated[float, Meta(gt=0)] | None = None
+    max_relief: Annotated[float, Meta(gt=0)] = 7.0
     tolerance: Annotated[float, Meta(gt=0)] | None = None
     steps: Annotated[int, Meta(ge=1, le=1000)] | None = None
     curve: str | None = None

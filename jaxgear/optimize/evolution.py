@@ -4,6 +4,7 @@ import functools
 import importlib
 from abc import abstractmethod
 from contextlib import contextmanager
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -43,7 +44,7 @@ class _Evolution(AbstractMethod):
     def search(self, problem: Problem, record: Record) -> None:
         """Runs the generations."""
         with _relaxed():
-            algorithm, parameters = _made(self, len(problem.names), problem.low.dtype)
+            algorithm, parameters = _made(replace(self, seed=0), len(problem.names), problem.low.dtype)
         key, first = jax.random.split(jax.random.key(self.seed))
         state, rest = self._begin(algorithm, parameters, problem, record, first)
         for generation in range(1, rest + 1):

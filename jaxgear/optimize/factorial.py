@@ -32,7 +32,7 @@ class Factorial(AbstractMethod):
 
     def __check_init__(self):
         for value in [self.levels] if isinstance(self.levels, int) else dict(self.levels).values():
-            whole("Factorial", "levels", value, 1)
+            whole("Factorial", "levels", value, 2)
 
     @property
     def name(self) -> str:

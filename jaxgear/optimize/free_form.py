@@ -79,8 +79,8 @@ def free_form(
         callback: called as callback(step, steps, best objective).
 
     Returns:
-        the optimum; its objective includes the penalty, its parameters are the values of both tables. What both flanks
-        have in common, and no transmission error shows, is not removed.
+        the optimum; its objective includes the penalty, its parameters are the values of both tables. What a flank
+        has in common all over, and no variation shows, is not removed, unless constraints may depend on it.
 
     Raises:
         ValueError: for numbers outside their range.
@@ -104,8 +104,9 @@ def free_form(
     unmodified = np.zeros(2 * points)
     given = np.clip(_values(mesh, roll, start) / max_relief, 0.0, 1.0)
     follow(problem, record, [Search(unmodified), Search(given)], steps=steps, tolerance=_TOLERANCE)
-    flanks = record.point.reshape(2, points)
-    record.point = (flanks - flanks.min(axis=1, keepdims=True)).ravel()
+    if not constraints:  # which may depend on what both flanks have in common
+        flanks = record.point.reshape(2, points)
+        record.point = (flanks - flanks.min(axis=1, keepdims=True)).ravel()
     return optimum_of(problem, record, "free_form", began)
 
 

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from ..contact import Mesh, MeshCycle
 from ..metrics import RESULTS, Result, max_relief, relief_reversal, removed_volume
 from ..microgeometry import AbstractModification
-from ..numerics import check
+from ..numerics import check, optional_real
 
 Scalar = Float[Array, ""]
 
@@ -43,16 +43,16 @@ Number = Callable[[Candidate], Scalar]
 
 
 class Quantity(NamedTuple):
-    """A named number of a candidate; see `jaxgear.metrics.Result`."""
+    """A named number of a candidate, and whether it takes the contact solution; see `jaxgear.metrics.Result`."""
 
     of: Number
     unit: str
     meaning: str
-    worst: str = "max"
+    of_contact: bool = False
 
 
 def _of_cycle(result: Result) -> Quantity:
-    return Quantity(lambda candidate: result.of(candidate.cycle), result.unit, result.meaning, result.worst)
+    return Quantity(lambda candidate: result.of(candidate.cycle), result.unit, result.meaning, of_contact=True)
 
 
 def _of_flanks(function) -> Number:
@@ -81,8 +81,8 @@ class Constraint(eqx.Module):
     """
 
     of: str | Mapping[str, float] | Number = eqx.field(static=True)
-    low: float | None = eqx.field(static=True, default=None)
-    high: float | None = eqx.field(static=True, default=None)
+    low: Scalar | None = eqx.field(converter=optional_real, default=None)
+    high: Scalar | None = eqx.field(converter=optional_real, default=None)
 
     def __post_init__(self):
         if isinstance(self.of, Mapping):  # as a static field it has to be hashable
@@ -111,9 +111,9 @@ class Constraint(eqx.Module):
         return getattr(self.of, "__name__", "constraint")
 
     @property
-    def unit(self) -> str:
-        """Unit of its limits, "" where it is unknown."""
-        return QUANTITIES[self.of].unit if isinstance(self.of, str) else ""
+    def of_contact(self) -> bool:
+        """Whether it takes the contact solution; a function of your own is taken to do so."""
+        return QUANTITIES[self.of].of_contact if isinstance(self.of, str) else not self.linear
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -133,11 +133,16 @@ class Constraint(eqx.Module):
     def excess(self, value: Scalar) -> list[Scalar]:
         """By how much each limit is passed, relative to the limit; negative inside."""
         over = []
-        if self.high is not None:
-            over.append((value - self.high) / (abs(self.high) or 1.0))
-        if self.low is not None:
-            over.append((self.low - value) / (abs(self.low) or 1.0))
+        for limit, sign in ((self.high, 1.0), (self.low, -1.0)):
+            if limit is not None:
+                limit = limit.astype(value.dtype)
+                over.append(sign * (value - limit) / jnp.where(limit == 0, 1.0, jnp.abs(limit)))
         return over
+
+
+def name_of(of: str | Number) -> str:
+    """What an objective is called."""
+    return of if isinstance(of, str) else getattr(of, "__name__", "objective")
 
 
 def number(of: str | Callable[[Any], Scalar]) -> Number:

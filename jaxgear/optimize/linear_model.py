@@ -7,6 +7,7 @@ Uryasev 2000, doi 10.21314/JOR.2000.038); other measures keep the shares that th
 """
 
 from collections.abc import Mapping
+from copy import copy
 from typing import NamedTuple, Protocol
 
 import jax
@@ -16,10 +17,11 @@ from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
 from ..numerics import CVaR, Worst
+from .goal import FEASIBLE
 from .problem import Linearization, Pieces, Problem
 
-# Weight of a relative violation of 1 against an objective of 1 in its own unit: above the multiplier of any sensible
-# constraint, so that the penalty is exact.
+# Weight of a relative violation of 1 against the objective at the start of a search (at least 1 in its own unit): above
+# the multiplier of any sensible constraint, so that the penalty is exact.
 PENALTY = 100.0
 
 
@@ -56,10 +58,16 @@ class Model:
         x: point of the unit box.
         linearization: of the problem at that point.
         scalarization: of several objectives; None for one.
+        penalty: of a relative violation of 1; None to size it by the objective at the point.
     """
 
     def __init__(
-        self, problem: Problem, x: np.ndarray, linearization: Linearization, scalarization: Scalarization | None = None
+        self,
+        problem: Problem,
+        x: np.ndarray,
+        linearization: Linearization,
+        scalarization: Scalarization | None = None,
+        penalty: float | None = None,
     ):
         self._lin: Linearization = jax.tree.map(lambda part: np.asarray(part, float), linearization)
         self._measure, self._weights = problem.measure, np.asarray(problem.cases.weights, float)
@@ -68,6 +76,10 @@ class Model:
         self._x, roughness = np.asarray(x, float), problem.roughness
         self._forms = np.zeros((0, len(x))) if roughness is None else np.asarray(roughness.forms, float)
         self._rough_weight = 0.0 if roughness is None else float(roughness.weight)
+        if penalty is None:  # scaled objectives are of about 1
+            size = abs(self.value) if self.fine and scalarization is None else 1.0
+            penalty = PENALTY * max(1.0, size)
+        self.penalty = penalty
 
     @property
     def fine(self) -> bool:
@@ -97,7 +109,7 @@ class Model:
     @property
     def merit(self) -> float:
         """Objective plus penalty."""
-        return self.value + PENALTY * self.violation
+        return self.value + self.penalty * self.violation
 
     def best_step(self, radius: float) -> Step:
         """The step of the largest predicted decrease within a distance in every parameter and within the unit box."""
@@ -108,7 +120,7 @@ class Model:
         if len(self._lin.excess):
             (slack,) = program.variables(1, low=0.0)  # the largest violation
             program.at_most(self._lin.excess_slope, -self._lin.excess, {slack: -1.0})
-            cost[slack] = PENALTY
+            cost[slack] = self.penalty
         if len(self._forms):
             (rough,) = program.variables(1)
             for sign in (1.0, -1.0):
@@ -119,6 +131,17 @@ class Model:
             return Step(np.zeros_like(x), 0.0)
         step, predicted = found
         return Step(step, self.merit - predicted - offset)
+
+    def decrease_left(self, reach: float) -> float:
+        """Fastest decrease of the objective that is left, per unit of distance; NaN where no slopes are known.
+
+        A constraint that is passed within the tolerance counts as met exactly: to meet it costs or gains nothing.
+        """
+        if not self.fine:
+            return np.nan
+        settled, excess = copy(self), self._lin.excess
+        settled._lin = self._lin._replace(excess=jnp.where(excess <= FEASIBLE, jnp.minimum(excess, 0.0), excess))
+        return max(settled.best_step(reach).decrease / reach, 0.0)
 
     def _shares(self, cases: np.ndarray) -> np.ndarray:
         return np.asarray(self._measure.shares(jnp.asarray(cases), jnp.asarray(self._weights)))

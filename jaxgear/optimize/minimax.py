@@ -9,7 +9,7 @@ import numpy as np
 
 from ..numerics import whole
 from .linear_model import Model, Scalarization
-from .problem import Linearization, Problem, gradient_cost
+from .problem import Linearization, Problem
 from .search import AbstractMethod, Record
 from .starts import points_nearby, real_points, start_points
 
@@ -96,6 +96,11 @@ class Search:
         self._model: Model | None = None
         self._radius, self._predicted = _FIRST_RADIUS, 0.0
 
+    @property
+    def penalty(self) -> float | None:
+        """Of a violation, the same all the way."""
+        return None if self._model is None else self._model.penalty
+
     def propose(self, tolerance: float) -> bool:
         """Finds the next trial point; False when the search has ended."""
         if self._model is None or self._radius < _LEAST_RADIUS:
@@ -146,9 +151,10 @@ def _linearize(problem: Problem, ledger: Ledger, searches: Sequence[Search], bat
     rows = [search.trial for search in searches]
     padded = np.stack(rows + [rows[-1]] * (batch - len(rows)))
     leaves, tree = jax.tree.flatten(_linearizations(problem, real_points(problem, padded)))
-    ledger.spend(len(rows), analyses=gradient_cost(len(problem.objectives)))
+    ledger.spend(len(rows), analyses=problem.gradient_cost)
     for search, *parts in zip(searches, *map(np.asarray, leaves)):
-        model = Model(problem, search.trial, jax.tree.unflatten(tree, parts), search.scalarization)
+        found = jax.tree.unflatten(tree, parts)
+        model = Model(problem, search.trial, found, search.scalarization, search.penalty)
         ledger.take(search.trial, model)
         search.take(model)
 

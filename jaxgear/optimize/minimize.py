@@ -13,11 +13,11 @@ from ..metrics import peak_to_peak
 from ..numerics import AbstractMeasure, CVaR, Mean, Quantile, Worst
 from ..tolerance import Tolerance
 from .cases import cases
-from .goal import Constraint, Number
+from .goal import Constraint, Number, name_of
 from .linear_model import Model
 from .methods import method_named
-from .problem import GRADIENT_COST, Design, Problem, make_problem
-from .result import Front, Optimum
+from .problem import Design, Problem, make_problem
+from .result import PENALIZED, Front, Optimum
 from .search import AbstractMethod, Callback, Record
 from .starts import real_points
 
@@ -126,21 +126,21 @@ def _decrease_left(problem: Problem, record: Record) -> float:
     """Fastest decrease of the objective at the best point, per step of the full range of every parameter."""
     model = record.model
     if model is None:
-        record.spend(1, analyses=GRADIENT_COST)
+        record.spend(1, analyses=problem.gradient_cost)
         found = jax.tree.map(np.asarray, _linearization(problem, real_points(problem, record.point)))
         model = Model(problem, record.point, found)
-    return max(model.best_step(_PROBE).decrease / _PROBE, 0.0)
+    return model.decrease_left(_PROBE)
 
 
 def objective_name(problem: Problem) -> str:
     """What is minimized, in words."""
-    names = [of if isinstance(of, str) else getattr(of, "__name__", "objective") for of in problem.objectives]
+    names = [name_of(of) for of in problem.objectives]
     if len(names) > 1:
         return f"distance from the ideal of {' and '.join(names)}"
     prefix = ""
     if problem.cases.count > 1:
         prefix = _measure_name(problem.measure) + " "
-    return prefix + names[0]
+    return prefix + names[0] + (PENALIZED if problem.roughness is not None else "")
 
 
 def _measure_name(measure: AbstractMeasure) -> str:
@@ -162,8 +162,11 @@ def _constraint_values(problem: Problem, x) -> dict[str, float]:
     values = np.asarray(_numbers(problem, x))
     named = {}
     for index, constraint in enumerate(problem.constraints):
-        column = values[:, index]
-        named[constraint.name] = float(column.max() if constraint.high is not None else column.min())
+        worst = max(values[:, index], key=lambda value: float(max(constraint.excess(jnp.asarray(value)))))
+        name, repeated = constraint.name, 2
+        while name in named:
+            name, repeated = f"{constraint.name} ({repeated})", repeated + 1
+        named[name] = float(worst)
     return named
 
 

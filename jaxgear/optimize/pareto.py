@@ -8,7 +8,7 @@ from scipy.stats import qmc
 
 from ..numerics import whole
 from ..numerics.pareto import pareto_front
-from .goal import FEASIBLE, QUANTITIES
+from .goal import FEASIBLE, QUANTITIES, name_of
 from .linear_model import Model
 from .minimax import Search, follow
 from .problem import Problem
@@ -51,6 +51,8 @@ class Pareto(AbstractMethod):
     def search(self, problem: Problem, record: Record) -> Front:
         """Runs the rounds, then sorts out the front of all designs met."""
         met, objectives = _Met(problem, record), len(problem.objectives)
+        if self.points < objectives:
+            raise ValueError(f"Pareto: points = {self.points} must be at least the number of objectives, {objectives}")
         # in blocks: every other point of the Halton sequence covers half of the box only
         ends = _ends(objectives)[np.arange(self.points) * objectives // self.points]
         spread = _weights(self.points, objectives)
@@ -61,8 +63,9 @@ class Pareto(AbstractMethod):
                 points = [met.best(way) for way in ways]
             searches = [Search(point, way) for point, way in zip(points, ways)]
             follow(problem, met, searches, steps=self.steps, tolerance=_TOLERANCE, round_of=(number, _ROUNDS))
-        if met.found:
-            record.offer(*met.compromise(), 0.0)
+        if not met.found:
+            raise RuntimeError("minimize: no design that the search for a front has met keeps the constraints")
+        record.offer(*met.compromise(), 0.0)
         return met.front()
 
 
@@ -96,7 +99,7 @@ class _Met:
         self._points = np.empty((0, len(problem.names)))
         self._values = np.empty((0, objectives))
         self._new: list[tuple[np.ndarray, np.ndarray]] = []
-        self._low, self._span = np.zeros(objectives), np.ones(objectives)
+        self._low, self._span, self._worst = np.zeros(objectives), np.ones(objectives), np.full(objectives, -np.inf)
 
     @property
     def found(self) -> bool:
@@ -117,13 +120,13 @@ class _Met:
         if self._new:
             points, values = (np.stack(part) for part in zip(*self._new))
             self._new = []
-            worst = values.max(axis=0)
+            self._worst = np.maximum(self._worst, values.max(axis=0))
             points, values = np.concatenate([self._points, points]), np.concatenate([self._values, values])
             best = pareto_front(values)
             self._points, self._values = points[best], values[best]
             self._low = self._values.min(axis=0)
             # as long as one design beats all others, the front has no span of its own
-            high = self._values.max(axis=0) if len(self._values) > len(self._low) else worst
+            high = self._values.max(axis=0) if len(self._values) > len(self._low) else self._worst
             self._span = np.maximum(high - self._low, _SPAN * np.maximum(np.abs(self._low), 1.0))
         self._record.report(step, steps, self.compromise()[1])
 
@@ -153,7 +156,7 @@ class _Met:
         low, high = np.asarray(problem.low), np.asarray(problem.high)
         parameters = low + self._points[order] * (high - low)
         return Front(
-            objectives=tuple(of if isinstance(of, str) else of.__name__ for of in problem.objectives),
+            objectives=tuple(name_of(of) for of in problem.objectives),
             units=tuple(QUANTITIES[of].unit if isinstance(of, str) else "" for of in problem.objectives),
             values=self._values[order],
             parameters={name: parameters[:, index] for index, name in enumerate(problem.names)},

@@ -21,14 +21,9 @@ Parameters = Mapping[str, Scalar]
 Modifications = tuple[AbstractModification | None, AbstractModification | None]
 Design = Callable[[Parameters], Modifications]
 
-# Contact analyses that a value with its gradient counts for, and the gradient of every further objective.
+# Contact analyses that a value with its gradient counts for, and the gradient of every further number of the contact.
 GRADIENT_COST = 3
 _FURTHER_GRADIENT = 2
-
-
-def gradient_cost(objectives: int) -> int:
-    """Contact analyses that so many objectives of a design with their gradients count for."""
-    return GRADIENT_COST + _FURTHER_GRADIENT * (objectives - 1)
 
 
 class Score(NamedTuple):
@@ -112,6 +107,12 @@ class Problem(eqx.Module):
     constraints: tuple[Constraint, ...] = ()
     roughness: Roughness | None = None
 
+    @property
+    def gradient_cost(self) -> int:
+        """Contact analyses that a linearization in one case counts for."""
+        limits = sum(limit.of_contact for limit in self.constraints)
+        return GRADIENT_COST + _FURTHER_GRADIENT * (len(self.objectives) - 1 + limits)
+
     def parameters(self, x: Vector) -> dict[str, Scalar]:
         """Parameters at a point of the unit box."""
         values = self.low + x * (self.high - self.low)
@@ -163,15 +164,16 @@ class Problem(eqx.Module):
         excess, excess_slope = jnp.zeros((0,), x.dtype), jnp.zeros((0, x.shape[0]), x.dtype)
         if others or self.constraints:
             values, slopes, converged = self._numbers_and_slopes(x, others)
-            fine = jnp.append(fine, converged)
+            if PPTE not in self.objectives:  # else the same contact solutions have been judged already
+                fine = jnp.all(converged)
             for index, of in enumerate(others):
                 piece, slope = values[:, index, None], slopes[:, index, None]
                 found[of] = Pieces(piece, jnp.zeros_like(piece), slope, jnp.zeros_like(slope))
             excess = values[:, len(others) :].reshape(-1)
             excess_slope = slopes[:, len(others) :].reshape(-1, x.shape[0])
         objectives = tuple(found[of] for of in self.objectives)
-        known = sum((jnp.sum(pieces.slope) for pieces in objectives), jnp.sum(excess_slope))
-        return Linearization(objectives, excess, excess_slope, jnp.all(fine) & jnp.isfinite(known))
+        known = jnp.stack([jnp.sum(leaf) for leaf in jax.tree.leaves((objectives, excess, excess_slope))])
+        return Linearization(objectives, excess, excess_slope, jnp.all(fine) & jnp.all(jnp.isfinite(known)))
 
     def _numbers_and_slopes(self, x: Vector, objectives: tuple[str | Number, ...]):
         """Objectives and excesses of every case with their slopes, and whether the contact solutions converged."""
@@ -180,61 +182,56 @@ class Problem(eqx.Module):
             numbers = [number(of)(candidate) for of in objectives]
             return jnp.concatenate([jnp.asarray(numbers, x.dtype), self._excess(candidate)]), _fine(candidate.cycle)
 
-        def numbers(x):
-            values, fine = self.over_cases(x, of_case)
-            return values, (values, fine)
+        def at(torque, deviation):
+            def numbers(x):
+                values, fine = of_case(self._candidate(x, torque, deviation))
+                return values, (values, fine)
 
-        slopes, (values, fine) = jax.jacrev(numbers, has_aux=True)(x)
-        return values, slopes, fine
+            # case by case: the numbers of one do not depend on the others
+            slopes, (values, fine) = jax.jacrev(numbers, has_aux=True)(x)
+            return values, slopes, fine
+
+        return self._each_case(at)
 
     def _curves(self, x: Vector):
-        """Transmission error of every case and its slopes.
+        """Transmission error of every case, its slopes, and whether the contact solutions converged.
 
         The transmission error at a position depends on the material removed at that position alone, by as much as the
         contacts share the load: one gradient of the contact analysis gives the slopes at all positions.
         """
 
-        def removed(x):
-            material = self._removed(x)
-            return material, material
+        def at(torque, deviation):
+            def material(x):
+                removed = self._removed(x, torque)
+                return removed, removed
 
-        slopes, material = jax.jacfwd(removed, has_aux=True)(x)
+            def curve(removed):
+                cycle = solve_removed(self.mesh, torque, removed)
+                return cycle.transmission_error, _fine(cycle)
 
-        def at(torque, deviations, removed, slope):
-            def one(deviation):
-                def curve(removed):
-                    cycle = solve_removed(self.mesh, torque, removed)
-                    return cycle.transmission_error, _fine(cycle)
+            slope, removed = jax.jacfwd(material, has_aux=True)(x)
+            error, back, fine = jax.vjp(curve, removed + deviation, has_aux=True)
+            (share,) = back(jnp.ones_like(error))
+            return error, jnp.einsum("isp,ispx->px", share, slope), fine
 
-                error, back, fine = jax.vjp(curve, removed + deviation, has_aux=True)
-                (share,) = back(jnp.ones_like(error))
-                return error, jnp.einsum("isp,ispx->px", share, slope), fine
+        return self._each_case(at)
 
-            return jax.vmap(one)(deviations)
-
-        found = jax.vmap(at)(self.cases.torque, self.cases.removed, material, slopes)
-        return tuple(part.reshape(self.cases.count, *part.shape[2:]) for part in found)
-
-    def _removed(self, x: Vector):
-        """Material that the design removes under every torque, (torques, pairs, slices, positions)."""
+    def _removed(self, x: Vector, torque):
+        """Material that the design removes, (pairs, slices, positions)."""
         pinion, wheel = self.modifications(x)
-        return jax.vmap(lambda torque: removed_material(self.mesh, torque, pinion=pinion, wheel=wheel))(
-            self.cases.torque
-        )
+        return removed_material(self.mesh, torque, pinion=pinion, wheel=wheel)
 
     def over_cases(self, x: Vector, of_case):
         """A function of a candidate in every case, cases leading."""
-        pinion, wheel = self.modifications(x)
-        parameters = self.parameters(x)
+        return self._each_case(lambda torque, deviation: of_case(self._candidate(x, torque, deviation)))
 
-        def at(torque, deviations, removed):
-            def one(deviation):
-                cycle = solve_removed(self.mesh, torque, removed + deviation)
-                return of_case(Candidate(parameters, pinion, wheel, cycle))
+    def _candidate(self, x: Vector, torque, deviation) -> Candidate:
+        cycle = solve_removed(self.mesh, torque, self._removed(x, torque) + deviation)
+        return Candidate(self.parameters(x), *self.modifications(x), cycle)
 
-            return jax.vmap(one)(deviations)
-
-        found = jax.vmap(at)(self.cases.torque, self.cases.removed, self._removed(x))
+    def _each_case(self, function):
+        """A function of torque and deviation in every case, cases leading."""
+        found = jax.vmap(jax.vmap(function, (None, 0)))(self.cases.torque, self.cases.removed)
         return jax.tree.map(lambda part: part.reshape(self.cases.count, *part.shape[2:]), found)
 
     def _numbers(self, candidate: Candidate, width):

@@ -8,6 +8,7 @@ import numpy as np
 from ..contact import MeshCycle
 from ..microgeometry import AbstractModification
 
+PENALIZED = " with curvature penalty"  # what the name of an objective says of it
 _SHOWN_PARAMETERS = 12  # a table of a hundred flank values tells a reader nothing
 
 
@@ -54,7 +55,7 @@ class Optimum(eqx.Module):
 
     Attributes:
         method: its name.
-        objective_name: what was minimized, such as "ppte" or "95 % CVaR of ppte".
+        objective_name: what was minimized, such as "ppte", "95 % CVaR of ppte" or "ppte with curvature penalty".
         parameters: value of every free parameter; none where the flanks themselves were sought.
         pinion, wheel: the modifications.
         cycle: mesh cycle of the optimum, of perfect gears under the torque (of a load spectrum, its heaviest weight).
@@ -62,12 +63,13 @@ class Optimum(eqx.Module):
         objective: least value found of what was minimized, in its unit.
         gradient_norm: fastest decrease of the objective that is left within bounds and constraints, per step of the
             full range of every parameter; 0 at an optimum. It comes from the linearized problem (`linear_model`) and
-            counts the kinks of PPTE, where the plain gradient does not vanish. NaN where there are no parameters.
+            counts the kinks of PPTE, where the plain gradient does not vanish. NaN of a front, where there are no
+            parameters, and where the slopes are not finite.
         active_bounds: which parameters ended at their "lower" or "upper" bound.
         constraints: value of every constrained number, the worst over the cases.
         violation: largest relative excess over a constraint.
         evaluations: contact analyses spent, one per design, torque and manufactured gear; one with its gradient
-            counts as three.
+            counts as three, each further gradient as two.
         history: best objective after every look at the search.
         history_evaluations: contact analyses spent until then.
         seconds: wall time of the search, compilation included [s].

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from ..optimize import QUANTITIES
+from ..optimize.result import PENALIZED
 
 ANALYSES_LABEL = "contact analyses spent [-]"
 _IDEAL = "distance from the ideal"
@@ -25,10 +26,11 @@ def objective_label(name: str, unit: str | None = None) -> str:
     """
     if name.startswith(_IDEAL):
         return f"{_IDEAL} [-]"
-    match = _MEASURED.fullmatch(name)
+    bare = name.removesuffix(PENALIZED)
+    match = _MEASURED.fullmatch(bare)
     if match and match["of"] in QUANTITIES:
-        quantity = QUANTITIES[match["of"]]
-        return f"{match['measure'] or ''}{quantity.meaning} [{unit_text(quantity.unit) or '-'}]"
+        quantity, rest = QUANTITIES[match["of"]], name[len(bare) :]
+        return f"{match['measure'] or ''}{quantity.meaning}{rest} [{unit_text(quantity.unit) or '-'}]"
     words = name.replace("_", " ")
     return f"{words} [{unit_text(unit)}]" if unit else words
 
