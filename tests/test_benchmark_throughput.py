@@ -50,6 +50,7 @@ def expected(mesh):
     return [ppte(variant) for variant in VARIANTS]
 
 
+@pytest.mark.slow
 def test_numpy_solves_the_same_physics(problem, expected):
     found = NumpyKernel(problem, batch=5).ppte(VARIANTS)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)

@@ -113,6 +113,7 @@ def test_three_objectives_within_a_limit(known, volume_per_amount):
     assert result.violation <= 1e-3
 
 
+@pytest.mark.slow
 def test_four_objectives(known):
     names = ("ppte", "removed_volume", "max_relief", "mesh_loss_factor")
     front = known.minimize(known.parabolas, BOX, objective=names, method=jg.Pareto(points=8, steps=5)).front

@@ -99,6 +99,7 @@ def test_a_load_spectrum_gives_mean_worst_and_every_torque(mesh, numbers):
         assert high[3] == pytest.approx(float(numbers(row, 62.5)[name]), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_tolerance_gives_mean_and_quantile_over_common_deviations(mesh):
     tolerance = jg.Tolerance.from_class(mesh.pair, 6).without_lead()
     table = run(mesh, tolerance=tolerance, samples=4, seed=9, results=("ppte", "effective_contact_ratio"))

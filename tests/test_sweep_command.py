@@ -50,6 +50,7 @@ def folder(tmp_path_factory):
     return folder, result
 
 
+@pytest.mark.slow
 def test_the_table_is_that_of_the_library(folder):
     folder, _ = folder
     table = jg.open_sweep(folder / "out")

@@ -328,6 +328,7 @@ def test_monte_carlo_refuses_impossible_arguments(mesh, change, message):
         jg.monte_carlo(mesh, **arguments)
 
 
+@pytest.mark.slow
 def test_gradients_of_the_mean_scatter_agree_with_differences(mesh, tolerance):
     tolerance = tolerance.without_lead()
 
