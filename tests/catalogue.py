@@ -69,6 +69,15 @@ def flank(
     )
 
 
+POWER_BOX = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.7), "exponent": (1.0, 3.0)}
+
+
+def power_reliefs(x):
+    """Reliefs of both gears of one power curve, from the parameters of `POWER_BOX`."""
+    curve = jg.Power(x["exponent"])
+    return jg.TipRelief(x["pinion"], x["length"], curve), jg.TipRelief(x["wheel"], x["length"], curve)
+
+
 def prepare(pair: jg.GearPair, compliance: jg.Compliance | None = None, resolution: jg.Resolution = COARSE) -> jg.Mesh:
     """`jaxgear.prepare` at the coarse resolution."""
     return jg.prepare(pair, compliance=compliance, resolution=resolution)

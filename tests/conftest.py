@@ -57,6 +57,14 @@ def interpolation():
         yield
 
 
+@pytest.fixture(scope="module")
+def mesh():
+    """The 19/48 pair at a coarse resolution, where a file has no mesh of its own."""
+    from catalogue import TWO_PAIRS, gear_pair, prepare
+
+    return prepare(gear_pair(), resolution=TWO_PAIRS)
+
+
 @pytest.fixture(scope="session")
 def solved():
     """The coupled reference cases of the catalogue, each solved once with its own torque: {name: (case, cycle)}."""

@@ -6,29 +6,18 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import TWO_PAIRS, gear_pair, ppte
+from catalogue import POWER_BOX, TWO_PAIRS, gear_pair, power_reliefs, ppte
 
 import jaxgear as jg
 from jaxgear.metrics import removed_at
 
 TORQUE, POINTS, SMOOTHNESS = 50.0, 24, 1e-3
-BOX = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.7), "exponent": (1.0, 3.0)}
-
-
-def design(x):
-    curve = jg.Power(x["exponent"])
-    return jg.TipRelief(x["pinion"], x["length"], curve), jg.TipRelief(x["wheel"], x["length"], curve)
-
-
-@pytest.fixture(scope="module")
-def mesh():
-    return jg.prepare(gear_pair(), resolution=TWO_PAIRS)
 
 
 @pytest.fixture(scope="module")
 def named(mesh):
     """The best relief of a power curve."""
-    return jg.minimize(design, BOX, mesh=mesh, torque=TORQUE)
+    return jg.minimize(power_reliefs, POWER_BOX, mesh=mesh, torque=TORQUE)
 
 
 def free(mesh, **options):

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import TWO_PAIRS, gear_pair, solve_any
+from catalogue import POWER_BOX, power_reliefs, solve_any
 
 import jaxgear as jg
 from jaxgear.optimize.cases import cases
@@ -16,24 +16,13 @@ from jaxgear.optimize.problem import Linearization, Pieces, Roughness, make_prob
 from jaxgear.tolerance import GearTolerance
 
 TORQUES = (50.0, 30.0)
-BOX = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.7), "exponent": (1.0, 3.0)}
 POINT = np.array([0.31, 0.46, 0.72, 0.22])
 STEP = 1e-5  # of the central differences, in the unit box
 
 
-def design(x):
-    curve = jg.Power(x["exponent"])
-    return jg.TipRelief(x["pinion"], x["length"], curve), jg.TipRelief(x["wheel"], x["length"], curve)
-
-
-@pytest.fixture(scope="module")
-def mesh():
-    return jg.prepare(gear_pair(), resolution=TWO_PAIRS)
-
-
 def problem_of(mesh, loads=TORQUES, objective="ppte", constraints=(), **deviations):
     judged = cases(mesh, jg.LoadSpectrum(loads), **deviations)
-    return make_problem(design, BOX, mesh, judged, (objective,), jg.Mean(), constraints)
+    return make_problem(power_reliefs, POWER_BOX, mesh, judged, (objective,), jg.Mean(), constraints)
 
 
 @eqx.filter_jit
@@ -48,7 +37,8 @@ def differences(function):
 
 
 def reliefs(x):
-    return design(dict(zip(BOX, [low + at * (high - low) for at, (low, high) in zip(x, BOX.values())])))
+    box = POWER_BOX.values()
+    return power_reliefs(dict(zip(POWER_BOX, [low + at * (high - low) for at, (low, high) in zip(x, box)])))
 
 
 def test_slopes_of_the_transmission_error(mesh):

@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import TWO_PAIRS, gear_pair, ppte
+from catalogue import ppte
 from known_optimum import BOX as TALL
 from known_optimum import DELTA0, Known, depth, grid, ppte_of, ppte_of_parabolas
 
@@ -18,11 +18,6 @@ BOX = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.7)}
 
 def design(x):
     return jg.TipRelief(x["pinion"], x["length"]), jg.TipRelief(x["wheel"], x["length"])
-
-
-@pytest.fixture(scope="module")
-def mesh():
-    return jg.prepare(gear_pair(), resolution=TWO_PAIRS)
 
 
 @pytest.fixture(scope="module")
