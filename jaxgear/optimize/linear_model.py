@@ -6,9 +6,10 @@ exact extremes, so that kinks, which stop a gradient method, are part of the mod
 Uryasev 2000, doi 10.21314/JOR.2000.038); other measures keep the shares that the cases have at the point.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from copy import copy
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -37,7 +38,7 @@ class Step(NamedTuple):
     decrease: float
 
 
-class Scalarization(Protocol):
+class AbstractScalarization(ABC):
     """Makes one number of several objectives: the largest of scaled ones, plus a part of the sum of all.
 
     Attributes:
@@ -46,8 +47,15 @@ class Scalarization(Protocol):
 
     part: float
 
+    @abstractmethod
     def scales(self) -> tuple[np.ndarray, np.ndarray]:
         """Factor and offset of every objective."""
+
+    def join(self, values: np.ndarray) -> np.ndarray:
+        """The one number, objectives on the last axis."""
+        factor, offset = self.scales()
+        scaled = factor * values + offset
+        return scaled.max(axis=-1) + self.part * scaled.sum(axis=-1)
 
 
 class Model:
@@ -59,6 +67,9 @@ class Model:
         linearization: of the problem at that point.
         scalarization: of several objectives; None for one.
         penalty: of a relative violation of 1; None to size it by the objective at the point.
+
+    Attributes:
+        values: objectives at the point; inf where a contact solution behind them failed.
     """
 
     def __init__(
@@ -66,12 +77,12 @@ class Model:
         problem: Problem,
         x: np.ndarray,
         linearization: Linearization,
-        scalarization: Scalarization | None = None,
+        scalarization: AbstractScalarization | None = None,
         penalty: float | None = None,
     ):
         self._lin: Linearization = jax.tree.map(lambda part: np.asarray(part, float), linearization)
         self._measure, self._weights = problem.measure, np.asarray(problem.cases.weights, float)
-        self._cases = [pieces.upper.max(axis=1) - pieces.lower.min(axis=1) for pieces in self._lin.objectives]
+        self._shares, self.values = self._measured_cases()
         self._scalarization = scalarization
         self._x, roughness = np.asarray(x, float), problem.roughness
         self._forms = np.zeros((0, len(x))) if roughness is None else np.asarray(roughness.forms, float)
@@ -87,19 +98,13 @@ class Model:
         return bool(self._lin.fine)
 
     @property
-    def values(self) -> np.ndarray:
-        """Objectives at the point."""
-        if not self.fine:
-            return np.full(len(self._cases), np.inf)
-        return np.asarray([self._shares(cases) @ cases for cases in self._cases])
-
-    @property
     def value(self) -> float:
         """The one number at the point, with the penalty of the roughness."""
         if not self.fine:
             return np.inf
         rough = np.abs(self._forms @ self._x).max(initial=0.0)
-        return self._joined(self.values) + self._rough_weight * float(rough)
+        joined = self.values[0] if self._scalarization is None else self._scalarization.join(self.values)
+        return float(joined) + self._rough_weight * float(rough)
 
     @property
     def violation(self) -> float:
@@ -143,20 +148,18 @@ class Model:
         settled._lin = self._lin._replace(excess=jnp.where(excess <= FEASIBLE, jnp.minimum(excess, 0.0), excess))
         return max(settled.best_step(reach).decrease / reach, 0.0)
 
-    def _shares(self, cases: np.ndarray) -> np.ndarray:
-        return np.asarray(self._measure.shares(jnp.asarray(cases), jnp.asarray(self._weights)))
-
-    def _joined(self, values: np.ndarray) -> float:
-        if self._scalarization is None:
-            return float(values[0])
-        factor, offset = self._scalarization.scales()
-        scaled = factor * values + offset
-        return float(scaled.max() + self._scalarization.part * scaled.sum())
+    def _measured_cases(self) -> tuple[list[np.ndarray], np.ndarray]:
+        """Shares of the cases in every objective, and the objectives."""
+        if not self.fine:
+            return [], np.full(len(self._lin.objectives), np.inf)
+        cases = [pieces.upper.max(axis=1) - pieces.lower.min(axis=1) for pieces in self._lin.objectives]
+        shares = [np.asarray(self._measure.shares(jnp.asarray(each), jnp.asarray(self._weights))) for each in cases]
+        return shares, np.asarray([share @ each for share, each in zip(shares, cases)])
 
     def _cost(self, program: "_Program", low, high) -> tuple[dict[int, float], float]:
         """Coefficients of the one number in the variables, and its constant."""
-        pairs = zip(self._lin.objectives, self._cases)
-        each = [self._measured(program, pieces, cases, low, high) for pieces, cases in pairs]
+        pairs = zip(self._lin.objectives, self._shares)
+        each = [self._measured(program, pieces, shares, low, high) for pieces, shares in pairs]
         if self._scalarization is None:
             return each[0], 0.0
         (largest,) = program.variables(1)
@@ -169,10 +172,10 @@ class Model:
             constant += part * offset
         return cost, constant
 
-    def _measured(self, program: "_Program", pieces: Pieces, cases: np.ndarray, low, high) -> dict[int, float]:
+    def _measured(self, program: "_Program", pieces: Pieces, shares: np.ndarray, low, high) -> dict[int, float]:
         """Coefficients of an objective in the variables, with the rows that the measure needs."""
         measure = self._measure
-        weights = self._weights if isinstance(measure, Worst | CVaR) else self._shares(cases)
+        weights = self._weights if isinstance(measure, Worst | CVaR) else shares
         carrying = np.flatnonzero(weights > 0)
         spans = [_span(program, pieces, case, low, high) for case in carrying]
         weights = weights[carrying]

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from ..numerics import whole
-from .linear_model import Model, Scalarization
+from .linear_model import AbstractScalarization, Model
 from .problem import Linearization, Problem
 from .search import AbstractMethod, Record
 from .starts import points_nearby, real_points, start_points
@@ -90,7 +90,7 @@ class Search:
         scalarization: of several objectives.
     """
 
-    def __init__(self, point: np.ndarray, scalarization: Scalarization | None = None):
+    def __init__(self, point: np.ndarray, scalarization: AbstractScalarization | None = None):
         self.trial, self.scalarization = point, scalarization
         self._point = point
         self._model: Model | None = None

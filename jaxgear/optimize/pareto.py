@@ -9,7 +9,7 @@ from scipy.stats import qmc
 from ..numerics import whole
 from ..numerics.pareto import pareto_front
 from .goal import FEASIBLE, QUANTITIES, name_of
-from .linear_model import Model
+from .linear_model import AbstractScalarization, Model
 from .minimax import Search, follow
 from .problem import Problem
 from .result import Front
@@ -69,7 +69,7 @@ class Pareto(AbstractMethod):
         return met.front()
 
 
-class _Chebyshev:
+class _Chebyshev(AbstractScalarization):
     """Largest weighted distance from the ideal point, in spans of the objectives."""
 
     part = _SUM
@@ -82,12 +82,6 @@ class _Chebyshev:
         low, span = self._frame()
         factor = self._weight / span
         return factor, -factor * low
-
-    def distance(self, values: np.ndarray) -> np.ndarray:
-        """Of designs, shape (designs, objectives)."""
-        factor, offset = self.scales()
-        scaled = factor * values + offset
-        return scaled.max(axis=1) + self.part * scaled.sum(axis=1)
 
 
 class _Met:
@@ -136,7 +130,7 @@ class _Met:
 
     def best(self, way: _Chebyshev) -> np.ndarray:
         """The design of the least distance."""
-        return self._points[way.distance(self._values).argmin()]
+        return self._points[way.join(self._values).argmin()]
 
     def compromise(self) -> tuple[np.ndarray, float]:
         """The design whose worst distance from the ideal, in spans of the front, is about the least; and that distance.
@@ -145,9 +139,8 @@ class _Met:
         """
         if not self.found:
             return np.full(self._points.shape[1], 0.5), np.inf
-        scaled = (self._values - self._low) / self._span
-        best = int((scaled.max(axis=1) + _SUM * scaled.sum(axis=1)).argmin())
-        return self._points[best], float(scaled[best].max())
+        best = int(_Chebyshev(np.ones_like(self._low), self.frame).join(self._values).argmin())
+        return self._points[best], float(((self._values[best] - self._low) / self._span).max())
 
     def front(self) -> Front:
         """Ascending in the first objective."""

@@ -178,14 +178,12 @@ class Problem(eqx.Module):
     def _numbers_and_slopes(self, x: Vector, objectives: tuple[str | Number, ...]):
         """Objectives and excesses of every case with their slopes, and whether the contact solutions converged."""
 
-        def of_case(candidate: Candidate):
-            numbers = [number(of)(candidate) for of in objectives]
-            return jnp.concatenate([jnp.asarray(numbers, x.dtype), self._excess(candidate)]), _fine(candidate.cycle)
-
         def at(torque, deviation):
             def numbers(x):
-                values, fine = of_case(self._candidate(x, torque, deviation))
-                return values, (values, fine)
+                candidate = self._candidate(x, torque, deviation)
+                each = jnp.asarray([number(of)(candidate) for of in objectives], x.dtype)
+                values = jnp.concatenate([each, self._excess(candidate)])
+                return values, (values, _fine(candidate.cycle))
 
             # case by case: the numbers of one do not depend on the others
             slopes, (values, fine) = jax.jacrev(numbers, has_aux=True)(x)
