@@ -10,7 +10,7 @@ import pytest
 from catalogue import POWER_BOX, power_reliefs, solve_any
 
 import jaxgear as jg
-from jaxgear.optimize.cases import cases
+from jaxgear.conditions import cases
 from jaxgear.optimize.linear_model import PENALTY, Model
 from jaxgear.optimize.problem import Linearization, Pieces, Roughness, make_problem
 from jaxgear.tolerance import GearTolerance

@@ -9,7 +9,7 @@ from known_optimum import BOX as TALL
 from known_optimum import DELTA0, Known, depth, grid, ppte_of, ppte_of_parabolas
 
 import jaxgear as jg
-from jaxgear.optimize.cases import cases
+from jaxgear.conditions import cases
 from jaxgear.tolerance import GearTolerance
 
 TORQUE = 50.0

@@ -8,7 +8,7 @@ from catalogue import constant_stiffness_mesh, gear_pair, kahraman_gear, prepare
 
 import jaxgear as jg
 from jaxgear.microgeometry import Flank
-from jaxgear.optimize import (
+from jaxgear.sizing import (
     crowning_for_misalignment,
     crowning_for_tolerance,
     dynamic_relief,

@@ -13,7 +13,7 @@ import pytest
 
 import jaxgear as jg
 from jaxgear.metrics import RESULTS, result_key
-from jaxgear.sweep.selection import front, smallest
+from jaxgear.sweeps.selection import front, smallest
 
 BOUNDS = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.5)}
 FEW = ("ppte", "max_flank_pressure", "effective_contact_ratio")

@@ -12,7 +12,8 @@ import typer
 from ..io import DesignFileError, optimize_request
 from ..io.schema import METHODS_WITHOUT_VARIABLES
 from ..microgeometry import NoModification
-from ..optimize import METHODS, iso_relief
+from ..optimize import METHODS
+from ..sizing import iso_relief
 from . import report
 from .devices import join_processes, use_all_cores
 from .run import run

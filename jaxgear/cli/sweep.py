@@ -13,7 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from ..io import load_design, sweep_request
-from ..sweep import SweepTable, sweep
+from ..sweeps import SweepTable, sweep
 from . import report
 from .cache import enable_cache
 from .sweep_figures import write_figures

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..metrics import result_key
-from ..sweep import SweepTable
+from ..sweeps import SweepTable
 
 _DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory does not grow with the table
 _CHARTS = 6  # radar charts

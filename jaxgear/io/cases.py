@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ..sweep import LoadSpectrum
+from ..conditions import LoadSpectrum
 from ..tolerance import Tolerance
 from . import schema
 from .design_file import DesignFile

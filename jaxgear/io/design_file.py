@@ -12,7 +12,7 @@ from ..compliance import Beam, Compliance, ElasticRing, legacy_compliance
 from ..contact import Mesh, Resolution, fewest_pairs, prepare
 from ..geometry import Gear, GearPair, Material
 from ..microgeometry import AbstractModification
-from ..optimize import iso_stiffness
+from ..sizing import iso_stiffness
 from . import schema, template
 from .errors import DesignFileError, refused, suggestion
 from .toml import decode, join, read

@@ -3,8 +3,9 @@
 import dataclasses
 from typing import Any
 
+from ..conditions import LoadSpectrum
 from ..metrics import RESULTS
-from ..sweep import AbstractPlan, FullFactorial, LatinHypercube, LoadSpectrum, Sobol
+from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
 from . import schema
 from .cases import load_of, tolerance_of

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..sweep import VariantList
+from ..sweeps import VariantList
 from .errors import DesignFileError
 
 _UNIT = re.compile(r" \[[^]]*\]$")  # of a heading, as tables of sweeps are exported

@@ -14,13 +14,6 @@ from .goal import QUANTITIES as QUANTITIES
 from .goal import Candidate as Candidate
 from .goal import Constraint as Constraint
 from .iteration import iterate_transmission_error as iterate_transmission_error
-from .lead_sizing import crowning_for_misalignment as crowning_for_misalignment
-from .lead_sizing import crowning_for_tolerance as crowning_for_tolerance
-from .lead_sizing import end_relief_amount as end_relief_amount
-from .lead_sizing import end_relief_length as end_relief_length
-from .lead_sizing import equivalent_misalignment as equivalent_misalignment
-from .lead_sizing import iso_crowning as iso_crowning
-from .lead_sizing import iso_end_relief as iso_end_relief
 from .methods import METHODS as METHODS
 from .minimax import Minimax as Minimax
 from .minimize import minimize as minimize
@@ -31,13 +24,3 @@ from .quasi_newton import LBFGS as LBFGS
 from .result import Front as Front
 from .result import Iterate as Iterate
 from .result import Optimum as Optimum
-from .sizing import IsoStiffness as IsoStiffness
-from .sizing import dynamic_relief as dynamic_relief
-from .sizing import effective_relief as effective_relief
-from .sizing import iso_relief as iso_relief
-from .sizing import iso_stiffness as iso_stiffness
-from .sizing import long_relief_length as long_relief_length
-from .sizing import mesh_stiffness_relief as mesh_stiffness_relief
-from .sizing import relief_amount as relief_amount
-from .sizing import run_in_relief as run_in_relief
-from .sizing import short_relief_length as short_relief_length

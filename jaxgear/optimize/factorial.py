@@ -6,7 +6,7 @@ import equinox as eqx
 import numpy as np
 
 from ..numerics import whole
-from ..sweep import FullFactorial
+from ..sweeps import FullFactorial
 from .evaluate import scores
 from .problem import Problem
 from .search import AbstractMethod, Record

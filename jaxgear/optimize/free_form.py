@@ -8,19 +8,19 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..conditions import cases
 from ..contact import Mesh
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, TabulatedProfile
 from ..numerics import AbstractMeasure, Mean, check, whole
+from ..sizing import iso_relief
 from ..tolerance import Tolerance
-from .cases import cases
 from .goal import Constraint
 from .minimax import Search, follow
 from .minimize import optimum_of
 from .problem import Parameters, Problem, Roughness
 from .result import Optimum
 from .search import Callback, Record
-from .sizing import iso_relief
 
 _FEWEST = 4  # values per flank
 _TOLERANCE = 1e-3  # a search ends where the predicted decrease is below this part of the objective

@@ -8,11 +8,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..conditions import cases
 from ..contact import Mesh, removed_material, solve_removed
 from ..metrics import peak_to_peak
 from ..numerics import AbstractMeasure, CVaR, Mean, Quantile, Worst
 from ..tolerance import Tolerance
-from .cases import cases
 from .goal import Constraint, Number, name_of
 from .linear_model import Model
 from .methods import method_named

@@ -8,11 +8,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from ..conditions import Cases
 from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..metrics import smooth_peak_to_peak
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import AbstractMeasure, check, real
-from .cases import Cases
 from .goal import PPTE, Candidate, Constraint, Number, known, number
 
 Scalar = Float[Array, ""]

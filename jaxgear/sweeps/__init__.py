@@ -1,6 +1,5 @@
 """Many variants into one table: plans, their evaluation on all devices, and a resumable store."""
 
-from .load import LoadSpectrum as LoadSpectrum
 from .plan import AbstractPlan as AbstractPlan
 from .plan import FullFactorial as FullFactorial
 from .plan import VariantList as VariantList

@@ -16,12 +16,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..conditions import LoadSpectrum
 from ..contact import Mesh, removed_material
 from ..numerics import whole
 from ..tolerance import Tolerance, sample_deviations
 from .columns import CONVERGED, VARIANT, Column, parameter_columns
 from .evaluate import Design, Evaluator, Pending
-from .load import LoadSpectrum
 from .plan import AbstractPlan
 from .store import MANIFEST, Store, make_manifest
 from .table import SweepTable, in_memory, open_sweep

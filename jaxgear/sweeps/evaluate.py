@@ -10,12 +10,12 @@ import numpy as np
 from jax.sharding import Mesh as DeviceMesh
 from jax.sharding import NamedSharding, PartitionSpec
 
+from ..conditions import LoadSpectrum
 from ..contact import Mesh, solve, solve_removed
 from ..metrics import RESULTS
 from ..microgeometry import AbstractModification
 from ..tolerance import Deviation, deviated_material
 from .columns import CONVERGED, result_columns
-from .load import LoadSpectrum
 from .possible import Possible
 
 Design = Callable[[Mapping[str, Any]], tuple[AbstractModification | None, AbstractModification | None]]

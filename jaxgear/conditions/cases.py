@@ -7,9 +7,9 @@ from jaxtyping import Array, Float
 
 from ..contact import Mesh
 from ..numerics import check, real, whole
-from ..sweep import LoadSpectrum
 from ..tolerance import Tolerance, sample_deviations
 from ..tolerance.deviation import deviation_field, flank_basis
+from .load import LoadSpectrum
 
 
 class Cases(eqx.Module):
