@@ -4,10 +4,16 @@ from .complementarity import ContactProblem as ContactProblem
 from .complementarity import ContactSolution as ContactSolution
 from .complementarity import solve_contact as solve_contact
 from .complementarity import tangent_stiffness as tangent_stiffness
+from .fields import Checked as Checked
+from .fields import Number as Number
 from .fields import check as check
 from .fields import concrete as concrete
+from .fields import count as count
+from .fields import fields_of as fields_of
+from .fields import number as number
 from .fields import optional_real as optional_real
 from .fields import real as real
+from .fields import result as result
 from .fields import whole as whole
 from .logarithm import log as log
 from .quadrature import gauss_legendre as gauss_legendre

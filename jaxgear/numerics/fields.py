@@ -1,15 +1,108 @@
-"""Converters and checks for the number fields of Modules.
+"""Number fields of Modules: declared once with unit and range, then converted, checked and printed from that.
 
 A bare Python float in a Module is static to JAX: it retraces per value and gets no gradient. Every number field
-therefore goes through `real`. Checks run on concrete values only; tracers pass through.
+therefore goes through `real`. Ranges are checked on concrete values only, tracers pass; shapes are always checked.
 """
 
+import dataclasses
+from dataclasses import MISSING
+from typing import Any, Literal, get_args, get_origin
+
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 _MOST = 2**53  # whole numbers up to here are exact as floating-point numbers too, in every reader of a table
+_KEY = "number"  # of a `Number` in the metadata of its field
+_SHOWN = 6  # numbers of an array that are printed; of a longer one its range is
+
+
+@dataclasses.dataclass(frozen=True)
+class Number:
+    """What a number field may hold.
+
+    Attributes:
+        unit: "" for a pure number.
+        low, high: allowed range, None without a limit.
+        open_low, open_high: the limit itself is not allowed.
+        whole: whole numbers only.
+        optional: None is allowed.
+        shape: names of the axes, () for a single number.
+        fewest: smallest length of an axis.
+        static: a Python number that is part of the structure, not a leaf.
+        checked: False for a result, which may hold anything, NaN included.
+    """
+
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    open_low: bool = False
+    open_high: bool = False
+    whole: bool = False
+    optional: bool = False
+    shape: tuple[str, ...] = ()
+    fewest: int = 1
+    static: bool = False
+    checked: bool = True
+
+
+def number(unit: str, *, default: Any = MISSING, kw_only: bool = False, **limits) -> Any:
+    """A field that holds a number or an array of numbers, a leaf that JAX can trace and differentiate.
+
+    Args:
+        unit: "" for a pure number.
+        default: value where none is given.
+        kw_only: as in dataclasses.
+        limits: the other fields of `Number`.
+    """
+    kind = Number(unit, **limits)
+    converter = _plain if kind.static else optional_real if kind.optional else real
+    return _field(kind, default, kw_only, converter=converter, static=kind.static)
+
+
+def count(
+    *, low: int = 1, high: int | None = None, optional: bool = False, default: Any = MISSING, kw_only: bool = False
+) -> Any:
+    """A static field that holds a whole number: a size, or how often something is done."""
+    kind = Number("", low, _MOST if high is None else high, whole=True, optional=optional, static=True)
+    return _field(kind, default, kw_only, converter=_plain, static=True)
+
+
+def result(unit: str = "") -> Any:
+    """A field of a result: printed with its unit, neither converted nor checked."""
+    return _field(Number(unit, checked=False), MISSING, False)
+
+
+def fields_of(cls: type) -> dict[str, Number]:
+    """The number fields of a class: what may be given for each."""
+    return {field.name: field.metadata[_KEY] for field in dataclasses.fields(cls) if _KEY in field.metadata}
+
+
+class Checked(eqx.Module):
+    """A Module whose fields are checked when it is made, and which prints its numbers with their units.
+
+    Besides its number fields, choices (`Literal`), switches (`bool`) and Modules within it are checked against their
+    annotation.
+
+    Raises:
+        ValueError: in one line that names class, field, value, unit and what is allowed.
+        TypeError: for something else than the Module that a field wants.
+    """
+
+    def __check_init__(self):
+        for field in dataclasses.fields(self):
+            _check_field(type(self).__name__, field, getattr(self, field.name))
+        self.check_together()
+
+    def check_together(self) -> None:
+        """Raises a `ValueError` where fields that are allowed one by one do not go together."""
+
+    def __repr__(self) -> str:
+        fields = [(field, getattr(self, field.name)) for field in dataclasses.fields(self) if field.repr]
+        parts = [f"{field.name}={_shown(value, field.metadata.get(_KEY, Number()).unit)}" for field, value in fields]
+        return f"{type(self).__name__}({', '.join(parts)})"
 
 
 def real(value) -> Float[Array, "..."]:
@@ -60,13 +153,74 @@ def check(
     )
 
 
-def whole(owner: str, name: str, value, low: int = 1) -> int:
-    """The value as an int; raises a one-line `ValueError` unless it is a whole number of at least `low`."""
+def whole(owner: str, name: str, value, low: int = 1, high: int = _MOST) -> int:
+    """The value as an int; raises a one-line `ValueError` unless it is a whole number from `low` to `high`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
         raise ValueError(f"{owner}: {name} = {value!r} must be a whole number of at least {low}")
-    if value > _MOST:
-        raise ValueError(f"{owner}: {name} = {value!r} must be at most 2^53")
+    if value > high:
+        raise ValueError(f"{owner}: {name} = {value!r} must be at most {'2^53' if high == _MOST else high}")
     return int(value)
+
+
+def _field(kind: Number, default, kw_only: bool, **options):
+    if default is not MISSING:
+        options["default"] = default
+    if kw_only:
+        options["kw_only"] = True
+    return eqx.field(metadata={_KEY: kind}, **options)
+
+
+def _plain(value):
+    """NumPy's scalars as Python's, which can be static."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _check_field(owner: str, field: dataclasses.Field, value) -> None:
+    kind = field.metadata.get(_KEY)
+    if kind is not None:
+        if kind.checked:
+            _check_number(owner, field.name, value, kind)
+    elif get_origin(field.type) is Literal:
+        options = get_args(field.type)
+        if not isinstance(value, str) or value not in options:
+            *first, last = [f'"{option}"' for option in options]
+            raise ValueError(f"{owner}: {field.name} = {value!r} must be {', '.join(first)} or {last}")
+    elif field.type is bool and not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{owner}: {field.name} = {value!r} must be True or False")
+    elif isinstance(field.type, type) and issubclass(field.type, eqx.Module) and not isinstance(value, field.type):
+        given = value.__name__ if isinstance(value, type) else type(value).__name__
+        # most often the class where an object of it is meant
+        made = f": write {given}(...)" if isinstance(value, type) and issubclass(value, field.type) else ""
+        raise TypeError(f"{owner}: {field.name} is {_shown(value)}, must be of type {field.type.__name__}{made}")
+
+
+def _check_number(owner: str, name: str, value, kind: Number) -> None:
+    if value is None and kind.optional:
+        return
+    if kind.static:
+        if kind.whole:
+            whole(owner, name, value, kind.low, kind.high)
+            return
+        if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
+            raise ValueError(f"{owner}: {name} = {value!r} must be a number")
+    else:
+        _check_shape(owner, name, value.shape, kind)
+    check(owner, name, value, kind.unit, low=kind.low, high=kind.high, open_low=kind.open_low, open_high=kind.open_high)
+    known = concrete(value) if kind.whole else None
+    if known is not None and (known != known.round()).any():
+        shown = float(known[known != known.round()].flat[0])
+        raise ValueError(f"{owner}: {name} = {shown:g} must be a whole number")
+
+
+def _check_shape(owner: str, name: str, shape: tuple[int, ...], kind: Number) -> None:
+    if len(shape) == len(kind.shape) and all(length >= kind.fewest for length in shape):
+        return
+    if not kind.shape:
+        raise ValueError(f"{owner}: {name} has shape {shape}, must be a single number; make many with jax.vmap")
+    least = f"at least {kind.fewest} " if kind.fewest > 1 else ""
+    wanted = "a list of" if len(kind.shape) == 1 else f"a table ({' x '.join(kind.shape)}) of"
+    unit = "numbers" if len(kind.shape) == 1 or not least else "numbers along every axis"
+    raise ValueError(f"{owner}: {name} has shape {shape}, must be {wanted} {least}{unit}")
 
 
 def _range(low, high, open_low, open_high, unit_text) -> str:
@@ -78,3 +232,26 @@ def _range(low, high, open_low, open_high, unit_text) -> str:
     if high is not None:
         parts.append(f"{'less than' if open_high else 'at most'} {float(high):g}{unit_text}")
     return "must be " + " and ".join(parts)
+
+
+def _shown(value, unit: str = "") -> str:
+    """A value as text: numbers with their unit, of many numbers the range, of a tracer its type."""
+    if isinstance(value, jax.core.Tracer):
+        return eqx.tree_pformat(value)
+    if isinstance(value, tuple | list):
+        return f"({', '.join(_shown(item, unit) for item in value)})"
+    if not isinstance(value, jax.Array | np.ndarray | np.generic | float):
+        return repr(value)
+    value = np.asarray(value)
+    if value.dtype == bool:
+        return str(value) if value.ndim == 0 else f"{value.sum()} of {value.size} true"
+    if value.ndim == 0:
+        text = f"{value:.6g}"
+    elif value.ndim == 1 and value.size <= _SHOWN:
+        text = f"[{', '.join(f'{item:.6g}' for item in value)}]"
+    elif value.size:
+        size = " x ".join(str(length) for length in value.shape)
+        text = f"[{size} numbers from {value.min():.6g} to {value.max():.6g}]"
+    else:
+        return "[]"
+    return f"{text} {unit}" if unit else text
