@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..microgeometry import AbstractModification, NoModification, terms
-from ..numerics import ContactProblem, check, real, safe_sqrt, solve_contact, tangent_stiffness
+from ..numerics import ContactProblem, check, minimum, real, safe_sqrt, solve_contact, tangent_stiffness
 from .mesh import Mesh
 
 Scalar = Float[Array, ""]
@@ -129,7 +129,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> MeshCycle:
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.tolerance)
     windup = mesh.hub * force / mesh.pair.face_width
     contact_stiffness = tangent_stiffness(problem, solution)
-    unloaded = jnp.min(gap / mesh.lever[:, None], axis=(0, 1))
+    unloaded = minimum(gap / mesh.lever[:, None], axis=(0, 1))
     return MeshCycle(
         mesh=mesh,
         torque=torque,

@@ -11,7 +11,7 @@ from ..compliance.hertz import AbstractLaw, contact_geometry
 from ..compliance.toothload import ToothLoad, tooth_load
 from ..geometry import GearPair, PathOfContact, outline, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import concrete, whole
+from ..numerics import concrete, minimum, whole
 from .corner import REACH, corner_gap
 
 Scalar = Float[Array, ""]
@@ -188,7 +188,7 @@ def _prepare(pair: GearPair, compliance: Compliance, resolution: Resolution) -> 
         outside=outside,
         corner_gap=gap,
         lever=lever,
-        outer_gap=jnp.min(_gaps_of_next_pairs(pair, contact, jnp.asarray([resolution.reach], dtype))),
+        outer_gap=minimum(_gaps_of_next_pairs(pair, contact, jnp.asarray([resolution.reach], dtype))),
         structure=compliance.structure(pinion, wheel),
         law=compliance.law(geometry, pinion, wheel, outside),
         width_factor=geometry.width_factor[:, 0],

@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 from ..contact import Mesh
 from ..geometry import Gear
 from ..microgeometry import AbstractModification, Flank, NoModification
-from ..numerics import gauss_legendre
+from ..numerics import gauss_legendre, maximum
 
 Scalar = Float[Array, ""]
 Profile = Float[Array, " points"]
@@ -73,8 +73,7 @@ def max_relief(
             for side in _sides(mesh, pinion, wheel)
         ]
     )
-    # the reductions of some backends drop NaN
-    return jnp.where(jnp.isfinite(jnp.sum(removed)), jnp.max(removed), jnp.nan)
+    return maximum(removed)
 
 
 @eqx.filter_jit
@@ -87,7 +86,7 @@ def relief_reversal(
     relief that only grows, and the depth of the dip for one that dips. A profile slope decreases on one of the ways.
     """
     worst = [_decrease(mesh, side) for side in _sides(mesh, pinion, wheel)]
-    return jnp.maximum(*worst)
+    return maximum(jnp.stack(worst))
 
 
 @eqx.filter_jit

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..numerics import safe_divide
+from ..numerics import maximum, minimum, safe_divide
 
 Scalar = Float[Array, ""]
 
@@ -52,17 +52,18 @@ def contact_shock(cycle: MeshCycle) -> ContactShock:
     return ContactShock(
         jnp.sum(jnp.maximum(fraction * step - (step - before), 0.0)),
         jnp.sum(jnp.maximum(fraction * step - (step - after), 0.0)),
-        jnp.max(corner_force),
+        maximum(corner_force),
     )
 
 
 def _loaded_fraction(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
     """Loaded part of every step from one position to the next, per pair."""
-    depth = -jnp.min(cycle.opening, axis=1)
+    depth = -minimum(cycle.opening, axis=1)
     # after the last position every pair takes the place of its predecessor
     arriving = jnp.concatenate([depth[:1, :1] * 0 - jnp.abs(depth[:1, -1:]), depth[:-1, :1]])
     following = jnp.concatenate([depth[:, 1:], arriving], axis=1)
-    low, high = jnp.minimum(depth, following), jnp.maximum(depth, following)
+    rising = following > depth
+    low, high = jnp.where(rising, depth, following), jnp.where(rising, following, depth)
     crossing = (high > 0) & (low <= 0)
     partial = high / jnp.where(crossing, high - low, 1.0)
     return jnp.where(crossing, partial, (low > 0).astype(depth.dtype))

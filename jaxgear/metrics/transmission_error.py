@@ -5,6 +5,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..numerics import spread
+
 Curve = Float[Array, "... positions"]
 
 
@@ -23,11 +25,10 @@ class Harmonics(eqx.Module):
 def peak_to_peak(curve: Curve) -> Float[Array, "..."]:
     """Largest minus smallest value over the positions (PPTE for a transmission error, in um).
 
-    It touches two positions only and has zero gradient on ties: report it, and follow `smooth_peak_to_peak` or the
-    harmonics when optimizing. NaN is passed on even where the reductions of the backend would drop it.
+    It touches two positions only, the first ones on ties: report it, and follow `smooth_peak_to_peak` or the harmonics
+    when optimizing. NaN is passed on even where the reductions of the backend would drop it.
     """
-    spread = jnp.max(curve, axis=-1) - jnp.min(curve, axis=-1)
-    return jnp.where(jnp.isfinite(jnp.sum(curve, axis=-1)), spread, jnp.nan)
+    return spread(curve, axis=-1)
 
 
 def smooth_peak_to_peak(curve: Curve, smoothing) -> Float[Array, "..."]:

@@ -1,9 +1,12 @@
-"""Numerical tools without a gear word in them: fields, safe functions, quadrature, roots, complementarity, risk."""
+"""Numerical tools without a gear word: fields, safe functions, extremes, quadrature, roots, complementarity, risk."""
 
 from .complementarity import ContactProblem as ContactProblem
 from .complementarity import ContactSolution as ContactSolution
 from .complementarity import solve_contact as solve_contact
 from .complementarity import tangent_stiffness as tangent_stiffness
+from .extremes import maximum as maximum
+from .extremes import minimum as minimum
+from .extremes import spread as spread
 from .fields import Checked as Checked
 from .fields import Number as Number
 from .fields import check as check

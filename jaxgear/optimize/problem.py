@@ -12,7 +12,7 @@ from ..conditions import Cases
 from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..metrics import smooth_peak_to_peak
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import AbstractMeasure, check, real
+from ..numerics import AbstractMeasure, check, maximum, real
 from .goal import PPTE, Candidate, Constraint, Number, known, number
 
 Scalar = Float[Array, ""]
@@ -151,7 +151,7 @@ class Problem(eqx.Module):
             return *numbers, self._excess(candidate), _fine(candidate.cycle)
 
         soft, true, excess, fine = self.over_cases(x, of_case)
-        return self._measured(soft), self._measured(true), jnp.max(excess, axis=0), jnp.all(fine)
+        return self._measured(soft), self._measured(true), maximum(excess, axis=0), jnp.all(fine)
 
     def linearize(self, x: Vector) -> Linearization:
         """The objectives and the constraints with their slopes."""

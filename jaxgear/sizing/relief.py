@@ -13,7 +13,7 @@ from ..contact import MeshCycle
 from ..geometry import GearPair, path_of_contact
 from ..metrics import secant_stiffness
 from ..microgeometry import AbstractCurve, TipRelief
-from ..numerics import check, real, safe_divide
+from ..numerics import check, minimum, real, safe_divide
 
 Scalar = Float[Array, ""]
 
@@ -147,9 +147,7 @@ def dynamic_relief(cycle: MeshCycle, internal_force=0.0, external_force=0.0) -> 
     check("dynamic_relief", "internal_force", internal_force, "N", low=0.0)
     check("dynamic_relief", "external_force", external_force, "N", low=0.0)
     stiffness = secant_stiffness(cycle)
-    # the reductions of some backends drop NaN
-    smallest = jnp.where(jnp.isfinite(jnp.sum(stiffness)), jnp.min(stiffness), jnp.nan)
-    return safe_divide(cycle.force + real(internal_force) + real(external_force), smallest)
+    return safe_divide(cycle.force + real(internal_force) + real(external_force), minimum(stiffness))
 
 
 def iso_relief(pair: GearPair, torque, *, curve: AbstractCurve | None = None, application_factor=1.0) -> TipRelief:

@@ -14,6 +14,7 @@ from ..conditions import LoadSpectrum
 from ..contact import Mesh, solve, solve_removed
 from ..metrics import RESULTS
 from ..microgeometry import AbstractModification
+from ..numerics import maximum, minimum
 from ..tolerance import Deviation, deviated_material
 from .columns import CONVERGED, result_columns
 from .possible import Possible
@@ -163,7 +164,7 @@ def _over_torques(cycle_numbers, load: LoadSpectrum, deviation, results):
     numbers, fine = jax.vmap(lambda torque: cycle_numbers(torque, deviation))(load.torques)
     flat = []
     for name, values in zip(results, numbers):
-        worst = jnp.max(values) if RESULTS[name].worst == "max" else jnp.min(values)
+        worst = maximum(values) if RESULTS[name].worst == "max" else minimum(values)
         flat += [jnp.sum(load.weights * values), worst, *values]
     return flat, jnp.all(fine)
 

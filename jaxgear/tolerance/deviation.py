@@ -10,7 +10,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from ..contact import Mesh, removed_material
 from ..microgeometry import AbstractModification, Flank, LeadSlope, ProfileSlope
-from ..numerics import real, whole
+from ..numerics import real, spread, whole
 from .distribution import AbstractDistribution
 from .limits import GearTolerance, Tolerance, check_slices
 
@@ -191,7 +191,7 @@ def _random_shape(key: PRNGKeyArray, dtype) -> Float[Array, " waves"]:
     order = jnp.arange(1, HARMONICS + 1, dtype=dtype)
     shape = jnp.concatenate([jnp.cos(angle) / order, jnp.sin(angle) / order])
     heights = jnp.asarray(_grid(), dtype) @ shape
-    return shape / (jnp.max(heights) - jnp.min(heights))
+    return shape / spread(heights)
 
 
 @cache
