@@ -10,7 +10,7 @@ import pytest
 from catalogue import POWER_BOX, power_reliefs, solve_any
 
 import jaxgear as jg
-from jaxgear.conditions import cases
+from jaxgear.conditions import conditions
 from jaxgear.optimize.linear_model import PENALTY, Model
 from jaxgear.optimize.problem import Linearization, Pieces, Roughness, make_problem
 from jaxgear.tolerance import GearTolerance
@@ -21,7 +21,7 @@ STEP = 1e-5  # of the central differences, in the unit box
 
 
 def problem_of(mesh, loads=TORQUES, objective="ppte", constraints=(), **deviations):
-    judged = cases(mesh, jg.LoadSpectrum(loads), **deviations)
+    judged = conditions("test", mesh, jg.LoadSpectrum(loads), **deviations).on(mesh)
     return make_problem(power_reliefs, POWER_BOX, mesh, judged, (objective,), jg.Mean(), constraints)
 
 

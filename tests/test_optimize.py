@@ -9,7 +9,7 @@ from known_optimum import BOX as TALL
 from known_optimum import DELTA0, Known, depth, grid, ppte_of, ppte_of_parabolas
 
 import jaxgear as jg
-from jaxgear.conditions import cases
+from jaxgear.conditions import conditions
 from jaxgear.tolerance import GearTolerance
 
 TORQUE = 50.0
@@ -278,7 +278,7 @@ def test_manufactured_gears(known, best):
     assert result.parameters == again.parameters and result.objective == again.objective
     assert result.objective_name == "75 % CVaR of ppte"
 
-    removed = cases(known.mesh, known.torque, **made).removed[0]
+    removed = conditions("test", known.mesh, known.torque, **made).on(known.mesh).removed[0]
     assert removed.shape[0] == 8
 
     def tail(found):
@@ -308,7 +308,6 @@ def test_manufactured_gears(known, best):
         (BOX, {"method": "pareto"}, "1 objectives"),
         (BOX, {"constraints": [jg.Constraint({"lenght": 1.0}, high=5.0)]}, '"lenght" of a constraint'),
         (BOX, {"samples": 8}, "samples = 8"),
-        (BOX, {"tolerance": jg.Tolerance()}, "samples = None"),
         (BOX, {"torque": -1.0}, "torque"),
         (BOX, {"method": jg.Factorial(1000)}, "1000000000 designs"),
     ],

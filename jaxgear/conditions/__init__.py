@@ -1,5 +1,10 @@
 """Under what a design is judged: loads, manufactured gears, and how the cases are joined into one number."""
 
 from .cases import Cases as Cases
-from .cases import cases as cases
+from .cases import Conditions as Conditions
+from .cases import conditions as conditions
+from .join import in_words as in_words
+from .join import joined as joined
+from .join import label as label
 from .load import LoadSpectrum as LoadSpectrum
+from .solved import solved as solved

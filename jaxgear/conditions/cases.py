@@ -1,4 +1,4 @@
-"""The loads and manufactured gears over which a design is judged."""
+"""The cases in which a design is judged: every load with every manufactured pair."""
 
 import equinox as eqx
 import jax
@@ -7,80 +7,123 @@ from jaxtyping import Array, Float
 
 from ..contact import Mesh
 from ..numerics import check, real, whole
-from ..tolerance import Tolerance, sample_deviations
+from ..tolerance import Deviation, Tolerance, sample_deviations
 from ..tolerance.deviation import deviation_field, flank_basis
 from .load import LoadSpectrum
 
+SAMPLES = 64  # manufactured pairs, where nothing is said
 
-class Cases(eqx.Module):
-    """Torques, and under each of them the same number of manufactured pairs.
 
-    What a deviation removes depends on the mesh and the torque, not on the design: it is worked out once. Every design
-    of an optimization meets the same gears (common random numbers), every torque meets others.
+class Conditions(eqx.Module):
+    """Under what designs are judged, whatever their mesh: loads, and the gears that run under every one of them.
+
+    All designs meet the same gears, and so do all loads (common random numbers): what is compared differs by the design
+    and the load alone.
 
     Attributes:
-        torque: on the pinion [N m], shape (torques,).
-        weight: of every torque, sum 1, shape (torques,).
-        removed: material that deviations remove [um], shape (torques, samples, pairs, slices, positions); one sample of
-            zeros without deviations.
+        load: torques and their weights.
+        deviations: of the manufactured gears, with a leading axis (samples,); None for perfect gears.
     """
 
-    torque: Float[Array, " torques"]
-    weight: Float[Array, " torques"]
-    removed: Float[Array, "torques samples pairs slices positions"]
+    load: LoadSpectrum
+    deviations: Deviation | None = None
+
+    @property
+    def samples(self) -> int:
+        """Number of manufactured pairs; 1 for perfect gears."""
+        return 1 if self.deviations is None else len(self.deviations.misalignment)
 
     @property
     def count(self) -> int:
         """Contact analyses per design."""
-        return self.removed.shape[0] * self.removed.shape[1]
+        return len(self.load.torques) * self.samples
+
+    def on(self, mesh: Mesh) -> "Cases":
+        """The cases on a mesh; traceable, where every design has a mesh of its own."""
+        dtype = mesh.phase.dtype
+        torques = self.load.torques.astype(dtype)
+        removed = None if self.deviations is None else _removed(mesh, torques, self.deviations)
+        return Cases(torques, self.load.weights.astype(dtype), removed)
+
+
+class Cases(eqx.Module):
+    """Conditions on a mesh.
+
+    What a deviation removes depends on the mesh and the torque, not on the flanks' design: it is worked out once.
+
+    Attributes:
+        torque: on the pinion [N m], shape (torques,).
+        weight: of every torque, sum 1, shape (torques,).
+        removed: material that deviations remove [um], shape (torques, samples, pairs, slices, positions); None for
+            perfect gears.
+    """
+
+    torque: Float[Array, " torques"]
+    weight: Float[Array, " torques"]
+    removed: Float[Array, "torques samples pairs slices positions"] | None
+
+    @property
+    def samples(self) -> int:
+        """Number of manufactured pairs; 1 for perfect gears."""
+        return 1 if self.removed is None else self.removed.shape[1]
+
+    @property
+    def count(self) -> int:
+        """Contact analyses per design."""
+        return len(self.torque) * self.samples
 
     @property
     def weights(self) -> Float[Array, " cases"]:
         """Weight of every case, torques first; sum 1."""
-        samples = self.removed.shape[1]
-        return jnp.repeat(self.weight / samples, samples)
+        return jnp.repeat(self.weight / self.samples, self.samples)
+
+    def each(self, function):
+        """function(torque, removed) in every case, with a leading axis (cases,); the torques run slowest.
+
+        A single case is not mapped, so that it costs no more than a plain call.
+        """
+        if self.removed is None:
+            nothing = jnp.zeros((), self.torque.dtype)
+            if self.count == 1:
+                return jax.tree.map(lambda part: part[None], function(self.torque[0], nothing))
+            return jax.vmap(lambda torque: function(torque, nothing))(self.torque)
+        found = jax.vmap(jax.vmap(function, (None, 0)))(self.torque, self.removed)
+        return jax.tree.map(lambda part: part.reshape(self.count, *part.shape[2:]), found)
 
 
-def cases(
-    mesh: Mesh, torque, *, tolerance: Tolerance | None = None, samples: int | None = None, seed: int = 0
-) -> Cases:
-    """Cases of a torque or a load spectrum.
+def conditions(
+    owner: str, mesh: Mesh, torque, *, tolerance: Tolerance | None = None, samples: int | None = None, seed: int = 0
+) -> Conditions:
+    """Conditions of a torque or a load spectrum, with manufactured gears where there is a tolerance.
 
     Args:
-        mesh: prepared mesh.
+        owner: the function that is asked, for messages.
+        mesh: prepared mesh; its number of pairs and its floating-point type count, nothing else.
         torque: on the pinion [N m], or a `LoadSpectrum`.
         tolerance: of manufactured gears; None for perfect ones.
-        samples: manufactured pairs per torque.
+        samples: manufactured pairs, which run under every torque; None for 64. Sample i depends on the seed and on i
+            alone, see `sample_deviations`.
         seed: of their deviations.
 
     Raises:
-        ValueError: for a negative torque, samples without a tolerance or the other way round, and for lead deviations
-            on a mesh of one slice.
+        ValueError: for a negative torque, samples without a tolerance, and for lead deviations on a mesh of one slice.
     """
-    load = torque if isinstance(torque, LoadSpectrum) else None
-    if load is None:
-        check("minimize", "torque", torque, "N m", low=0.0)
+    load = torque
+    if not isinstance(torque, LoadSpectrum):
+        check(owner, "torque", torque, "N m", low=0.0)
         load = LoadSpectrum.of(real(torque))
-    if (tolerance is None) != (samples is None):
-        raise ValueError(
-            f"minimize: samples = {samples!r} must be given with a tolerance, and a tolerance with samples"
-        )
-    dtype, size = mesh.phase.dtype, mesh.resolution
-    torques, weights = load.torques.astype(dtype), load.weights.astype(dtype)
-    count = len(torques)
-    if tolerance is None or samples is None:
-        removed = jnp.zeros((count, 1, size.pairs, size.slices, size.positions), dtype)
-        return Cases(torques, weights, removed)
-    whole("minimize", "samples", samples)
-    deviations = sample_deviations(tolerance, mesh, count * samples, seed)
-    deviations = jax.tree.map(lambda leaf: leaf.reshape(count, samples, *leaf.shape[1:]), deviations)
-    return Cases(torques, weights, _removed(mesh, torques, deviations))
+    if tolerance is None:
+        if samples is not None:
+            raise ValueError(f"{owner}: samples = {samples!r} has no effect without a tolerance")
+        return Conditions(load)
+    count = SAMPLES if samples is None else whole(owner, "samples", samples)
+    return Conditions(load, sample_deviations(tolerance, mesh, count, seed))
 
 
 @eqx.filter_jit
-def _removed(mesh: Mesh, torques, deviations):
-    def at(torque, several):
+def _removed(mesh: Mesh, torques, deviations: Deviation):
+    def at(torque):
         basis = flank_basis(mesh, torque)
-        return jax.vmap(lambda one: deviation_field(one, basis))(several)
+        return jax.vmap(lambda one: deviation_field(one, basis))(deviations)
 
-    return jax.vmap(at)(torques, deviations)
+    return jax.vmap(at)(torques)

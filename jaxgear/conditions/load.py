@@ -1,4 +1,4 @@
-"""The loads of a sweep."""
+"""The loads over which a design is judged."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,35 +14,56 @@ class LoadSpectrum(eqx.Module):
     Attributes:
         torques: on the pinion [N m], shape (torques,).
         weights: shares, which sum to 1, shape (torques,).
+        speeds: of the pinion at every torque [rpm], shape (torques,); None where nothing asks for them.
     """
 
     torques: Float[Array, " torques"]
     weights: Float[Array, " torques"]
+    speeds: Float[Array, " torques"] | None
 
-    def __init__(self, torques, weights=None):
+    def __init__(self, torques, weights=None, speeds=None):
         """Makes the spectrum.
 
         Args:
-            torques: on the pinion [N m], all different.
+            torques: on the pinion [N m], all different unless they have speeds.
             weights: of any sum; None for equal shares.
+            speeds: of the pinion [rpm], one per torque or one for all; None for none.
 
         Raises:
-            ValueError: for torques or weights that are negative, not finite, repeated or of different number, or
-                weights that are all zero.
+            ValueError: for torques, weights or speeds that are negative, not finite or of different number, loads that
+                are repeated, or weights that are all zero.
         """
         check("LoadSpectrum", "torques", torques, "N m", low=0.0)
         self.torques = real(torques)
         if self.torques.ndim != 1 or not len(self.torques):
             raise ValueError("LoadSpectrum: torques must be a list of at least one torque")
-        known = concrete(self.torques)
-        if known is not None and len(np.unique(known)) != len(known):
-            raise ValueError("LoadSpectrum: torques must be different")
+        self.speeds = None
+        if speeds is not None:
+            check("LoadSpectrum", "speeds", speeds, "rpm", low=0.0)
+            self.speeds = self._as_many("speeds", real(speeds))
+        self._check_different()
         shares = jnp.ones_like(self.torques) if weights is None else real(weights)
         check("LoadSpectrum", "weights", shares, "", low=0.0)
-        if shares.shape != self.torques.shape:
-            raise ValueError(f"LoadSpectrum: {shares.size} weights must be as many as the {len(self.torques)} torques")
+        if shares.ndim != 1:
+            raise ValueError(f"LoadSpectrum: weights must be a list of {len(self.torques)}, one per torque")
+        shares = self._as_many("weights", shares)
         check("LoadSpectrum", "sum of the weights", jnp.sum(shares), "", low=0.0, open_low=True)
         self.weights = shares / jnp.sum(shares)
+
+    def _as_many(self, name: str, values):
+        if values.ndim == 0:
+            values = jnp.full_like(self.torques, values)
+        if values.shape != self.torques.shape:
+            raise ValueError(f"LoadSpectrum: {values.size} {name} must be as many as the {len(self.torques)} torques")
+        return values
+
+    def _check_different(self) -> None:
+        given = [self.torques] if self.speeds is None else [self.torques, self.speeds]
+        known = [concrete(values) for values in given]
+        if any(values is None for values in known):
+            return
+        if len(np.unique(np.stack(known, axis=1), axis=0)) != len(self.torques):
+            raise ValueError("LoadSpectrum: torques must be different" + ", or their speeds" * (len(given) > 1))
 
     @staticmethod
     def of(torque) -> "LoadSpectrum":

@@ -4,19 +4,17 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from ..conditions.batches import padded, side_by_side
 from .goal import FEASIBLE
 from .problem import Problem, Score
 
-_POINTS_SIDE_BY_SIDE = 2**12  # contact points that advance together, whose arrays fit the cache of a CPU
 _INFEASIBLE = 1e6  # rank of a design that passes a limit, above any objective
 
 
 def scores(problem: Problem, points) -> Score:
     """Scores of points of the unit box, leading axis (points,), in batches that fit the cache."""
     count, batch = len(points), min(batch_size(problem), len(points))
-    # whole batches only: the rest would be a program of its own, compiled for the length of the contact solution
-    padded = jnp.concatenate([points, jnp.repeat(points[-1:], -count % batch, axis=0)])
-    return jax.tree.map(lambda part: part[:count], _scores(problem, padded, batch))
+    return jax.tree.map(lambda part: part[:count], _scores(problem, padded(points, batch), batch))
 
 
 @eqx.filter_jit
@@ -26,8 +24,7 @@ def _scores(problem: Problem, points, batch: int) -> Score:
 
 def batch_size(problem: Problem) -> int:
     """Designs side by side."""
-    size = problem.mesh.resolution
-    return max(_POINTS_SIDE_BY_SIDE // (size.positions * size.slices * problem.cases.count), 1)
+    return side_by_side(problem.mesh, problem.cases.count)
 
 
 def fitness(score: Score):

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..conditions import cases
+from ..conditions import conditions
 from ..contact import Mesh
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, TabulatedProfile
@@ -93,7 +93,7 @@ def free_form(
     if any(limit.linear for limit in constraints):
         raise ValueError("free_form: a linear constraint names parameters, and the values of a table have no names")
     began = time.perf_counter()
-    judged = cases(mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
+    judged = conditions("free_form", mesh, torque, tolerance=tolerance, samples=samples, seed=seed).on(mesh)
     roll = _roll_lengths(mesh, points)
     problem = _problem(mesh, judged, roll, max_relief, curvature, measure, constraints)
     heaviest = float(judged.torque[int(np.argmax(judged.weight))])

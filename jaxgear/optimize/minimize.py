@@ -8,10 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..conditions import cases
+from ..conditions import conditions, in_words
 from ..contact import Mesh, removed_material, solve_removed
 from ..metrics import peak_to_peak
-from ..numerics import AbstractMeasure, CVaR, Mean, Quantile, Worst
+from ..numerics import AbstractMeasure, Mean
 from ..tolerance import Tolerance
 from .goal import Constraint, Number, name_of
 from .linear_model import Model
@@ -54,8 +54,8 @@ def minimize(
         measure: of the objective over torques and manufactured gears: `Mean()`, `Worst()`, `Quantile(level)` or
             `CVaR(level)`; None for the mean.
         constraints: limits that hold in every case.
-        tolerance: of manufactured gears, of which `samples` are drawn for every torque; None for perfect gears.
-        samples: manufactured gears per torque.
+        tolerance: of manufactured gears, of which `samples` run under every torque; None for perfect gears.
+        samples: manufactured gears; None for 64 with a tolerance.
         seed: of their random numbers, and of a method that draws some.
         method: "minimax" (sequential linear programming), "adam", "lbfgs", "genetic", "cma_es",
             "differential_evolution", "factorial" or "pareto"; or one with its options, such as `Minimax(starts=8)`.
@@ -77,7 +77,7 @@ def minimize(
             f"minimize: {len(objectives)} objectives with method {method.name!r}: a Pareto front takes several and is "
             'found by method "pareto", the others take one'
         )
-    judged = cases(mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
+    judged = conditions("minimize", mesh, torque, tolerance=tolerance, samples=samples, seed=seed).on(mesh)
     measure = Mean() if measure is None else measure
     problem = make_problem(design, bounds, mesh, judged, objectives, measure, constraints)
     began = time.perf_counter()
@@ -139,21 +139,8 @@ def objective_name(problem: Problem) -> str:
         return f"distance from the ideal of {' and '.join(names)}"
     prefix = ""
     if problem.cases.count > 1:
-        prefix = _measure_name(problem.measure) + " "
+        prefix = in_words(problem.measure) + " "
     return prefix + names[0] + (PENALIZED if problem.roughness is not None else "")
-
-
-def _measure_name(measure: AbstractMeasure) -> str:
-    match measure:
-        case Mean():
-            return "mean"
-        case Worst():
-            return "worst"
-        case Quantile():
-            return f"{100 * float(measure.level):g} % quantile of"
-        case CVaR():
-            return f"{100 * float(measure.level):g} % CVaR of"
-    return type(measure).__name__
 
 
 def _constraint_values(problem: Problem, x) -> dict[str, float]:

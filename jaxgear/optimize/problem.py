@@ -8,8 +8,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ..conditions import Cases
-from ..contact import Mesh, MeshCycle, removed_material, solve_removed
+from ..conditions import Cases, solved
+from ..contact import Mesh, removed_material, solve_removed
 from ..metrics import smooth_peak_to_peak
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import AbstractMeasure, check, maximum, real
@@ -127,7 +127,7 @@ class Problem(eqx.Module):
         """True objectives and violation."""
 
         def of_case(candidate: Candidate):
-            return self._numbers(candidate, None), self._excess(candidate), _fine(candidate.cycle)
+            return self._numbers(candidate, None), self._excess(candidate), solved(candidate.cycle)
 
         numbers, excess, fine = self.over_cases(x, of_case)
         values = self._measured(numbers)
@@ -148,7 +148,7 @@ class Problem(eqx.Module):
 
         def of_case(candidate: Candidate):
             numbers = self._numbers(candidate, width), self._numbers(candidate, None)
-            return *numbers, self._excess(candidate), _fine(candidate.cycle)
+            return *numbers, self._excess(candidate), solved(candidate.cycle)
 
         soft, true, excess, fine = self.over_cases(x, of_case)
         return self._measured(soft), self._measured(true), maximum(excess, axis=0), jnp.all(fine)
@@ -183,7 +183,7 @@ class Problem(eqx.Module):
                 candidate = self._candidate(x, torque, deviation)
                 each = jnp.asarray([number(of)(candidate) for of in objectives], x.dtype)
                 values = jnp.concatenate([each, self._excess(candidate)])
-                return values, (values, _fine(candidate.cycle))
+                return values, (values, solved(candidate.cycle))
 
             # case by case: the numbers of one do not depend on the others
             slopes, (values, fine) = jax.jacrev(numbers, has_aux=True)(x)
@@ -205,7 +205,7 @@ class Problem(eqx.Module):
 
             def curve(removed):
                 cycle = solve_removed(self.mesh, torque, removed)
-                return cycle.transmission_error, _fine(cycle)
+                return cycle.transmission_error, solved(cycle)
 
             slope, removed = jax.jacfwd(material, has_aux=True)(x)
             error, back, fine = jax.vjp(curve, removed + deviation, has_aux=True)
@@ -229,8 +229,7 @@ class Problem(eqx.Module):
 
     def _each_case(self, function):
         """A function of torque and deviation in every case, cases leading."""
-        found = jax.vmap(jax.vmap(function, (None, 0)))(self.cases.torque, self.cases.removed)
-        return jax.tree.map(lambda part: part.reshape(self.cases.count, *part.shape[2:]), found)
+        return self.cases.each(function)
 
     def _numbers(self, candidate: Candidate, width):
         """Objectives of a case, with soft extremes where a width is given."""
@@ -248,10 +247,6 @@ class Problem(eqx.Module):
 
     def _measured(self, numbers):
         return jax.vmap(lambda column: self.measure(column, self.cases.weights), 1)(numbers)
-
-
-def _fine(cycle: MeshCycle):
-    return jnp.all(cycle.converged) & jnp.isfinite(jnp.sum(cycle.transmission_error))
 
 
 def make_problem(
