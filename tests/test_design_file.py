@@ -125,8 +125,8 @@ def test_every_curve_can_be_written(load, table, curve):
 
 
 def test_every_modification_and_curve_of_the_library_has_a_name_in_design_files():
-    from jaxgear.io.schema import CURVES as curves
-    from jaxgear.io.schema import MODIFICATIONS as modifications
+    from jaxgear.io.parts import CURVES as curves
+    from jaxgear.io.parts import MODIFICATIONS as modifications
     from jaxgear.microgeometry import AbstractCurve, AbstractModification, NoModification, Sum
 
     def of_library(base):
@@ -370,16 +370,36 @@ MALFORMED = {
     ),
     "resolution too coarse": (
         text(tail="[resolution]\npositions = 3"),
-        "resolution.positions: must be a whole number >= 4",
+        "resolution.positions: 3 must be at least 4 and at most 4096",
     ),
     "resolution absurd": (
         text(tail="[resolution]\nslices = 100000000"),
-        "resolution.slices: must be a whole number <=",
+        "resolution.slices: 100000000 must be at least 1 and at most 1024",
     ),
     "syntax": (text() + "[model\n", f"line {text().count(chr(10)) + 1}, column 7: "),
     "unfinished string": (text() + 'title = "x', f"line {text().count(chr(10)) + 1}"),
     "key twice": (text().replace("teeth = 19", "teeth = 19\nteeth = 20"), "line 4, column"),
     "not text": (text().encode() + b"\ntitle = '\xff'", f"line {text().count(chr(10)) + 2}: not UTF-8 text"),
+    "number of seventy bits": (
+        text(tail=f"[tolerance]\nquality_class = 5\nseed = {2**70}"),
+        "tolerance.seed: a whole number of about 22 digits must be at least 0 and at most 2147483647",
+    ),
+    "number of absurd length": (text(tail="x = 1" + "0" * 5000), "a whole number has more than 4300 digits"),
+    "empty name of a body": (text(tail='[model]\nbody = ""'), 'model.body: "" is not known, must be one of'),
+    "empty name of a method": (text(tail='[optimize]\nmethod = ""'), 'optimize.method: "" is empty'),
+    "no objective": (text(tail="[optimize]\nobjective = []"), "optimize.objective: [] is empty"),
+    "torque absurd": (
+        text().replace("torque = 50.0", "torque = 1e300"),
+        "load.torque: 1e+300 N m must be at least 1e-06 N m and at most 1e+09 N m",
+    ),
+    "torque of the range not finite": (
+        text(load="torque_range = [10.0, inf]"),
+        "load.torque_range[1]: inf must be finite",
+    ),
+    "application factor of zero": (
+        text(tail="[optimize]\napplication_factor = 0"),
+        "optimize.application_factor: 0 must be greater than 0 and at most 100",
+    ),
     "nested absurdly": ("a = " + "[" * 100_000, "tables or lists are nested too deeply"),
     "number beyond all bounds": (text().replace("module = 3.0", "module = 1" + "0" * 400), "pinion.module: "),
     "empty": ("", "pinion: missing, this key is required"),

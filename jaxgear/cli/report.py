@@ -14,7 +14,7 @@ from rich.table import Table
 
 from ..contact import Mesh
 from ..io import DesignFile, describe
-from ..io.schema import UNITS
+from ..io.parts import UNITS
 from .study import Evaluation
 
 Evaluations = Mapping[str, Evaluation]

@@ -1,12 +1,9 @@
 """Design files: a gear pair, its load, its flank modifications and their free parameters, as TOML."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
-
-import msgspec
 
 from ..compliance import Beam, Compliance, ElasticRing, legacy_compliance
 from ..contact import Mesh, Resolution, fewest_pairs, prepare
@@ -15,9 +12,10 @@ from ..microgeometry import AbstractModification
 from ..sizing import iso_stiffness
 from . import schema, template
 from .errors import DesignFileError, refused, suggestion
+from .layout import Section
 from .toml import decode, join, read
 
-T = TypeVar("T")
+T = TypeVar("T", bound=Section)
 
 # Tooth pairs are carried along up to this many times the deflection of a single pair after ISO 6336-1.
 _DEFLECTIONS = 2.0
@@ -120,7 +118,7 @@ def load_design(path: str | Path) -> DesignFile:
     top = decode(file, "", read(file), schema.FileSection)
 
     def section(name: str, struct: type[T]) -> T:
-        return decode(file, name, getattr(top, name) or {}, struct)  # type: ignore[type-var]
+        return decode(file, name, getattr(top, name) or {}, struct)
 
     gears, parts = [], []
     for name in ("pinion", "wheel"):
@@ -128,7 +126,7 @@ def load_design(path: str | Path) -> DesignFile:
         gears.append(_gear(file, name, gear))
         keys = [f"{name}.modification[{i}]" for i in range(len(gear.modification))]
         parts.append([template.parse_modification(file, key, table) for key, table in zip(keys, gear.modification)])
-    pair = refused(file, "pair", GearPair, *gears, **_given(section("pair", schema.PairSection)))
+    pair = refused(file, "pair", GearPair, *gears, **section("pair", schema.PairSection).given())
     load = _load(file, section("load", schema.LoadSection))
     optimize = section("optimize", schema.OptimizeSection)
     if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
@@ -136,24 +134,22 @@ def load_design(path: str | Path) -> DesignFile:
     bounds, units = _variables(file, top.variables or {}, [*parts[0], *parts[1]])
     if top.sweep is not None and not top.variables:
         raise DesignFileError(file, "sweep", "has no effect without [variables]")
-    factor = 1.0 if optimize.application_factor is None else optimize.application_factor
-    _number(file, "optimize.application_factor", factor, above=0.0)
     return DesignFile(
         path=file,
         title=top.title or file.stem,
         torque=load.torque,
-        torque_range=load.torque_range or tuple(share * load.torque for share in _TORQUE_RANGE),  # type: ignore[arg-type]
+        torque_range=_torque_range(load),
         speed=load.speed,
         friction=load.friction,
         bounds=bounds,
         units=units,
-        application_factor=factor,
+        application_factor=optimize.application_factor,
         optimize=optimize,
         sweep=None if top.sweep is None else section("sweep", schema.SweepSection),
         tolerance=None if top.tolerance is None else section("tolerance", schema.ToleranceSection),
         _pair=pair,
         _compliance=_compliance(file, section("model", schema.ModelSection)),
-        _resolution=Resolution(**_given(section("resolution", schema.ResolutionSection))),
+        _resolution=Resolution(**section("resolution", schema.ResolutionSection).given()),
         _pairs_given=bool(top.resolution and "pairs" in top.resolution),
         _parts=(parts[0], parts[1]),
     )
@@ -163,49 +159,45 @@ def _gear(file: Path, name: str, section: schema.GearSection) -> Gear:
     key = join(name, "material")
     constants = decode(file, key, section.material or {}, schema.MaterialSection)
     # never the library's STEEL: it was made at import, possibly in single precision
-    material = refused(file, key, Material, **_given(constants))
-    numbers = {key: value for key, value in _given(section).items() if key not in ("material", "modification")}
+    material = refused(file, key, Material, **constants.given())
+    numbers = {key: value for key, value in section.given().items() if key not in ("material", "modification")}
     return refused(file, name, Gear, **{**numbers, "teeth": float(section.teeth)}, material=material)
 
 
 def _load(file: Path, load: schema.LoadSection) -> schema.LoadSection:
-    _number(file, "load.torque", load.torque, above=0.0, unit=" N m")
     if load.torque_range is not None:
-        low, high = load.torque_range
-        _number(file, "load.torque_range[0]", low, above=0.0, unit=" N m")
-        _number(file, "load.torque_range[1]", high, above=low, unit=" N m")
-    if load.speed is not None:
-        _number(file, "load.speed", load.speed, above=0.0, unit=" rpm")
-    if load.friction is not None:
-        if load.speed is None:
-            raise DesignFileError(file, "load.friction", "has no effect without load.speed (flash temperature)")
-        _number(file, "load.friction", load.friction, above=0.0)
+        _increasing(file, "load.torque_range[1]", *load.torque_range, unit=" N m")
+    if load.friction is not None and load.speed is None:
+        raise DesignFileError(file, "load.friction", "has no effect without load.speed (flash temperature)")
     return load
 
 
+def _torque_range(load: schema.LoadSection) -> tuple[float, float]:
+    low, high = load.torque_range or [share * load.torque for share in _TORQUE_RANGE]
+    return low, high
+
+
 def _compliance(file: Path, model: schema.ModelSection) -> Compliance:
-    given = set(_given(model)) - {"preset"}
+    given = set(model.given()) - {"preset"}
     if model.preset == "legacy":
         if given:
             raise DesignFileError(file, f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
         return legacy_compliance()
-    body = _choice(file, "model.body", model.body or "ring", schema.BODIES)
-    contact = _choice(file, "model.contact", model.contact or "depth", schema.CONTACTS)
+    body, contact = schema.BODIES[model.body], schema.CONTACTS[model.contact]
     options = {name: getattr(model, name) for name in ("hub_windup", "coupling") if name in given}
     if options and body is not ElasticRing:
         raise DesignFileError(file, f"model.{min(options)}", f'has no effect with body = "{model.body}"')
     return Compliance(Beam(), body(**options), contact(), model.plane or "stress")
 
 
-def _variables(file: Path, tables: schema.Table, parts: list[template.Part]):
+def _variables(file: Path, tables: schema.Tables, parts: list[template.Part]):
     """Bounds and units of the free parameters, each declared once and used at least once."""
     bounds: dict[str, tuple[float, float]] = {}
     units: dict[str, str] = {}
     for name, table in tables.items():
         key = f"variables.{name}"
         variable = decode(file, key, table, schema.VariableSection)
-        _number(file, f"{key}.low", variable.low)
-        _number(file, f"{key}.high", variable.high, above=variable.low)
+        _increasing(file, f"{key}.high", variable.low, variable.high)
         bounds[name] = (variable.low, variable.high)
     for part in parts:
         for free, unit in part.free():
@@ -232,19 +224,6 @@ def _quantity(unit: str) -> str:
     return f"a quantity in {unit}" if unit else "a pure number"
 
 
-def _choice(file: Path, key: str, name: str, known: Mapping[str, T]) -> T:
-    if name not in known:
-        raise DesignFileError(file, key, f'"{name}" is not known, {suggestion(name, known)}')
-    return known[name]
-
-
-def _number(file: Path, key: str, value: float, *, above: float | None = None, unit: str = "") -> None:
-    if not math.isfinite(value):
-        raise DesignFileError(file, key, f"{value} must be finite")
-    if above is not None and value <= above:
-        raise DesignFileError(file, key, f"{value:g}{unit} must be greater than {above:g}{unit}")
-
-
-def _given(section: msgspec.Struct) -> dict[str, Any]:
-    """The keys that the file sets."""
-    return {name: value for name, value in msgspec.structs.asdict(section).items() if value is not None}
+def _increasing(file: Path, key: str, low: float, high: float, unit: str = "") -> None:
+    if high <= low:
+        raise DesignFileError(file, key, f"{high:g}{unit} must be greater than {low:g}{unit}")

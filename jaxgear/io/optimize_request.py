@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import jax.numpy as jnp
-import msgspec
 
 from ..contact import Mesh
 from ..numerics import AbstractMeasure, CVaR, Mean, Quantile, Worst
@@ -158,7 +157,7 @@ def _options(design: DesignFile, name: str) -> dict[str, Any]:
     """The table of one method."""
     table = getattr(design.optimize, name) or {}
     options = decode(design.path, f"optimize.{name}", table, schema.METHOD_OPTIONS[name])
-    return {key: value for key, value in msgspec.structs.asdict(options).items() if value is not None}
+    return {key: value for key in type(options).model_fields if (value := getattr(options, key)) is not None}
 
 
 def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
@@ -216,7 +215,7 @@ def _gears(design: DesignFile, section: schema.OptimizeSection, quick: bool) -> 
     return {"tolerance": tolerance, "samples": samples}
 
 
-def _constraint(design: DesignFile, key: str, table: schema.Table) -> Constraint:
+def _constraint(design: DesignFile, key: str, table: schema.Tables) -> Constraint:
     section = decode(design.path, key, table, schema.ConstraintSection)
     if (section.of is None) == (section.variables is None):
         raise DesignFileError(design.path, key, "needs either of = a quantity or variables = a table of coefficients")

@@ -17,7 +17,7 @@ from ..geometry import diameter, roll_angle
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, NoModification, Sum
 from ..optimize import Front
-from .schema import CURVES, MODIFICATIONS
+from .parts import CURVES, MODIFICATIONS
 
 Designs = Mapping[str, tuple[AbstractModification, AbstractModification]]
 

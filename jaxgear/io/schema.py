@@ -1,175 +1,205 @@
-"""The layout of a design file: one struct per table, its fields are the allowed keys.
+"""The layout of a design file: one class per table, its fields are the allowed keys.
 
-Numbers of modifications and curves may be the name of a variable instead (`Value`). Defaults that belong to the library
-stay there: None means that the key is absent.
+Numbers of modifications and curves may be the name of a variable instead. Defaults that belong to the library stay
+there: None means that the key is absent.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-import msgspec
-from msgspec import Meta
+from .. import compliance
+from ..numerics import Number
+from .kinds import Choice, Either, ListOf, Real, Switch, Table, Text
+from .layout import Section
 
-from .. import compliance, microgeometry
-
-Value = float | str
-Table = dict[str, Any]
-Count = Annotated[int, Meta(ge=1)]
+Tables = dict[str, Any]
+_SEED = 2**31 - 1  # what every generator of random numbers takes
 
 
-class Section(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """A table of the file."""
+def _count(low: int, high: int) -> Real:
+    """A whole number; the upper limits keep a slip of the finger from filling the memory or compiling for hours."""
+    return Real(Number(low=low, high=high, whole=True))
+
+
+def _positive(unit: str) -> Real:
+    return Real(Number(unit, low=0.0, open_low=True))
+
+
+_NUMBER = Real()
+_SHARE = Real(Number(low=0.0, high=1.0, open_low=True, open_high=True))
+_TABLES = ListOf(Table(), empty=True)
+_WEIGHTS = ListOf(Real(Number(low=0.0)))
 
 
 class FileSection(Section):
     """The top level; the tables are decoded one by one, so that messages carry the full key."""
 
-    pinion: Table
-    wheel: Table
-    load: Table
-    title: str = ""
-    pair: Table | None = None
-    model: Table | None = None
-    resolution: Table | None = None
-    variables: Table | None = None
-    optimize: Table | None = None
-    sweep: Table | None = None
-    tolerance: Table | None = None
+    pinion: Annotated[Tables, Table()]
+    wheel: Annotated[Tables, Table()]
+    load: Annotated[Tables, Table()]
+    title: Annotated[str | None, Text()] = None
+    pair: Annotated[Tables | None, Table()] = None
+    model: Annotated[Tables | None, Table()] = None
+    resolution: Annotated[Tables | None, Table()] = None
+    variables: Annotated[Tables | None, Table(Table())] = None
+    optimize: Annotated[Tables | None, Table()] = None
+    sweep: Annotated[Tables | None, Table()] = None
+    tolerance: Annotated[Tables | None, Table()] = None
 
 
 class MaterialSection(Section):
-    elastic_modulus: float | None = None
-    poisson_ratio: float | None = None
-    density: float | None = None
-    thermal_contact_coefficient: float | None = None
+    elastic_modulus: Annotated[float | None, _NUMBER] = None
+    poisson_ratio: Annotated[float | None, _NUMBER] = None
+    density: Annotated[float | None, _NUMBER] = None
+    thermal_contact_coefficient: Annotated[float | None, _NUMBER] = None
 
 
 class GearSection(Section):
-    teeth: int
-    module: float
-    face_width: float
-    pressure_angle: float | None = None
-    profile_shift: float | None = None
-    addendum: float | None = None
-    dedendum: float | None = None
-    root_radius: float | None = None
-    tip_diameter: float | None = None
-    bore_diameter: float | None = None
-    tip_edge_radius: float | None = None
-    material: Table | None = None
-    modification: list[Table] = []
+    teeth: Annotated[int, Real(Number(whole=True))]
+    module: Annotated[float, _NUMBER]
+    face_width: Annotated[float, _NUMBER]
+    pressure_angle: Annotated[float | None, _NUMBER] = None
+    profile_shift: Annotated[float | None, _NUMBER] = None
+    addendum: Annotated[float | None, _NUMBER] = None
+    dedendum: Annotated[float | None, _NUMBER] = None
+    root_radius: Annotated[float | None, _NUMBER] = None
+    tip_diameter: Annotated[float | None, _NUMBER] = None
+    bore_diameter: Annotated[float | None, _NUMBER] = None
+    tip_edge_radius: Annotated[float | None, _NUMBER] = None
+    material: Annotated[Tables | None, Table()] = None
+    modification: Annotated[list[Tables], _TABLES] = []
 
 
 class PairSection(Section):
-    center_distance: float | None = None
+    center_distance: Annotated[float | None, _NUMBER] = None
 
 
 class LoadSection(Section):
-    torque: float
-    torque_range: tuple[float, float] | None = None
-    speed: float | None = None
-    friction: float | None = None
+    torque: Annotated[float, _positive("N m")]
+    torque_range: Annotated[list[float] | None, ListOf(_positive("N m"), length=2)] = None
+    speed: Annotated[float | None, _positive("rpm")] = None
+    friction: Annotated[float | None, _positive("")] = None
+
+
+BODIES: dict[str, type[compliance.AbstractBody]] = {
+    "ring": compliance.ElasticRing,
+    "sainsot": compliance.Sainsot,
+    "half_plane": compliance.HalfPlane,
+}
+CONTACTS: dict[str, type[compliance.AbstractContact]] = {
+    "depth": compliance.DepthReferenced,
+    "weber": compliance.Weber,
+    "constant": compliance.ConstantHertz,
+    "center_distance": compliance.CenterDistance,
+    "kovalskii": compliance.Kovalskii,
+    "palmgren": compliance.Palmgren,
+    "power": compliance.NonlinearPower,
+}
 
 
 class ModelSection(Section):
-    preset: Literal["default", "legacy"] = "default"
-    plane: Literal["stress", "strain"] | None = None
-    body: str | None = None
-    hub_windup: bool | None = None
-    coupling: bool | None = None
-    contact: str | None = None
+    preset: Annotated[str, Choice(("default", "legacy"))] = "default"
+    plane: Annotated[str | None, Choice(("stress", "strain"))] = None
+    body: Annotated[str, Choice(tuple(BODIES))] = "ring"
+    hub_windup: Annotated[bool | None, Switch()] = None
+    coupling: Annotated[bool | None, Switch()] = None
+    contact: Annotated[str, Choice(tuple(CONTACTS))] = "depth"
 
 
 class ResolutionSection(Section):
-    """The upper limits keep a slip of the finger from filling the memory or compiling for hours."""
-
-    positions: Annotated[int, Meta(ge=4, le=4096)] | None = None
-    slices: Annotated[int, Meta(ge=1, le=1024)] | None = None
-    pairs: Annotated[int, Meta(ge=2, le=12)] | None = None
-    patch_nodes: Annotated[int, Meta(ge=1, le=64)] | None = None
-    newton_steps: Annotated[int, Meta(ge=1, le=100)] | None = None
-    tolerance: Annotated[float, Meta(gt=0, lt=1)] | None = None
+    positions: Annotated[int | None, _count(4, 4096)] = None
+    slices: Annotated[int | None, _count(1, 1024)] = None
+    pairs: Annotated[int | None, _count(2, 12)] = None
+    patch_nodes: Annotated[int | None, _count(1, 64)] = None
+    newton_steps: Annotated[int | None, _count(1, 100)] = None
+    tolerance: Annotated[float | None, _SHARE] = None
 
 
 class VariableSection(Section):
-    low: float
-    high: float
-    unit: str | None = None
+    low: Annotated[float, _NUMBER]
+    high: Annotated[float, _NUMBER]
+    unit: Annotated[str | None, Text(empty=True)] = None
 
 
 class OptimizeSection(Section):
-    method: str | None = None
-    objective: str | list[str] | None = None
-    measure: Literal["mean", "worst", "quantile", "cvar"] | None = None
-    level: Annotated[float, Meta(gt=0, lt=1)] | None = None
-    torques: list[float] | None = None
-    weights: list[float] | None = None
-    manufactured: Annotated[int, Meta(ge=1, le=10_000)] | None = None
-    seed: Annotated[int, Meta(ge=0)] | None = None
-    starts: Annotated[int, Meta(ge=1, le=4096)] | None = None
-    steps: Annotated[int, Meta(ge=10, le=100_000)] | None = None
-    application_factor: float | None = None
-    constraint: list[Table] = []
-    minimax: Table | None = None
-    genetic: Table | None = None
-    cma_es: Table | None = None
-    differential_evolution: Table | None = None
-    factorial: Table | None = None
-    pareto: Table | None = None
-    te_iteration: Table | None = None
-    free_form: Table | None = None
+    method: Annotated[str | None, Text()] = None
+    objective: Annotated[str | list[str] | None, Either(Text(), ListOf(Text()), "a string or a list of strings")] = None
+    measure: Annotated[str | None, Choice(("mean", "worst", "quantile", "cvar"))] = None
+    level: Annotated[float | None, _SHARE] = None
+    torques: Annotated[list[float] | None, ListOf(_positive("N m"))] = None
+    weights: Annotated[list[float] | None, _WEIGHTS] = None
+    manufactured: Annotated[int | None, _count(1, 10_000)] = None
+    seed: Annotated[int | None, _count(0, _SEED)] = None
+    starts: Annotated[int | None, _count(1, 4096)] = None
+    steps: Annotated[int | None, _count(10, 100_000)] = None
+    application_factor: Annotated[float, Real(Number(low=0.0, high=100.0, open_low=True))] = 1.0
+    constraint: Annotated[list[Tables], _TABLES] = []
+    minimax: Annotated[Tables | None, Table()] = None
+    genetic: Annotated[Tables | None, Table()] = None
+    cma_es: Annotated[Tables | None, Table()] = None
+    differential_evolution: Annotated[Tables | None, Table()] = None
+    factorial: Annotated[Tables | None, Table()] = None
+    pareto: Annotated[Tables | None, Table()] = None
+    te_iteration: Annotated[Tables | None, Table()] = None
+    free_form: Annotated[Tables | None, Table()] = None
 
 
 class ConstraintSection(Section):
-    of: str | None = None
-    variables: dict[str, float] | None = None
-    low: float | None = None
-    high: float | None = None
+    of: Annotated[str | None, Text()] = None
+    variables: Annotated[dict[str, float] | None, Table(_NUMBER)] = None
+    low: Annotated[float | None, _NUMBER] = None
+    high: Annotated[float | None, _NUMBER] = None
 
 
 class MinimaxOptions(Section):
-    rounds: Annotated[int, Meta(ge=1, le=1000)] | None = None
+    rounds: Annotated[int | None, _count(1, 1000)] = None
 
 
 class _EvolutionOptions(Section):
-    population: Annotated[int, Meta(ge=4, le=100_000)] | None = None
-    generations: Annotated[int, Meta(ge=1, le=100_000)] | None = None
+    population: Annotated[int | None, _count(4, 100_000)] = None
+    generations: Annotated[int | None, _count(1, 100_000)] = None
 
 
 class GeneticOptions(_EvolutionOptions):
-    crossover: Annotated[float, Meta(ge=0, le=1)] | None = None
+    crossover: Annotated[float | None, Real(Number(low=0.0, high=1.0))] = None
 
 
 class CMAESOptions(_EvolutionOptions):
-    spread: Annotated[float, Meta(gt=0, le=1)] | None = None
+    spread: Annotated[float | None, Real(Number(low=0.0, high=1.0, open_low=True))] = None
 
 
 class DifferentialEvolutionOptions(_EvolutionOptions):
     pass
 
 
+_LEVEL = _count(2, 10_000)
+
+
 class FactorialOptions(Section):
-    levels: int | dict[str, int] | None = None
+    levels: Annotated[
+        int | dict[str, int] | None,
+        Either(_LEVEL, Table(_LEVEL), "a whole number, or a table with one entry per variable"),
+    ] = None
 
 
 class ParetoOptions(Section):
-    points: Annotated[int, Meta(ge=2, le=4096)] | None = None
-    steps: Annotated[int, Meta(ge=1, le=100_000)] | None = None
+    points: Annotated[int | None, _count(2, 4096)] = None
+    steps: Annotated[int | None, _count(1, 100_000)] = None
 
 
 class IterationOptions(Section):
-    start: Literal["unmodified", "given", "low_pressure"] = "unmodified"
-    max_relief: Annotated[float, Meta(gt=0)] = 7.0
-    tolerance: Annotated[float, Meta(gt=0)] | None = None
-    steps: Annotated[int, Meta(ge=1, le=1000)] | None = None
-    curve: str | None = None
+    start: Annotated[str, Choice(("unmodified", "given", "low_pressure"))] = "unmodified"
+    max_relief: Annotated[float, _positive("um")] = 7.0
+    tolerance: Annotated[float | None, _positive("um")] = None
+    steps: Annotated[int | None, _count(1, 1000)] = None
+    curve: Annotated[str | None, Text()] = None
 
 
 class FreeFormOptions(Section):
-    points: Annotated[int, Meta(ge=4, le=500)] | None = None
-    max_relief: Annotated[float, Meta(gt=0)] | None = None
-    curvature: Annotated[float, Meta(ge=0)] | None = None
-    steps: Annotated[int, Meta(ge=1, le=10_000)] | None = None
-    curve: str | None = None
+    points: Annotated[int | None, _count(4, 500)] = None
+    max_relief: Annotated[float | None, _positive("um")] = None
+    curvature: Annotated[float | None, Real(Number(low=0.0))] = None
+    steps: Annotated[int | None, _count(1, 10_000)] = None
+    curve: Annotated[str | None, Text()] = None
 
 
 # They seek the flanks themselves.
@@ -188,105 +218,31 @@ METHOD_OPTIONS: dict[str, type[Section]] = {
 
 
 class SweepSection(Section):
-    sampling: Literal["sobol", "latin_hypercube", "full_factorial", "list"] = "sobol"
-    samples: Annotated[int, Meta(ge=1, le=2**40)] | None = None
-    seed: Annotated[int, Meta(ge=0)] | None = None
-    levels: int | dict[str, int | list[float]] | None = None
-    file: str | None = None
-    torques: list[float] | None = None
-    weights: list[float] | None = None
-    results: list[str] | None = None
-    part_rows: Annotated[int, Meta(ge=1, le=2**24)] | None = None
+    sampling: Annotated[str, Choice(("sobol", "latin_hypercube", "full_factorial", "list"))] = "sobol"
+    samples: Annotated[int | None, _count(1, 2**40)] = None
+    seed: Annotated[int | None, _count(0, _SEED)] = None
+    levels: Annotated[
+        int | dict[str, int | list[float]] | None,
+        Either(
+            _LEVEL,
+            Table(Either(_LEVEL, ListOf(_NUMBER), "a whole number or a list of values")),
+            "a whole number, or a table with one entry per variable",
+        ),
+    ] = None
+    file: Annotated[str | None, Text()] = None
+    torques: Annotated[list[float] | None, ListOf(_positive("N m"))] = None
+    weights: Annotated[list[float] | None, _WEIGHTS] = None
+    results: Annotated[list[str] | None, ListOf(Text())] = None
+    part_rows: Annotated[int | None, _count(1, 2**24)] = None
+
+
+_CLASS = Real(Number(whole=True))
 
 
 class ToleranceSection(Section):
-    quality_class: int | tuple[int, int]
-    misalignment: float | None = None
-    samples: Annotated[int, Meta(ge=2, le=100_000)] = 64
-    seed: Annotated[int, Meta(ge=0)] = 0
-
-
-class _Plain(Section):
-    """A curve without numbers."""
-
-
-class _PowerCurve(Section):
-    exponent: Value
-
-
-class _ThreeCoefficients(Section):
-    b0: Value
-    b1: Value
-    b2: Value
-
-
-class _PolynomialCurve(Section):
-    coefficients: list[Value]
-
-
-class _ParabolicLinearCurve(Section):
-    node: Value
-
-
-class _SplineCurve(Section):
-    values: list[Value]
-
-
-class _Amount(Section):
-    amount: Value
-
-
-class _Relief(Section):
-    amount: Value
-    length: Value
-    curve: Table | None = None
-
-
-class _EndRelief(_Relief):
-    side: Literal["both", "negative", "positive"] | None = None
-
-
-class _TabulatedProfile(Section):
-    position: list[float]
-    amount: list[Value]
-    coordinate: Literal["roll_length", "roll_angle"] | None = None
-    method: Literal["linear", "cubic2", "monotonic"] | None = None
-
-
-# `type` of a curve or modification -> its class in the library and its keys. The keys are the fields of the class.
-CURVES: dict[str, tuple[type[microgeometry.AbstractCurve], type[Section]]] = {
-    "linear": (microgeometry.Linear, _Plain),
-    "parabolic": (microgeometry.Parabolic, _Plain),
-    "parabolic_linear": (microgeometry.ParabolicLinear, _ParabolicLinearCurve),
-    "power": (microgeometry.Power, _PowerCurve),
-    "quadratic": (microgeometry.Quadratic, _ThreeCoefficients),
-    "polynomial": (microgeometry.Polynomial, _PolynomialCurve),
-    "sinusoidal": (microgeometry.Sinusoidal, _ThreeCoefficients),
-    "spline": (microgeometry.Spline, _SplineCurve),
-}
-MODIFICATIONS: dict[str, tuple[type[microgeometry.AbstractModification], type[Section]]] = {
-    "tip_relief": (microgeometry.TipRelief, _Relief),
-    "root_relief": (microgeometry.RootRelief, _Relief),
-    "profile_crowning": (microgeometry.ProfileCrowning, _Amount),
-    "profile_slope": (microgeometry.ProfileSlope, _Amount),
-    "lead_crowning": (microgeometry.LeadCrowning, _Amount),
-    "lead_slope": (microgeometry.LeadSlope, _Amount),
-    "end_relief": (microgeometry.EndRelief, _EndRelief),
-    "tabulated_profile": (microgeometry.TabulatedProfile, _TabulatedProfile),
-}
-UNITS = {"amount": "um", "length": "mm"}  # of the keys that a variable can stand for; the others are pure numbers
-
-BODIES: dict[str, type[compliance.AbstractBody]] = {
-    "ring": compliance.ElasticRing,
-    "sainsot": compliance.Sainsot,
-    "half_plane": compliance.HalfPlane,
-}
-CONTACTS: dict[str, type[compliance.AbstractContact]] = {
-    "depth": compliance.DepthReferenced,
-    "weber": compliance.Weber,
-    "constant": compliance.ConstantHertz,
-    "center_distance": compliance.CenterDistance,
-    "kovalskii": compliance.Kovalskii,
-    "palmgren": compliance.Palmgren,
-    "power": compliance.NonlinearPower,
-}
+    quality_class: Annotated[
+        int | list[int], Either(_CLASS, ListOf(_CLASS, length=2), "a whole number, or a list of two")
+    ]
+    misalignment: Annotated[float | None, Real(Number("um", low=0.0))] = None
+    samples: Annotated[int, _count(2, 100_000)] = 64
+    seed: Annotated[int, _count(0, _SEED)] = 0

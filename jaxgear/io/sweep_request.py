@@ -1,7 +1,6 @@
 """What the tables [sweep] and [tolerance] of a design file ask for."""
 
 import dataclasses
-from typing import Any
 
 from ..conditions import LoadSpectrum
 from ..metrics import RESULTS
@@ -64,9 +63,9 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
         if "samples" not in _KEYS[section.sampling]:
             problem = f'"{section.sampling}" takes no number of samples from the command line'
             raise DesignFileError(design.path, "sweep.sampling", problem)
-        section = _with(section, samples=samples)
+        section = section.model_copy(update={"samples": samples})
     if most is not None and section.samples is not None:
-        section = _with(section, samples=min(section.samples, most))
+        section = section.model_copy(update={"samples": min(section.samples, most)})
     wanted = tuple(section.results or _RESULTS)
     for index, name in enumerate(wanted):
         if name not in RESULTS:
@@ -101,7 +100,3 @@ def _plan(design: DesignFile, section: schema.SweepSection) -> AbstractPlan:
         return refused(design.path, "sweep.levels", lambda: FullFactorial(bounds, section.levels or 0))
     make = Sobol if kind == "sobol" else LatinHypercube
     return refused(design.path, "sweep.samples", lambda: make(bounds, section.samples or 0, seed=seed))
-
-
-def _with(section: schema.SweepSection, **changes: Any) -> schema.SweepSection:
-    return type(section)(**{name: changes.get(name, getattr(section, name)) for name in section.__struct_fields__})

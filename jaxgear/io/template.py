@@ -7,11 +7,12 @@ from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
-import msgspec
 
 from ..microgeometry import AbstractModification, NoModification
 from .errors import DesignFileError, suggestion
-from .schema import CURVES, MODIFICATIONS, UNITS, Section, Table, Value
+from .kinds import ListOf, Real
+from .layout import Section
+from .parts import CURVES, MODIFICATIONS, UNITS, Tables
 from .toml import decode, join
 
 
@@ -57,7 +58,7 @@ def build(parts: list[Part], parameters: Mapping[str, Any]) -> AbstractModificat
     return NoModification() if total is None else total
 
 
-def parse_modification(file: Path, key: str, table: Table) -> Part:
+def parse_modification(file: Path, key: str, table: Tables) -> Part:
     """A modification from its table.
 
     Raises:
@@ -66,7 +67,7 @@ def parse_modification(file: Path, key: str, table: Table) -> Part:
     return _parse(file, key, table, MODIFICATIONS)
 
 
-def _parse(file: Path, key: str, table: Table, known: Mapping[str, tuple[type, type[Section]]]) -> Part:
+def _parse(file: Path, key: str, table: Tables, known: Mapping[str, tuple[type, type[Section]]]) -> Part:
     name = table.get("type")
     if name is None:
         raise DesignFileError(file, join(key, "type"), f"missing, must be one of {', '.join(known)}")
@@ -75,22 +76,20 @@ def _parse(file: Path, key: str, table: Table, known: Mapping[str, tuple[type, t
     make, struct = known[name]
     section = decode(file, key, {other: value for other, value in table.items() if other != "type"}, struct)
     fields: dict[str, Any] = {}
-    for field in msgspec.structs.fields(section):
-        value, here = getattr(section, field.name), join(key, field.name)
-        if value is None:
-            continue
-        if field.name == "curve":
-            fields[field.name] = _parse(file, here, value, CURVES)
-        elif field.type == Value:
-            fields[field.name] = _open(value, here)
-        elif field.type == list[Value]:
-            fields[field.name] = [_open(item, f"{here}[{i}]") for i, item in enumerate(value)]
+    for field, value in section.given().items():
+        here, kind = join(key, field), struct.kind(field)
+        if field == "curve":
+            fields[field] = _parse(file, here, value, CURVES)
+        elif isinstance(kind, Real):
+            fields[field] = _open(value, here)
+        elif isinstance(kind, ListOf):
+            fields[field] = [_open(item, f"{here}[{i}]") for i, item in enumerate(value)]
         else:
-            fields[field.name] = value
+            fields[field] = value
     return Part(make, fields, key)
 
 
-def _open(value: Value, key: str) -> float | Free:
+def _open(value: float | str, key: str) -> float | Free:
     return Free(value, key) if isinstance(value, str) else value
 
 

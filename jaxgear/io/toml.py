@@ -2,32 +2,18 @@
 
 import re
 import tomllib
-import typing
 from pathlib import Path
 from typing import Any, TypeVar
 
-import msgspec
+from pydantic import BaseModel, ValidationError
 
 from .errors import DesignFileError, suggestion
+from .kinds import TAGS, not_of_kind
 
-S = TypeVar("S", bound=msgspec.Struct)
+S = TypeVar("S", bound=BaseModel)
 
-_AT = re.compile(r" - at `\$\.?(?P<path>[^`]*)`$")
-_UNKNOWN = re.compile(r"Object contains unknown field `(?P<name>.*)`", re.DOTALL)
-_INVALID = re.compile(r"Invalid enum value '(?P<value>.*)'", re.DOTALL)
-_MISSING = re.compile(r"Object missing required field `(?P<name>.*)`")
-# the words of TOML for the types in msgspec's messages
-_WORDS = {
-    "float | str": "a number or the name of a variable",
-    "int | object": "a whole number, or a table with one entry per variable",
-    "int | array": "a whole number or a list",
-    "float": "a number",
-    "int": "a whole number",
-    "str": "a string",
-    "object": "a table",
-    "array": "a list",
-    "bool": "true or false",
-}
+# pydantic's own errors about the containers of values; what is wrong with a value, its kind says itself
+_CONTAINERS = {"list_type": "a list", "dict_type": "a table", "model_type": "a table"}
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -53,39 +39,32 @@ def read(path: Path) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise DesignFileError(path, "", _syntax(str(error), text)) from None
+    except ValueError:  # of int()
+        raise DesignFileError(path, "", "a whole number has more than 4300 digits") from None
     except RecursionError:
         raise DesignFileError(path, "", "tables or lists are nested too deeply") from None
 
 
 def decode(file: Path, key: str, data: Any, section: type[S]) -> S:
-    """Decodes one table into its struct.
+    """Decodes one table into its section.
 
     Args:
         file: for the message.
         key: dotted key of the table, "" at the top level.
         data: the table.
-        section: the struct.
+        section: its keys.
 
     Raises:
-        DesignFileError: for unknown or missing keys and wrong types.
+        DesignFileError: for unknown or missing keys, values of a wrong type and numbers out of range.
     """
     try:
-        return msgspec.convert(data, section)
-    except msgspec.ValidationError as error:
-        problem = str(error)
-    at = _AT.search(problem)
-    name = at["path"] if at else ""
-    if at:
-        problem, key = problem[: at.start()], join(key, name)
-    if invalid := _INVALID.fullmatch(problem):
-        choices = _choices(section, name)
-        raise DesignFileError(file, key, f'"{invalid["value"]}" is not known, {suggestion(invalid["value"], choices)}')
-    if unknown := _UNKNOWN.fullmatch(problem):
-        names = [field.encode_name for field in msgspec.structs.fields(section)]
-        raise DesignFileError(file, join(key, unknown["name"]), f"unknown key, {suggestion(unknown['name'], names)}")
-    if missing := _MISSING.fullmatch(problem):
-        raise DesignFileError(file, join(key, missing["name"]), "missing, this key is required")
-    raise DesignFileError(file, key, _translate(problem))
+        return section.model_validate(data)
+    except ValidationError as error:
+        problems = error.errors(include_url=False)
+    first = problems[0]
+    if first["type"] == "missing":  # often it is there, misspelt
+        first = next((problem for problem in problems if problem["type"] == "extra_forbidden"), first)
+    raise DesignFileError(file, join(key, _dotted(first["loc"])), _worded(first, section))
 
 
 def join(key: str, name: str) -> str:
@@ -93,22 +72,34 @@ def join(key: str, name: str) -> str:
     return f"{key}.{name}" if key and name else key or name
 
 
+def _dotted(loc: tuple[int | str, ...]) -> str:
+    """`("modification", 1, "amount")` -> `modification[1].amount`."""
+    key = ""
+    for part in loc:
+        if part not in TAGS:
+            key = f"{key}[{part}]" if isinstance(part, int) else join(key, part)
+    return key
+
+
+def _worded(problem, section: type[BaseModel]) -> str:
+    kind, context = problem["type"], problem.get("ctx", {})
+    if kind == "extra_forbidden":
+        return f"unknown key, {suggestion(problem['loc'][-1], section.model_fields)}"
+    if kind == "missing":
+        return "missing, this key is required"
+    if kind in _CONTAINERS:
+        return not_of_kind(_CONTAINERS[kind], problem["input"])
+    if kind in ("too_short", "too_long"):
+        if not context["actual_length"]:
+            return f"{'{}' if isinstance(problem['input'], dict) else '[]'} is empty"
+        return f"must be a list of length {context.get('min_length', context.get('max_length'))}, not " + str(
+            context["actual_length"]
+        )
+    return problem["msg"]
+
+
 def _syntax(message: str, text: str) -> str:
     """`message (at line 3, column 7)` -> `line 3, column 7: message`."""
     message = message.replace("at end of document", f"at line {text.count(chr(10)) + 1}")
     found = re.fullmatch(r"(?P<what>.*) \(at (?P<where>line [^)]*)\)", message, re.DOTALL)
     return f"{found['where']}: {found['what']}" if found else message
-
-
-def _translate(problem: str) -> str:
-    problem = problem.replace(" | null", "")
-    for name, words in _WORDS.items():
-        problem = problem.replace(f"`{name}`", words)
-    return problem.replace("Expected", "must be").replace(", got", ", not").replace("`", "")
-
-
-def _choices(section: type[msgspec.Struct], name: str) -> list[str]:
-    """The strings that a Literal field allows."""
-    hint = typing.get_type_hints(section).get(name)
-    parts = typing.get_args(hint)
-    return [value for part in (hint, *parts) for value in typing.get_args(part) if isinstance(value, str)]

@@ -1,0 +1,262 @@
+"""Kinds of values in a design file: what may stand after a key, how it is checked and how it is described.
+
+Pydantic finds its way through the tables and says where a value is wrong; these classes say what is wrong with it.
+"""
+
+import datetime
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from ..numerics import Number
+from .errors import suggestion
+
+# Magnitudes that an engineer can mean, by unit: (least of a number that must be positive, most). Beyond them the number
+# or its unit is a slip, and arithmetic on it overflows or loses all digits.
+PLAUSIBLE: Mapping[str, tuple[float, float]] = {
+    "mm": (1e-3, 1e5),
+    "um": (1e-6, 1e5),
+    "N m": (1e-6, 1e9),
+    "rpm": (1e-3, 1e7),
+    "MPa": (1.0, 1e7),
+    "kg/m^3": (50.0, 5e4),
+    "N/(m s^0.5 K)": (1.0, 1e6),
+}
+_PURE = (1e-9, 1e9)
+# Tags of alternatives; they are no part of a key.
+TAGS = ("<list>", "<table>", "<other>")
+
+
+class Kind:
+    """What may stand after a key."""
+
+    words: str
+
+    def schema(self) -> CoreSchema:
+        """For pydantic."""
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def read(self, value: Any) -> Any:
+        """The value as it is used; raises `PydanticCustomError` for what is not allowed."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(self, source, handler) -> CoreSchema:
+        return self.schema()
+
+
+@dataclass(frozen=True)
+class Real(Kind):
+    """A number.
+
+    Attributes:
+        number: unit and range.
+        open: the name of a variable may stand for it.
+    """
+
+    number: Number = Number()
+    open: bool = False
+
+    @property
+    def words(self) -> str:
+        plain = "a whole number" if self.number.whole else "a number"
+        return f"{plain} or the name of a variable" if self.open else plain
+
+    def read(self, value: Any) -> Any:
+        if self.open and isinstance(value, str) and value:
+            return value
+        if isinstance(value, bool) or not isinstance(value, int if self.number.whole else int | float):
+            raise refusal(self.words, value)
+        problem = outside(self.number, value)
+        if problem:
+            raise PydanticCustomError("range", "{problem}", {"problem": problem})
+        return value if self.number.whole else float(value)
+
+
+@dataclass(frozen=True)
+class Text(Kind):
+    """A string.
+
+    Attributes:
+        empty: the empty one is allowed.
+    """
+
+    empty: bool = False
+    words = "a string"
+
+    def read(self, value: Any) -> str:
+        if not isinstance(value, str):
+            raise refusal(self.words, value)
+        if not value and not self.empty:
+            raise PydanticCustomError("empty", '"" is empty')
+        return value
+
+
+@dataclass(frozen=True)
+class Switch(Kind):
+    """True or false."""
+
+    words = "true or false"
+
+    def read(self, value: Any) -> bool:
+        if not isinstance(value, bool):
+            raise refusal(self.words, value)
+        return value
+
+
+@dataclass(frozen=True)
+class Choice(Kind):
+    """One of several names."""
+
+    names: tuple[str, ...]
+
+    @property
+    def words(self) -> str:
+        return "one of " + ", ".join(f'"{name}"' for name in self.names)
+
+    def read(self, value: Any) -> str:
+        if not isinstance(value, str):
+            raise refusal("a string", value)
+        if value not in self.names:
+            raise PydanticCustomError("choice", "{problem}", {"problem": not_known(value, self.names)})
+        return value
+
+
+@dataclass(frozen=True)
+class ListOf(Kind):
+    """A list.
+
+    Attributes:
+        item: kind of its items.
+        length: number of items, None for any.
+        empty: the empty list is allowed.
+    """
+
+    item: Kind
+    length: int | None = None
+    empty: bool = False
+
+    @property
+    def words(self) -> str:
+        return "a list"
+
+    def schema(self) -> CoreSchema:
+        least = 0 if self.empty else self.length or 1
+        return core_schema.list_schema(self.item.schema(), min_length=least, max_length=self.length, strict=True)
+
+
+@dataclass(frozen=True)
+class Table(Kind):
+    """A table with keys of its own.
+
+    Attributes:
+        item: kind of its values; None for a table that is looked into later.
+    """
+
+    item: Kind | None = None
+    words = "a table"
+
+    def schema(self) -> CoreSchema:
+        values = core_schema.any_schema() if self.item is None else self.item.schema()
+        least = None if self.item is None else 1
+        return core_schema.dict_schema(core_schema.str_schema(), values, min_length=least, strict=True)
+
+
+@dataclass(frozen=True)
+class Either(Kind):
+    """A plain value, a list or a table.
+
+    Attributes:
+        plain: kind of a plain value.
+        many: `ListOf` or `Table`.
+        words: for messages.
+    """
+
+    plain: Kind
+    many: ListOf | Table
+    words: str
+
+    def schema(self) -> CoreSchema:
+        kind, tag = (list, TAGS[0]) if isinstance(self.many, ListOf) else (dict, TAGS[1])
+        other = dict if kind is list else list
+
+        def choose(value: Any) -> str | None:
+            return tag if isinstance(value, kind) else None if isinstance(value, other) else TAGS[2]
+
+        return core_schema.tagged_union_schema(
+            {tag: self.many.schema(), TAGS[2]: self.plain.schema()},
+            choose,
+            custom_error_type="kind",
+            custom_error_message=f"must be {self.words}",
+        )
+
+
+def outside(number: Number, value: float) -> str:
+    """What is wrong with a number, "" if it is finite and within its range and an engineer's."""
+    unit = f" {number.unit}" if number.unit else ""
+    if isinstance(value, float) and not math.isfinite(value):
+        return f"{value} must be finite"
+    shown = f"{shorten(value)}{unit}"
+    low, high = number.low, number.high
+    if low is not None and (value <= low if number.open_low else value < low):
+        return f"{shown} must be {_range(number, unit)}"
+    if high is not None and (value >= high if number.open_high else value > high):
+        return f"{shown} must be {_range(number, unit)}"
+    least, most = PLAUSIBLE.get(number.unit, _PURE)
+    positive = low is not None and low >= 0 and number.open_low
+    if abs(value) > most or (positive and value < least):
+        floor = least if positive else -most if low is None else low
+        return f"{shown} must be at least {floor:g}{unit} and at most {most:g}{unit}"
+    return ""
+
+
+def shorten(value: float) -> str:
+    """A number as text, of any size."""
+    if isinstance(value, float) or abs(value) < 10**12:
+        return f"{value:g}" if isinstance(value, float) else str(value)
+    digits = int(abs(value).bit_length() * math.log10(2)) + 1
+    return f"a whole number of about {digits} digits"
+
+
+def allowed(number: Number) -> str:
+    """The range as text, "" without limits."""
+    return _range(number, f" {number.unit}" if number.unit else "")
+
+
+def refusal(wanted: str, value: Any) -> PydanticCustomError:
+    """A value of another kind than wanted."""
+    return PydanticCustomError("kind", "{problem}", {"problem": not_of_kind(wanted, value)})
+
+
+def not_of_kind(wanted: str, value: Any) -> str:
+    """`must be a number, not a string`."""
+    return f"must be {wanted}, not {_kind(value)}"
+
+
+def not_known(value: object, names: Iterable[str]) -> str:
+    """`"x" is not known`, and what to write instead."""
+    return f'"{value}" is not known, {suggestion(value, names)}'
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true or false"
+    if isinstance(value, int | float):
+        return "a number"
+    if isinstance(value, str):
+        return "a string" if value else "an empty string"
+    if isinstance(value, datetime.date | datetime.time):
+        return "a date or time"
+    return "a list" if isinstance(value, list) else "a table"
+
+
+def _range(number: Number, unit: str) -> str:
+    parts = []
+    if number.low is not None:
+        parts.append(f"{'greater than' if number.open_low else 'at least'} {number.low:g}{unit}")
+    if number.high is not None:
+        high = str(number.high) if number.whole else f"{number.high:g}"
+        parts.append(f"{'less than' if number.open_high else 'at most'} {high}{unit}")
+    return " and ".join(parts)

@@ -1,0 +1,163 @@
+"""The keys of a table that describes an object of the library, derived from the fields of its class.
+
+Names, units, ranges, choices and defaults stand in the class alone. A class derived from one of the library's abstract
+ones is known to design files by its name in snake case (`TipRelief`: `type = "tip_relief"`), a user's own too.
+"""
+
+import dataclasses
+import inspect
+import re
+import types
+import typing
+from functools import cache
+from typing import Annotated, Any
+
+import equinox as eqx
+from pydantic import BaseModel, ConfigDict, create_model
+
+from ..numerics import Number, fields_of
+from .kinds import Choice, Kind, ListOf, Real, Switch, Table, Text
+
+
+class Section(BaseModel):
+    """A table of the file: its fields are the allowed keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    def given(self) -> dict[str, Any]:
+        """The keys that the file sets."""
+        return {name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set}
+
+    @classmethod
+    def kind(cls, name: str) -> Kind:
+        """What may stand after a key."""
+        return next(item for item in cls.model_fields[name].metadata if isinstance(item, Kind))
+
+
+@cache
+def section_of(cls: type[eqx.Module]) -> type[Section]:
+    """The keys of a class: its fields that can be written in a file.
+
+    Raises:
+        TypeError: where a field without default cannot be written.
+    """
+    keys: dict[str, Any] = {}
+    for field in dataclasses.fields(cls):
+        if not field.init:
+            continue
+        kind = _kind(cls, field)
+        needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+        if kind is None:
+            if needed:
+                raise TypeError(f"{cls.__name__}: {field.name} cannot be written in a design file")
+            continue
+        keys[field.name] = (Annotated[Any, kind], ... if needed else None)
+    return create_model(cls.__name__, __base__=Section, **keys)
+
+
+def modules_of(cls: type[eqx.Module]) -> dict[str, type[eqx.Module]]:
+    """The fields that hold a Module, with its class: a curve, a material."""
+    found = {field.name: _module(_hint(cls, field)) for field in dataclasses.fields(cls) if field.init}
+    return {name: kind for name, kind in found.items() if kind is not None}
+
+
+def family(base: type[eqx.Module]) -> dict[str, type[eqx.Module]]:
+    """The classes derived from an abstract one, by the name that design files call them.
+
+    A user's class cannot take the place of one of the library; of two of his own with one name the later is meant.
+    """
+    found: dict[str, type[eqx.Module]] = {}
+    for cls in _descendants(base):
+        name = snake(cls.__name__)
+        if name in found and _own(cls) and not _own(found[name]):
+            continue
+        if not (cls.__name__.startswith("_") or inspect.isabstract(cls)) and _writable(cls):
+            found[name] = cls
+    return found
+
+
+def is_family(cls: type[eqx.Module]) -> bool:
+    """Whether a table of this class says with `type` which derived class it describes."""
+    return inspect.isabstract(cls)
+
+
+def snake(name: str) -> str:
+    """`TipRelief` -> `tip_relief`."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
+
+
+def meanings(cls: type) -> dict[str, str]:
+    """What every field means, from the list of attributes in the docstring of the class or of one that it extends."""
+    found: dict[str, str] = {}
+    for owner in reversed(cls.__mro__):
+        block = re.search(r"\n\s*Attributes:\n(?P<list>.*?)(\n\s*\n|\Z)", owner.__doc__ or "", re.DOTALL)
+        if block is None:
+            continue
+        lines = inspect.cleandoc("\n" + block["list"]).splitlines()
+        for entry in re.split(r"\n(?=\S)", "\n".join(lines)):
+            names, _, text = entry.partition(": ")
+            found.update(dict.fromkeys(names.split(", "), " ".join(text.split())))
+    return found
+
+
+def summary(cls: type) -> str:
+    """The first sentence of a docstring."""
+    return inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
+
+
+def _kind(cls, field: dataclasses.Field) -> Kind | None:
+    number = fields_of(cls).get(field.name)
+    if number is not None:
+        return _number(number)
+    hint = _hint(cls, field)
+    if _module(hint) is not None:
+        return Table()
+    if typing.get_origin(hint) is typing.Literal:
+        return Choice(typing.get_args(hint))
+    plain = {bool: Switch(), str: Text(), int: Real(Number(whole=True)), float: Real()}
+    return plain.get(hint) if isinstance(hint, type) else None
+
+
+def _number(number: Number) -> Kind | None:
+    if not number.checked:
+        return None
+    kind: Kind = Real(number, open=not number.static)
+    for _ in number.shape:
+        kind = ListOf(kind)
+    return kind
+
+
+def _hint(cls, field: dataclasses.Field) -> Any:
+    """The annotation, without None."""
+    hint = field.type
+    if isinstance(hint, str):
+        try:
+            hint = typing.get_type_hints(cls)[field.name]
+        except (NameError, TypeError):  # a shape of an array
+            return None
+    if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
+        parts = [part for part in typing.get_args(hint) if part is not type(None)]
+        return parts[0] if len(parts) == 1 else None
+    return hint
+
+
+def _module(hint) -> type[eqx.Module] | None:
+    return hint if isinstance(hint, type) and issubclass(hint, eqx.Module) else None
+
+
+def _descendants(base):
+    for cls in base.__subclasses__():
+        yield cls
+        yield from _descendants(cls)
+
+
+def _own(cls) -> bool:
+    return not cls.__module__.startswith("jaxgear.")
+
+
+def _writable(cls) -> bool:
+    try:
+        section_of(cls)
+    except TypeError:
+        return False
+    return True
