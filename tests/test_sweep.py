@@ -14,6 +14,7 @@ import pytest
 import jaxgear as jg
 from jaxgear.metrics import RESULTS, result_key
 from jaxgear.sweeps.selection import front, smallest
+from jaxgear.sweeps.store import Store, load_manifest
 
 BOUNDS = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.5)}
 FEW = ("ppte", "max_flank_pressure", "effective_contact_ratio")
@@ -62,6 +63,10 @@ def folder(mesh, tmp_path):
 
 def content(table):
     return {name: table.column(name) for name in table.names}
+
+
+def parts_of(folder):
+    return sorted(folder.glob("part-*.parquet"))
 
 
 def assert_same(first, second):
@@ -138,7 +143,7 @@ def test_unsolved_variants_are_rows(mesh, tmp_path):
     assert len(table) == 40 and not table.column("converged").any()
     assert np.isnan(table.column("ppte_um")).all()
     assert len(table.best(3)) == 0 and len(table.pareto(["ppte_um", "length"])) == 0
-    stored = parquet.read_table(tmp_path / "out" / "part-0000000.parquet")
+    stored = parquet.read_table(parts_of(tmp_path / "out")[0])
     assert stored["ppte_um"].null_count == 16  # null, which statistics leave out, not NaN
     table.to_csv(tmp_path / "table.csv")
     with (tmp_path / "table.csv").open() as file:
@@ -173,8 +178,49 @@ def test_best_is_sorted_and_large_where_large_is_better(table):
     ratio = table.best(1, by="effective_contact_ratio").column("effective_contact_ratio")
     assert ratio == columns["effective_contact_ratio"].max()
     assert len(table.best(100)) == 40 and "40 variants, 0 failed" in str(table)
-    with pytest.raises(ValueError, match='"ppte" is not a column, must be one of variant, pinion'):
-        table.best(1, by="ppte")
+    with pytest.raises(ValueError, match='"noise" is not a column, must be one of variant, pinion'):
+        table.best(1, by="noise")
+
+
+def test_a_column_is_found_with_and_without_its_unit(mesh, table):
+    for name in ("ppte", "max_flank_pressure"):
+        best = table.best(3, by=name)
+        np.testing.assert_array_equal(best.column("variant"), table.best(3, by=table.find(name).name).column("variant"))
+        np.testing.assert_array_equal(best.column(name), best.column(table.find(name).name))
+    assert next(table.batches(["ppte"]))["ppte"][0] == table.column("ppte_um")[0]
+    pair = table.pareto(["ppte", "max_flank_pressure_MPa"])
+    assert_same(pair, table.pareto(["ppte_um", "max_flank_pressure"]))
+    with pytest.raises(ValueError, match="two or three different columns"):
+        table.pareto(["ppte", "ppte_um"])
+    spectrum = run(mesh, torque=jg.LoadSpectrum([25.0, 50.0]), results=("ppte",))
+    assert [spectrum.find(name).name for name in ("ppte", "ppte_worst")] == ["ppte_um_mean", "ppte_um_worst"]
+
+
+def test_the_table_is_arrow_pandas_and_xarray_with_units(table, folder):
+    import pandas
+    import polars
+    import pyarrow
+
+    for view in (table, jg.open_sweep(folder)):
+        arrow = pyarrow.table(view)  # through the stream
+        assert arrow.equals(view.to_arrow()) and len(arrow) == 40
+        assert arrow.schema.field("ppte_um").metadata[b"unit"] == b"um"
+        frame, dataset = view.to_pandas(), view.to_xarray()
+        assert isinstance(frame, pandas.DataFrame) and frame.attrs["units"]["ppte_um"] == "um"
+        assert dataset["ppte_um"].attrs["units"] == "um" and dataset["length"].attrs["high"] == 5.5
+        for name in view.names:
+            for values in (arrow[name], frame[name], dataset[name], polars.DataFrame(view)[name]):
+                np.testing.assert_array_equal(values.to_numpy(), view.column(name))
+
+
+def test_a_folder_is_read_as_a_folder(table, folder):
+    import pandas
+    import polars
+
+    for frame in (pandas.read_parquet(folder), polars.scan_parquet(folder).collect(), polars.read_parquet(folder)):
+        assert tuple(frame.columns) == table.names
+        for name in table.names:
+            np.testing.assert_array_equal(frame[name].to_numpy(), table.column(name))
 
 
 @pytest.mark.parametrize(
@@ -204,7 +250,7 @@ def test_selections_of_a_stream_are_those_of_the_whole():
 
 
 def test_units_ranges_and_settings_are_in_the_files(folder):
-    schema = parquet.read_schema(folder / "part-0000002.parquet")
+    schema = parquet.read_schema(parts_of(folder)[2])
     field = schema.field("max_flank_pressure_MPa")
     assert field.metadata == {b"unit": b"MPa", b"kind": b"result", b"better": b"smaller"}
     field = schema.field("length")
@@ -213,28 +259,61 @@ def test_units_ranges_and_settings_are_in_the_files(folder):
     assert {b"jaxgear", b"plan", b"weights", b"fingerprint"} <= set(schema.metadata)
     table = jg.open_sweep(folder)
     assert table.units["ppte_um"] == "um" and table.units["effective_contact_ratio"] == ""
-    table.to_csv(folder / "table.csv")
-    header, first, *_ = (folder / "table.csv").read_text().splitlines()
+    table.to_csv(folder.parent / "table.csv")
+    header, first, *_ = (folder.parent / "table.csv").read_text().splitlines()
     assert header.split(",")[3:5] == ['"length [mm]"', '"ppte_um"']
     assert float(first.split(",")[4]) == table.column("ppte_um")[0]
 
 
-def test_a_resumed_sweep_computes_what_is_missing_and_only_that(mesh, table, folder):
-    parts = sorted(folder.glob("*.parquet"))
-    assert [path.name for path in parts] == [f"part-000000{i}.parquet" for i in range(3)]
+def test_a_resumed_sweep_computes_what_is_missing_and_only_that(mesh, table, folder, caplog):
+    parts = parts_of(folder)
+    assert [path.name[:13] for path in parts] == [f"part-000000{i}-" for i in range(3)]
     before = parts[0].stat().st_mtime_ns
     parts[1].write_bytes(parts[1].read_bytes()[:-100])  # torn
     parts[2].unlink()
-    for leftover in (".part-0000001.parquet.0f.tmp", ".part-0000000.parquet.12.tmp"):
-        (folder / leftover).write_bytes(b"PAR1")
-    with pytest.raises(ValueError, match="is not complete, 2 of 3 parts are missing: resume"):
+    for part in (1, 0):
+        (folder / f".{parts[part].name}.0f.tmp").write_bytes(b"PAR1")
+    with pytest.raises(ValueError, match="not complete, 1 of 3 parts are missing and part-0000001-.* is damaged"):
         jg.open_sweep(folder)
     seen = []
     resumed = run(mesh, output=folder, callback=lambda *progress: seen.append(progress))
     assert_same(table, resumed)
     assert parts[0].stat().st_mtime_ns == before
     assert seen == [(16, 40), (32, 40), (40, 40)]
-    assert {path.name for path in folder.iterdir()} == {*(path.name for path in parts), "sweep.json"}
+    assert {path.name for path in folder.iterdir()} == {*(path.name for path in parts), "_sweep.parquet"}
+    assert [record.getMessage() for record in caplog.records if record.name == "jaxgear"] == [
+        f"{parts[1]}: is damaged or displaced, its variants are evaluated again"
+    ]
+
+
+def test_every_flipped_byte_and_every_swap_of_parts_is_found(mesh, table, folder, caplog):
+    parts = parts_of(folder)
+    manifest = load_manifest(folder)
+    store = Store(folder, manifest)
+    sound = parts[1].read_bytes()
+    for place in range(0, len(sound), 7):  # data, footer and the names in it
+        parts[1].write_bytes(sound[:place] + bytes([sound[place] ^ 0x10]) + sound[place + 1 :])
+        assert store.unsound(parts) == [parts[1]]
+    assert_same(table, run(mesh, output=folder))
+    assert f"{parts[1]}: is damaged" in caplog.text
+    first, second = (path.read_bytes() for path in parts[:2])
+    parts[0].write_bytes(second), parts[1].write_bytes(first)
+    with pytest.raises(ValueError, match="part-0000000-.* is damaged or displaced: repeat"):
+        jg.open_sweep(folder)
+    assert_same(table, run(mesh, output=folder))
+    displaced = folder / parts[0].name.replace("part-0000000", "part-0000002")  # a good part at another's place
+    parts[2].unlink()
+    parts[0].rename(displaced)
+    assert_same(table, run(mesh, output=folder))
+    assert not displaced.exists() and parts_of(folder) == parts
+
+
+def test_a_part_that_is_damaged_later_is_named(folder):
+    table = jg.open_sweep(folder)
+    part = parts_of(folder)[1]
+    part.write_bytes(b"PAR1" + bytes(200))
+    with pytest.raises(ValueError, match=rf"{part.name}: is damaged or gone: repeat the sweep"):
+        table.column("ppte")
 
 
 @pytest.mark.parametrize(
@@ -312,11 +391,22 @@ def test_folders_that_cannot_be_used_are_refused(mesh, tmp_path):
     ):
         with pytest.raises(ValueError, match=problem):
             run(mesh, output=tmp_path / target)
-    with pytest.raises(ValueError, match="is not a sweep: sweep.json: No such file"):
+    with pytest.raises(ValueError, match="is not a sweep: _sweep.parquet: No such file"):
         jg.open_sweep(tmp_path)
-    (tmp_path / "sweep.json").write_text('{"title": ')
-    with pytest.raises(ValueError, match="is not a sweep: sweep.json is not readable"):
+    (tmp_path / "_sweep.parquet").write_text("PAR1")
+    with pytest.raises(ValueError, match="is not a sweep: _sweep.parquet: is damaged"):
         jg.open_sweep(tmp_path)
+
+
+@pytest.mark.parametrize("settings", ["null", "{}", '{"variants": null, "part_rows": 16}', "[1", '{"variants": -1}'])
+def test_a_manifest_that_cannot_be_trusted_is_refused(mesh, folder, settings):
+    path = folder / "_sweep.parquet"
+    empty = parquet.read_table(path)
+    notes = {**empty.schema.metadata, b"sweep": settings.encode()}
+    parquet.write_table(empty.replace_schema_metadata(notes), path)
+    for use in (lambda: jg.open_sweep(folder), lambda: run(mesh, output=folder)):
+        with pytest.raises(ValueError, match="is not a sweep: _sweep.parquet: is damaged, or of another version"):
+            use()
 
 
 def test_summary_is_made_of_the_named_results(mesh):

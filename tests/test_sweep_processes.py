@@ -81,7 +81,7 @@ def test_killed_again_and_again_on_other_devices_it_has_the_rows_of_an_uninterru
             process.wait()
     there = len(list(folder.glob("part-*.parquet")))
     assert 25 <= there < PARTS, "the processes were killed too late to test anything"
-    (folder / ".part-0000039.parquet.1234.tmp").write_bytes(b"PAR1")  # what a kill in the middle of writing leaves
+    (folder / ".part-0000039-0f.parquet.1234.tmp").write_bytes(b"PAR1")  # what a kill in the middle of writing leaves
     with started(environment, folder, 2) as process:
         finish(process)
     assert_same(jg.open_sweep(folder), complete)

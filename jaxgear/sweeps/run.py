@@ -6,7 +6,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from ..tolerance import Tolerance, sample_deviations
 from .columns import CONVERGED, VARIANT, Column, parameter_columns
 from .evaluate import Design, Evaluator, Pending
 from .plan import AbstractPlan
-from .store import MANIFEST, Store, make_manifest
+from .store import MANIFEST, Manifest, Store
 from .table import SweepTable, in_memory, open_sweep
 
 Callback = Callable[[int, int], None]
@@ -51,9 +50,11 @@ def sweep(
 ) -> SweepTable:
     """Evaluates every variant of a plan, on all local devices.
 
-    With an output folder the rows are written part by part as Parquet, and memory does not depend on their number. An
+    With an output folder the rows are written part by part as Parquet, and memory does not depend on their number; the
+    folder holds nothing else, so that `pandas.read_parquet(folder)` and `polars.scan_parquet(folder)` read it. An
     interrupted sweep resumes when it is called again with the same arguments: its table has the rows of an
-    uninterrupted one to the last bit, on the same kind and number of devices (on another number to rounding). With
+    uninterrupted one to the last bit, on the same kind and number of devices (on another number to rounding). Parts
+    that are damaged or displaced are evaluated again, with a warning of the logger "jaxgear" that names them. With
     several processes (`jax.distributed.initialize`) each writes its share of the parts into the same, shared folder,
     and all return the complete table.
 
@@ -98,9 +99,11 @@ def sweep(
     settings = {
         **_settings(design, example, plan, mesh, load, results),
         "columns": [column.name for column in columns],
+        "variants": plan.size,
+        "part_rows": part_rows,
         "tolerance": None if tolerance is None else {"limits": _digest(tolerance), "samples": samples, "seed": seed},
     }
-    manifest = make_manifest(columns, title=title, variants=plan.size, part_rows=part_rows, settings=settings)
+    manifest = Manifest(title, tuple(columns), settings)
     if output is None:
         if jax.process_count() > 1:
             raise ValueError("sweep: output = None cannot gather the rows of several processes, name a shared folder")
@@ -120,11 +123,10 @@ def _fill(evaluator: Evaluator, plan: AbstractPlan, store: Store, callback: Call
     if not leader:
         _wait((store.folder / MANIFEST).exists)
         store.claim(leader=False)
-    store.remove_leftovers(own)
-    _run(evaluator, plan, store, {part: not store.is_there(part) for part in own}, store.write, callback)
-    if jax.process_count() > 1:
-        for part in range(store.parts):
-            _wait(partial(store.is_there, part))
+    store.clean(own)
+    there = store.found()
+    _run(evaluator, plan, store, {part: part not in there for part in own}, store.write, callback)
+    _wait(lambda: len(store.found()) >= store.parts)
 
 
 def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts: dict[int, bool], keep, callback) -> None:

@@ -1,25 +1,46 @@
-"""The folder of a sweep: a manifest, and parts that are complete or absent.
+"""The folder of a sweep: Parquet files and nothing else, so that whatever reads a folder of Parquet reads it.
 
-A part is written under a temporary name, flushed to the disk and renamed: whatever ends the process, no part is ever
-half there. What determines the rows stands in the manifest, so that a resumed sweep goes on with the same ones or is
-refused.
+The manifest is a file without rows: its schema holds the columns with their units, the title and everything that
+determines the rows. A resumed sweep goes on with the same ones or is refused. A part is written under a temporary name,
+flushed to the disk and renamed: whatever ends the process, no part is ever half there. Its name ends with a digest of
+the sweep, of its place in it and of its bytes, so that a part which is damaged, displaced or of another sweep is known
+as such, and its variants are evaluated again.
 """
 
 import hashlib
 import json
+import logging
 import os
+import re
 import uuid
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .columns import CONVERGED, VARIANT, Column
 
-MANIFEST = "sweep.json"
+MANIFEST = "_sweep.parquet"  # Arrow and Spark pass over such names, others find no row in it
 _TEMPORARY = ".tmp"
+_PART = re.compile(r"part-(\d+)-[0-9a-f]+\.parquet")
+_LEFTOVER = re.compile(r"\.part-(\d+)-.*\.tmp")
+
+_log = logging.getLogger("jaxgear")
+
+
+class Manifest(NamedTuple):
+    """What a sweep is.
+
+    Attributes:
+        title: free text.
+        columns: of the table.
+        settings: everything that determines the rows, as plain data; `variants` and `part_rows` among it.
+    """
+
+    title: str
+    columns: tuple[Column, ...]
+    settings: Mapping[str, Any]
 
 
 class Store:
@@ -27,27 +48,23 @@ class Store:
 
     Attributes:
         folder: where they lie.
-        manifest: what the sweep is, as plain data.
+        manifest: what the sweep is.
     """
 
-    def __init__(self, folder: str | Path, manifest: Mapping[str, Any]):
+    def __init__(self, folder: str | Path, manifest: Manifest):
         self.folder, self.manifest = Path(folder), manifest
-        self._fingerprint = fingerprint(manifest["settings"])
-        self._schema = schema([Column(**column) for column in manifest["columns"]], manifest, self._fingerprint)
+        self._variants, self._part_rows = (int(manifest.settings[key]) for key in ("variants", "part_rows"))
+        self._schema = _schema(manifest)
+        self._fingerprint = _digest(manifest.settings)
 
     @property
     def parts(self) -> int:
         """Number of parts of the complete sweep."""
-        return -(-self.manifest["variants"] // self.manifest["part_rows"])
+        return -(-self._variants // self._part_rows)
 
     def span(self, part: int) -> tuple[int, int]:
         """Variants of a part: the first, and the one after the last."""
-        rows = self.manifest["part_rows"]
-        return part * rows, min((part + 1) * rows, self.manifest["variants"])
-
-    def path(self, part: int) -> Path:
-        """Where a part lies."""
-        return self.folder / f"part-{part:07d}.parquet"
+        return part * self._part_rows, min((part + 1) * self._part_rows, self._variants)
 
     def claim(self, *, leader: bool) -> None:
         """Makes the folder that of this sweep; the leader of several processes writes the manifest.
@@ -60,34 +77,36 @@ class Store:
             if not (self.folder / MANIFEST).exists():
                 if leader:
                     self.folder.mkdir(parents=True, exist_ok=True)
-                    text = json.dumps(self.manifest, indent=2, ensure_ascii=False)
-                    write_durably(self.folder / MANIFEST, lambda file: file.write(text.encode()))
+                    data = _parquet(self._schema.empty_table())
+                    write_durably(self.folder / MANIFEST, lambda file: file.write(data))
                 return
         except OSError as error:
             raise ValueError(f"{self.folder}: cannot be written: {error.strerror or error}") from None
-        earlier, now = load_manifest(self.folder)["settings"], self.manifest["settings"]
+        there = load_manifest(self.folder)
+        earlier, now = there.settings, self.manifest.settings
         changed = [key for key in sorted({*earlier, *now}) if earlier.get(key) != now.get(key)]
         if changed:
             raise ValueError(f"{self.folder}: holds a sweep of other settings ({', '.join(changed)}), delete it or "
                              "choose another folder")  # fmt: skip
+        self.manifest, self._schema = there, _schema(there)  # all parts have one title and one set of units
 
-    def is_there(self, part: int) -> bool:
-        """Whether a part is complete and belongs to this sweep."""
-        import pyarrow
-        import pyarrow.parquet as parquet
+    def found(self) -> dict[int, Path]:
+        """The parts that are there, by their number; `unsound` reads them."""
+        matches = ((_PART.fullmatch(path.name), path) for path in sorted(self.folder.iterdir()))
+        return {int(match[1]): path for match, path in matches if match}
 
-        try:
-            found = parquet.read_metadata(self.path(part))
-        except (OSError, pyarrow.ArrowException):  # absent, or torn by something else than this program
-            return False
-        start, stop = self.span(part)
-        return found.num_rows == stop - start and (found.metadata or {}).get(b"fingerprint") == self._fingerprint
+    def unsound(self, paths: Iterable[Path]) -> list[Path]:
+        """Those of some parts that are damaged, displaced or of another sweep."""
+        return [path for path in paths if not self._is_sound(path)]
 
-    def remove_leftovers(self, parts: range) -> None:
-        """Deletes what killed processes left of parts that are this process's to write."""
-        for path in self.folder.glob(f".part-*{_TEMPORARY}"):
-            number = path.name[len(".part-") :].partition(".")[0]
-            if number.isdigit() and int(number) in parts:
+    def clean(self, parts: range) -> None:
+        """Deletes what killed processes left, and what is unsound, of parts that are this process's to write."""
+        for path in sorted(self.folder.iterdir()):
+            leftover, part = _LEFTOVER.fullmatch(path.name), _PART.fullmatch(path.name)
+            if leftover and int(leftover[1]) in parts:
+                path.unlink(missing_ok=True)
+            if part and int(part[1]) in parts and not self._is_sound(path):
+                _log.warning("%s: is damaged or displaced, its variants are evaluated again", path)
                 path.unlink(missing_ok=True)
 
     def write(self, part: int, columns: Mapping[str, np.ndarray]) -> None:
@@ -96,19 +115,12 @@ class Store:
         Raises:
             ValueError: when the disk is full or the folder is gone.
         """
-        import pyarrow.parquet as parquet
-
-        table = self.table(part, columns)
+        data = _parquet(self.table(part, columns))
+        path = self._path(part, data)
         try:
-            write_durably(
-                self.path(part),
-                # these numbers never repeat and hardly compress: a fast codec, no dictionary
-                lambda file: parquet.write_table(
-                    table, file, compression="zstd", compression_level=1, use_dictionary=False, write_page_checksum=True
-                ),
-            )
+            write_durably(path, lambda file: file.write(data))
         except OSError as error:
-            raise ValueError(f"{self.path(part)}: cannot be written: {error.strerror or error}") from None
+            raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
 
     def table(self, part: int, columns: Mapping[str, np.ndarray]):
         """A part as an Arrow table; numbers of failed variants are null."""
@@ -119,59 +131,45 @@ class Store:
         arrays = [pyarrow.array(values[field.name], field.type, from_pandas=failed) for field in self._schema]
         return pyarrow.Table.from_arrays(arrays, schema=self._schema)
 
+    def _path(self, part: int, data) -> Path:
+        digest = hashlib.sha256(f"{self._fingerprint} {part} ".encode())
+        digest.update(data)
+        return self.folder / f"part-{part:07d}-{digest.hexdigest()[:16]}.parquet"
 
-def make_manifest(
-    columns: Sequence[Column], *, title: str, variants: int, part_rows: int, settings: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Contents of the manifest."""
-    return {
-        "title": title,
-        "variants": variants,
-        "part_rows": part_rows,
-        "columns": [asdict(column) for column in columns],
-        "settings": {**settings, "variants": variants, "part_rows": part_rows},
-    }
+    def _is_sound(self, path: Path) -> bool:
+        part = _PART.fullmatch(path.name)
+        try:
+            return part is not None and path == self._path(int(part[1]), path.read_bytes())
+        except OSError:  # it cannot be read
+            return False
 
 
-def load_manifest(folder: Path) -> dict[str, Any]:
+def load_manifest(folder: Path) -> Manifest:
     """Reads the manifest of a folder.
 
     Raises:
-        ValueError: when there is none.
+        ValueError: when there is none, or none that can be trusted.
     """
-    try:
-        manifest = json.loads((Path(folder) / MANIFEST).read_text(encoding="utf-8"))
-        return {key: manifest[key] for key in ("title", "variants", "part_rows", "columns", "settings")}
-    except OSError as error:
-        raise ValueError(f"{folder}: is not a sweep: {MANIFEST}: {error.strerror or error}") from None
-    except (ValueError, KeyError, TypeError):
-        raise ValueError(f"{folder}: is not a sweep: {MANIFEST} is not readable") from None
-
-
-def fingerprint(settings: Mapping[str, Any]) -> bytes:
-    """Digest of the settings."""
-    return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest().encode()
-
-
-def schema(columns: Sequence[Column], manifest: Mapping[str, Any], digest: bytes):
-    """Arrow schema with units and ranges at the columns, and the sweep itself at the table."""
     import pyarrow
+    import pyarrow.parquet as parquet
 
-    types = {"number": pyarrow.int64(), "flag": pyarrow.bool_()}
-    fields = []
-    for column in columns:
-        notes = {"unit": column.unit, "kind": column.kind, "better": column.better}
-        if column.low is not None and column.high is not None:
-            notes |= {"low": repr(column.low), "high": repr(column.high)}
-        kept = {key: value for key, value in notes.items() if value or key == "unit"}
-        fields.append(pyarrow.field(column.name, types.get(column.kind, pyarrow.float64()), metadata=kept))
-    settings = manifest["settings"]
-    notes = {"title": manifest["title"], "fingerprint": digest.decode(), "sweep": json.dumps(settings)}
-    for key in ("jaxgear", "plan", "torques_Nm", "weights"):
-        if key in settings:
-            value = settings[key]
-            notes[key] = value if isinstance(value, str) else json.dumps(value)
-    return pyarrow.schema(fields, metadata=notes)
+    path = Path(folder) / MANIFEST
+    try:
+        with path.open("rb") as file:  # what the system says of a missing file, not what Arrow says
+            schema = parquet.read_schema(file)
+    except OSError as error:
+        raise ValueError(f"{folder}: is not a sweep: {MANIFEST}: {error.strerror or 'is damaged'}") from None
+    except pyarrow.ArrowException:
+        raise ValueError(f"{folder}: is not a sweep: {MANIFEST}: is damaged") from None
+    try:
+        notes = {key.decode(): value.decode() for key, value in schema.metadata.items()}
+        manifest = Manifest(notes["title"], tuple(map(_column, schema)), json.loads(notes["sweep"]))
+        if not _schema(manifest).equals(schema, check_metadata=True):
+            raise ValueError
+        Store(folder, manifest)
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise ValueError(f"{folder}: is not a sweep: {MANIFEST}: is damaged, or of another version") from None
+    return manifest
 
 
 def write_durably(path: Path, write) -> None:
@@ -192,6 +190,52 @@ def write_durably(path: Path, write) -> None:
             os.fsync(folder)
         finally:
             os.close(folder)
+
+
+def _schema(manifest: Manifest):
+    """Arrow schema with units and ranges at the columns, and the sweep itself at the table."""
+    import pyarrow
+
+    types = {"number": pyarrow.int64(), "flag": pyarrow.bool_()}
+    fields = []
+    for column in manifest.columns:
+        notes = {"unit": column.unit, "kind": column.kind, "better": column.better}
+        if column.low is not None and column.high is not None:
+            notes |= {"low": repr(column.low), "high": repr(column.high)}
+        kept = {key: value for key, value in notes.items() if value or key == "unit"}
+        fields.append(pyarrow.field(column.name, types.get(column.kind, pyarrow.float64()), metadata=kept))
+    settings = manifest.settings
+    notes = {"title": manifest.title, "sweep": json.dumps(settings, sort_keys=True)}
+    for key in ("jaxgear", "plan", "torques_Nm", "weights"):
+        if key in settings:
+            value = settings[key]
+            notes[key] = value if isinstance(value, str) else json.dumps(value, sort_keys=True)
+    plain = [[column.name, *sorted(field.metadata.items())] for column, field in zip(manifest.columns, fields)]
+    return pyarrow.schema(fields, metadata={**notes, "fingerprint": _digest([notes, str(plain)])})
+
+
+def _column(field) -> Column:
+    """A column of the table from the field that `_schema` makes of it."""
+    notes = {key.decode(): value.decode() for key, value in field.metadata.items()}
+    limits = {key: float(notes[key]) for key in ("low", "high") if key in notes}
+    return Column(field.name, notes["unit"], notes["kind"], notes.get("better", ""), **limits)  # type: ignore[arg-type]
+
+
+def _parquet(table) -> memoryview:
+    """A table as the bytes of a file."""
+    import pyarrow
+    import pyarrow.parquet as parquet
+
+    file = pyarrow.BufferOutputStream()
+    # these numbers never repeat and hardly compress: a fast codec, no dictionary
+    options = {"compression": "zstd", "compression_level": 1, "use_dictionary": False, "write_page_checksum": True}
+    parquet.write_table(table, file, **options)
+    return memoryview(file.getvalue())
+
+
+def _digest(data) -> str:
+    """Digest of plain data."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
 
 def _check_folder(folder: Path) -> None:

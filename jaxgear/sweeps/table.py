@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .columns import CONVERGED, Column
+from .columns import CONVERGED, VARIANT, Column
 from .selection import front, smallest
 from .store import Store, load_manifest, write_durably
 
@@ -18,6 +18,8 @@ class SweepTable:
 
     Every method but `column` holds one part of the table at a time, whatever its size. Failed variants stay in the
     table: their `converged` is False and their results are NaN.
+
+    A method takes the name of a column with or without its unit: "ppte_um" or "ppte".
 
     Attributes:
         title: of the sweep.
@@ -60,6 +62,18 @@ class SweepTable:
         """Unit of every column, "" for a pure number."""
         return {column.name: column.unit for column in self.columns}
 
+    def find(self, name: str) -> Column:
+        """The column of a name: with or without its unit, a result's own name standing for its (weighted) mean.
+
+        Raises:
+            ValueError: for an unknown column.
+        """
+        for ending in ("", "_mean", "_mean_mean"):
+            for column in self.columns:
+                if f"{name}{ending}" in (column.name, _without_unit(column)):
+                    return column
+        raise ValueError(f'SweepTable: "{name}" is not a column, must be one of {", ".join(self.names)}')
+
     def batches(self, names: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
         """The columns, part by part.
 
@@ -69,10 +83,10 @@ class SweepTable:
         Raises:
             ValueError: for an unknown column.
         """
-        wanted = [self._column(name).name for name in (self.names if names is None else names)]
+        wanted = {name: self.find(name).name for name in (self.names if names is None else names)}
         for part in range(len(self._sizes)):
-            table = self._read(part, wanted)
-            yield {name: table[name].to_numpy() for name in wanted}
+            table = self._read(part, [*dict.fromkeys(wanted.values())])
+            yield {name: table[column].to_numpy() for name, column in wanted.items()}
 
     def column(self, name: str) -> np.ndarray:
         """A whole column, shape (variants,).
@@ -96,7 +110,7 @@ class SweepTable:
         Raises:
             ValueError: for an unknown column.
         """
-        column = self._column(self.results[0] if by is None else by)
+        column = self.find(self.results[0] if by is None else by)
         ranked = ((numbers, values[:, 0]) for numbers, values in self._ranked([column]))
         return self.take(smallest(ranked, count))
 
@@ -109,9 +123,10 @@ class SweepTable:
         Raises:
             ValueError: for an unknown column, or another number of them.
         """
-        if len(set(by)) != len(by) or not 2 <= len(by) <= 3:
+        columns = [self.find(name) for name in by]
+        if len(set(columns)) != len(columns) or not 2 <= len(columns) <= 3:
             raise ValueError("SweepTable.pareto: needs two or three different columns")
-        return self.take(front(self._ranked([self._column(name) for name in by])))
+        return self.take(front(self._ranked(columns)))
 
     def take(self, numbers) -> "SweepTable":
         """Some rows, in the order of their numbers given, as a table in memory."""
@@ -131,6 +146,36 @@ class SweepTable:
         """Parameters of every row, ready for the `design` of the sweep."""
         rows = zip(*(self.column(name).tolist() for name in self.parameters))
         return [dict(zip(self.parameters, row)) for row in rows]
+
+    def to_arrow(self):
+        """The whole table as a `pyarrow.Table`; the metadata of its fields hold unit, kind and range."""
+        import pyarrow
+
+        return pyarrow.Table.from_batches(self._stream(), self._schema)
+
+    def to_pandas(self):
+        """The whole table as a `pandas.DataFrame`; `attrs` hold the title and the units of the columns."""
+        frame = self.to_arrow().to_pandas()
+        frame.attrs = {"title": self.title, "units": self.units}
+        return frame
+
+    def to_xarray(self):
+        """The whole table as an `xarray.Dataset` over the variants; attributes hold title, units and ranges."""
+        import xarray
+
+        variables = {}
+        for column in self.columns:
+            notes = {"units": column.unit, "low": column.low, "high": column.high}
+            kept = {key: value for key, value in notes.items() if value is not None}
+            variables[column.name] = ((VARIANT,), self.column(column.name), kept)
+        return xarray.Dataset(variables, attrs={"title": self.title})
+
+    def __arrow_c_stream__(self, requested_schema=None):
+        """The table part by part, for whatever takes Arrow data: `polars.DataFrame(table)`, `pyarrow.table(table)`."""
+        import pyarrow
+
+        reader = pyarrow.RecordBatchReader.from_batches(self._schema, self._stream())
+        return reader.__arrow_c_stream__(requested_schema)
 
     def to_csv(self, path: str | Path) -> None:
         """Writes all rows as CSV with the units in the header; cells of failed results are empty."""
@@ -154,11 +199,14 @@ class SweepTable:
         lines += ["  ".join(cell.rjust(width) for cell, width in zip(row, widths)) for row in zip(*cells)]
         return "\n".join([*lines, "..."] if count > _SHOWN else lines)
 
-    def _column(self, name: str) -> Column:
-        for column in self.columns:
-            if column.name == name:
-                return column
-        raise ValueError(f'SweepTable: "{name}" is not a column, must be one of {", ".join(self.names)}')
+    @property
+    def _schema(self):
+        return self._read(0, None).schema
+
+    def _stream(self) -> Iterator:
+        """The rows as Arrow batches, one part after the other in memory."""
+        for part in range(len(self._sizes)):
+            yield from self._read(part, None).to_batches()
 
     def _ranked(self, columns: Sequence[Column]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Row numbers and values of the columns, turned so that small is better, NaN where the variant failed."""
@@ -180,7 +228,7 @@ def in_memory(title: str, columns: Sequence[Column], tables: Sequence) -> SweepT
 
 
 def open_sweep(folder: str | Path) -> SweepTable:
-    """Opens the table of a finished sweep.
+    """Opens the table of a finished sweep, and reads it once to see that it is undamaged.
 
     Args:
         folder: the output of a sweep.
@@ -188,26 +236,40 @@ def open_sweep(folder: str | Path) -> SweepTable:
     Raises:
         ValueError: when the folder holds no sweep, or one that is not complete.
     """
-    import pyarrow.parquet as parquet
-
     folder = Path(folder)
     manifest = load_manifest(folder)
     store = Store(folder, manifest)
-    missing = sum(not store.is_there(part) for part in range(store.parts))
-    if missing:
-        raise ValueError(f"{folder}: is not complete, {missing} of {store.parts} parts are missing: resume the sweep")
-    columns = [Column(**column) for column in manifest["columns"]]
-    return SweepTable(
-        manifest["title"],
-        columns,
-        [stop - start for start, stop in map(store.span, range(store.parts))],
-        lambda part, names: parquet.read_table(store.path(part), columns=names, page_checksum_verification=True),
-    )
+    paths = store.found()
+    unsound = store.unsound(paths.values())
+    missing = store.parts - len(set(range(store.parts)) & set(paths))
+    problems = [f"{missing} of {store.parts} parts are missing"] if missing else []
+    problems += [f"{path.name} is damaged or displaced" for path in unsound[:1]]
+    if problems:
+        raise ValueError(f"{folder}: is not complete, {' and '.join(problems)}: repeat the sweep, which mends it")
+    sizes = [stop - start for start, stop in map(store.span, range(store.parts))]
+    return SweepTable(manifest.title, manifest.columns, sizes, lambda part, names: _stored(paths[part], names))
+
+
+def _stored(path: Path, names: Sequence[str] | None):
+    import pyarrow
+    import pyarrow.parquet as parquet
+
+    try:
+        with parquet.ParquetFile(path, page_checksum_verification=True) as file:
+            return file.read(names)
+    except (OSError, pyarrow.ArrowException):
+        raise ValueError(f"{path}: is damaged or gone: repeat the sweep, which mends it") from None
 
 
 def _heading(column: Column) -> str:
     """Name with the unit, once: the names of results end with theirs."""
     return f"{column.name} [{column.unit}]" if column.unit and column.kind == "parameter" else column.name
+
+
+def _without_unit(column: Column) -> str:
+    """Name of a result without the unit in it."""
+    unit = column.unit.replace(" ", "").replace("/", "_per_")
+    return column.name.replace(f"_{unit}", "", 1) if unit and column.kind == "result" else column.name
 
 
 def _text(value) -> str:
