@@ -248,3 +248,107 @@ def test_relief_starts_without_a_step_and_parabolas_also_without_a_kink():
         before, after = relief(profile([TIP - 3.0 - h, TIP - 3.0 + h]))
         assert float(before) == 0.0
         assert float(after - before) == pytest.approx(6.0 * slope * h / 3.0, abs=1e-12)
+
+
+def test_a_number_scales_a_modification_and_sum_adds_many():
+    """Also a traced number, whose derivative is the unscaled modification."""
+    points = profile(RHO, np.linspace(-10, 10, 33))
+    parts = [jg.TipRelief(7.0, 3.0), jg.LeadCrowning(5.0), jg.ProfileSlope(1.0)]
+    alone = [part(points) for part in parts]
+    np.testing.assert_allclose(sum(parts)(points), sum(alone), atol=1e-13)
+    for factor in (2, 2.0, np.float64(2.0), jnp.asarray(2.0)):
+        np.testing.assert_array_equal((factor * parts[0])(points), 2.0 * alone[0])
+        np.testing.assert_array_equal((parts[0] * factor)(points), 2.0 * alone[0])
+    np.testing.assert_array_equal((-parts[0])(points), -alone[0])
+    np.testing.assert_allclose((sum(parts) - parts[1])(points), alone[0] + alone[2], atol=1e-13)
+    by_factor = jax.jacfwd(lambda x: (x * sum(parts))(points))(3.0)
+    np.testing.assert_allclose(by_factor, sum(alone), atol=1e-13)
+    assert str(2 * parts[1] + parts[2]) == (
+        "Scaled(factor=2, modification=LeadCrowning(amount=5 um)) + ProfileSlope(amount=1 um)"
+    )
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda relief: relief + 1.0,
+        lambda relief: 1 + relief,
+        lambda relief: relief + None,
+        lambda relief: relief - "tip",
+        lambda relief: relief * relief,
+        lambda relief: "2" * relief,
+        lambda relief: relief * [1.0, 2.0],
+    ],
+)
+def test_what_is_no_modification_cannot_be_added_and_what_is_no_number_cannot_scale(wrong):
+    with pytest.raises(TypeError, match=r"TipRelief\(amount=5 um.*only (a number can|another modification can)"):
+        wrong(jg.TipRelief(5.0, 3.0))
+
+
+def test_a_factor_is_one_number():
+    with pytest.raises(ValueError, match=r"Scaled: factor has shape \(3,\), must be a single number"):
+        jnp.arange(3.0) * jg.TipRelief(5.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda x: jg.TipRelief(x, 4.0),
+        lambda x: jg.RootRelief(4.0, x),
+        lambda x: jg.EndRelief(x, 1.0),
+        jg.ProfileCrowning,
+        jg.ProfileSlope,
+        jg.LeadCrowning,
+        jg.LeadSlope,
+        jg.Power,
+        ParabolicLinear,
+        lambda x: jg.Quadratic(0.0, x, 0.0),
+    ],
+)
+def test_arrays_where_a_single_number_is_meant_are_refused_also_while_traced(make):
+    """An array as long as the positions was one amount per position, without a word."""
+    for call in (make, jax.jit(make)):
+        with pytest.raises(ValueError, match=r"has shape \(32,\), must be a single number; make many with jax.vmap"):
+            call(jnp.linspace(0.1, 0.9, 32))
+
+
+def test_many_reliefs_by_vmap():
+    amounts = jnp.linspace(1.0, 9.0, 5)
+    reliefs = jax.vmap(lambda amount: jg.TipRelief(amount, 4.0))(amounts)
+    removed = jax.vmap(lambda relief: relief(profile(RHO)))(reliefs)
+    for amount, row in zip(amounts, removed):
+        np.testing.assert_allclose(row, jg.TipRelief(amount, 4.0)(profile(RHO)), atol=1e-14)
+
+
+def test_numbers_are_checked_inside_traced_functions_too():
+    with pytest.raises(ValueError, match="TipRelief: length = -1 mm must be at least 0 mm"):
+        jax.jit(lambda amount: jg.TipRelief(amount, -1.0))(5.0)
+
+
+def test_which_modifications_vary_along_the_face():
+    """Amounts of zero do not; traced ones may."""
+    relief = jg.TipRelief(5.0, 3.0)
+    assert not (relief + jg.ProfileSlope(2.0) + jg.LeadCrowning(0.0) + jg.NoModification()).varies_along_face
+    assert not (0.0 * jg.LeadSlope(3.0)).varies_along_face and not (2.0 * relief).varies_along_face
+    for lead in (jg.LeadCrowning(1.0), jg.LeadSlope(-1.0), jg.EndRelief(1.0, 2.0), -jg.LeadSlope(1.0)):
+        assert lead.varies_along_face and (relief + lead).varies_along_face
+    seen = []
+    jax.jit(lambda x: seen.append(jg.LeadCrowning(x).varies_along_face) or x)(0.0)
+    assert seen == [True]
+
+
+@pytest.mark.parametrize("node", [1e-300, 1e-12, 1.0])
+def test_derivative_by_the_node_is_right_for_any_node(node):
+    """Closed form: -2 (1 - n) / (2 - n)^2 ... on the tangent, on the parabola d^2 (2 n - 2) / (2 n - n^2)^2."""
+    r = jnp.asarray([0.0, 0.25, 0.5, 1.0 - 1e-9])
+    d = r * node
+    value, by_node, by_depth = (
+        jax.vmap(f, (None, 0))(node, d)
+        for f in (lambda n, d: ParabolicLinear(n)(d), jax.grad(lambda n, d: ParabolicLinear(n)(d)),
+                  jax.grad(lambda n, d: ParabolicLinear(n)(d), argnums=1))
+    )  # fmt: skip
+    np.testing.assert_allclose(value, node * r**2 / (2 - node), rtol=1e-14)
+    np.testing.assert_allclose(by_node, r**2 * (2 * node - 2) / (2 - node) ** 2, rtol=1e-8, atol=1e-14)
+    np.testing.assert_allclose(by_depth, 2 * r / (2 - node), rtol=1e-14)
+    beyond = jax.vmap(jax.grad(lambda n, d: ParabolicLinear(n)(d)), (None, 0))(node, jnp.asarray([0.3, 1.0]))
+    assert bool(jnp.all(jnp.isfinite(beyond)))

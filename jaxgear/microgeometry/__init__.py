@@ -1,4 +1,4 @@
-"""What is taken off the flank: profile and lead modifications, composed with `+`.
+"""What is taken off the flank: profile and lead modifications, composed with `+` and factors.
 
 Positive means material removed, in um, normal to the flank in the transverse plane (ISO 21771), which is along the line
 of action. Profile lengths are roll lengths in mm (differences of radii of curvature) and are counted from the tip for a
@@ -8,6 +8,7 @@ of action. Profile lengths are roll lengths in mm (differences of radii of curva
 from .base import AbstractModification as AbstractModification
 from .base import Flank as Flank
 from .base import NoModification as NoModification
+from .base import Scaled as Scaled
 from .base import Sum as Sum
 from .base import terms as terms
 from .curves import AbstractCurve as AbstractCurve

@@ -1,43 +1,76 @@
-"""The interface of a flank modification and its composition with `+`."""
+"""The interface of a flank modification and its composition with `+`, `-` and factors."""
 
 from abc import abstractmethod
 
-import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
+from ..numerics import Checked, concrete, number, result
 
-class Flank(eqx.Module):
+
+class Flank(Checked):
     """Points on one gear's flank at which a modification is evaluated. The fields broadcast against each other.
 
     Attributes:
-        roll_length: radius of curvature of the involute at the point [mm].
-        tip_roll_length: roll length at the tip [mm].
-        start_roll_length: roll length at the start of the active profile [mm].
-        base_radius: base radius of the gear [mm].
-        face_coordinate: position along the face, from its middle [mm].
-        face_width: common face width of the pair [mm].
+        roll_length: radius of curvature of the involute at the point.
+        tip_roll_length: roll length at the tip.
+        start_roll_length: roll length at the start of the active profile.
+        base_radius: base radius of the gear.
+        face_coordinate: position along the face, from its middle.
+        face_width: common face width of the pair.
     """
 
-    roll_length: Float[Array, "..."]
-    tip_roll_length: Float[Array, "..."]
-    start_roll_length: Float[Array, "..."]
-    base_radius: Float[Array, "..."]
-    face_coordinate: Float[Array, "..."]
-    face_width: Float[Array, "..."]
+    roll_length: Float[Array, "..."] = result("mm")
+    tip_roll_length: Float[Array, "..."] = result("mm")
+    start_roll_length: Float[Array, "..."] = result("mm")
+    base_radius: Float[Array, "..."] = result("mm")
+    face_coordinate: Float[Array, "..."] = result("mm")
+    face_width: Float[Array, "..."] = result("mm")
 
 
-class AbstractModification(eqx.Module):
-    """Material removed from a flank; modifications add up with `+`."""
+class AbstractModification(Checked):
+    """Material removed from a flank. Modifications add up with `+` and `sum`; a number scales them.
+
+    Raises:
+        TypeError: when something else than a modification is added, or something else than a number is the factor.
+    """
+
+    __array_ufunc__ = None  # NumPy's numbers leave the product to `__rmul__`
 
     @abstractmethod
     def __call__(self, flank: Flank) -> Float[Array, "..."]:
         """Material removed normal to the flank [um], in the broadcast shape of the flank's points."""
 
+    @property
+    @abstractmethod
+    def varies_along_face(self) -> bool:
+        """Whether slices of one flank differ, so that a mesh of one slice cannot show the modification."""
+
     def __add__(self, other: "AbstractModification") -> "Sum":
         if not isinstance(other, AbstractModification):
-            return NotImplemented
+            given = f"{self!r} + {other!r}"
+            raise TypeError(f"{given}: only another modification can be added to a modification")
         return Sum((*terms(self), *terms(other)))
+
+    def __radd__(self, other) -> "AbstractModification":
+        if isinstance(other, int) and other == 0:  # where `sum` starts
+            return self
+        raise TypeError(f"{other!r} + {self!r}: only another modification can be added to a modification")
+
+    def __mul__(self, factor) -> "Scaled":
+        if not isinstance(factor, int | float | np.ndarray | np.generic | jax.Array):
+            raise TypeError(f"{factor!r} * {self!r}: only a number can scale a modification")
+        return Scaled(factor, self)
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> "Scaled":
+        return Scaled(-1.0, self)
+
+    def __sub__(self, other: "AbstractModification") -> "Sum":
+        return self + (-other if isinstance(other, AbstractModification) else other)
 
 
 class Sum(AbstractModification):
@@ -51,12 +84,42 @@ class Sum(AbstractModification):
             total = total + term(flank)
         return total
 
+    @property
+    def varies_along_face(self) -> bool:
+        return any(term.varies_along_face for term in self.terms)
+
+    def __repr__(self) -> str:
+        return " + ".join(map(repr, self.terms))
+
+
+class Scaled(AbstractModification):
+    """A modification times a number, the result of `*`."""
+
+    factor: Float[Array, ""] = number("")
+    modification: AbstractModification
+
+    def __call__(self, flank: Flank) -> Float[Array, "..."]:
+        removed = self.modification(flank)
+        return self.factor.astype(removed.dtype) * removed
+
+    @property
+    def varies_along_face(self) -> bool:
+        return acts(self.factor) and self.modification.varies_along_face
+
 
 class NoModification(AbstractModification):
     """The nominal involute."""
 
+    varies_along_face = False
+
     def __call__(self, flank: Flank) -> Float[Array, "..."]:
         return jnp.zeros_like(flank.roll_length)
+
+
+def acts(amount: Float[Array, "..."]) -> bool:
+    """Whether an amount is or may become another than zero: a traced one may."""
+    known = concrete(amount)
+    return known is None or bool(known.any())
 
 
 def terms(modification: AbstractModification) -> tuple[AbstractModification, ...]:

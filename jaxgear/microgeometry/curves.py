@@ -8,15 +8,14 @@ spline of ground flanks that are designed from the static transmission error.
 
 from abc import abstractmethod
 
-import equinox as eqx
 import interpax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import check, real, safe_divide, safe_power
+from ..numerics import Checked, number, safe_power, safe_sqrt
 
 
-class AbstractCurve(eqx.Module):
+class AbstractCurve(Checked):
     """Shape function of a relief."""
 
     @abstractmethod
@@ -41,10 +40,7 @@ class Parabolic(AbstractCurve):
 class Power(AbstractCurve):
     """d^exponent; 1.5 is Walker's form, 1 to 2 are usual. At exponents below 1 the slope at the start is infinite."""
 
-    exponent: Float[Array, ""] = eqx.field(converter=real)
-
-    def __check_init__(self):
-        check("Power", "exponent", self.exponent, "", low=0.0, open_low=True)
+    exponent: Float[Array, ""] = number("", low=0.0, open_low=True)
 
     def __call__(self, d):
         return safe_power(d, self.exponent)
@@ -53,13 +49,9 @@ class Power(AbstractCurve):
 class Quadratic(AbstractCurve):
     """b0 + b1 d + b2 d^2. A non-zero b0 is a step at the start of the relief."""
 
-    b0: Float[Array, ""] = eqx.field(converter=real)
-    b1: Float[Array, ""] = eqx.field(converter=real)
-    b2: Float[Array, ""] = eqx.field(converter=real)
-
-    def __check_init__(self):
-        for name in ("b0", "b1", "b2"):
-            check("Quadratic", name, getattr(self, name), "")
+    b0: Float[Array, ""] = number("")
+    b1: Float[Array, ""] = number("")
+    b2: Float[Array, ""] = number("")
 
     def __call__(self, d):
         return self.b0 + d * (self.b1 + d * self.b2)
@@ -68,10 +60,7 @@ class Quadratic(AbstractCurve):
 class Polynomial(AbstractCurve):
     """sum_i coefficients[i] d^i, lowest power first."""
 
-    coefficients: Float[Array, " terms"] = eqx.field(converter=real)
-
-    def __check_init__(self):
-        check("Polynomial", "coefficients", self.coefficients, "")
+    coefficients: Float[Array, " terms"] = number("", shape=("terms",))
 
     def __call__(self, d):
         value = jnp.zeros_like(d)
@@ -87,26 +76,22 @@ class ParabolicLinear(AbstractCurve):
     becomes the straight line.
     """
 
-    node: Float[Array, ""] = eqx.field(converter=real)
-
-    def __check_init__(self):
-        check("ParabolicLinear", "node", self.node, "", low=0.0, open_low=True, high=1.0)
+    node: Float[Array, ""] = number("", low=0.0, open_low=True, high=1.0)
 
     def __call__(self, d):
-        tangent = 2 * d - self.node
-        return jnp.where(d < self.node, safe_divide(d * d, self.node), tangent) / (2 - self.node)
+        inside = d < self.node
+        # two divisions by the root: the derivative of one by the node has its square, which underflows for tiny nodes
+        root = safe_sqrt(jnp.where(inside, self.node, 1.0))
+        parabola = d * (jnp.where(inside, d, 0.0) / root / root)
+        return jnp.where(inside, parabola, 2 * d - self.node) / (2 - self.node)
 
 
 class Sinusoidal(AbstractCurve):
-    """sin(b0 d + b1) + cos(b0 d + b2), phases in rad. It starts from zero only if sin(b1) = -cos(b2)."""
+    """sin(b0 d + b1) + cos(b0 d + b2). It starts from zero only if sin(b1) = -cos(b2)."""
 
-    b0: Float[Array, ""] = eqx.field(converter=real)
-    b1: Float[Array, ""] = eqx.field(converter=real)
-    b2: Float[Array, ""] = eqx.field(converter=real)
-
-    def __check_init__(self):
-        for name in ("b0", "b1", "b2"):
-            check("Sinusoidal", name, getattr(self, name), "")
+    b0: Float[Array, ""] = number("rad")
+    b1: Float[Array, ""] = number("rad")
+    b2: Float[Array, ""] = number("rad")
 
     def __call__(self, d):
         return jnp.sin(self.b0 * d + self.b1) + jnp.cos(self.b0 * d + self.b2)
@@ -115,12 +100,7 @@ class Sinusoidal(AbstractCurve):
 class Spline(AbstractCurve):
     """Natural cubic spline through `values` at equally spaced depths; the first value belongs to the start (d = 0)."""
 
-    values: Float[Array, " knots"] = eqx.field(converter=real)
-
-    def __check_init__(self):
-        if self.values.ndim != 1 or self.values.shape[0] < 3:
-            raise ValueError(f"Spline: values has shape {self.values.shape}, must be a list of at least 3 numbers")
-        check("Spline", "values", self.values, "")
+    values: Float[Array, " knots"] = number("", shape=("knots",), fewest=3)
 
     def __call__(self, d):
         d = jnp.asarray(d)

@@ -6,54 +6,54 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import check, real
-from .base import AbstractModification, Flank
+from ..numerics import number
+from .base import AbstractModification, Flank, acts
 from .curves import AbstractCurve, Linear
 from .profile import relief
 
 
 class LeadCrowning(AbstractModification):
-    """Lead crowning C_beta: parabola with zero in the middle of the face and `amount` [um] at both ends."""
+    """Lead crowning C_beta: parabola with zero in the middle of the face and `amount` at both ends."""
 
-    amount: Float[Array, ""] = eqx.field(converter=real)
+    amount: Float[Array, ""] = number("um")
 
-    def __check_init__(self):
-        check("LeadCrowning", "amount", self.amount, "um")
+    @property
+    def varies_along_face(self) -> bool:
+        return acts(self.amount)
 
     def __call__(self, flank: Flank):
         return self.amount * (2.0 * flank.face_coordinate / flank.face_width) ** 2
 
 
 class LeadSlope(AbstractModification):
-    """Lead slope C_H_beta: straight line over the face, `amount` [um] from end to end, zero in the middle, removing
-    material at positive face coordinates."""
+    """Lead slope C_H_beta: straight line over the face, `amount` from end to end, zero in the middle, removing material
+    at positive face coordinates."""
 
-    amount: Float[Array, ""] = eqx.field(converter=real)
+    amount: Float[Array, ""] = number("um")
 
-    def __check_init__(self):
-        check("LeadSlope", "amount", self.amount, "um")
+    @property
+    def varies_along_face(self) -> bool:
+        return acts(self.amount)
 
     def __call__(self, flank: Flank):
         return self.amount * flank.face_coordinate / flank.face_width
 
 
 class EndRelief(AbstractModification):
-    """End relief C_beta I and II: `amount` [um] at the ends of the face, over `length` [mm].
+    """End relief C_beta I and II: `amount` at the ends of the face, over `length`.
 
     Attributes:
         side: "both", "negative" or "positive" (the end with negative or positive face coordinate).
     """
 
-    amount: Float[Array, ""] = eqx.field(converter=real)
-    length: Float[Array, ""] = eqx.field(converter=real)
+    amount: Float[Array, ""] = number("um")
+    length: Float[Array, ""] = number("mm", low=0.0)
     curve: AbstractCurve = eqx.field(default_factory=Linear)
     side: Literal["both", "negative", "positive"] = eqx.field(default="both", static=True)
 
-    def __check_init__(self):
-        check("EndRelief", "amount", self.amount, "um")
-        check("EndRelief", "length", self.length, "mm", low=0.0)
-        if self.side not in ("both", "negative", "positive"):
-            raise ValueError(f'EndRelief: side = {self.side!r} must be "both", "negative" or "positive"')
+    @property
+    def varies_along_face(self) -> bool:
+        return acts(self.amount)
 
     def __call__(self, flank: Flank):
         end = 0.5 * flank.face_width

@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import check, real, safe_divide
+from ..numerics import number, safe_divide
 from .base import AbstractModification, Flank
 from .curves import AbstractCurve, Linear, Parabolic
 
@@ -16,59 +16,52 @@ def relief(distance, amount, length, curve: AbstractCurve) -> Float[Array, "..."
 
 
 class TipRelief(AbstractModification):
-    """Tip relief C_alpha_a: `amount` [um] at the tip, over the last `length` [mm] of roll length.
+    """Tip relief C_alpha_a: `amount` at the tip, over the last `length` of roll length.
 
     A length of zero means no relief.
     """
 
-    amount: Float[Array, ""] = eqx.field(converter=real)
-    length: Float[Array, ""] = eqx.field(converter=real)
+    amount: Float[Array, ""] = number("um")
+    length: Float[Array, ""] = number("mm", low=0.0)
     curve: AbstractCurve = eqx.field(default_factory=Parabolic)
 
-    def __check_init__(self):
-        check("TipRelief", "amount", self.amount, "um")
-        check("TipRelief", "length", self.length, "mm", low=0.0)
+    varies_along_face = False
 
     def __call__(self, flank: Flank):
         return relief(flank.tip_roll_length - flank.roll_length, self.amount, self.length, self.curve)
 
 
 class RootRelief(AbstractModification):
-    """Root relief C_alpha_f: `amount` [um] at the start of the active profile, over the first `length` [mm]."""
+    """Root relief C_alpha_f: `amount` at the start of the active profile, over the first `length`."""
 
-    amount: Float[Array, ""] = eqx.field(converter=real)
-    length: Float[Array, ""] = eqx.field(converter=real)
+    amount: Float[Array, ""] = number("um")
+    length: Float[Array, ""] = number("mm", low=0.0)
     curve: AbstractCurve = eqx.field(default_factory=Linear)
 
-    def __check_init__(self):
-        check("RootRelief", "amount", self.amount, "um")
-        check("RootRelief", "length", self.length, "mm", low=0.0)
+    varies_along_face = False
 
     def __call__(self, flank: Flank):
         return relief(flank.roll_length - flank.start_roll_length, self.amount, self.length, self.curve)
 
 
 class ProfileCrowning(AbstractModification):
-    """Profile crowning C_alpha: parabola with zero in the middle of the active profile and `amount` [um] at its
-    ends."""
+    """Profile crowning C_alpha: parabola with zero in the middle of the active profile and `amount` at its ends."""
 
-    amount: Float[Array, ""] = eqx.field(converter=real)
+    amount: Float[Array, ""] = number("um")
 
-    def __check_init__(self):
-        check("ProfileCrowning", "amount", self.amount, "um")
+    varies_along_face = False
 
     def __call__(self, flank: Flank):
         return self.amount * _from_middle(flank) ** 2
 
 
 class ProfileSlope(AbstractModification):
-    """Profile slope C_H_alpha: straight line, half the `amount` [um] removed at the tip, half added at the start of the
+    """Profile slope C_H_alpha: straight line, half the `amount` removed at the tip, half added at the start of the
     active profile, so that the middle stays."""
 
-    amount: Float[Array, ""] = eqx.field(converter=real)
+    amount: Float[Array, ""] = number("um")
 
-    def __check_init__(self):
-        check("ProfileSlope", "amount", self.amount, "um")
+    varies_along_face = False
 
     def __call__(self, flank: Flank):
         return 0.5 * self.amount * _from_middle(flank)

@@ -7,7 +7,7 @@ import interpax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import check, concrete, real
+from ..numerics import concrete, number
 from .base import AbstractModification, Flank
 from .curves import natural_spline
 
@@ -17,34 +17,27 @@ class TabulatedProfile(AbstractModification):
 
     Attributes:
         position: increasing table positions, shape (points,).
-        amount: material removed [um], shape (points,).
+        amount: material removed, shape (points,).
         coordinate: what the positions are: "roll_length" [mm] (default) or "roll_angle" [deg].
         method: "linear", or "cubic2" for a natural cubic spline, or "monotonic" for a shape-preserving cubic.
     """
 
-    position: Float[Array, " points"] = eqx.field(converter=real)
-    amount: Float[Array, " points"] = eqx.field(converter=real)
+    position: Float[Array, " points"] = number("mm or deg", shape=("points",))
+    amount: Float[Array, " points"] = number("um", shape=("points",))
     coordinate: Literal["roll_length", "roll_angle"] = eqx.field(default="roll_length", static=True)
     method: Literal["linear", "cubic2", "monotonic"] = eqx.field(default="linear", static=True)
 
-    def __check_init__(self):
-        if self.position.ndim != 1 or self.position.shape != self.amount.shape or self.position.shape[0] < 2:
+    def check_together(self):
+        if self.position.shape != self.amount.shape or self.position.shape[0] < 2:
             raise ValueError(
                 f"TabulatedProfile: position {self.position.shape} and amount {self.amount.shape} must be two lists of "
                 "the same length, at least 2"
             )
-        if self.coordinate not in ("roll_length", "roll_angle"):
-            raise ValueError(
-                f'TabulatedProfile: coordinate = {self.coordinate!r} must be "roll_length" or "roll_angle"'
-            )
-        if self.method not in ("linear", "cubic2", "monotonic"):
-            raise ValueError(f'TabulatedProfile: method = {self.method!r} must be "linear", "cubic2" or "monotonic"')
-        unit = "mm" if self.coordinate == "roll_length" else "deg"
-        check("TabulatedProfile", "position", self.position, unit)
-        check("TabulatedProfile", "amount", self.amount, "um")
         position = concrete(self.position)
         if position is not None and not (position[1:] > position[:-1]).all():
             raise ValueError("TabulatedProfile: position must increase strictly")
+
+    varies_along_face = False
 
     def __call__(self, flank: Flank):
         x = flank.roll_length

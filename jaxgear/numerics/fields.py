@@ -106,7 +106,17 @@ class Checked(eqx.Module):
 
 
 def real(value) -> Float[Array, "..."]:
-    """Converts to an inexact array: arrays of floats keep their dtype, everything else takes JAX's default float."""
+    """Converts to an inexact array: arrays of floats keep their dtype, everything else takes JAX's default float.
+
+    Numbers stay concrete inside traced functions, so that they are checked there too.
+    """
+    if any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value)):
+        return _inexact(value)
+    with jax.ensure_compile_time_eval():
+        return _inexact(value)
+
+
+def _inexact(value) -> Float[Array, "..."]:
     array = jnp.asarray(value)
     dtype = array.dtype if jnp.issubdtype(array.dtype, jnp.inexact) else jnp.result_type(float)
     # the conversion also drops the weak type of Python numbers, which would retrace where an array did not

@@ -6,18 +6,17 @@ Its gradient passes through the values, with the weights of their ranks.
 
 from abc import abstractmethod
 
-import equinox as eqx
 import jax.numpy as jnp
 from jax.scipy.special import betainc
 from jaxtyping import Array, Float
 
-from .fields import check, real
+from .fields import Checked, number
 
 Scalar = Float[Array, ""]
 Values = Float[Array, " values"]
 
 
-class AbstractMeasure(eqx.Module):
+class AbstractMeasure(Checked):
     """A number that stands for many."""
 
     @abstractmethod
@@ -64,10 +63,7 @@ class Worst(AbstractMeasure):
 class CVaR(AbstractMeasure):
     """Conditional value at risk: mean of the worst 1 - level of all values (Rockafellar and Uryasev 2000)."""
 
-    level: Scalar = eqx.field(converter=real, default=0.95)
-
-    def __check_init__(self):
-        check("CVaR", "level", self.level, "", low=0.0, high=1.0, open_high=True)
+    level: Scalar = number("", low=0.0, high=1.0, open_high=True, default=0.95)
 
     def spread(self, share, count):
         level = self.level.astype(share.dtype)
@@ -81,10 +77,7 @@ class Quantile(AbstractMeasure):
     happens to stand at the level.
     """
 
-    level: Scalar = eqx.field(converter=real, default=0.95)
-
-    def __check_init__(self):
-        check("Quantile", "level", self.level, "", low=0.0, high=1.0, open_low=True, open_high=True)
+    level: Scalar = number("", low=0.0, high=1.0, open_low=True, open_high=True, default=0.95)
 
     def spread(self, share, count):
         level = self.level.astype(share.dtype)

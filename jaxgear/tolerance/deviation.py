@@ -10,7 +10,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from ..contact import Mesh, removed_material
 from ..microgeometry import AbstractModification, Flank, LeadSlope, ProfileSlope
-from ..numerics import real, spread, whole
+from ..numerics import Checked, number, real, result, spread, whole
 from .distribution import AbstractDistribution
 from .limits import GearTolerance, Tolerance, check_slices
 
@@ -22,8 +22,8 @@ HARMONICS = 4
 _SHAPE_POINTS = 129  # at which the height of a waviness is taken: 32 per shortest wave, 0.5 % of it at most
 
 
-class GearDeviation(eqx.Module):
-    """Deviations of one gear [um, positive where material is missing]; a leading axis for several samples.
+class GearDeviation(Checked):
+    """Deviations of one gear, positive where material is missing; a leading axis for several samples.
 
     Attributes:
         profile_slope: as the amount of `ProfileSlope`, shape (*samples,).
@@ -32,23 +32,23 @@ class GearDeviation(eqx.Module):
         helix_slope: as the amount of `LeadSlope`, shape (*samples,).
     """
 
-    profile_slope: Real
-    waviness: Float[Array, "*samples waves"]
-    pitch: Float[Array, "*samples pairs"]
-    helix_slope: Real
+    profile_slope: Real = result("um")
+    waviness: Float[Array, "*samples waves"] = result("um")
+    pitch: Float[Array, "*samples pairs"] = result("um")
+    helix_slope: Real = result("um")
 
 
-class Deviation(eqx.Module):
+class Deviation(Checked):
     """Deviations of a gear pair, made by `sample_deviations`; a leading axis for several samples.
 
     Attributes:
         pinion, wheel: deviations of the two gears.
-        misalignment: lead slope of the contact of all pairs [um over the face width], shape (*samples,).
+        misalignment: lead slope of the contact of all pairs over the face width, shape (*samples,).
     """
 
     pinion: GearDeviation
     wheel: GearDeviation
-    misalignment: Real
+    misalignment: Real = result("um")
 
 
 class Waviness(AbstractModification):
@@ -59,10 +59,12 @@ class Waviness(AbstractModification):
     slope through sin(2 pi k x) is -6 / (pi k).
 
     Attributes:
-        coefficients: c_1 ... c_n, s_1 ... s_n [um], shape (2 n,).
+        coefficients: c_1 ... c_n, s_1 ... s_n, shape (2 n,).
     """
 
-    coefficients: Float[Array, " waves"]
+    coefficients: Float[Array, " waves"] = number("um", shape=("waves",))
+
+    varies_along_face = False
 
     def __call__(self, flank: Flank):
         x = (flank.roll_length - flank.start_roll_length) / (flank.tip_roll_length - flank.start_roll_length)

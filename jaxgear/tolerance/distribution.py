@@ -2,14 +2,13 @@
 
 from abc import abstractmethod
 
-import equinox as eqx
 import jax
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from ..numerics import check, real
+from ..numerics import Checked, number
 
 
-class AbstractDistribution(eqx.Module):
+class AbstractDistribution(Checked):
     """A symmetric distribution between -1 and 1; a deviation is its tolerance limit times a draw."""
 
     @abstractmethod
@@ -23,10 +22,7 @@ class TruncatedNormal(AbstractDistribution):
     Three is the usual reading of a tolerance on a capable process (0.27 % of the parts sorted out).
     """
 
-    sigmas: Float[Array, ""] = eqx.field(converter=real, default=3.0)
-
-    def __check_init__(self):
-        check("TruncatedNormal", "sigmas", self.sigmas, "", low=0.0, open_low=True)
+    sigmas: Float[Array, ""] = number("", low=0.0, open_low=True, default=3.0)
 
     def __call__(self, key, shape, dtype):
         sigmas = self.sigmas.astype(dtype)

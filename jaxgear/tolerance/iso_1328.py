@@ -1,44 +1,34 @@
 """Flank tolerances of ISO 1328-1:2013, which differ from the 1995 edition: never mix the two."""
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import Gear
-from ..numerics import check, concrete, real
+from ..numerics import Checked, check, number, real
 
 Scalar = Float[Array, ""]
 
 
-class ToleranceClass(eqx.Module):
+class ToleranceClass(Checked):
     """Tolerances of one gear in a flank tolerance class (ISO 1328-1:2013, 5.3), unrounded and differentiable.
 
     All follow `(terms in d, m_n, b) * sqrt(2)^(class - 5)`; slopes and pitch are limits of either sign, form and total
     deviations are widths of a band. `iso_rounded` gives the numbers that stand on a drawing.
 
     Attributes:
-        diameter: reference diameter d [mm], 5 to 15 000.
-        module: normal module m_n [mm], 0.5 to 70.
-        face_width: b [mm], 4 to 1200.
-        quality_class: 1 (finest) to 11, a whole number.
+        diameter: reference diameter d.
+        module: normal module m_n.
+        face_width: b.
+        quality_class: 1 is the finest.
 
     Raises:
         ValueError: for a number outside the range of the standard.
     """
 
-    diameter: Scalar = eqx.field(converter=real)
-    module: Scalar = eqx.field(converter=real)
-    face_width: Scalar = eqx.field(converter=real)
-    quality_class: Scalar = eqx.field(converter=real)
-
-    def __check_init__(self):
-        check("ToleranceClass", "diameter", self.diameter, "mm", low=5.0, high=15_000.0)
-        check("ToleranceClass", "module", self.module, "mm", low=0.5, high=70.0)
-        check("ToleranceClass", "face_width", self.face_width, "mm", low=4.0, high=1200.0)
-        check("ToleranceClass", "quality_class", self.quality_class, "", low=1.0, high=11.0)
-        quality = concrete(self.quality_class)
-        if quality is not None and (quality != quality.round()).any():
-            raise ValueError(f"ToleranceClass: quality_class = {float(quality):g} must be a whole number")
+    diameter: Scalar = number("mm", low=5.0, high=15_000.0)
+    module: Scalar = number("mm", low=0.5, high=70.0)
+    face_width: Scalar = number("mm", low=4.0, high=1200.0)
+    quality_class: Scalar = number("", low=1.0, high=11.0, whole=True)
 
     @classmethod
     def of(cls, gear: Gear, quality_class) -> "ToleranceClass":

@@ -7,15 +7,15 @@ from jaxtyping import Array, Float
 
 from ..contact import Mesh
 from ..geometry import Gear, GearPair
-from ..numerics import check, concrete, optional_real, real
+from ..numerics import Checked, concrete, number, real
 from .distribution import AbstractDistribution, TruncatedNormal
 from .iso_1328 import ToleranceClass, iso_rounded
 
 Scalar = Float[Array, ""]
 
 
-class GearTolerance(eqx.Module):
-    """Limits of the flank deviations of one gear, all in um.
+class GearTolerance(Checked):
+    """Limits of the flank deviations of one gear.
 
     Attributes:
         profile_slope: f_Halpha, of either sign; all teeth share the deviation, as it comes from tool and machine.
@@ -28,14 +28,10 @@ class GearTolerance(eqx.Module):
         ValueError: for a negative or non-finite limit.
     """
 
-    profile_slope: Scalar = eqx.field(converter=real, default=0.0)
-    profile_form: Scalar = eqx.field(converter=real, default=0.0)
-    pitch: Scalar = eqx.field(converter=real, default=0.0)
-    helix_slope: Scalar | None = eqx.field(converter=optional_real, default=None)
-
-    def __check_init__(self):
-        for name in ("profile_slope", "profile_form", "pitch", "helix_slope"):
-            check("GearTolerance", name, getattr(self, name), "um", low=0.0)
+    profile_slope: Scalar = number("um", low=0.0, default=0.0)
+    profile_form: Scalar = number("um", low=0.0, default=0.0)
+    pitch: Scalar = number("um", low=0.0, default=0.0)
+    helix_slope: Scalar | None = number("um", low=0.0, optional=True, default=None)
 
     @classmethod
     def from_class(cls, gear: Gear, quality_class, *, rounded: bool = True) -> "GearTolerance":
@@ -56,7 +52,7 @@ class GearTolerance(eqx.Module):
         )
 
 
-class Tolerance(eqx.Module):
+class Tolerance(Checked):
     """Limits of everything that a sample of manufactured gears may deviate by, and the distribution in between.
 
     All deviations are independent of each other. Left out are the helix form, which slices without mutual support
@@ -65,7 +61,7 @@ class Tolerance(eqx.Module):
 
     Attributes:
         pinion, wheel: limits of the two gears.
-        misalignment: of the shafts in the plane of action, of either sign [um over the face width]; None without.
+        misalignment: of the shafts in the plane of action, over the face width, of either sign; None without.
             Needs a mesh of several slices.
         distribution: of every deviation between its limits.
 
@@ -75,11 +71,8 @@ class Tolerance(eqx.Module):
 
     pinion: GearTolerance = eqx.field(default_factory=GearTolerance)
     wheel: GearTolerance = eqx.field(default_factory=GearTolerance)
-    misalignment: Scalar | None = eqx.field(converter=optional_real, default=None)
+    misalignment: Scalar | None = number("um", low=0.0, optional=True, default=None)
     distribution: AbstractDistribution = eqx.field(default_factory=TruncatedNormal)
-
-    def __check_init__(self):
-        check("Tolerance", "misalignment", self.misalignment, "um", low=0.0)
 
     @classmethod
     def from_class(
