@@ -10,6 +10,7 @@ from .extremes import spread as spread
 from .fields import Checked as Checked
 from .fields import Number as Number
 from .fields import check as check
+from .frozen import Frozen as Frozen
 from .fields import concrete as concrete
 from .fields import count as count
 from .fields import fields_of as fields_of
