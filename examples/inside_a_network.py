@@ -123,11 +123,12 @@ def draw(found):
     import matplotlib.pyplot as plt
 
     from jaxgear import plot
+    from jaxgear.plot.figure import line_style
 
     figure, axis = plt.subplots(figsize=(4.7, 3.0), layout="constrained")
     for index, name in enumerate(("unmodified", "rule", "network")):
         label = "ISO 6336 rule for 50 N m" if name == "rule" else name
-        axis.plot(found["torques"], found[name], label=label, **plot.line_style(index))
+        axis.plot(found["torques"], found[name], label=label, **line_style(index))
     axis.set(xlabel="torque on the pinion [N m]", ylabel="peak-to-peak TE [µm]", ylim=(0.0, None))
     axis.legend(frameon=False)
     plot.save(figure, "results/inside_a_network.png")

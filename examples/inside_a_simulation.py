@@ -139,11 +139,12 @@ def draw(found):
     import matplotlib.pyplot as plt
 
     from jaxgear import plot
+    from jaxgear.plot.figure import line_style
 
     figure, axis = plt.subplots(figsize=(4.7, 3.0), layout="constrained")
     for index, name in enumerate(("unmodified", "relief")):
         label = name if name == "unmodified" else f"tip relief of {float(found['amount']):.1f} µm"
-        axis.plot(found["shares"], found[name], label=label, **plot.line_style(index))
+        axis.plot(found["shares"], found[name], label=label, **line_style(index))
     axis.set(xlabel="mesh frequency / natural frequency [-]", ylabel="rms of the vibration [µm]", ylim=(0.0, None))
     axis.legend(frameon=False)
     plot.save(figure, "results/inside_a_simulation.png")
