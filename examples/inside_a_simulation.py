@@ -157,7 +157,7 @@ if __name__ == "__main__":
     print(f"  unmodified            {answer['worst_rms_unmodified_um']:.3f} um")
     print(f"  {answer['relief_um']:.1f} um of tip relief {answer['worst_rms_relief_um']:.3f} um")
     print(
-        f"At half that relief and half the natural frequency it changes by {answer['slope_um_per_um']:.4f} um per um of "
-        f"relief (central difference: {answer['difference_um_per_um']:.4f})"
+        f"At half that relief and half the natural frequency it changes by {answer['slope_um_per_um']:.4f} um per um "
+        f"of relief (central difference: {answer['difference_um_per_um']:.4f})"
     )
     draw(found)

@@ -10,7 +10,6 @@ from .extremes import spread as spread
 from .fields import Checked as Checked
 from .fields import Number as Number
 from .fields import check as check
-from .frozen import Frozen as Frozen
 from .fields import concrete as concrete
 from .fields import count as count
 from .fields import fields_of as fields_of
@@ -19,6 +18,7 @@ from .fields import optional_real as optional_real
 from .fields import real as real
 from .fields import result as result
 from .fields import whole as whole
+from .frozen import Frozen as Frozen
 from .logarithm import log as log
 from .quadrature import gauss_legendre as gauss_legendre
 from .risk import AbstractMeasure as AbstractMeasure
