@@ -16,6 +16,7 @@ Units: mm for geometry, um for modifications and transmission error, N, N m (on 
 Importing jaxgear changes no JAX setting; switch on `jax_enable_x64` for double precision.
 """
 
+from . import geometry as _geometry
 from .compliance import Beam as Beam
 from .compliance import CenterDistance as CenterDistance
 from .compliance import Compliance as Compliance
@@ -33,7 +34,6 @@ from .compliance import legacy_compliance as legacy_compliance
 from .conditions import LoadSpectrum as LoadSpectrum
 from .contact import Mesh as Mesh
 from .contact import MeshCycle as MeshCycle
-from .contact import ModifiedMesh as ModifiedMesh
 from .contact import Resolution as Resolution
 from .contact import fewest_pairs as fewest_pairs
 from .contact import prepare as prepare
@@ -42,12 +42,16 @@ from .contact import solve as solve
 from .contact import solve_removed as solve_removed
 from .geometry import Gear as Gear
 from .geometry import GearPair as GearPair
+from .geometry import Margins as Margins
 from .geometry import Material as Material
 from .geometry import PathOfContact as PathOfContact
 from .geometry import diameter as diameter
+from .geometry import explain as explain
+from .geometry import margins as margins
 from .geometry import path_of_contact as path_of_contact
 from .geometry import roll_angle as roll_angle
 from .geometry import roll_length as roll_length
+from .geometry import tooth_thickness as tooth_thickness
 from .metrics import contact_shock as contact_shock
 from .metrics import effective_contact_ratio as effective_contact_ratio
 from .metrics import flash_temperature as flash_temperature
@@ -145,7 +149,5 @@ STEEL: Material
 
 def __getattr__(name: str):
     if name == "STEEL":  # made when it is asked for, see `jaxgear.geometry.material`
-        from .geometry import STEEL
-
-        return STEEL
+        return _geometry.STEEL
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

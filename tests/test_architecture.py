@@ -64,6 +64,32 @@ def test_layers_import_only_earlier_ones(path):
         assert ORDER.index(other) < ORDER.index(own), f"{own} imports {other}"
 
 
+# imported where they are used, so that the library starts fast and without what it does not need
+HEAVY = {"evosax", "matplotlib", "pyarrow", "xarray", "jaxgear.plot"}
+
+
+def hidden(path: Path):
+    """Packages, of jaxgear with the layer, that a file imports anywhere but at module level."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if node in tree.body:
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield (node.module or "").split(".")[0]
+        elif isinstance(node, ast.ImportFrom):
+            yield from (f"jaxgear.{node.module or alias.name}" for alias in node.names)
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in FILES if layer(p) != "contact"], ids=lambda path: str(path.relative_to(PACKAGE))
+)
+def test_no_import_hides_a_circle(path):
+    """None inside a function, none under TYPE_CHECKING, but for packages that are heavy."""
+    assert set(hidden(path)) <= HEAVY
+
+
 def test_the_check_sees_imports():
     assert {"geometry", "numerics"} <= {name for name, _ in imported(PACKAGE / "contact" / "mesh.py")}
 

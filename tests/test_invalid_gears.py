@@ -1,5 +1,7 @@
 """Every impossible gear, pair, resolution or load is refused in one line: what, how much, and what is allowed."""
 
+import re
+
 import jax
 import jax.numpy as jnp
 import pytest
@@ -75,6 +77,18 @@ def test_bore_beyond_the_root_circle():
     gear(bore_diameter=52.0)
 
 
+def test_gears_of_many_numbers():
+    """Whether or not they are being traced; `jax.vmap` makes many gears, each of which is checked."""
+    three = jnp.asarray([0.0, 0.1, 0.2])
+    refused(lambda: gear(shift=three), "Gear: profile_shift has shape (3,), must be a single number", "jax.vmap")
+    refused(lambda: jax.jit(lambda x: gear(shift=x).tip_radius)(three), "Gear: profile_shift has shape (3,)")
+    refused(lambda: gear(module=three[None]), "Gear: module has shape (1, 3)")
+    many = jax.vmap(lambda x: gear(shift=x))(three)
+    assert many.profile_shift.shape == (3,)
+    refused(lambda: jg.GearPair(many, many), "GearPair: pinion holds gears of shape (3,), must be one", "jax.vmap")
+    assert jax.vmap(jg.GearPair)(many, many).working_center_distance.shape == (3,)
+
+
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
@@ -110,9 +124,9 @@ def test_contact_ratio_below_one():
 
 
 def test_interference_below_the_form_circle():
-    """The 60-tooth wheel's tip reaches below the undercut of a 12-tooth pinion, or below its base circle."""
+    """The 100-tooth wheel's tip reaches below the undercut of a 16-tooth pinion, or below its base circle."""
     refused(
-        lambda: jg.GearPair(gear(12), gear(60)),
+        lambda: jg.GearPair(gear(16), gear(100)),
         "GearPair: wheel tip_diameter reaches the pinion's flank at diameter", "mm", "form diameter",
     )  # fmt: skip
     refused(
@@ -120,6 +134,23 @@ def test_interference_below_the_form_circle():
         "GearPair: pinion tip_diameter reaches the wheel's flank", "below the base circle",
     )  # fmt: skip
     jg.GearPair(gear(12, shift=0.5), gear(60, shift=-0.5))
+
+
+@pytest.mark.parametrize(
+    ("pinion", "wheel"),
+    [
+        ({"teeth": 19, "shift": -0.3}, {"teeth": 48}),
+        ({"teeth": 5}, {"teeth": 5}),
+        ({"teeth": 8}, {"teeth": 40}),
+        ({"teeth": 19, "pressure_angle": 14.5}, {"teeth": 48, "pressure_angle": 14.5}),
+    ],
+)
+def test_interference_compares_what_grows_along_the_flank(pinion, wheel):
+    """Below the base circle diameters grow again: the numbers of the message must be in the order that it claims."""
+    with pytest.raises(ValueError) as error:
+        jg.GearPair(gear(**pinion), gear(**wheel))
+    numbers = re.search(r" (?:diameter|of) (-?[\d.]+) mm.*?must be at least \D*([\d.]+) mm", str(error.value))
+    assert numbers is not None and float(numbers[1]) < float(numbers[2]), str(error.value)
 
 
 @pytest.mark.parametrize(

@@ -10,23 +10,26 @@ Coordinates and signs used everywhere:
 - `phase` psi counts base pitches, psi = 0 with the reference pair at the pitch point: s = psi p_b.
 """
 
+from . import material as _material
 from .gear import Gear as Gear
 from .involute import diameter as diameter
 from .involute import roll_angle as roll_angle
 from .involute import roll_length as roll_length
+from .involute import tooth_thickness as tooth_thickness
+from .margins import Margins as Margins
 from .material import Material as Material
 from .outline import Outline as Outline
 from .outline import outline as outline
 from .pair import GearPair as GearPair
+from .pair import explain as explain
+from .pair import margins as margins
+from .pair import path_of_contact as path_of_contact
 from .path import PathOfContact as PathOfContact
-from .path import path_of_contact as path_of_contact
 
 STEEL: Material
 
 
 def __getattr__(name: str):
     if name == "STEEL":  # made when it is asked for, see `material`
-        from .material import STEEL
-
-        return STEEL
+        return _material.STEEL
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -4,13 +4,31 @@ With t = rho / r_b = tan(alpha_y) the involute function is inv(alpha_y) = t - at
 derivatives stay finite at the base circle.
 """
 
+from typing import Protocol
+
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import safe_sqrt
-from .gear import Gear
 
 Real = Float[Array, "..."]
+Scalar = Float[Array, ""]
+
+
+class Toothed(Protocol):
+    """What the relations need to know of a gear; meanings as in `Gear`."""
+
+    @property
+    def teeth(self) -> Scalar: ...
+
+    @property
+    def pressure_angle(self) -> Scalar: ...
+
+    @property
+    def profile_shift(self) -> Scalar: ...
+
+    @property
+    def base_radius(self) -> Scalar: ...
 
 
 def involute(tangent: Real) -> Real:
@@ -18,23 +36,28 @@ def involute(tangent: Real) -> Real:
     return tangent - jnp.arctan(tangent)
 
 
-def half_tooth_angle(gear: Gear, rho: Real) -> Real:
+def half_tooth_angle(gear: Toothed, rho: Real) -> Real:
     """Angle between the tooth centreline and the involute at a roll length [mm], seen from the gear centre [rad]."""
     alpha = jnp.deg2rad(gear.pressure_angle)
     at_base = (jnp.pi / 2 + 2 * gear.profile_shift * jnp.tan(alpha)) / gear.teeth + involute(jnp.tan(alpha))
     return at_base - involute(rho / gear.base_radius)
 
 
-def roll_length(gear: Gear, diameter: Real) -> Real:
+def tooth_thickness(gear: Toothed, diameter: Real) -> Real:
+    """Thickness of the tooth as an arc [mm] on a diameter [mm] not below the base circle."""
+    return diameter * half_tooth_angle(gear, roll_length(gear, diameter))
+
+
+def roll_length(gear: Toothed, diameter: Real) -> Real:
     """Roll length [mm] of the involute point on a diameter [mm]; 0 below the base circle."""
     return safe_sqrt((0.5 * diameter) ** 2 - gear.base_radius**2)
 
 
-def roll_angle(gear: Gear, rho: Real) -> Real:
+def roll_angle(gear: Toothed, rho: Real) -> Real:
     """Roll angle [deg] from the roll length [mm]."""
     return jnp.rad2deg(rho / gear.base_radius)
 
 
-def diameter(gear: Gear, rho: Real) -> Real:
+def diameter(gear: Toothed, rho: Real) -> Real:
     """Diameter [mm] of the involute point with a roll length [mm]."""
     return 2 * jnp.sqrt(gear.base_radius**2 + rho**2)

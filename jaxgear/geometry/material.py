@@ -1,12 +1,13 @@
 """Elastic and thermal constants of the gear material."""
 
-import equinox as eqx
 from jaxtyping import Array, Float
 
-from ..numerics import check, real
+from ..numerics import Checked, number
+
+Scalar = Float[Array, ""]
 
 
-class Material(eqx.Module):
+class Material(Checked):
     """Isotropic linear elastic material.
 
     Attributes:
@@ -17,17 +18,10 @@ class Material(eqx.Module):
             temperature (ISO/TS 6336-20).
     """
 
-    elastic_modulus: Float[Array, ""] = eqx.field(converter=real, default=206_000.0)
-    poisson_ratio: Float[Array, ""] = eqx.field(converter=real, default=0.3)
-    density: Float[Array, ""] = eqx.field(converter=real, default=7850.0)
-    thermal_contact_coefficient: Float[Array, ""] = eqx.field(converter=real, default=13_800.0)
-
-    def __check_init__(self):
-        check("Material", "elastic_modulus", self.elastic_modulus, "MPa", low=0.0, open_low=True)
-        check("Material", "poisson_ratio", self.poisson_ratio, "", low=0.0, high=0.5, open_high=True)
-        check("Material", "density", self.density, "kg/m^3", low=0.0, open_low=True)
-        name = "thermal_contact_coefficient"
-        check("Material", name, self.thermal_contact_coefficient, "N/(m s^0.5 K)", low=0.0, open_low=True)
+    elastic_modulus: Scalar = number("MPa", low=0.0, open_low=True, default=206_000.0)
+    poisson_ratio: Scalar = number("", low=0.0, high=0.5, open_high=True, default=0.3)
+    density: Scalar = number("kg/m^3", low=0.0, open_low=True, default=7850.0)
+    thermal_contact_coefficient: Scalar = number("N/(m s^0.5 K)", low=0.0, open_low=True, default=13_800.0)
 
 
 STEEL: Material  # constants of gear steel

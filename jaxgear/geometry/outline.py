@@ -46,6 +46,7 @@ class Outline(eqx.Module):
         return self.gear.root_circle_radius * jnp.cos(self.root_half_angle)
 
 
+@eqx.filter_jit
 def outline(gear: Gear) -> Outline:
     """Generates the outline of one gear.
 
@@ -56,7 +57,8 @@ def outline(gear: Gear) -> Outline:
     alpha = jnp.deg2rad(gear.pressure_angle)
     end_x, end_y = trochoid(gear, jnp.full_like(alpha, jnp.pi / 2))
     tangential = _tangential_form_roll_length(gear)
-    undercut = tangential < 0
+    # at the limit of undercut both junctions lie on the base circle; rounding must not choose between them
+    undercut = tangential < -8 * jnp.finfo(tangential.dtype).eps * gear.pitch_radius
     cut = _undercut_junction(gear)
     junction = jnp.where(undercut, cut, alpha)
     x, y = trochoid(gear, cut)
@@ -99,17 +101,18 @@ def _undercut_junction(gear: Gear) -> Scalar:
     """Trochoid parameter where the fillet crosses the involute of an undercut tooth."""
     alpha = jnp.deg2rad(gear.pressure_angle)
     top, bottom = alpha, jnp.full_like(alpha, jnp.pi / 2)
+    at_base = jax.lax.stop_gradient(bracketed_root(_height_above_base, top, bottom, gear))
+    return bracketed_root(_angle_outside_involute, top, at_base, gear)
 
-    def above_base(g, gear):
-        x, y = trochoid(gear, g)
-        return jnp.sqrt(x**2 + y**2) - gear.base_radius
 
-    at_base = jax.lax.stop_gradient(bracketed_root(above_base, top, bottom, gear))
+# functions of the module, not of a call: a root search compiles once for each function that it is given
+def _height_above_base(g: Real, gear: Gear) -> Real:
+    x, y = trochoid(gear, g)
+    return jnp.sqrt(x**2 + y**2) - gear.base_radius
 
-    def outside(g, gear):
-        x, y = trochoid(gear, g)
-        squared = x**2 + y**2 - gear.base_radius**2
-        rho = jnp.sqrt(jnp.maximum(squared, (1e-9 * gear.base_radius) ** 2))
-        return jnp.arctan2(x, y) - half_tooth_angle(gear, rho)
 
-    return bracketed_root(outside, top, at_base, gear)
+def _angle_outside_involute(g: Real, gear: Gear) -> Real:
+    x, y = trochoid(gear, g)
+    squared = x**2 + y**2 - gear.base_radius**2
+    rho = jnp.sqrt(jnp.maximum(squared, (1e-9 * gear.base_radius) ** 2))
+    return jnp.arctan2(x, y) - half_tooth_angle(gear, rho)

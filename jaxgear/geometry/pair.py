@@ -1,17 +1,20 @@
 """Two gears on their operating centre distance."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import bracketed_root, optional_real
+from ..numerics import Checked, number
 from .gear import Gear
-from .involute import involute
+from .margins import Margins, faults_between, margins_between
+from .outline import outline
+from .path import PathOfContact, path_between, working_pressure_angle
 
 Scalar = Float[Array, ""]
 
 
-class GearPair(eqx.Module):
+class GearPair(Checked):
     """Pinion (driving) and wheel (driven).
 
     Attributes:
@@ -22,27 +25,27 @@ class GearPair(eqx.Module):
 
     Raises:
         ValueError: for gears that do not share module or pressure angle, an impossible centre distance, a contact ratio
-            below 1, or a tip that touches the mate's flank below its form circle.
+            below 1, a tip that touches the mate's flank below its form circle or the mate's root circle: the first of
+            what `explain` lists. Pairs made while being traced pass; their `margins` tell.
     """
 
     pinion: Gear
     wheel: Gear
-    center_distance: Scalar | None = eqx.field(converter=optional_real, default=None)
+    center_distance: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
 
-    def __check_init__(self):
-        from .validity import check_pair
-
-        check_pair(self)
+    def check_together(self) -> None:
+        for name, gear in (("pinion", self.pinion), ("wheel", self.wheel)):
+            if gear.teeth.ndim:
+                raise ValueError(
+                    f"GearPair: {name} holds gears of shape {gear.teeth.shape}, must be one; make many with jax.vmap"
+                )
+        for fault in _faults(self):
+            raise ValueError(fault)
 
     @property
     def working_pressure_angle(self) -> Scalar:
         """Operating pressure angle [rad]."""
-        radii = self.pinion.base_radius + self.wheel.base_radius
-        if self.center_distance is not None:
-            ratio = radii / self.center_distance
-            # the clip keeps a traced, impossible centre distance finite; a concrete one has been refused
-            return jnp.arccos(jnp.minimum(ratio, 1.0 - 1e-6))
-        return _backlash_free_angle(self)
+        return working_pressure_angle(self.pinion, self.wheel, self.center_distance)
 
     @property
     def working_center_distance(self) -> Scalar:
@@ -50,6 +53,11 @@ class GearPair(eqx.Module):
         if self.center_distance is not None:
             return self.center_distance
         return (self.pinion.base_radius + self.wheel.base_radius) / jnp.cos(self.working_pressure_angle)
+
+    @property
+    def backlash(self) -> Scalar:
+        """Play between the unloaded flanks on the line of action [um], of nominal tooth thicknesses."""
+        return margins(self).backlash
 
     @property
     def face_width(self) -> Scalar:
@@ -67,19 +75,35 @@ class GearPair(eqx.Module):
         return self.wheel.teeth / self.pinion.teeth
 
 
-_WIDEST_ANGLE = 1.2  # rad; no gear pair works beyond about 45 degrees
+def path_of_contact(pair: GearPair) -> PathOfContact:
+    """Path of contact of a pair, limited by the two tip circles."""
+    return path_between(pair.pinion, pair.wheel, pair.center_distance)
 
 
-def _backlash_free_angle(pair: GearPair) -> Scalar:
-    """inv(alpha_w) = inv(alpha) + 2 tan(alpha) (x1 + x2) / (z1 + z2) (ISO 21771)."""
-    pinion, wheel = pair.pinion, pair.wheel
-    alpha = jnp.deg2rad(pinion.pressure_angle)
-    shift = (pinion.profile_shift + wheel.profile_shift) / (pinion.teeth + wheel.teeth)
-    target = involute(jnp.tan(alpha)) + 2 * jnp.tan(alpha) * shift
-    tangent = bracketed_root(
-        lambda t, wanted: involute(t) - wanted,
-        jnp.full_like(target, 1e-3),
-        jnp.full_like(target, jnp.tan(_WIDEST_ANGLE)),
-        target,
-    )
-    return jnp.arctan(tangent)
+@eqx.filter_jit
+def margins(pair: GearPair) -> Margins:
+    """How far a pair is from what cannot run; finite and differentiable for impossible gears too."""
+    return margins_between(outline(pair.pinion), outline(pair.wheel), path_of_contact(pair), pair.center_distance)
+
+
+def explain(pair: GearPair) -> tuple[str, ...]:
+    """Why a pair cannot run, one line for each margin that does not hold; empty if it can.
+
+    Args:
+        pair: one pair of concrete numbers, for instance a design that `jax.jit` or `jax.vmap` returned.
+
+    Raises:
+        ValueError: while being traced, or for many pairs at once.
+    """
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(pair)):
+        raise ValueError("explain: pair is being traced, must hold concrete numbers; use `margins` inside")
+    if pair.pinion.teeth.ndim:
+        raise ValueError(f"explain: pair holds pairs of shape {pair.pinion.teeth.shape}, must be one")
+    return _faults(pair)
+
+
+def _faults(pair: GearPair) -> tuple[str, ...]:
+    known = margins(pair)
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((pair, known))):
+        return ()
+    return faults_between(pair.pinion, pair.wheel, pair.center_distance, known)

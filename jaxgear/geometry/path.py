@@ -1,13 +1,17 @@
-"""The path of contact: points A to E, contact ratio, sliding and rolling."""
+"""Where two gears meet: operating pressure angle and centre distance, points A to E, contact ratio, sliding."""
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .pair import GearPair
+from ..numerics import bracketed_root
+from .gear import Gear
+from .involute import involute
 
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
+
+_WIDEST_ANGLE = 1.2  # rad; no gear pair works beyond about 45 degrees
 
 
 class PathOfContact(eqx.Module):
@@ -63,19 +67,42 @@ class PathOfContact(eqx.Module):
         return pinion * wheel / (pinion + wheel)
 
 
-def path_of_contact(pair: GearPair) -> PathOfContact:
-    """Path of contact of a pair, limited by the two tip circles."""
-    tangent = jnp.tan(pair.working_pressure_angle)
-    pinion, wheel = pair.pinion, pair.wheel
+@eqx.filter_jit
+def working_pressure_angle(pinion: Gear, wheel: Gear, center_distance: Scalar | None) -> Scalar:
+    """Operating pressure angle [rad] at a centre distance [mm], or without backlash (None)."""
+    if center_distance is not None:
+        ratio = (pinion.base_radius + wheel.base_radius) / center_distance
+        # the clip keeps a traced, impossible centre distance finite; a concrete one has been refused
+        return jnp.arccos(jnp.minimum(ratio, 1.0 - 1e-6))
+    target = backlash_free_involute(pinion, wheel)
+    low, high = jnp.full_like(target, 1e-3), jnp.full_like(target, jnp.tan(_WIDEST_ANGLE))
+    return jnp.arctan(bracketed_root(_missing_involute, low, high, target))
+
+
+def backlash_free_involute(pinion: Gear, wheel: Gear) -> Scalar:
+    """inv(alpha_w) = inv(alpha) + 2 tan(alpha) (x1 + x2) / (z1 + z2) [rad] (ISO 21771)."""
+    tangent = jnp.tan(jnp.deg2rad(pinion.pressure_angle))
+    shift = (pinion.profile_shift + wheel.profile_shift) / (pinion.teeth + wheel.teeth)
+    return involute(tangent) + 2 * tangent * shift
+
+
+def _missing_involute(tangent: Scalar, wanted: Scalar) -> Scalar:
+    return involute(tangent) - wanted
+
+
+@eqx.filter_jit
+def path_between(pinion: Gear, wheel: Gear, center_distance: Scalar | None) -> PathOfContact:
+    """Path of contact at a centre distance [mm], or without backlash (None), limited by the two tip circles."""
+    tangent = jnp.tan(working_pressure_angle(pinion, wheel, center_distance))
     pinion_pitch, wheel_pitch = pinion.base_radius * tangent, wheel.base_radius * tangent
     start = wheel_pitch - wheel.tip_roll_length
     end = pinion.tip_roll_length - pinion_pitch
     return PathOfContact(
         start=start,
-        inner_single=end - pair.base_pitch,
-        outer_single=start + pair.base_pitch,
+        inner_single=end - pinion.base_pitch,
+        outer_single=start + pinion.base_pitch,
         end=end,
-        base_pitch=pair.base_pitch,
+        base_pitch=pinion.base_pitch,
         pinion_pitch_roll_length=pinion_pitch,
         wheel_pitch_roll_length=wheel_pitch,
         pinion_base_radius=pinion.base_radius,

@@ -1,11 +1,14 @@
 """Scalar roots inside a bracket, elementwise over arrays, with exact derivatives."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 
 _BISECTIONS = 24  # the bracket shrinks to 6e-8 of its width, from where two Newton steps reach machine precision
 
 
+@partial(jax.jit, static_argnames="function", inline=True)
 def bracketed_root(function, low, high, args):
     """Root of an increasing or decreasing `function(x, args)` in [low, high], elementwise.
 
@@ -14,7 +17,8 @@ def bracketed_root(function, low, high, args):
     `args` are. Where the function has no sign change the end nearer to a root is returned.
 
     Args:
-        function: (x, args) -> residual, same shape as x.
+        function: (x, args) -> residual, same shape as x. A function of a module, not one made at every call, outside of
+            compiled code: each compiles anew.
         low: lower end, any shape.
         high: upper end, same shape.
         args: pytree that the function depends on; derivatives flow through it only.

@@ -1,0 +1,191 @@
+"""How far two gears are from what cannot run, as numbers that an optimizer can hold, and in words.
+
+One rule for each margin decides both: `Margins.held`. Concrete pairs are refused by it, traced ones flagged.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from ..numerics import Checked, result, safe_sqrt
+from .gear import Gear, shape_faults
+from .involute import diameter, involute
+from .outline import Outline, outline
+from .path import PathOfContact, backlash_free_involute, working_pressure_angle
+
+Scalar = Float[Array, ""]
+
+# a micrometre of the radius below the form circle, or into the root circle, is within the accuracy of any outline
+_OUTLINE_ACCURACY = 1e-3
+# single precision resolves a centre distance to about 1e-7 of its value
+_DISTANCE_ACCURACY = 1e-6
+
+
+class Accuracy(eqx.Module):
+    """By how much a margin may lie below zero: what an outline, or single precision, does not resolve.
+
+    Attributes:
+        pinion_form, wheel_form: roll length that the accuracy of the outline is worth at the form circle [mm].
+        backlash: [um].
+    """
+
+    pinion_form: Scalar
+    wheel_form: Scalar
+    backlash: Scalar
+
+
+class Margins(Checked):
+    """Numbers that are positive where a pair can run; made by `margins`.
+
+    Each is finite and has a finite derivative for impossible gears too, so that a search finds back.
+
+    Attributes:
+        pinion_tip_land, wheel_tip_land: thickness of the tooth at the tip, as an arc [mm].
+        pinion_tip_height, wheel_tip_height: height of the tip above base and root circle [mm].
+        pinion_rim_thickness, wheel_rim_thickness: from the bore to the root circle [mm].
+        pinion_form_clearance, wheel_form_clearance: roll length at which the mate's tip meets the flank beyond that of
+            the form circle, where the usable involute starts [mm].
+        pinion_tip_clearance, wheel_tip_clearance: from the gear's tip to the mate's root circle on the line of
+            centres [mm].
+        contact_ratio_margin: transverse contact ratio minus 1.
+        backlash: play between the unloaded flanks on the line of action [um]; 0 without a given centre distance.
+        base_circle_clearance: centre distance minus both base radii [mm].
+        base_pitch_difference: between pinion and wheel, relative. No margin: it must vanish.
+        accuracy: by how much clearances of the form circles and backlash may lie below zero.
+    """
+
+    pinion_tip_land: Scalar = result("mm")
+    wheel_tip_land: Scalar = result("mm")
+    pinion_tip_height: Scalar = result("mm")
+    wheel_tip_height: Scalar = result("mm")
+    pinion_rim_thickness: Scalar = result("mm")
+    wheel_rim_thickness: Scalar = result("mm")
+    pinion_form_clearance: Scalar = result("mm")
+    wheel_form_clearance: Scalar = result("mm")
+    pinion_tip_clearance: Scalar = result("mm")
+    wheel_tip_clearance: Scalar = result("mm")
+    contact_ratio_margin: Scalar = result("")
+    backlash: Scalar = result("um")
+    base_circle_clearance: Scalar = result("mm")
+    base_pitch_difference: Scalar = eqx.field(repr=False)
+    accuracy: Accuracy = eqx.field(repr=False)
+
+    @property
+    def held(self) -> dict[str, Bool[Array, "..."]]:
+        """For each margin by name whether it holds, most basic first."""
+        shape = {
+            f"{side}_{name}": getattr(self, f"{side}_{name}") > 0
+            for side in ("pinion", "wheel")
+            for name in ("tip_height", "tip_land", "rim_thickness")
+        }
+        return shape | {
+            "base_pitch_difference": self.base_pitch_difference <= _DISTANCE_ACCURACY,
+            "base_circle_clearance": self.base_circle_clearance > 0,
+            "backlash": self.backlash >= -self.accuracy.backlash,
+            "contact_ratio_margin": self.contact_ratio_margin >= 0,
+            "pinion_form_clearance": self.pinion_form_clearance >= -self.accuracy.pinion_form,
+            "wheel_form_clearance": self.wheel_form_clearance >= -self.accuracy.wheel_form,
+            "pinion_tip_clearance": self.pinion_tip_clearance >= -_OUTLINE_ACCURACY,
+            "wheel_tip_clearance": self.wheel_tip_clearance >= -_OUTLINE_ACCURACY,
+        }
+
+    @property
+    def valid(self) -> Bool[Array, "..."]:
+        """Whether the pair can run: every margin holds."""
+        return jnp.all(jnp.stack(list(self.held.values())), axis=0)
+
+
+def margins_between(pinion: Outline, wheel: Outline, path: PathOfContact, center_distance: Scalar | None) -> Margins:
+    """Margins of two generated gears on their path of contact; `center_distance` [mm] as in `GearPair`."""
+    first, second = pinion.gear, wheel.gear
+    both = first.base_radius + second.base_radius
+    tangent = path.pinion_pitch_roll_length / path.pinion_base_radius
+    secant = jnp.sqrt(1 + tangent**2)
+    distance = both * secant if center_distance is None else center_distance
+    # p_b - s_1 - s_2 with the thicknesses at the base circles: 2 (r_b1 + r_b2) (inv(alpha_w) - inv(alpha_w,free))
+    play = 2e3 * both * (involute(tangent) - backlash_free_involute(first, second))
+    return Margins(
+        pinion_tip_land=first.tip_land,
+        wheel_tip_land=second.tip_land,
+        pinion_tip_height=first.tip_height,
+        wheel_tip_height=second.tip_height,
+        pinion_rim_thickness=first.rim_thickness,
+        wheel_rim_thickness=second.rim_thickness,
+        pinion_form_clearance=path.pinion_roll_length(path.start) - pinion.form_roll_length,
+        wheel_form_clearance=path.wheel_roll_length(path.end) - wheel.form_roll_length,
+        pinion_tip_clearance=distance - first.tip_radius - second.root_circle_radius,
+        wheel_tip_clearance=distance - second.tip_radius - first.root_circle_radius,
+        contact_ratio_margin=path.contact_ratio - 1,
+        backlash=jnp.zeros_like(play) if center_distance is None else play,
+        base_circle_clearance=distance - both,
+        base_pitch_difference=jnp.abs(first.base_pitch - second.base_pitch) / first.base_pitch,
+        accuracy=Accuracy(
+            pinion_form=_form_accuracy(pinion),
+            wheel_form=_form_accuracy(wheel),
+            # dj / da = 2 sin(alpha_w)
+            backlash=2e3 * _DISTANCE_ACCURACY * both * tangent,
+        ),
+    )
+
+
+def _form_accuracy(outline: Outline) -> Scalar:
+    """Roll length that the accuracy of the outline's radius is worth at the form circle [mm]."""
+    base, form = outline.gear.base_radius, outline.form_roll_length
+    lower = jnp.sqrt(base**2 + form**2) - _OUTLINE_ACCURACY
+    return form - safe_sqrt(lower**2 - base**2)
+
+
+def faults_between(pinion: Gear, wheel: Gear, center_distance: Scalar | None, margins: Margins) -> tuple[str, ...]:
+    """The margins that do not hold, in words; all numbers concrete."""
+    faults = [
+        f"{side}: {fault}" for side, gear in (("pinion", pinion), ("wheel", wheel)) for fault in shape_faults(gear)
+    ]
+    faults += [
+        f"GearPair: wheel {name} = {float(getattr(wheel, name)):g} {unit} must equal the pinion's, "
+        f"{float(getattr(pinion, name)):g} {unit}"
+        for name, unit in (("module", "mm"), ("pressure_angle", "deg"))
+        if float(getattr(wheel, name)) != float(getattr(pinion, name))
+    ]
+    missed = {name for name, held in margins.held.items() if not held}
+    if "base_circle_clearance" in missed:
+        closest = float(pinion.base_radius + wheel.base_radius)
+        distance = closest + float(margins.base_circle_clearance)
+        faults.append(f"GearPair: center_distance = {distance:g} mm must be greater than {closest:g} mm")
+    elif "backlash" in missed:
+        faults.append(_backlash_fault(pinion, wheel, center_distance))
+    if "contact_ratio_margin" in missed:
+        faults.append(
+            f"GearPair: contact ratio = {float(margins.contact_ratio_margin) + 1:.4g} must be at least 1: raise a "
+            "tip_diameter or addendum, or lower center_distance"
+        )
+    for name, mate, gear in (("pinion", "wheel", pinion), ("wheel", "pinion", wheel)):
+        if f"{name}_form_clearance" in missed:
+            faults.append(_form_fault(name, mate, gear, float(getattr(margins, f"{name}_form_clearance"))))
+        if f"{mate}_tip_clearance" in missed:
+            faults.append(
+                f"GearPair: {mate} tip_diameter leaves a clearance of "
+                f"{float(getattr(margins, f'{mate}_tip_clearance')):.4g} mm to the {name}'s root circle, must be at "
+                "least 0 mm"
+            )
+    return tuple(faults)
+
+
+def _backlash_fault(pinion: Gear, wheel: Gear, center_distance) -> str:
+    angle = working_pressure_angle(pinion, wheel, None)
+    free = float((pinion.base_radius + wheel.base_radius) / jnp.cos(angle)) * (1 - _DISTANCE_ACCURACY)
+    unit = "mm (backlash-free)"
+    return f"GearPair: center_distance = {float(center_distance):g} {unit} must be at least {free:g} {unit}"
+
+
+def _form_fault(name: str, mate: str, gear: Gear, clearance: float) -> str:
+    form = outline(gear).form_roll_length
+    reached = form + clearance
+    wanted, start = f"{float(diameter(gear, form)):.6g} mm", f"GearPair: {mate} tip_diameter reaches the {name}'s flank"
+    if reached >= 0:
+        at = float(diameter(gear, reached))
+        return f"{start} at diameter {at:.6g} mm, must be at least its form diameter {wanted}"
+    # where the involute has ended diameters grow again: only the roll length tells how far off it is
+    return (
+        f"{start} at a roll length of {float(reached):.4g} mm (below the base circle), must be at least "
+        f"{float(form):.4g} mm, that of its form diameter {wanted}"
+    )

@@ -1,0 +1,171 @@
+"""Margins tell traced gears that cannot run, by the rules that refuse concrete ones, and hold a search by gradients."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import gear_pair
+from scipy.optimize import minimize
+
+import jaxgear as jg
+from jaxgear.geometry import outline
+from jaxgear.numerics import fields_of
+
+# pinion shift, wheel shift, pinion addendum, centre distance, pinion tip diameter, pinion bore of a 19/48 pair
+SOUND = (0.1, -0.05, 1.0, 100.9, 63.5, 24.0)
+IMPOSSIBLE = {
+    "pinion_tip_land": (0.3, 0.0, 1.0, 101.5, 71.0, 24.0),
+    "pinion_tip_height": (0.1, 0.0, 1.0, 100.9, 52.0, 24.0),
+    "pinion_rim_thickness": (0.1, 0.0, 1.0, 100.9, 63.5, 52.0),
+    "base_circle_clearance": (0.1, 0.0, 1.0, 93.0, 63.5, 24.0),
+    "backlash": (0.4, 0.3, 1.0, 101.5, 63.5, 24.0),
+    "contact_ratio_margin": (0.1, 0.0, 1.0, 104.5, 63.5, 24.0),
+    "pinion_form_clearance": (-0.5, 0.5, 1.0, 100.9, 59.0, 24.0),
+    "pinion_tip_clearance": (0.1, -0.6, 1.0, 100.5, 68.6, 24.0),
+}
+
+
+def pair_of(x, teeth=(19.0, 48.0)):
+    shift, mate_shift, addendum, distance, tip, bore = x
+    pinion = jg.Gear(
+        teeth[0], 3.0, profile_shift=shift, face_width=10.0, addendum=addendum, tip_diameter=tip, bore_diameter=bore
+    )
+    wheel = jg.Gear(teeth[1], 3.0, profile_shift=mate_shift, face_width=10.0)
+    return jg.GearPair(pinion, wheel, distance)
+
+
+def numbers(x):
+    margins = jg.margins(pair_of(x))
+    return jnp.stack([getattr(margins, name) for name in fields_of(jg.Margins)])
+
+
+NAMES = tuple(fields_of(jg.Margins))
+jacobian = jax.jit(jax.vmap(jax.jacfwd(numbers)))
+values = jax.jit(jax.vmap(numbers))
+held = jax.jit(jax.vmap(lambda x: (jg.margins(pair_of(x)).valid, jg.margins(pair_of(x)).held)))
+
+
+def test_margins_of_a_pair_in_closed_form():
+    pair = gear_pair((19, 48), 3.0)
+    margins = jg.margins(pair)
+    assert bool(margins.valid) and jg.explain(pair) == ()
+    assert float(margins.pinion_tip_clearance) == pytest.approx(0.25 * 3.0, rel=1e-12)
+    assert float(margins.wheel_tip_clearance) == pytest.approx(0.25 * 3.0, rel=1e-12)
+    assert float(margins.pinion_rim_thickness) == pytest.approx(0.5 * (3.0 * 16.5 - 24.0), rel=1e-12)
+    assert float(margins.wheel_tip_height) == pytest.approx(3.0 * 2.25, rel=1e-12)
+    assert float(margins.contact_ratio_margin) == pytest.approx(0.6456, abs=6e-5)
+    assert float(margins.base_circle_clearance) == pytest.approx(100.5 * (1 - np.cos(np.deg2rad(20))), rel=1e-12)
+    assert float(margins.pinion_tip_land) == pytest.approx(float(jg.tooth_thickness(pair.pinion, 63.0)), rel=1e-12)
+    path = jg.path_of_contact(pair)
+    reached = path.wheel_roll_length(path.end) - outline(pair.wheel).form_roll_length
+    assert float(margins.wheel_form_clearance) == pytest.approx(float(reached), rel=1e-12)
+    assert float(margins.backlash) == 0.0
+
+
+@pytest.mark.parametrize("extra", [0.0, 0.05, 0.6])
+def test_backlash_is_the_operating_pitch_less_both_thicknesses(extra):
+    free = gear_pair((20, 31), 2.0, shift=(0.5, 0.3), bores=(None, None))
+    distance = float(free.working_center_distance) + extra
+    pair = jg.GearPair(free.pinion, free.wheel, distance)
+    diameters = 2 * distance * 20 / 51, 2 * distance * 31 / 51
+    thickness = sum(float(jg.tooth_thickness(g, jnp.asarray(d))) for g, d in zip((pair.pinion, pair.wheel), diameters))
+    on_the_circle = np.pi * diameters[0] / 20 - thickness
+    normal = on_the_circle * np.cos(float(pair.working_pressure_angle))
+    assert float(pair.backlash) == pytest.approx(1e3 * normal, abs=1e-8)
+    # dj / da = 2 sin(alpha_w), by the trapezoidal rule
+    sine = 0.5 * sum(np.sin(float(gears.working_pressure_angle)) for gears in (free, pair))
+    assert float(pair.backlash) == pytest.approx(2e3 * extra * sine, rel=1e-3, abs=1e-8)
+
+
+def test_each_rule_has_its_impossible_pair():
+    valid, rules = held(jnp.asarray([SOUND, *IMPOSSIBLE.values()]))
+    assert bool(valid[0]) and not bool(valid[1:].any())
+    for place, name in enumerate(IMPOSSIBLE, start=1):
+        assert not bool(rules[name][place]), name
+    make = jax.jit(pair_of)
+    for x in IMPOSSIBLE.values():
+        assert jg.explain(make(jnp.asarray(x)))
+        with pytest.raises(ValueError):
+            pair_of(x)
+
+
+def test_a_pair_is_refused_exactly_where_its_margins_flag_it():
+    generator = np.random.default_rng(5)
+    low, high = np.array([-0.6, -0.6, 0.8, 99.0, 60.0, 20.0]), np.array([0.8, 0.6, 1.2, 104.0, 67.0, 50.0])
+    points = low + (high - low) * generator.random((120, 6))
+    valid = np.asarray(held(jnp.asarray(points))[0])
+    assert 10 < valid.sum() < 110
+
+    def accepted(x):
+        try:
+            pair_of(x)
+        except ValueError:
+            return False
+        return True
+
+    assert [accepted(x) for x in points] == valid.tolist()
+
+
+def test_two_micrometres_of_the_form_diameter_are_the_accuracy_of_the_outline():
+    """A wheel tip that reaches 1.9 um below the pinion's form diameter runs, one that reaches 2.1 um below does not."""
+
+    def pair(micrometres, make=jg.GearPair):
+        pinion, wheel = jg.Gear(19, 3.0, face_width=10.0), jg.Gear(48, 3.0, face_width=10.0)
+        form = outline(pinion)
+        reached = jg.roll_length(pinion, jg.diameter(pinion, form.form_roll_length) - 1e-3 * micrometres)
+        line = 100.5 * np.sin(np.deg2rad(20))
+        tip = 2 * np.hypot(float(wheel.base_radius), line - float(reached))
+        return make(pinion, jg.Gear(48, 3.0, face_width=10.0, tip_diameter=tip))
+
+    make = jax.jit(jg.GearPair)
+    assert bool(jg.margins(pair(1.9)).valid)
+    with pytest.raises(ValueError, match="form diameter"):
+        pair(2.1)
+    assert not bool(jg.margins(pair(2.1, make)).valid)
+
+
+def test_derivatives_of_the_margins_of_sound_and_impossible_gears():
+    points, step = np.asarray([SOUND, *IMPOSSIBLE.values()]), 1e-6
+    exact = np.asarray(jacobian(points))
+    for i, move in enumerate(np.eye(points.shape[1]) * step):
+        difference = (values(points + move) - values(points - move)) / (2 * step)
+        np.testing.assert_allclose(exact[:, :, i], difference, rtol=1e-5, atol=1e-5)
+    # each violated margin knows a way back
+    for place, name in enumerate(IMPOSSIBLE, start=1):
+        assert np.abs(exact[place, NAMES.index(name)]).max() > 1e-3, name
+
+
+def test_absurd_traced_gears_have_finite_margins_and_derivatives():
+    generator = np.random.default_rng(3)
+    low, high = np.array([-3.0, -3.0, -1.0, 40.0, 1.0, 0.0]), np.array([4.0, 4.0, 4.0, 150.0, 150.0, 150.0])
+    points = jnp.asarray(low + (high - low) * generator.random((500, 6)))
+    assert bool(jnp.all(jnp.isfinite(values(points)))) and bool(jnp.all(jnp.isfinite(jacobian(points))))
+
+
+def test_a_search_by_gradients_is_held_by_the_margins():
+    """The largest contact ratio over shift, addendum, centre distance: longer and longer teeth, closer and closer."""
+
+    def pair(x):
+        shift, addendum, distance = x
+        pinion = jg.Gear(19, 3.0, profile_shift=shift, face_width=10.0, addendum=addendum)
+        wheel = jg.Gear(48, 3.0, face_width=10.0, addendum=addendum)
+        return jg.GearPair(pinion, wheel, distance)
+
+    def rules(x):
+        margins = jg.margins(pair(x))
+        rows = [getattr(margins, name) for name in NAMES]
+        # a tip as thick as engineers ask for, and backlash in a unit near 1
+        return jnp.stack(rows).at[0].add(-0.6).at[1].add(-0.6) * jnp.asarray([1.0] * 11 + [0.01, 1.0])
+
+    objective = jax.jit(jax.value_and_grad(lambda x: -jg.path_of_contact(pair(x)).contact_ratio))
+    rule, slope, valid = jax.jit(rules), jax.jit(jax.jacrev(rules)), jax.jit(lambda x: jg.margins(pair(x)).valid)
+    start, box = np.array([0.2, 0.9, 101.5]), [(-0.8, 1.2), (0.6, 1.6), (97.0, 104.0)]
+    held_by = {"type": "ineq", "fun": lambda x: np.asarray(rule(x)), "jac": lambda x: np.asarray(slope(x))}
+    run = {"x0": start, "fun": lambda x: tuple(map(np.asarray, objective(x))), "jac": True, "bounds": box}
+    free = minimize(method="SLSQP", **run)
+    bound = minimize(method="SLSQP", constraints=held_by, **run)
+    assert not bool(valid(free.x))
+    assert bound.success and np.asarray(rule(bound.x)).min() > -1e-6
+    assert -bound.fun > 1.2 * -float(objective(start)[0])
+    assert bool(jg.margins(pair(bound.x + np.array([0.0, 0.0, 1e-6]))).valid)
+    assert np.isclose(np.asarray(rule(bound.x)), 0.0, atol=1e-6).sum() >= 2, "margins, not the box, end the search"
