@@ -95,7 +95,7 @@ def _plan(design: DesignFile, section: schema.SweepSection) -> AbstractPlan:
             raise DesignFileError(design.path, f"sweep.{key}", f'missing, sampling = "{kind}" needs it')
     bounds, seed = design.bounds, section.seed or 0
     if kind == "list":
-        return read_variants(design.path.parent / str(section.file), tuple(bounds))
+        return read_variants(design.path.parent / str(section.file), bounds, design.units)
     if kind == "full_factorial":
         return refused(design.path, "sweep.levels", lambda: FullFactorial(bounds, section.levels or 0))
     make = Sobol if kind == "sobol" else LatinHypercube

@@ -1,8 +1,9 @@
 """Variants listed in a file, CSV or Parquet."""
 
+import csv as text
 import re
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,29 +11,37 @@ import numpy as np
 from ..sweeps import VariantList
 from .errors import DesignFileError
 
-_UNIT = re.compile(r" \[[^]]*\]$")  # of a heading, as tables of sweeps are exported
+_HEADING = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^]]*)\])?")  # as tables of sweeps are exported
+_LENGTHS = {"nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "m": 1.0}  # with micro sign and with mu
 
 
-def read_variants(path: Path, names: Sequence[str]) -> VariantList:
+def read_variants(
+    path: Path, bounds: Mapping[str, tuple[float, float]], units: Mapping[str, str] | None = None
+) -> VariantList:
     """Reads a list of variants; other columns of the file are passed over, so the table of a sweep can be read again.
 
     The numbers go through a temporary file on the disk: a list may be longer than fits the memory.
 
     Args:
-        path: a .parquet file, or a CSV file whose headings are the names, with or without a unit in brackets.
-        names: of the parameters.
+        path: a .parquet file, or a CSV file in UTF-8 whose headings are the names, with or without a unit in brackets.
+        bounds: (low, high) of every parameter.
+        units: of the parameters; lengths in another unit are converted, anything else in another unit is refused.
 
     Raises:
-        DesignFileError: when the file cannot be read, lacks a parameter, or holds something else than numbers.
+        DesignFileError: when the file cannot be read, lacks a parameter or has it twice, or holds something else than
+            numbers within the bounds.
     """
     import pyarrow
 
-    rows = 0
+    names, rows = list(bounds), 0
     with tempfile.TemporaryFile() as scratch:  # the array on it outlives it
         try:
-            for piece in (_parquet if path.suffix.lower() == ".parquet" else _csv)(path, names):
+            for piece in (_parquet if path.suffix.lower() == ".parquet" else _csv)(path, names, units or {}):
+                _check_bounds(path, piece, bounds, rows)
                 scratch.write(np.ascontiguousarray(piece, np.float64).tobytes())
                 rows += len(piece)
+        except UnicodeDecodeError:
+            raise DesignFileError(path, "", "is not text in UTF-8: save it so, or as Parquet") from None
         except (OSError, pyarrow.ArrowException) as error:
             problem = getattr(error, "strerror", None) or str(error).partition("\n")[0]
             raise DesignFileError(path, "", problem) from None
@@ -42,37 +51,73 @@ def read_variants(path: Path, names: Sequence[str]) -> VariantList:
         return VariantList(names, np.memmap(scratch, np.float64, "r", shape=(rows, len(names))))
 
 
-def _csv(path: Path, names: Sequence[str]) -> Iterator[np.ndarray]:
+def _csv(path: Path, names: Sequence[str], units: Mapping[str, str]) -> Iterator[np.ndarray]:
     import pyarrow
     from pyarrow import csv
 
-    with path.open(encoding="utf-8-sig") as file:
-        headings = [heading.strip().strip('"') for heading in file.readline().strip().split(",")]
-    wanted = _columns(path, headings, names)
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        headings = [heading.strip() for heading in next(text.reader(file), [])]
+    places, factors = _columns(path, [_parts(heading) for heading in headings], names, units)
+    numbered = [str(place) for place in range(len(headings))]  # headings that nobody asks for may be there twice
+    wanted = [numbered[place] for place in places]
     options = csv.ConvertOptions(column_types=dict.fromkeys(wanted, pyarrow.float64()), include_columns=wanted)
-    read = csv.ReadOptions(column_names=headings, skip_rows=1)
+    read = csv.ReadOptions(column_names=numbered, skip_rows=1)
     for batch in csv.open_csv(path, read_options=read, convert_options=options):
-        yield _numbers(batch)
+        yield _numbers(batch) * factors
 
 
-def _parquet(path: Path, names: Sequence[str]) -> Iterator[np.ndarray]:
+def _parquet(path: Path, names: Sequence[str], units: Mapping[str, str]) -> Iterator[np.ndarray]:
     import pyarrow
     from pyarrow import parquet
 
     with parquet.ParquetFile(path) as file:
-        wanted = _columns(path, file.schema_arrow.names, names)
+        fields = list(file.schema_arrow)
+        known = [(_parts(field.name)[0], _unit(field) or _parts(field.name)[1]) for field in fields]
+        places, factors = _columns(path, known, names, units)
+        wanted = [fields[place].name for place in places]
         types = pyarrow.schema([(name, pyarrow.float64()) for name in wanted])
         for batch in file.iter_batches(columns=wanted):
-            yield _numbers(batch.select(wanted).cast(types))
+            yield _numbers(batch.select(wanted).cast(types)) * factors
 
 
-def _columns(path: Path, headings: Sequence[str], names: Sequence[str]) -> list[str]:
-    """The file's names of the parameters."""
-    known = {_UNIT.sub("", heading): heading for heading in headings}
-    missing = [name for name in names if name not in known]
+def _columns(path: Path, known: Sequence[tuple[str, str | None]], names: Sequence[str], units: Mapping[str, str]):
+    """Places of the parameters among the columns of the file, and what turns their numbers into their units."""
+    places = {name: [i for i, (other, _) in enumerate(known) if other == name] for name in names}
+    missing = [name for name in names if not places[name]]
     if missing:
         raise DesignFileError(path, "", f"has no column {', '.join(missing)}")
-    return [known[name] for name in names]
+    for name in names:
+        if len(places[name]) > 1:
+            raise DesignFileError(path, "", f"has {len(places[name])} columns {name}, must have one")
+    chosen = [places[name][0] for name in names]
+    return chosen, np.array([_factor(path, name, known[i][1], units.get(name)) for name, i in zip(names, chosen)])
+
+
+def _factor(path: Path, name: str, given: str | None, wanted: str | None) -> float:
+    if given is None or wanted is None or given == wanted:
+        return 1.0
+    if given in _LENGTHS and wanted in _LENGTHS:
+        return float(f"{_LENGTHS[given] / _LENGTHS[wanted]:.1e}")  # a power of ten to the last bit
+    raise DesignFileError(path, "", f"column {name} is in [{given}], must be in [{wanted or '-'}]")
+
+
+def _check_bounds(path: Path, rows: np.ndarray, bounds: Mapping[str, tuple[float, float]], before: int) -> None:
+    for column, (name, (low, high)) in zip(rows.T, bounds.items()):
+        outside = np.flatnonzero((column < low) | (column > high))
+        if outside.size:
+            value, number = column[outside[0]], before + outside[0]
+            raise DesignFileError(path, "", f"{name} = {value:g} of variant {number} must be from {low:g} to {high:g}")
+
+
+def _parts(heading: str) -> tuple[str, str | None]:
+    """Name and unit of a heading, None where it has none."""
+    match = _HEADING.fullmatch(heading)
+    return (heading, None) if match is None else (match["name"], match["unit"])
+
+
+def _unit(field) -> str | None:
+    unit = (field.metadata or {}).get(b"unit")
+    return unit.decode() if unit else None
 
 
 def _numbers(batch) -> np.ndarray:
