@@ -17,6 +17,9 @@ from .loss import loss_factor as loss_factor
 from .loss import ohlendorf_loss_factor as ohlendorf_loss_factor
 from .pressure import corner_pressure as corner_pressure
 from .pressure import flank_pressure as flank_pressure
+from .quantity import Quantity as Quantity
+from .quantity import quantities as quantities
+from .quantity import quantity_of as quantity_of
 from .registry import RESULTS as RESULTS
 from .registry import Result as Result
 from .registry import result_key as result_key
@@ -30,3 +33,4 @@ from .transmission_error import Harmonics as Harmonics
 from .transmission_error import harmonics as harmonics
 from .transmission_error import peak_to_peak as peak_to_peak
 from .transmission_error import smooth_peak_to_peak as smooth_peak_to_peak
+from .vocabulary import mean_removed_material as mean_removed_material

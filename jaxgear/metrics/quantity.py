@@ -1,0 +1,140 @@
+"""Named quantities of a mesh cycle: one open vocabulary for tables, objectives, limits, reports and design files."""
+
+import difflib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..contact import MeshCycle
+from ..numerics.reductions import AbstractReduction, Value
+
+Numbers = Float[Array, "..."]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of a mesh cycle, with its name and unit; call it with a cycle.
+
+    A name of the vocabulary, or a quantity of your own, is taken wherever a quantity is asked for:
+
+        ripple = Quantity("ripple", lambda cycle: cycle.tangent_stiffness, "N/um", reduction=Range())
+
+    Attributes:
+        name: as tables and design files call it.
+        of: computes it from one solved cycle: a single number, or an array that the reduction makes one of. Traced, so
+            it must be pure; every use of one quantity shares compiled programs as long as it is the same function.
+        unit: "" for a pure number.
+        meaning: in a few words.
+        reduction: makes one number of an array, over all its axes. Linear programs keep the extremes of `Max`, `Min`
+            and `Range` exact, and gradient methods soften them.
+        better: whether small or large values are the better ones: what is minimized, worst, or on a front.
+        local: whether the array has positions last and its values at a position depend on the material removed at that
+            position alone, as those of transmission error, line load and pressure do. It only saves time.
+    """
+
+    name: str
+    of: Callable[[MeshCycle], Any]
+    unit: str = ""
+    meaning: str = ""
+    reduction: AbstractReduction = Value()
+    better: Literal["smaller", "larger"] = "smaller"
+    local: bool = False
+
+    @property
+    def key(self) -> str:
+        """Name with the unit, as tables and summaries carry it: `ppte_um`, `max_line_load_N_per_mm`."""
+        suffix = self.unit.replace(" ", "").replace("/", "_per_")
+        return f"{self.name}_{suffix}" if suffix else self.name
+
+    @property
+    def sign(self) -> int:
+        """1 where small values are the better ones, else -1."""
+        return 1 if self.better == "smaller" else -1
+
+    def __call__(self, cycle: MeshCycle) -> Numbers:
+        """The number, of every cycle where the cycle has leading axes from `jax.vmap`."""
+        number = _number(self)
+        for _ in range(cycle.transmission_error.ndim - 1):
+            number = jax.vmap(number)
+        return number(cycle)
+
+    def values(self, cycle: MeshCycle) -> Float[Array, "..."]:
+        """What is reduced, of one cycle, in its own shape.
+
+        Raises:
+            ValueError: when it is no number or array, or an array without a reduction.
+        """
+        given = self.of(cycle)
+        try:
+            values = jnp.asarray(given)
+        except (TypeError, ValueError):
+            raise ValueError(f"{self.name}: gives {type(given).__name__}, must be a number or an array") from None
+        if isinstance(self.reduction, Value) and values.size != 1:
+            raise ValueError(
+                f"{self.name}: gives an array of shape {values.shape}, must be a single number; "
+                "a Quantity(name, of, reduction=Max()) says what to make of it"
+            )
+        return values.astype(cycle.transmission_error.dtype)
+
+
+def _number(quantity: Quantity) -> Callable[[MeshCycle], Numbers]:
+    return lambda cycle: quantity.reduction(quantity.values(cycle).ravel())
+
+
+class Vocabulary(Mapping[str, Quantity]):
+    """Quantities by name. Packages add theirs; names are looked up in both spellings, "ppte" and "ppte_um"."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, Quantity] = {}
+
+    def add(self, *quantities: Quantity) -> None:
+        """Adds quantities.
+
+        Raises:
+            ValueError: for a name that is taken.
+        """
+        for quantity in quantities:
+            if quantity.name in self:
+                raise ValueError(f'quantities: "{quantity.name}" is there already')
+            self._known[quantity.name] = quantity
+
+    def __getitem__(self, name: str) -> Quantity:
+        if name in self._known:
+            return self._known[name]
+        return {quantity.key: quantity for quantity in self._known.values()}[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._known)
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+
+quantities = Vocabulary()
+
+
+def quantity_of(of: str | Quantity | Callable[[MeshCycle], Any], owner: str = "quantity") -> Quantity:
+    """The quantity that is meant by a name in either spelling, a `Quantity`, or a function of a cycle.
+
+    Args:
+        of: the quantity; a function is taken for a quantity of its own name that gives a single number.
+        owner: who asks, for the message.
+
+    Raises:
+        ValueError: for an unknown name, with the nearest known one.
+    """
+    if isinstance(of, Quantity):
+        return of
+    if callable(of):
+        return Quantity(getattr(of, "__name__", type(of).__name__), of)
+    if of in quantities:
+        return quantities[of]
+    near = difflib.get_close_matches(
+        str(of), [*quantities, *(each.key for each in quantities.values())], n=1, cutoff=0.5
+    )
+    hint = f'did you mean "{near[0]}"?' if near else f"must be one of {', '.join(quantities)}"
+    raise ValueError(f'{owner}: "{of}" is not known, {hint}')

@@ -1,0 +1,123 @@
+"""The quantities of this package."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..contact import MeshCycle
+from ..numerics.reductions import Average, Harmonic, Max, Min, Range, Rms
+from .flank import max_relief, relief_reversal, removed_volume
+from .load import contact_shock, effective_contact_ratio
+from .loss import loss_factor
+from .quantity import Quantity, quantities
+from .root_stress import root_stress
+
+Scalar = Float[Array, ""]
+Load = Float[Array, "pairs slices positions"]
+
+
+def _te(cycle: MeshCycle):
+    return cycle.transmission_error
+
+
+def _corner_length(cycle: MeshCycle) -> Scalar:
+    shock = contact_shock(cycle)
+    return shock.approach + shock.recess
+
+
+def _corner_force(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
+    return jnp.where(cycle.mesh.outside > 0, cycle.pair_force, 0.0)
+
+
+def _contact_pressure(cycle: MeshCycle) -> Load:
+    # a contact is on the flank or at the tip edge, and zero in the other field
+    return cycle.contact_pressure + cycle.corner_pressure
+
+
+def mean_removed_material(cycle: MeshCycle) -> Scalar:
+    """Material removed from both flanks together, mean over the contacts on the path of contact [um].
+
+    It breaks ties among designs of equal transmission error: what is not removed need not be ground.
+    """
+    inside = cycle.mesh.outside <= 0
+    # on the path of contact unmodified flanks have no gap: what is there is the modification
+    removed = jnp.where(inside, jnp.mean(cycle.gap, axis=1), 0.0)
+    return jnp.sum(removed) / jnp.sum(inside.astype(removed.dtype))
+
+
+def _of_flanks(function):
+    return lambda cycle: function(cycle.mesh, cycle.pinion, cycle.wheel)
+
+
+quantities.add(
+    Quantity("ppte", _te, "um", "peak-to-peak transmission error", Range(), local=True),
+    Quantity("mean_te", _te, "um", "mean transmission error", Average(), local=True),
+    Quantity("te_rms", _te, "um", "rms of the transmission error about its mean", Rms(), local=True),
+    Quantity(
+        "unloaded_ppte",
+        lambda cycle: cycle.unloaded_transmission_error,
+        "um",
+        "peak-to-peak transmission error, unloaded",
+        Range(),
+        local=True,
+    ),
+    *(
+        Quantity(
+            f"te_harmonic_{order}",
+            _te,
+            "um",
+            f"amplitude of mesh harmonic {order} of the transmission error",
+            Harmonic(order),
+            local=True,
+        )
+        for order in (1, 2, 3)
+    ),
+    Quantity(
+        "max_flank_pressure", lambda c: c.contact_pressure, "MPa", "largest Hertzian flank pressure", Max(), local=True
+    ),
+    Quantity(
+        "max_corner_pressure", lambda c: c.corner_pressure, "MPa", "largest pressure of a tip edge", Max(), local=True
+    ),
+    Quantity(
+        "max_contact_pressure", _contact_pressure, "MPa", "largest pressure of flanks and tip edges", Max(), local=True
+    ),
+    Quantity("max_line_load", lambda c: c.line_load, "N/mm", "largest line load", Max(), local=True),
+    Quantity(
+        "contact_ratio",
+        lambda c: c.mesh.path_of_contact.contact_ratio,
+        meaning="theoretical contact ratio",
+        better="larger",
+    ),
+    Quantity(
+        "effective_contact_ratio", effective_contact_ratio, meaning="mean number of loaded pairs", better="larger"
+    ),
+    Quantity("corner_contact_length", _corner_length, "mm", "loaded path beyond the theoretical path of contact"),
+    Quantity("corner_force", _corner_force, "N", "largest force on a pair there", Max(), local=True),
+    Quantity(
+        "pinion_root_stress",
+        lambda c: root_stress(c).pinion,
+        "MPa",
+        "largest root stress, pinion",
+        Max(),
+        local=True,
+    ),
+    Quantity(
+        "wheel_root_stress", lambda c: root_stress(c).wheel, "MPa", "largest root stress, wheel", Max(), local=True
+    ),
+    Quantity("mesh_loss_factor", loss_factor, meaning="loss power per input power and coefficient of friction"),
+    Quantity(
+        "min_tangent_stiffness",
+        lambda c: c.tangent_stiffness,
+        "N/um",
+        "smallest mesh stiffness",
+        Min(),
+        better="larger",
+        local=True,
+    ),
+    Quantity(
+        "max_tangent_stiffness", lambda c: c.tangent_stiffness, "N/um", "largest mesh stiffness", Max(), local=True
+    ),
+    Quantity("removed_material", mean_removed_material, "um", "mean material removed from both flanks together"),
+    Quantity("max_relief", _of_flanks(max_relief), "um", "largest material removed from a flank"),
+    Quantity("relief_reversal", _of_flanks(relief_reversal), "um", "by how much removal fails to be monotone"),
+    Quantity("removed_volume", _of_flanks(removed_volume), "mm3", "material ground off all flanks"),
+)

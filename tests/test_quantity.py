@@ -1,0 +1,91 @@
+"""One vocabulary of quantities: names and objects, reductions exact, soft and in pieces."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import ppte
+
+import jaxgear as jg
+from jaxgear.metrics import Quantity, quantities, quantity_of
+from jaxgear.numerics.reductions import Average, Harmonic, Max, Min, Range, Rms, Value
+
+VALUES = np.array([0.3, -1.2, 2.5, 0.9, 1.1, -0.4])
+
+
+@pytest.fixture(scope="module")
+def cycle(mesh):
+    relief = jg.TipRelief(5.0, 3.0)
+    return jg.solve(mesh, 50.0, pinion=relief, wheel=relief)
+
+
+@pytest.mark.parametrize(
+    ("reduction", "value"),
+    [
+        (Max(), VALUES.max()),
+        (Min(), VALUES.min()),
+        (Range(), np.ptp(VALUES)),
+        (Average(), VALUES.mean()),
+        (Rms(), VALUES.std()),
+        (Harmonic(2), 2 * abs(np.fft.rfft(VALUES)[2]) / len(VALUES)),
+    ],
+    ids=lambda part: type(part).__name__ if not isinstance(part, float) else "",
+)
+def test_reductions(reduction, value):
+    assert float(reduction(jnp.asarray(VALUES))) == pytest.approx(value, rel=1e-12)
+    # of many rows at once, and softly with a width that goes to zero
+    assert reduction(jnp.stack([jnp.asarray(VALUES), 2 * jnp.asarray(VALUES)])) == pytest.approx([value, 2 * value])
+    assert float(reduction.soft(jnp.asarray(VALUES), 1e-3)) == pytest.approx(value, abs=5e-3)
+    assert np.isnan(float(reduction(jnp.asarray([1.0, np.nan, 2.0, 1.0, 0.0, 0.0]))))
+    # constant values: a derivative all the same
+    assert np.isfinite(jax.grad(reduction)(jnp.ones(6))).all()
+
+
+@pytest.mark.parametrize(("reduction", "sign"), [(Max(), 1), (Min(), -1), (Range(), 1)])
+def test_pieces_make_the_value(reduction, sign):
+    above, below = reduction.factors(sign)
+    assert (above * VALUES).max() - (below * VALUES).min() == pytest.approx(
+        sign * float(reduction(jnp.asarray(VALUES)))
+    )
+    # made large, a largest value is not convex: no pieces
+    assert reduction.factors(-sign) is None
+
+
+def test_both_spellings_and_the_nearest_name():
+    assert quantity_of("ppte") is quantity_of("ppte_um") is quantities["ppte"]
+    assert quantities["max_line_load"].key == "max_line_load_N_per_mm"
+    with pytest.raises(ValueError, match='^sweep: "ppet" is not known, did you mean "ppte"?'):
+        quantity_of("ppet", "sweep")
+    with pytest.raises(ValueError, match="there already"):
+        quantities.add(Quantity("ppte", lambda cycle: cycle.transmission_error))
+
+
+def test_a_quantity_of_your_own_is_as_good_as_one_of_the_vocabulary(cycle):
+    mine = Quantity("mine", lambda c: c.transmission_error, "um", reduction=Range())
+    assert quantity_of(mine) is mine
+    assert float(mine(cycle)) == float(quantities["ppte"](cycle)) == float(jg.peak_to_peak(cycle.transmission_error))
+    assert float(quantity_of(lambda c: c.residual[0])(cycle)) == float(cycle.residual[0])
+
+
+def test_an_array_needs_a_reduction(cycle):
+    with pytest.raises(ValueError, match=r"te: gives an array of shape \(32,\), must be a single number.*Max\(\)"):
+        Quantity("te", lambda c: c.transmission_error)(cycle)
+    with pytest.raises(ValueError, match="te: gives dict, must be a number or an array"):
+        Quantity("te", lambda c: {"ppte": 1.0}, reduction=Max())(cycle)
+    with pytest.raises(ValueError, match="2 values"):
+        Value()(jnp.ones(2))
+
+
+def test_of_many_cycles(mesh):
+    """One number per design, whatever the quantity: that of the design alone."""
+
+    def solve(amount):
+        relief = jg.TipRelief(amount, 3.0)
+        return jg.solve(mesh, 50.0, pinion=relief, wheel=relief)
+
+    many = eqx.filter_jit(jax.vmap(solve))(jnp.asarray([1.0, 6.0]))
+    assert quantities["ppte"](many) == pytest.approx(
+        [ppte(mesh, 50.0, jg.TipRelief(a, 3.0), jg.TipRelief(a, 3.0)) for a in (1.0, 6.0)], abs=1e-9
+    )
+    assert quantities["effective_contact_ratio"](many).shape == (2,)
