@@ -97,9 +97,11 @@ def solve(
         the mesh cycle, differentiable with respect to every number in `mesh`, `torque` and the modifications.
 
     Raises:
-        ValueError: for a negative or non-finite torque.
+        ValueError: for a negative or non-finite torque, and for a modification that varies along the face on a mesh of
+            one slice.
     """
     check("solve", "torque", torque, "N m", low=0.0)
+    _check_slices(mesh, pinion=pinion, wheel=wheel)
     return _solve(mesh, real(torque), pinion, wheel)
 
 
@@ -117,7 +119,7 @@ def solve_removed(mesh: Mesh, torque, removed: Load) -> MeshCycle:
 
 @eqx.filter_jit
 def _solve(mesh: Mesh, torque: Scalar, pinion, wheel) -> MeshCycle:
-    return _solve_removed(mesh, torque, removed_material(mesh, torque, pinion=pinion, wheel=wheel))
+    return _solve_removed(mesh, torque, _removed_material(mesh, torque, pinion, wheel))
 
 
 @eqx.filter_jit
@@ -145,7 +147,6 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> MeshCycle:
     )
 
 
-@eqx.filter_jit
 def removed_material(
     mesh: Mesh,
     torque,
@@ -166,8 +167,30 @@ def removed_material(
 
     Returns:
         shape (pairs, slices, positions).
+
+    Raises:
+        ValueError: for a modification that varies along the face on a mesh of one slice.
     """
-    half_width = safe_sqrt(mesh.width_factor * _force(mesh, real(torque)) / mesh.pair.face_width)
+    _check_slices(mesh, pinion=pinion, wheel=wheel)
+    return _removed_material(mesh, real(torque), pinion, wheel)
+
+
+def _check_slices(mesh: Mesh, **flanks: AbstractModification | None) -> None:
+    """Refuses what a mesh of one slice cannot show: it would be ignored without a word. A traced amount counts."""
+    if mesh.resolution.slices > 1:
+        return
+    for gear, modification in flanks.items():
+        for term in terms(modification or NoModification()):
+            if term.varies_along_face:
+                raise ValueError(
+                    f"{gear}: {term} varies along the face, which a mesh of 1 slice cannot show: prepare with "
+                    "Resolution(slices=11)"
+                )
+
+
+@eqx.filter_jit
+def _removed_material(mesh: Mesh, torque: Scalar, pinion, wheel) -> Load:
+    half_width = safe_sqrt(mesh.width_factor * _force(mesh, torque) / mesh.pair.face_width)
     weights = list(mesh.patch_weight)
     flanks = [mesh.flanks(place * half_width) for place in mesh.patch_place]
     sizes = mesh.resolution

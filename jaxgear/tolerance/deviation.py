@@ -160,8 +160,11 @@ def flank_basis(mesh: Mesh, torque) -> Float[Array, "terms pairs slices position
         yield removed(side, ProfileSlope(unit))[None]
         yield jax.vmap(lambda row: removed(side, Waviness(row)))(waves)
 
-    lead = removed("pinion", LeadSlope(unit))[None]
-    return jnp.concatenate([*terms("pinion"), *terms("wheel"), lead])
+    profiles = [*terms("pinion"), *terms("wheel")]
+    # one slice stands in the middle of the face, where no slope removes anything
+    several = mesh.resolution.slices > 1
+    lead = removed("pinion", LeadSlope(unit))[None] if several else jnp.zeros_like(profiles[0])
+    return jnp.concatenate([*profiles, lead])
 
 
 def _coefficients(deviation: Deviation) -> Float[Array, " terms"]:
