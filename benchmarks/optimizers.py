@@ -26,7 +26,7 @@ from .optimization.report import Row, claims, findings, print_table  # noqa: E40
 from .optimization.tasks import Task, tasks  # noqa: E402
 from .rates import machine  # noqa: E402
 
-FIGURE = Path(__file__).parent / "figures" / "optimizers.png"
+FIGURE = Path(__file__).parents[1] / "examples" / "guides" / "figures" / "optimizers.png"
 
 
 def compare(task: Task, chosen: Sequence[Method], effort: Effort) -> list[Row]:
@@ -116,7 +116,7 @@ def _arguments(argv) -> argparse.Namespace:
         type=Path,
         nargs="?",
         const=FIGURE,
-        help="draw the comparison into this file (default: benchmarks/figures/optimizers.png)",
+        help="draw the comparison into this file (default: examples/guides/figures/optimizers.png)",
     )
     return parser.parse_args(argv)
 
