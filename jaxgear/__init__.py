@@ -34,6 +34,7 @@ from .compliance import legacy_compliance as legacy_compliance
 from .conditions import LoadSpectrum as LoadSpectrum
 from .contact import Mesh as Mesh
 from .contact import MeshCycle as MeshCycle
+from .contact import ModifiedMesh as ModifiedMesh
 from .contact import Resolution as Resolution
 from .contact import fewest_pairs as fewest_pairs
 from .contact import prepare as prepare

@@ -281,7 +281,7 @@ def test_a_failed_contact_solution_is_loud(folder, tmp_path):
             FREE.replace("starts = 2\nsteps = 100", 'method = "factorial"') + "factorial = { levels = { width = 3 } }",
             ["optimize.factorial.levels: must name all variables and nothing else: height"],
         ),
-        ("optimize", FREE + "genetic = { population = 2 }", ["optimize.genetic.population: must be"]),
+        ("optimize", FREE + "genetic = { population = 2 }", ["optimize.genetic.population: 2 must be at least 4"]),
         ("analyze", FIXED.replace("teeth = 19", "teth = 19"), ['pinion.teth: unknown key, did you mean "teeth"?']),
         ("analyze", FIXED.replace("module = 3.0", "module = -3.0", 1), ["pinion: Gear: module = -3 mm must be"]),
         ("optimize", "[pinion", ["gear.toml: line 1: Expected ']' at the end of a table declaration"]),

@@ -1,5 +1,6 @@
 """Loaded tooth contact: prepared meshes, unloaded gaps and the solution over one mesh cycle."""
 
+from .component import ModifiedMesh as ModifiedMesh
 from .cycle import MeshCycle as MeshCycle
 from .cycle import removed_material as removed_material
 from .cycle import solve as solve

@@ -18,6 +18,7 @@ from .fields import optional_real as optional_real
 from .fields import real as real
 from .fields import result as result
 from .fields import whole as whole
+from .frozen import Frozen as Frozen
 from .logarithm import log as log
 from .quadrature import gauss_legendre as gauss_legendre
 from .risk import AbstractMeasure as AbstractMeasure
