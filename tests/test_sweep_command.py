@@ -10,6 +10,8 @@ from pathlib import Path
 import jax
 import matplotlib.pyplot as plt
 import numpy as np
+import pyarrow
+import pyarrow.parquet as parquet
 import pytest
 from test_cli import FREE, assert_refused, call
 
@@ -72,7 +74,7 @@ def test_the_best_are_printed_and_written(folder):
     for name in ("ppte_um", "height"):
         assert f"{best.column(name)[0]:.4g}" in result.out
     assert f"table in {folder / 'out'}{os.sep}" in result.out and "60 variants, " in result.out
-    read = read_variants(folder / "out" / "best.csv", ["height"])
+    read = read_variants(folder / "out" / "best.csv", {"height": (0.0, 20.0)}, {"height": "um"})
     np.testing.assert_array_equal(read.rows(0, 5)[:, 0], best.column("height"))
     assert "jaxgear: 60 of 60 variants" in result.err.splitlines()[-1]
 
@@ -267,3 +269,40 @@ def test_every_usable_core_becomes_a_device_unless_told_otherwise(monkeypatch):
     monkeypatch.setenv("XLA_FLAGS", "--xla_force_host_platform_device_count=5")
     devices.use_all_cores()
     assert not settings
+
+
+BOX = {"a": (0.0, 20.0), "l": (1.0, 6.0)}
+
+
+def listed(path, content, encoding="utf-8"):
+    path.write_text(content, encoding=encoding)
+    return read_variants(path, BOX, {"a": "um", "l": "mm"}).rows(0, 1).tolist()
+
+
+def test_a_list_in_other_units_is_converted_or_refused(tmp_path):
+    path = tmp_path / "list.csv"
+    assert listed(path, "a [mm],l [um]\n0.006,3400\n") == [[6.0, 3.4]]
+    assert listed(path, '"l","other","a [µm]",other\n3.4,x,6,y\n') == [[6.0, 3.4]]
+    assert listed(path, "\ufeffa,l [mm]\n6,3.4\n") == [[6.0, 3.4]]
+    with pytest.raises(ValueError, match=r"list.csv: column a is in \[deg\], must be in \[um\]"):
+        listed(path, "a [deg],l\n6,3.4\n")
+    table = pyarrow.table({"a": [0.006], "l": [3.4]})
+    fields = [pyarrow.field("a", "float64", metadata={"unit": "mm"}), pyarrow.field("l", "float64")]
+    parquet.write_table(table.cast(pyarrow.schema(fields)), tmp_path / "list.parquet")
+    assert read_variants(tmp_path / "list.parquet", BOX, {"a": "um"}).rows(0, 1).tolist() == [[6.0, 3.4]]
+
+
+@pytest.mark.parametrize(
+    "content, encoding, problem",
+    [
+        ("a,l\n6,3\n6,7\n", "utf-8", "l = 7 of variant 1 must be from 1 to 6"),
+        ("a,l\n-1e-9,3\n", "utf-8", "a = -1e-09 of variant 0 must be from 0 to 20"),
+        ("a,l\ninf,3\n", "utf-8", "a = inf of variant 0 must be"),
+        ("a,l,a [mm]\n6,3,6\n", "utf-8", "has 2 columns a, must have one"),
+        ("a,l,Ä\n6,3,1\n", "latin-1", "is not text in UTF-8"),
+        ("a,l\n6,3\n", "utf-16", "is not text in UTF-8"),
+    ],
+)
+def test_a_list_that_cannot_be_meant_is_refused_by_name(tmp_path, content, encoding, problem):
+    with pytest.raises(ValueError, match=f"list.csv: {problem}"):
+        listed(tmp_path / "list.csv", content, encoding)
