@@ -51,8 +51,7 @@ def run(model: Model, cases: Sequence[Case]) -> dict[Case, Curves]:
     """
     curves = {}
     for case in cases:
-        mesh = _mesh(model, case.pair, case.plane)
-        cycle = eqx.tree_at(lambda c: c.mesh, _solved(mesh, case), mesh)
+        cycle = _solved(_mesh(model, case.pair, case.plane), case)
         if not bool(jnp.all(cycle.converged)):
             raise RuntimeError(
                 f"{model.name}, {case}: contact solution not converged, residual {cycle.residual.max():g}"
@@ -63,7 +62,7 @@ def run(model: Model, cases: Sequence[Case]) -> dict[Case, Curves]:
 
 def _curves(cycle: jg.MeshCycle) -> Curves:
     force = np.asarray(cycle.pair_force)
-    corner = (np.asarray(cycle.mesh.outside) > 0) & (force > 0)
+    corner = (np.asarray(cycle.kinematics.outside) > 0) & (force > 0)
     pressure = np.where(corner, np.nan, np.asarray(cycle.contact_pressure[:, 0]))
     te = np.asarray(cycle.transmission_error)
     return Curves(te, np.asarray(cycle.unloaded_transmission_error), force, pressure)

@@ -107,7 +107,7 @@ def test_finite_element_column(case):
 @CASES
 def test_effective_contact_ratio(case, solved):
     _, cycle = solved[case.name]
-    geometric = float(cycle.mesh.path_of_contact.contact_ratio)
+    geometric = float(cycle.kinematics.path_of_contact.contact_ratio)
     effective = float(jg.effective_contact_ratio(cycle))
     assert effective > geometric
     assert effective == pytest.approx(case.effective_contact_ratio, rel=0.02)

@@ -108,7 +108,7 @@ def test_a_flank_to_start_from_does_not_get_worse(mesh, named):
     """One step from the best named curve, as the table samples it."""
     start = named.pinion, named.wheel
     sampled = [
-        jg.TabulatedProfile(roll, removed_at(mesh, flank, roll, of_pinion=index == 0))
+        jg.TabulatedProfile(roll, removed_at(mesh.sides[index], flank, roll))
         for index, (flank, roll) in enumerate(zip(start, rolls(mesh, POINTS)))
     ]
     started = free(mesh, start=start, steps=1, curvature=0.0)
@@ -121,7 +121,7 @@ def distances(mesh, first, second):
     """Largest distance of two pairs of flanks from the pitch points to the tips [um]."""
     far = 0.0
     for index, roll in enumerate(rolls(mesh, 1001)):
-        one, other = (removed_at(mesh, flanks[index], roll, of_pinion=index == 0) for flanks in (first, second))
+        one, other = (removed_at(mesh.sides[index], flanks[index], roll) for flanks in (first, second))
         far = max(far, float(jnp.abs(one - other).max()))
     return far
 

@@ -33,7 +33,8 @@ def test_equal_gears_are_symmetric_about_the_pitch_point(cycle):
 def test_hub_windup_shifts_the_mean_only(cycle):
     rigid = jg.solve(mesh_of(hub=False), 150.0)
     shift = np.asarray(cycle.transmission_error - rigid.transmission_error)
-    windup = float(cycle.mesh.hub * cycle.force / cycle.mesh.pair.face_width)
+    mesh = mesh_of()
+    windup = float(mesh.hub * cycle.force / mesh.pair.face_width)
     np.testing.assert_allclose(shift, windup, rtol=1e-10)
     np.testing.assert_allclose(cycle.pair_force, rigid.pair_force, rtol=1e-10, atol=1e-8)
     assert windup > 5.0

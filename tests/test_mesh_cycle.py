@@ -34,7 +34,7 @@ def sliced():
 @CASES
 def test_forces_balance_the_torque(name, solved):
     case, cycle = solved[name]
-    force = 1e3 * case.torque / float(cycle.mesh.pair.pinion.base_radius)
+    force = 1e3 * case.torque / float(cycle.kinematics.pair.pinion.base_radius)
     assert float(cycle.force) == pytest.approx(force, rel=1e-14)
     assert force / case.face_width == pytest.approx(case.line_load, abs=6e-3)
     np.testing.assert_allclose(jnp.sum(cycle.pair_force, axis=0), force, rtol=1e-13)
@@ -57,8 +57,8 @@ def test_contact_conditions(name, solved):
 def test_pairs_follow_each_other(name, solved):
     """After a base pitch every pair takes the place of its predecessor: force and path continue across the cycle."""
     _, cycle = solved[name]
-    force, path = np.asarray(cycle.pair_force), np.asarray(cycle.mesh.path)
-    pitch = float(cycle.mesh.path_of_contact.base_pitch)
+    force, path = np.asarray(cycle.pair_force), np.asarray(cycle.kinematics.path)
+    pitch = float(cycle.kinematics.path_of_contact.base_pitch)
     step = pitch / cycle.phase.shape[0]
     np.testing.assert_allclose(path[1:, -1] + step, path[:-1, 0], atol=1e-12)
     whole = force[::-1].ravel()  # one pair over the whole path
@@ -73,7 +73,7 @@ def test_axes_and_shapes(sliced):
     assert cycle.line_load.shape == cycle.contact_pressure.shape == cycle.corner_pressure.shape == (4, 7, 32)
     assert cycle.pair_force.shape == (4, 32)
     np.testing.assert_allclose(cycle.phase, np.arange(32) / 32, atol=1e-16)
-    np.testing.assert_allclose(cycle.mesh.path[1, 0], 0.0, atol=1e-15)
+    np.testing.assert_allclose(cycle.kinematics.path[1, 0], 0.0, atol=1e-15)
 
 
 def test_equal_gears_are_symmetric_about_the_pitch_point():
@@ -134,8 +134,7 @@ def resliced(mesh, slices):
     width = mesh.pair.face_width
     return dataclasses.replace(
         mesh,
-        resolution=dataclasses.replace(mesh.resolution, slices=slices),
-        face_coordinate=((jnp.arange(slices, dtype=width.dtype) + 0.5) / slices - 0.5) * width,
+        kinematics=dataclasses.replace(mesh.kinematics, resolution=dataclasses.replace(mesh.resolution, slices=slices)),
         slice_width=jnp.full((slices,), width / slices),
     )
 
@@ -203,7 +202,7 @@ def test_unloaded_transmission_error_is_the_limit_of_light_load(mesh):
     np.testing.assert_allclose(none.transmission_error, none.unloaded_transmission_error, atol=1e-13)
     np.testing.assert_allclose(none.pair_force, 0.0, atol=1e-12)
     assert bool(jnp.all(none.converged)) and bool(jnp.all(light.converged))
-    smallest = jnp.min(none.gap / none.mesh.lever[:, None], axis=(0, 1))
+    smallest = jnp.min(none.gap / mesh.lever[:, None], axis=(0, 1))
     np.testing.assert_allclose(none.unloaded_transmission_error, smallest, rtol=1e-14)
 
 

@@ -33,6 +33,7 @@ def optimum(method="minimax", history=(np.inf, 3.0, 1.0), spent=(0, 10, 100), **
         "parameters": {},
         "pinion": jg.NoModification(),
         "wheel": jg.NoModification(),
+        "mesh": None,
         "cycle": None,
         "ppte": 1.0,
         "objective": history[-1],

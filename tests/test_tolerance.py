@@ -167,7 +167,7 @@ def test_waviness_keeps_mean_line_and_form_tolerance(wide_mesh, pair):
     """Least-squares line through the deviation along the whole profile is zero; its height is the form deviation."""
     tolerance = jg.Tolerance(pinion=jg.GearTolerance(profile_form=6.0), distribution=jg.Uniform())
     waves = jg.sample_deviations(tolerance, wide_mesh, 200, seed=1).pinion.waviness
-    flank = wide_mesh.pinion_flank
+    flank = wide_mesh.flanks()[0]
     x = jnp.linspace(0.0, 1.0, 4001)
     length = flank.start_roll_length + x * (flank.tip_roll_length - flank.start_roll_length)
     line = type(flank)(length, *(getattr(flank, name) for name in ("tip_roll_length", "start_roll_length")), *(

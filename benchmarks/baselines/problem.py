@@ -77,6 +77,8 @@ def prepare(positions: int = 64, slices: int = 1):
 def plain(mesh) -> Problem:
     """The numbers of a prepared mesh with the default compliance model, under the benchmark's torque."""
     from jaxgear.compliance.hertz import contact_geometry
+    from jaxgear.compliance.toothload import tooth_load
+    from jaxgear.geometry import outline
 
     gears = mesh.pair.pinion, mesh.pair.wheel
     force = 1e3 * TORQUE / float(gears[0].base_radius)
@@ -85,12 +87,13 @@ def plain(mesh) -> Problem:
     count = mesh.resolution.patch_nodes
     angle = np.pi * np.arange(1, count + 1) / (count + 1)
     offset = np.cos(angle)[:, None, None] * half_width
-    rolls = [np.asarray(load.roll_length) for load in (mesh.pinion_load, mesh.wheel_load)]
+    loads = [tooth_load(outline(side.gear), side.contact_roll_length) for side in mesh.sides]
+    rolls = [np.asarray(load.roll_length) for load in loads]
     beyond = [
         np.maximum(roll + sign * offset * float(gear.base_radius) / roll, 0.0) - float(gear.tip_roll_length)
         for roll, gear, sign in zip(rolls, gears, (+1, -1))
     ]
-    geometry = contact_geometry(mesh.pinion_load, mesh.wheel_load, mesh.compliance.plane, mesh.pair.face_width)
+    geometry = contact_geometry(*loads, mesh.compliance.plane, mesh.pair.face_width)
     edge = mesh.law.edge
 
     def of_both(value):

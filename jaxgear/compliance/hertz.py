@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..geometry import reduced_radius
 from ..numerics import AbstractSpring, log
 from .plane import Plane, plane_modulus, plane_poisson
 from .toothload import ToothLoad
@@ -67,8 +68,7 @@ class ContactGeometry(eqx.Module):
     @property
     def width_factor(self) -> Field:
         """a^2 / q = 4 R / (pi E*) [mm^2 per N/mm]."""
-        reduced = self.pinion.radius * self.wheel.radius / (self.pinion.radius + self.wheel.radius)
-        return 4 * reduced / jnp.pi * self.compliance
+        return 4 * reduced_radius(self.pinion.radius, self.wheel.radius) / jnp.pi * self.compliance
 
 
 def contact_geometry(pinion: ToothLoad, wheel: ToothLoad, plane: Plane, face_width) -> ContactGeometry:

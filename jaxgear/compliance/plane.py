@@ -14,6 +14,11 @@ def plane_modulus(material: Material, plane: Plane):
     return material.elastic_modulus / (1 - material.poisson_ratio**2)
 
 
+def combined_modulus(first: Material, second: Material, plane: Plane):
+    """E* of two bodies in contact [MPa]: 1 / E* = 1 / E'_1 + 1 / E'_2."""
+    return 1 / (1 / plane_modulus(first, plane) + 1 / plane_modulus(second, plane))
+
+
 def plane_poisson(material: Material, plane: Plane):
     """Poisson's ratio of the two-dimensional problem: nu, or nu / (1 - nu) in plane strain."""
     if plane == "stress":

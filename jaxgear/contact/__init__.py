@@ -2,10 +2,13 @@
 
 from .component import ModifiedMesh as ModifiedMesh
 from .cycle import MeshCycle as MeshCycle
-from .cycle import removed_material as removed_material
-from .cycle import solve as solve
-from .cycle import solve_removed as solve_removed
+from .kinematics import Kinematics as Kinematics
+from .kinematics import Side as Side
 from .mesh import Mesh as Mesh
-from .mesh import Resolution as Resolution
 from .mesh import fewest_pairs as fewest_pairs
 from .mesh import prepare as prepare
+from .operation import Operation as Operation
+from .resolution import Resolution as Resolution
+from .solve import removed_material as removed_material
+from .solve import solve as solve
+from .solve import solve_removed as solve_removed

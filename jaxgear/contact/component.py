@@ -4,8 +4,9 @@ import equinox as eqx
 
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Frozen
-from .cycle import MeshCycle, solve
+from .cycle import MeshCycle
 from .mesh import Mesh
+from .solve import check_mesh, solve
 
 
 class ModifiedMesh(eqx.Module):
@@ -31,8 +32,7 @@ class ModifiedMesh(eqx.Module):
     def __init__(
         self, mesh: Mesh, *, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None
     ):
-        if not isinstance(mesh, Mesh):
-            raise TypeError(f"ModifiedMesh: mesh is a {type(mesh).__name__}, must be a Mesh: jaxgear.prepare makes one")
+        check_mesh("ModifiedMesh", mesh)
         self.pinion = NoModification() if pinion is None else pinion
         self.wheel = NoModification() if wheel is None else wheel
         self._mesh = Frozen(mesh)

@@ -1,76 +1,31 @@
 """A prepared mesh: everything that depends neither on the modification nor on the torque."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..compliance import Compliance, default_compliance
 from ..compliance.hertz import AbstractLaw, contact_geometry
-from ..compliance.toothload import ToothLoad, tooth_load
+from ..compliance.toothload import tooth_load
 from ..geometry import GearPair, PathOfContact, outline, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import concrete, minimum, whole
-from .corner import REACH, corner_gap
+from ..numerics import concrete, minimum
+from .kinematics import Contacts, Kinematics, Side, contacts, kinematics, sides
+from .resolution import Resolution
 
 Scalar = Float[Array, ""]
 Field = Float[Array, "pairs positions"]
-
-
-class Resolution(eqx.Module):
-    """Array sizes of a mesh, all static.
-
-    Attributes:
-        positions: mesh positions over one base pitch.
-        slices: slices over the common face width.
-        pairs: tooth pairs carried along; `fewest_pairs` tells how few suffice. Pair i runs at
-            phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two base pitches on either side of the pitch
-            point: contact ratios up to 3.
-        patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks
-            and steep flanks over its own width; 1 takes the nominal contact point alone.
-        newton_steps: largest number of steps of the contact solution.
-        tolerance: residual at which the contact solution ends, relative to the transmission error and to the force;
-            None for 1e-11 in double and 5e-6 in single precision.
-    """
-
-    positions: int = eqx.field(static=True, default=64)
-    slices: int = eqx.field(static=True, default=1)
-    pairs: int = eqx.field(static=True, default=4)
-    patch_nodes: int = eqx.field(static=True, default=4)
-    newton_steps: int = eqx.field(static=True, default=8)
-    tolerance: float | None = eqx.field(static=True, default=None)
-
-    def __check_init__(self):
-        for name, low in (("positions", 4), ("slices", 1), ("pairs", 2), ("patch_nodes", 1), ("newton_steps", 1)):
-            whole("Resolution", name, getattr(self, name), low)
-        if self.tolerance is not None and not (isinstance(self.tolerance, float) and 0 < self.tolerance < 1):
-            raise ValueError(f"Resolution: tolerance = {self.tolerance!r} must be a number between 0 and 1, or None")
-
-    @property
-    def leading(self) -> int:
-        """Base pitches by which the first pair leads the reference pair."""
-        return (self.pairs - 1) // 2
-
-    @property
-    def reach(self) -> tuple[int, int]:
-        """Base pitches behind and ahead of the pitch point that the pairs cover."""
-        return self.pairs - 1 - self.leading, self.leading + 1
 
 
 class Mesh(eqx.Module):
     """A gear pair prepared for contact analysis; made by `prepare`.
 
     Attributes:
-        pair: the gear pair.
+        kinematics: the pair, its path of contact and the array sizes, which the results keep.
         compliance: the compliance model.
-        resolution: array sizes.
-        path_of_contact: points A to E.
-        phase: mesh positions in base pitches, shape (positions,).
-        path: nominal path position of every pair [mm], shape (pairs, positions).
-        pinion_load, wheel_load: load lines at the contact points.
-        outside: distance of every pair outside the path of contact [mm], zero on it.
-        corner_gap: gap of the unmodified flanks there [um].
+        sides: both gears' sides of every contact.
+        corner_gap: gap of the unmodified flanks outside the path of contact [um], shape (pairs, positions).
         lever: what a pair closes per unit of transmission error; 1 on the path of contact, less beyond it, because the
             corner's gap opens while the gears turn on.
         outer_gap: smallest transmission error, beyond the unloaded one, at which pairs that are not carried along could
@@ -81,19 +36,12 @@ class Mesh(eqx.Module):
         patch_place, patch_weight: points across the contact, relative to its half width, and their weights, shape
             (patch_nodes,).
         hub: common wind-up of the gear bodies [um per N/mm].
-        face_coordinate: middle of every slice [mm], shape (slices,).
         slice_width: [mm], shape (slices,).
     """
 
-    pair: GearPair
+    kinematics: Kinematics
     compliance: Compliance
-    resolution: Resolution
-    path_of_contact: PathOfContact
-    phase: Float[Array, " positions"]
-    path: Field
-    pinion_load: ToothLoad
-    wheel_load: ToothLoad
-    outside: Field
+    sides: tuple[Side, Side]
     corner_gap: Field
     lever: Field
     outer_gap: Scalar
@@ -103,43 +51,60 @@ class Mesh(eqx.Module):
     patch_place: Float[Array, " patch_nodes"]
     patch_weight: Float[Array, " patch_nodes"]
     hub: Scalar
-    face_coordinate: Float[Array, " slices"]
     slice_width: Float[Array, " slices"]
 
     @property
-    def pinion_flank(self) -> Flank:
-        """Contact points on the pinion, for its modification; fields broadcast to (pairs, slices, positions)."""
-        return self.flanks(0.0)[0]
+    def pair(self) -> GearPair:
+        """The gear pair."""
+        return self.kinematics.pair
 
     @property
-    def wheel_flank(self) -> Flank:
-        """Contact points on the wheel, for its modification; fields broadcast to (pairs, slices, positions)."""
-        return self.flanks(0.0)[1]
+    def path_of_contact(self) -> PathOfContact:
+        """Points A to E."""
+        return self.kinematics.path_of_contact
 
-    def flanks(self, offset) -> tuple[Flank, Flank]:
-        """Points of both flanks that face each other at a distance from the centre of contact.
+    @property
+    def resolution(self) -> Resolution:
+        """Array sizes."""
+        return self.kinematics.resolution
+
+    @property
+    def phase(self) -> Float[Array, " positions"]:
+        """Mesh positions in base pitches, shape (positions,)."""
+        return self.kinematics.phase
+
+    @property
+    def path(self) -> Field:
+        """Nominal path position of every pair [mm], shape (pairs, positions)."""
+        return self.kinematics.path
+
+    @property
+    def outside(self) -> Field:
+        """Distance of every pair outside the path of contact [mm], zero on it."""
+        return self.kinematics.outside
+
+    @property
+    def face_coordinate(self) -> Float[Array, " slices"]:
+        """Middle of every slice [mm], shape (slices,)."""
+        return self.kinematics.face_coordinate
+
+    def flanks(self, offset=0.0) -> tuple[Flank, Flank]:
+        """Points of pinion and wheel that face each other at a distance from the centre of contact.
 
         Args:
             offset: distance along the flanks, towards the pinion tip [mm], scalar or (pairs, positions).
-        """
-        contact = self.path_of_contact
-        return (
-            self._flank(self.pinion_load, contact.pinion_roll_length(contact.start), offset),
-            self._flank(self.wheel_load, contact.wheel_roll_length(contact.end), -offset),
-        )
 
-    def _flank(self, load: ToothLoad, start: Scalar, offset) -> Flank:
-        gear = load.outline.gear
+        Returns:
+            points whose fields broadcast to (pairs, slices, positions).
+        """
+        pinion, wheel = self.sides
+        return self._flank(pinion, offset), self._flank(wheel, -offset)
+
+    def _flank(self, side: Side, offset) -> Flank:
+        rho = side.contact_roll_length
         # arc length of an involute: ds = rho / r_b d rho
-        moved = jnp.maximum(load.roll_length + offset * gear.base_radius / load.roll_length, 0.0)
-        return Flank(
-            roll_length=moved[:, None],
-            tip_roll_length=gear.tip_roll_length,
-            start_roll_length=start,
-            base_radius=gear.base_radius,
-            face_coordinate=self.face_coordinate[None, :, None],
-            face_width=self.pair.face_width,
-        )
+        moved = jnp.maximum(rho + offset * side.base_radius / rho, 0.0)
+        return side.flank(moved[:, None], self.face_coordinate[None, :, None])
 
 
 def prepare(pair: GearPair, *, compliance: Compliance | None = None, resolution: Resolution | None = None) -> Mesh:
@@ -164,79 +129,28 @@ def prepare(pair: GearPair, *, compliance: Compliance | None = None, resolution:
 
 @eqx.filter_jit
 def _prepare(pair: GearPair, compliance: Compliance, resolution: Resolution) -> Mesh:
-    contact = path_of_contact(pair)
-    dtype = jnp.result_type(contact.start)
-    phase = jnp.arange(resolution.positions, dtype=dtype) / resolution.positions
-    offset = resolution.leading - jnp.arange(resolution.pairs, dtype=dtype)
-    path = (phase[None] + offset[:, None]) * contact.base_pitch
-    pinion_rho, wheel_rho, gap, lever, outside = _contact_points(pair, contact, path)
-    pinion, wheel = tooth_load(outline(pair.pinion), pinion_rho), tooth_load(outline(pair.wheel), wheel_rho)
-    slices, width = resolution.slices, pair.face_width
-    geometry = contact_geometry(pinion, wheel, compliance.plane, width)
-    centre = (jnp.arange(slices, dtype=dtype) + 0.5) / slices - 0.5
+    moving = kinematics(pair, resolution, compliance.plane)
+    contact, dtype = moving.path_of_contact, moving.path.dtype
+    points = contacts(pair, contact, moving.path)
+    pinion = tooth_load(outline(pair.pinion), points.pinion_roll_length)
+    wheel = tooth_load(outline(pair.wheel), points.wheel_roll_length)
+    geometry = contact_geometry(pinion, wheel, compliance.plane, pair.face_width)
     # Chebyshev nodes of the second kind integrate with the weight of the semi-elliptic pressure
     angle = jnp.pi * jnp.arange(1, resolution.patch_nodes + 1, dtype=dtype) / (resolution.patch_nodes + 1)
     return Mesh(
-        pair=pair,
+        kinematics=moving,
         compliance=compliance,
-        resolution=resolution,
-        path_of_contact=contact,
-        phase=phase,
-        path=path,
-        pinion_load=pinion,
-        wheel_load=wheel,
-        outside=outside,
-        corner_gap=gap,
-        lever=lever,
-        outer_gap=minimum(_gaps_of_next_pairs(pair, contact, jnp.asarray([resolution.reach], dtype))),
+        sides=sides(pair, contact, points),
+        corner_gap=points.corner_gap,
+        lever=points.lever,
+        outer_gap=minimum(_closing(_next_pairs(pair, contact, jnp.asarray([resolution.reach], dtype)))),
         structure=compliance.structure(pinion, wheel),
-        law=compliance.law(geometry, pinion, wheel, outside),
+        law=compliance.law(geometry, pinion, wheel, moving.outside),
         width_factor=geometry.width_factor[:, 0],
         patch_place=jnp.cos(angle),
         patch_weight=jnp.sin(angle) ** 2,
         hub=compliance.hub(pinion, wheel),
-        face_coordinate=centre * width,
-        slice_width=jnp.full((slices,), 1.0 / slices, dtype) * width,
-    )
-
-
-def _contact_points(pair: GearPair, contact: PathOfContact, path: Field) -> tuple[Field, Field, Field, Field, Field]:
-    """Roll lengths of pinion and wheel at the contact, corner gap [um], lever and distance outside the path, per pair.
-
-    `phase` is the mean position of both gears: under a transmission error d the pinion leads it by d/2 and the wheel
-    lags by d/2, so a corner is d/2 farther out than its nominal position and its gap grows by half its slope times d.
-    """
-    pinion_base, wheel_base = contact.pinion_base_radius, contact.wheel_base_radius
-    before, after = contact.start - path, path - contact.end
-    on_path = jnp.clip(path, contact.start, contact.end)
-    approach = contact.pinion_roll_length(contact.start), pinion_base
-    recess = contact.wheel_roll_length(contact.end), wheel_base
-    reach = REACH * contact.base_pitch
-    gap_before, slope_before, pinion_rho = _corner(before, reach, pair.wheel.tip_roll_length, wheel_base, *approach)
-    gap_after, slope_after, wheel_rho = _corner(after, reach, pair.pinion.tip_roll_length, pinion_base, *recess)
-    return (
-        jnp.where(before > 0, pinion_rho, contact.pinion_roll_length(on_path)),
-        jnp.where(after > 0, wheel_rho, contact.wheel_roll_length(on_path)),
-        gap_before + gap_after,
-        1 - 0.5e-3 * (slope_before + slope_after),
-        jnp.maximum(jnp.maximum(before, after), 0.0),
-    )
-
-
-def _corner(x, reach, tip_rho, tip_base, mate_rho, mate_base):
-    """Corner gap [um], its slope [um/mm] and the mate's roll length [mm].
-
-    Beyond `reach` the gap goes on along its tangent, so that far pairs stay finite and apart.
-    """
-    near = jnp.clip(x, 0.0, reach)
-    (gap, rho), (slope, _) = jax.jvp(
-        lambda t: corner_gap(t, tip_rho, tip_base, mate_rho, mate_base), (near,), (jnp.ones_like(near),)
-    )
-    outside = x > 0
-    return (
-        jnp.where(outside, gap + slope * (jnp.maximum(x, reach) - reach), 0.0),
-        jnp.where(outside, slope, 0.0),
-        rho,
+        slice_width=moving.slice_width,
     )
 
 
@@ -265,14 +179,17 @@ def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
 @eqx.filter_jit
 def _gaps_at(pair: GearPair, reaches):
     contact = path_of_contact(pair)
-    return _gaps_of_next_pairs(pair, contact, jnp.asarray(reaches, jnp.result_type(contact.start)))
+    return _closing(_next_pairs(pair, contact, jnp.asarray(reaches, jnp.result_type(contact.start))))
 
 
-def _gaps_of_next_pairs(pair: GearPair, contact: PathOfContact, reach) -> Float[Array, "windows 2"]:
-    """Closing of the first pairs beyond windows of (behind, ahead) base pitches, zero on the path of contact [um]."""
-    path = jnp.stack([-reach[:, 0], reach[:, 1]], axis=1) * contact.base_pitch
-    _, _, gap, lever, _ = _contact_points(pair, contact, path)
-    return gap / lever
+def _next_pairs(pair: GearPair, contact: PathOfContact, reach: Float[Array, "windows 2"]) -> Contacts:
+    """The first pairs beyond windows of (behind, ahead) base pitches, where they are nearest; shape (windows, 2)."""
+    return contacts(pair, contact, jnp.stack([-reach[:, 0], reach[:, 1]], axis=1) * contact.base_pitch)
+
+
+def _closing(points: Contacts) -> Float[Array, "..."]:
+    """Transmission error that closes the gaps of unmodified flanks, zero on the path of contact [um]."""
+    return points.corner_gap / points.lever
 
 
 def _check_cover(contact: PathOfContact, resolution: Resolution) -> None:

@@ -25,6 +25,7 @@ from .pair import explain as explain
 from .pair import margins as margins
 from .pair import path_of_contact as path_of_contact
 from .path import PathOfContact as PathOfContact
+from .path import reduced_radius as reduced_radius
 
 STEEL: Material
 

@@ -63,8 +63,12 @@ class PathOfContact(eqx.Module):
 
     def reduced_radius(self, path: Real) -> Real:
         """Reduced radius of curvature [mm], 1 / (1 / rho_pinion + 1 / rho_wheel)."""
-        pinion, wheel = self.pinion_roll_length(path), self.wheel_roll_length(path)
-        return pinion * wheel / (pinion + wheel)
+        return reduced_radius(self.pinion_roll_length(path), self.wheel_roll_length(path))
+
+
+def reduced_radius(first: Real, second: Real) -> Real:
+    """Radius of the cylinder that touches a plane as two cylinders touch each other [mm]."""
+    return first * second / (first + second)
 
 
 @eqx.filter_jit

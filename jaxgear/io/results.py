@@ -87,17 +87,12 @@ def _profiles(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModificat
 
 @eqx.filter_jit
 def _evaluate(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification):
-    contact, pair = mesh.path_of_contact, mesh.pair
-    sides = (
-        (pinion, pair.pinion, contact.pinion_roll_length(contact.start), True),
-        (wheel, pair.wheel, contact.wheel_roll_length(contact.end), False),
-    )
-    face = jnp.linspace(-0.5, 0.5, _FACE_POINTS) * pair.face_width
+    face = jnp.linspace(-0.5, 0.5, _FACE_POINTS) * mesh.pair.face_width
     columns = []
-    for modification, gear, start, of_pinion in sides:
-        rho = jnp.linspace(start, gear.tip_roll_length, _PROFILE_POINTS)
-        removed = removed_at(mesh, modification, rho, face, of_pinion=of_pinion)
-        columns.append((roll_angle(gear, rho), rho, diameter(gear, rho), face, removed))
+    for side, modification in zip(mesh.sides, (pinion, wheel)):
+        rho = jnp.linspace(side.start_roll_length, side.tip_roll_length, _PROFILE_POINTS)
+        removed = removed_at(side, modification, rho, face)
+        columns.append((roll_angle(side.gear, rho), rho, diameter(side.gear, rho), face, removed))
     return columns
 
 

@@ -15,8 +15,6 @@ from .load import effective_contact_ratio as effective_contact_ratio
 from .load import load_sharing as load_sharing
 from .loss import loss_factor as loss_factor
 from .loss import ohlendorf_loss_factor as ohlendorf_loss_factor
-from .pressure import corner_pressure as corner_pressure
-from .pressure import flank_pressure as flank_pressure
 from .quantity import Quantity as Quantity
 from .quantity import quantities as quantities
 from .quantity import quantity_of as quantity_of

@@ -3,9 +3,10 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..compliance.plane import plane_modulus
+from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle
-from ..numerics import check, real, safe_divide, safe_sqrt
+from ..geometry import reduced_radius
+from ..numerics import check, over_batch, real, safe_divide, safe_sqrt
 
 Load = Float[Array, "pairs slices positions"]
 
@@ -33,16 +34,20 @@ def flash_temperature(cycle: MeshCycle, speed, *, friction=0.06) -> Load:
     """
     check("flash_temperature", "speed", speed, "rpm", low=0.0)
     check("flash_temperature", "friction", friction, "", low=0.0)
-    mesh = cycle.mesh
-    plane, pair = mesh.compliance.plane, mesh.pair
-    pinion_speed, wheel_speed = mesh.path_of_contact.rolling_speeds(mesh.path, real(speed))
-    pinion_radius, wheel_radius = mesh.pinion_load.roll_length, mesh.wheel_load.roll_length
-    reduced = pinion_radius * wheel_radius / (pinion_radius + wheel_radius)
-    compliance = sum(1 / plane_modulus(gear.material, plane) for gear in (pair.pinion, pair.wheel))
-    half_width = safe_sqrt(4 * cycle.line_load * reduced[:, None] * compliance / jnp.pi) * 1e-3  # [m]
-    heat = real(friction) * cycle.line_load * 1e3 * jnp.abs(pinion_speed - wheel_speed)[:, None]
+    return _flash(cycle, real(speed), real(friction))
+
+
+@over_batch
+def _flash(cycle: MeshCycle, speed, friction) -> Load:
+    kinematics, (pinion, wheel) = cycle.kinematics, cycle.sides
+    pair = kinematics.pair
+    pinion_speed, wheel_speed = kinematics.path_of_contact.rolling_speeds(kinematics.path, speed)
+    reduced = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)
+    modulus = combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)
+    half_width = safe_sqrt(4 * cycle.line_load * reduced[:, None] / modulus / jnp.pi) * 1e-3  # [m]
+    heat = friction * cycle.line_load * 1e3 * jnp.abs(pinion_speed - wheel_speed)[:, None]
     sink = pair.pinion.material.thermal_contact_coefficient * safe_sqrt(
         pinion_speed
     ) + pair.wheel.material.thermal_contact_coefficient * safe_sqrt(wheel_speed)
     rise = _BLOK_FACTOR * safe_divide(heat, sink[:, None] * safe_sqrt(2 * half_width))
-    return jnp.where((mesh.outside <= 0)[:, None], rise, 0.0)
+    return jnp.where((kinematics.outside <= 0)[:, None], rise, 0.0)

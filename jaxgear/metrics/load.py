@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..numerics import maximum, minimum, safe_divide
+from ..numerics import maximum, minimum, over_batch, safe_divide
 
 Scalar = Float[Array, ""]
 
@@ -24,11 +24,13 @@ class ContactShock(eqx.Module):
     force: Scalar
 
 
+@over_batch
 def load_sharing(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
     """Share of every pair in the total force; the shares of a position sum to 1, or are 0 at zero torque."""
     return safe_divide(cycle.pair_force, cycle.force)
 
 
+@over_batch
 def effective_contact_ratio(cycle: MeshCycle) -> Scalar:
     """Loaded length of the path of contact in base pitches, the mean number of loaded pairs.
 
@@ -39,16 +41,17 @@ def effective_contact_ratio(cycle: MeshCycle) -> Scalar:
     return jnp.sum(jnp.mean(_loaded_fraction(cycle), axis=-1))
 
 
+@over_batch
 def contact_shock(cycle: MeshCycle) -> ContactShock:
     """Loaded path beyond its theoretical ends and the largest corner force there."""
-    mesh = cycle.mesh
-    contact, fraction = mesh.path_of_contact, _loaded_fraction(cycle)
-    step = contact.base_pitch / mesh.resolution.positions
+    kinematics, fraction = cycle.kinematics, _loaded_fraction(cycle)
+    contact, path = kinematics.path_of_contact, kinematics.path
+    step = contact.base_pitch / kinematics.resolution.positions
     # Every step [path, path + step] counts with its loaded length minus the part of it that lies on the theoretical
     # path: contact is unbroken, so a step across an end of the path is loaded on the inside first.
-    before = jnp.clip(contact.start - mesh.path, 0.0, step)
-    after = jnp.clip(mesh.path + step - contact.end, 0.0, step)
-    corner_force = jnp.where(mesh.outside > 0, cycle.pair_force, 0.0)
+    before = jnp.clip(contact.start - path, 0.0, step)
+    after = jnp.clip(path + step - contact.end, 0.0, step)
+    corner_force = jnp.where(kinematics.outside > 0, cycle.pair_force, 0.0)
     return ContactShock(
         jnp.sum(jnp.maximum(fraction * step - (step - before), 0.0)),
         jnp.sum(jnp.maximum(fraction * step - (step - after), 0.0)),

@@ -5,11 +5,12 @@ from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
 from ..geometry import GearPair, path_of_contact
-from ..numerics import safe_divide
+from ..numerics import over_batch, safe_divide
 
 Scalar = Float[Array, ""]
 
 
+@over_batch
 def loss_factor(cycle: MeshCycle) -> Scalar:
     """Loss factor H_VL of the loaded mesh: loss power = input power * friction coefficient * H_VL.
 
@@ -21,10 +22,9 @@ def loss_factor(cycle: MeshCycle) -> Scalar:
     References:
         A. Wimmer, Lastverluste von Stirnradverzahnungen, TU Muenchen 2006.
     """
-    mesh = cycle.mesh
-    contact = mesh.path_of_contact
+    contact = cycle.kinematics.path_of_contact
     # sliding over base-circle speed: v_g / v_tb = |s| (1 / r_b1 + 1 / r_b2)
-    sliding = jnp.abs(mesh.path) * (1 / contact.pinion_base_radius + 1 / contact.wheel_base_radius)
+    sliding = jnp.abs(cycle.kinematics.path) * (1 / contact.pinion_base_radius + 1 / contact.wheel_base_radius)
     return safe_divide(jnp.sum(jnp.mean(cycle.pair_force * sliding, axis=-1)), cycle.force)
 
 

@@ -56,7 +56,7 @@ def mean_removed_material(cycle: MeshCycle) -> Scalar:
 
     It breaks ties among designs of equal transmission error: what is not removed need not be ground.
     """
-    inside = cycle.mesh.outside <= 0
+    inside = cycle.kinematics.outside <= 0
     # on the path of contact unmodified flanks have no gap: what is there is the modification
     removed = jnp.where(inside, jnp.mean(cycle.gap, axis=1), 0.0)
     return jnp.sum(removed) / jnp.sum(inside.astype(removed.dtype))
@@ -95,7 +95,7 @@ RESULTS: Mapping[str, Result] = MappingProxyType(
         ),
         "max_line_load": Result(lambda c: maximum(c.line_load), "N/mm", "largest line load"),
         "contact_ratio": Result(
-            lambda c: c.mesh.path_of_contact.contact_ratio, "", "theoretical contact ratio", worst="min"
+            lambda c: c.kinematics.path_of_contact.contact_ratio, "", "theoretical contact ratio", worst="min"
         ),
         "effective_contact_ratio": Result(effective_contact_ratio, "", "mean number of loaded pairs", worst="min"),
         "corner_contact_length": Result(_corner_length, "mm", "loaded path beyond the theoretical path of contact"),

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
+from ..numerics import over_batch
 from .registry import RESULTS, result_key
 
 _SUMMARY = (
@@ -23,6 +24,7 @@ _SUMMARY = (
 )
 
 
+@over_batch
 def summary(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
     """The numbers that engineers ask for first, by name and unit; traceable, so it can be vmapped."""
     return {
@@ -30,21 +32,3 @@ def summary(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
         **{result_key(name): RESULTS[name].of(cycle) for name in _SUMMARY},
         "converged": jnp.all(cycle.converged),
     }
-
-
-def describe(cycle: MeshCycle) -> str:
-    """Short text of a concrete cycle."""
-    values = summary(cycle)
-    state = "converged" if bool(values["converged"]) else "NOT CONVERGED"
-    return "\n".join(
-        [
-            f"MeshCycle at {float(values['torque_Nm']):g} N m, {cycle.phase.shape[0]} positions, {state}",
-            f"  transmission error   mean {float(values['mean_te_um']):.3f} um, "
-            f"peak to peak {float(values['ppte_um']):.3f} um",
-            f"  flank pressure       max {float(values['max_flank_pressure_MPa']):.0f} MPa",
-            f"  root stress          pinion {float(values['pinion_root_stress_MPa']):.0f} MPa, "
-            f"wheel {float(values['wheel_root_stress_MPa']):.0f} MPa",
-            f"  contact ratio        {float(values['contact_ratio']):.3f}, effective "
-            f"{float(values['effective_contact_ratio']):.3f}",
-        ]
-    )

@@ -14,9 +14,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..contact import MeshCycle
+from ..contact import MeshCycle, Side
 from ..geometry import Gear
 from ..geometry.involute import half_tooth_angle
+from ..numerics import over_batch
 
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
@@ -88,13 +89,13 @@ def root_factors(gear: Gear, roll_length: Real) -> RootFactors:
     return RootFactors(form, correction, arm)
 
 
+@over_batch
 def root_stress(cycle: MeshCycle) -> RootStress:
     """Nominal local root stress sigma_F0 = f_t / m Y_F Y_S of both gears [MPa], f_t tangential line load."""
-    mesh = cycle.mesh
 
-    def stress(gear, load):
-        factors = root_factors(gear, load.roll_length)
+    def stress(side: Side) -> Load:
+        gear, factors = side.gear, root_factors(side.gear, side.contact_roll_length)
         tangential = cycle.line_load * jnp.cos(jnp.deg2rad(gear.pressure_angle))
         return tangential / gear.module * (factors.form * factors.correction)[:, None]
 
-    return RootStress(stress(mesh.pair.pinion, mesh.pinion_load), stress(mesh.pair.wheel, mesh.wheel_load))
+    return RootStress(*(stress(side) for side in cycle.sides))

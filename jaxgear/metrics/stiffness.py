@@ -3,9 +3,10 @@
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..numerics import safe_divide
+from ..numerics import over_batch, safe_divide
 
 
+@over_batch
 def secant_stiffness(cycle: MeshCycle) -> Float[Array, " positions"]:
     """Average slope k = F / (loaded - unloaded transmission error) [N/um]; 0 at zero torque.
 

@@ -25,7 +25,7 @@ def _corner_length(cycle: MeshCycle) -> Scalar:
 
 
 def _corner_force(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
-    return jnp.where(cycle.mesh.outside > 0, cycle.pair_force, 0.0)
+    return jnp.where(cycle.kinematics.outside > 0, cycle.pair_force, 0.0)
 
 
 def _contact_pressure(cycle: MeshCycle) -> Load:
@@ -38,14 +38,14 @@ def mean_removed_material(cycle: MeshCycle) -> Scalar:
 
     It breaks ties among designs of equal transmission error: what is not removed need not be ground.
     """
-    inside = cycle.mesh.outside <= 0
+    inside = cycle.kinematics.outside <= 0
     # on the path of contact unmodified flanks have no gap: what is there is the modification
     removed = jnp.where(inside, jnp.mean(cycle.gap, axis=1), 0.0)
     return jnp.sum(removed) / jnp.sum(inside.astype(removed.dtype))
 
 
 def _of_flanks(function):
-    return lambda cycle: function(cycle.mesh, cycle.pinion, cycle.wheel)
+    return lambda cycle: function(cycle.kinematics, cycle.pinion, cycle.wheel)
 
 
 quantities.add(
@@ -83,7 +83,7 @@ quantities.add(
     Quantity("max_line_load", lambda c: c.line_load, "N/mm", "largest line load", Max(), local=True),
     Quantity(
         "contact_ratio",
-        lambda c: c.mesh.path_of_contact.contact_ratio,
+        lambda c: c.kinematics.path_of_contact.contact_ratio,
         meaning="theoretical contact ratio",
         better="larger",
     ),

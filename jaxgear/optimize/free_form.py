@@ -111,9 +111,8 @@ def free_form(
 
 
 def _roll_lengths(mesh: Mesh, points: int):
-    contact, pair = mesh.path_of_contact, mesh.pair
-    first = jnp.stack([contact.pinion_pitch_roll_length, contact.wheel_pitch_roll_length])
-    last = jnp.stack([pair.pinion.tip_roll_length, pair.wheel.tip_roll_length])
+    first = jnp.stack([side.pitch_roll_length for side in mesh.sides])
+    last = jnp.stack([side.tip_roll_length for side in mesh.sides])
     return jnp.linspace(first, last, points, axis=1).astype(mesh.phase.dtype)
 
 
@@ -141,5 +140,4 @@ def _problem(mesh, judged, roll, max_relief, curvature, measure, constraints) ->
 
 def _values(mesh: Mesh, roll, start) -> np.ndarray:
     """Values of the tables of the modifications to start from [um]."""
-    sides = zip(start, roll, (True, False))
-    return np.concatenate([removed_at(mesh, flank, where, of_pinion=of_pinion) for flank, where, of_pinion in sides])
+    return np.concatenate([removed_at(side, flank, where) for side, flank, where in zip(mesh.sides, start, roll)])

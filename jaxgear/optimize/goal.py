@@ -8,7 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..contact import Mesh, MeshCycle
+from ..contact import MeshCycle
 from ..metrics import RESULTS, Result, max_relief, relief_reversal, removed_volume
 from ..microgeometry import AbstractModification
 from ..numerics import check, optional_real
@@ -33,11 +33,6 @@ class Candidate(eqx.Module):
     wheel: AbstractModification
     cycle: MeshCycle
 
-    @property
-    def mesh(self) -> Mesh:
-        """The prepared mesh."""
-        return self.cycle.mesh
-
 
 Number = Callable[[Candidate], Scalar]
 
@@ -56,7 +51,7 @@ def _of_cycle(result: Result) -> Quantity:
 
 
 def _of_flanks(function) -> Number:
-    return lambda candidate: function(candidate.mesh, candidate.pinion, candidate.wheel)
+    return lambda candidate: function(candidate.cycle.kinematics, candidate.pinion, candidate.wheel)
 
 
 # All that an objective or a constraint can name: the results of a mesh cycle, and what the flanks say by themselves.

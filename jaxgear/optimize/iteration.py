@@ -95,6 +95,7 @@ def iterate_transmission_error(
         parameters={},
         pinion=iterates[best].pinion,
         wheel=iterates[best].wheel,
+        mesh=mesh,
         cycle=states[best].cycle,
         ppte=iterates[best].ppte,
         objective=iterates[best].ppte,
@@ -136,8 +137,8 @@ class _Flanks:
             np.asarray(contact.wheel_roll_length(jnp.asarray(self._path))),
         )
         self._given = tuple(
-            np.asarray(removed_at(mesh, modification, jnp.asarray(roll), of_pinion=of_pinion))
-            for modification, roll, of_pinion in zip(self._start, self._roll, (True, False))
+            np.asarray(removed_at(side, modification, jnp.asarray(roll)))
+            for side, modification, roll in zip(mesh.sides, self._start, self._roll)
         )
         self._extra = [np.zeros_like(self._path), np.zeros_like(self._path)]
 
@@ -176,7 +177,8 @@ def _periodic(phase: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _solve(mesh: Mesh, torque, pinion, wheel) -> _State:
-    cycle = solve_removed(mesh, torque, removed_material(mesh, jnp.asarray(torque), pinion=pinion, wheel=wheel))
+    removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
+    cycle = solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
     error = np.asarray(cycle.transmission_error)
     if not (np.asarray(cycle.converged).all() and np.isfinite(error).all()):
         raise RuntimeError("iterate_transmission_error: a contact solution did not converge")

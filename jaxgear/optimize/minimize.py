@@ -99,7 +99,7 @@ def optimum_of(problem: Problem, record: Record, method: str, began: float, fron
     heaviest = problem.cases.torque[int(np.argmax(problem.cases.weight))]
     # the removed material as an array: the program that solves for it is the one that every other design uses
     removed = removed_material(problem.mesh, heaviest, pinion=pinion, wheel=wheel)
-    cycle = solve_removed(problem.mesh, heaviest, removed)
+    cycle = solve_removed(problem.mesh, heaviest, removed, pinion=pinion, wheel=wheel)
     left = float("nan") if front is not None else _decrease_left(problem, record)
     return Optimum(
         method=method,
@@ -107,6 +107,7 @@ def optimum_of(problem: Problem, record: Record, method: str, began: float, fron
         parameters={name: float(value) for name, value in parameters.items()},
         pinion=pinion,
         wheel=wheel,
+        mesh=problem.mesh,
         cycle=cycle,
         ppte=float(peak_to_peak(cycle.transmission_error)),
         objective=record.value,

@@ -224,8 +224,10 @@ class Problem(eqx.Module):
         return self._each_case(lambda torque, deviation: of_case(self._candidate(x, torque, deviation)))
 
     def _candidate(self, x: Vector, torque, deviation) -> Candidate:
-        cycle = solve_removed(self.mesh, torque, self._removed(x, torque) + deviation)
-        return Candidate(self.parameters(x), *self.modifications(x), cycle)
+        pinion, wheel = self.modifications(x)
+        removed = self._removed(x, torque) + deviation
+        cycle = solve_removed(self.mesh, torque, removed, pinion=pinion, wheel=wheel)
+        return Candidate(self.parameters(x), pinion, wheel, cycle)
 
     def _each_case(self, function):
         """A function of torque and deviation in every case, cases leading."""

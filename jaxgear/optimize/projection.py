@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..contact import Mesh, MeshCycle, removed_material, solve_removed
+from ..contact import MeshCycle, Side, removed_material, solve_removed
 from ..metrics import peak_to_peak, removed_at
 from ..microgeometry import (
     AbstractCurve,
@@ -88,28 +88,29 @@ def project(optimum: Optimum, curve: str = "power") -> Projection:
     """
     if curve not in CURVES:
         raise ValueError(f'project: curve = "{curve}" is not known, must be one of {", ".join(CURVES)}')
-    mesh, torque = optimum.cycle.mesh, optimum.cycle.torque
-    fits = [_fit(mesh, optimum.pinion, True, curve), _fit(mesh, optimum.wheel, False, curve)]
+    mesh, torque = optimum.mesh, optimum.cycle.operation
+    fits = [_fit(side, flank, curve) for side, flank in zip(mesh.sides, (optimum.pinion, optimum.wheel))]
     pinion, wheel = (relief for relief, _ in fits)
-    cycle = solve_removed(mesh, torque, removed_material(mesh, torque, pinion=pinion, wheel=wheel))
+    removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
+    cycle = solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
     ppte = float(peak_to_peak(cycle.transmission_error))
     misfit = max(distance for _, distance in fits)
     return Projection(curve, pinion, wheel, cycle, ppte, ppte - optimum.ppte, misfit)
 
 
-def _fit(mesh: Mesh, modification: AbstractModification, of_pinion: bool, curve: str):
+def _fit(side: Side, modification: AbstractModification, curve: str):
     """The best relief of one gear, and its largest distance from the flank."""
     _, first, low, high = CURVES[curve]
-    roll = _roll_lengths(mesh, of_pinion)
+    roll = jnp.linspace(side.pitch_roll_length, side.tip_roll_length, _SAMPLES)
     addendum = float(roll[-1] - roll[0])
-    flank = np.asarray(removed_at(mesh, modification, roll, of_pinion=of_pinion))
+    flank = np.asarray(removed_at(side, modification, roll))
     most = max(float(flank.max()), 1e-3)
 
     def residual(values):
-        return np.asarray(_distance(mesh, jnp.asarray(values), jnp.asarray(flank), roll, of_pinion, curve)) / most
+        return np.asarray(_distance(side, jnp.asarray(values), jnp.asarray(flank), roll, curve)) / most
 
     def slope(values):
-        return np.asarray(_slope(mesh, jnp.asarray(values), jnp.asarray(flank), roll, of_pinion, curve)) / most
+        return np.asarray(_slope(side, jnp.asarray(values), jnp.asarray(flank), roll, curve)) / most
 
     bounds = [0.0, _LEAST_LENGTH * addendum, *low], [3 * most, addendum, *high]
     starts = [[most, share * addendum, *first] for share in _LENGTHS]
@@ -123,22 +124,15 @@ def _relief(values, curve: str) -> TipRelief:
     return TipRelief(real(amount), real(length), CURVES[curve][0](*shape))
 
 
-def _roll_lengths(mesh: Mesh, of_pinion: bool):
-    contact, pair = mesh.path_of_contact, mesh.pair
-    pitch = contact.pinion_pitch_roll_length if of_pinion else contact.wheel_pitch_roll_length
-    gear = pair.pinion if of_pinion else pair.wheel
-    return jnp.linspace(pitch, gear.tip_roll_length, _SAMPLES)
-
-
-def _difference(values, mesh, flank, roll, of_pinion, curve):
-    return removed_at(mesh, _relief(values, curve), roll, of_pinion=of_pinion) - flank
+def _difference(values, side, flank, roll, curve):
+    return removed_at(side, _relief(values, curve), roll) - flank
 
 
 @eqx.filter_jit
-def _distance(mesh: Mesh, values, flank, roll, of_pinion: bool, curve: str):
-    return _difference(values, mesh, flank, roll, of_pinion, curve)
+def _distance(side: Side, values, flank, roll, curve: str):
+    return _difference(values, side, flank, roll, curve)
 
 
 @eqx.filter_jit
-def _slope(mesh: Mesh, values, flank, roll, of_pinion: bool, curve: str):
-    return jax.jacfwd(_difference)(values, mesh, flank, roll, of_pinion, curve)
+def _slope(side: Side, values, flank, roll, curve: str):
+    return jax.jacfwd(_difference)(values, side, flank, roll, curve)

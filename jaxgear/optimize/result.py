@@ -5,7 +5,7 @@ from typing import Any
 import equinox as eqx
 import numpy as np
 
-from ..contact import MeshCycle
+from ..contact import Mesh, MeshCycle
 from ..microgeometry import AbstractModification
 
 PENALIZED = " with curvature penalty"  # what the name of an objective says of it
@@ -58,6 +58,7 @@ class Optimum(eqx.Module):
         objective_name: what was minimized, such as "ppte", "95 % CVaR of ppte" or "ppte with curvature penalty".
         parameters: value of every free parameter; none where the flanks themselves were sought.
         pinion, wheel: the modifications.
+        mesh: prepared mesh of the search.
         cycle: mesh cycle of the optimum, of perfect gears under the torque (of a load spectrum, its heaviest weight).
         ppte: peak-to-peak transmission error of that cycle [um].
         objective: least value found of what was minimized, in its unit.
@@ -82,6 +83,7 @@ class Optimum(eqx.Module):
     parameters: dict[str, float]
     pinion: AbstractModification
     wheel: AbstractModification
+    mesh: Mesh
     cycle: MeshCycle
     ppte: float
     objective: float

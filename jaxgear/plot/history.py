@@ -21,7 +21,7 @@ def pair_history(cycle: MeshCycle, values) -> tuple[np.ndarray, np.ndarray]:
     Returns:
         the path positions [mm], shape (pairs * positions,), and the values there, shape (..., pairs * positions).
     """
-    path = np.asarray(cycle.mesh.path).ravel()
+    path = np.asarray(cycle.kinematics.path).ravel()
     stages = np.moveaxis(np.asarray(values), 0, -2)
     stages = stages.reshape(*stages.shape[:-2], -1)
     order = np.argsort(path, kind="stable")
@@ -32,8 +32,8 @@ def path_limits(cycles) -> tuple[float, float]:
     """Path range that holds the path of contact and all loaded corner contact of these cycles, with some air [mm]."""
     low, high = [], []
     for cycle in cycles:
-        contact = cycle.mesh.path_of_contact
-        loaded = np.asarray(cycle.mesh.path)[np.asarray(cycle.pair_force) > 0]
+        contact = cycle.kinematics.path_of_contact
+        loaded = np.asarray(cycle.kinematics.path)[np.asarray(cycle.pair_force) > 0]
         air = 0.1 * float(contact.base_pitch)
         low.append(min(float(contact.start), loaded.min(initial=np.inf)) - air)
         high.append(max(float(contact.end), loaded.max(initial=-np.inf)) + air)

@@ -21,7 +21,7 @@ def load_sharing(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axe
         for index, (name, cycle) in enumerate(cycles.items()):
             ax.plot(*pair_history(cycle, share(cycle)), label=name, **line_style(index))
         if cycles:
-            mark_path(ax, next(iter(cycles.values())).mesh.path_of_contact)
+            mark_path(ax, next(iter(cycles.values())).kinematics.path_of_contact)
             ax.set_xlim(path_limits(cycles.values()))
         ax.set(ylim=(0, 1.05), xlabel=PATH_LABEL, ylabel="share of the pair in the load [-]")
         legend_above(ax, distance=ABOVE_MARKS)

@@ -25,7 +25,7 @@ def pressure(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
         for index, (name, cycle) in enumerate(cycles.items()):
             path, flank = pair_history(cycle, np.max(cycle.contact_pressure, axis=1))
             _, corner = pair_history(cycle, np.max(cycle.corner_pressure, axis=1))
-            contact = cycle.mesh.path_of_contact
+            contact = cycle.kinematics.path_of_contact
             outside = (path < float(contact.start)) | (path > float(contact.end))
             highest = corner.max()
             any_corner |= highest > 0
@@ -35,7 +35,7 @@ def pressure(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
         if any_corner:
             ax.fill_between([], [], color=GREY, linewidth=0, label="tip corner contact")
         if cycles:
-            mark_path(ax, next(iter(cycles.values())).mesh.path_of_contact)
+            mark_path(ax, next(iter(cycles.values())).kinematics.path_of_contact)
             ax.set_xlim(path_limits(cycles.values()))
         ax.set_ylim(bottom=0)
         ax.set(xlabel=PATH_LABEL, ylabel="flank pressure [MPa]")

@@ -15,10 +15,10 @@ def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
         cycle: solved cycle, of several slices to show more than one row.
         ax: Axes to draw into; None for a new figure.
     """
-    mesh = cycle.mesh
+    kinematics = cycle.kinematics
     path, flank = pair_history(cycle, cycle.contact_pressure)
-    half = 0.5 * float(mesh.pair.face_width)
-    face_edges = np.linspace(-half, half, mesh.resolution.slices + 1)
+    half = 0.5 * float(kinematics.pair.face_width)
+    face_edges = np.linspace(-half, half, kinematics.resolution.slices + 1)
     step = path[1] - path[0]
     path_edges = np.append(path, path[-1] + step) - 0.5 * step
     with report_axes(ax) as ax:
@@ -28,8 +28,8 @@ def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
         bar = ax.figure.colorbar(image, ax=ax, pad=0.02)
         bar.set_label("flank pressure [MPa]")
         bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
-        mark_path(ax, mesh.path_of_contact, zorder=3)
-        air = 0.05 * float(mesh.path_of_contact.base_pitch)
-        ax.set_xlim(float(mesh.path_of_contact.start) - air, float(mesh.path_of_contact.end) + air)
+        mark_path(ax, kinematics.path_of_contact, zorder=3)
+        air = 0.05 * float(kinematics.path_of_contact.base_pitch)
+        ax.set_xlim(float(kinematics.path_of_contact.start) - air, float(kinematics.path_of_contact.end) + air)
         ax.set(ylim=(-half, half), xlabel=PATH_LABEL, ylabel="face coordinate [mm]")
     return ax

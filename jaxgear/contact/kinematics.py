@@ -1,0 +1,202 @@
+"""Where the teeth touch over one base pitch: positions of the pairs, and both gears' sides of every contact."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..compliance import Plane
+from ..geometry import Gear, GearPair, PathOfContact, path_of_contact
+from ..microgeometry import Flank
+from ..numerics import over_batch
+from .corner import REACH, corner_gap
+from .resolution import Resolution
+
+Scalar = Float[Array, ""]
+Field = Float[Array, "pairs positions"]
+
+
+class Side(eqx.Module):
+    """One gear's side of the contact.
+
+    Attributes:
+        gear: the gear.
+        start_roll_length, pitch_roll_length: roll lengths at the start of the active profile and at the pitch point
+            [mm].
+        contact_roll_length: roll length of every contact [mm], shape (pairs, positions).
+        face_width: common face width of the pair [mm].
+    """
+
+    gear: Gear
+    start_roll_length: Scalar
+    pitch_roll_length: Scalar
+    contact_roll_length: Field
+    face_width: Scalar
+
+    @property
+    def base_radius(self) -> Scalar:
+        """[mm]"""
+        return self.gear.base_radius
+
+    @property
+    def tip_roll_length(self) -> Scalar:
+        """Roll length at the tip [mm]."""
+        return self.gear.tip_roll_length
+
+    def flank(self, roll_length: Float[Array, "..."], face_coordinate: Float[Array, "..."]) -> Flank:
+        """Points of the flank, for its modification; roll lengths and face coordinates [mm] broadcast."""
+        return Flank(
+            roll_length=roll_length,
+            tip_roll_length=self.tip_roll_length,
+            start_roll_length=self.start_roll_length,
+            base_radius=self.base_radius,
+            face_coordinate=face_coordinate,
+            face_width=self.face_width,
+        )
+
+
+class Kinematics(eqx.Module):
+    """How two gears move past each other over one base pitch: a few numbers, from which everything else follows.
+
+    Attributes:
+        pair: the gear pair.
+        path_of_contact: points A to E.
+        resolution: array sizes.
+        plane: "stress" or "strain", of the elastic constants.
+    """
+
+    pair: GearPair
+    path_of_contact: PathOfContact
+    resolution: Resolution
+    plane: Plane = eqx.field(static=True)
+
+    @property
+    def batch_ndim(self) -> int:
+        """Number of leading batch axes."""
+        return self.path_of_contact.base_pitch.ndim
+
+    @property
+    def phase(self) -> Float[Array, " positions"]:
+        """Mesh positions in base pitches, shape (positions,) without batch axes."""
+        return self._count(self.resolution.positions) / self.resolution.positions
+
+    @property
+    @over_batch
+    def path(self) -> Field:
+        """Nominal path position of every pair [mm], shape (pairs, positions)."""
+        offset = self.resolution.leading - self._count(self.resolution.pairs)
+        return (self.phase[None] + offset[:, None]) * self.path_of_contact.base_pitch
+
+    @property
+    @over_batch
+    def outside(self) -> Field:
+        """Distance of every pair outside the path of contact [mm], zero on it, shape (pairs, positions)."""
+        path, contact = self.path, self.path_of_contact
+        return jnp.maximum(jnp.maximum(contact.start - path, path - contact.end), 0.0)
+
+    @property
+    @over_batch
+    def sides(self) -> tuple[Side, Side]:
+        """Pinion and wheel."""
+        return sides(self.pair, self.path_of_contact, contacts(self.pair, self.path_of_contact, self.path))
+
+    @property
+    @over_batch
+    def face_coordinate(self) -> Float[Array, " slices"]:
+        """Middle of every slice [mm], shape (slices,)."""
+        slices = self.resolution.slices
+        return ((self._count(slices) + 0.5) / slices - 0.5) * self.pair.face_width
+
+    @property
+    @over_batch
+    def slice_width(self) -> Float[Array, " slices"]:
+        """[mm], shape (slices,)."""
+        slices = self.resolution.slices
+        return jnp.full((slices,), 1.0 / slices, self._dtype) * self.pair.face_width
+
+    def _count(self, number: int):
+        return jnp.arange(number, dtype=self._dtype)
+
+    @property
+    def _dtype(self):
+        return self.path_of_contact.start.dtype
+
+
+class Contacts(eqx.Module):
+    """Contact points of tooth pairs; fields of one shape.
+
+    Attributes:
+        pinion_roll_length, wheel_roll_length: [mm].
+        corner_gap: gap of the unmodified flanks outside the path of contact [um], zero on it.
+        lever: what a pair closes per unit of transmission error; 1 on the path of contact, less beyond it, because the
+            corner's gap opens while the gears turn on.
+    """
+
+    pinion_roll_length: Float[Array, "..."]
+    wheel_roll_length: Float[Array, "..."]
+    corner_gap: Float[Array, "..."]
+    lever: Float[Array, "..."]
+
+
+def contacts(pair: GearPair, contact: PathOfContact, path: Float[Array, "..."]) -> Contacts:
+    """Contact points at path positions [mm], on the path of contact and outside it.
+
+    A position is the mean one of both gears: under a transmission error d the pinion leads it by d/2 and the wheel
+    lags by d/2, so a corner is d/2 farther out than its nominal position and its gap grows by half its slope times d.
+    """
+    pinion_base, wheel_base = contact.pinion_base_radius, contact.wheel_base_radius
+    before, after = contact.start - path, path - contact.end
+    on_path = jnp.clip(path, contact.start, contact.end)
+    approach = contact.pinion_roll_length(contact.start), pinion_base
+    recess = contact.wheel_roll_length(contact.end), wheel_base
+    reach = REACH * contact.base_pitch
+    gap_before, slope_before, pinion_rho = _corner(before, reach, pair.wheel.tip_roll_length, wheel_base, *approach)
+    gap_after, slope_after, wheel_rho = _corner(after, reach, pair.pinion.tip_roll_length, pinion_base, *recess)
+    return Contacts(
+        jnp.where(before > 0, pinion_rho, contact.pinion_roll_length(on_path)),
+        jnp.where(after > 0, wheel_rho, contact.wheel_roll_length(on_path)),
+        gap_before + gap_after,
+        1 - 0.5e-3 * (slope_before + slope_after),
+    )
+
+
+def _corner(x, reach, tip_rho, tip_base, mate_rho, mate_base):
+    """Corner gap [um], its slope [um/mm] and the mate's roll length [mm].
+
+    Beyond `reach` the gap goes on along its tangent, so that far pairs stay finite and apart.
+    """
+    near = jnp.clip(x, 0.0, reach)
+    (gap, rho), (slope, _) = jax.jvp(
+        lambda t: corner_gap(t, tip_rho, tip_base, mate_rho, mate_base), (near,), (jnp.ones_like(near),)
+    )
+    outside = x > 0
+    return (
+        jnp.where(outside, gap + slope * (jnp.maximum(x, reach) - reach), 0.0),
+        jnp.where(outside, slope, 0.0),
+        rho,
+    )
+
+
+def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Side, Side]:
+    """Pinion and wheel at given contacts."""
+    return (
+        Side(
+            pair.pinion,
+            contact.pinion_roll_length(contact.start),
+            contact.pinion_pitch_roll_length,
+            points.pinion_roll_length,
+            pair.face_width,
+        ),
+        Side(
+            pair.wheel,
+            contact.wheel_roll_length(contact.end),
+            contact.wheel_pitch_roll_length,
+            points.wheel_roll_length,
+            pair.face_width,
+        ),
+    )
+
+
+def kinematics(pair: GearPair, resolution: Resolution, plane: Plane) -> Kinematics:
+    """The kinematics of a pair."""
+    return Kinematics(pair, path_of_contact(pair), resolution, plane)

@@ -1,0 +1,42 @@
+"""What a mesh is run at: torque, speed and friction."""
+
+from jaxtyping import Array, Float
+
+from ..numerics import Checked, check, number, real
+
+Scalar = Float[Array, ""]
+
+
+class Operation(Checked):
+    """One state of operation; many are made with `jax.vmap`.
+
+    Attributes:
+        torque: on the pinion [N m].
+        speed: of the pinion [rpm]; None where no result depends on it.
+        friction: mean coefficient of friction; None for the default of whatever needs it.
+
+    Raises:
+        ValueError: for a negative or non-finite number, or an array of numbers.
+    """
+
+    torque: Scalar = number("N m", low=0.0)
+    speed: Scalar | None = number("rpm", low=0.0, optional=True, default=None)
+    friction: Scalar | None = number("", low=0.0, optional=True, default=None)
+
+
+def operation_of(owner: str, torque, dtype) -> Operation:
+    """An operation in the precision of a mesh, of a torque [N m] or of an operation.
+
+    Raises:
+        ValueError: for a negative or non-finite torque, or an array of torques; the message names the owner.
+    """
+    if not isinstance(torque, Operation):
+        torque = real(torque)
+        if torque.ndim:
+            raise ValueError(
+                f"{owner}: torque has shape {torque.shape}, must be a single number; solve for many with jax.vmap"
+            )
+        check(owner, "torque", torque, "N m", low=0.0)
+        torque = Operation(torque)
+    given = torque.torque, torque.speed, torque.friction
+    return Operation(*(None if part is None else part.astype(dtype) for part in given))

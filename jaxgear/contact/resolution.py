@@ -1,0 +1,43 @@
+"""Array sizes of a mesh."""
+
+import equinox as eqx
+
+from ..numerics import Checked, count
+
+
+class Resolution(Checked):
+    """Array sizes of a mesh, all static.
+
+    Attributes:
+        positions: mesh positions over one base pitch.
+        slices: slices over the common face width.
+        pairs: tooth pairs carried along; `fewest_pairs` tells how few suffice. Pair i runs at
+            phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two base pitches on either side of the pitch
+            point: contact ratios up to 3.
+        patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks
+            and steep flanks over its own width; 1 takes the nominal contact point alone.
+        newton_steps: largest number of steps of the contact solution.
+        tolerance: residual at which the contact solution ends, relative to the transmission error and to the force;
+            None for 1e-11 in double and 5e-6 in single precision.
+    """
+
+    positions: int = count(low=4, default=64)
+    slices: int = count(default=1)
+    pairs: int = count(low=2, default=4)
+    patch_nodes: int = count(default=4)
+    newton_steps: int = count(default=8)
+    tolerance: float | None = eqx.field(static=True, default=None)
+
+    def check_together(self) -> None:
+        if self.tolerance is not None and not (isinstance(self.tolerance, float) and 0 < self.tolerance < 1):
+            raise ValueError(f"Resolution: tolerance = {self.tolerance!r} must be a number between 0 and 1, or None")
+
+    @property
+    def leading(self) -> int:
+        """Base pitches by which the first pair leads the reference pair."""
+        return (self.pairs - 1) // 2
+
+    @property
+    def reach(self) -> tuple[int, int]:
+        """Base pitches behind and ahead of the pitch point that the pairs cover."""
+        return self.pairs - 1 - self.leading, self.leading + 1

@@ -1,0 +1,199 @@
+"""Contact of the loaded mesh over one base pitch."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..microgeometry import AbstractModification, NoModification, terms
+from ..numerics import ContactProblem, minimum, safe_sqrt, solve_contact, tangent_stiffness
+from .cycle import MeshCycle
+from .mesh import Mesh
+from .operation import Operation, operation_of
+
+Scalar = Float[Array, ""]
+Load = Float[Array, "pairs slices positions"]
+
+
+def solve(
+    mesh: Mesh,
+    torque: Any,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+) -> MeshCycle:
+    """Loaded tooth contact analysis of one design under one torque.
+
+    Torque and modifications are taken in the precision of the mesh.
+
+    Args:
+        mesh: prepared mesh.
+        torque: on the pinion [N m], scalar; or an `Operation`.
+        pinion: modification of the pinion flank; None for the nominal involute.
+        wheel: modification of the wheel flank; None for the nominal involute.
+
+    Returns:
+        the mesh cycle, differentiable with respect to every number in `mesh`, `torque` and the modifications.
+
+    Raises:
+        TypeError: for something else than a prepared mesh or a modification.
+        ValueError: for a negative or non-finite torque, an array of torques, or a modification that varies along the
+            face on a mesh of one slice.
+    """
+    check_mesh("solve", mesh)
+    operation = operation_of("solve", torque, mesh.slice_width.dtype)
+    pinion, wheel = flanks_of("solve", mesh, pinion, wheel)
+    return _cycle(mesh, operation, _solve(mesh, operation.torque, pinion, wheel), pinion, wheel)
+
+
+def solve_removed(
+    mesh: Mesh,
+    torque: Any,
+    removed: Load,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+) -> MeshCycle:
+    """`solve` for material removed as an array: one compilation serves every kind of modification.
+
+    Args:
+        mesh: prepared mesh.
+        torque: on the pinion [N m], scalar; or an `Operation`.
+        removed: material removed from both flanks together at every contact [um], as `removed_material` gives it.
+        pinion, wheel: modifications for the cycle to carry, where they are known; `removed` alone is solved for.
+
+    Raises:
+        TypeError: for something else than a prepared mesh.
+        ValueError: for a negative or non-finite torque, an array of torques, or removed material of another shape.
+    """
+    check_mesh("solve_removed", mesh)
+    operation = operation_of("solve_removed", torque, mesh.slice_width.dtype)
+    wanted = (mesh.resolution.pairs, mesh.resolution.slices, mesh.resolution.positions)
+    if jnp.shape(removed) != wanted:
+        raise ValueError(
+            f"solve_removed: removed has shape {jnp.shape(removed)}, must be {wanted} (pairs, slices, positions)"
+        )
+    return _cycle(mesh, operation, _solve_removed(mesh, operation.torque, removed), pinion, wheel)
+
+
+def removed_material(
+    mesh: Mesh,
+    torque: Any,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+) -> Load:
+    """Material removed from both flanks, averaged over the contact with the weight of the Hertzian pressure [um].
+
+    To first order a small gap that varies across the contact acts with its pressure-weighted mean. The half width is
+    that of one pair that carries the full load.
+
+    Args:
+        mesh: prepared mesh.
+        torque: on the pinion [N m], scalar; or an `Operation`.
+        pinion: modification of the pinion flank; None for the nominal involute.
+        wheel: modification of the wheel flank; None for the nominal involute.
+
+    Returns:
+        shape (pairs, slices, positions).
+
+    Raises:
+        TypeError: for something else than a prepared mesh or a modification.
+        ValueError: for a negative or non-finite torque, an array of torques, or a modification that varies along the
+            face on a mesh of one slice.
+    """
+    check_mesh("removed_material", mesh)
+    torque = operation_of("removed_material", torque, mesh.slice_width.dtype).torque
+    pinion, wheel = flanks_of("removed_material", mesh, pinion, wheel)
+    return _removed(mesh, torque, pinion, wheel)
+
+
+@eqx.filter_jit
+def _removed(mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: AbstractModification) -> Load:
+    dtype = torque.dtype
+    half_width = safe_sqrt(mesh.width_factor * _force(mesh, torque) / mesh.pair.face_width)
+    weights = list(mesh.patch_weight)
+    flanks = [mesh.flanks(place * half_width) for place in mesh.patch_place]
+    sizes = mesh.resolution
+    total = jnp.zeros((sizes.pairs, sizes.slices, sizes.positions), dtype)
+    for modification, points in zip((pinion, wheel), zip(*flanks)):
+        # every term on its own, since most vary along the profile or along the face only
+        for term in terms(_in_precision(modification, dtype)):
+            total = total + sum(weight * term(point) for weight, point in zip(weights, points)) / sum(weights)
+    return total
+
+
+def check_mesh(owner: str, mesh: Any) -> None:
+    """Raises a one-line `TypeError` for something else than a prepared mesh."""
+    if not isinstance(mesh, Mesh):
+        raise TypeError(f"{owner}: mesh is a {type(mesh).__name__}, must be a Mesh: jaxgear.prepare makes one")
+
+
+def flanks_of(owner: str, mesh: Mesh, pinion: Any, wheel: Any) -> tuple[AbstractModification, AbstractModification]:
+    """Both modifications, that of the nominal involute for None.
+
+    Raises:
+        TypeError: for something else than a modification.
+        ValueError: for what a mesh of one slice cannot show: it would be ignored without a word. A traced amount
+            counts.
+    """
+    for gear, modification in (("pinion", pinion), ("wheel", wheel)):
+        if modification is not None and not isinstance(modification, AbstractModification):
+            raise TypeError(
+                f"{owner}: {gear} is a {type(modification).__name__}, must be a modification such as TipRelief, or None"
+            )
+        for term in terms(modification or NoModification()):
+            if mesh.resolution.slices == 1 and term.varies_along_face:
+                raise ValueError(
+                    f"{gear}: {term} varies along the face, which a mesh of 1 slice cannot show: prepare with "
+                    "Resolution(slices=11)"
+                )
+    return pinion or NoModification(), wheel or NoModification()
+
+
+def _cycle(mesh: Mesh, operation: Operation, contact: dict[str, Array], pinion=None, wheel=None) -> MeshCycle:
+    """What the compiled programs leave out: it passes through them unchanged, and would be copied."""
+    return MeshCycle(kinematics=mesh.kinematics, operation=operation, pinion=pinion, wheel=wheel, **contact)
+
+
+@eqx.filter_jit
+def _solve(mesh: Mesh, torque: Scalar, pinion, wheel) -> dict[str, Array]:
+    return _solve_removed(mesh, torque, _removed(mesh, torque, pinion, wheel))
+
+
+@eqx.filter_jit
+def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> dict[str, Array]:
+    force = _force(mesh, torque)
+    gap = mesh.corner_gap[:, None] + removed.astype(force.dtype)
+    problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, force)
+    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.tolerance)
+    windup = mesh.hub * force / mesh.pair.face_width
+    contact_stiffness = tangent_stiffness(problem, solution)
+    unloaded = minimum(gap / mesh.lever[:, None], axis=(0, 1))
+    return {
+        "transmission_error": solution.approach + windup,
+        "unloaded_transmission_error": unloaded,
+        "line_load": solution.line_load,
+        "pair_force": mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1),
+        "opening": solution.opening,
+        "gap": gap,
+        "tangent_stiffness": 1 / (1 / contact_stiffness + mesh.hub / mesh.pair.face_width),
+        "residual": solution.residual,
+        "converged": solution.solved & (solution.approach - unloaded < mesh.outer_gap),
+    }
+
+
+def _in_precision(modification: AbstractModification, dtype) -> AbstractModification:
+    """The modification with its numbers in the precision of the mesh."""
+
+    def cast(leaf):
+        return leaf.astype(dtype) if eqx.is_inexact_array(leaf) else leaf
+
+    return jax.tree.map(cast, modification)
+
+
+def _force(mesh: Mesh, torque: Scalar) -> Scalar:
+    """Force on the line of action [N]."""
+    return 1e3 * torque / mesh.pair.pinion.base_radius
