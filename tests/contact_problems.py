@@ -66,3 +66,8 @@ def random_problem(seed, springs, slices, positions, law="softening", levers=Tru
 def with_load(data: ContactProblem, load) -> ContactProblem:
     """The same problem under another load."""
     return eqx.tree_at(lambda p: p.load, data, load)
+
+
+def at_approach(data: ContactProblem, approach) -> ContactProblem:
+    """The same problem at a prescribed approach, shape (positions,)."""
+    return ContactProblem(data.compliance, data.law, data.gap, data.lever, data.weight, approach=approach)

@@ -119,6 +119,20 @@ def test_zero_load_touches_at_the_smallest_gap():
     assert bool(jnp.all(solution.residual < 1e-13))
 
 
+def test_vanishing_loads_are_solved_whatever_the_gaps():
+    """Gaps without a common part, as of a crowned face: there is nothing large to measure a load of 1e-60 against."""
+    data = random_problem(14, 4, 7, 600)
+    touching = jnp.asarray(np.random.default_rng(2).integers(0, 7, 600))
+    gap = jnp.where(jnp.arange(7)[:, None] == touching[None], 0.0, data.gap + 0.1)
+    data = eqx.tree_at(lambda p: p.gap, data, gap.at[1:].add(5.0))
+    loads = jnp.asarray([0.0, 1e-300, 1e-60, 1e-30, 1e-15, 1e-9, 1e-6])
+    solutions = eqx.filter_jit(
+        lambda data: jax.vmap(lambda load: solve_contact(with_load(data, load), steps=8))(loads)
+    )(data)
+    assert bool(jnp.all(solutions.solved))
+    np.testing.assert_allclose(solutions.approach, 0.0, atol=1e-6)
+
+
 def test_all_but_one_spring_far_apart():
     data = random_problem(6, 4, 1, 100, levers=False)
     gap = jnp.full_like(data.gap, 1e4).at[2].set(3.0)

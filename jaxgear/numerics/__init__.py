@@ -1,9 +1,9 @@
 """Numerical tools without a gear word: fields, safe functions, extremes, quadrature, roots, complementarity, risk."""
 
-from .complementarity import ContactProblem as ContactProblem
-from .complementarity import ContactSolution as ContactSolution
 from .complementarity import solve_contact as solve_contact
 from .complementarity import tangent_stiffness as tangent_stiffness
+from .contact_problem import ContactProblem as ContactProblem
+from .contact_problem import ContactSolution as ContactSolution
 from .extremes import maximum as maximum
 from .extremes import minimum as minimum
 from .extremes import spread as spread

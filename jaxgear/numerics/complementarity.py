@@ -8,7 +8,8 @@ For every position the unknowns are the line loads q[p, s] >= 0 of P springs in 
 C is symmetric positive semi-definite and h increases, so this is the optimality condition of a strictly convex
 programme: the solution exists and is unique. It is found by Newton's method on the active set; slices meet only in d,
 so each step is P x P eliminations and one scalar equation. Derivatives of any order come from the implicit function
-theorem at the final active set, never from the iteration.
+theorem at the final active set, never from the iteration. Where d is prescribed instead of the load, the scalar
+equation drops out and everything else stays.
 
 The iterate v holds the load of every spring in contact, and of every other one minus the load that would open it as far
 as it is open: its sign is the active set. All arrays keep the positions innermost and the P springs of an elimination
@@ -22,11 +23,12 @@ from operator import itemgetter
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Bool, Float
 
-from .elimination import balance, factorize, product
+from .contact_problem import ContactProblem, ContactSolution
+from .elimination import at_approach, balance, factorize, product
 from .spring import LOAD_FLOOR, AbstractSpring
+from .tangents import jvp_of_given
 
 Rows = list[Float[Array, "slices positions"]]
 Curve = Float[Array, " positions"]
@@ -40,47 +42,6 @@ _SINGLE_STEPS = 2
 _TOLERANCE = {jnp.dtype(jnp.float32): 5e-6, jnp.dtype(jnp.float64): 1e-11}
 
 
-class ContactProblem(eqx.Module):
-    """Data of the contact problem.
-
-    Attributes:
-        compliance: C, shape (pairs, pairs, positions).
-        law: h(q) of every spring.
-        gap: shape (pairs, slices, positions).
-        lever: what a spring closes per unit of common approach, positive, shape (pairs, positions).
-        weight: width of each slice, shape (slices,).
-        load: total load, scalar.
-    """
-
-    compliance: Float[Array, "pairs pairs positions"]
-    law: AbstractSpring
-    gap: Float[Array, "pairs slices positions"]
-    lever: Float[Array, "pairs positions"]
-    weight: Float[Array, " slices"]
-    load: Float[Array, ""]
-
-
-class ContactSolution(eqx.Module):
-    """Line loads, common approach, what is left of the gaps, and how well the conditions hold.
-
-    Attributes:
-        line_load: q, shape (pairs, slices, positions).
-        approach: d, shape (positions,).
-        opening: y without the spring's own deflection, C q + gap - lever d, shape (pairs, slices, positions): the
-            remaining gap where it is positive, minus the contact deflection h(q) where the spring is loaded.
-        in_contact: which springs carry load, shape (pairs, slices, positions).
-        residual: largest violation of any condition, relative to the approach and to the load, shape (positions,).
-        solved: whether the residual is as small as it has to be, shape (positions,).
-    """
-
-    line_load: Float[Array, "pairs slices positions"]
-    approach: Float[Array, " positions"]
-    opening: Float[Array, "pairs slices positions"]
-    in_contact: Bool[Array, "pairs slices positions"]
-    residual: Float[Array, " positions"]
-    solved: Bool[Array, " positions"]
-
-
 def solve_contact(problem: ContactProblem, *, steps: int, tolerance: float | None = None) -> ContactSolution:
     """Solves the contact problem by at most a given number of Newton steps.
 
@@ -91,20 +52,23 @@ def solve_contact(problem: ContactProblem, *, steps: int, tolerance: float | Non
 
     Returns:
         the solution; it is differentiable with respect to every leaf of `problem`. Where a spring is just touching the
-        derivative is one-sided.
+        derivative is one-sided. Loads and their derivatives are exactly zero where a prescribed approach closes no gap.
     """
     # a gap common to all springs only shifts the approach: without it light loads lose no digits to wide gaps
     tolerance = _TOLERANCE[problem.gap.dtype] if tolerance is None else tolerance
     closing = problem.gap / problem.lever[:, None]
     common = jax.lax.stop_gradient(jnp.min(closing, axis=(0, 1)))
     problem = eqx.tree_at(lambda p: p.gap, problem, problem.lever[:, None] * (closing - common[None, None]))
+    if problem.approach is not None:
+        problem = eqx.tree_at(lambda p: p.approach, problem, problem.approach - common)
     v, approach, residual = _solve(steps, tolerance, problem, common)
     load = _carried(v)
     return ContactSolution(
         line_load=jnp.stack(load),
         approach=approach + common,
+        load=_total(problem, load),
         opening=jnp.stack(_opening(problem, load, approach)),
-        in_contact=jnp.stack(_active(v)),
+        in_contact=jnp.stack(_active(problem, v)),
         residual=residual,
         solved=residual < tolerance,
     )
@@ -135,7 +99,9 @@ def _solve(steps: int, tolerance: float, problem: ContactProblem, common: Curve)
 
     state = jax.lax.fori_loop(0, _SECANT_STEPS, with_secants, (v, jnp.zeros_like(single.lever[0])))
     state = jax.lax.fori_loop(0, _SINGLE_STEPS, with_laws, state)
-    return _iterate(steps, tolerance, problem, single, common, *_cast(state, common.dtype))
+    v, approach = _cast(state, common.dtype)
+    approach = approach if problem.approach is None else problem.approach
+    return _iterate(steps, tolerance, problem, single, common, v, approach)
 
 
 def _iterate(
@@ -147,10 +113,11 @@ def _iterate(
     six digits, at half the cost.
     """
     dtype = common.dtype
+    rounding = jnp.finfo(dtype).eps * jnp.maximum(jnp.abs(common), jnp.max(jnp.abs(problem.gap), axis=(0, 1)))
 
     def evaluated(v, approach):
         secant = _secants(problem, _carried(v))
-        return v, approach, secant, _residual(problem, v, approach, secant, common)
+        return v, approach, secant, _residual(problem, v, approach, secant, common, rounding)
 
     def advance(state):
         step, (v, _, secant, _) = state
@@ -176,28 +143,19 @@ def _solve_jvp(steps, tolerance, primals, tangents):
     load = _carried(v)
 
     def conditions(data):
-        mismatch = [y + law.deflection(q) for y, law, q in zip(_opening(data, load, approach), _laws(data), load)]
-        return mismatch, _total(data, load) - data.load
+        d = approach if data.approach is None else data.approach
+        mismatch = [y + law.deflection(q) for y, law, q in zip(_opening(data, load, d), _laws(data), load)]
+        return mismatch, d if data.load is None else _total(data, load) - data.load
 
-    _, (mismatch_dot, total_dot) = _jvp_of_given(conditions, problem, problem_dot)
-    factors = factorize(problem.compliance, problem.lever, _active(v), _slopes(problem, load, _secants(problem, load)))
-    v_dot, approach_dot = balance(problem.weight, factors, [-dot for dot in mismatch_dot], -total_dot)
+    _, (mismatch_dot, last_dot) = jvp_of_given(conditions, problem, problem_dot)
+    slope = _slopes(problem, load, _secants(problem, load))
+    factors = factorize(problem.compliance, problem.lever, _active(problem, v), slope)
+    known = [-dot for dot in mismatch_dot]
+    if problem.load is None:
+        v_dot, approach_dot = at_approach(factors, known, jnp.zeros_like(approach)), last_dot
+    else:
+        v_dot, approach_dot = balance(problem.weight, factors, known, -last_dot)
     return (v, approach, residual), (v_dot, approach_dot, jnp.zeros_like(residual))
-
-
-def _jvp_of_given(function, primal, tangent):
-    """`jax.jvp` along those leaves of the tangent that are not symbolically zero: the others cost nothing."""
-    tangents, structure = jax.tree.flatten(tangent, is_leaf=lambda leaf: isinstance(leaf, SymbolicZero))
-    primals = jax.tree.leaves(primal)
-    given = [i for i, leaf in enumerate(tangents) if not isinstance(leaf, SymbolicZero)]
-
-    def of_given(leaves):
-        everything = list(primals)
-        for i, leaf in zip(given, leaves):
-            everything[i] = leaf
-        return function(jax.tree.unflatten(structure, everything))
-
-    return jax.jvp(of_given, ([primals[i] for i in given],), ([tangents[i] for i in given],))
 
 
 def _start(problem: ContactProblem) -> tuple[Rows, Rows]:
@@ -205,6 +163,8 @@ def _start(problem: ContactProblem) -> tuple[Rows, Rows]:
 
     The secants do not depend on the gaps: for many problems that differ in their gaps alone they are evaluated once.
     """
+    if problem.load is None:
+        return _start_at(problem)
     even = problem.load / jnp.sum(problem.weight)
     secant = _secants(problem, [jnp.broadcast_to(even, lever[None].shape) for lever in problem.lever])
     # gaps wider than the approach of any one spring that bears the load alone stay open
@@ -216,8 +176,20 @@ def _start(problem: ContactProblem) -> tuple[Rows, Rows]:
     return [(lever * bound)[None] - gap for lever, gap in zip(problem.lever, problem.gap)], secant
 
 
-def _active(v: Rows) -> list[Bool[Array, "slices positions"]]:
-    """Where the iterate is not negative; if it is everywhere, the largest counts, so that the system stays regular."""
+def _start_at(problem: ContactProblem) -> tuple[Rows, Rows]:
+    """Contact wherever the approach closes the gap, and the secants under the loads of every spring on its own."""
+    closed = [(lever * problem.approach)[None] - gap for lever, gap in zip(problem.lever, problem.gap)]
+    load = [jnp.ones_like(row) for row in closed]
+    for _ in range(_SECANT_STEPS):
+        secant = _secants(problem, load)
+        load = [row / (c + problem.compliance[i, i][None]) for i, (row, c) in enumerate(zip(closed, secant))]
+    return closed, _secants(problem, load)
+
+
+def _active(problem: ContactProblem, v: Rows) -> list[Bool[Array, "slices positions"]]:
+    """Where the iterate is not negative; if it is everywhere, the largest must bear the load."""
+    if problem.load is None:
+        return [row >= 0 for row in v]
     floor = jnp.minimum(reduce(jnp.maximum, [jnp.max(row, axis=0) for row in v]), 0.0)
     return [row >= floor[None] for row in v]
 
@@ -245,10 +217,13 @@ def _slopes(problem: ContactProblem, load: Rows, secant: Rows) -> Rows:
 
 def _newton(problem: ContactProblem, v: Rows, secant: Rows, slope: Rows) -> tuple[Rows, Curve]:
     """One Newton step on the active set; `secant` and `slope` belong to the loads of v."""
-    active, carried = _active(v), _carried(v)
+    active, carried = _active(problem, v), _carried(v)
     factors = factorize(problem.compliance, problem.lever, active, slope)
     known = [-gap - (c - s) * q for gap, c, s, q in zip(problem.gap, secant, slope, carried)]
-    load, approach = balance(problem.weight, factors, known, problem.load)
+    if problem.load is None:
+        load, approach = at_approach(factors, known, problem.approach), problem.approach
+    else:
+        load, approach = balance(problem.weight, factors, known, problem.load)
     opening = _opening(problem, load, approach)
     return [
         jnp.where(flag, q, -y * inverse) for flag, q, y, inverse in zip(active, load, opening, factors.inverse)
@@ -267,18 +242,25 @@ def _total(problem, load: Rows) -> Curve:
     return sum(lever * jnp.sum(problem.weight[:, None] * q, axis=0) for lever, q in zip(problem.lever, load))
 
 
-def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Rows, common: Curve) -> Curve:
-    """Largest violation of any condition, relative to the approach and to the load."""
+def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Rows, common: Curve, rounding: Curve) -> Curve:
+    """Largest violation of any condition, relative to the approach and to the load.
+
+    Neither is measured against less than the rounding error of the largest gap, and the load that such an error makes:
+    vanishing load is not measured against zero.
+    """
     load = _carried(v)
-    worst, scale, softest = jnp.zeros_like(approach), jnp.abs(common), jnp.zeros_like(approach)
+    worst, softest = jnp.zeros_like(approach), jnp.zeros_like(approach)
+    scale = jnp.maximum(jnp.abs(common), rounding)
     for i, (q, y, c, lever) in enumerate(zip(load, _opening(problem, load, approach), secant, problem.lever)):
         mismatch = y + c * q
         closing = jnp.abs(mismatch + (lever * approach)[None])
         worst = jnp.maximum(worst, jnp.max(jnp.where(q > 0, jnp.abs(mismatch), -mismatch), axis=0))
         scale = jnp.maximum(scale, jnp.max(jnp.where(q > 0, closing, 0.0), axis=0))
         softest = jnp.maximum(softest, problem.compliance[i, i] + jnp.max(c, axis=0))
-    tiny, eps = jnp.finfo(worst.dtype).tiny, jnp.finfo(worst.dtype).eps
-    # the load that a rounding error of the approach makes, so that zero load is not measured against zero
-    rounding = eps * jnp.abs(common) * jnp.sum(problem.weight) / softest
-    balance = jnp.abs(_total(problem, load) - problem.load) / (jnp.abs(problem.load) + rounding + tiny)
-    return jnp.maximum(worst / (scale + tiny), balance)
+    tiny = jnp.finfo(worst.dtype).tiny
+    violation = worst / (scale + tiny)
+    if problem.load is None:
+        return violation
+    least = rounding * jnp.sum(problem.weight) / softest
+    unbalanced = jnp.abs(_total(problem, load) - problem.load)
+    return jnp.maximum(violation, unbalanced / (jnp.abs(problem.load) + least + tiny))

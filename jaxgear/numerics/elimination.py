@@ -74,9 +74,24 @@ def product(weight: Float[Array, " slices"], factors: Factors, first: Rows, seco
 
 def balance(weight: Float[Array, " slices"], factors: Factors, known: Rows, load) -> tuple[Rows, Curve]:
     """Solves (C + slope) q = known + lever d on the active rows, q = 0 on the others, with sum lever w q = load."""
-    part = _forward(factors.rows, factors.inverse, [flag * row for flag, row in zip(factors.active, known)])
+    part = _of_known(factors, known)
     stiffness = product(weight, factors, factors.lever, factors.lever)
     approach = (load - product(weight, factors, factors.lever, part)) / stiffness
+    return _backward(factors, part, approach), approach
+
+
+def at_approach(factors: Factors, known: Rows, approach: Curve) -> Rows:
+    """Solves (C + slope) q = known + lever d on the active rows, q = 0 on the others, for a given approach d."""
+    return _backward(factors, _of_known(factors, known), approach)
+
+
+def _of_known(factors: Factors, known: Rows) -> Rows:
+    """L^-1 known on the active rows."""
+    return _forward(factors.rows, factors.inverse, [flag * row for flag, row in zip(factors.active, known)])
+
+
+def _backward(factors: Factors, part: Rows, approach: Curve) -> Rows:
+    """q from L^-1 known and the approach."""
     count = len(part)
     result: dict[int, Array] = {}
     for i in reversed(range(count)):
@@ -84,4 +99,4 @@ def balance(weight: Float[Array, " slices"], factors: Factors, known: Rows, load
         for k in range(i + 1, count):
             value = value - factors.rows[k][i] * result[k]
         result[i] = value / factors.diagonal[i]
-    return [result[i] for i in range(count)], approach
+    return [result[i] for i in range(count)]
