@@ -14,7 +14,9 @@ import pytest
 import jaxgear as jg
 from jaxgear.geometry import path_of_contact
 from jaxgear.io import DesignFileError, describe, flank_rows, load_design, result_folder, write_summary
-from jaxgear.microgeometry import Flank, ParabolicLinear
+from jaxgear.io.layout import family
+from jaxgear.microgeometry import AbstractCurve, AbstractModification, Flank, ParabolicLinear
+from jaxgear.numerics import number
 
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.toml"))
 
@@ -125,16 +127,67 @@ def test_every_curve_can_be_written(load, table, curve):
 
 
 def test_every_modification_and_curve_of_the_library_has_a_name_in_design_files():
-    from jaxgear.io.parts import CURVES as curves
-    from jaxgear.io.parts import MODIFICATIONS as modifications
-    from jaxgear.microgeometry import AbstractCurve, AbstractModification, NoModification, Scaled, Sum
+    from jaxgear.microgeometry import Scaled, Sum
 
     def of_library(base):
         return {cls for cls in base.__subclasses__() if cls.__module__.startswith("jaxgear.microgeometry")}
 
-    composed = {NoModification, Scaled, Sum}
-    assert {make for make, _ in modifications.values()} == of_library(AbstractModification) - composed
-    assert {make for make, _ in curves.values()} == of_library(AbstractCurve)
+    assert set(family(AbstractModification).values()) >= of_library(AbstractModification) - {Scaled, Sum}
+    assert set(family(AbstractCurve).values()) >= of_library(AbstractCurve)
+
+
+class BumpAtPitch(AbstractModification):
+    """A user's own modification: a bump around a roll length.
+
+    Attributes:
+        height: of the bump.
+        place: roll length of its top.
+        curve: by which it fades.
+        rounded: whether its top is.
+    """
+
+    height: jax.Array = number("um", low=0.0, high=50.0)
+    place: jax.Array = number("mm", low=0.0)
+    curve: "HalfCosine" = eqx.field(default_factory=lambda: HalfCosine(1.0))
+    rounded: bool = eqx.field(static=True, default=True)
+    varies_along_face = False
+
+    def __call__(self, flank):
+        distance = jnp.abs(flank.roll_length - self.place) / 3.0
+        return self.height * (1.0 - self.curve(jnp.clip(distance, 0.0, 1.0)))
+
+
+class HalfCosine(AbstractCurve):
+    """A user's own curve."""
+
+    power: jax.Array = number("", low=0.5, default=1.0)
+
+    def __call__(self, d):
+        return (0.5 - 0.5 * jnp.cos(jnp.pi * d)) ** self.power
+
+
+def test_a_modification_and_a_curve_of_a_user_need_no_line_in_the_package(load):
+    """Defined above, outside the package: their fields are the keys, with units, ranges and defaults."""
+    table = '[[pinion.modification]]\ntype = "bump_at_pitch"\nheight = "height"\nplace = 9.0\n'
+    variables = "[variables]\nheight = { low = 0.0, high = 20.0 }\n"
+    file = load(text(pinion=table, tail=variables))
+    assert file.units == {"height": "um"}
+    pinion, _ = file.design({"height": 6.0})
+    assert isinstance(pinion, BumpAtPitch)
+    np.testing.assert_allclose(removed(pinion), removed(BumpAtPitch(6.0, 9.0)))
+    assert removed(pinion).max() == pytest.approx(6.0, rel=1e-2)
+    # the curve in another relief, and the ranges of both
+    relief = '[[pinion.modification]]\ntype = "tip_relief"\namount = 5.0\nlength = 3.0\ncurve = {}\n'
+    curved, _ = load(text(pinion=relief.format('{ type = "half_cosine", power = 2 }'))).design({})
+    np.testing.assert_allclose(removed(curved), removed(jg.TipRelief(5.0, 3.0, HalfCosine(2.0))))
+    assert describe(curved)[0]["curve"] == {"type": "half_cosine", "power": 2.0}
+    for content, problem in (
+        (text(pinion=table, tail=variables.replace("20.0", "60.0")), "variables.height.high: 60 um must be at least 0"),
+        (text(pinion=table.replace('"height"\n', "-1\n")), "pinion.modification[0].height: -1 um must be at least 0"),
+        (text(pinion=relief.format('{ type = "half_cosine", power = 0.1 }')), "[0].curve.power: 0.1 must be at least"),
+    ):
+        with pytest.raises(DesignFileError, match=re.escape(problem)):
+            load(content)
 
 
 def test_modifications_of_one_gear_add_up(load):
@@ -260,7 +313,7 @@ MALFORMED = {
     ),
     "modification without type": (
         text(pinion="[[pinion.modification]]\namount = 1.0"),
-        "pinion.modification[0].type: missing, must be one of tip_relief,",
+        "pinion.modification[0].type: missing, must be one of no_modification, tip_relief,",
     ),
     "unknown curve": (
         text(pinion=RELIEF.replace('"height"', "1.0") + 'curve = { type = "cubic" }'),
@@ -291,7 +344,7 @@ MALFORMED = {
     "wrong length": (text(load="torque_range = [1.0]"), "load.torque_range: must be a list of length 2, not 1"),
     "wrong list element": (
         text(wheel='[[wheel.modification]]\ntype = "tabulated_profile"\nposition = [1.0, "x"]\namount = [1.0, 2.0]'),
-        "wheel.modification[0].position[1]: must be a number, not a string",
+        'wheel.modification[0].position[1]: "x" is not a variable, there is no [variables] table',
     ),
     "torque of zero": (text().replace("torque = 50.0", "torque = 0.0"), "load.torque: 0 N m must be greater than 0"),
     "torque not a number": (text().replace("torque = 50.0", "torque = nan"), "load.torque: nan must be finite"),
@@ -302,30 +355,30 @@ MALFORMED = {
     "friction without speed": (text(load="friction = 0.06"), "load.friction: has no effect without load.speed"),
     "physical error of a gear": (
         text().replace("face_width = 20.0", "face_width = -20.0"),
-        "pinion: Gear: face_width = -20 mm must be greater than 0 mm",
+        "pinion.face_width: -20 mm must be greater than 0 mm",
     ),
     "physical error of a material": (
         text(pinion="material = { poisson_ratio = 0.7 }"),
-        "pinion.material: Material: poisson_ratio = 0.7 must be",
+        "pinion.material.poisson_ratio: 0.7 must be at least 0 and less than 0.5",
     ),
     "physical error of the pair": (
         text().replace("module = 3\n", "module = 4.0\n"),
-        "pair: GearPair: wheel module = 4 mm must equal the pinion's, 3 mm",
+        "wheel.module: 4 mm must equal the pinion's, 3 mm",
     ),
-    "impossible centre distance": (text(tail="[pair]\ncenter_distance = 90.0"), "pair: GearPair: center_distance = 90"),
+    "impossible centre distance": (text(tail="[pair]\ncenter_distance = 90.0"), "pair.center_distance: 90 mm must be"),
     "physical error of a modification": (
         text(pinion=RELIEF.replace('"height"', "1.0").replace("3.4", "-3.4")),
-        "pinion.modification[0]: TipRelief: length = -3.4 mm must be at least 0 mm",
+        "pinion.modification[0].length: -3.4 mm must be at least 0 mm",
     ),
     "bound outside what is possible": (
         text(
             pinion=RELIEF.replace("3.4", '"height"').replace('amount = "height"', "amount = 1.0"), tail=VARIABLE
         ).replace("low = 0.0", "low = -1.0"),
-        "pinion.modification[0]: TipRelief: length = -1 mm must be at least 0 mm",
+        "variables.height.low: -1 mm must be at least 0 mm as pinion.modification[0].length",
     ),
     "table that does not increase": (
         text(wheel='[[wheel.modification]]\ntype = "tabulated_profile"\nposition = [2, 1]\namount = [1.0, 2.0]'),
-        "wheel.modification[0]: TabulatedProfile: position must increase strictly",
+        "wheel.modification[0]: position must increase strictly",
     ),
     "variable not declared": (
         text(pinion=RELIEF),
@@ -401,6 +454,38 @@ MALFORMED = {
         text(tail="[optimize]\napplication_factor = 0"),
         "optimize.application_factor: 0 must be greater than 0 and at most 100",
     ),
+    "face width of nothing": (
+        text().replace("face_width = 20.0", "face_width = 1e-300"),
+        "pinion.face_width: 1e-300 mm must be at least 0.001 mm and at most 100000 mm",
+    ),
+    "modulus in pascal": (
+        text(wheel="material = { elastic_modulus = 2.06e11 }"),
+        "wheel.material.elastic_modulus: 2.06e+11 MPa must be at least 1 MPa and at most 1e+07 MPa",
+    ),
+    "number not finite": (text().replace("module = 3.0", "module = nan"), "pinion.module: nan must be finite"),
+    "amount absurd": (
+        text(pinion=RELIEF.replace('"height"', "1e300")),
+        "pinion.modification[0].amount: 1e+300 um must be at least -100000 um and at most 100000 um",
+    ),
+    "coefficient not finite": (
+        text(pinion=RELIEF.replace('"height"', "1.0") + 'curve = { type = "power", exponent = inf }'),
+        "pinion.modification[0].curve.exponent: inf must be finite",
+    ),
+    "lower bound absurd": (
+        text(pinion=RELIEF, tail=VARIABLE.replace("low = 0.0", "low = -1e300")),
+        "variables.height.low: -1e+300 um must be at least -100000 um and at most 100000 um as pinion.modification[0]",
+    ),
+    "bound of a length below zero": (
+        text(pinion=RELIEF.replace("3.4", '"l"'), tail=VARIABLE + "l = { low = -1.0, high = 3.0 }"),
+        "variables.l.low: -1 mm must be at least 0 mm as pinion.modification[0].length",
+    ),
+    "teeth absurd": (text().replace("teeth = 19", f"teeth = {2**70}"), "pinion.teeth: a whole number of about 22"),
+    "teeth too few": (text().replace("teeth = 19", "teeth = 3"), "pinion.teeth: 3 must be at least 5"),
+    "tip of the file": (
+        text(wheel="tip_diameter = 30.0"),
+        "wheel.tip_diameter: tip diameter = 30 mm must be greater than",
+    ),
+    "bore of the file": (text(wheel="bore_diameter = 140.0"), "wheel.bore_diameter: 140 mm must be less than 136.5"),
     "nested absurdly": ("a = " + "[" * 100_000, "tables or lists are nested too deeply"),
     "number beyond all bounds": (text().replace("module = 3.0", "module = 1" + "0" * 400), "pinion.module: "),
     "empty": ("", "pinion: missing, this key is required"),
@@ -434,7 +519,7 @@ def test_a_resolution_that_misses_part_of_the_path_is_refused(load):
     gear = "teeth = 70\nmodule = 3.0\nface_width = 20.0\naddendum = 1.3\ndedendum = 1.5\nroot_radius = 0.2\n"
     tail = "[load]\ntorque = 50.0\n[resolution]\npositions = 4\npairs = 2\n"
     file = load(f"[pinion]\n{gear}[wheel]\n{gear}{tail}")
-    with pytest.raises(DesignFileError, match="resolution: Resolution: pairs = 2 must be at least"):
+    with pytest.raises(DesignFileError, match="resolution: pairs = 2 must be at least"):
         file.mesh()
 
 

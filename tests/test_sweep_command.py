@@ -180,7 +180,7 @@ def test_an_interrupted_sweep_says_how_to_go_on_and_does(tmp_path):
         ('"ppte"', '"te_harmonic_3", "ppte"', None),
         ("part_rows = 25", "weights = [1.0]", ["sweep.weights: has no effect without sweep.torques"]),
         ("part_rows = 25", "torques = [-1.0]", ["sweep.torques[0]: -1 N m must be greater than 0 N m"]),
-        ("part_rows = 25", "torques = [1, 2]\nweights = [1]", ["sweep.weights: LoadSpectrum: 1 weights must be"]),
+        ("part_rows = 25", "torques = [1, 2]\nweights = [1]", ["sweep.weights: 1 weights must be"]),
         ("part_rows = 25", "part_rows = 0", ["sweep.part_rows: 0 must be"]),
         ('"latin_hypercube"\nsamples = 60', '"full_factorial"', ["sweep.levels: missing"]),
         ('"latin_hypercube"\nsamples = 60', '"full_factorial"\nlevels = 1', ["sweep.levels: 1 must be at least 2"]),

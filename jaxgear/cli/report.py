@@ -14,7 +14,7 @@ from rich.table import Table
 
 from ..contact import Mesh
 from ..io import DesignFile, describe
-from ..io.parts import UNITS
+from ..io.results import unit_of
 from .study import Evaluation
 
 Evaluations = Mapping[str, Evaluation]
@@ -164,12 +164,13 @@ def _flank_cells(evaluation: Evaluation) -> Iterator[tuple[str, str]]:
     for gear, modification in (("pinion", evaluation.pinion), ("wheel", evaluation.wheel)):
         seen: dict[str, int] = {}
         for part in describe(modification):
-            kind = part.pop("type").replace("_", " ")
+            name = part.pop("type")
+            kind = name.replace("_", " ")
             seen[kind] = seen.get(kind, 0) + 1
             again = f" {seen[kind]}" if seen[kind] > 1 else ""
-            for name, value in part.items():
-                unit = f" [{UNITS[name]}]" if name in UNITS else ""
-                yield f"{gear} {kind}{again}, {name}{unit}", _text(value)
+            for field, value in part.items():
+                unit = f" [{unit_of(name, field)}]" if unit_of(name, field) else ""
+                yield f"{gear} {kind}{again}, {field}{unit}", _text(value)
 
 
 def _text(value, form: str = ".3f") -> str:

@@ -7,13 +7,14 @@ from typing import Any, TypeVar
 
 from ..compliance import Beam, Compliance, ElasticRing, legacy_compliance
 from ..contact import Mesh, Resolution, fewest_pairs, prepare
-from ..geometry import Gear, GearPair, Material
+from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
 from ..sizing import iso_stiffness
 from . import schema, template
 from .errors import DesignFileError, refused, suggestion
+from .kinds import outside
 from .layout import Section
-from .toml import decode, join, read
+from .toml import decode, read
 
 T = TypeVar("T", bound=Section)
 
@@ -126,10 +127,11 @@ def load_design(path: str | Path) -> DesignFile:
     gears, parts = [], []
     for name in ("pinion", "wheel"):
         gear = section(name, schema.GearSection)
-        gears.append(_gear(file, name, gear))
+        gears.append(template.part_of(file, name, gear, Gear))
         keys = [f"{name}.modification[{i}]" for i in range(len(gear.modification))]
-        parts.append([template.parse_modification(file, key, table) for key, table in zip(keys, gear.modification)])
-    pair = refused(file, "pair", GearPair, *gears, **section("pair", schema.PairSection).given())
+        tables = zip(keys, gear.modification)
+        parts.append([template.parse(file, key, table, AbstractModification) for key, table in tables])
+    pair = _pair(file, *gears, top.pair or {})
     load = _load(file, section("load", schema.LoadSection))
     optimize = section("optimize", schema.OptimizeSection)
     if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
@@ -158,13 +160,12 @@ def load_design(path: str | Path) -> DesignFile:
     )
 
 
-def _gear(file: Path, name: str, section: schema.GearSection) -> Gear:
-    key = join(name, "material")
-    constants = decode(file, key, section.material or {}, schema.MaterialSection)
-    # never the library's STEEL: it was made at import, possibly in single precision
-    material = refused(file, key, Material, **constants.given())
-    numbers = {key: value for key, value in section.given().items() if key not in ("material", "modification")}
-    return refused(file, name, Gear, **{**numbers, "teeth": float(section.teeth)}, material=material)
+def _pair(file: Path, pinion: template.Part, wheel: template.Part, table: schema.Tables) -> GearPair:
+    rest = template.part_of(file, "pair", decode(file, "pair", table, schema.PairSection), GearPair)
+    pair = template.Part(GearPair, {"pinion": pinion, "wheel": wheel, **rest.fields}, "pair")
+    for free in pair.free():
+        raise DesignFileError(file, free.key, "must be a number, not a string")
+    return pair.checked(file, {})
 
 
 def _load(file: Path, load: schema.LoadSection) -> schema.LoadSection:
@@ -215,7 +216,8 @@ def _variables(file: Path, tables: schema.Tables, parts: list[template.Part]):
         _increasing(file, f"{key}.high", variable.low, variable.high)
         bounds[name] = (variable.low, variable.high)
     for part in parts:
-        for free, unit in part.free():
+        for free in part.free():
+            unit = free.number.unit
             if free.name not in bounds:
                 known = suggestion(free.name, bounds) if bounds else "there is no [variables] table"
                 raise DesignFileError(file, free.key, f'"{free.name}" is not a variable, {known}')
@@ -223,6 +225,9 @@ def _variables(file: Path, tables: schema.Tables, parts: list[template.Part]):
             if other != unit:
                 problem = f"{free.name} stands for {_quantity(unit)} here and for {_quantity(other)} elsewhere"
                 raise DesignFileError(file, free.key, problem)
+            for end, bound in zip(("low", "high"), bounds[free.name]):
+                if problem := outside(free.number, bound):
+                    raise DesignFileError(file, f"variables.{free.name}.{end}", f"{problem} as {free.key}")
     for name, table in tables.items():
         if name not in units:
             raise DesignFileError(file, f"variables.{name}", "is declared but used in no modification")
@@ -231,7 +236,7 @@ def _variables(file: Path, tables: schema.Tables, parts: list[template.Part]):
             raise DesignFileError(file, f"variables.{name}.unit", f'"{unit}" must be "{units[name]}" as it is used')
     for part in parts:
         for end in (0, 1):
-            refused(file, part.key, part.build, {name: limits[end] for name, limits in bounds.items()})
+            part.checked(file, {name: limits[end] for name, limits in bounds.items()})
     return bounds, {name: units[name] for name in bounds}
 
 

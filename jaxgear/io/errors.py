@@ -1,6 +1,7 @@
 """What can be wrong with a design file, always in one line."""
 
 import difflib
+import re
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
@@ -20,7 +21,12 @@ def refused(file, key: str, make: Callable[..., T], *args, **kwargs) -> T:
     try:
         return make(*args, **kwargs)
     except (ValueError, OverflowError) as error:
-        raise DesignFileError(file, key, error) from None
+        raise DesignFileError(file, key, problem(error)) from None
+
+
+def problem(error: Exception) -> str:
+    """What the library refuses, without the class that refuses it: a design file has keys."""
+    return re.sub(r"\A[A-Z]\w*: ", "", str(error))
 
 
 def suggestion(name: object, valid: Iterable[str]) -> str:

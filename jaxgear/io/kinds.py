@@ -54,10 +54,12 @@ class Real(Kind):
     Attributes:
         number: unit and range.
         open: the name of a variable may stand for it.
+        plausible: it must be of an engineer's range; otherwise that is checked later, once its unit is known.
     """
 
     number: Number = Number()
     open: bool = False
+    plausible: bool = True
 
     @property
     def words(self) -> str:
@@ -69,7 +71,7 @@ class Real(Kind):
             return value
         if isinstance(value, bool) or not isinstance(value, int if self.number.whole else int | float):
             raise refusal(self.words, value)
-        problem = outside(self.number, value)
+        problem = outside(self.number, value, plausible=self.plausible)
         if problem:
             raise PydanticCustomError("range", "{problem}", {"problem": problem})
         return value if self.number.whole else float(value)
@@ -193,8 +195,8 @@ class Either(Kind):
         )
 
 
-def outside(number: Number, value: float) -> str:
-    """What is wrong with a number, "" if it is finite and within its range and an engineer's."""
+def outside(number: Number, value: float, *, plausible: bool = True) -> str:
+    """What is wrong with a number, "" if it is finite and within its range and, if `plausible`, an engineer's."""
     unit = f" {number.unit}" if number.unit else ""
     if isinstance(value, float) and not math.isfinite(value):
         return f"{value} must be finite"
@@ -206,7 +208,7 @@ def outside(number: Number, value: float) -> str:
         return f"{shown} must be {_range(number, unit)}"
     least, most = PLAUSIBLE.get(number.unit, _PURE)
     positive = low is not None and low >= 0 and number.open_low
-    if abs(value) > most or (positive and value < least):
+    if plausible and (abs(value) > most or (positive and value < least)):
         floor = least if positive else -most if low is None else low
         return f"{shown} must be at least {floor:g}{unit} and at most {most:g}{unit}"
     return ""

@@ -35,15 +35,19 @@ class Section(BaseModel):
 
 
 @cache
-def section_of(cls: type[eqx.Module]) -> type[Section]:
+def section_of(cls: type[eqx.Module], without: tuple[str, ...] = ()) -> type[Section]:
     """The keys of a class: its fields that can be written in a file.
+
+    Args:
+        cls: the class.
+        without: fields that stand elsewhere.
 
     Raises:
         TypeError: where a field without default cannot be written.
     """
     keys: dict[str, Any] = {}
     for field in dataclasses.fields(cls):
-        if not field.init:
+        if not field.init or field.name in without:
             continue
         kind = _kind(cls, field)
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
@@ -69,7 +73,9 @@ def family(base: type[eqx.Module]) -> dict[str, type[eqx.Module]]:
     found: dict[str, type[eqx.Module]] = {}
     for cls in _descendants(base):
         name = snake(cls.__name__)
-        if name in found and _own(cls) and not _own(found[name]):
+        if not (_users(cls) or cls.__module__.startswith(base.__module__.rpartition(".")[0])):
+            continue  # a part of another layer, no choice of the user
+        if name in found and _users(cls) and not _users(found[name]):
             continue
         if not (cls.__name__.startswith("_") or inspect.isabstract(cls)) and _writable(cls):
             found[name] = cls
@@ -110,8 +116,10 @@ def _kind(cls, field: dataclasses.Field) -> Kind | None:
     if number is not None:
         return _number(number)
     hint = _hint(cls, field)
-    if _module(hint) is not None:
-        return Table()
+    module = _module(hint)
+    if module is not None:
+        # what contains another of its family is made by the lists of the file
+        return None if is_family(module) and issubclass(cls, module) else Table()
     if typing.get_origin(hint) is typing.Literal:
         return Choice(typing.get_args(hint))
     plain = {bool: Switch(), str: Text(), int: Real(Number(whole=True)), float: Real()}
@@ -121,7 +129,7 @@ def _kind(cls, field: dataclasses.Field) -> Kind | None:
 def _number(number: Number) -> Kind | None:
     if not number.checked:
         return None
-    kind: Kind = Real(number, open=not number.static)
+    kind: Kind = Real(number, open=not (number.static or number.whole))
     for _ in number.shape:
         kind = ListOf(kind)
     return kind
@@ -151,7 +159,7 @@ def _descendants(base):
         yield from _descendants(cls)
 
 
-def _own(cls) -> bool:
+def _users(cls) -> bool:
     return not cls.__module__.startswith("jaxgear.")
 
 

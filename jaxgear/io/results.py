@@ -16,8 +16,9 @@ from ..contact import Mesh
 from ..geometry import diameter, roll_angle
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, NoModification, Sum
+from ..numerics import fields_of
 from ..optimize import Front
-from .parts import CURVES, MODIFICATIONS
+from .layout import family, snake
 
 Designs = Mapping[str, tuple[AbstractModification, AbstractModification]]
 
@@ -39,7 +40,13 @@ def describe(modification: AbstractModification) -> list[dict[str, Any]]:
     if isinstance(modification, NoModification):
         return []
     terms = modification.terms if isinstance(modification, Sum) else (modification,)
-    return [_plain(term, MODIFICATIONS) for term in terms]
+    return [_plain(term) for term in terms]
+
+
+def unit_of(kind: str, name: str) -> str:
+    """Unit of a number of a modification, both in the words of a design file; "" for a pure number."""
+    number = fields_of(family(AbstractModification)[kind]).get(name) if kind in family(AbstractModification) else None
+    return number.unit if number else ""
 
 
 def flank_rows(mesh: Mesh, designs: Designs) -> Iterator[tuple[str, str, float, float, float, float, float]]:
@@ -96,16 +103,17 @@ def _evaluate(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModificat
     return columns
 
 
-def _plain(part: eqx.Module, known) -> dict[str, Any]:
-    name = next((name for name, (make, _) in known.items() if make is type(part)), None)
-    if name is None:
-        return {"type": type(part).__name__}
-    data: dict[str, Any] = {"type": name}
+def _plain(part: eqx.Module) -> dict[str, Any]:
+    data: dict[str, Any] = {"type": snake(type(part).__name__)}
     for field, value in vars(part).items():
-        if field == "curve":
-            data[field] = _plain(value, CURVES)
+        if isinstance(value, eqx.Module):
+            data[field] = _plain(value)
+        elif isinstance(value, tuple) and all(isinstance(item, eqx.Module) for item in value):
+            data[field] = [_plain(item) for item in value]
+        elif isinstance(value, str | bool) or value is None:
+            data[field] = value
         else:
-            data[field] = value if isinstance(value, str) else np.asarray(value).tolist()
+            data[field] = np.asarray(value).tolist()
     return data
 
 

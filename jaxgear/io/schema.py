@@ -7,9 +7,10 @@ there: None means that the key is absent.
 from typing import Annotated, Any
 
 from .. import compliance
+from ..geometry import Gear, GearPair
 from ..numerics import Number
 from .kinds import Choice, Either, ListOf, Real, Switch, Table, Text
-from .layout import Section
+from .layout import Section, section_of
 
 Tables = dict[str, Any]
 _SEED = 2**31 - 1  # what every generator of random numbers takes
@@ -25,6 +26,7 @@ def _positive(unit: str) -> Real:
 
 
 _NUMBER = Real()
+_BOUND = Real(plausible=False)
 _SHARE = Real(Number(low=0.0, high=1.0, open_low=True, open_high=True))
 _TABLES = ListOf(Table(), empty=True)
 _WEIGHTS = ListOf(Real(Number(low=0.0)))
@@ -46,31 +48,13 @@ class FileSection(Section):
     tolerance: Annotated[Tables | None, Table()] = None
 
 
-class MaterialSection(Section):
-    elastic_modulus: Annotated[float | None, _NUMBER] = None
-    poisson_ratio: Annotated[float | None, _NUMBER] = None
-    density: Annotated[float | None, _NUMBER] = None
-    thermal_contact_coefficient: Annotated[float | None, _NUMBER] = None
+class GearSection(section_of(Gear)):  # type: ignore[misc]
+    """A gear and what is taken off its flanks."""
 
-
-class GearSection(Section):
-    teeth: Annotated[int, Real(Number(whole=True))]
-    module: Annotated[float, _NUMBER]
-    face_width: Annotated[float, _NUMBER]
-    pressure_angle: Annotated[float | None, _NUMBER] = None
-    profile_shift: Annotated[float | None, _NUMBER] = None
-    addendum: Annotated[float | None, _NUMBER] = None
-    dedendum: Annotated[float | None, _NUMBER] = None
-    root_radius: Annotated[float | None, _NUMBER] = None
-    tip_diameter: Annotated[float | None, _NUMBER] = None
-    bore_diameter: Annotated[float | None, _NUMBER] = None
-    tip_edge_radius: Annotated[float | None, _NUMBER] = None
-    material: Annotated[Tables | None, Table()] = None
     modification: Annotated[list[Tables], _TABLES] = []
 
 
-class PairSection(Section):
-    center_distance: Annotated[float | None, _NUMBER] = None
+PairSection = section_of(GearPair, without=("pinion", "wheel"))
 
 
 class LoadSection(Section):
@@ -115,8 +99,8 @@ class ResolutionSection(Section):
 
 
 class VariableSection(Section):
-    low: Annotated[float, _NUMBER]
-    high: Annotated[float, _NUMBER]
+    low: Annotated[float, _BOUND]
+    high: Annotated[float, _BOUND]
     unit: Annotated[str | None, Text(empty=True)] = None
 
 

@@ -1,5 +1,6 @@
-"""Modifications with named free parameters: what a design file holds before the parameters have values."""
+"""Objects of the library with named free parameters: what a design file holds before the parameters have values."""
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,26 +10,36 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from ..microgeometry import AbstractModification, NoModification
-from .errors import DesignFileError, suggestion
-from .kinds import ListOf, Real
-from .layout import Section
-from .parts import CURVES, MODIFICATIONS, UNITS, Tables
+from ..numerics import Number, fields_of
+from .errors import DesignFileError, problem
+from .kinds import not_known
+from .layout import Section, family, is_family, modules_of, section_of
 from .toml import decode, join
+
+# `tip_diameter = 3 mm must be`, `wheel module = 4 mm must be`: what the library says of a field
+_FIELD = re.compile(r"((?P<part>\w+) )?(?P<name>\w+)( =|:) ")
 
 
 @dataclass(frozen=True)
 class Free:
-    """A number that the file leaves open, with the key where it stands."""
+    """A number that the file leaves open.
+
+    Attributes:
+        name: of the variable.
+        key: where it stands.
+        number: what may stand there.
+    """
 
     name: str
     key: str
+    number: Number
 
 
 @dataclass(frozen=True)
 class Part:
-    """A modification or a curve: its class, and its fields.
+    """An object of the library: its class, and those of its fields that the file gives.
 
-    A field is a number, a `Free` number, a list of both, a curve, or a choice among strings.
+    A field is a number, a `Free` number, a list of both, another part, or a choice among strings.
     """
 
     make: Callable[..., eqx.Module]
@@ -36,17 +47,37 @@ class Part:
     key: str
 
     def build(self, parameters: Mapping[str, Any]) -> Any:
-        """The modification with the parameters in place of the open numbers; they may be tracers."""
+        """The object with the parameters in place of the open numbers; they may be tracers."""
         return self.make(**{name: _fill(value, parameters) for name, value in self.fields.items()})
 
-    def free(self) -> Iterator[tuple[Free, str]]:
-        """Every open number with its unit."""
-        for name, value in self.fields.items():
-            if isinstance(value, Part):
-                yield from value.free()
-            for item in value if isinstance(value, list) else [value]:
-                if isinstance(item, Free):
-                    yield item, UNITS.get(name, "")
+    def checked(self, file: Path, parameters: Mapping[str, Any]) -> Any:
+        """The object with concrete parameters.
+
+        Args:
+            file: for the message.
+            parameters: in place of the open numbers.
+
+        Raises:
+            DesignFileError: for what the class refuses, with the key of the field where the file gives it.
+        """
+        given = {
+            name: value.checked(file, parameters) if isinstance(value, Part) else _fill(value, parameters)
+            for name, value in self.fields.items()
+        }
+        try:
+            return self.make(**given)
+        except (ValueError, OverflowError) as error:
+            text = problem(error)
+            field = _FIELD.match(text)
+            owner = self.fields.get(field["part"]) if field and field["part"] else self
+            if field and isinstance(owner, Part) and field["name"] in owner.fields:
+                raise DesignFileError(file, join(owner.key, field["name"]), text[field.end() :]) from None
+            raise DesignFileError(file, self.key, text) from None
+
+    def free(self) -> Iterator[Free]:
+        """Every open number."""
+        for value in self.fields.values():
+            yield from _open(value)
 
 
 def build(parts: list[Part], parameters: Mapping[str, Any]) -> AbstractModification:
@@ -58,39 +89,51 @@ def build(parts: list[Part], parameters: Mapping[str, Any]) -> AbstractModificat
     return NoModification() if total is None else total
 
 
-def parse_modification(file: Path, key: str, table: Tables) -> Part:
-    """A modification from its table.
+def parse(file: Path, key: str, table: Mapping[str, Any], cls: type[eqx.Module]) -> Part:
+    """An object from its table; `type` says which class derived from an abstract one it is of.
 
     Raises:
-        DesignFileError: for an unknown type, unknown or missing keys and wrong types.
+        DesignFileError: for an unknown type, unknown or missing keys, wrong types and numbers out of range.
     """
-    return _parse(file, key, table, MODIFICATIONS)
+    if is_family(cls):
+        known, name = family(cls), table.get("type")
+        if name is None:
+            raise DesignFileError(file, join(key, "type"), f"missing, must be one of {', '.join(known)}")
+        if not isinstance(name, str) or name not in known:
+            raise DesignFileError(file, join(key, "type"), not_known(name, known))
+        cls, table = known[name], {other: value for other, value in table.items() if other != "type"}
+    return part_of(file, key, decode(file, key, table, section_of(cls)), cls)
 
 
-def _parse(file: Path, key: str, table: Tables, known: Mapping[str, tuple[type, type[Section]]]) -> Part:
-    name = table.get("type")
-    if name is None:
-        raise DesignFileError(file, join(key, "type"), f"missing, must be one of {', '.join(known)}")
-    if not isinstance(name, str) or name not in known:
-        raise DesignFileError(file, join(key, "type"), f'"{name}" is not known, {suggestion(name, known)}')
-    make, struct = known[name]
-    section = decode(file, key, {other: value for other, value in table.items() if other != "type"}, struct)
+def part_of(file: Path, key: str, section: Section, cls: type[eqx.Module]) -> Part:
+    """An object from its decoded table."""
+    numbers, modules = fields_of(cls), modules_of(cls)
     fields: dict[str, Any] = {}
-    for field, value in section.given().items():
-        here, kind = join(key, field), struct.kind(field)
-        if field == "curve":
-            fields[field] = _parse(file, here, value, CURVES)
-        elif isinstance(kind, Real):
-            fields[field] = _open(value, here)
-        elif isinstance(kind, ListOf):
-            fields[field] = [_open(item, f"{here}[{i}]") for i, item in enumerate(value)]
-        else:
-            fields[field] = value
-    return Part(make, fields, key)
+    for name, value in section.given().items():
+        here = join(key, name)
+        if name in modules:
+            fields[name] = parse(file, here, value, modules[name])
+        elif name in numbers:
+            fields[name] = _opened(value, here, numbers[name])
+        elif name in section_of(cls).model_fields:
+            fields[name] = value
+    return Part(cls, fields, key)
 
 
-def _open(value: float | str, key: str) -> float | Free:
-    return Free(value, key) if isinstance(value, str) else value
+def _opened(value, key: str, number: Number):
+    if isinstance(value, list):
+        return [_opened(item, f"{key}[{i}]", number) for i, item in enumerate(value)]
+    return Free(value, key, number) if isinstance(value, str) else value
+
+
+def _open(value) -> Iterator[Free]:
+    if isinstance(value, Part):
+        yield from value.free()
+    elif isinstance(value, list):
+        for item in value:
+            yield from _open(item)
+    elif isinstance(value, Free):
+        yield value
 
 
 def _fill(value, parameters):
@@ -98,6 +141,6 @@ def _fill(value, parameters):
         return value.build(parameters)
     if isinstance(value, Free):
         return parameters[value.name]
-    if isinstance(value, list) and any(isinstance(item, Free) for item in value):
-        return jnp.stack([jnp.asarray(_fill(item, parameters)) for item in value])
+    if isinstance(value, list) and any(True for _ in _open(value)):
+        return jnp.stack([jnp.asarray(_fill(item, parameters), float) for item in value])
     return value
