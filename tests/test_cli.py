@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import errno
 import importlib
 import io
 import json
@@ -10,16 +11,19 @@ import re
 import stat
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import equinox as eqx
 import jax
+import numpy as np
 import pytest
 
 import jaxgear as jg
+from jaxgear import plot
 from jaxgear.cli import cache, main, run
 from jaxgear.io import load_design
-from jaxgear.io.folder import RESULT_FILES
+from jaxgear.io.folder import RESULT_FILES, result_folder
 
 FIXED = """
 title = "a [small] pair"
@@ -56,6 +60,9 @@ starts = 2
 steps = 100
 """
 )
+
+
+EARLIER = '{"versions": {"jaxgear": "0.1.0"}}'  # the summary of an earlier run
 
 
 @pytest.fixture(autouse=True)
@@ -153,6 +160,7 @@ def test_rule_based_design_is_the_iso_relief_on_both_tips(folder, optimized):
 
 def test_all_result_files_are_there(folder, analyzed, optimized):
     of_others = {"front.csv", "front.png", "iterations_relief.png", "iterations_transmission_error.png"}
+    of_others |= {"lead_chart.png", "pressure_map.png"}  # one slice shows nothing over the face
     assert {path.name for path in (folder / "optimized").iterdir()} == RESULT_FILES - of_others
     assert {path.name for path in (folder / "analyzed").iterdir()} == {"summary.json", "flanks.csv"}
     for path in (folder / "optimized").glob("*.png"):
@@ -237,6 +245,8 @@ def test_results_of_an_earlier_run_are_replaced_and_figures_are_optional(folder,
     target = tmp_path / "out"
     target.mkdir()
     (target / "k_chart.png").write_text("from an earlier run")
+    assert_refused(call("analyze", folder / "fixed.toml", "-o", target), "other files than results of jaxgear (k_chart")
+    (target / "summary.json").write_text(EARLIER)
     assert call("analyze", folder / "fixed.toml", "-o", target, "--no-figures").code == 0
     assert {path.name for path in target.iterdir()} == {"summary.json", "flanks.csv"}
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
@@ -246,8 +256,41 @@ def test_results_of_an_earlier_run_are_replaced_and_figures_are_optional(folder,
 def test_results_go_beside_the_caller_by_default(folder, tmp_path, monkeypatch, analyzed):
     monkeypatch.chdir(tmp_path)
     result = call("analyze", folder / "fixed.toml", "--no-figures")
-    assert result.code == 0 and (tmp_path / "results" / "fixed" / "summary.json").is_file()
-    assert "results in results/fixed/" in result.out
+    assert result.code == 0 and (tmp_path / "results" / "fixed" / "analyze" / "summary.json").is_file()
+    assert "results in results/fixed/analyze/" in result.out
+
+
+def test_no_two_commands_share_a_folder():
+    folders = [
+        run.default_folder(Path("a/gear.toml"), *command, quick=quick)
+        for command in (("analyze",), ("optimize", "minimax"), ("optimize", "factorial"), ("sweep",))
+        for quick in (False, True)
+    ]
+    assert len(set(folders)) == len(folders) and folders[4] == Path("results/gear/optimize/factorial")
+    assert not any(one in other.parents for one in folders for other in folders)
+
+
+def test_a_full_disk_is_one_line_with_the_path(tmp_path):
+    with pytest.raises(ValueError, match=r"out: cannot be written: No space left on device$"):
+        with result_folder(tmp_path / "out"):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert not list(tmp_path.iterdir())
+    figure = plot.ppte_over_torque([1.0, 2.0], {"a": np.array([1.0, 2.0])}).figure
+    with pytest.raises(ValueError, match="full.png: cannot be written: File too large"), files_of_at_most(1000):
+        plot.save(figure, tmp_path / "full.png")
+    assert not list(tmp_path.iterdir())
+
+
+@contextlib.contextmanager
+def files_of_at_most(size):
+    """What a full disk does, without filling one."""
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_a_failed_contact_solution_is_loud(folder, tmp_path):
@@ -309,7 +352,13 @@ def test_files_and_folders_that_cannot_be_used_are_refused(folder, tmp_path, mon
     assert_refused(call("analyze", "thesis"), "thesis: is a folder, not a file")
     assert_refused(call("analyze", fixed, "-o", "taken"), "taken: is a file, not a folder")
     assert_refused(call("analyze", fixed, "-o", "taken/below"), "taken/below: cannot be written")
-    assert_refused(call("analyze", fixed, "-o", "thesis"), "thesis: holds other files than results")
+    assert_refused(call("analyze", fixed, "-o", "thesis"), "thesis: holds other files than results of jaxgear (chapter")
+    assert_refused(call("analyze", fixed, "-o", "."), ".: holds other files than results")
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")  # replacing it would leave the shell in a folder that is gone
+    assert_refused(call("analyze", fixed, "-o", "."), ".: is the folder you are in and would be replaced")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").rmdir()
     assert {path.name for path in tmp_path.rglob("*")} == {"taken", "thesis", "chapter.tex"}
 
 
@@ -333,7 +382,7 @@ def test_wrong_usage_is_one_line(arguments, fragment):
 def test_interruption_leaves_earlier_results_alone(folder, tmp_path, monkeypatch, command):
     target = tmp_path / "out"
     target.mkdir()
-    (target / "summary.json").write_text("earlier")
+    (target / "summary.json").write_text(EARLIER)
 
     def interrupt(*_):
         raise KeyboardInterrupt
@@ -344,7 +393,7 @@ def test_interruption_leaves_earlier_results_alone(folder, tmp_path, monkeypatch
     result = call(command, folder / f"{name}.toml", "-o", target)
     assert result.code == 130
     assert result.err == "jaxgear: interrupted, nothing was written\n"
-    assert (target / "summary.json").read_text() == "earlier"
+    assert (target / "summary.json").read_text() == EARLIER
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 

@@ -55,7 +55,7 @@ def folder(tmp_path_factory):
 @pytest.mark.slow
 def test_the_table_is_that_of_the_library(folder):
     folder, _ = folder
-    table = jg.open_sweep(folder / "out")
+    table = jg.open_sweep(folder / "out" / "table")
     assert table.names == ("variant", "height", "ppte_um", "effective_contact_ratio", "converged")
     assert table.units["height"] == "um" and len(table) == 60 and table.title == "a [small] pair"
     np.testing.assert_array_equal(
@@ -69,11 +69,11 @@ def test_the_table_is_that_of_the_library(folder):
 
 def test_the_best_are_printed_and_written(folder):
     folder, result = folder
-    best = jg.open_sweep(folder / "out").best(5)
+    best = jg.open_sweep(folder / "out" / "table").best(5)
     assert "a [small] pair, best first by ppte_um" in result.out and "height [um]" in result.out
     for name in ("ppte_um", "height"):
         assert f"{best.column(name)[0]:.4g}" in result.out
-    assert f"table in {folder / 'out'}{os.sep}" in result.out and "60 variants, " in result.out
+    assert f"table in {folder / 'out' / 'table'}{os.sep}" in result.out and "60 variants, " in result.out
     read = read_variants(folder / "out" / "best.csv", {"height": (0.0, 20.0)}, {"height": "um"})
     np.testing.assert_array_equal(read.rows(0, 5)[:, 0], best.column("height"))
     assert "jaxgear: 60 of 60 variants" in result.err.splitlines()[-1]
@@ -85,7 +85,7 @@ def test_pictures_show_every_variant_or_an_even_share(folder, tmp_path, monkeypa
     monkeypatch.setattr(sweep_figures, "_DRAWN", 20)
     drawn = {}
     monkeypatch.setattr("jaxgear.plot.pareto", lambda table, *names, **_: drawn.update(table) or plt.subplots()[1])
-    table = jg.open_sweep(folder / "out")
+    table = jg.open_sweep(folder / "out" / "table")
     sweep_figures.write_figures(tmp_path, table, ("ppte", "effective_contact_ratio"))
     front = table.pareto(["ppte_um", "effective_contact_ratio"]).column("ppte_um")
     assert set(drawn["ppte_um"]) == {*table.column("ppte_um")[::3], *front}
@@ -93,12 +93,12 @@ def test_pictures_show_every_variant_or_an_even_share(folder, tmp_path, monkeypa
 
 def test_repeated_it_finds_everything_there(folder):
     folder, _ = folder
-    before = {path.name: path.stat().st_mtime_ns for path in (folder / "out").glob("part-*")}
+    before = {path.name: path.stat().st_mtime_ns for path in (folder / "out" / "table").glob("part-*")}
     result = sweep(folder / "gear.toml", "-o", folder / "out")
     assert result.code == 0 and "resuming, 60 of 60 variants are there" in result.err
-    assert {path.name: path.stat().st_mtime_ns for path in (folder / "out").glob("part-*")} == before
+    assert {path.name: path.stat().st_mtime_ns for path in (folder / "out" / "table").glob("part-*")} == before
     other = sweep(folder / "gear.toml", "-o", folder / "out", "--samples", "61")
-    assert_refused(other, "out: holds a sweep of other settings (plan, variants)")
+    assert_refused(other, "table: holds a sweep of other settings (plan, variants)")
 
 
 def test_a_list_of_variants_may_be_the_best_of_a_sweep(folder, tmp_path):
@@ -108,8 +108,8 @@ def test_a_list_of_variants_may_be_the_best_of_a_sweep(folder, tmp_path):
     (tmp_path / "best.csv").write_bytes((folder / "out" / "best.csv").read_bytes())
     assert sweep(tmp_path / "listed.toml", "-o", tmp_path / "out").code == 0
     again, best = (
-        jg.open_sweep(tmp_path / "out"),
-        jg.open_sweep(folder / "out").best(len(jg.open_sweep(tmp_path / "out"))),
+        jg.open_sweep(tmp_path / "out" / "table"),
+        jg.open_sweep(folder / "out" / "table").best(len(jg.open_sweep(tmp_path / "out" / "table"))),
     )
     np.testing.assert_array_equal(again.column("ppte_um"), best.column("ppte_um"))
 
@@ -119,14 +119,39 @@ def test_a_quick_sweep_is_coarse_short_and_says_so(folder, tmp_path, monkeypatch
     (tmp_path / "gear.toml").write_text(SWEEP.replace("samples = 60", "samples = 5000").replace("part_rows = 25", ""))
     result = sweep("gear.toml", "--quick")
     assert result.code == 0 and "quick run" in result.out
-    assert len(jg.open_sweep("results/gear-quick")) == 4096
+    assert len(jg.open_sweep("results/gear/sweep-quick/table")) == 4096
 
 
 def test_failed_variants_are_loud(folder, tmp_path):
     (tmp_path / "gear.toml").write_text(SWEEP.replace("positions = 8", "positions = 8\ntolerance = 1e-30"))
     result = sweep(tmp_path / "gear.toml", "-o", tmp_path / "out")
     assert result.code == 1 and "60 variants failed" in result.err
-    assert len(jg.open_sweep(tmp_path / "out")) == 60
+    assert len(jg.open_sweep(tmp_path / "out" / "table")) == 60
+
+
+def test_interrupted_while_drawing_it_says_what_is_there(folder, monkeypatch):
+    folder, _ = folder
+    monkeypatch.setattr("jaxgear.cli.sweep.write_figures", lambda *_: signal.raise_signal(signal.SIGINT))
+    result = call("sweep", folder / "gear.toml", "-o", folder / "out")
+    line = f"the table and best.csv are complete in {folder / 'out'}{os.sep}, not all figures are drawn"
+    assert result.code == 130 and result.err.splitlines()[-1] == f"jaxgear: interrupted, {line}"
+
+
+def test_a_damaged_part_is_named_and_mended(folder, tmp_path):
+    folder, _ = folder
+    parts = sorted((folder / "out" / "table").glob("part-*"))
+    sound = parts[1].read_bytes()
+    parts[1].write_bytes(sound[:1000] + bytes([sound[1000] ^ 1]) + sound[1001:])
+    result = sweep(folder / "gear.toml", "-o", folder / "out")
+    warning = f"jaxgear: warning: {parts[1]}: is damaged or displaced, its variants are evaluated again"
+    assert result.code == 0 and warning in result.err.splitlines()
+    assert parts[1].read_bytes() == sound
+
+
+def test_a_folder_of_something_else_is_refused(folder, tmp_path):
+    (tmp_path / "best.csv").write_text("mine")
+    assert_refused(sweep(folder[0] / "gear.toml", "-o", tmp_path), "holds other files than a sweep (best.csv)")
+    assert (tmp_path / "best.csv").read_text() == "mine"
 
 
 @pytest.mark.slow
@@ -153,7 +178,7 @@ def test_an_interrupted_sweep_says_how_to_go_on_and_does(tmp_path):
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     process = subprocess.Popen(command, cwd=tmp_path, env=environment, **pipes)
     try:
-        while len(list((tmp_path / "out").glob("part-*"))) < 3 and process.poll() is None:
+        while len(list((tmp_path / "out" / "table").glob("part-*"))) < 3 and process.poll() is None:
             time.sleep(0.001)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
@@ -164,7 +189,7 @@ def test_an_interrupted_sweep_says_how_to_go_on_and_does(tmp_path):
     assert err.endswith(f" of 6,000 variants are in out{os.sep}, resume with the same command\n")
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0 and "jaxgear: resuming, " in done.stderr
-    assert len(jg.open_sweep(tmp_path / "out")) == 6000
+    assert len(jg.open_sweep(tmp_path / "out" / "table")) == 6000
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,10 @@
 """The commands, and the promise that every failure is one line."""
 
+import logging
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, NoReturn
 
@@ -14,10 +16,10 @@ from ..io.schema import METHODS_WITHOUT_VARIABLES
 from ..microgeometry import NoModification
 from ..optimize import METHODS
 from ..sizing import iso_relief
-from . import report
+from . import interrupt, report
 from .devices import join_processes, use_all_cores
-from .run import run
-from .sweep import Interrupted, run_sweep
+from .run import default_folder, opened, run
+from .sweep import run_sweep
 
 _TORQUES, _QUICK_TORQUES = 25, 7
 _QUICK_POSITIONS = 16
@@ -41,9 +43,13 @@ def _show_version(wanted: bool) -> None:
 
 
 File = Annotated[Path, typer.Argument(metavar="FILE.toml", help="Design file.", show_default=False)]
-Output = Annotated[
-    Path | None, typer.Option("--output", "-o", metavar="DIR", help="Result folder.", show_default="results/FILE")
-]
+
+
+def _output(folder: str):
+    """The option --output of a command with its own folder, which a quick run marks with -quick."""
+    return typer.Option("--output", "-o", metavar="DIR", help="Result folder.", show_default=f"results/FILE/{folder}")
+
+
 NoFigures = Annotated[bool, typer.Option("--no-figures", help="Write no figures.")]
 NoCache = Annotated[
     bool, typer.Option("--no-cache", envvar="JAXGEAR_NO_CACHE", help="Do not keep compiled programs on disk.")
@@ -63,28 +69,33 @@ def root(
 
 
 @app.command()
-def analyze(file: File, output: Output = None, no_figures: NoFigures = False, no_cache: NoCache = False) -> int:
+def analyze(
+    file: File,
+    output: Annotated[Path | None, _output("analyze")] = None,
+    no_figures: NoFigures = False,
+    no_cache: NoCache = False,
+) -> int:
     """Analyze the unmodified pair and the modification of the design file."""
-    with run(file, output, cache=not no_cache) as current:
-        design = current.design
+    with opened(file, cache=not no_cache) as (design, stages):
         if design.bounds:
             free = ", ".join(design.bounds)
             raise DesignFileError(
                 file, "variables", f"analyze needs numbers, these are free: {free}; use jaxgear optimize"
             )
-        current.prepare(torques=_TORQUES)
-        current.evaluate("unmodified", NoModification(), NoModification())
-        pinion, wheel = design.design({})
-        if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
-            current.evaluate("modified", pinion, wheel)
-        current.write(figures=not no_figures)
+        with run(design, output or default_folder(file, "analyze"), stages) as current:
+            current.prepare(torques=_TORQUES)
+            current.evaluate("unmodified", NoModification(), NoModification())
+            pinion, wheel = design.design({})
+            if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
+                current.evaluate("modified", pinion, wheel)
+            current.write(figures=not no_figures)
     return OK if current.show() else NOT_CONVERGED
 
 
 @app.command()
 def optimize(
     file: File,
-    output: Output = None,
+    output: Annotated[Path | None, _output("optimize/METHOD")] = None,
     method: Annotated[
         str | None, typer.Option("--method", "-m", metavar="NAME", help=f"In place of the file's: {_METHODS}.")
     ] = None,
@@ -97,28 +108,26 @@ def optimize(
     Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
     the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
     """
-    with run(file, output, cache=not no_cache) as current:
-        design = current.design
+    with opened(file, cache=not no_cache) as (design, stages):
         request = optimize_request(design, method=method, quick=quick)
-        if quick:
-            current.coarsen(positions=_QUICK_POSITIONS)
-        current.prepare(torques=_QUICK_TORQUES if quick else _TORQUES)
-        current.evaluate("unmodified", NoModification(), NoModification())
-        factor = design.application_factor
-        relief = eqx.filter_jit(iso_relief)(design.pair(), design.torque, application_factor=factor)
-        current.evaluate("rule-based", relief, relief)
-        current.search(request)
-        current.write(figures=not no_figures)
+        target = output or default_folder(file, "optimize", request.method, quick=quick)
+        with run(design, target, stages) as current:
+            if quick:
+                current.coarsen(positions=_QUICK_POSITIONS)
+            current.prepare(torques=_QUICK_TORQUES if quick else _TORQUES)
+            current.evaluate("unmodified", NoModification(), NoModification())
+            factor = design.application_factor
+            relief = eqx.filter_jit(iso_relief)(design.pair(), design.torque, application_factor=factor)
+            current.evaluate("rule-based", relief, relief)
+            current.search(request)
+            current.write(figures=not no_figures)
     return OK if current.show() else NOT_CONVERGED
 
 
 @app.command()
 def sweep(
     file: File,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="DIR", help="Folder of the table.", show_default="results/FILE"),
-    ] = None,
+    output: Annotated[Path | None, _output("sweep")] = None,
     samples: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Number of variants in place of the file's.")
     ] = None,
@@ -137,7 +146,8 @@ def sweep(
 ) -> int:
     """Evaluate the variants that the design file asks for, any number of them, into a table of Parquet files.
 
-    An interrupted sweep goes on where it was when the command is repeated.
+    The folder "table" of the results holds it and nothing else: pandas, polars and Arrow read it as a whole. An
+    interrupted sweep goes on where it was when the command is repeated.
     """
     use_all_cores()
     join_processes(coordinator, processes, process, automatic=distributed)
@@ -150,25 +160,48 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a title beyond the terminal's alphabet is no reason to fail
+    with interrupt.listening(), _warnings():
+        code = _run(arguments)
+    sys.exit(code)
+
+
+@contextmanager
+def _warnings() -> Iterator[None]:
+    """Shows what the library warns of as lines on stderr."""
+    lines = logging.StreamHandler()
+    lines.setLevel(logging.WARNING)
+    lines.setFormatter(logging.Formatter("jaxgear: warning: %(message)s"))
+    logger = logging.getLogger("jaxgear")
+    logger.addHandler(lines)
+    try:
+        yield
+    finally:
+        logger.removeHandler(lines)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         code = app(args=arguments, prog_name="jaxgear", standalone_mode=False)
-        if code == INTERRUPTED:
-            raise KeyboardInterrupt
-    except Interrupted as interrupted:
-        print(f"jaxgear: interrupted, {interrupted}", file=sys.stderr)
-        sys.exit(INTERRUPTED)
+        if code == INTERRUPTED or interrupt.asked():
+            return _say_interrupted()
     except (KeyboardInterrupt, typer.Abort):
-        print("jaxgear: interrupted, nothing was written", file=sys.stderr)
-        sys.exit(INTERRUPTED)
+        return _say_interrupted()
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # keeps the flush at exit quiet
-        sys.exit(OK)
+        return OK
     except Exception as error:  # noqa: BLE001 - a user never sees a traceback
         if os.environ.get("JAXGEAR_DEBUG"):
             raise
+        if interrupt.asked():  # a library has made something else of it
+            return _say_interrupted()
         print(f"jaxgear: error: {_one_line(error)}", file=sys.stderr)
-        sys.exit(FAILED)
-    sys.exit(code or OK)
+        return FAILED
+    return code or OK
+
+
+def _say_interrupted() -> int:
+    print(f"jaxgear: interrupted, {interrupt.written()}", file=sys.stderr)
+    return INTERRUPTED
 
 
 def _one_line(error: Exception) -> str:

@@ -4,7 +4,7 @@ import dataclasses
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import jax
@@ -16,7 +16,7 @@ from ..contact import Mesh
 from ..io import DesignFile, OptimizeRequest, load_design, result_folder, write_flanks, write_front, write_summary
 from ..microgeometry import AbstractModification
 from ..optimize import Optimum, Projection, project
-from . import optimum_report, report
+from . import interrupt, optimum_report, report
 from .cache import enable_cache
 from .study import Evaluation, Evaluator
 
@@ -130,29 +130,48 @@ class Stages:
 
     def begin(self, stage: str) -> None:
         """Names the next stage."""
+        interrupt.check()
         self._progress.update(self._task, description=stage, total=None, completed=0, note="")
         if not self._console.is_terminal:
             self._console.print(f"jaxgear: {stage}")
 
     def step(self, step: int, total: int, best: float) -> None:
         """Callback of the search."""
+        interrupt.check()
         self._progress.update(self._task, completed=step, total=total, note=f"best {best:.4g}")
 
 
 @contextmanager
-def run(file: Path, output: Path | None, *, cache: bool) -> Iterator[Run]:
-    """Reads the design file and opens the result folder; the results appear when the block ends without an exception.
+def opened(file: Path, *, cache: bool) -> Iterator[tuple[DesignFile, Stages]]:
+    """A design file and the progress of the command.
 
     Args:
         file: design file.
-        output: result folder, None for results/<stem of the file>.
         cache: keep compiled programs on disk.
     """
     jax.config.update("jax_enable_x64", True)
     if cache:
         enable_cache()
     with Stages(report.console(stderr=True)) as stages:
-        design = load_design(file)
-        target = Path("results") / file.stem if output is None else output
+        yield load_design(file), stages
+
+
+def default_folder(file: Path, *command: str, quick: bool = False) -> Path:
+    """Folder of the results of a command, in which those of no other command or kind of run are."""
+    folder = Path("results", file.stem, *command)
+    return folder.with_name(f"{folder.name}-quick") if quick else folder
+
+
+@contextmanager
+def run(design: DesignFile, target: Path, stages: Stages) -> Iterator[Run]:
+    """Opens the result folder; the results appear when the block ends without an exception.
+
+    Args:
+        design: design file.
+        target: result folder.
+        stages: progress of the command.
+    """
+    with ExitStack() as putting_in_place:
         with result_folder(target) as folder:
             yield Run(design, target, folder, stages)
+            putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))

@@ -12,20 +12,17 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from ..io import load_design, sweep_request
+from ..io import load_design, sweep_request, writing
 from ..sweeps import SweepTable, sweep
-from . import report
+from . import interrupt, report
 from .cache import enable_cache
+from .run import default_folder
 from .sweep_figures import write_figures
 
 _QUICK_POSITIONS, _QUICK_SAMPLES = 16, 4096
-_BEST_FILE = "best.csv"
+_TABLE, _BEST_FILE = "table", "best.csv"  # apart: readers of the table take its folder for theirs alone
 _LABEL_WIDTH, _CELL_WIDTH = 32, 10  # of the table of the best designs
 _LINES = 10  # of progress, where there is no terminal
-
-
-class Interrupted(Exception):
-    """Ctrl-C while parts of the table were being written."""
 
 
 def run_sweep(
@@ -35,7 +32,7 @@ def run_sweep(
 
     Args:
         file: design file.
-        output: folder of the table, None for results/<stem of the file>.
+        output: folder of the results, None for the default.
         samples: number of variants, None for the file's.
         best: how many designs to list.
         quick: coarse positions and few samples.
@@ -44,9 +41,6 @@ def run_sweep(
 
     Returns:
         False when a variant failed.
-
-    Raises:
-        Interrupted: when the rows so far are kept.
     """
     jax.config.update("jax_enable_x64", True)
     if cache:
@@ -56,37 +50,45 @@ def run_sweep(
     size = design.resolution(float(jnp.max(request.load.torques)))
     if quick:
         size = dataclasses.replace(size, positions=min(size.positions, _QUICK_POSITIONS))
-    target = Path("results") / (f"{file.stem}-quick" if quick else file.stem) if output is None else output
+    target = output or default_folder(file, "sweep", quick=quick)
+    _check(target)
     options = {} if request.part_rows is None else {"part_rows": request.part_rows}
     if request.tolerance is not None:
         options |= {"samples": request.samples, "seed": request.seed}
-    with Meter(report.console(stderr=True)) as meter:
-        try:
-            table = sweep(
-                design.design,
-                request.plan,
-                mesh=design.mesh(size),
-                torque=request.load,
-                results=request.results,
-                output=target,
-                tolerance=request.tolerance,
-                title=design.title,
-                units=design.units,
-                callback=meter,
-                **options,
-            )
-        except KeyboardInterrupt:
-            if meter.done is None:
-                raise
-            kept = f"{meter.done:,} of {meter.total:,} variants are in {target}{os.sep}"
-            raise Interrupted(f"{kept}, resume with the same command") from None
+    with Meter(report.console(stderr=True), target) as meter:
+        table = sweep(
+            design.design,
+            request.plan,
+            mesh=design.mesh(size),
+            torque=request.load,
+            results=request.results,
+            output=target / _TABLE,
+            tolerance=request.tolerance,
+            title=design.title,
+            units=design.units,
+            callback=meter,
+            **options,
+        )
     if jax.process_index() > 0:  # the first process speaks for all
         return table.failures() == 0
     chosen = table.best(best)
-    chosen.to_csv(target / _BEST_FILE)
+    with writing(target / _BEST_FILE):
+        chosen.to_csv(target / _BEST_FILE)
+    interrupt.note(f"the table and {_BEST_FILE} are complete in {target}{os.sep}, not all figures are drawn")
     if figures and len(chosen):
         write_figures(target, table, request.results)
+    interrupt.note(f"all results are in {target}{os.sep}")
     return _show(table, chosen, target, meter, quick=quick)
+
+
+def _check(target: Path) -> None:
+    """Refuses a folder of something else: a file of its own could have the name of a result."""
+    try:
+        others = [] if (target / _TABLE).exists() or not target.is_dir() else sorted(os.listdir(target))
+    except OSError as error:
+        raise ValueError(f"{target}: cannot be written: {error.strerror or error}") from None
+    if others:
+        raise ValueError(f"{target}: holds other files than a sweep ({others[0]}), choose another folder")
 
 
 def _show(table: SweepTable, chosen: SweepTable, target: Path, meter: "Meter", *, quick: bool) -> bool:
@@ -94,7 +96,7 @@ def _show(table: SweepTable, chosen: SweepTable, target: Path, meter: "Meter", *
     out.print(_side_by_side(chosen, (out.width - _LABEL_WIDTH) // _CELL_WIDTH))
     if quick:
         out.print("quick run: coarse positions and few samples, not a result to build on", soft_wrap=True)
-    out.print(f"best {len(chosen)} in {target / _BEST_FILE}, table in {target}{os.sep}", soft_wrap=True)
+    out.print(f"best {len(chosen)} in {target / _BEST_FILE}, table in {target / _TABLE}{os.sep}", soft_wrap=True)
     rate = f", {meter.rate:,.0f}/s" if meter.rate else ""
     out.print(f"{len(table):,} variants{rate}, {meter.elapsed:.1f} s", soft_wrap=True)
     failures = table.failures()
@@ -125,7 +127,8 @@ class Meter:
         done, total: variants of this process, None before the first.
     """
 
-    def __init__(self, console: Console):
+    def __init__(self, console: Console, target: Path):
+        self._target = target
         self.done: int | None = None
         self.total = 0
         self._console, self._began = console, time.perf_counter()
@@ -150,6 +153,8 @@ class Meter:
             if done:
                 self._console.print(f"jaxgear: resuming, {done:,} of {total:,} variants are there", soft_wrap=True)
         self.done, self.total = done, total
+        there = f"{done:,} of {total:,} variants are in {self._target}{os.sep}"
+        interrupt.note(f"{there}, resume with the same command")
         note = f"{done:,} of {total:,} variants" + (f", {self.rate:,.0f}/s" if self.rate else "")
         self._progress.update(self._task, completed=done, total=total, note=note)
         if not self._console.is_terminal and done * _LINES // total > self._lines:

@@ -4,6 +4,7 @@ from .design_file import DesignFile as DesignFile
 from .design_file import load_design as load_design
 from .errors import DesignFileError as DesignFileError
 from .folder import result_folder as result_folder
+from .folder import writing as writing
 from .optimize_request import OptimizeRequest as OptimizeRequest
 from .optimize_request import optimize_request as optimize_request
 from .results import describe as describe

@@ -1,5 +1,6 @@
 """A result folder that appears complete or not at all."""
 
+import json
 import os
 import shutil
 import tempfile
@@ -7,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-# A folder that holds anything else is not an earlier result and is never replaced.
+# A folder that holds anything else, or no summary of this program, is not an earlier result and is never replaced.
 RESULT_FILES = frozenset(
     {
         "summary.json",
@@ -24,6 +25,8 @@ RESULT_FILES = frozenset(
         "ppte_over_torque.png",
         "harris_map.png",
         "k_chart.png",
+        "lead_chart.png",
+        "pressure_map.png",
     }
 )
 
@@ -39,7 +42,8 @@ def result_folder(target: str | Path) -> Iterator[Path]:
         target: folder of the results.
 
     Raises:
-        ValueError: when the target is a file or a folder with other content, or cannot be written.
+        ValueError: when the target is a file, a folder with other content or the one the caller is in, or cannot be
+            written.
     """
     target = Path(target)
     _check_target(target)
@@ -52,12 +56,26 @@ def result_folder(target: str | Path) -> Iterator[Path]:
         _remove_empty(missing)
         raise ValueError(f"{target}: cannot be written: {error.strerror or error}") from None
     try:
-        yield temporary
+        with writing(target):
+            yield temporary
         _replace(temporary, target)
     except BaseException:
         shutil.rmtree(temporary, ignore_errors=True)
         _remove_empty(missing)
         raise
+
+
+@contextmanager
+def writing(path: str | Path) -> Iterator[None]:
+    """Names what is being written when the disk is full, or refuses for another reason.
+
+    Raises:
+        ValueError: in place of an OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
 def _check_target(target: Path) -> None:
@@ -66,13 +84,25 @@ def _check_target(target: Path) -> None:
             return
         if not target.is_dir():
             raise ValueError(f"{target}: is a file, not a folder")
-        others = sorted(entry.name for entry in target.iterdir() if entry.name not in RESULT_FILES)
+        names = sorted(entry.name for entry in target.iterdir())
     except OSError as error:
         raise ValueError(f"{target}: cannot be written: {error.strerror or error}") from None
-    if others:
-        raise ValueError(f"{target}: holds other files than results ({others[0]}), choose another folder")
+    others = [name for name in names if name not in RESULT_FILES]
+    if names and (others or not _is_ours(target)):
+        found = (others or names)[0]
+        raise ValueError(f"{target}: holds other files than results of jaxgear ({found}), choose another folder")
+    if Path.cwd().is_relative_to(target.resolve()):
+        raise ValueError(f"{target}: is the folder you are in and would be replaced, choose one below it")
     if not os.access(target, os.W_OK):
         raise ValueError(f"{target}: cannot be written: Permission denied")
+
+
+def _is_ours(folder: Path) -> bool:
+    """Whether the summary of a run of this program is there."""
+    try:
+        return "jaxgear" in json.loads((folder / "summary.json").read_text(encoding="utf-8"))["versions"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
 
 
 def _replace(temporary: Path, target: Path) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
 from ..geometry import PathOfContact
+from ..sweeps.store import write_durably
 
 _INCH = 25.4  # mm
 _POINTS_PER_INCH = 72
@@ -218,9 +220,17 @@ def save(fig: Figure, path: str | Path) -> Path:
 
     Returns:
         the path.
+
+    Raises:
+        ValueError: when the file cannot be written; no torn picture is left behind.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    fig.savefig(path, format="png", dpi=_DPI, bbox_inches="tight", pad_inches=0.03, facecolor="white")
+    picture = BytesIO()
+    fig.savefig(picture, format="png", dpi=_DPI, bbox_inches="tight", pad_inches=0.03, facecolor="white")
     plt.close(fig)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_durably(path, lambda file: file.write(picture.getvalue()))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
     return path

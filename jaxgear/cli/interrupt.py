@@ -1,0 +1,94 @@
+"""Ctrl-C: it always ends the command, and what the command then says of its files is true.
+
+Python raises KeyboardInterrupt wherever it happens to be. In a callback that JAX or a destructor runs, the exception is
+printed and lost, and the command would go on; so it is kept in mind, raised again where that is safe, and asked for
+before anything is put in place.
+"""
+
+import _thread
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+NOTHING = "nothing was written"
+_SOON = 0.02  # seconds in which Python is out of the callback
+
+
+class _State:
+    asked = False  # Ctrl-C was pressed
+    held = False  # it has to wait
+    written = NOTHING
+
+
+_state = _State()
+
+
+@contextmanager
+def listening() -> Iterator[None]:
+    """Takes care of Ctrl-C for a block; nothing changes outside the main thread."""
+    _state.asked, _state.held, _state.written = False, False, NOTHING
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    earlier, hook = signal.signal(signal.SIGINT, _interrupted), sys.unraisablehook
+    sys.unraisablehook = _lost
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
+        signal.signal(signal.SIGINT, earlier)
+
+
+def note(written: str) -> None:
+    """Says what is on the disk from now on."""
+    _state.written = written
+    check()
+
+
+def written() -> str:
+    """What is on the disk."""
+    return _state.written
+
+
+def asked() -> bool:
+    """Whether Ctrl-C was pressed."""
+    return _state.asked
+
+
+def check() -> None:
+    """Raises KeyboardInterrupt where an earlier one was lost."""
+    if _state.asked and not _state.held:
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def held(then: str) -> Iterator[None]:
+    """Lets Ctrl-C wait for the end of a block that must not be left half done.
+
+    Args:
+        then: what is on the disk after it.
+    """
+    check()
+    _state.held = True
+    try:
+        yield
+        _state.written = then
+    finally:
+        _state.held = False
+    check()
+
+
+def _interrupted(*_) -> None:
+    _state.asked = True
+    check()
+
+
+def _lost(unraisable) -> None:
+    if issubclass(unraisable.exc_type, KeyboardInterrupt):
+        again = threading.Timer(_SOON, _thread.interrupt_main)  # until it is raised where it can pass
+        again.daemon = True
+        again.start()
+    else:
+        sys.__unraisablehook__(unraisable)

@@ -1,0 +1,28 @@
+"""Starts the command `jaxgear`: listens to Ctrl-C before the imports, which take a second.
+
+Installed as a module beside the package (pyproject.toml), since whatever lies in a package imports all of it first.
+"""
+
+import os
+import signal
+import sys
+
+
+def main() -> None:
+    """Entry point of the installed command."""
+
+    def leave(*_) -> None:  # at once: nothing is open, and an exception could be lost in a module that starts
+        os.write(2, b"jaxgear: interrupted, nothing was written\n")
+        os._exit(130)
+
+    signal.signal(signal.SIGINT, leave)
+    from jaxgear.cli import main as command
+
+    try:
+        command()
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said and done
+
+
+if __name__ == "__main__":
+    sys.exit(main())

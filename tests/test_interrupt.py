@@ -1,0 +1,125 @@
+"""Ctrl-C at any moment: it always ends the command, without a traceback, and what is said of the files is true."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from test_cli import FIXED, call
+
+from jaxgear.cli import interrupt, launcher, run
+
+NOTHING = "jaxgear: interrupted, nothing was written\n"
+# raises the signal when a module is asked for
+AT_IMPORT = """
+import os, runpy, signal, sys
+class Finder:
+    def find_spec(self, name, *_):
+        if name == {moment!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Finder())
+sys.argv = ["jaxgear", "analyze", "gear.toml"]
+runpy.run_path({launcher!r}, run_name="__main__")
+"""
+
+
+@pytest.fixture(autouse=True)
+def no_cache(monkeypatch):
+    """The tests keep their own compilation cache."""
+    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
+
+
+@pytest.fixture
+def gear(tmp_path):
+    (tmp_path / "gear.toml").write_text(FIXED)
+    return tmp_path / "gear.toml"
+
+
+def environment():
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+
+
+@pytest.mark.parametrize("moment", ["jaxgear", "numpy", "equinox", "jaxgear.cli.app"])
+def test_during_the_imports(gear, moment):
+    code = AT_IMPORT.format(moment=moment, launcher=launcher.__file__)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=gear.parent, env=environment(), capture_output=True, text=True
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", NOTHING)
+    assert [path.name for path in gear.parent.iterdir()] == ["gear.toml"]
+
+
+class Lost:
+    """Has Ctrl-C pressed where Python cannot raise."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_where_python_loses_it(capfd):
+    with pytest.raises(KeyboardInterrupt), interrupt.listening():
+        kept = Lost()
+        del kept
+        for _ in range(1000):
+            time.sleep(0.001)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("made_of_it", [None, RuntimeError("INTERNAL: KeyboardInterrupt"), TypeError("?")])
+def test_what_a_library_makes_of_it_does_not_matter(gear, tmp_path, monkeypatch, made_of_it):
+    def evaluate(*_):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            if made_of_it is not None:
+                raise made_of_it from None
+
+    monkeypatch.setattr(run.Run, "prepare", lambda self, **_: None)
+    monkeypatch.setattr(run.Run, "evaluate", evaluate)
+    monkeypatch.setattr(run.Run, "write", lambda self, **_: None)
+    result = call("analyze", gear, "-o", tmp_path / "out")
+    assert (result.code, result.err) == (130, NOTHING)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("late", ["replace", "show"])
+def test_results_that_are_there_are_not_denied(gear, tmp_path, monkeypatch, late):
+    def written(self, **_):
+        (self._folder / "summary.json").write_text(json.dumps({}))
+
+    def press(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        return original(*arguments)
+
+    monkeypatch.setattr(run.Run, "prepare", lambda self, **_: None)
+    monkeypatch.setattr(run.Run, "evaluate", lambda *_: None)
+    monkeypatch.setattr(run.Run, "write", written)
+    where = "jaxgear.io.folder._replace" if late == "replace" else "jaxgear.cli.run.Run.show"
+    original = __import__("jaxgear.io.folder", fromlist=["_replace"])._replace
+    monkeypatch.setattr(where, press)
+    result = call("analyze", gear, "-o", tmp_path / "out")
+    assert (result.code, result.err) == (130, f"jaxgear: interrupted, the results are in {tmp_path / 'out'}{os.sep}\n")
+    assert (tmp_path / "out" / "summary.json").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="other systems have no SIGINT for one process")
+def test_at_any_moment(gear):
+    moments = random.Random(3)
+    for _ in range(8):
+        for path in (gear.parent / "out").glob("*"):
+            path.unlink()
+        command = [sys.executable, launcher.__file__, "analyze", "gear.toml", "-o", "out", "--no-figures"]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        process = subprocess.Popen(command, cwd=gear.parent, env=environment(), **pipes)
+        time.sleep(moments.uniform(0.2, 12.0))
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=120)
+        there = (gear.parent / "out" / "summary.json").exists()
+        assert "Traceback" not in err and process.returncode == (130 if "interrupted" in err else 0), err
+        assert there == (NOTHING not in err), err
+        assert {path.name for path in gear.parent.iterdir()} <= {"gear.toml", "out"}
