@@ -7,6 +7,7 @@ import pytest
 from catalogue import gear_pair, high_contact_ratio_pair, kahraman_gear
 
 import jaxgear as jg
+from jaxgear.geometry import outline
 from jaxgear.geometry.involute import half_tooth_angle, involute
 
 # tip diameter of the 50/50 module 3 gear and the contact ratio it makes
@@ -179,6 +180,14 @@ def test_path_ends_at_the_tips():
     assert float(path.end - path.inner_single) == pytest.approx(float(pair.base_pitch), rel=1e-14)
 
 
+def test_a_gear_prints_the_diameters_that_follow_from_others():
+    """An omitted bore is a held circle all the same: of half the root diameter, 0.5 * 3 * (20 - 2.5)."""
+    text = str(jg.Gear(20, 3.0, face_width=10.0))
+    assert "bore_diameter=26.25 mm (half the root diameter)" in text and "tip_diameter=66 mm (of the rack)" in text
+    given = str(jg.Gear(20, 3.0, face_width=10.0, bore_diameter=30.0, tip_diameter=65.5))
+    assert "bore_diameter=30 mm, " in given and "tip_diameter=65.5 mm, " in given
+
+
 def test_face_width_and_ratio_of_a_pair():
     pair = jg.GearPair(jg.Gear(19, 3.0, face_width=20.0), jg.Gear(48, 3.0, face_width=18.0))
     assert float(pair.face_width) == 18.0
@@ -192,3 +201,17 @@ def test_every_number_of_a_pair_is_a_differentiable_leaf():
     # a larger tip circle lengthens the path of contact: d rho / d (2 r) = r / (2 rho)
     rho = float(pair.pinion.tip_roll_length)
     assert float(gradient.pinion.tip_diameter) == pytest.approx(31.5 / (2 * rho) / float(pair.base_pitch), rel=1e-12)
+
+
+def test_eager_calls_compile_once(caplog):
+    """Root searches make no new functions at every call: a second pair without a centre distance compiles nothing."""
+
+    def use(module):
+        pair = jg.GearPair(jg.Gear(19, module, face_width=20.0), jg.Gear(48, module, face_width=18.0))
+        jg.path_of_contact(pair), pair.working_center_distance, outline(pair.pinion), jg.fewest_pairs(pair)
+        jg.iso_relief(pair, 50.0)
+
+    use(3.0)
+    with jax.log_compiles():
+        use(3.1)
+    assert [record.getMessage() for record in caplog.records if "ompil" in record.getMessage()] == []
