@@ -86,6 +86,7 @@ from .microgeometry import Quadratic as Quadratic
 from .microgeometry import RootRelief as RootRelief
 from .microgeometry import Sinusoidal as Sinusoidal
 from .microgeometry import Spline as Spline
+from .microgeometry import TabulatedFlank as TabulatedFlank
 from .microgeometry import TabulatedProfile as TabulatedProfile
 from .microgeometry import TipRelief as TipRelief
 from .optimize import CMAES as CMAES

@@ -50,13 +50,6 @@ def clean_figures():
     assert dict(matplotlib.rcParams) == before
 
 
-@pytest.fixture
-def interpolation():
-    """Allows the promotion of ranks and dtypes that interpax's cubic splines use inside."""
-    with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):
-        yield
-
-
 @pytest.fixture(scope="module")
 def mesh():
     """The 19/48 pair at a coarse resolution, where a file has no mesh of its own."""

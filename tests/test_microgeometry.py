@@ -97,7 +97,6 @@ def test_derivative_by_the_node_is_continuous_and_finite():
     assert bool(jnp.all(jnp.isfinite(by_node(0.0, d))))
 
 
-@pytest.mark.usefixtures("interpolation")
 def test_spline_curve_is_the_natural_cubic():
     """Exact at its knots, exact for a straight line, vanishing curvature at the ends, the natural spline in between."""
     from scipy.interpolate import CubicSpline
@@ -210,7 +209,6 @@ def test_modifications_add_up():
         parts[0] + 1.0
 
 
-@pytest.mark.usefixtures("interpolation")
 @pytest.mark.parametrize("method", ["linear", "cubic2", "monotonic"])
 def test_tables_are_exact_at_their_knots_and_constant_beyond(method):
     position, amount = np.array([5.0, 6.0, 8.5, 10.0, 12.0]), np.array([3.0, 1.0, 0.0, 0.5, 6.0])
@@ -231,7 +229,6 @@ def test_tables_over_the_roll_angle():
     np.testing.assert_allclose(table(profile(np.deg2rad(angle) * BASE)), [1.0, 4.0, 2.0], atol=1e-13)
 
 
-@pytest.mark.usefixtures("interpolation")
 def test_table_reproduces_a_sampled_modification():
     relief = jg.TipRelief(7.0, 6.0) + jg.ProfileCrowning(2.0)
     knots = np.linspace(START, TIP, 200)
@@ -352,3 +349,75 @@ def test_derivative_by_the_node_is_right_for_any_node(node):
     np.testing.assert_allclose(by_depth, 2 * r / (2 - node), rtol=1e-14)
     beyond = jax.vmap(jax.grad(lambda n, d: ParabolicLinear(n)(d)), (None, 0))(node, jnp.asarray([0.3, 1.0]))
     assert bool(jnp.all(jnp.isfinite(beyond)))
+
+
+TABLE = [5.0, 6.0, 8.5, 10.0, 12.0]
+
+
+@pytest.mark.parametrize("method", ["linear", "cubic2", "monotonic"])
+def test_a_flank_table_without_variation_over_the_face_is_a_profile_table(method):
+    column = np.array([3.0, 1.0, 0.0, 0.5, 6.0])
+    table = jg.TabulatedFlank(TABLE, [-10.0, 0.0, 4.0], np.stack([column] * 3, axis=1), method)
+    points = profile(np.linspace(START, 14.0, 60), np.linspace(-14.0, 14.0, 60))
+    np.testing.assert_allclose(table(points), jg.TabulatedProfile(TABLE, column, method=method)(points), atol=1e-13)
+    assert not table.varies_along_face
+
+
+@pytest.mark.parametrize("method", ["linear", "cubic2", "monotonic"])
+def test_a_flank_table_is_exact_at_its_points_linear_over_the_face_and_constant_beyond(method):
+    face = np.array([-9.0, -2.0, 8.0])
+    amount = np.random.default_rng(3).normal(size=(5, 3))
+    table = jg.TabulatedFlank(TABLE, face, amount, method)
+    grid = profile(np.repeat(TABLE, 3), np.tile(face, 5))
+    np.testing.assert_allclose(table(grid), amount.reshape(-1), atol=1e-13)
+    columns = [jg.TabulatedProfile(TABLE, column, method=method)(profile(RHO)) for column in amount.T]
+    np.testing.assert_allclose(table(profile(RHO, 3.0)), 0.5 * (columns[1] + columns[2]), atol=1e-13)
+    np.testing.assert_allclose(table(profile(RHO, 99.0)), columns[2], atol=1e-13)
+    np.testing.assert_allclose(table(profile(RHO, -99.0)), columns[0], atol=1e-13)
+    assert table.varies_along_face
+
+
+@pytest.mark.parametrize("method", ["linear", "cubic2", "monotonic"])
+def test_derivatives_of_a_flank_table(method):
+    """By amounts, roll lengths and face coordinates against central differences, forward and reverse."""
+    amount = np.random.default_rng(4).normal(size=(5, 3))
+    points = profile(np.linspace(5.2, 11.9, 7), np.linspace(-7.7, 7.1, 7))
+    weight = jnp.arange(1.0, 8.0)
+    start = jnp.concatenate([jnp.asarray(TABLE), jnp.asarray([-9.0, -2.0, 8.0]), jnp.asarray(amount).reshape(-1)])
+    value = lambda x: jg.TabulatedFlank(x[:5], x[5:8], x[8:].reshape(5, 3), method)(points) @ weight  # noqa: E731
+    reverse, forward = jax.jit(jax.grad(value))(start), jax.jit(jax.jacfwd(value))(start)
+    np.testing.assert_allclose(reverse, forward, rtol=1e-9, atol=1e-12)
+    steps = 1e-6 * jnp.eye(start.shape[0])
+    values = jax.jit(jax.vmap(value))
+    central = (values(start[None] + steps) - values(start[None] - steps)) / 2e-6
+    np.testing.assert_allclose(reverse, central, rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: jg.TabulatedFlank([1.0, 2.0], [0.0, 1.0], [[1.0, 2.0]]),
+            r"amount has shape \(1, 2\), must be \(2, 2\)",
+        ),
+        (lambda: jg.TabulatedFlank([1.0, 2.0], [0.0], [[1.0], [2.0]]), "face_coordinate has shape .* at least 2"),
+        (lambda: jg.TabulatedFlank([2.0, 1.0], [0.0, 1.0], np.ones((2, 2))), "roll_length must increase strictly"),
+        (lambda: jg.TabulatedFlank([1.0, 2.0], [1.0, 1.0], np.ones((2, 2))), "face_coordinate must increase strictly"),
+        (lambda: jg.TabulatedFlank([1.0, 2.0], [0.0, 1.0], [1.0, 2.0]), "amount has shape .* must be a table"),
+    ],
+)
+def test_flank_tables_that_are_refused(make, message):
+    with pytest.raises(ValueError, match=f"TabulatedFlank: {message}"):
+        make()
+
+
+@pytest.mark.parametrize("method", ["cubic2", "monotonic"])
+def test_cubic_tables_against_scipy(method):
+    """The natural spline, and the shape-preserving cubic of Fritsch and Butland with its end slopes."""
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    rng, fine = np.random.default_rng(5), np.linspace(5.0, 12.0, 71)
+    rows = np.concatenate([rng.normal(size=(6, 5)), rng.integers(-1, 2, (9, 5)), np.sort(rng.normal(size=(6, 5)))])
+    ours = jax.jit(jax.vmap(lambda row: jg.TabulatedProfile(TABLE, row, method=method)(profile(fine))))(rows)
+    exact = CubicSpline(TABLE, rows.T, bc_type="natural") if method == "cubic2" else PchipInterpolator(TABLE, rows.T)
+    np.testing.assert_allclose(ours, exact(fine).T, atol=1e-12)

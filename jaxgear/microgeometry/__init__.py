@@ -27,4 +27,5 @@ from .profile import ProfileCrowning as ProfileCrowning
 from .profile import ProfileSlope as ProfileSlope
 from .profile import RootRelief as RootRelief
 from .profile import TipRelief as TipRelief
+from .tabulated import TabulatedFlank as TabulatedFlank
 from .tabulated import TabulatedProfile as TabulatedProfile

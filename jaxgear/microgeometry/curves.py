@@ -8,11 +8,11 @@ spline of ground flanks that are designed from the static transmission error.
 
 from abc import abstractmethod
 
-import interpax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import Checked, number, safe_power, safe_sqrt
+from ..numerics.spline import interpolate
 
 
 class AbstractCurve(Checked):
@@ -104,14 +104,5 @@ class Spline(AbstractCurve):
 
     def __call__(self, d):
         d = jnp.asarray(d)
-        knots = jnp.linspace(0.0, 1.0, self.values.shape[0], dtype=d.dtype)
-        values = self.values.astype(d.dtype)
-        return natural_spline(d, knots, values)
-
-
-def natural_spline(x, knots, values) -> Float[Array, "..."]:
-    """Natural cubic spline through `values` at `knots`, at any shape of x."""
-    # interpax's own end condition is not-a-knot, which overshoots between the first knots; axis 0 because it takes the
-    # boundary values of a negative axis for a whole row
-    slopes = interpax.approx_df(knots, values, "cubic2", axis=0, bc_type="natural")
-    return interpax.interp1d(x.reshape(-1), knots, values, method="cubic2", fx=slopes).reshape(x.shape)
+        depths = jnp.linspace(0.0, 1.0, self.values.shape[0], dtype=d.dtype)
+        return interpolate(d, depths, self.values, "cubic2")
