@@ -1,0 +1,36 @@
+"""README and guides keep their promises: every snippet runs, in the order of its page."""
+
+import re
+from pathlib import Path
+
+import jax
+import matplotlib
+import pytest
+
+matplotlib.use("Agg")
+
+ROOT = Path(__file__).parents[1]
+GUIDES = ROOT / "examples" / "guides"
+PAGES = [page for page in (ROOT / "README.md", *sorted(GUIDES.glob("*.md"))) if "```python" in page.read_text("utf-8")]
+
+
+def snippets(page: Path) -> list[str]:
+    return re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_snippet_runs(page, tmp_path, monkeypatch, clean_figures):
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    # what readers run has JAX's own rules of promotion
+    with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
+        for number, snippet in enumerate(snippets(page), 1):
+            exec(compile(snippet, f"{page.name}, snippet {number}", "exec"), names)
+
+
+def test_code_of_the_guides_is_marked_as_what_it_is():
+    """An indented Python snippet would not be run."""
+    for page in (ROOT / "README.md", *GUIDES.glob("*.md")):
+        outside = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+        assert not re.search(r"^    .*\b(import jax|jg\.|def \w+\()", outside, flags=re.MULTILINE), page.name
