@@ -13,8 +13,20 @@ import pytest
 
 import jaxgear as jg
 from jaxgear.geometry import path_of_contact
-from jaxgear.io import DesignFileError, describe, flank_rows, load_design, result_folder, write_summary
-from jaxgear.io.layout import family
+from jaxgear.io import (
+    DesignFileError,
+    describe,
+    flank_rows,
+    load_design,
+    optimize_request,
+    reference,
+    result_folder,
+    schema,
+    schema_sweep,
+    sweep_request,
+    write_summary,
+)
+from jaxgear.io.layout import family, section_of
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, Flank, ParabolicLinear
 from jaxgear.numerics import number
 
@@ -485,6 +497,10 @@ MALFORMED = {
         "wheel.tip_diameter: tip diameter = 30 mm must be greater than",
     ),
     "bore of the file": (text(wheel="bore_diameter = 140.0"), "wheel.bore_diameter: 140 mm must be less than 136.5"),
+    "tolerance of nothing": (
+        text(tail="[tolerance]\nquality_class = 5"),
+        "tolerance: has no effect without [sweep] or optimize.manufactured",
+    ),
     "nested absurdly": ("a = " + "[" * 100_000, "tables or lists are nested too deeply"),
     "number beyond all bounds": (text().replace("module = 3.0", "module = 1" + "0" * 400), "pinion.module: "),
     "empty": ("", "pinion: missing, this key is required"),
@@ -499,6 +515,98 @@ def test_a_malformed_file_is_one_line_that_names_file_and_key(load, tmp_path, ca
     message = str(caught.value)
     assert "\n" not in message
     assert message.startswith(f"{tmp_path / 'gear.toml'}: {expected}")
+
+
+def test_a_torque_in_newton_millimetres_is_named_as_one(load):
+    with pytest.raises(DesignFileError, match=r"load\.torque: 50000 N m deflects a pair of teeth of module 3 mm by"):
+        load(text().replace("torque = 50.0", "torque = 50000.0") + "torque_range = [49999.0, 50000.0]").resolution()
+
+
+WRONG = [
+    *("nan", "-inf", "1e300", "-1e300", "1e-300", "0", "-1", "0.0", str(2**70), "1" + "0" * 400),
+    *('""', '"x"', '"ppte"', "true", "[]", "{}", "[[]]", "[1.0, nan]", "[{}]", "{ a = nan }", "1979-05-27", "3.5"),
+]
+EVERYTHING = """
+[optimize]
+method = "minimax"
+objective = "ppte"
+measure = "cvar"
+level = 0.9
+torques = [40.0, 50.0]
+weights = [1.0, 2.0]
+manufactured = 4
+seed = 1
+starts = 4
+steps = 20
+application_factor = 1.2
+constraint = [{ of = "max_contact_pressure", high = 900.0 }, { variables = { height = 1.0 }, low = 1.0 }]
+minimax = { rounds = 2 }
+free_form = { points = 20, max_relief = 10.0, curvature = 0.01 }
+te_iteration = { start = "unmodified", max_relief = 8.0 }
+factorial = { levels = { height = 3 } }
+genetic = { population = 20, crossover = 0.4 }
+[sweep]
+sampling = "full_factorial"
+levels = { height = [1.0, 2.0, 4.0] }
+torques = [40.0, 50.0]
+results = ["ppte", "mean_te"]
+part_rows = 100
+[tolerance]
+quality_class = [5, 6]
+samples = 8
+seed = 3
+[model]
+plane = "stress"
+body = "ring"
+coupling = false
+[resolution]
+positions = 16
+pairs = 2
+[pair]
+center_distance = 101.0
+"""
+
+
+def test_whatever_is_written_in_a_file_it_is_read_or_refused_in_one_line(load):
+    """Every value of a file that says everything is replaced by values that nobody means: never a traceback."""
+    gear = "profile_shift = 0.1\nbore_diameter = 20.0\ntip_edge_radius = 0.1\nmaterial = { density = 7800.0 }\n"
+    curve = 'curve = { type = "quadratic", b0 = 0.0, b1 = 0.4, b2 = 0.6 }\n'
+    whole = text(pinion=gear + RELIEF + curve, load="speed = 1000.0\nfriction = 0.05", tail=VARIABLE + EVERYTHING)
+    rng, refusals = np.random.default_rng(0), 0
+    places = list(re.finditer(r"(?<= = )(\"[^\"]*\"|\[[^\]]*\]|\{[^{}]*\}|[-\w.]+)", whole))
+
+    def run(content):
+        file = load(content)
+        optimize_request(file)
+        sweep_request(file)
+
+    run(whole)  # the control: this one is right
+    for place in rng.choice(len(places), 200):
+        value = WRONG[rng.integers(len(WRONG))]
+        start, end = places[place].span()
+        try:
+            run(whole[:start] + value + whole[end:])
+        except DesignFileError as error:
+            refusals += 1
+            problem = str(error).partition("gear.toml: ")[2]
+            assert "\n" not in problem
+            assert re.match(r"[\w.\[\]]+: ", problem), problem  # a key, then what is wrong with it
+            assert not re.search(r"\b(Gear|GearPair|Material|TipRelief|LoadSpectrum|Quadratic|pydantic)\b", problem)
+    assert refusals > 150
+
+
+def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
+    text = reference()
+    sections = [schema.FileSection, schema.GearSection, schema.LoadSection, schema.OptimizeSection]
+    sections += [*schema.METHOD_OPTIONS.values(), schema_sweep.SweepSection, schema_sweep.ToleranceSection]
+    sections += [section_of(cls) for cls in (*family(AbstractModification, users=False).values(), jg.Material)]
+    for section in sections:
+        assert not [name for name in section.model_fields if f"| `{name}` | " not in text]
+    assert "| `module` | a number | mm | greater than 0 | required |" in text
+    assert "| `density` | a number | kg/m^3 | greater than 0 | `7850` | " in text
+    assert '| `side` | one of "both", "negative", "positive" |  |  | `"both"` | ' in text
+    guide = Path(__file__).parent.parent / "examples" / "guides" / "design_files.md"
+    assert guide.read_text(encoding="utf-8") == text, "python -m jaxgear.io.reference > examples/guides/design_files.md"
 
 
 def test_files_that_cannot_be_read(tmp_path):

@@ -7,6 +7,7 @@ from .folder import result_folder as result_folder
 from .folder import writing as writing
 from .optimize_request import OptimizeRequest as OptimizeRequest
 from .optimize_request import optimize_request as optimize_request
+from .reference import reference as reference
 from .results import describe as describe
 from .results import flank_rows as flank_rows
 from .results import write_flanks as write_flanks

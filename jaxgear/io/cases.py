@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ..conditions import LoadSpectrum
 from ..tolerance import Tolerance
-from . import schema
+from . import schema_sweep
 from .design_file import DesignFile
 from .errors import DesignFileError, refused
 
@@ -19,7 +19,7 @@ def load_of(design: DesignFile, table: str, torques: Sequence[float] | None, wei
     return load if weights is None else refused(design.path, f"{table}.weights", LoadSpectrum, torques, weights)
 
 
-def tolerance_of(design: DesignFile, section: schema.ToleranceSection) -> Tolerance:
+def tolerance_of(design: DesignFile, section: schema_sweep.ToleranceSection) -> Tolerance:
     """The tolerance of the table [tolerance]; without lead deviations on a mesh of one slice."""
 
     def make():

@@ -10,7 +10,7 @@ from ..contact import Mesh, Resolution, fewest_pairs, prepare
 from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
 from ..sizing import iso_stiffness
-from . import schema, template
+from . import schema, schema_sweep, template
 from .errors import DesignFileError, refused, suggestion
 from .kinds import outside
 from .layout import Section
@@ -56,8 +56,8 @@ class DesignFile:
     units: dict[str, str]
     application_factor: float
     optimize: schema.OptimizeSection
-    sweep: schema.SweepSection | None
-    tolerance: schema.ToleranceSection | None
+    sweep: schema_sweep.SweepSection | None
+    tolerance: schema_sweep.ToleranceSection | None
     _pair: GearPair
     _compliance: Compliance
     _resolution: Resolution
@@ -73,13 +73,22 @@ class DesignFile:
 
         Args:
             torque: largest torque on the pinion [N m], None for the largest that the file names.
+
+        Raises:
+            DesignFileError: when no number of pairs is enough, because of a torque or modulus in another unit.
         """
         if self._pairs_given:
             return self._resolution
         torque = max(self.torque, self.torque_range[1]) if torque is None else torque
         line_load = 1e3 * torque / float(self._pair.pinion.base_radius * self._pair.face_width)
         deflection = _DEFLECTIONS * line_load / float(iso_stiffness(self._pair, line_load).single)
-        return replace(self._resolution, pairs=fewest_pairs(self._pair, deflection=deflection))
+        try:
+            pairs = fewest_pairs(self._pair, deflection=deflection)
+        except ValueError:
+            given = f"{torque:g} N m deflects a pair of teeth of module {float(self._pair.pinion.module):g} mm by about"
+            problem = f"{given} {deflection / _DEFLECTIONS:.3g} um: give the torque in N m, elastic moduli in MPa"
+            raise DesignFileError(self.path, "load.torque", problem) from None
+        return replace(self._resolution, pairs=pairs)
 
     def mesh(self, resolution: Resolution | None = None) -> Mesh:
         """The prepared mesh.
@@ -127,7 +136,7 @@ def load_design(path: str | Path) -> DesignFile:
     gears, parts = [], []
     for name in ("pinion", "wheel"):
         gear = section(name, schema.GearSection)
-        gears.append(template.part_of(file, name, gear, Gear))
+        gears.append(template.part_of(file, name, gear, Gear, open=False))
         keys = [f"{name}.modification[{i}]" for i in range(len(gear.modification))]
         tables = zip(keys, gear.modification)
         parts.append([template.parse(file, key, table, AbstractModification) for key, table in tables])
@@ -137,6 +146,9 @@ def load_design(path: str | Path) -> DesignFile:
     if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
         raise DesignFileError(file, "optimize", "has no effect without [variables]")
     bounds, units = _variables(file, top.variables or {}, [*parts[0], *parts[1]])
+    tolerance = None if top.tolerance is None else section("tolerance", schema_sweep.ToleranceSection)
+    if tolerance is not None and top.sweep is None and optimize.manufactured is None:
+        raise DesignFileError(file, "tolerance", "has no effect without [sweep] or optimize.manufactured")
     if top.sweep is not None and not top.variables:
         raise DesignFileError(file, "sweep", "has no effect without [variables]")
     return DesignFile(
@@ -150,8 +162,8 @@ def load_design(path: str | Path) -> DesignFile:
         units=units,
         application_factor=optimize.application_factor,
         optimize=optimize,
-        sweep=None if top.sweep is None else section("sweep", schema.SweepSection),
-        tolerance=None if top.tolerance is None else section("tolerance", schema.ToleranceSection),
+        sweep=None if top.sweep is None else section("sweep", schema_sweep.SweepSection),
+        tolerance=tolerance,
         _pair=pair,
         _compliance=_compliance(file, section("model", schema.ModelSection)),
         _resolution=_resolution(file, section("resolution", schema.ResolutionSection), [*parts[0], *parts[1]], bounds),
@@ -161,10 +173,8 @@ def load_design(path: str | Path) -> DesignFile:
 
 
 def _pair(file: Path, pinion: template.Part, wheel: template.Part, table: schema.Tables) -> GearPair:
-    rest = template.part_of(file, "pair", decode(file, "pair", table, schema.PairSection), GearPair)
+    rest = template.part_of(file, "pair", decode(file, "pair", table, schema.PairSection), GearPair, open=False)
     pair = template.Part(GearPair, {"pinion": pinion, "wheel": wheel, **rest.fields}, "pair")
-    for free in pair.free():
-        raise DesignFileError(file, free.key, "must be a number, not a string")
     return pair.checked(file, {})
 
 

@@ -195,6 +195,21 @@ class Either(Kind):
         )
 
 
+def count(low: int, high: int) -> Real:
+    """A whole number; the upper limits keep a slip of the finger from filling the memory or compiling for hours."""
+    return Real(Number(low=low, high=high, whole=True))
+
+
+def positive(unit: str) -> Real:
+    """A number greater than zero."""
+    return Real(Number(unit, low=0.0, open_low=True))
+
+
+SEED = count(0, 2**31 - 1)  # what every generator of random numbers takes
+LEVEL = count(2, 10_000)
+WEIGHTS = ListOf(Real(Number(low=0.0)))
+
+
 def outside(number: Number, value: float, *, plausible: bool = True) -> str:
     """What is wrong with a number, "" if it is finite and within its range and, if `plausible`, an engineer's."""
     unit = f" {number.unit}" if number.unit else ""

@@ -35,12 +35,13 @@ class Section(BaseModel):
 
 
 @cache
-def section_of(cls: type[eqx.Module], without: tuple[str, ...] = ()) -> type[Section]:
+def section_of(cls: type[eqx.Module], without: tuple[str, ...] = (), *, open: bool = True) -> type[Section]:
     """The keys of a class: its fields that can be written in a file.
 
     Args:
         cls: the class.
         without: fields that stand elsewhere.
+        open: the name of a variable may stand for a number.
 
     Raises:
         TypeError: where a field without default cannot be written.
@@ -49,14 +50,14 @@ def section_of(cls: type[eqx.Module], without: tuple[str, ...] = ()) -> type[Sec
     for field in dataclasses.fields(cls):
         if not field.init or field.name in without:
             continue
-        kind = _kind(cls, field)
+        kind = _kind(cls, field, open)
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
         if kind is None:
             if needed:
                 raise TypeError(f"{cls.__name__}: {field.name} cannot be written in a design file")
             continue
         keys[field.name] = (Annotated[Any, kind], ... if needed else None)
-    return create_model(cls.__name__, __base__=Section, **keys)
+    return create_model(cls.__name__, __base__=Section, __doc__=cls.__doc__, **keys)
 
 
 def modules_of(cls: type[eqx.Module]) -> dict[str, type[eqx.Module]]:
@@ -65,15 +66,19 @@ def modules_of(cls: type[eqx.Module]) -> dict[str, type[eqx.Module]]:
     return {name: kind for name, kind in found.items() if kind is not None}
 
 
-def family(base: type[eqx.Module]) -> dict[str, type[eqx.Module]]:
+def family(base: type[eqx.Module], *, users: bool = True) -> dict[str, type[eqx.Module]]:
     """The classes derived from an abstract one, by the name that design files call them.
 
     A user's class cannot take the place of one of the library; of two of his own with one name the later is meant.
+
+    Args:
+        base: the abstract class.
+        users: with those that are defined outside the library.
     """
     found: dict[str, type[eqx.Module]] = {}
     for cls in _descendants(base):
         name = snake(cls.__name__)
-        if not (_users(cls) or cls.__module__.startswith(base.__module__.rpartition(".")[0])):
+        if not (_users(cls) and users or cls.__module__.startswith(base.__module__.rpartition(".")[0])):
             continue  # a part of another layer, no choice of the user
         if name in found and _users(cls) and not _users(found[name]):
             continue
@@ -92,11 +97,11 @@ def snake(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
 
 
-def meanings(cls: type) -> dict[str, str]:
-    """What every field means, from the list of attributes in the docstring of the class or of one that it extends."""
+def meanings(of: Any) -> dict[str, str]:
+    """What every field means, from the list in the docstring of a class, of one that it extends, or of a function."""
     found: dict[str, str] = {}
-    for owner in reversed(cls.__mro__):
-        block = re.search(r"\n\s*Attributes:\n(?P<list>.*?)(\n\s*\n|\Z)", owner.__doc__ or "", re.DOTALL)
+    for owner in reversed(of.__mro__) if isinstance(of, type) else [of]:
+        block = re.search(r"\n\s*(Attributes|Args):\n(?P<list>.*?)(\n\s*\n|\Z)", owner.__doc__ or "", re.DOTALL)
         if block is None:
             continue
         lines = inspect.cleandoc("\n" + block["list"]).splitlines()
@@ -106,15 +111,15 @@ def meanings(cls: type) -> dict[str, str]:
     return found
 
 
-def summary(cls: type) -> str:
-    """The first sentence of a docstring."""
-    return inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
+def summary(of: Any) -> str:
+    """The first paragraph of a docstring."""
+    return inspect.cleandoc(of.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
 
 
-def _kind(cls, field: dataclasses.Field) -> Kind | None:
+def _kind(cls, field: dataclasses.Field, open: bool) -> Kind | None:
     number = fields_of(cls).get(field.name)
     if number is not None:
-        return _number(number)
+        return _number(number, open)
     hint = _hint(cls, field)
     module = _module(hint)
     if module is not None:
@@ -126,10 +131,10 @@ def _kind(cls, field: dataclasses.Field) -> Kind | None:
     return plain.get(hint) if isinstance(hint, type) else None
 
 
-def _number(number: Number) -> Kind | None:
+def _number(number: Number, open: bool) -> Kind | None:
     if not number.checked:
         return None
-    kind: Kind = Real(number, open=not (number.static or number.whole))
+    kind: Kind = Real(number, open=open and not (number.static or number.whole))
     for _ in number.shape:
         kind = ListOf(kind)
     return kind

@@ -9,31 +9,34 @@ from typing import Annotated, Any
 from .. import compliance
 from ..geometry import Gear, GearPair
 from ..numerics import Number
-from .kinds import Choice, Either, ListOf, Real, Switch, Table, Text
+from .kinds import LEVEL, SEED, WEIGHTS, Choice, Either, ListOf, Real, Switch, Table, Text, count, positive
 from .layout import Section, section_of
 
 Tables = dict[str, Any]
-_SEED = 2**31 - 1  # what every generator of random numbers takes
-
-
-def _count(low: int, high: int) -> Real:
-    """A whole number; the upper limits keep a slip of the finger from filling the memory or compiling for hours."""
-    return Real(Number(low=low, high=high, whole=True))
-
-
-def _positive(unit: str) -> Real:
-    return Real(Number(unit, low=0.0, open_low=True))
 
 
 _NUMBER = Real()
 _BOUND = Real(plausible=False)
 _SHARE = Real(Number(low=0.0, high=1.0, open_low=True, open_high=True))
 _TABLES = ListOf(Table(), empty=True)
-_WEIGHTS = ListOf(Real(Number(low=0.0)))
 
 
 class FileSection(Section):
-    """The top level; the tables are decoded one by one, so that messages carry the full key."""
+    """The tables of a file, and its title.
+
+    Attributes:
+        pinion: the driving gear.
+        wheel: the driven gear.
+        load: torque and speed.
+        title: free text; the name of the file without it.
+        pair: how the gears are mounted.
+        model: the stiffness model; the library's default without it.
+        resolution: array sizes; the library's defaults without it.
+        variables: numbers left open, with their bounds.
+        optimize: what `jaxgear optimize` does.
+        sweep: what `jaxgear sweep` does.
+        tolerance: of manufactured gears, for a sweep or `optimize.manufactured`.
+    """
 
     pinion: Annotated[Tables, Table()]
     wheel: Annotated[Tables, Table()]
@@ -48,20 +51,33 @@ class FileSection(Section):
     tolerance: Annotated[Tables | None, Table()] = None
 
 
-class GearSection(section_of(Gear)):  # type: ignore[misc]
-    """A gear and what is taken off its flanks."""
+class GearSection(section_of(Gear, open=False)):  # type: ignore[misc]
+    """A gear and what is taken off its flanks.
+
+    Attributes:
+        modification: what is taken off the flank; several add up.
+    """
 
     modification: Annotated[list[Tables], _TABLES] = []
 
 
-PairSection = section_of(GearPair, without=("pinion", "wheel"))
+PairSection = section_of(GearPair, ("pinion", "wheel"), open=False)
 
 
 class LoadSection(Section):
-    torque: Annotated[float, _positive("N m")]
-    torque_range: Annotated[list[float] | None, ListOf(_positive("N m"), length=2)] = None
-    speed: Annotated[float | None, _positive("rpm")] = None
-    friction: Annotated[float | None, _positive("")] = None
+    """Under what the pair runs.
+
+    Attributes:
+        torque: design torque on the pinion.
+        torque_range: lowest and highest torque of interest; half and twice the design torque without it.
+        speed: of the pinion, for the flash temperature.
+        friction: mean coefficient of friction, used with a speed only.
+    """
+
+    torque: Annotated[float, positive("N m")]
+    torque_range: Annotated[list[float] | None, ListOf(positive("N m"), length=2)] = None
+    speed: Annotated[float | None, positive("rpm")] = None
+    friction: Annotated[float | None, positive("")] = None
 
 
 BODIES: dict[str, type[compliance.AbstractBody]] = {
@@ -81,6 +97,15 @@ CONTACTS: dict[str, type[compliance.AbstractContact]] = {
 
 
 class ModelSection(Section):
+    """The stiffness model.
+
+    Attributes:
+        preset: "legacy" is the model of older studies and takes no other key.
+        plane: of the material, for narrow (stress) or wide (strain) gears; "stress" without it.
+        body: gear body.
+        contact: contact law.
+    """
+
     preset: Annotated[str, Choice(("default", "legacy"))] = "default"
     plane: Annotated[str | None, Choice(("stress", "strain"))] = None
     body: Annotated[str, Choice(tuple(BODIES))] = "ring"
@@ -90,31 +115,66 @@ class ModelSection(Section):
 
 
 class ResolutionSection(Section):
-    positions: Annotated[int | None, _count(4, 4096)] = None
-    slices: Annotated[int | None, _count(1, 1024)] = None
-    pairs: Annotated[int | None, _count(2, 12)] = None
-    patch_nodes: Annotated[int | None, _count(1, 64)] = None
-    newton_steps: Annotated[int | None, _count(1, 100)] = None
+    """Array sizes. Without `pairs`, as few as the load needs; without `slices`, as many as the modifications need."""
+
+    positions: Annotated[int | None, count(4, 4096)] = None
+    slices: Annotated[int | None, count(1, 1024)] = None
+    pairs: Annotated[int | None, count(2, 12)] = None
+    patch_nodes: Annotated[int | None, count(1, 64)] = None
+    newton_steps: Annotated[int | None, count(1, 100)] = None
     tolerance: Annotated[float | None, _SHARE] = None
 
 
 class VariableSection(Section):
+    """A number of the file that is left open: modifications name it in place of a number.
+
+    Attributes:
+        low: least value, in the unit of the number that it stands for.
+        high: greatest value.
+        unit: checked against its use.
+    """
+
     low: Annotated[float, _BOUND]
     high: Annotated[float, _BOUND]
     unit: Annotated[str | None, Text(empty=True)] = None
 
 
 class OptimizeSection(Section):
+    """A search for the best values of the variables, or for flanks without any.
+
+    Attributes:
+        method: name of the method; "minimax" without it.
+        objective: a quantity to be made small, or several for method "pareto"; "ppte" without it.
+        measure: joins the cases of several torques or manufactured gears into one number; "mean" without it.
+        level: of the measures "quantile" and "cvar".
+        torques: on the pinion; the design torque alone without it.
+        weights: of the torques.
+        manufactured: pairs of manufactured gears under every torque; needs [tolerance].
+        seed: of random searches and of the manufactured gears.
+        starts: searches, of methods "minimax", "adam" and "lbfgs".
+        steps: most steps of every search, of the same methods.
+        application_factor: K_A of the rule-based relief.
+        constraint: limits of quantities or of combinations of variables.
+        minimax: options of the method.
+        genetic: options of the method.
+        cma_es: options of the method.
+        differential_evolution: options of the method.
+        factorial: options of the method.
+        pareto: options of the method.
+        te_iteration: options of the method.
+        free_form: options of the method.
+    """
+
     method: Annotated[str | None, Text()] = None
     objective: Annotated[str | list[str] | None, Either(Text(), ListOf(Text()), "a string or a list of strings")] = None
     measure: Annotated[str | None, Choice(("mean", "worst", "quantile", "cvar"))] = None
     level: Annotated[float | None, _SHARE] = None
-    torques: Annotated[list[float] | None, ListOf(_positive("N m"))] = None
-    weights: Annotated[list[float] | None, _WEIGHTS] = None
-    manufactured: Annotated[int | None, _count(1, 10_000)] = None
-    seed: Annotated[int | None, _count(0, _SEED)] = None
-    starts: Annotated[int | None, _count(1, 4096)] = None
-    steps: Annotated[int | None, _count(10, 100_000)] = None
+    torques: Annotated[list[float] | None, ListOf(positive("N m"))] = None
+    weights: Annotated[list[float] | None, WEIGHTS] = None
+    manufactured: Annotated[int | None, count(1, 10_000)] = None
+    seed: Annotated[int | None, SEED] = None
+    starts: Annotated[int | None, count(1, 4096)] = None
+    steps: Annotated[int | None, count(10, 100_000)] = None
     application_factor: Annotated[float, Real(Number(low=0.0, high=100.0, open_low=True))] = 1.0
     constraint: Annotated[list[Tables], _TABLES] = []
     minimax: Annotated[Tables | None, Table()] = None
@@ -128,6 +188,15 @@ class OptimizeSection(Section):
 
 
 class ConstraintSection(Section):
+    """A limit, of either a quantity or a linear combination of variables.
+
+    Attributes:
+        of: name of a quantity.
+        variables: coefficient of every variable of the combination.
+        low: least value.
+        high: greatest value.
+    """
+
     of: Annotated[str | None, Text()] = None
     variables: Annotated[dict[str, float] | None, Table(_NUMBER)] = None
     low: Annotated[float | None, _NUMBER] = None
@@ -135,12 +204,12 @@ class ConstraintSection(Section):
 
 
 class MinimaxOptions(Section):
-    rounds: Annotated[int | None, _count(1, 1000)] = None
+    rounds: Annotated[int | None, count(1, 1000)] = None
 
 
 class _EvolutionOptions(Section):
-    population: Annotated[int | None, _count(4, 100_000)] = None
-    generations: Annotated[int | None, _count(1, 100_000)] = None
+    population: Annotated[int | None, count(4, 100_000)] = None
+    generations: Annotated[int | None, count(1, 100_000)] = None
 
 
 class GeneticOptions(_EvolutionOptions):
@@ -155,34 +224,31 @@ class DifferentialEvolutionOptions(_EvolutionOptions):
     pass
 
 
-_LEVEL = _count(2, 10_000)
-
-
 class FactorialOptions(Section):
     levels: Annotated[
         int | dict[str, int] | None,
-        Either(_LEVEL, Table(_LEVEL), "a whole number, or a table with one entry per variable"),
+        Either(LEVEL, Table(LEVEL), "a whole number, or a table with one entry per variable"),
     ] = None
 
 
 class ParetoOptions(Section):
-    points: Annotated[int | None, _count(2, 4096)] = None
-    steps: Annotated[int | None, _count(1, 100_000)] = None
+    points: Annotated[int | None, count(2, 4096)] = None
+    steps: Annotated[int | None, count(1, 100_000)] = None
 
 
 class IterationOptions(Section):
     start: Annotated[str, Choice(("unmodified", "given", "low_pressure"))] = "unmodified"
-    max_relief: Annotated[float, _positive("um")] = 7.0
-    tolerance: Annotated[float | None, _positive("um")] = None
-    steps: Annotated[int | None, _count(1, 1000)] = None
+    max_relief: Annotated[float, positive("um")] = 7.0
+    tolerance: Annotated[float | None, positive("um")] = None
+    steps: Annotated[int | None, count(1, 1000)] = None
     curve: Annotated[str | None, Text()] = None
 
 
 class FreeFormOptions(Section):
-    points: Annotated[int | None, _count(4, 500)] = None
-    max_relief: Annotated[float | None, _positive("um")] = None
+    points: Annotated[int | None, count(4, 500)] = None
+    max_relief: Annotated[float | None, positive("um")] = None
     curvature: Annotated[float | None, Real(Number(low=0.0))] = None
-    steps: Annotated[int | None, _count(1, 10_000)] = None
+    steps: Annotated[int | None, count(1, 10_000)] = None
     curve: Annotated[str | None, Text()] = None
 
 
@@ -199,34 +265,3 @@ METHOD_OPTIONS: dict[str, type[Section]] = {
     "te_iteration": IterationOptions,
     "free_form": FreeFormOptions,
 }
-
-
-class SweepSection(Section):
-    sampling: Annotated[str, Choice(("sobol", "latin_hypercube", "full_factorial", "list"))] = "sobol"
-    samples: Annotated[int | None, _count(1, 2**40)] = None
-    seed: Annotated[int | None, _count(0, _SEED)] = None
-    levels: Annotated[
-        int | dict[str, int | list[float]] | None,
-        Either(
-            _LEVEL,
-            Table(Either(_LEVEL, ListOf(_NUMBER), "a whole number or a list of values")),
-            "a whole number, or a table with one entry per variable",
-        ),
-    ] = None
-    file: Annotated[str | None, Text()] = None
-    torques: Annotated[list[float] | None, ListOf(_positive("N m"))] = None
-    weights: Annotated[list[float] | None, _WEIGHTS] = None
-    results: Annotated[list[str] | None, ListOf(Text())] = None
-    part_rows: Annotated[int | None, _count(1, 2**24)] = None
-
-
-_CLASS = Real(Number(whole=True))
-
-
-class ToleranceSection(Section):
-    quality_class: Annotated[
-        int | list[int], Either(_CLASS, ListOf(_CLASS, length=2), "a whole number, or a list of two")
-    ]
-    misalignment: Annotated[float | None, Real(Number("um", low=0.0))] = None
-    samples: Annotated[int, _count(2, 100_000)] = 64
-    seed: Annotated[int, _count(0, _SEED)] = 0

@@ -6,7 +6,7 @@ from ..conditions import LoadSpectrum
 from ..metrics import RESULTS
 from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
-from . import schema
+from . import schema_sweep
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
 from .errors import DesignFileError, refused, suggestion
@@ -85,7 +85,7 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
     )
 
 
-def _plan(design: DesignFile, section: schema.SweepSection) -> AbstractPlan:
+def _plan(design: DesignFile, section: schema_sweep.SweepSection) -> AbstractPlan:
     kind = section.sampling
     for key in ("samples", "seed", "levels", "file"):
         given = getattr(section, key) is not None

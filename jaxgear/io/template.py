@@ -89,8 +89,15 @@ def build(parts: list[Part], parameters: Mapping[str, Any]) -> AbstractModificat
     return NoModification() if total is None else total
 
 
-def parse(file: Path, key: str, table: Mapping[str, Any], cls: type[eqx.Module]) -> Part:
+def parse(file: Path, key: str, table: Mapping[str, Any], cls: type[eqx.Module], *, open: bool = True) -> Part:
     """An object from its table; `type` says which class derived from an abstract one it is of.
+
+    Args:
+        file: for the message.
+        key: dotted key of the table.
+        table: the table.
+        cls: its class.
+        open: the name of a variable may stand for a number.
 
     Raises:
         DesignFileError: for an unknown type, unknown or missing keys, wrong types and numbers out of range.
@@ -102,17 +109,17 @@ def parse(file: Path, key: str, table: Mapping[str, Any], cls: type[eqx.Module])
         if not isinstance(name, str) or name not in known:
             raise DesignFileError(file, join(key, "type"), not_known(name, known))
         cls, table = known[name], {other: value for other, value in table.items() if other != "type"}
-    return part_of(file, key, decode(file, key, table, section_of(cls)), cls)
+    return part_of(file, key, decode(file, key, table, section_of(cls, open=open)), cls, open=open)
 
 
-def part_of(file: Path, key: str, section: Section, cls: type[eqx.Module]) -> Part:
+def part_of(file: Path, key: str, section: Section, cls: type[eqx.Module], *, open: bool = True) -> Part:
     """An object from its decoded table."""
     numbers, modules = fields_of(cls), modules_of(cls)
     fields: dict[str, Any] = {}
     for name, value in section.given().items():
         here = join(key, name)
         if name in modules:
-            fields[name] = parse(file, here, value, modules[name])
+            fields[name] = parse(file, here, value, modules[name], open=open)
         elif name in numbers:
             fields[name] = _opened(value, here, numbers[name])
         elif name in section_of(cls).model_fields:

@@ -1,0 +1,61 @@
+"""The layout of the tables [sweep] and [tolerance]."""
+
+from typing import Annotated
+
+from ..numerics import Number
+from .kinds import LEVEL, SEED, WEIGHTS, Choice, Either, ListOf, Real, Table, Text, count, positive
+from .layout import Section
+
+
+class SweepSection(Section):
+    """Variants to be evaluated.
+
+    Attributes:
+        sampling: how they are spread over the bounds of the variables.
+        samples: number of variants, of "sobol" and "latin_hypercube".
+        seed: of the same.
+        levels: values per variable, of "full_factorial": one number, or a number or list of values per variable.
+        file: CSV or Parquet file of the variants, of "list".
+        torques: on the pinion; the design torque alone without it.
+        weights: of the torques.
+        results: quantities to be listed.
+        part_rows: variants per file of the table.
+    """
+
+    sampling: Annotated[str, Choice(("sobol", "latin_hypercube", "full_factorial", "list"))] = "sobol"
+    samples: Annotated[int | None, count(1, 2**40)] = None
+    seed: Annotated[int | None, SEED] = None
+    levels: Annotated[
+        int | dict[str, int | list[float]] | None,
+        Either(
+            LEVEL,
+            Table(Either(LEVEL, ListOf(Real()), "a whole number or a list of values")),
+            "a whole number, or a table with one entry per variable",
+        ),
+    ] = None
+    file: Annotated[str | None, Text()] = None
+    torques: Annotated[list[float] | None, ListOf(positive("N m"))] = None
+    weights: Annotated[list[float] | None, WEIGHTS] = None
+    results: Annotated[list[str] | None, ListOf(Text())] = None
+    part_rows: Annotated[int | None, count(1, 2**24)] = None
+
+
+_CLASS = Real(Number(whole=True))
+
+
+class ToleranceSection(Section):
+    """Deviations of manufactured gears after ISO 1328-1.
+
+    Attributes:
+        quality_class: of both gears, or of pinion and wheel.
+        misalignment: of the axes over the face width.
+        samples: manufactured pairs per variant of a sweep.
+        seed: of their deviations.
+    """
+
+    quality_class: Annotated[
+        int | list[int], Either(_CLASS, ListOf(_CLASS, length=2), "a whole number, or a list of two")
+    ]
+    misalignment: Annotated[float | None, Real(Number("um", low=0.0))] = None
+    samples: Annotated[int, count(2, 100_000)] = 64
+    seed: Annotated[int, SEED] = 0
