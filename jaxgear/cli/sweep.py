@@ -53,8 +53,6 @@ def run_sweep(
     target = output or default_folder(file, "sweep", quick=quick)
     _check(target)
     options = {} if request.part_rows is None else {"part_rows": request.part_rows}
-    if request.tolerance is not None:
-        options |= {"samples": request.samples, "seed": request.seed}
     with Meter(report.console(stderr=True), target) as meter:
         table = sweep(
             design.design,
@@ -64,6 +62,8 @@ def run_sweep(
             results=request.results,
             output=target / _TABLE,
             tolerance=request.tolerance,
+            samples=request.samples,
+            seed=request.seed,
             title=design.title,
             units=design.units,
             callback=meter,

@@ -8,3 +8,6 @@ from .join import joined as joined
 from .join import label as label
 from .load import LoadSpectrum as LoadSpectrum
 from .solved import solved as solved
+from .variant import Variant as Variant
+from .variant import Variants as Variants
+from .variant import variants as variants

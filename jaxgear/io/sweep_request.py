@@ -41,7 +41,7 @@ class SweepRequest:
     results: tuple[str, ...]
     part_rows: int | None
     tolerance: Tolerance | None
-    samples: int
+    samples: int | None
     seed: int
 
 
@@ -80,7 +80,7 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
         results=wanted,
         part_rows=section.part_rows,
         tolerance=None if tolerance is None else tolerance_of(design, tolerance),
-        samples=0 if tolerance is None else tolerance.samples,
+        samples=None if tolerance is None else tolerance.samples,
         seed=0 if tolerance is None else tolerance.seed,
     )
 

@@ -25,7 +25,9 @@ _UNITS = {
     "percent": "%",
 }
 # what may follow the unit: the torque, or a statistic over torques and samples
-_NAME = re.compile(rf"(?P<what>.+?)_(?P<unit>{'|'.join(_UNITS)})(?P<of>(_[-+.\de]+Nm|_mean|_worst|_q\d+)*)")
+_NAME = re.compile(
+    rf"(?P<what>.+?)_(?P<unit>{'|'.join(_UNITS)})(?P<of>(_[-+.\de]+(Nm|rpm)|_mean|_worst|_q[.\d]+|_cvar[.\d]+)*)"
+)
 _ACRONYMS = {"ppte": "PPTE", "te": "TE"}
 
 
@@ -42,6 +44,7 @@ def label(name: str, labels: Labels | None = None) -> str:
     what, unit, of = (match["what"], _UNITS[match["unit"]], match["of"]) if match else (name, "-", "")
     words = [_ACRONYMS.get(word, word) for word in (what + of).split("_")]
     words = [re.sub(r"^([-+.\de]+)Nm$", r"at \1 N m", word) for word in words]
+    words = [re.sub(r"^([-+.\de]+)rpm$", r"at \1 rpm", word) for word in words]
     return f"{' '.join(words)} [{unit}]"
 
 

@@ -4,7 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from ..conditions import Conditions, LoadSpectrum, label
 from ..metrics import RESULTS, result_key
+from ..numerics import AbstractMeasure
 from .plan import AbstractPlan
 
 VARIANT, CONVERGED = "variant", "converged"
@@ -43,28 +45,36 @@ def parameter_columns(plan: AbstractPlan, units: Mapping[str, str], taken: Seque
     return [Column(name, units.get(name, ""), "parameter", low=low, high=high) for name, low, high in limits]
 
 
-def result_columns(results: Sequence[str], torques: Sequence[float], *, scattered: bool) -> list[Column]:
+def result_columns(results: Sequence[str], conditions: Conditions, measures: Sequence[AbstractMeasure]) -> list[Column]:
     """The columns of every result, in the order in which the evaluation gives them.
 
-    One torque makes one column, several make their weighted mean, the worst and one each. Random deviations
-    split each of these into its mean and its 95 % quantile over the samples.
+    One case makes one column, `ppte_um`. Several make one for each measure over all of them, `ppte_um_mean`; several
+    torques besides those of each torque, `ppte_um_25Nm`, over its manufactured gears `ppte_um_25Nm_q95`.
 
     Args:
         results: names of results.
-        torques: of the load spectrum [N m].
-        scattered: whether deviations are sampled.
+        conditions: loads and manufactured gears.
+        measures: by which the cases are joined, none for a single one.
 
     Raises:
         ValueError: for no, repeated or unknown results.
     """
     if not results or len(set(results)) != len(results):
         raise ValueError("sweep: results must be different and at least one")
-    loads = [""] if len(torques) == 1 else ["_mean", "_worst", *(f"_{torque:.12g}Nm" for torque in torques)]
-    scatter = ["_mean", "_q95"] if scattered else [""]
+    loads = _labels(conditions.load) if len(conditions.load.torques) > 1 else []
+    joins = [f"_{label(measure)}" for measure in measures]
+    gears = joins if conditions.samples > 1 else [""]
+    endings = [*(joins or [""]), *(f"{load}{join}" for load in loads for join in gears)]
     columns = []
     for result in results:
         key = result_key(result)
         better: Literal["smaller", "larger"] = "smaller" if RESULTS[result].worst == "max" else "larger"
-        for name in (f"{key}{load}{statistic}" for load in loads for statistic in scatter):
-            columns.append(Column(name, RESULTS[result].unit, "result", better))
+        columns += [Column(f"{key}{ending}", RESULTS[result].unit, "result", better) for ending in endings]
     return columns
+
+
+def _labels(load: LoadSpectrum) -> list[str]:
+    torques = [f"_{torque:.12g}Nm" for torque in load.torques.tolist()]
+    if load.speeds is None:
+        return torques
+    return [f"{torque}_{speed:.12g}rpm" for torque, speed in zip(torques, load.speeds.tolist())]

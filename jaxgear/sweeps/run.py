@@ -15,12 +15,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..conditions import LoadSpectrum
+from ..conditions import Conditions, Variants, label, variants
+from ..conditions.variant import Design, Parameters
 from ..contact import Mesh, removed_material
-from ..numerics import whole
-from ..tolerance import Tolerance, sample_deviations
+from ..numerics import AbstractMeasure, Mean, Quantile, Worst, whole
+from ..tolerance import Tolerance
 from .columns import CONVERGED, VARIANT, Column, parameter_columns
-from .evaluate import Design, Evaluator, Pending
+from .evaluate import Evaluator, Pending
 from .plan import AbstractPlan
 from .store import MANIFEST, Manifest, Store
 from .table import SweepTable, in_memory, open_sweep
@@ -36,12 +37,13 @@ def sweep(
     design: Design,
     plan: AbstractPlan,
     *,
-    mesh: Mesh,
+    mesh: Mesh | Callable[[Parameters], Mesh],
     torque,
     results: Sequence[str] = ("ppte",),
+    measures: Sequence[AbstractMeasure] | None = None,
     output: str | Path | None = None,
     tolerance: Tolerance | None = None,
-    samples: int = 64,
+    samples: int | None = None,
     seed: int = 0,
     part_rows: int = PART_ROWS,
     title: str = "sweep",
@@ -58,15 +60,27 @@ def sweep(
     several processes (`jax.distributed.initialize`) each writes its share of the parts into the same, shared folder,
     and all return the complete table.
 
+    The variables of the plan may be anything that a variant depends on. Those of the flanks go through `design`; with
+    functions of them as `mesh` and `torque` they are also the macro geometry and the load:
+
+        jg.sweep(
+            lambda v: (jg.TipRelief(v["amount"], 4.0), None),
+            plan,
+            mesh=lambda v: jg.prepare(pair_of(v["shift"]), resolution=jg.Resolution(positions=32, pairs=2)),
+            torque=lambda v: v["torque"],
+        )
+
     Args:
-        design: makes (pinion, wheel) modifications from the named parameters; traced, so it must be pure.
+        design: makes (pinion, wheel) modifications from the named variables; traced, so it must be pure.
         plan: the variants: `FullFactorial`, `LatinHypercube`, `Sobol` or `VariantList`.
-        mesh: prepared mesh.
-        torque: on the pinion [N m], scalar, or a `LoadSpectrum`.
+        mesh: prepared mesh; or a function of the named variables that prepares one, traced likewise.
+        torque: on the pinion [N m], a `LoadSpectrum`, or a function of the named variables that gives a torque.
         results: names of `metrics.RESULTS`; only these are computed.
+        measures: by which torques and manufactured gears are joined, a column each; None for `Mean()` and `Worst()` of
+            several torques, with a tolerance `Mean()` and `Quantile(0.95)`.
         output: folder of the table; None keeps it in memory.
-        tolerance: evaluates every variant under the same random deviations; None for the nominal design.
-        samples: deviations of a tolerance.
+        tolerance: evaluates every variant with the same manufactured gears; None for the nominal design.
+        samples: manufactured gears; None for 64 with a tolerance.
         seed: of the deviations.
         part_rows: variants per file.
         title: of the table.
@@ -75,33 +89,37 @@ def sweep(
             earlier call are done already, and after every part.
 
     Returns:
-        the table. A variant whose modification is impossible or whose contact solution failed is a row with
-        `converged` False and results NaN.
+        the table. A variant whose modification, gear pair or load is impossible or whose contact solution failed is a
+        row with `converged` False and results NaN.
 
     Raises:
-        ValueError: for arguments out of range, unknown results, and an output folder that cannot be used or holds a
-            sweep of other settings.
+        ValueError: for arguments out of range, unknown results, variables on which nothing depends, and an output
+            folder that cannot be used or holds a sweep of other settings.
     """
     whole("sweep", "part_rows", part_rows)
-    load = LoadSpectrum.of(torque)
-    deviations = None if tolerance is None else sample_deviations(tolerance, mesh, samples, seed=seed)
-    example = dict(zip(plan.names, plan.rows(0, 1)[0]))
-    evaluator = Evaluator(
-        design,
+    example = plan.rows(0, 1)[0]
+    made = variants(
+        "sweep",
+        plan.names,
         example,
+        design=design,
         mesh=mesh,
-        load=load,
-        results=results,
-        rows=min(part_rows, plan.size),
-        deviations=deviations,
+        torque=torque,
+        tolerance=tolerance,
+        samples=samples,
+        seed=seed,
     )
+    joins = _measures(made.conditions, measures)
+    evaluator = Evaluator(made, example, results=results, measures=joins, rows=min(part_rows, plan.size))
     columns = _columns(plan, units or {}, evaluator)
     settings = {
-        **_settings(design, example, plan, mesh, load, results),
+        **_settings(made, example, plan, results),
         "columns": [column.name for column in columns],
         "variants": plan.size,
         "part_rows": part_rows,
-        "tolerance": None if tolerance is None else {"limits": _digest(tolerance), "samples": samples, "seed": seed},
+        "tolerance": None
+        if tolerance is None
+        else {"limits": _digest(tolerance), "samples": made.conditions.samples, "seed": seed},
     }
     manifest = Manifest(title, tuple(columns), settings)
     if output is None:
@@ -175,16 +193,33 @@ def _columns(plan: AbstractPlan, units: Mapping[str, str], evaluator: Evaluator)
     ]
 
 
-def _settings(design, example, plan, mesh: Mesh, load: LoadSpectrum, results) -> dict[str, Any]:
+def _measures(conditions: Conditions, given: Sequence[AbstractMeasure] | None) -> tuple[AbstractMeasure, ...]:
+    """The measures that are asked for; the usual ones where nothing is said, none for a single case."""
+    if given is None:
+        if conditions.samples > 1:
+            return Mean(), Quantile(0.95)
+        return (Mean(), Worst()) if conditions.count > 1 else ()
+    if conditions.count == 1:
+        raise ValueError("sweep: measures have no effect: one torque and perfect gears are a single case")
+    names = [label(measure) for measure in given]
+    if not names or len(set(names)) != len(names):
+        raise ValueError(f"sweep: measures {', '.join(names) or '(none)'} must be different and at least one")
+    return tuple(given)
+
+
+def _settings(made: Variants, example: np.ndarray, plan: AbstractPlan, results) -> dict[str, Any]:
     """Everything that determines the rows, as plain data."""
+    load = made.conditions.load
+    fixed = isinstance(made.mesh, Mesh)
     return {
         "plan": plan.describe(),
-        "torques_Nm": np.asarray(load.torques).tolist(),
+        "torques_Nm": None if made.torque is not None else np.asarray(load.torques).tolist(),
+        "speeds_rpm": None if load.speeds is None else np.asarray(load.speeds).tolist(),
         "weights": np.asarray(load.weights).tolist(),
         "results": list(results),
-        "design": _design_digest(design, example, mesh, load),
-        "mesh": _digest(mesh),
-        "precision": str(mesh.phase.dtype),
+        "design": _design_digest(made, example),
+        "mesh": _digest(made.mesh) if fixed else None,
+        "precision": str(eqx.filter_eval_shape(made, example).mesh.phase.dtype),
         "platform": jax.local_devices()[0].platform,
         "jaxgear": _version("jaxgear"),
         "jax": jax.__version__,
@@ -201,15 +236,18 @@ def _digest(tree) -> str:
     return digest.hexdigest()
 
 
-def _design_digest(design: Design, example: Mapping[str, float], mesh: Mesh, load: LoadSpectrum) -> str:
-    """Digest of what the design computes: a function has no other identity that outlives the process."""
+def _design_digest(made: Variants, example: np.ndarray) -> str:
+    """Digest of what the variables make: a function has no other identity that outlives the process."""
 
-    def removed(parameters, mesh):
-        pinion, wheel = design(parameters)
-        return removed_material(mesh, load.torques[0], pinion=pinion, wheel=wheel)
+    def removed(values, mesh):
+        variants = made if mesh is None else eqx.tree_at(lambda tree: tree.mesh, made, mesh)
+        variant = variants(values)
+        torque = variant.cases.torque[0]
+        flanks = removed_material(variant.mesh, torque, pinion=variant.pinion, wheel=variant.wheel)
+        return flanks, torque, eqx.filter(None if mesh is not None else variant.mesh, eqx.is_array)
 
-    parameters = {name: jnp.asarray(value, mesh.phase.dtype) for name, value in example.items()}
-    traced, _, _ = eqx.filter_make_jaxpr(removed)(parameters, mesh)
+    mesh = made.mesh if isinstance(made.mesh, Mesh) else None
+    traced, _, _ = eqx.filter_make_jaxpr(removed)(jnp.asarray(example), mesh)
     text = _without_addresses(str(traced.jaxpr))
     return hashlib.sha256(text.encode() + _digest(traced.consts).encode()).hexdigest()
 

@@ -1,0 +1,176 @@
+"""From the variables of a problem to what is solved: the mesh, the loads and both modifications."""
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.interpreters.partial_eval import dce_jaxpr
+from jaxtyping import Array, Bool, Float
+
+from ..contact import Mesh
+from ..microgeometry import AbstractModification
+from ..numerics import Checked, fields_of, real
+from .cases import Cases, Conditions, conditions
+from .load import LoadSpectrum
+
+Scalar = Float[Array, ""]
+Parameters = Mapping[str, Scalar]
+Modifications = tuple[AbstractModification | None, AbstractModification | None]
+Design = Callable[[Parameters], Modifications]
+
+
+class Variant(NamedTuple):
+    """One design with its mesh and its loads.
+
+    Attributes:
+        mesh: prepared mesh.
+        cases: loads and manufactured gears on it.
+        pinion, wheel: modifications.
+        possible: whether all numbers that the variables made are within the ranges of their fields.
+    """
+
+    mesh: Mesh
+    cases: Cases
+    pinion: AbstractModification | None
+    wheel: AbstractModification | None
+    possible: Bool[Array, ""]
+
+
+class Variants(eqx.Module):
+    """What the named variables of a problem make.
+
+    A variable is used wherever a function asks for it: in the flanks (`design`), in the pair (a `mesh` that is a
+    function), in the load (a `torque` that is one). What is no function is the same for all variants, and worked out
+    once.
+
+    Attributes:
+        names: of the variables.
+        design: makes (pinion, wheel) modifications from the named variables.
+        mesh: prepared mesh, or a function that prepares one from the named variables.
+        torque: on the pinion [N m], a function of the named variables; None where the conditions say it.
+        conditions: loads and manufactured gears; its load counts where `torque` is None.
+        cases: the conditions on a mesh that is the same for all variants, else None.
+    """
+
+    names: tuple[str, ...] = eqx.field(static=True)
+    design: Design
+    mesh: Mesh | Callable[[Parameters], Mesh]
+    torque: Callable[[Parameters], Any] | None
+    conditions: Conditions
+    cases: Cases | None
+
+    def __call__(self, values: Sequence) -> Variant:
+        """The variant of some values of the variables, in the order of their names; traceable."""
+        parameters = dict(zip(self.names, values))
+        pinion, wheel = self.design(parameters)
+        mesh, cases, made = self.mesh, self.cases, [pinion, wheel]
+        if not isinstance(mesh, Mesh):
+            mesh = mesh(parameters)
+            made.append(mesh.pair)
+        if cases is None:
+            conditions = self.conditions
+            if self.torque is not None:
+                torque = real(self.torque(parameters))
+                made.append(torque)
+                conditions = Conditions(LoadSpectrum.of(torque), conditions.deviations)
+            cases = conditions.on(mesh)
+        possible = jnp.all(jnp.stack([jnp.asarray(True), *_in_range(made)]))
+        if self.torque is not None:
+            possible &= jnp.all(cases.torque >= 0)
+        return Variant(mesh, cases, pinion, wheel, possible)
+
+    def check_used(self, owner: str, values: Sequence) -> None:
+        """Raises a `ValueError` that names variables on which nothing depends: traced, not guessed from names."""
+
+        def made(values):
+            variant = self(values)
+            own_mesh = None if isinstance(self.mesh, Mesh) else variant.mesh
+            own_cases = None if self.cases is not None else variant.cases
+            return eqx.filter((own_mesh, own_cases, variant.pinion, variant.wheel), eqx.is_array)
+
+        jaxpr = jax.make_jaxpr(made)(tuple(values)).jaxpr
+        _, used = dce_jaxpr(jaxpr, [True] * len(jaxpr.outvars))
+        unused = [f'"{name}"' for name, is_used in zip(self.names, used) if not is_used]
+        if unused:
+            raise ValueError(
+                f"{owner}: nothing depends on {', '.join(unused)}: use it in design, or in a mesh or torque that is a "
+                f"function of the variables, such as torque=lambda v: v[{unused[0]}]"
+            )
+
+
+def variants(
+    owner: str,
+    names: Sequence[str],
+    values: Sequence,
+    *,
+    design: Design,
+    mesh: Mesh | Callable[[Parameters], Mesh],
+    torque,
+    tolerance=None,
+    samples: int | None = None,
+    seed: int = 0,
+) -> Variants:
+    """Checks and collects what the variables of a problem make.
+
+    Args:
+        owner: the function that is asked, for messages.
+        names: of the variables.
+        values: of the variables of one variant, by which the functions are tried.
+        design: makes (pinion, wheel) modifications from the named variables.
+        mesh: prepared mesh, or a function of the named variables that prepares one; traced.
+        torque: on the pinion [N m], a `LoadSpectrum`, or a function of the named variables that gives a torque.
+        tolerance, samples, seed: of manufactured gears, see `conditions`.
+
+    Raises:
+        ValueError: for variables that nothing depends on, and whatever the functions and `conditions` refuse.
+    """
+    parameters = {name: real(value) for name, value in zip(names, values)}
+    # shapes only: the example may be a variant that cannot be
+    example = mesh if isinstance(mesh, Mesh) else eqx.filter_eval_shape(mesh, parameters)
+    if not isinstance(example, Mesh):
+        raise ValueError(f"{owner}: mesh gives {type(example).__name__}, must be a Mesh as `prepare` makes it")
+    given = 0.0 if callable(torque) else torque
+    judged = conditions(owner, example, given, tolerance=tolerance, samples=samples, seed=seed)
+    fixed = isinstance(mesh, Mesh) and not callable(torque)
+    made = Variants(
+        names=tuple(names),
+        design=design,
+        mesh=mesh,
+        torque=torque if callable(torque) else None,
+        conditions=judged,
+        cases=judged.on(example) if fixed else None,
+    )
+    made.check_used(owner, [value.astype(example.phase.dtype) for value in parameters.values()])
+    return made
+
+
+def _in_range(tree) -> Iterator[Bool[Array, ""]]:
+    """Of every traced number in the Modules of a tree, whether it is within the range of its field.
+
+    Modules refuse concrete numbers out of range when they are made; traced ones pass, and would turn an impossible
+    design into some number.
+    """
+    for module in _modules(tree):
+        for name, kind in fields_of(type(module)).items():
+            value = getattr(module, name)
+            if not kind.checked or not isinstance(value, jax.core.Tracer):
+                continue
+            yield jnp.all(jnp.isfinite(value))
+            if kind.low is not None:
+                yield jnp.all(value > kind.low if kind.open_low else value >= kind.low)
+            if kind.high is not None:
+                yield jnp.all(value < kind.high if kind.open_high else value <= kind.high)
+
+
+def _modules(node) -> Iterator[Checked]:
+    if isinstance(node, eqx.Module):
+        if isinstance(node, Checked):
+            yield node
+        for field in dataclasses.fields(node):
+            yield from _modules(getattr(node, field.name))
+    elif isinstance(node, list | tuple):
+        for part in node:
+            yield from _modules(part)
