@@ -129,22 +129,22 @@ from .sizing import run_in_relief as run_in_relief
 from .sizing import short_relief_length as short_relief_length
 from .sweeps import FullFactorial as FullFactorial
 from .sweeps import LatinHypercube as LatinHypercube
+from .sweeps import Scatter as Scatter
 from .sweeps import Sobol as Sobol
 from .sweeps import SweepTable as SweepTable
 from .sweeps import VariantList as VariantList
+from .sweeps import monte_carlo as monte_carlo
 from .sweeps import open_sweep as open_sweep
 from .sweeps import sweep as sweep
 from .tolerance import Deviation as Deviation
 from .tolerance import GearDeviation as GearDeviation
 from .tolerance import GearTolerance as GearTolerance
-from .tolerance import Scatter as Scatter
 from .tolerance import Tolerance as Tolerance
 from .tolerance import ToleranceClass as ToleranceClass
 from .tolerance import TruncatedNormal as TruncatedNormal
 from .tolerance import Uniform as Uniform
 from .tolerance import deviated_material as deviated_material
 from .tolerance import iso_rounded as iso_rounded
-from .tolerance import monte_carlo as monte_carlo
 from .tolerance import sample_deviations as sample_deviations
 
 STEEL: Material

@@ -3,11 +3,14 @@
 from .cases import Cases as Cases
 from .cases import Conditions as Conditions
 from .cases import conditions as conditions
+from .join import Better as Better
 from .join import in_words as in_words
 from .join import joined as joined
 from .join import label as label
+from .join import ranked as ranked
 from .load import LoadSpectrum as LoadSpectrum
 from .solved import solved as solved
 from .variant import Variant as Variant
 from .variant import Variants as Variants
+from .variant import check_used as check_used
 from .variant import variants as variants

@@ -7,6 +7,7 @@ samples it scatters less than the value that happens to stand at the level; of m
 from typing import Literal
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..numerics import AbstractMeasure, CVaR, Mean, Quantile, Worst
@@ -30,6 +31,18 @@ def joined(measure: AbstractMeasure, values, weights, better: Better = "smaller"
     sign = 1.0 if better == "smaller" else -1.0
     bad = jnp.where(jnp.isfinite(values), sign * values, jnp.inf)
     return sign * measure(bad, weights)
+
+
+def ranked(measure: AbstractMeasure, values: np.ndarray, better: Better = "smaller") -> np.ndarray:
+    """`joined` for many values of equal weight along the first axis, on the host."""
+    count, sign = len(values), 1.0 if better == "smaller" else -1.0
+    edges = jnp.arange(count + 1) / count
+    shares = np.diff(np.asarray(measure.spread(edges, jnp.asarray(count, edges.dtype)))).astype(values.dtype)
+    ordered = np.sort(np.where(np.isfinite(values), sign * values, np.inf), axis=0)
+    carried = shares > 0
+    # from the smallest on, so that equal values give that value to the last bit
+    excess = ordered[carried] - ordered[:1]
+    return sign * (ordered[0] + np.tensordot(shares[carried], excess, 1))
 
 
 def label(measure: AbstractMeasure) -> str:

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jax.interpreters.partial_eval import dce_jaxpr
 from jaxtyping import Array, Bool, Float
 
-from ..contact import Mesh
+from ..contact import Mesh, removed_material
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, fields_of, real
 from .cases import Cases, Conditions, conditions
@@ -82,23 +82,27 @@ class Variants(eqx.Module):
             possible &= jnp.all(cases.torque >= 0)
         return Variant(mesh, cases, pinion, wheel, possible)
 
-    def check_used(self, owner: str, values: Sequence) -> None:
-        """Raises a `ValueError` that names variables on which nothing depends: traced, not guessed from names."""
+    def mesh_shape(self, values: Sequence) -> Mesh:
+        """The mesh, or one of shapes where every variant has its own."""
+        if isinstance(self.mesh, Mesh):
+            return self.mesh
+        return eqx.filter_eval_shape(self.mesh, dict(zip(self.names, map(real, values))))
 
-        def made(values):
-            variant = self(values)
-            own_mesh = None if isinstance(self.mesh, Mesh) else variant.mesh
-            own_cases = None if self.cases is not None else variant.cases
-            return eqx.filter((own_mesh, own_cases, variant.pinion, variant.wheel), eqx.is_array)
+    def traced(self, values: Sequence):
+        """Jaxpr of all that the variables make, as an identity of the functions, and the variables that it uses."""
 
-        jaxpr = jax.make_jaxpr(made)(tuple(values)).jaxpr
-        _, used = dce_jaxpr(jaxpr, [True] * len(jaxpr.outvars))
-        unused = [f'"{name}"' for name, is_used in zip(self.names, used) if not is_used]
-        if unused:
-            raise ValueError(
-                f"{owner}: nothing depends on {', '.join(unused)}: use it in design, or in a mesh or torque that is a "
-                f"function of the variables, such as torque=lambda v: v[{unused[0]}]"
-            )
+        def made(values, mesh):
+            whole = self if mesh is None else eqx.tree_at(lambda tree: tree.mesh, self, mesh)
+            variant = whole(values)
+            torque = variant.cases.torque[0]
+            removed = removed_material(variant.mesh, torque, pinion=variant.pinion, wheel=variant.wheel)
+            own = None if mesh is not None else (variant.mesh, variant.cases)
+            return removed, torque, eqx.filter(own, eqx.is_array)
+
+        mesh = self.mesh if isinstance(self.mesh, Mesh) else None
+        closed, _, _ = eqx.filter_make_jaxpr(made)(tuple(values), mesh)
+        _, used = dce_jaxpr(closed.jaxpr, [True] * len(closed.jaxpr.outvars))
+        return closed, [name for name, is_used in zip(self.names, used) if is_used]
 
 
 def variants(
@@ -125,7 +129,7 @@ def variants(
         tolerance, samples, seed: of manufactured gears, see `conditions`.
 
     Raises:
-        ValueError: for variables that nothing depends on, and whatever the functions and `conditions` refuse.
+        ValueError: for whatever the functions and `conditions` refuse.
     """
     parameters = {name: real(value) for name, value in zip(names, values)}
     # shapes only: the example may be a variant that cannot be
@@ -143,8 +147,17 @@ def variants(
         conditions=judged,
         cases=judged.on(example) if fixed else None,
     )
-    made.check_used(owner, [value.astype(example.phase.dtype) for value in parameters.values()])
     return made
+
+
+def check_used(owner: str, names: Sequence[str], used: Sequence[str]) -> None:
+    """Raises a `ValueError` that names the variables on which nothing depends."""
+    unused = [f'"{name}"' for name in names if name not in used]
+    if unused:
+        raise ValueError(
+            f"{owner}: nothing depends on {', '.join(unused)}: use it in design, or in a mesh or torque that is a "
+            f"function of the variables, such as torque=lambda v: v[{unused[0]}]"
+        )
 
 
 def _in_range(tree) -> Iterator[Bool[Array, ""]]:

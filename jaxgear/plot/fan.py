@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..tolerance import Scatter
+from ..sweeps import Scatter
 from .figure import GREY, legend_above, line_style, report_axes
 from .history import PHASE_LABEL, two_pitches
 

@@ -1,5 +1,7 @@
-"""Many variants into one table: plans, their evaluation on all devices, and a resumable store."""
+"""Many variants, loads or manufactured gears: tables of plans in a resumable store, and the scatter of one design."""
 
+from .monte_carlo import Scatter as Scatter
+from .monte_carlo import monte_carlo as monte_carlo
 from .plan import AbstractPlan as AbstractPlan
 from .plan import FullFactorial as FullFactorial
 from .plan import VariantList as VariantList

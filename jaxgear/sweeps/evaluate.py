@@ -63,7 +63,7 @@ class Evaluator:
         conditions = variants.conditions
         self.columns = result_columns(results, conditions, measures)
         self._devices = local_devices()
-        mesh = eqx.filter_eval_shape(variants, example).mesh
+        mesh = variants.mesh_shape(example)
         batch = side_by_side(mesh, conditions.count)
         steps = max(-(-rows // (batch * self._devices.size)), _LEAST_STEPS)
         self.capacity = steps * batch * self._devices.size

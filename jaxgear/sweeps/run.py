@@ -10,14 +10,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..conditions import Conditions, Variants, label, variants
+from ..conditions import Conditions, Variants, check_used, label, variants
 from ..conditions.variant import Design, Parameters
-from ..contact import Mesh, removed_material
+from ..contact import Mesh
 from ..numerics import AbstractMeasure, Mean, Quantile, Worst, whole
 from ..tolerance import Tolerance
 from .columns import CONVERGED, VARIANT, Column, parameter_columns
@@ -109,11 +108,13 @@ def sweep(
         samples=samples,
         seed=seed,
     )
+    traced, used = made.traced(jnp.asarray(example))
+    check_used("sweep", plan.names, used)
     joins = _measures(made.conditions, measures)
     evaluator = Evaluator(made, example, results=results, measures=joins, rows=min(part_rows, plan.size))
     columns = _columns(plan, units or {}, evaluator)
     settings = {
-        **_settings(made, example, plan, results),
+        **_settings(made, example, _design_digest(traced), plan, results),
         "columns": [column.name for column in columns],
         "variants": plan.size,
         "part_rows": part_rows,
@@ -207,7 +208,7 @@ def _measures(conditions: Conditions, given: Sequence[AbstractMeasure] | None) -
     return tuple(given)
 
 
-def _settings(made: Variants, example: np.ndarray, plan: AbstractPlan, results) -> dict[str, Any]:
+def _settings(made: Variants, example: np.ndarray, identity: str, plan: AbstractPlan, results) -> dict[str, Any]:
     """Everything that determines the rows, as plain data."""
     load = made.conditions.load
     fixed = isinstance(made.mesh, Mesh)
@@ -217,9 +218,9 @@ def _settings(made: Variants, example: np.ndarray, plan: AbstractPlan, results) 
         "speeds_rpm": None if load.speeds is None else np.asarray(load.speeds).tolist(),
         "weights": np.asarray(load.weights).tolist(),
         "results": list(results),
-        "design": _design_digest(made, example),
+        "design": identity,
         "mesh": _digest(made.mesh) if fixed else None,
-        "precision": str(eqx.filter_eval_shape(made, example).mesh.phase.dtype),
+        "precision": str(made.mesh_shape(example).phase.dtype),
         "platform": jax.local_devices()[0].platform,
         "jaxgear": _version("jaxgear"),
         "jax": jax.__version__,
@@ -236,18 +237,8 @@ def _digest(tree) -> str:
     return digest.hexdigest()
 
 
-def _design_digest(made: Variants, example: np.ndarray) -> str:
+def _design_digest(traced) -> str:
     """Digest of what the variables make: a function has no other identity that outlives the process."""
-
-    def removed(values, mesh):
-        variants = made if mesh is None else eqx.tree_at(lambda tree: tree.mesh, made, mesh)
-        variant = variants(values)
-        torque = variant.cases.torque[0]
-        flanks = removed_material(variant.mesh, torque, pinion=variant.pinion, wheel=variant.wheel)
-        return flanks, torque, eqx.filter(None if mesh is not None else variant.mesh, eqx.is_array)
-
-    mesh = made.mesh if isinstance(made.mesh, Mesh) else None
-    traced, _, _ = eqx.filter_make_jaxpr(removed)(jnp.asarray(example), mesh)
     text = _without_addresses(str(traced.jaxpr))
     return hashlib.sha256(text.encode() + _digest(traced.consts).encode()).hexdigest()
 

@@ -1,4 +1,4 @@
-"""What manufacturing deviations make of a design: tolerances, random deviations and their Monte Carlo analysis.
+"""What manufacturing deviations make of a design: tolerances and random deviations between them.
 
 Deviations are material removed in um like every modification: positive into the flank, of either sign. Slopes turn
 about the middle of the profile or the face, as `ProfileSlope` and `LeadSlope` do, and the waviness has neither mean nor
@@ -16,5 +16,3 @@ from .iso_1328 import ToleranceClass as ToleranceClass
 from .iso_1328 import iso_rounded as iso_rounded
 from .limits import GearTolerance as GearTolerance
 from .limits import Tolerance as Tolerance
-from .monte_carlo import Scatter as Scatter
-from .monte_carlo import monte_carlo as monte_carlo

@@ -6,20 +6,21 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.sharding import Mesh as DeviceMesh
-from jax.sharding import PartitionSpec
 from jaxtyping import Array, Bool, Float
 
+from ..conditions import Better, joined, ranked, solved
+from ..conditions.batches import local_devices, over_devices, side_by_side
 from ..contact import Mesh, removed_material, solve_removed
+from ..metrics import RESULTS, result_key
 from ..microgeometry import AbstractModification
-from ..numerics import check, real, whole
-from .deviation import deviation_field, deviation_of, flank_basis
-from .limits import Tolerance, check_slices
+from ..numerics import AbstractMeasure, Quantile, Worst, check, real, whole
+from ..tolerance import Tolerance
+from ..tolerance.deviation import deviation_field, deviation_of, flank_basis
+from ..tolerance.limits import check_slices
 
 Scalar = Float[Array, ""]
 
-_BLOCK = 4096  # samples per call and device, all side by side on an accelerator
-_CPU_BATCH = 128  # samples side by side on a CPU, whose arrays then stay in the cache
+_BLOCK = 4096  # samples per call and device
 
 
 class Scatter(eqx.Module):
@@ -39,6 +40,7 @@ class Scatter(eqx.Module):
         nominal_transmission_error: of the design without deviations [um], shape (positions,).
         quantiles: levels of the quantile curves, ascending, shape (quantiles,).
         transmission_error_quantiles: of the transmission error at every phase [um], shape (quantiles, positions).
+        numbers: the results asked for, of every sample, by name with unit; each of shape (samples,), NaN where failed.
     """
 
     ppte: Float[Array, " samples"]
@@ -51,6 +53,25 @@ class Scatter(eqx.Module):
     nominal_transmission_error: Float[Array, " positions"]
     quantiles: Float[Array, " quantiles"]
     transmission_error_quantiles: Float[Array, "quantiles positions"]
+    numbers: dict[str, Float[Array, " samples"]]
+
+    def joined(self, name: str, measure: AbstractMeasure) -> Scalar:
+        """One number for a result of all samples, such as its 95 % quantile.
+
+        Args:
+            name: of a result asked for, or "ppte".
+            measure: `Mean()`, `Worst()`, `Quantile(level)` or `CVaR(level)`.
+
+        Raises:
+            ValueError: for an unknown name.
+        """
+        known = {result_key("ppte"): self.ppte, **self.numbers}
+        key = result_key(name) if name in RESULTS else name
+        if key not in known:
+            raise ValueError(f'Scatter: "{name}" is not there, must be one of {", ".join(known)}')
+        (worst,) = [result.worst for each, result in RESULTS.items() if result_key(each) == key]
+        better: Better = "smaller" if worst == "max" else "larger"
+        return joined(measure, known[key], jnp.ones_like(self.ppte), better)
 
     @property
     def failed(self) -> int:
@@ -83,8 +104,9 @@ def monte_carlo(
     samples: int = 100_000,
     seed: int = 0,
     quantiles: Sequence[float] = (0.05, 0.25, 0.5, 0.75, 0.95),
+    results: Sequence[str] = (),
 ) -> Scatter:
-    """Scatter of the transmission error of one design over manufactured gears.
+    """Scatter of the transmission error and other results of one design over manufactured gears.
 
     Runs in blocks on all local devices; one compilation serves every tolerance, torque, seed and amount of
     modification. Beyond the blocks it holds one transmission error curve per sample in memory. For gradients, average
@@ -108,65 +130,64 @@ def monte_carlo(
         samples: how many, at least 2.
         seed: of the random numbers; sample i is that of `sample_deviations` with the same seed.
         quantiles: levels of the transmission error curves, between 0 and 1.
+        results: names of further results, as for `sweep`.
 
     Raises:
-        ValueError: for a torque, a number of samples or a quantile outside its range, or lead deviations on a mesh of
-            one slice.
+        ValueError: for a torque, a number of samples or a quantile outside its range, unknown results, or lead
+            deviations on a mesh of one slice.
     """
     check("monte_carlo", "torque", torque, "N m", low=0.0)
     levels = np.sort(np.asarray(quantiles, float))
     check("monte_carlo", "quantiles", levels, "", low=0.0, high=1.0)
     whole("monte_carlo", "samples", samples, 2)
     check_slices("monte_carlo", tolerance, mesh)
+    keys = [result_key(name) for name in results]
     task = (mesh, real(torque), tolerance, pinion, wheel, jax.random.key(seed))
-    curves, converged = _run(task, samples + 1)
-    return _scatter(mesh.phase, curves, converged, levels)
+    curves, converged, numbers = _run(task, tuple(results), samples + 1)
+    return _scatter(mesh.phase, curves, converged, levels, dict(zip(keys, numbers.T)))
 
 
-def _run(task, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Transmission errors (count, positions) and success (count,) on the host; number 0 is the nominal design."""
-    devices = len(jax.local_devices())
-    block = min(_BLOCK, -(-count // devices)) * devices
-    parts = []
-    for start in range(0, count, block):
-        numbers = start + jnp.arange(block)
-        parts.append(jax.device_get(_block(task, numbers)))
-    curves, converged = (np.concatenate(part)[:count] for part in zip(*parts))
-    return curves, converged
+def _run(task, results: tuple[str, ...], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Transmission errors (count, positions), success (count,) and results (count, results) on the host.
+
+    Number 0 is the nominal design, which rides along without its own compilation.
+    """
+    devices = local_devices()
+    share = min(_BLOCK, -(-count // devices.size))
+    batch = min(side_by_side(task[0]), share)
+    block = -(-share // batch) * batch * devices.size
+    parts = [
+        jax.device_get(_block(task, start + jnp.arange(block), results, batch, devices))
+        for start in range(0, count, block)
+    ]
+    curves, converged, numbers = (np.concatenate(part)[:count] for part in zip(*parts))
+    return curves, converged, numbers
 
 
 @eqx.filter_jit
-def _block(task, numbers):
-    arrays, rest = eqx.partition(task, eqx.is_array)
-    devices = jax.local_devices()
-
-    def run(arrays, numbers):
-        return _solve_numbers(eqx.combine(arrays, rest), numbers)
-
-    if len(devices) > 1:
-        everywhere, split = PartitionSpec(), PartitionSpec("samples")
-        grid = DeviceMesh(np.asarray(devices), ("samples",))
-        run = jax.shard_map(run, mesh=grid, in_specs=(everywhere, split), out_specs=split, check_vma=False)
-    return run(arrays, numbers)
-
-
-def _solve_numbers(task, numbers):
-    """The samples of the given numbers; the nominal design rides along as number 0, without its own compilation."""
+def _block(task, numbers, results: tuple[str, ...], batch: int, devices):
     mesh, torque, tolerance, pinion, wheel, key = task
-    design = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-    basis = flank_basis(mesh, torque)
+    design, basis = removed_material(mesh, torque, pinion=pinion, wheel=wheel), flank_basis(mesh, torque)
+    arrays, rest = eqx.partition((mesh, torque, tolerance, key, design, basis), eqx.is_array)
 
-    def one(number):
-        deviation = deviation_of(tolerance, mesh, key, number - 1)
-        field = deviation_field(deviation, basis)
-        cycle = solve_removed(mesh, torque, design + jnp.where(number > 0, field, 0.0))
-        return cycle.transmission_error, jnp.all(cycle.converged)
+    def one(arrays, number):
+        return _solve_number(eqx.combine(arrays, rest), number, results)
 
-    on_cpu = jax.default_backend() == "cpu"
-    return jax.lax.map(one, numbers, batch_size=_CPU_BATCH if on_cpu else numbers.shape[0])
+    return over_devices(one, numbers, arrays, batch=batch, devices=devices)
 
 
-def _scatter(phase, curves: np.ndarray, converged: np.ndarray, levels: np.ndarray) -> Scatter:
+def _solve_number(task, number, results: tuple[str, ...]):
+    """The sample of a number; the nominal design is number 0."""
+    mesh, torque, tolerance, key, design, basis = task
+    deviation = deviation_of(tolerance, mesh, key, number - 1)
+    field = deviation_field(deviation, basis)
+    cycle = solve_removed(mesh, torque, design + jnp.where(number > 0, field, 0.0))
+    found = [RESULTS[name].of(cycle) for name in results]
+    numbers = jnp.stack(found) if found else jnp.zeros((0,), mesh.phase.dtype)
+    return cycle.transmission_error, solved(cycle) & jnp.all(jnp.isfinite(numbers)), numbers
+
+
+def _scatter(phase, curves: np.ndarray, converged: np.ndarray, levels: np.ndarray, numbers=None) -> Scatter:
     """Statistics of the solved samples, on the host: reductions of the device drop NaN from large arrays."""
     spread = np.ptp(curves, axis=1)
     converged = converged & np.isfinite(curves).all(axis=1)
@@ -181,24 +202,24 @@ def _scatter(phase, curves: np.ndarray, converged: np.ndarray, levels: np.ndarra
         nominal_ppte=array(np.where(converged[0], spread[0], np.nan)),
         mean=array(np.mean(ppte, dtype=float)),
         std=array(np.std(ppte, ddof=1, dtype=float)),
-        ppte_quantile95=array(_quantiles(ppte, fine, np.array(0.95))),
+        ppte_quantile95=array(_quantiles(ppte, fine, [0.95])[0]),
         phase=phase,
         nominal_transmission_error=array(nominal),
         quantiles=array(levels),
         transmission_error_quantiles=array(_quantiles(curves[1:], fine, levels)),
+        numbers={key: array(np.where(fine, values[1:], np.nan)) for key, values in (numbers or {}).items()},
     )
 
 
-def _quantiles(values: np.ndarray, fine: np.ndarray, levels: np.ndarray) -> np.ndarray:
-    """Quantiles over the samples of the first axis in which failed ones rank beyond all others, on either side.
+def _quantiles(values: np.ndarray, fine: np.ndarray, levels) -> np.ndarray:
+    """Quantiles over the samples of the first axis, shape (levels, ...); failed ones rank beyond all others.
 
-    Each is the value of a sample, the outer one of the two at the level: interpolation towards an infinite neighbour
-    would give NaN. Shape (levels, ...).
+    They do so on either side: below the median, where a bound is a lower one, among the smallest.
     """
-    ordered = np.sort(np.ascontiguousarray(values[fine].T), axis=-1)
-    count, failed = ordered.shape[-1], len(values) - ordered.shape[-1]
-    place = levels * (len(values) - 1)
-    pick = np.where(levels >= 0.5, np.ceil(place), np.floor(place) - failed).astype(int)
-    ends = [np.full((*ordered.shape[:-1], 1), end, ordered.dtype) for end in (-np.inf, np.inf)]
-    bounded = np.concatenate([ends[0], ordered, ends[1]], axis=-1)
-    return bounded[..., np.clip(pick, -1, count) + 1].T
+    known = np.where(fine.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan)
+    found = []
+    for level in levels:
+        better: Better = "smaller" if level >= 0.5 else "larger"
+        outer = level if level >= 0.5 else 1 - level
+        found.append(ranked(Worst() if outer == 1 else Quantile(outer), known, better))
+    return np.stack(found)
