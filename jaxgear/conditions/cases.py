@@ -5,8 +5,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..contact import Mesh
-from ..numerics import check, real, whole
+from ..contact import Mesh, Operation
+from ..contact.operation import operation_of
+from ..numerics import real, whole
 from ..tolerance import Deviation, Tolerance, sample_deviations
 from ..tolerance.deviation import deviation_field, flank_basis
 from .load import LoadSpectrum
@@ -42,8 +43,10 @@ class Conditions(eqx.Module):
         """The cases on a mesh; traceable, where every design has a mesh of its own."""
         dtype = mesh.phase.dtype
         torques = self.load.torques.astype(dtype)
+        speeds = None if self.load.speeds is None else self.load.speeds.astype(dtype)
         removed = None if self.deviations is None else _removed(mesh, torques, self.deviations)
-        return Cases(torques, self.load.weights.astype(dtype), removed)
+        friction = None if self.load.friction is None else self.load.friction.astype(dtype)
+        return Cases(torques, speeds, friction, self.load.weights.astype(dtype), removed)
 
 
 class Cases(eqx.Module):
@@ -53,12 +56,16 @@ class Cases(eqx.Module):
 
     Attributes:
         torque: on the pinion [N m], shape (torques,).
+        speed: of the pinion at every torque [rpm], shape (torques,); None where nothing asks for it.
+        friction: mean coefficient of friction; None for the default of whatever needs it.
         weight: of every torque, sum 1, shape (torques,).
         removed: material that deviations remove [um], shape (torques, samples, pairs, slices, positions); None for
             perfect gears.
     """
 
     torque: Float[Array, " torques"]
+    speed: Float[Array, " torques"] | None
+    friction: Float[Array, ""] | None
     weight: Float[Array, " torques"]
     removed: Float[Array, "torques samples pairs slices positions"] | None
 
@@ -78,17 +85,23 @@ class Cases(eqx.Module):
         return jnp.repeat(self.weight / self.samples, self.samples)
 
     def each(self, function):
-        """function(torque, removed) in every case, with a leading axis (cases,); the torques run slowest.
+        """function(operation, removed) in every case, with a leading axis (cases,); the torques run slowest.
 
         A single case is not mapped, so that it costs no more than a plain call.
         """
-        if self.removed is None:
-            nothing = jnp.zeros((), self.torque.dtype)
-            if self.count == 1:
-                return jax.tree.map(lambda part: part[None], function(self.torque[0], nothing))
-            return jax.vmap(lambda torque: function(torque, nothing))(self.torque)
-        found = jax.vmap(jax.vmap(function, (None, 0)))(self.torque, self.removed)
-        return jax.tree.map(lambda part: part.reshape(self.count, *part.shape[2:]), found)
+
+        def at(torque, speed, removed):
+            return function(Operation(torque, speed, self.friction), removed)
+
+        by_speed = None if self.speed is None else 0
+        if self.removed is not None:
+            found = jax.vmap(jax.vmap(at, (None, None, 0)), (0, by_speed, 0))(self.torque, self.speed, self.removed)
+            return jax.tree.map(lambda part: part.reshape(self.count, *part.shape[2:]), found)
+        nothing = jnp.zeros((), self.torque.dtype)
+        if self.count == 1:
+            speed = None if self.speed is None else self.speed[0]
+            return jax.tree.map(lambda part: part[None], at(self.torque[0], speed, nothing))
+        return jax.vmap(at, (0, by_speed, None))(self.torque, self.speed, nothing)
 
 
 def conditions(
@@ -99,7 +112,7 @@ def conditions(
     Args:
         owner: the function that is asked, for messages.
         mesh: prepared mesh; its number of pairs and its floating-point type count, nothing else.
-        torque: on the pinion [N m], or a `LoadSpectrum`.
+        torque: on the pinion [N m], an `Operation`, or a `LoadSpectrum`.
         tolerance: of manufactured gears; None for perfect ones.
         samples: manufactured pairs, which run under every torque; None for 64. Sample i depends on the seed and on i
             alone, see `sample_deviations`.
@@ -110,8 +123,7 @@ def conditions(
     """
     load = torque
     if not isinstance(torque, LoadSpectrum):
-        check(owner, "torque", torque, "N m", low=0.0)
-        load = LoadSpectrum.of(real(torque))
+        load = LoadSpectrum.of(operation_of(owner, torque, real(0.0).dtype))
     if tolerance is None:
         if samples is not None:
             raise ValueError(f"{owner}: samples = {samples!r} has no effect without a tolerance")

@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import check, concrete, real
+from ..contact import Operation
+from ..numerics import check, concrete, optional_real, real
 
 
 class LoadSpectrum(eqx.Module):
@@ -15,19 +16,22 @@ class LoadSpectrum(eqx.Module):
         torques: on the pinion [N m], shape (torques,).
         weights: shares, which sum to 1, shape (torques,).
         speeds: of the pinion at every torque [rpm], shape (torques,); None where nothing asks for them.
+        friction: mean coefficient of friction at all of them; None for the default of whatever needs it.
     """
 
     torques: Float[Array, " torques"]
     weights: Float[Array, " torques"]
     speeds: Float[Array, " torques"] | None
+    friction: Float[Array, ""] | None
 
-    def __init__(self, torques, weights=None, speeds=None):
+    def __init__(self, torques, weights=None, speeds=None, friction=None):
         """Makes the spectrum.
 
         Args:
             torques: on the pinion [N m], all different unless they have speeds.
             weights: of any sum; None for equal shares.
             speeds: of the pinion [rpm], one per torque or one for all; None for none.
+            friction: mean coefficient of friction; None for the default of whatever needs it.
 
         Raises:
             ValueError: for torques, weights or speeds that are negative, not finite or of different number, loads that
@@ -41,6 +45,8 @@ class LoadSpectrum(eqx.Module):
         if speeds is not None:
             check("LoadSpectrum", "speeds", speeds, "rpm", low=0.0)
             self.speeds = self._as_many("speeds", real(speeds))
+        check("LoadSpectrum", "friction", friction, "", low=0.0)
+        self.friction = optional_real(friction)
         self._check_different()
         shares = jnp.ones_like(self.torques) if weights is None else real(weights)
         check("LoadSpectrum", "weights", shares, "", low=0.0)
@@ -66,6 +72,7 @@ class LoadSpectrum(eqx.Module):
             raise ValueError("LoadSpectrum: torques must be different" + ", or their speeds" * (len(given) > 1))
 
     @staticmethod
-    def of(torque) -> "LoadSpectrum":
-        """A spectrum from itself or from a single torque [N m]."""
-        return torque if isinstance(torque, LoadSpectrum) else LoadSpectrum(real(torque)[None])
+    def of(operation: Operation) -> "LoadSpectrum":
+        """A spectrum of a single load."""
+        speeds = None if operation.speed is None else operation.speed[None]
+        return LoadSpectrum(operation.torque[None], speeds=speeds, friction=operation.friction)

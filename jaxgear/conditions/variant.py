@@ -11,6 +11,7 @@ from jax.interpreters.partial_eval import dce_jaxpr
 from jaxtyping import Array, Bool, Float
 
 from ..contact import Mesh, removed_material
+from ..contact.operation import operation_of
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, fields_of, real
 from .cases import Cases, Conditions, conditions
@@ -50,7 +51,8 @@ class Variants(eqx.Module):
         names: of the variables.
         design: makes (pinion, wheel) modifications from the named variables.
         mesh: prepared mesh, or a function that prepares one from the named variables.
-        torque: on the pinion [N m], a function of the named variables; None where the conditions say it.
+        torque: on the pinion [N m], or an `Operation`, as a function of the named variables; None where the conditions
+            say it.
         conditions: loads and manufactured gears; its load counts where `torque` is None.
         cases: the conditions on a mesh that is the same for all variants, else None.
     """
@@ -73,13 +75,11 @@ class Variants(eqx.Module):
         if cases is None:
             conditions = self.conditions
             if self.torque is not None:
-                torque = real(self.torque(parameters))
-                made.append(torque)
-                conditions = Conditions(LoadSpectrum.of(torque), conditions.deviations)
+                operation = operation_of("torque", self.torque(parameters), mesh.slice_width.dtype)
+                made.append(operation)
+                conditions = Conditions(LoadSpectrum.of(operation), conditions.deviations)
             cases = conditions.on(mesh)
         possible = jnp.all(jnp.stack([jnp.asarray(True), *_in_range(made)]))
-        if self.torque is not None:
-            possible &= jnp.all(cases.torque >= 0)
         return Variant(mesh, cases, pinion, wheel, possible)
 
     def mesh_shape(self, values: Sequence) -> Mesh:
@@ -125,7 +125,8 @@ def variants(
         values: of the variables of one variant, by which the functions are tried.
         design: makes (pinion, wheel) modifications from the named variables.
         mesh: prepared mesh, or a function of the named variables that prepares one; traced.
-        torque: on the pinion [N m], a `LoadSpectrum`, or a function of the named variables that gives a torque.
+        torque: on the pinion [N m], an `Operation` or a `LoadSpectrum`; or a function of the named variables that gives
+            a torque or an operation.
         tolerance, samples, seed: of manufactured gears, see `conditions`.
 
     Raises:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..conditions import Conditions, LoadSpectrum, label
-from ..metrics import RESULTS, result_key
+from ..metrics import Quantity
 from ..numerics import AbstractMeasure
 from .plan import AbstractPlan
 
@@ -45,21 +45,23 @@ def parameter_columns(plan: AbstractPlan, units: Mapping[str, str], taken: Seque
     return [Column(name, units.get(name, ""), "parameter", low=low, high=high) for name, low, high in limits]
 
 
-def result_columns(results: Sequence[str], conditions: Conditions, measures: Sequence[AbstractMeasure]) -> list[Column]:
+def result_columns(
+    results: Sequence[Quantity], conditions: Conditions, measures: Sequence[AbstractMeasure]
+) -> list[Column]:
     """The columns of every result, in the order in which the evaluation gives them.
 
     One case makes one column, `ppte_um`. Several make one for each measure over all of them, `ppte_um_mean`; several
     torques besides those of each torque, `ppte_um_25Nm`, over its manufactured gears `ppte_um_25Nm_q95`.
 
     Args:
-        results: names of results.
+        results: the quantities wanted.
         conditions: loads and manufactured gears.
         measures: by which the cases are joined, none for a single one.
 
     Raises:
-        ValueError: for no, repeated or unknown results.
+        ValueError: for no or repeated results.
     """
-    if not results or len(set(results)) != len(results):
+    if not results or len({of.key for of in results}) != len(results):
         raise ValueError("sweep: results must be different and at least one")
     loads = _labels(conditions.load) if len(conditions.load.torques) > 1 else []
     joins = [f"_{label(measure)}" for measure in measures]
@@ -67,9 +69,7 @@ def result_columns(results: Sequence[str], conditions: Conditions, measures: Seq
     endings = [*(joins or [""]), *(f"{load}{join}" for load in loads for join in gears)]
     columns = []
     for result in results:
-        key = result_key(result)
-        better: Literal["smaller", "larger"] = "smaller" if RESULTS[result].worst == "max" else "larger"
-        columns += [Column(f"{key}{ending}", RESULTS[result].unit, "result", better) for ending in endings]
+        columns += [Column(f"{result.key}{ending}", result.unit, "result", result.better) for ending in endings]
     return columns
 
 

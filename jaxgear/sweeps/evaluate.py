@@ -13,7 +13,7 @@ from jax.sharding import Mesh as DeviceMesh
 from ..conditions import Variants, joined, solved
 from ..conditions.batches import divided, everywhere, local_devices, over_devices, padded, side_by_side
 from ..contact import removed_material, solve_removed
-from ..metrics import RESULTS
+from ..metrics import Quantity
 from ..numerics import AbstractMeasure
 from .columns import CONVERGED, result_columns
 
@@ -26,7 +26,7 @@ class _Program(NamedTuple):
     """What is compiled for: everything that is neither an array nor its shape."""
 
     rest: Variants
-    results: tuple[str, ...]
+    results: tuple[Quantity, ...]
     batch: int
     devices: DeviceMesh
 
@@ -44,7 +44,7 @@ class Evaluator:
         variants: Variants,
         example: np.ndarray,
         *,
-        results: Sequence[str],
+        results: Sequence[Quantity],
         measures: Sequence[AbstractMeasure],
         rows: int,
     ):
@@ -53,12 +53,12 @@ class Evaluator:
         Args:
             variants: what the variables make.
             example: a value of every variable.
-            results: names of results.
+            results: the quantities wanted.
             measures: by which the cases of a variant are joined; none for a single case.
             rows: largest number of variants of a call.
 
         Raises:
-            ValueError: for unknown results, and for whatever the variants or a result refuse.
+            ValueError: for no or repeated results, and for whatever the variants or a result refuse.
         """
         conditions = variants.conditions
         self.columns = result_columns(results, conditions, measures)
@@ -107,16 +107,18 @@ def _numbers(program: _Program, data, values):
     variants, measures = eqx.combine(data, program.rest)
     variant = variants(values)
 
-    def of_case(torque, deviation):
-        removed = removed_material(variant.mesh, torque, pinion=variant.pinion, wheel=variant.wheel)
-        cycle = solve_removed(variant.mesh, torque, removed + deviation)
-        numbers = jnp.stack([RESULTS[name].of(cycle) for name in program.results])
+    flanks = {"pinion": variant.pinion, "wheel": variant.wheel}
+
+    def of_case(operation, deviation):
+        removed = removed_material(variant.mesh, operation, **flanks)
+        cycle = solve_removed(variant.mesh, operation, removed + deviation, **flanks)
+        numbers = jnp.stack([of(cycle) for of in program.results])
         return numbers, solved(cycle) & jnp.all(jnp.isfinite(numbers))
 
     numbers, fine = variant.cases.each(of_case)
     flat = []
-    for name, of_cases in zip(program.results, numbers.T):
-        flat += _joined(of_cases, variant.cases, measures, "smaller" if RESULTS[name].worst == "max" else "larger")
+    for of, of_cases in zip(program.results, numbers.T):
+        flat += _joined(of_cases, variant.cases, measures, of.better)
     return flat, jnp.all(fine) & variant.possible
 
 

@@ -11,8 +11,8 @@ from jaxtyping import Array, Bool, Float
 from ..conditions import Better, joined, ranked, solved
 from ..conditions.batches import local_devices, over_devices, side_by_side
 from ..contact import Mesh, removed_material, solve_removed
-from ..metrics import RESULTS, result_key
-from ..microgeometry import AbstractModification
+from ..metrics import Quantity, quantity_of
+from ..microgeometry import AbstractModification, NoModification
 from ..numerics import AbstractMeasure, Quantile, Worst, check, real, whole
 from ..tolerance import Tolerance
 from ..tolerance.deviation import deviation_field, deviation_of, flank_basis
@@ -55,23 +55,21 @@ class Scatter(eqx.Module):
     transmission_error_quantiles: Float[Array, "quantiles positions"]
     numbers: dict[str, Float[Array, " samples"]]
 
-    def joined(self, name: str, measure: AbstractMeasure) -> Scalar:
+    def joined(self, of: str | Quantity, measure: AbstractMeasure) -> Scalar:
         """One number for a result of all samples, such as its 95 % quantile.
 
         Args:
-            name: of a result asked for, or "ppte".
+            of: a result asked for, or "ppte".
             measure: `Mean()`, `Worst()`, `Quantile(level)` or `CVaR(level)`.
 
         Raises:
-            ValueError: for an unknown name.
+            ValueError: for a result that was not asked for.
         """
-        known = {result_key("ppte"): self.ppte, **self.numbers}
-        key = result_key(name) if name in RESULTS else name
-        if key not in known:
-            raise ValueError(f'Scatter: "{name}" is not there, must be one of {", ".join(known)}')
-        (worst,) = [result.worst for each, result in RESULTS.items() if result_key(each) == key]
-        better: Better = "smaller" if worst == "max" else "larger"
-        return joined(measure, known[key], jnp.ones_like(self.ppte), better)
+        wanted = quantity_of(of, "Scatter")
+        known = {"ppte_um": self.ppte, **self.numbers}
+        if wanted.key not in known:
+            raise ValueError(f'Scatter: "{wanted.key}" is not there, must be one of {", ".join(known)}')
+        return joined(measure, known[wanted.key], jnp.ones_like(self.ppte), wanted.better)
 
     @property
     def failed(self) -> int:
@@ -104,7 +102,7 @@ def monte_carlo(
     samples: int = 100_000,
     seed: int = 0,
     quantiles: Sequence[float] = (0.05, 0.25, 0.5, 0.75, 0.95),
-    results: Sequence[str] = (),
+    results: Sequence[str | Quantity] = (),
 ) -> Scatter:
     """Scatter of the transmission error and other results of one design over manufactured gears.
 
@@ -130,7 +128,7 @@ def monte_carlo(
         samples: how many, at least 2.
         seed: of the random numbers; sample i is that of `sample_deviations` with the same seed.
         quantiles: levels of the transmission error curves, between 0 and 1.
-        results: names of further results, as for `sweep`.
+        results: further quantities, as for `sweep`.
 
     Raises:
         ValueError: for a torque, a number of samples or a quantile outside its range, unknown results, or lead
@@ -141,13 +139,14 @@ def monte_carlo(
     check("monte_carlo", "quantiles", levels, "", low=0.0, high=1.0)
     whole("monte_carlo", "samples", samples, 2)
     check_slices("monte_carlo", tolerance, mesh)
-    keys = [result_key(name) for name in results]
-    task = (mesh, real(torque), tolerance, pinion, wheel, jax.random.key(seed))
-    curves, converged, numbers = _run(task, tuple(results), samples + 1)
-    return _scatter(mesh.phase, curves, converged, levels, dict(zip(keys, numbers.T)))
+    wanted = tuple(quantity_of(of, "monte_carlo") for of in results)
+    flanks = pinion or NoModification(), wheel or NoModification()
+    task = (mesh, real(torque), tolerance, *flanks, jax.random.key(seed))
+    curves, converged, numbers = _run(task, wanted, samples + 1)
+    return _scatter(mesh.phase, curves, converged, levels, {of.key: column for of, column in zip(wanted, numbers.T)})
 
 
-def _run(task, results: tuple[str, ...], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _run(task, results: tuple[Quantity, ...], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Transmission errors (count, positions), success (count,) and results (count, results) on the host.
 
     Number 0 is the nominal design, which rides along without its own compilation.
@@ -165,10 +164,10 @@ def _run(task, results: tuple[str, ...], count: int) -> tuple[np.ndarray, np.nda
 
 
 @eqx.filter_jit
-def _block(task, numbers, results: tuple[str, ...], batch: int, devices):
+def _block(task, numbers, results: tuple[Quantity, ...], batch: int, devices):
     mesh, torque, tolerance, pinion, wheel, key = task
     design, basis = removed_material(mesh, torque, pinion=pinion, wheel=wheel), flank_basis(mesh, torque)
-    arrays, rest = eqx.partition((mesh, torque, tolerance, key, design, basis), eqx.is_array)
+    arrays, rest = eqx.partition((mesh, torque, tolerance, pinion, wheel, key, design, basis), eqx.is_array)
 
     def one(arrays, number):
         return _solve_number(eqx.combine(arrays, rest), number, results)
@@ -176,13 +175,14 @@ def _block(task, numbers, results: tuple[str, ...], batch: int, devices):
     return over_devices(one, numbers, arrays, batch=batch, devices=devices)
 
 
-def _solve_number(task, number, results: tuple[str, ...]):
+def _solve_number(task, number, results: tuple[Quantity, ...]):
     """The sample of a number; the nominal design is number 0."""
-    mesh, torque, tolerance, key, design, basis = task
+    mesh, torque, tolerance, pinion, wheel, key, design, basis = task
     deviation = deviation_of(tolerance, mesh, key, number - 1)
     field = deviation_field(deviation, basis)
-    cycle = solve_removed(mesh, torque, design + jnp.where(number > 0, field, 0.0))
-    found = [RESULTS[name].of(cycle) for name in results]
+    removed = design + jnp.where(number > 0, field, 0.0)
+    cycle = solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
+    found = [of(cycle) for of in results]
     numbers = jnp.stack(found) if found else jnp.zeros((0,), mesh.phase.dtype)
     return cycle.transmission_error, solved(cycle) & jnp.all(jnp.isfinite(numbers)), numbers
 

@@ -10,13 +10,15 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ..conditions import Conditions, Variants, check_used, label, variants
 from ..conditions.variant import Design, Parameters
-from ..contact import Mesh
+from ..contact import Mesh, solve
+from ..metrics import Quantity, quantities, quantity_of
 from ..numerics import AbstractMeasure, Mean, Quantile, Worst, whole
 from ..tolerance import Tolerance
 from .columns import CONVERGED, VARIANT, Column, parameter_columns
@@ -38,7 +40,7 @@ def sweep(
     *,
     mesh: Mesh | Callable[[Parameters], Mesh],
     torque,
-    results: Sequence[str] = ("ppte",),
+    results: Sequence[str | Quantity] = ("ppte",),
     measures: Sequence[AbstractMeasure] | None = None,
     output: str | Path | None = None,
     tolerance: Tolerance | None = None,
@@ -74,7 +76,7 @@ def sweep(
         plan: the variants: `FullFactorial`, `LatinHypercube`, `Sobol` or `VariantList`.
         mesh: prepared mesh; or a function of the named variables that prepares one, traced likewise.
         torque: on the pinion [N m], a `LoadSpectrum`, or a function of the named variables that gives a torque.
-        results: names of `metrics.RESULTS`; only these are computed.
+        results: names of `metrics.quantities`, or quantities of your own; only these are computed.
         measures: by which torques and manufactured gears are joined, a column each; None for `Mean()` and `Worst()` of
             several torques, with a tolerance `Mean()` and `Quantile(0.95)`.
         output: folder of the table; None keeps it in memory.
@@ -110,11 +112,12 @@ def sweep(
     )
     traced, used = made.traced(jnp.asarray(example))
     check_used("sweep", plan.names, used)
+    wanted = [quantity_of(of, "sweep") for of in results]
     joins = _measures(made.conditions, measures)
-    evaluator = Evaluator(made, example, results=results, measures=joins, rows=min(part_rows, plan.size))
+    evaluator = Evaluator(made, example, results=wanted, measures=joins, rows=min(part_rows, plan.size))
     columns = _columns(plan, units or {}, evaluator)
     settings = {
-        **_settings(made, example, _design_digest(traced), plan, results),
+        **_settings(made, example, _design_digest(traced), plan, wanted),
         "columns": [column.name for column in columns],
         "variants": plan.size,
         "part_rows": part_rows,
@@ -217,7 +220,8 @@ def _settings(made: Variants, example: np.ndarray, identity: str, plan: Abstract
         "torques_Nm": None if made.torque is not None else np.asarray(load.torques).tolist(),
         "speeds_rpm": None if load.speeds is None else np.asarray(load.speeds).tolist(),
         "weights": np.asarray(load.weights).tolist(),
-        "results": list(results),
+        "results": [of.key for of in results],
+        "quantities": _own_digest(made, example, results),
         "design": identity,
         "mesh": _digest(made.mesh) if fixed else None,
         "precision": str(made.mesh_shape(example).phase.dtype),
@@ -241,6 +245,21 @@ def _design_digest(traced) -> str:
     """Digest of what the variables make: a function has no other identity that outlives the process."""
     text = _without_addresses(str(traced.jaxpr))
     return hashlib.sha256(text.encode() + _digest(traced.consts).encode()).hexdigest()
+
+
+def _own_digest(made: Variants, example: np.ndarray, results: Sequence[Quantity]) -> str | None:
+    """Digest of what quantities compute that are not those of the vocabulary; None without any."""
+    own = [of for of in results if quantities.get(of.name) is not of]
+    if not own:
+        return None
+
+    def cycle(values):
+        variant = made(values)
+        return solve(variant.mesh, variant.cases.torque[0], pinion=variant.pinion, wheel=variant.wheel)
+
+    shape = eqx.filter_eval_shape(cycle, jnp.asarray(example))
+    traced, _, _ = eqx.filter_make_jaxpr(lambda cycle: [of(cycle) for of in own])(shape)
+    return _design_digest(traced)
 
 
 def _without_addresses(text: str) -> str:
