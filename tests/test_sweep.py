@@ -350,7 +350,7 @@ def test_another_design_or_mesh_is_another_sweep(mesh, folder):
     [
         ({"results": ()}, "results must be different and at least one"),
         ({"results": ("ppte", "ppte")}, "results must be different"),
-        ({"results": ("noise",)}, '"noise" is not a result, must be one of ppte, mean_te'),
+        ({"results": ("noise",)}, 'sweep: "noise" is not known'),
         ({"part_rows": 0}, "part_rows = 0 must be a whole number of at least 1"),
         ({"torque": -1.0}, "sweep: torque = -1 N m must be at least 0"),
     ],
