@@ -169,3 +169,24 @@ def test_a_search_by_gradients_is_held_by_the_margins():
     assert -bound.fun > 1.2 * -float(objective(start)[0])
     assert bool(jg.margins(pair(bound.x + np.array([0.0, 0.0, 1e-6]))).valid)
     assert np.isclose(np.asarray(rule(bound.x)), 0.0, atol=1e-6).sum() >= 2, "margins, not the box, end the search"
+
+
+def test_traced_gears_that_cannot_run_do_not_converge():
+    """A profile shift of 0.9 leaves 12 teeth no tip: refused when concrete, and no less wrong while being traced."""
+
+    @jax.jit
+    def solved(shift):
+        pinion = jg.Gear(12, 3.0, profile_shift=shift, face_width=20.0, bore_diameter=12.0)
+        pair = jg.GearPair(pinion, jg.Gear(48, 3.0, face_width=18.0, bore_diameter=70.0))
+        cycle = jg.solve(jg.prepare(pair, resolution=jg.Resolution(positions=4, pairs=2)), 20.0)
+        return cycle.valid, cycle.converged, cycle.margins.pinion_tip_land
+
+    valid, converged, _ = solved(0.5)
+    assert bool(valid) and bool(converged.all())
+    valid, converged, land = solved(0.9)
+    assert not bool(valid) and not bool(converged.any()) and float(land) < 0
+
+
+def test_a_slip_of_the_unit_is_named_where_no_number_of_pairs_suffices():
+    with pytest.raises(ValueError, match=r"deflection = 12933.3 um.*torque.*N m.*elastic modulus.*MPa"):
+        jg.fewest_pairs(gear_pair((19, 48), 3.0), deflection=12933.3)

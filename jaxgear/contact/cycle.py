@@ -4,6 +4,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..geometry import Margins
 from ..microgeometry import AbstractModification
 from ..numerics import over_batch
 from .kinematics import Kinematics, Side
@@ -23,6 +24,7 @@ class MeshCycle(eqx.Module):
 
     Attributes:
         kinematics: the pair, its path of contact and the array sizes.
+        margins: how far the pair is from what cannot run.
         operation: what the mesh was run at.
         pinion, wheel: modifications of the flanks; None where only the material removed was given (`solve_removed`).
         transmission_error: loaded, on the line of action, positive when the wheel lags [um], shape (positions,).
@@ -34,11 +36,12 @@ class MeshCycle(eqx.Module):
         gap: gap of the undeformed flanks at zero transmission error [um]: corner gap plus both modifications.
         tangent_stiffness: d force / d transmission error at fixed position [N/um].
         residual: largest relative violation of the contact conditions, shape (positions,).
-        converged: where the residual is below the resolution's tolerance and no pair beyond those carried along could
-            touch, shape (positions,).
+        converged: where the residual is below the resolution's tolerance, no pair beyond those carried along could
+            touch and the gears are valid, shape (positions,).
     """
 
     kinematics: Kinematics
+    margins: Margins
     operation: Operation
     pinion: AbstractModification | None
     wheel: AbstractModification | None
@@ -61,6 +64,11 @@ class MeshCycle(eqx.Module):
     def phase(self) -> Curve:
         """Mesh position in base pitches, shape (positions,) without batch axes."""
         return self.kinematics.phase
+
+    @property
+    def valid(self) -> Array:
+        """Whether such gears can run, which only traced ones may fail to; `margins` and `explain` tell why."""
+        return self.margins.valid
 
     @property
     def torque(self) -> Scalar:

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 from ..compliance import Compliance, default_compliance
 from ..compliance.hertz import AbstractLaw, contact_geometry
 from ..compliance.toothload import tooth_load
-from ..geometry import GearPair, PathOfContact, outline, path_of_contact
+from ..geometry import GearPair, Margins, PathOfContact, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
 from ..numerics import concrete, minimum
 from .kinematics import Contacts, Kinematics, Side, contacts, kinematics, sides
@@ -28,6 +28,7 @@ class Mesh(eqx.Module):
         corner_gap: gap of the unmodified flanks outside the path of contact [um], shape (pairs, positions).
         lever: what a pair closes per unit of transmission error; 1 on the path of contact, less beyond it, because the
             corner's gap opens while the gears turn on.
+        margins: how far the pair is from what cannot run; of traced gears, nothing else tells.
         outer_gap: smallest transmission error, beyond the unloaded one, at which pairs that are not carried along could
             touch [um].
         structure: compliance of both gears, (pairs, pairs, positions) [um per N/mm].
@@ -44,6 +45,7 @@ class Mesh(eqx.Module):
     sides: tuple[Side, Side]
     corner_gap: Field
     lever: Field
+    margins: Margins
     outer_gap: Scalar
     structure: Float[Array, "pairs pairs positions"]
     law: AbstractLaw
@@ -132,8 +134,9 @@ def _prepare(pair: GearPair, compliance: Compliance, resolution: Resolution) -> 
     moving = kinematics(pair, resolution, compliance.plane)
     contact, dtype = moving.path_of_contact, moving.path.dtype
     points = contacts(pair, contact, moving.path)
-    pinion = tooth_load(outline(pair.pinion), points.pinion_roll_length)
-    wheel = tooth_load(outline(pair.wheel), points.wheel_roll_length)
+    outlines = outline(pair.pinion), outline(pair.wheel)
+    pinion = tooth_load(outlines[0], points.pinion_roll_length)
+    wheel = tooth_load(outlines[1], points.wheel_roll_length)
     geometry = contact_geometry(pinion, wheel, compliance.plane, pair.face_width)
     # Chebyshev nodes of the second kind integrate with the weight of the semi-elliptic pressure
     angle = jnp.pi * jnp.arange(1, resolution.patch_nodes + 1, dtype=dtype) / (resolution.patch_nodes + 1)
@@ -143,6 +146,7 @@ def _prepare(pair: GearPair, compliance: Compliance, resolution: Resolution) -> 
         sides=sides(pair, contact, points),
         corner_gap=points.corner_gap,
         lever=points.lever,
+        margins=margins_between(*outlines, contact, pair.center_distance),
         outer_gap=minimum(_closing(_next_pairs(pair, contact, jnp.asarray([resolution.reach], dtype)))),
         structure=compliance.structure(pinion, wheel),
         law=compliance.law(geometry, pinion, wheel, moving.outside),
@@ -173,7 +177,10 @@ def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
     for pairs, gap in zip(candidates, gaps):
         if gap.min() > deflection:
             return pairs
-    raise ValueError(f"fewest_pairs: 12 pairs do not contain every contact up to deflection = {deflection:g} um")
+    raise ValueError(
+        f"fewest_pairs: 12 pairs do not contain every contact up to deflection = {deflection:g} um: the torque is too "
+        "large for these teeth, or is it not in N m, or the elastic modulus not in MPa?"
+    )
 
 
 @eqx.filter_jit

@@ -155,7 +155,9 @@ def flanks_of(owner: str, mesh: Mesh, pinion: Any, wheel: Any) -> tuple[Abstract
 
 def _cycle(mesh: Mesh, operation: Operation, contact: dict[str, Array], pinion=None, wheel=None) -> MeshCycle:
     """What the compiled programs leave out: it passes through them unchanged, and would be copied."""
-    return MeshCycle(kinematics=mesh.kinematics, operation=operation, pinion=pinion, wheel=wheel, **contact)
+    return MeshCycle(
+        kinematics=mesh.kinematics, margins=mesh.margins, operation=operation, pinion=pinion, wheel=wheel, **contact
+    )
 
 
 @eqx.filter_jit
@@ -181,7 +183,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> dict[str, Array
         "gap": gap,
         "tangent_stiffness": 1 / (1 / contact_stiffness + mesh.hub / mesh.pair.face_width),
         "residual": solution.residual,
-        "converged": solution.solved & (solution.approach - unloaded < mesh.outer_gap),
+        "converged": solution.solved & (solution.approach - unloaded < mesh.outer_gap) & mesh.margins.valid,
     }
 
 

@@ -17,6 +17,7 @@ from .involute import roll_angle as roll_angle
 from .involute import roll_length as roll_length
 from .involute import tooth_thickness as tooth_thickness
 from .margins import Margins as Margins
+from .margins import margins_between as margins_between
 from .material import Material as Material
 from .outline import Outline as Outline
 from .outline import outline as outline
