@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 import jaxgear as jg
-from jaxgear.compliance.hertz import LinearLaw
+from jaxgear.compliance.laws import LinearLaw
 from jaxgear.contact import removed_material, solve_removed
 from jaxgear.microgeometry import AbstractModification
 

@@ -3,9 +3,10 @@
     tooth (beam) + body (elastic ring with neighbouring teeth, or Sainsot's polynomial) + contact law (Hertz)
 
 `Compliance` composes the parts; `default_compliance` is the recommended set, `legacy_compliance` the one that most
-published spur-gear studies use.
+published spur-gear studies use. Anything else that knows the elasticity of both gears is an `AbstractCompliance`.
 """
 
+from .assembly import AbstractCompliance as AbstractCompliance
 from .assembly import Compliance as Compliance
 from .assembly import default_compliance as default_compliance
 from .assembly import legacy_compliance as legacy_compliance
@@ -18,10 +19,12 @@ from .body import Sainsot as Sainsot
 from .hertz import AbstractContact as AbstractContact
 from .hertz import CenterDistance as CenterDistance
 from .hertz import ConstantHertz as ConstantHertz
+from .hertz import ContactGeometry as ContactGeometry
 from .hertz import DepthReferenced as DepthReferenced
 from .hertz import Kovalskii as Kovalskii
 from .hertz import NonlinearPower as NonlinearPower
 from .hertz import Palmgren as Palmgren
 from .hertz import Weber as Weber
+from .laws import AbstractLaw as AbstractLaw
 from .plane import Plane as Plane
 from .toothload import ToothLoad as ToothLoad

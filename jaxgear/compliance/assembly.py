@@ -1,18 +1,54 @@
 """Composition of tooth, body and contact models into the compliance of a mesh."""
 
+from abc import abstractmethod
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..numerics import AbstractSpring
 from .beam import AbstractTooth, Beam
 from .body import AbstractBody, ElasticRing, Sainsot
 from .edge import EdgeLaw, edge
-from .hertz import AbstractContact, AbstractLaw, ConstantHertz, ContactGeometry, DepthReferenced
+from .hertz import AbstractContact, ConstantHertz, ContactGeometry, DepthReferenced
 from .plane import Plane, check_plane
 from .toothload import ToothLoad
 
 
-class Compliance(eqx.Module):
+class AbstractCompliance(eqx.Module):
+    """What a prepared mesh needs to know of the elasticity of both gears: composed of models, or a table.
+
+    Attributes:
+        plane: "stress" or "strain", of the elastic constants.
+    """
+
+    plane: eqx.AbstractVar[Plane]
+
+    @abstractmethod
+    def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "pairs pairs positions"]:
+        """Compliance of teeth and bodies between all pairs in contact [um per N/mm], without hub wind-up.
+
+        Args:
+            pinion: load lines of all contacts on the pinion, fields of shape (pairs, positions).
+            wheel: the same on the wheel.
+        """
+
+    @abstractmethod
+    def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, ""]:
+        """Wind-up of both gear bodies, in um per N/mm of total line load."""
+
+    @abstractmethod
+    def law(
+        self,
+        geometry: ContactGeometry,
+        pinion: ToothLoad,
+        wheel: ToothLoad,
+        outside: Float[Array, "pairs positions"],
+    ) -> AbstractSpring:
+        """The prepared contact law, for contacts at a distance `outside` the path of contact [mm]."""
+
+
+class Compliance(AbstractCompliance):
     """Which models make up the compliance of the mesh.
 
     Attributes:
@@ -34,7 +70,6 @@ class Compliance(eqx.Module):
         check_plane(self.plane)
 
     def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "pairs pairs positions"]:
-        """Compliance of teeth and bodies between all pairs in contact [um per N/mm], without hub wind-up."""
         total = self.body.compliance(pinion, +1, self.plane) + self.body.compliance(wheel, -1, self.plane)
         teeth = self.tooth.compliance(pinion, self.plane) + self.tooth.compliance(wheel, self.plane)
         for i in range(teeth.shape[0]):
@@ -42,11 +77,9 @@ class Compliance(eqx.Module):
         return total
 
     def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, ""]:
-        """Wind-up of both gear bodies, in um per N/mm of total line load."""
         return self.body.hub(pinion.outline) + self.body.hub(wheel.outline)
 
-    def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside) -> AbstractLaw:
-        """The prepared contact law, for contacts at a distance `outside` the path of contact [mm]."""
+    def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside) -> AbstractSpring:
         law = self.contact.prepare(geometry)
         if not self.edge_softening:
             return law

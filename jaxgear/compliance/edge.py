@@ -29,8 +29,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import log
-from .hertz import AbstractLaw, ContactGeometry, LogarithmicLaw, polynomial
+from ..numerics import AbstractSpring, log
+from .hertz import ContactGeometry
+from .laws import AbstractLaw, Cut, polynomial
 from .toothload import ToothLoad
 
 Field = Float[Array, "pairs 1 positions"]
@@ -105,7 +106,7 @@ def _wedge_excess(load: ToothLoad) -> Float[Array, ""]:
     return jnp.sin(b) ** 2 / (b + twin) + jnp.cos(b) ** 2 / (b - twin) - 2 / jnp.pi
 
 
-class EdgeLaw(AbstractLaw):
+class EdgeLaw(AbstractSpring):
     """A contact law with the softening of the nearest tip corner added.
 
     Attributes:
@@ -123,11 +124,8 @@ class EdgeLaw(AbstractLaw):
     def secant(self, load: Real) -> Real:
         squared = self.width_factor * load
         patch = cut_off(self.edge.distance, squared)
-        if isinstance(self.flank, LogarithmicLaw):
-            # Phi's logarithm replaces the half width by half the extent of the patch
-            flank = self.flank.logarithmic_secant(load, patch.squared_extent)
-        else:
-            flank = self.flank.secant(load) + 0.25 * self.truncation * log(squared / patch.squared_extent)
+        # Phi's logarithm replaces the half width by half the extent of the patch
+        flank = self.flank.cut_secant(load, self._cut(squared, patch))
         # ln(span) where it is positive, with a smooth onset: ln(1 + span^4) / 4
         softer = self.edge.wedge * 0.25 * log(1 + self._span(patch) ** 4)
         # the division at the end is what a compiler stores, instead of evaluating all of this wherever it is used
@@ -136,15 +134,14 @@ class EdgeLaw(AbstractLaw):
     def slope(self, load: Real, secant: Real) -> Real:
         squared = self.width_factor * load
         patch = cut_off(self.edge.distance, squared)
-        if isinstance(self.flank, LogarithmicLaw):
-            change = self.flank.secant_change(load, patch.widening)
-        else:
-            flank = self.flank.secant(load)
-            change = self.flank.slope(load, flank) - flank + 0.25 * self.truncation * (1 - patch.widening)
+        change = self.flank.cut_change(load, self._cut(squared, patch))
         share = 1 / (1 + self._span(patch) ** 4) - 1  # -d (softer) / d ln(mean distance), over the wedge's compliance
         change = change + self.edge.wedge * share * patch.mean_slope * squared * (1 / patch.mean_distance)
         bending = self.truncation * (patch.bending_slope * squared - patch.bending)
         return ((secant + change) * squared + bending) / squared
+
+    def _cut(self, squared: Real, patch: "Patch") -> Cut:
+        return Cut(squared, patch.squared_extent, patch.widening, 0.5 * self.truncation)
 
     def _span(self, patch: "Patch") -> Real:
         return self.edge.reach / _APEX_DISTANCE * (1 / patch.mean_distance)

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import reduced_radius
-from ..numerics import AbstractSpring, log
+from .laws import AbstractLaw, LinearLaw, LogarithmicLaw, PowerLaw
 from .plane import Plane, plane_modulus, plane_poisson
 from .toothload import ToothLoad
 
@@ -92,77 +92,12 @@ def contact_geometry(pinion: ToothLoad, wheel: ToothLoad, plane: Plane, face_wid
     return ContactGeometry(side(pinion), side(wheel), field(face_width))
 
 
-class AbstractLaw(AbstractSpring):
-    """A prepared contact law: approach of the two flanks [um] under a line load [N/mm]."""
-
-
 class AbstractContact(eqx.Module):
     """A choice of contact law."""
 
     @abstractmethod
     def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
         """The law for a given local geometry."""
-
-
-class LinearLaw(AbstractLaw):
-    """approach = compliance * q"""
-
-    compliance: Field
-
-    def secant(self, load: Real) -> Real:
-        return jnp.broadcast_to(self.compliance, jnp.broadcast_shapes(self.compliance.shape, load.shape))
-
-
-class PowerLaw(AbstractLaw):
-    """approach = factor q^exponent"""
-
-    factor: Field
-    exponent: Field
-
-    def secant(self, load: Real) -> Real:
-        return self.factor * load ** (self.exponent - 1)
-
-
-class LogarithmicLaw(AbstractLaw):
-    """approach = q (series(a^2) - factor ln a), a^2 = width_factor q: every law with the half width in a logarithm.
-
-    Attributes:
-        factor: 2 / (pi E*) [um per N/mm].
-        width_factor: a^2 / q [mm^2 per N/mm].
-        span: a^2 at which the series ends [mm^2]; it stays constant beyond.
-        series: coefficients over powers of 2 a^2 / span - 1, lowest first [um per N/mm].
-    """
-
-    factor: Field
-    width_factor: Field
-    span: Field
-    series: tuple[Field, ...]
-
-    def secant(self, load: Real) -> Real:
-        return self.logarithmic_secant(load, self.width_factor * load)
-
-    def slope(self, load: Real, secant: Real) -> Real:
-        return secant + self.secant_change(load)
-
-    def logarithmic_secant(self, load: Real, squared_extent: Real) -> Real:
-        """`secant` with the square of another half extent in place of a^2 in the logarithm [mm^2]."""
-        place = jnp.minimum(2 * self.width_factor * load / self.span - 1, 1.0)
-        return polynomial(self.series, place) - 0.5 * self.factor * log(squared_extent)
-
-    def secant_change(self, load: Real, widening: Real | float = 1.0) -> Real:
-        """load d secant / d load [um per N/mm], with widening = d ln(squared_extent) / d ln(load)."""
-        place = 2 * self.width_factor * load / self.span - 1
-        derivative = [power * coefficient for power, coefficient in enumerate(self.series)][1:]
-        stretch = jnp.where(place < 1, polynomial(derivative, place), 0.0) * (place + 1)
-        return stretch - 0.5 * self.factor * widening
-
-
-def polynomial(coefficients, x: Real) -> Real:
-    """Coefficients with the lowest power first; zero without any."""
-    value = jnp.zeros_like(x)
-    for coefficient in reversed(coefficients):
-        value = value * x + coefficient
-    return value
 
 
 class ConstantHertz(AbstractContact):

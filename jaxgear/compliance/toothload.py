@@ -4,8 +4,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry.involute import half_tooth_angle
-from ..geometry.outline import Outline
+from ..geometry.involute import load_angle
+from ..geometry.outline import Outline, involute_point
 
 Real = Float[Array, "..."]
 
@@ -29,11 +29,8 @@ class ToothLoad(eqx.Module):
 
 
 def tooth_load(outline: Outline, roll_length: Real) -> ToothLoad:
-    """The load line is tangent to the base circle: it crosses the centreline at r_b / cos(angle)."""
+    """The load line of every point, which is the normal to the involute there."""
     gear = outline.gear
-    half_angle = half_tooth_angle(gear, roll_length)
-    angle = jnp.arctan(roll_length / gear.base_radius) - half_angle
-    radius = jnp.sqrt(gear.base_radius**2 + roll_length**2)
-    return ToothLoad(
-        outline, roll_length, angle, gear.base_radius / jnp.cos(angle), radius * jnp.sin(half_angle) / jnp.cos(angle)
-    )
+    angle = load_angle(gear, roll_length)
+    x, _ = involute_point(gear, roll_length)
+    return ToothLoad(outline, roll_length, angle, gear.base_radius / jnp.cos(angle), x / jnp.cos(angle))

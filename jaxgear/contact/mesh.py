@@ -5,12 +5,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..compliance import Compliance, default_compliance
-from ..compliance.hertz import AbstractLaw, contact_geometry
+from ..compliance import AbstractCompliance, default_compliance
+from ..compliance.hertz import contact_geometry
 from ..compliance.toothload import tooth_load
 from ..geometry import GearPair, Margins, PathOfContact, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import concrete, minimum
+from ..numerics import AbstractSpring, concrete, minimum
 from .kinematics import Contacts, Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution
 
@@ -41,14 +41,14 @@ class Mesh(eqx.Module):
     """
 
     kinematics: Kinematics
-    compliance: Compliance
+    compliance: AbstractCompliance
     sides: tuple[Side, Side]
     corner_gap: Field
     lever: Field
     margins: Margins
     outer_gap: Scalar
     structure: Float[Array, "pairs pairs positions"]
-    law: AbstractLaw
+    law: AbstractSpring
     width_factor: Field
     patch_place: Float[Array, " patch_nodes"]
     patch_weight: Float[Array, " patch_nodes"]
@@ -109,7 +109,9 @@ class Mesh(eqx.Module):
         return side.flank(moved[:, None], self.face_coordinate[None, :, None])
 
 
-def prepare(pair: GearPair, *, compliance: Compliance | None = None, resolution: Resolution | None = None) -> Mesh:
+def prepare(
+    pair: GearPair, *, compliance: AbstractCompliance | None = None, resolution: Resolution | None = None
+) -> Mesh:
     """Prepares a gear pair for `solve`: contact points, corner gaps and compliances over one base pitch.
 
     Args:
@@ -130,7 +132,7 @@ def prepare(pair: GearPair, *, compliance: Compliance | None = None, resolution:
 
 
 @eqx.filter_jit
-def _prepare(pair: GearPair, compliance: Compliance, resolution: Resolution) -> Mesh:
+def _prepare(pair: GearPair, compliance: AbstractCompliance, resolution: Resolution) -> Mesh:
     moving = kinematics(pair, resolution, compliance.plane)
     contact, dtype = moving.path_of_contact, moving.path.dtype
     points = contacts(pair, contact, moving.path)

@@ -43,6 +43,14 @@ def half_tooth_angle(gear: Toothed, rho: Real) -> Real:
     return at_base - involute(rho / gear.base_radius)
 
 
+def load_angle(gear: Toothed, rho: Real) -> Real:
+    """Angle between the normal to the involute at a roll length [mm] and the normal to the tooth centreline [rad].
+
+    The normal is tangent to the base circle: it crosses the centreline at r_b / cos(angle).
+    """
+    return jnp.arctan(rho / gear.base_radius) - half_tooth_angle(gear, rho)
+
+
 def tooth_thickness(gear: Toothed, diameter: Real) -> Real:
     """Thickness of the tooth as an arc [mm] on a diameter [mm] not below the base circle."""
     return diameter * half_tooth_angle(gear, roll_length(gear, diameter))

@@ -67,9 +67,17 @@ def outline(gear: Gear) -> Outline:
     return Outline(gear, junction, form, jnp.arctan2(end_x, end_y), undercut.astype(form.dtype))
 
 
+def rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
+    """Centre of the rack's tip arc: distance from the tooth centreline [mm], depth below the pitch line, and radius."""
+    alpha, m = jnp.deg2rad(gear.pressure_angle), gear.module
+    tip = gear.root_radius * m
+    from_rack_centre = jnp.pi * m / 4 - gear.dedendum * m * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * tip / jnp.cos(alpha)
+    return jnp.pi * m / 2 - from_rack_centre, (gear.dedendum - gear.profile_shift) * m - tip, tip
+
+
 def trochoid(gear: Gear, g: Real) -> tuple[Real, Real]:
     """Point (x, y) [mm] of the fillet at the parameter g [rad]."""
-    offset, depth, tip = _rack_tip(gear)
+    offset, depth, tip = rack_tip(gear)
     r = gear.pitch_radius
     phi = (depth / jnp.tan(g) + offset) / r
     distance = depth / jnp.sin(g) + tip
@@ -80,14 +88,6 @@ def involute_point(gear: Gear, rho: Real) -> tuple[Real, Real]:
     """Point (x, y) [mm] of the involute at a roll length [mm]."""
     r, gamma = jnp.sqrt(gear.base_radius**2 + rho**2), half_tooth_angle(gear, rho)
     return r * jnp.sin(gamma), r * jnp.cos(gamma)
-
-
-def _rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
-    """Centre of the rack's tip arc: distance from the tooth centreline [mm], depth below the pitch line, and radius."""
-    alpha, m = jnp.deg2rad(gear.pressure_angle), gear.module
-    tip = gear.root_radius * m
-    from_rack_centre = jnp.pi * m / 4 - gear.dedendum * m * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * tip / jnp.cos(alpha)
-    return jnp.pi * m / 2 - from_rack_centre, (gear.dedendum - gear.profile_shift) * m - tip, tip
 
 
 def _tangential_form_roll_length(gear: Gear) -> Scalar:

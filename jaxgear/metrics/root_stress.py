@@ -16,7 +16,8 @@ from jaxtyping import Array, Float
 
 from ..contact import MeshCycle, Side
 from ..geometry import Gear
-from ..geometry.involute import half_tooth_angle
+from ..geometry.involute import load_angle
+from ..geometry.outline import rack_tip
 from ..numerics import over_batch
 
 Real = Float[Array, "..."]
@@ -60,14 +61,10 @@ class RootStress(eqx.Module):
 
 def critical_section(gear: Gear) -> CriticalSection:
     """Section of the generated root at the 30 degree tangent (external spur gear)."""
-    alpha, m, z = jnp.deg2rad(gear.pressure_angle), gear.module, gear.teeth
-    radius = gear.root_radius
-    centre = jnp.pi / 4 - gear.dedendum * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * radius / jnp.cos(alpha)
-    g = radius - gear.dedendum + gear.profile_shift
-    h = 2 / z * (jnp.pi / 2 - centre) - jnp.pi / 3
-    theta = jax.lax.fori_loop(
-        0, _SECTION_STEPS, lambda _, t: 2 * g / z * jnp.tan(t) - h, jnp.full_like(alpha, jnp.pi / 6)
-    )
+    m, z = gear.module, gear.teeth
+    offset, below, radius = (length / m for length in rack_tip(gear))
+    g, h = -below, 2 / z * offset - jnp.pi / 3
+    theta = jax.lax.fori_loop(0, _SECTION_STEPS, lambda _, t: 2 * g / z * jnp.tan(t) - h, jnp.full_like(h, jnp.pi / 6))
     reach = g / jnp.cos(theta) - radius
     chord = z * jnp.sin(jnp.pi / 3 - theta) + jnp.sqrt(3.0) * reach
     fillet = radius + 2 * g**2 / (jnp.cos(theta) * (z * jnp.cos(theta) ** 2 - 2 * g))
@@ -78,11 +75,11 @@ def critical_section(gear: Gear) -> CriticalSection:
 def root_factors(gear: Gear, roll_length: Real) -> RootFactors:
     """Y_F and Y_S for a load at a roll length [mm] of the flank."""
     section, m = critical_section(gear), gear.module
-    load_angle = jnp.arctan(roll_length / gear.base_radius) - half_tooth_angle(gear, roll_length)
-    # the load line crosses the tooth centreline at r_b / cos(load angle): the lever arm ends there
-    arm = jnp.maximum(gear.base_radius / jnp.cos(load_angle) - section.depth, _SHORTEST_ARM * m)
+    cosine = jnp.cos(load_angle(gear, roll_length))
+    # the lever arm ends where the load line crosses the tooth centreline
+    arm = jnp.maximum(gear.base_radius / cosine - section.depth, _SHORTEST_ARM * m)
     alpha = jnp.deg2rad(gear.pressure_angle)
-    form = 6 * (arm / m) * jnp.cos(load_angle) / ((section.chord / m) ** 2 * jnp.cos(alpha))
+    form = 6 * (arm / m) * cosine / ((section.chord / m) ** 2 * jnp.cos(alpha))
     slenderness = section.chord / arm
     notch = jnp.clip(section.chord / (2 * section.fillet_radius), *_NOTCH_LIMITS)
     correction = (1.2 + 0.13 * slenderness) * notch ** (1 / (1.21 + 2.3 / slenderness))
