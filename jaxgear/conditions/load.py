@@ -1,28 +1,27 @@
 """The loads over which a design is judged."""
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import Operation
-from ..numerics import check, concrete, optional_real, real
+from ..numerics import Checked, check, concrete, number, optional_real, real
 
 
-class LoadSpectrum(eqx.Module):
+class LoadSpectrum(Checked):
     """Several torques, each with the share of time or revolutions that it is run for.
 
     Attributes:
-        torques: on the pinion [N m], shape (torques,).
+        torques: on the pinion, shape (torques,).
         weights: shares, which sum to 1, shape (torques,).
-        speeds: of the pinion at every torque [rpm], shape (torques,); None where nothing asks for them.
+        speeds: of the pinion at every torque, shape (torques,); None where nothing asks for them.
         friction: mean coefficient of friction at all of them; None for the default of whatever needs it.
     """
 
-    torques: Float[Array, " torques"]
-    weights: Float[Array, " torques"]
-    speeds: Float[Array, " torques"] | None
-    friction: Float[Array, ""] | None
+    torques: Float[Array, " torques"] = number("N m", low=0.0, shape=("torques",))
+    weights: Float[Array, " torques"] = number("", low=0.0, shape=("torques",))
+    speeds: Float[Array, " torques"] | None = number("rpm", low=0.0, shape=("torques",), optional=True)
+    friction: Float[Array, ""] | None = number("", low=0.0, optional=True)
 
     def __init__(self, torques, weights=None, speeds=None, friction=None):
         """Makes the spectrum.
@@ -37,15 +36,12 @@ class LoadSpectrum(eqx.Module):
             ValueError: for torques, weights or speeds that are negative, not finite or of different number, loads that
                 are repeated, or weights that are all zero.
         """
-        check("LoadSpectrum", "torques", torques, "N m", low=0.0)
         self.torques = real(torques)
         if self.torques.ndim != 1 or not len(self.torques):
             raise ValueError("LoadSpectrum: torques must be a list of at least one torque")
         self.speeds = None
         if speeds is not None:
-            check("LoadSpectrum", "speeds", speeds, "rpm", low=0.0)
             self.speeds = self._as_many("speeds", real(speeds))
-        check("LoadSpectrum", "friction", friction, "", low=0.0)
         self.friction = optional_real(friction)
         self._check_different()
         shares = jnp.ones_like(self.torques) if weights is None else real(weights)

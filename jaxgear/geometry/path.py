@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import bracketed_root
+from ..numerics import Checked, bracketed_root, result
 from .gear import Gear
 from .involute import involute
 
@@ -14,7 +14,7 @@ Scalar = Float[Array, ""]
 _WIDEST_ANGLE = 1.2  # rad; no gear pair works beyond about 45 degrees
 
 
-class PathOfContact(eqx.Module):
+class PathOfContact(Checked):
     """Points on the line of action, as `path` positions from the pitch point C [mm] (ISO 21771).
 
     Attributes:
@@ -22,20 +22,20 @@ class PathOfContact(eqx.Module):
         inner_single: B, a preceding pair leaves contact at E.
         outer_single: D, the following pair enters contact at A.
         end: E, tip of the pinion leaves.
-        base_pitch: [mm].
-        pinion_pitch_roll_length, wheel_pitch_roll_length: roll lengths of the two gears at C [mm].
-        pinion_base_radius, wheel_base_radius: [mm].
+        base_pitch: of both gears.
+        pinion_pitch_roll_length, wheel_pitch_roll_length: roll lengths of the two gears at C.
+        pinion_base_radius, wheel_base_radius: base radii.
     """
 
-    start: Scalar
-    inner_single: Scalar
-    outer_single: Scalar
-    end: Scalar
-    base_pitch: Scalar
-    pinion_pitch_roll_length: Scalar
-    wheel_pitch_roll_length: Scalar
-    pinion_base_radius: Scalar
-    wheel_base_radius: Scalar
+    start: Scalar = result("mm")
+    inner_single: Scalar = result("mm")
+    outer_single: Scalar = result("mm")
+    end: Scalar = result("mm")
+    base_pitch: Scalar = result("mm")
+    pinion_pitch_roll_length: Scalar = result("mm")
+    wheel_pitch_roll_length: Scalar = result("mm")
+    pinion_base_radius: Scalar = result("mm")
+    wheel_base_radius: Scalar = result("mm")
 
     @property
     def contact_ratio(self) -> Scalar:

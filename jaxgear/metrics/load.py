@@ -1,27 +1,26 @@
 """How the pairs share the load and over which part of the path they carry it."""
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..numerics import maximum, minimum, over_batch, safe_divide
+from ..numerics import Checked, maximum, minimum, over_batch, result, safe_divide
 
 Scalar = Float[Array, ""]
 
 
-class ContactShock(eqx.Module):
+class ContactShock(Checked):
     """Contact beyond the theoretical path of contact.
 
     Attributes:
-        approach: loaded path length before its start, where the wheel's tip corner touches [mm].
-        recess: loaded path length after its end, where the pinion's tip corner touches [mm].
-        force: largest force on a pair there [N].
+        approach: loaded path length before its start, where the wheel's tip corner touches.
+        recess: loaded path length after its end, where the pinion's tip corner touches.
+        force: largest force on a pair there.
     """
 
-    approach: Scalar
-    recess: Scalar
-    force: Scalar
+    approach: Scalar = result("mm")
+    recess: Scalar = result("mm")
+    force: Scalar = result("N")
 
 
 @over_batch

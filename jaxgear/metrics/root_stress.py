@@ -9,7 +9,6 @@ References:
     minus).
 """
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -18,7 +17,7 @@ from ..contact import MeshCycle, Side
 from ..geometry import Gear
 from ..geometry.involute import load_angle
 from ..geometry.outline import rack_tip
-from ..numerics import over_batch
+from ..numerics import Checked, over_batch, result
 
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
@@ -30,33 +29,33 @@ _NOTCH_LIMITS = (1.0, 8.0)  # validity of Y_S in the notch parameter q_s
 _SHORTEST_ARM = 0.05
 
 
-class CriticalSection(eqx.Module):
+class CriticalSection(Checked):
     """Root section at the 30 degree tangent.
 
     Attributes:
-        chord: s_Fn [mm].
-        fillet_radius: rho_F [mm].
-        depth: distance of the section from the gear centre [mm].
+        chord: s_Fn.
+        fillet_radius: rho_F.
+        depth: distance of the section from the gear centre.
     """
 
-    chord: Scalar
-    fillet_radius: Scalar
-    depth: Scalar
+    chord: Scalar = result("mm")
+    fillet_radius: Scalar = result("mm")
+    depth: Scalar = result("mm")
 
 
-class RootFactors(eqx.Module):
+class RootFactors(Checked):
     """Form factor Y_F and stress correction factor Y_S at given load points."""
 
-    form: Real
-    correction: Real
-    lever_arm: Real
+    form: Real = result()
+    correction: Real = result()
+    lever_arm: Real = result("mm")
 
 
-class RootStress(eqx.Module):
-    """Nominal local root stress of both gears [MPa], shape (pairs, slices, positions)."""
+class RootStress(Checked):
+    """Nominal local root stress of both gears, shape (pairs, slices, positions)."""
 
-    pinion: Load
-    wheel: Load
+    pinion: Load = result("MPa")
+    wheel: Load = result("MPa")
 
 
 def critical_section(gear: Gear) -> CriticalSection:

@@ -1,25 +1,24 @@
 """Variation of a transmission error curve over one base pitch."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import spread
+from ..numerics import Checked, result, spread
 
 Curve = Float[Array, "... positions"]
 
 
-class Harmonics(eqx.Module):
+class Harmonics(Checked):
     """Mesh-frequency harmonics 1 ... n of a curve: curve = mean + sum_n amplitude_n cos(2 pi n psi + phase_n).
 
     Attributes:
         amplitude: [unit of the curve], shape (..., n).
-        phase: [deg], shape (..., n); zero with zero gradient where the amplitude vanishes.
+        phase: shape (..., n); zero with zero gradient where the amplitude vanishes.
     """
 
-    amplitude: Float[Array, "... harmonics"]
-    phase: Float[Array, "... harmonics"]
+    amplitude: Float[Array, "... harmonics"] = result()
+    phase: Float[Array, "... harmonics"] = result("deg")
 
 
 def peak_to_peak(curve: Curve) -> Float[Array, "..."]:

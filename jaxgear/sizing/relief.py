@@ -5,7 +5,6 @@ References:
     ISO/TR 13989-1 and ISO/TS 6336-20, equation B.1; ISO 21771 for relief lengths.
 """
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -13,7 +12,7 @@ from ..contact import MeshCycle
 from ..geometry import GearPair, path_of_contact
 from ..metrics import secant_stiffness
 from ..microgeometry import AbstractCurve, TipRelief
-from ..numerics import check, minimum, real, safe_divide
+from ..numerics import Checked, check, minimum, real, result, safe_divide
 
 Scalar = Float[Array, ""]
 
@@ -23,8 +22,8 @@ _MODEL_FACTOR = 0.8  # C_M, measured to theoretical single stiffness
 _LIGHT_LOAD = 100.0  # line load [N/mm] below which c' falls with its fourth root
 
 
-class IsoStiffness(eqx.Module):
-    """Tooth stiffness of ISO 6336-1 Method B, solid disc bodies, in N/(mm um).
+class IsoStiffness(Checked):
+    """Tooth stiffness of ISO 6336-1 Method B, solid disc bodies.
 
     Attributes:
         theoretical: c'_th.
@@ -32,9 +31,9 @@ class IsoStiffness(eqx.Module):
         mesh: c_gamma_alpha, mean of the total mesh stiffness.
     """
 
-    theoretical: Scalar
-    single: Scalar
-    mesh: Scalar
+    theoretical: Scalar = result("N/(mm um)")
+    single: Scalar = result("N/(mm um)")
+    mesh: Scalar = result("N/(mm um)")
 
 
 def iso_stiffness(pair: GearPair, line_load=_LIGHT_LOAD) -> IsoStiffness:

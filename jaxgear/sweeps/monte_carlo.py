@@ -13,7 +13,7 @@ from ..conditions.batches import local_devices, over_devices, side_by_side
 from ..contact import Mesh, removed_material, solve_removed
 from ..metrics import Quantity, quantity_of
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import AbstractMeasure, Quantile, Worst, check, real, whole
+from ..numerics import AbstractMeasure, Checked, Quantile, Worst, check, real, result, whole
 from ..tolerance import Tolerance
 from ..tolerance.deviation import deviation_field, deviation_of, flank_basis
 from ..tolerance.limits import check_slices
@@ -23,7 +23,7 @@ Scalar = Float[Array, ""]
 _BLOCK = 4096  # samples per call and device
 
 
-class Scatter(eqx.Module):
+class Scatter(Checked):
     """Result of `monte_carlo`.
 
     A sample fails when its contact solution does not converge or is not finite. It stays in every array and counts
@@ -43,17 +43,17 @@ class Scatter(eqx.Module):
         numbers: the results asked for, of every sample, by name with unit; each of shape (samples,), NaN where failed.
     """
 
-    ppte: Float[Array, " samples"]
-    converged: Bool[Array, " samples"]
-    nominal_ppte: Scalar
-    mean: Scalar
-    std: Scalar
-    ppte_quantile95: Scalar
-    phase: Float[Array, " positions"]
-    nominal_transmission_error: Float[Array, " positions"]
-    quantiles: Float[Array, " quantiles"]
-    transmission_error_quantiles: Float[Array, "quantiles positions"]
-    numbers: dict[str, Float[Array, " samples"]]
+    ppte: Float[Array, " samples"] = result("um")
+    converged: Bool[Array, " samples"] = result()
+    nominal_ppte: Scalar = result("um")
+    mean: Scalar = result("um")
+    std: Scalar = result("um")
+    ppte_quantile95: Scalar = result("um")
+    phase: Float[Array, " positions"] = result()
+    nominal_transmission_error: Float[Array, " positions"] = result("um")
+    quantiles: Float[Array, " quantiles"] = result()
+    transmission_error_quantiles: Float[Array, "quantiles positions"] = result("um")
+    numbers: dict[str, Float[Array, " samples"]] = result()
 
     def joined(self, of: str | Quantity, measure: AbstractMeasure) -> Scalar:
         """One number for a result of all samples, such as its 95 % quantile.
