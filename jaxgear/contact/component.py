@@ -42,6 +42,9 @@ class ModifiedMesh(eqx.Module):
         """The prepared mesh, constant to every derivative."""
         return self._mesh()
 
+    def __repr__(self) -> str:
+        return f"ModifiedMesh({self.mesh!r}, pinion={self.pinion!r}, wheel={self.wheel!r})"
+
     def __call__(self, torque) -> MeshCycle:
         """Mesh cycle under a torque on the pinion [N m]; see `solve`."""
         return solve(self.mesh, torque, pinion=self.pinion, wheel=self.wheel)

@@ -55,6 +55,9 @@ class Mesh(eqx.Module):
     hub: Scalar
     slice_width: Float[Array, " slices"]
 
+    def __repr__(self) -> str:
+        return f"Mesh(pair={self.pair!r}, resolution={self.resolution!r})"
+
     @property
     def pair(self) -> GearPair:
         """The gear pair."""

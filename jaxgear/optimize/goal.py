@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from ..contact import MeshCycle
 from ..metrics import RESULTS, Result, max_relief, relief_reversal, removed_volume
 from ..microgeometry import AbstractModification
-from ..numerics import check, optional_real
+from ..numerics import Checked, check, optional_real
 
 Scalar = Float[Array, ""]
 
@@ -66,7 +66,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
 PPTE = "ppte"
 
 
-class Constraint(eqx.Module):
+class Constraint(Checked):
     """A number of the design that has to stay within limits, in every case.
 
     Attributes:

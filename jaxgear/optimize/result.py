@@ -7,12 +7,13 @@ import numpy as np
 
 from ..contact import Mesh, MeshCycle
 from ..microgeometry import AbstractModification
+from ..numerics import Checked
 
 PENALIZED = " with curvature penalty"  # what the name of an objective says of it
 _SHOWN_PARAMETERS = 12  # a table of a hundred flank values tells a reader nothing
 
 
-class Iterate(eqx.Module):
+class Iterate(Checked):
     """One state of the transmission-error iteration.
 
     Attributes:
@@ -34,7 +35,7 @@ class Iterate(eqx.Module):
     max_corner_pressure: float
 
 
-class Front(eqx.Module):
+class Front(Checked):
     """Designs of which none is better in every objective.
 
     Attributes:
