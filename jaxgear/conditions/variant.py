@@ -23,6 +23,13 @@ Modifications = tuple[AbstractModification | None, AbstractModification | None]
 Design = Callable[[Parameters], Modifications]
 
 
+# where the variables of an engine can be used
+_USES = {
+    "minimize": "design",
+    "sweep": "design, or in a mesh or torque that is a function of the variables",
+}
+
+
 class Variant(NamedTuple):
     """One design with its mesh and its loads.
 
@@ -155,10 +162,7 @@ def check_used(owner: str, names: Sequence[str], used: Sequence[str]) -> None:
     """Raises a `ValueError` that names the variables on which nothing depends."""
     unused = [f'"{name}"' for name in names if name not in used]
     if unused:
-        raise ValueError(
-            f"{owner}: nothing depends on {', '.join(unused)}: use it in design, or in a mesh or torque that is a "
-            f"function of the variables, such as torque=lambda v: v[{unused[0]}]"
-        )
+        raise ValueError(f"{owner}: nothing depends on {', '.join(unused)}: use it in {_USES[owner]}, or leave it out")
 
 
 def _in_range(tree) -> Iterator[Bool[Array, ""]]:

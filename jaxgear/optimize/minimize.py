@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..conditions import conditions, in_words
+from ..conditions import Variants, check_used, conditions, in_words
 from ..contact import Mesh, removed_material, solve_removed
 from ..metrics import peak_to_peak
 from ..numerics import AbstractMeasure, Mean
@@ -77,9 +77,11 @@ def minimize(
             f"minimize: {len(objectives)} objectives with method {method.name!r}: a Pareto front takes several and is "
             'found by method "pareto", the others take one'
         )
-    judged = conditions("minimize", mesh, torque, tolerance=tolerance, samples=samples, seed=seed).on(mesh)
+    judged = conditions("minimize", mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
     measure = Mean() if measure is None else measure
-    problem = make_problem(design, bounds, mesh, judged, objectives, measure, constraints)
+    problem = make_problem(design, bounds, mesh, judged.on(mesh), objectives, measure, constraints)
+    made = Variants(problem.names, design, mesh, None, judged, problem.cases)
+    check_used("minimize", problem.names, made.traced(problem.low)[1])
     began = time.perf_counter()
     record = Record(problem, callback)
     front = method.search(problem, record)

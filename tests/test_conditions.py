@@ -1,0 +1,133 @@
+"""Every engine judges a design under the same conditions, and a sweep takes any variable of the problem."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.stats.mstats import hdquantiles
+
+import jaxgear as jg
+from jaxgear.conditions import conditions, joined, ranked, variants
+from jaxgear.metrics import Quantity
+from jaxgear.numerics.reductions import Max
+from jaxgear.optimize.problem import make_problem
+
+SIZES = jg.Resolution(positions=8, pairs=2, patch_nodes=1)
+AMOUNT, TORQUES = 5.0, (30.0, 50.0)
+
+
+def pair(shift=0.0, distance=None):
+    pinion = jg.Gear(teeth=19, module=3.0, face_width=20.0, profile_shift=shift)
+    return jg.GearPair(pinion, jg.Gear(teeth=48, module=3.0, face_width=18.0), center_distance=distance)
+
+
+def design(v):
+    return jg.TipRelief(v["amount"], 4.0), None
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return jg.prepare(pair(), resolution=SIZES)
+
+
+@pytest.fixture(scope="module")
+def tolerance(mesh):
+    return jg.Tolerance.from_class(mesh.pair, 6).without_lead()
+
+
+def test_every_torque_meets_the_same_gears(mesh, tolerance):
+    judged = conditions("test", mesh, jg.LoadSpectrum(TORQUES), tolerance=tolerance, samples=3, seed=7)
+    drawn = jg.sample_deviations(tolerance, mesh, 3, seed=7)
+    jax.tree.map(np.testing.assert_array_equal, judged.deviations, drawn)
+    cases = judged.on(mesh)
+    assert cases.count == 6 and cases.weights.tolist() == pytest.approx([1 / 6] * 6)
+    for row, torque in enumerate(TORQUES):
+        alone = conditions("test", mesh, torque, tolerance=tolerance, samples=3, seed=7).on(mesh)
+        np.testing.assert_allclose(cases.removed[row], alone.removed[0], atol=1e-12)
+    # the pitch deviations of a tooth do not depend on the load: they show that the gears are the same ones
+    np.testing.assert_allclose(np.ptp(cases.removed[0] - cases.removed[1], axis=0).max(), 0.0, atol=0.5)
+
+
+def test_one_quantile_in_every_engine(mesh, tolerance):
+    made = {"tolerance": tolerance, "samples": 6, "seed": 3}
+    scatter = jg.monte_carlo(mesh, 50.0, pinion=jg.TipRelief(AMOUNT, 4.0), results=("mean_te",), **made)
+    plan, measures = jg.VariantList(("amount",), [[AMOUNT]]), (jg.Quantile(0.95), jg.CVaR(0.5))
+    table = jg.sweep(design, plan, mesh=mesh, torque=50.0, measures=measures, **made)
+    assert table.results == ("ppte_um_q95", "ppte_um_cvar50")
+    cases = conditions("minimize", mesh, 50.0, **made).on(mesh)
+    problem = make_problem(design, {"amount": (0.0, 10.0)}, mesh, cases, ("ppte",), jg.Quantile(0.95), ())
+    searched = float(jax.jit(lambda x: problem.score(x).value[0])(jnp.asarray([AMOUNT / 10])))
+    expected = float(hdquantiles(np.asarray(scatter.ppte), [0.95])[0])
+    assert np.ptp(scatter.ppte) > 0.1
+    for found in (scatter.ppte_quantile95, table.column("ppte_um_q95")[0], searched):
+        assert float(found) == pytest.approx(expected, rel=1e-9)
+    tail = np.sort(scatter.ppte)[-3:].mean()
+    assert float(scatter.joined("ppte", jg.CVaR(0.5))) == pytest.approx(tail, rel=1e-9)
+    assert table.column("ppte_um_cvar50")[0] == pytest.approx(tail, rel=1e-9)
+    assert float(scatter.joined("mean_te", jg.Mean())) == pytest.approx(float(scatter.numbers["mean_te_um"].mean()))
+    with pytest.raises(ValueError, match='"max_line_load_N_per_mm" is not there'):
+        scatter.joined("max_line_load", jg.Mean())
+
+
+@pytest.mark.parametrize("measure", [jg.Mean(), jg.Worst(), jg.Quantile(0.9), jg.CVaR(0.8)])
+def test_host_and_device_join_alike(measure):
+    values = np.random.default_rng(0).gamma(2.0, size=40)
+    for better in ("smaller", "larger"):
+        on_device = float(joined(measure, jnp.asarray(values), jnp.ones(40), better))
+        assert float(ranked(measure, values, better)) == pytest.approx(on_device, rel=1e-12)
+    values[3] = np.nan  # ranks beyond all others, on the bad side
+    worst = float(joined(jg.Worst(), jnp.asarray(values), jnp.ones(40), "larger"))
+    assert worst == -np.inf and float(joined(measure, jnp.asarray(values), jnp.ones(40))) == np.inf
+
+
+def test_a_sweep_of_geometry_load_and_flanks_is_a_loop_over_them():
+    """Traced through `prepare`; what cannot be is a row that says so, be it the first one."""
+    rows = [[AMOUNT, 0.9, 0.0, 50.0], [AMOUNT, 0.0, 0.0, 50.0], [8.0, 0.2, 0.1, 30.0], [8.0, 0.2, 0.0, -30.0]]
+    plan = jg.VariantList(("amount", "shift", "wider", "torque"), rows)
+
+    def mesh_of(v):
+        return jg.prepare(pair(v["shift"], 101.8 + v["wider"]), resolution=SIZES)
+
+    own = Quantity("peak", lambda cycle: cycle.transmission_error * cycle.torque, "um N m", reduction=Max())
+    results = ("ppte", "contact_ratio", own, "max_relief")
+    table = jg.sweep(design, plan, mesh=mesh_of, torque=lambda v: v["torque"], results=results)
+    np.testing.assert_array_equal(table.column("converged"), [False, True, True, False])
+    assert np.isnan(table.column("ppte_um")[[0, 3]]).all()
+    for row in (1, 2):
+        values = dict(zip(plan.names, rows[row]))
+        cycle = jg.solve(mesh_of(values), values["torque"], pinion=design(values)[0])
+        expected = np.asarray(cycle.transmission_error)
+        assert table.column("ppte_um")[row] == pytest.approx(np.ptp(expected), abs=1e-9)
+        assert table.column(own.key)[row] == pytest.approx(values["torque"] * expected.max(), rel=1e-9)
+        assert table.column("max_relief_um")[row] == pytest.approx(values["amount"], rel=1e-9)
+
+
+def test_unused_variables_are_named(mesh):
+    plan = jg.Sobol({"amount": (0.0, 9.0), "torque": (10.0, 60.0), "lenght": (1.0, 2.0)}, 8, seed=0)
+    with pytest.raises(ValueError, match='^sweep: nothing depends on "torque", "lenght": use it in design'):
+        jg.sweep(design, plan, mesh=mesh, torque=50.0)
+    with pytest.raises(ValueError, match='^sweep: nothing depends on "lenght"'):
+        jg.sweep(design, plan, mesh=mesh, torque=lambda v: v["torque"])
+    with pytest.raises(ValueError, match='^minimize: nothing depends on "lenght": use it in design'):
+        jg.minimize(design, {"amount": (0.0, 9.0), "lenght": (1.0, 2.0)}, mesh=mesh, torque=50.0)
+
+
+def test_what_has_no_effect_is_refused(mesh):
+    plan = jg.VariantList(("amount",), [[AMOUNT]])
+    for options, words in (
+        ({"measures": (jg.Mean(),)}, "sweep: measures have no effect"),
+        ({"samples": 8}, "sweep: samples = 8 has no effect without a tolerance"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            jg.sweep(design, plan, mesh=mesh, torque=50.0, **options)
+    with pytest.raises(ValueError, match="sweep: mesh gives GearPair, must be a Mesh"):
+        jg.sweep(design, plan, mesh=lambda v: pair(), torque=50.0)
+
+
+def test_a_load_has_a_speed(mesh):
+    load = jg.LoadSpectrum([50.0, 50.0], speeds=[1000.0, 2000.0], friction=0.05)
+    made = variants("test", ("amount",), (AMOUNT,), design=design, mesh=mesh, torque=load)
+    speeds = made.cases.each(lambda operation, removed: (operation.speed, operation.torque * operation.friction))
+    np.testing.assert_allclose(speeds, [[1000.0, 2000.0], [2.5, 2.5]])
+    with pytest.raises(ValueError, match="torques must be different, or their speeds"):
+        jg.LoadSpectrum([50.0, 50.0], speeds=1000.0)
