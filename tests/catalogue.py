@@ -10,10 +10,10 @@ from jaxgear.compliance.laws import LinearLaw
 from jaxgear.contact import removed_material, solve_removed
 from jaxgear.microgeometry import AbstractModification
 
-COARSE = jg.Resolution(positions=32)
+COARSE = jg.Resolution(positions=32, pairs=4)
 # two pairs reach as far as 40 um of deflection at the contact ratios of these tests, and compile in half the time
 TWO_PAIRS = jg.Resolution(positions=32, pairs=2)
-SLICED = jg.Resolution(positions=32, slices=7)
+SLICED = jg.Resolution(positions=32, slices=7, pairs=4)
 
 
 def gear_pair(

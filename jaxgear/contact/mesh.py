@@ -1,6 +1,9 @@
 """A prepared mesh: everything that depends neither on the modification nor on the torque."""
 
+from dataclasses import replace
+
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -10,9 +13,14 @@ from ..compliance.hertz import contact_geometry
 from ..compliance.toothload import tooth_load
 from ..geometry import GearPair, Margins, PathOfContact, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import AbstractSpring, concrete, minimum
+from ..numerics import AbstractSpring, concrete
 from .kinematics import Contacts, Kinematics, Side, contacts, kinematics, sides
-from .resolution import Resolution
+from .resolution import Resolution, reach
+
+# Deflection that the pairs contain by default [um per mm of module]: root stress and deflection of a tooth grow with
+# its load and shrink with its module, so that 8 um per mm are about 500 MPa; twice that leaves room for deep reliefs.
+_DEFLECTION = 16.0
+_PAIRS_TRACED = 4
 
 Scalar = Float[Array, ""]
 Field = Float[Array, "pairs positions"]
@@ -29,8 +37,9 @@ class Mesh(eqx.Module):
         lever: what a pair closes per unit of transmission error; 1 on the path of contact, less beyond it, because the
             corner's gap opens while the gears turn on.
         margins: how far the pair is from what cannot run; of traced gears, nothing else tells.
-        outer_gap: smallest transmission error, beyond the unloaded one, at which pairs that are not carried along could
-            touch [um].
+        outer_gap: transmission error at which the pairs behind and ahead of those carried along could touch if they
+            were not modified [um], shape (2,).
+        outer_lever: their lever, shape (2,).
         structure: compliance of both gears, (pairs, pairs, positions) [um per N/mm].
         law: prepared contact law.
         width_factor: squared half width of the contact per line load [mm^2 per N/mm].
@@ -38,6 +47,7 @@ class Mesh(eqx.Module):
             (patch_nodes,).
         hub: common wind-up of the gear bodies [um per N/mm].
         slice_width: [mm], shape (slices,).
+        automatic: whether the number of pairs was left to `prepare`: `solve` takes more where they are too few.
     """
 
     kinematics: Kinematics
@@ -46,7 +56,8 @@ class Mesh(eqx.Module):
     corner_gap: Field
     lever: Field
     margins: Margins
-    outer_gap: Scalar
+    outer_gap: Float[Array, "2"]
+    outer_lever: Float[Array, "2"]
     structure: Float[Array, "pairs pairs positions"]
     law: AbstractSpring
     width_factor: Field
@@ -54,6 +65,7 @@ class Mesh(eqx.Module):
     patch_weight: Float[Array, " patch_nodes"]
     hub: Scalar
     slice_width: Float[Array, " slices"]
+    automatic: bool = eqx.field(static=True, default=False)
 
     def __repr__(self) -> str:
         return f"Mesh(pair={self.pair!r}, resolution={self.resolution!r})"
@@ -113,7 +125,11 @@ class Mesh(eqx.Module):
 
 
 def prepare(
-    pair: GearPair, *, compliance: AbstractCompliance | None = None, resolution: Resolution | None = None
+    pair: GearPair,
+    *,
+    compliance: AbstractCompliance | None = None,
+    resolution: Resolution | None = None,
+    deflection: float | None = None,
 ) -> Mesh:
     """Prepares a gear pair for `solve`: contact points, corner gaps and compliances over one base pitch.
 
@@ -121,6 +137,9 @@ def prepare(
         pair: gear pair; every number in it may be traced.
         compliance: compliance model; None for `default_compliance()`.
         resolution: array sizes; None for `Resolution()`.
+        deflection: transmission error that the pairs have to contain where the resolution leaves their number open
+            [um]; None for 16 um per mm of module, at which root stresses are beyond 1000 MPa. Gears that are traced
+            take four pairs.
 
     Returns:
         the mesh, to be shared by any number of modifications and torques.
@@ -130,8 +149,19 @@ def prepare(
     """
     compliance = default_compliance() if compliance is None else compliance
     resolution = Resolution() if resolution is None else resolution
+    automatic = resolution.pairs is None
+    if automatic:
+        resolution = replace(resolution, pairs=_pairs_for(pair, deflection))
     _check_cover(path_of_contact(pair), resolution)
-    return _prepare(pair, compliance, resolution)
+    mesh = _prepare(pair, compliance, resolution)
+    return replace(mesh, automatic=True) if automatic else mesh
+
+
+def _pairs_for(pair: GearPair, deflection: float | None) -> int:
+    module = concrete(pair.pinion.module)
+    if module is None or any(concrete(leaf) is None for leaf in jax.tree.leaves(pair)):
+        return _PAIRS_TRACED
+    return fewest_pairs(pair, deflection=_DEFLECTION * float(module) if deflection is None else deflection)
 
 
 @eqx.filter_jit
@@ -143,6 +173,7 @@ def _prepare(pair: GearPair, compliance: AbstractCompliance, resolution: Resolut
     pinion = tooth_load(outlines[0], points.pinion_roll_length)
     wheel = tooth_load(outlines[1], points.wheel_roll_length)
     geometry = contact_geometry(pinion, wheel, compliance.plane, pair.face_width)
+    outer = _next_pairs(pair, contact, jnp.asarray([resolution.reach], dtype))
     # Chebyshev nodes of the second kind integrate with the weight of the semi-elliptic pressure
     angle = jnp.pi * jnp.arange(1, resolution.patch_nodes + 1, dtype=dtype) / (resolution.patch_nodes + 1)
     return Mesh(
@@ -152,7 +183,8 @@ def _prepare(pair: GearPair, compliance: AbstractCompliance, resolution: Resolut
         corner_gap=points.corner_gap,
         lever=points.lever,
         margins=margins_between(*outlines, contact, pair.center_distance),
-        outer_gap=minimum(_closing(_next_pairs(pair, contact, jnp.asarray([resolution.reach], dtype)))),
+        outer_gap=_closing(outer)[0],
+        outer_lever=outer.lever[0],
         structure=compliance.structure(pinion, wheel),
         law=compliance.law(geometry, pinion, wheel, moving.outside),
         width_factor=geometry.width_factor[:, 0],
@@ -177,7 +209,7 @@ def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
         ValueError: when more than 12 pairs would be needed.
     """
     candidates = range(2, 13)
-    reaches = [Resolution(pairs=pairs).reach for pairs in candidates]
+    reaches = [reach(pairs) for pairs in candidates]
     gaps = np.asarray(_gaps_at(pair, reaches))
     for pairs, gap in zip(candidates, gaps):
         if gap.min() > deflection:

@@ -11,7 +11,7 @@ class Resolution(Checked):
     Attributes:
         positions: mesh positions over one base pitch.
         slices: slices over the common face width.
-        pairs: tooth pairs carried along; `fewest_pairs` tells how few suffice. Pair i runs at
+        pairs: tooth pairs carried along; None for as few as the gears and the load need, see `prepare`. Pair i runs at
             phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two base pitches on either side of the pitch
             point: contact ratios up to 3.
         patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks
@@ -23,7 +23,7 @@ class Resolution(Checked):
 
     positions: int = count(low=4, default=64)
     slices: int = count(default=1)
-    pairs: int = count(low=2, default=4)
+    pairs: int | None = count(low=2, optional=True, default=None)
     patch_nodes: int = count(default=4)
     newton_steps: int = count(default=8)
     tolerance: float | None = eqx.field(static=True, default=None)
@@ -35,9 +35,26 @@ class Resolution(Checked):
     @property
     def leading(self) -> int:
         """Base pitches by which the first pair leads the reference pair."""
-        return (self.pairs - 1) // 2
+        return _leading(chosen(self.pairs))
 
     @property
     def reach(self) -> tuple[int, int]:
         """Base pitches behind and ahead of the pitch point that the pairs cover."""
-        return self.pairs - 1 - self.leading, self.leading + 1
+        return reach(chosen(self.pairs))
+
+
+def reach(pairs: int) -> tuple[int, int]:
+    """Base pitches behind and ahead of the pitch point that a number of pairs covers."""
+    ahead = _leading(pairs) + 1
+    return pairs - ahead, ahead
+
+
+def chosen(pairs: int | None) -> int:
+    """The number of pairs, which `prepare` has chosen where it was not given."""
+    if pairs is None:
+        raise ValueError("Resolution: pairs = None has no number yet: prepare chooses it")
+    return pairs
+
+
+def _leading(pairs: int) -> int:
+    return (pairs - 1) // 2

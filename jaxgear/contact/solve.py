@@ -1,17 +1,20 @@
 """Contact of the loaded mesh over one base pitch."""
 
+from dataclasses import replace
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..microgeometry import AbstractModification, NoModification, terms
-from ..numerics import ContactProblem, minimum, safe_sqrt, solve_contact, tangent_stiffness
+from ..numerics import ContactProblem, concrete, minimum, safe_sqrt, solve_contact, tangent_stiffness
 from .cycle import MeshCycle
-from .mesh import Mesh
+from .mesh import Mesh, prepare
 from .operation import Operation, operation_of
+
+_MOST_PAIRS = 12
 
 Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
@@ -35,7 +38,8 @@ def solve(
         wheel: modification of the wheel flank; None for the nominal involute.
 
     Returns:
-        the mesh cycle, differentiable with respect to every number in `mesh`, `torque` and the modifications.
+        the mesh cycle, differentiable with respect to every number in `mesh`, `torque` and the modifications. Where
+        the number of pairs was left open, is too small for this load, and nothing is traced, it has more of them.
 
     Raises:
         TypeError: for something else than a prepared mesh or a modification.
@@ -45,7 +49,9 @@ def solve(
     check_mesh("solve", mesh)
     operation = operation_of("solve", torque, mesh.slice_width.dtype)
     pinion, wheel = flanks_of("solve", mesh, pinion, wheel)
-    return _cycle(mesh, operation, _solve(mesh, operation.torque, pinion, wheel), pinion, wheel)
+    cycle = _cycle(mesh, operation, _solve(mesh, operation.torque, pinion, wheel), pinion, wheel)
+    wider = _wider(mesh, cycle)
+    return cycle if wider is None else solve(wider, operation, pinion=pinion, wheel=wheel)
 
 
 def solve_removed(
@@ -162,6 +168,34 @@ def _cycle(mesh: Mesh, operation: Operation, contact: dict[str, Array], pinion=N
     )
 
 
+def _wider(mesh: Mesh, cycle: MeshCycle) -> Mesh | None:
+    """The mesh with more pairs, where their number was left open, is too small and can be known."""
+    failed = concrete(cycle.converged) if mesh.automatic else None
+    if failed is None or failed.all() or mesh.resolution.pairs >= _MOST_PAIRS:
+        return None
+    beyond = concrete(_beyond(mesh, cycle))
+    if beyond is None or not beyond.any():
+        return None
+    sizes = replace(mesh.resolution, pairs=mesh.resolution.pairs + 1)
+    wider = prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes)
+    return replace(wider, automatic=True)
+
+
+def _beyond(mesh: Mesh, cycle: MeshCycle) -> Bool[Array, " positions"]:
+    removed = cycle.gap - mesh.corner_gap[:, None]
+    windup = mesh.hub * cycle.force / mesh.pair.face_width
+    return cycle.transmission_error - windup >= _outermost(mesh, removed)
+
+
+def _outermost(mesh: Mesh, removed: Load) -> Scalar:
+    """Transmission error at which the next pairs behind and ahead of those carried along could touch [um].
+
+    They are nearest where the last pair begins and the first one ends the base pitch, and are modified as those there.
+    """
+    ends = jnp.stack([minimum(removed[-1, :, 0]), minimum(removed[0, :, -1])])
+    return minimum(mesh.outer_gap + ends / mesh.outer_lever)
+
+
 @eqx.filter_jit
 def _solve(mesh: Mesh, torque: Scalar, pinion, wheel) -> dict[str, Array]:
     return _solve_removed(mesh, torque, _removed(mesh, torque, pinion, wheel))
@@ -170,7 +204,8 @@ def _solve(mesh: Mesh, torque: Scalar, pinion, wheel) -> dict[str, Array]:
 @eqx.filter_jit
 def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> dict[str, Array]:
     force = _force(mesh, torque)
-    gap = mesh.corner_gap[:, None] + removed.astype(force.dtype)
+    removed = removed.astype(force.dtype)
+    gap = mesh.corner_gap[:, None] + removed
     problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, force)
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.tolerance)
     windup = mesh.hub * force / mesh.pair.face_width
@@ -185,7 +220,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> dict[str, Array
         "gap": gap,
         "tangent_stiffness": 1 / (1 / contact_stiffness + mesh.hub / mesh.pair.face_width),
         "residual": solution.residual,
-        "converged": solution.solved & (solution.approach - unloaded < mesh.outer_gap) & mesh.margins.valid,
+        "converged": solution.solved & (solution.approach < _outermost(mesh, removed)) & mesh.margins.valid,
     }
 
 
