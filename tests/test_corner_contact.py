@@ -121,7 +121,7 @@ def test_touched_point_lies_on_the_mate():
 
 def test_mesh_continues_beyond_the_path_with_continuous_slope():
     """Gap and lever over the whole cycle: zero and one on the path; value and slope continuous at its ends."""
-    mesh = prepare(gear_pair(), resolution=jg.Resolution(positions=512))
+    mesh = prepare(gear_pair(), resolution=jg.Resolution(positions=512, pairs=4))
     path, contact = np.asarray(mesh.path), mesh.path_of_contact
     order = np.argsort(path, axis=None)
     s, gap, lever = (np.asarray(a).ravel()[order] for a in (path, mesh.corner_gap, mesh.lever))
@@ -138,7 +138,7 @@ def test_mesh_continues_beyond_the_path_with_continuous_slope():
 
 def test_lever_is_one_minus_half_the_slope_of_the_gap():
     """Energy: under a transmission error d both gears turn by d/2, so the gap changes by its slope times d/2."""
-    mesh = prepare(gear_pair(), resolution=jg.Resolution(positions=512))
+    mesh = prepare(gear_pair(), resolution=jg.Resolution(positions=512, pairs=4))
     gap, lever, path = (np.asarray(a)[0] for a in (mesh.corner_gap, mesh.lever, mesh.path))
     end, pitch = float(mesh.path_of_contact.end), float(mesh.path_of_contact.base_pitch)
     after = (path > end) & (path < end + 0.35 * pitch)  # farther out the gap goes on along its tangent
