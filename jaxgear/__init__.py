@@ -41,6 +41,7 @@ from .contact import fewest_pairs as fewest_pairs
 from .contact import prepare as prepare
 from .contact import removed_material as removed_material
 from .contact import solve as solve
+from .contact import solve_at as solve_at
 from .contact import solve_removed as solve_removed
 from .geometry import Gear as Gear
 from .geometry import GearPair as GearPair

@@ -8,6 +8,8 @@ from .mesh import Mesh as Mesh
 from .mesh import fewest_pairs as fewest_pairs
 from .mesh import prepare as prepare
 from .operation import Operation as Operation
+from .prescribed import PrescribedContact as PrescribedContact
+from .prescribed import solve_at as solve_at
 from .resolution import Resolution as Resolution
 from .solve import removed_material as removed_material
 from .solve import solve as solve

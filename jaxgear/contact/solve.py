@@ -184,10 +184,10 @@ def _wider(mesh: Mesh, cycle: MeshCycle) -> Mesh | None:
 def _beyond(mesh: Mesh, cycle: MeshCycle) -> Bool[Array, " positions"]:
     removed = cycle.gap - mesh.corner_gap[:, None]
     windup = mesh.hub * cycle.force / mesh.pair.face_width
-    return cycle.transmission_error - windup >= _outermost(mesh, removed)
+    return cycle.transmission_error - windup >= outermost(mesh, removed)
 
 
-def _outermost(mesh: Mesh, removed: Load) -> Scalar:
+def outermost(mesh: Mesh, removed: Load) -> Scalar:
     """Transmission error at which the next pairs behind and ahead of those carried along could touch [um].
 
     They are nearest where the last pair begins and the first one ends the base pitch, and are modified as those there.
@@ -220,7 +220,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> dict[str, Array
         "gap": gap,
         "tangent_stiffness": 1 / (1 / contact_stiffness + mesh.hub / mesh.pair.face_width),
         "residual": solution.residual,
-        "converged": solution.solved & (solution.approach < _outermost(mesh, removed)) & mesh.margins.valid,
+        "converged": solution.solved & (solution.approach < outermost(mesh, removed)) & mesh.margins.valid,
     }
 
 

@@ -1,0 +1,99 @@
+"""Contact of the mesh at a prescribed transmission error: what dynamics and wear ask for."""
+
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from ..microgeometry import AbstractModification
+from ..numerics import ContactProblem, check, real, solve_contact, tangent_stiffness
+from .mesh import Mesh
+from .operation import operation_of
+from .solve import check_mesh, outermost, removed_material
+
+Scalar = Float[Array, ""]
+Curve = Float[Array, " positions"]
+Load = Float[Array, "pairs slices positions"]
+
+
+class PrescribedContact(eqx.Module):
+    """Result of `solve_at`.
+
+    Attributes:
+        transmission_error: that was prescribed [um], shape (positions,).
+        force: total force on the line of action [N], shape (positions,).
+        pair_force: what every pair contributes [N], shape (pairs, positions).
+        line_load: [N/mm], shape (pairs, slices, positions); exactly zero where nothing touches, as are the forces.
+        tangent_stiffness: d force / d transmission error [N/um]; it counts only where there is contact.
+        residual: largest relative violation of the contact conditions, shape (positions,).
+        converged: where the residual is below the resolution's tolerance, no pair beyond those carried along could
+            touch, and the gears can run, shape (positions,).
+    """
+
+    transmission_error: Curve
+    force: Curve
+    pair_force: Float[Array, "pairs positions"]
+    line_load: Load
+    tangent_stiffness: Curve
+    residual: Curve
+    converged: Bool[Array, " positions"]
+
+
+def solve_at(
+    mesh: Mesh,
+    transmission_error: Any,
+    *,
+    torque: Any,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+) -> PrescribedContact:
+    """Contact at a prescribed transmission error of the teeth: the force that it takes, zero where they are apart.
+
+    The wind-up of the gear bodies between bore and root is a spring of its own in series, that all pairs share
+    (`mesh.hub`): the error here is without it. That of a cycle is `solve_at` of
+
+        cycle.transmission_error - mesh.hub * cycle.force / mesh.pair.face_width
+
+    Args:
+        mesh: prepared mesh.
+        transmission_error: without the wind-up of the bodies [um], scalar or shape (positions,).
+        torque: on the pinion [N m], at which the width of the contact is taken over which modifications are averaged:
+            that of the mean load.
+        pinion: modification of the pinion flank; None for the nominal involute.
+        wheel: modification of the wheel flank; None for the nominal involute.
+
+    Returns:
+        the contact, differentiable with respect to every number.
+
+    Raises:
+        TypeError: for something else than a prepared mesh or a modification.
+        ValueError: for a transmission error that is not finite or has another shape, and as `solve`.
+    """
+    check_mesh("solve_at", mesh)
+    error, positions = real(transmission_error), mesh.resolution.positions
+    if error.shape not in ((), (positions,)):
+        raise ValueError(
+            f"solve_at: transmission_error has shape {error.shape}, must be a single number or ({positions},)"
+        )
+    check("solve_at", "transmission_error", error, "um")
+    torque = operation_of("solve_at", torque, mesh.slice_width.dtype).torque
+    removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
+    return _solve_at(mesh, jnp.broadcast_to(error.astype(removed.dtype), (positions,)), removed)
+
+
+@eqx.filter_jit
+def _solve_at(mesh: Mesh, error: Curve, removed: Load) -> PrescribedContact:
+    gap = mesh.corner_gap[:, None] + removed
+    problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, approach=error)
+    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.tolerance)
+    pair_force = mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1)
+    return PrescribedContact(
+        transmission_error=error,
+        force=jnp.sum(pair_force, axis=0),
+        pair_force=pair_force,
+        line_load=solution.line_load,
+        tangent_stiffness=tangent_stiffness(problem, solution),
+        residual=solution.residual,
+        converged=solution.solved & mesh.margins.valid & (error < outermost(mesh, removed)),
+    )

@@ -1,0 +1,59 @@
+"""Contact at a prescribed transmission error."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import gear_pair
+
+import jaxgear as jg
+
+TORQUE = 50.0
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return jg.prepare(gear_pair(), resolution=jg.Resolution(positions=16, pairs=2))
+
+
+@pytest.fixture(scope="module")
+def cycle(mesh):
+    return jg.solve(mesh, TORQUE, pinion=jg.TipRelief(6.9, 3.4))
+
+
+@pytest.fixture(scope="module")
+def error_of_teeth(mesh, cycle):
+    return cycle.transmission_error - mesh.hub * cycle.force / mesh.pair.face_width
+
+
+def contact(mesh, error):
+    return jg.solve_at(mesh, error, torque=TORQUE, pinion=jg.TipRelief(6.9, 3.4))
+
+
+def test_error_of_a_torque_takes_its_force(mesh, cycle, error_of_teeth):
+    """There and back: the loads of the cycle, at every position."""
+    found = contact(mesh, error_of_teeth)
+    assert bool(found.converged.all())
+    np.testing.assert_allclose(found.force, float(cycle.force), rtol=1e-9)
+    np.testing.assert_allclose(found.pair_force, cycle.pair_force, rtol=1e-9, atol=1e-7)
+
+
+def test_slope_of_the_force_is_the_tangent_stiffness(mesh, cycle, error_of_teeth):
+    """That of the teeth; in series with the bodies it is the cycle's."""
+    (slope,) = jax.vjp(lambda error: contact(mesh, error).force, error_of_teeth)[1](jnp.ones(16))
+    np.testing.assert_allclose(slope, contact(mesh, error_of_teeth).tangent_stiffness, rtol=1e-9)
+    bodies = mesh.pair.face_width / mesh.hub
+    np.testing.assert_allclose(1 / (1 / slope + 1 / bodies), cycle.tangent_stiffness, rtol=1e-9)
+
+
+def test_teeth_that_are_apart_carry_exactly_nothing(mesh):
+    apart = contact(mesh, -5.0)
+    assert bool(apart.converged.all())
+    assert not np.any(apart.force) and not np.any(apart.line_load)
+
+
+def test_wrong_errors_are_named(mesh):
+    with pytest.raises(ValueError, match=r"solve_at: transmission_error has shape \(3,\), must be a single number or"):
+        contact(mesh, jnp.zeros(3))
+    with pytest.raises(ValueError, match="solve_at: transmission_error = nan um must be finite"):
+        contact(mesh, jnp.nan)
