@@ -403,7 +403,7 @@ MALFORMED = {
         text(wheel='[[wheel.modification]]\ntype = "tabulated_profile"\nposition = [1, 2]\namount = [1.0, "h"]'),
         'wheel.modification[0].amount[1]: "h" is not a variable',
     ),
-    "variable not used": (text(tail=VARIABLE), "variables.height: is declared but used in no modification"),
+    "variable not used": (text(tail=VARIABLE), "variables.height: is declared but used nowhere"),
     "variable of two units": (
         text(pinion=RELIEF.replace("3.4", '"height"'), tail=VARIABLE),
         "pinion.modification[0].length: height stands for a quantity in mm here and for a quantity in um elsewhere",
@@ -602,11 +602,62 @@ def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
     sections += [section_of(cls) for cls in (*family(AbstractModification, users=False).values(), jg.Material)]
     for section in sections:
         assert not [name for name in section.model_fields if f"| `{name}` | " not in text]
-    assert "| `module` | a number | mm | greater than 0 | required |" in text
-    assert "| `density` | a number | kg/m^3 | greater than 0 | `7850` | " in text
+    assert "| `module` | a number or the name of a variable | mm | greater than 0 | required |" in text
+    assert "| `density` | a number or the name of a variable | kg/m^3 | greater than 0 | `7850` | " in text
     assert '| `side` | one of "both", "negative", "positive" |  |  | `"both"` | ' in text
     guide = Path(__file__).parent.parent / "examples" / "guides" / "design_files.md"
     assert guide.read_text(encoding="utf-8") == text, "python -m jaxgear.io.reference > examples/guides/design_files.md"
+
+
+def open_case():
+    """Profile shift, centre distance and torque are variables of a sweep."""
+    variables = "[variables]\nx = { low = 0.0, high = 0.2 }\na = { low = 101.4, high = 101.8 }\n"
+    variables += 't = { low = 20.0, high = 60.0, unit = "N m" }\n'
+    tail = '[pair]\ncenter_distance = "a"\n[resolution]\npositions = 8\n' + variables
+    tail += '[sweep]\nsampling = "full_factorial"\nlevels = 2\nresults = ["mean_te"]\n'
+    return text(pinion='profile_shift = "x"', tail=tail).replace("torque = 50.0", 'torque = "t"')
+
+
+def test_variables_stand_for_numbers_of_gears_pair_and_load(load):
+    whole = open_case()
+    file = load(whole)
+    assert file.units == {"x": "x module", "a": "mm", "t": "N m"} and file.torque == 40.0
+    assert float(file.pair().pinion.profile_shift) == pytest.approx(0.1)
+    request = sweep_request(file)
+    assert request.highest_torque == 60.0 and request.plan.size == 8
+    low = {name: jnp.asarray(bounds[0]) for name, bounds in file.bounds.items()}
+    assert float(file.pair(low).center_distance) == 101.4 and float(request.load(low).torque) == 20.0
+    for old, new, problem in (
+        ("results", "torques = [30.0]\nresults", 'sweep.torques: has no effect, load.torque is "t"'),
+        ("high = 0.2", "high = 3.0", "variables.x.high: 3 x module must be at least -1.5 x module and at most 2"),
+        ('[pair]\ncenter_distance = "a"', "", "variables.a: is declared but used nowhere"),
+        ("high = 101.8", "high = 301.8", "pair.center_distance: "),
+    ):
+        with pytest.raises(DesignFileError, match=re.escape(problem)):
+            sweep_request(load(whole.replace(old, new)))
+    with pytest.raises(DesignFileError, match=r'pinion\.profile_shift: "x" is a variable, which a sweep alone'):
+        optimize_request(file)
+
+
+@pytest.mark.slow
+def test_a_sweep_of_gears_pair_and_load_solves_each_as_the_library_does(load):
+    file = load(open_case())
+    request = sweep_request(file)
+    mesh = file.sweep_mesh(file.resolution(request.highest_torque))
+    table = jg.sweep(
+        file.design, request.plan, mesh=mesh, torque=request.load, results=request.results, units=file.units
+    )
+    rows = {key: table.column(key) for key in ("x", "a", "t", "mean_te_um", "converged")}
+    assert table.units["t"] == "N m" and rows["converged"].all()
+    for row in range(8):
+        x, a, t, deflection, _ = (column[row] for column in rows.values())
+        pair = jg.GearPair(
+            jg.Gear(19, 3.0, profile_shift=x, face_width=20.0, material=jg.Material()),
+            jg.Gear(48, 3.0, face_width=18.0, material=jg.Material()),
+            center_distance=a,
+        )
+        cycle = jg.solve(jg.prepare(pair, resolution=jg.Resolution(positions=8, pairs=4)), t)
+        assert deflection == pytest.approx(float(jnp.mean(cycle.transmission_error)), rel=1e-9)
 
 
 def test_files_that_cannot_be_read(tmp_path):

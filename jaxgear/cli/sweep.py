@@ -6,7 +6,6 @@ import time
 from pathlib import Path
 
 import jax
-import jax.numpy as jnp
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -47,7 +46,7 @@ def run_sweep(
         enable_cache()
     design = load_design(file)
     request = sweep_request(design, samples=samples, most=_QUICK_SAMPLES if quick else None)
-    size = design.resolution(float(jnp.max(request.load.torques)))
+    size = design.resolution(request.highest_torque)
     if quick:
         size = dataclasses.replace(size, positions=min(size.positions, _QUICK_POSITIONS))
     target = output or default_folder(file, "sweep", quick=quick)
@@ -57,7 +56,7 @@ def run_sweep(
         table = sweep(
             design.design,
             request.plan,
-            mesh=design.mesh(size),
+            mesh=design.sweep_mesh(size),
             torque=request.load,
             results=request.results,
             output=target / _TABLE,

@@ -1,20 +1,21 @@
 """Design files: a gear pair, its load, its flank modifications and their free parameters, as TOML."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ..compliance import Beam, Compliance, ElasticRing, legacy_compliance
-from ..contact import Mesh, Resolution, fewest_pairs, prepare
+from ..contact import Mesh, Operation, Resolution, fewest_pairs, prepare
 from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
+from ..numerics import fields_of
 from ..sizing import iso_stiffness
 from . import schema, schema_sweep, template
-from .errors import DesignFileError, refused, suggestion
-from .kinds import outside
+from .errors import DesignFileError, refused
 from .layout import Section
 from .toml import decode, read
+from .variables import increasing, read_variables
 
 T = TypeVar("T", bound=Section)
 
@@ -34,7 +35,7 @@ class DesignFile:
     Attributes:
         path: the file.
         title: free text, the file's stem if it has none.
-        torque: design torque on the pinion [N m].
+        torque: design torque on the pinion [N m]; the middle of its bounds where it is a variable.
         torque_range: lowest and highest torque of interest [N m].
         speed: of the pinion [rpm], None if the file names none.
         friction: mean coefficient of friction; used with a speed only, None for the library's default.
@@ -44,6 +45,7 @@ class DesignFile:
         optimize: the table of that name; `optimize_request` makes sense of it.
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
+        open_case: numbers of gears, pair and load that are variables; a sweep alone can vary them.
     """
 
     path: Path
@@ -58,15 +60,21 @@ class DesignFile:
     optimize: schema.OptimizeSection
     sweep: schema_sweep.SweepSection | None
     tolerance: schema_sweep.ToleranceSection | None
-    _pair: GearPair
+    open_case: tuple[template.Free, ...]
+    _pair: template.Part
+    _middle: GearPair
     _compliance: Compliance
     _resolution: Resolution
     _pairs_given: bool
     _parts: tuple[list[template.Part], list[template.Part]]
 
-    def pair(self) -> GearPair:
-        """The gear pair."""
-        return self._pair
+    def pair(self, parameters: Mapping[str, Any] | None = None) -> GearPair:
+        """The gear pair.
+
+        Args:
+            parameters: value of every free parameter, they may be tracers; None for the middle of their bounds.
+        """
+        return self._middle if parameters is None else self._pair.build(parameters)
 
     def resolution(self, torque: float | None = None) -> Resolution:
         """The array sizes that the file asks for, with as few tooth pairs as the load needs where it names none.
@@ -80,14 +88,16 @@ class DesignFile:
         if self._pairs_given:
             return self._resolution
         torque = max(self.torque, self.torque_range[1]) if torque is None else torque
-        line_load = 1e3 * torque / float(self._pair.pinion.base_radius * self._pair.face_width)
-        deflection = _DEFLECTIONS * line_load / float(iso_stiffness(self._pair, line_load).single)
+        line_load = 1e3 * torque / float(self._middle.pinion.base_radius * self._middle.face_width)
+        deflection = _DEFLECTIONS * line_load / float(iso_stiffness(self._middle, line_load).single)
         try:
-            pairs = fewest_pairs(self._pair, deflection=deflection)
+            pairs = fewest_pairs(self._middle, deflection=deflection)
         except ValueError:
-            given = f"{torque:g} N m deflects a pair of teeth of module {float(self._pair.pinion.module):g} mm by about"
+            given = f"{torque:g} N m deflects a pair of teeth of module {float(self._middle.pinion.module):g} mm by"
             problem = f"{given} {deflection / _DEFLECTIONS:.3g} um: give the torque in N m, elastic moduli in MPa"
             raise DesignFileError(self.path, "load.torque", problem) from None
+        if any(True for _ in self._pair.free()):  # other variants can have a larger contact ratio
+            pairs = max(pairs, self._resolution.pairs)
         return replace(self._resolution, pairs=pairs)
 
     def mesh(self, resolution: Resolution | None = None) -> Mesh:
@@ -101,7 +111,13 @@ class DesignFile:
         """
         resolution = self.resolution() if resolution is None else resolution
         key, compliance = "resolution", self._compliance
-        return refused(self.path, key, prepare, self._pair, compliance=compliance, resolution=resolution)
+        return refused(self.path, key, prepare, self._middle, compliance=compliance, resolution=resolution)
+
+    def sweep_mesh(self, resolution: Resolution) -> Mesh | Callable[[Mapping[str, Any]], Mesh]:
+        """The prepared mesh; a function of the parameters that prepares it where numbers of the gears are free."""
+        if not any(True for _ in self._pair.free()):
+            return self.mesh(resolution)
+        return lambda parameters: prepare(self.pair(parameters), compliance=self._compliance, resolution=resolution)
 
     def design(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
         """Modifications of pinion and wheel; pure and traceable.
@@ -136,16 +152,21 @@ def load_design(path: str | Path) -> DesignFile:
     gears, parts = [], []
     for name in ("pinion", "wheel"):
         gear = section(name, schema.GearSection)
-        gears.append(template.part_of(file, name, gear, Gear, open=False))
+        gears.append(template.part_of(file, name, gear, Gear))
         keys = [f"{name}.modification[{i}]" for i in range(len(gear.modification))]
         tables = zip(keys, gear.modification)
         parts.append([template.parse(file, key, table, AbstractModification) for key, table in tables])
     pair = _pair(file, *gears, top.pair or {})
     load = _load(file, section("load", schema.LoadSection))
+    torque = template.opened(load.torque, "load.torque", fields_of(Operation)["torque"])
     optimize = section("optimize", schema.OptimizeSection)
     if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
         raise DesignFileError(file, "optimize", "has no effect without [variables]")
-    bounds, units = _variables(file, top.variables or {}, [*parts[0], *parts[1]])
+    open_load = [torque] if isinstance(torque, template.Free) else []
+    open_case = [*pair.free(), *open_load]
+    bounds, units = read_variables(file, top.variables or {}, [*parts[0], *parts[1]], open_case)
+    middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
+    design_torque = middle[torque.name] if isinstance(torque, template.Free) else torque
     tolerance = None if top.tolerance is None else section("tolerance", schema_sweep.ToleranceSection)
     if tolerance is not None and top.sweep is None and optimize.manufactured is None:
         raise DesignFileError(file, "tolerance", "has no effect without [sweep] or optimize.manufactured")
@@ -154,8 +175,8 @@ def load_design(path: str | Path) -> DesignFile:
     return DesignFile(
         path=file,
         title=top.title or file.stem,
-        torque=load.torque,
-        torque_range=_torque_range(load),
+        torque=design_torque,
+        torque_range=_torque_range(load, design_torque),
         speed=load.speed,
         friction=load.friction,
         bounds=bounds,
@@ -164,7 +185,9 @@ def load_design(path: str | Path) -> DesignFile:
         optimize=optimize,
         sweep=None if top.sweep is None else section("sweep", schema_sweep.SweepSection),
         tolerance=tolerance,
+        open_case=tuple(open_case),
         _pair=pair,
+        _middle=pair.checked(file, middle),
         _compliance=_compliance(file, section("model", schema.ModelSection)),
         _resolution=_resolution(file, section("resolution", schema.ResolutionSection), [*parts[0], *parts[1]], bounds),
         _pairs_given=bool(top.resolution and "pairs" in top.resolution),
@@ -172,15 +195,14 @@ def load_design(path: str | Path) -> DesignFile:
     )
 
 
-def _pair(file: Path, pinion: template.Part, wheel: template.Part, table: schema.Tables) -> GearPair:
-    rest = template.part_of(file, "pair", decode(file, "pair", table, schema.PairSection), GearPair, open=False)
-    pair = template.Part(GearPair, {"pinion": pinion, "wheel": wheel, **rest.fields}, "pair")
-    return pair.checked(file, {})
+def _pair(file: Path, pinion: template.Part, wheel: template.Part, table: schema.Tables) -> template.Part:
+    rest = template.part_of(file, "pair", decode(file, "pair", table, schema.PairSection), GearPair)
+    return template.Part(GearPair, {"pinion": pinion, "wheel": wheel, **rest.fields}, "pair")
 
 
 def _load(file: Path, load: schema.LoadSection) -> schema.LoadSection:
     if load.torque_range is not None:
-        _increasing(file, "load.torque_range[1]", *load.torque_range, unit=" N m")
+        increasing(file, "load.torque_range[1]", *load.torque_range, unit=" N m")
     if load.friction is not None and load.speed is None:
         raise DesignFileError(file, "load.friction", "has no effect without load.speed (flash temperature)")
     return load
@@ -198,8 +220,8 @@ def _resolution(file: Path, sizes: schema.ResolutionSection, parts: list[templat
     return Resolution(**given)
 
 
-def _torque_range(load: schema.LoadSection) -> tuple[float, float]:
-    low, high = load.torque_range or [share * load.torque for share in _TORQUE_RANGE]
+def _torque_range(load: schema.LoadSection, torque: float) -> tuple[float, float]:
+    low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
     return low, high
 
 
@@ -214,46 +236,3 @@ def _compliance(file: Path, model: schema.ModelSection) -> Compliance:
     if options and body is not ElasticRing:
         raise DesignFileError(file, f"model.{min(options)}", f'has no effect with body = "{model.body}"')
     return Compliance(Beam(), body(**options), contact(), model.plane or "stress")
-
-
-def _variables(file: Path, tables: schema.Tables, parts: list[template.Part]):
-    """Bounds and units of the free parameters, each declared once and used at least once."""
-    bounds: dict[str, tuple[float, float]] = {}
-    units: dict[str, str] = {}
-    for name, table in tables.items():
-        key = f"variables.{name}"
-        variable = decode(file, key, table, schema.VariableSection)
-        _increasing(file, f"{key}.high", variable.low, variable.high)
-        bounds[name] = (variable.low, variable.high)
-    for part in parts:
-        for free in part.free():
-            unit = free.number.unit
-            if free.name not in bounds:
-                known = suggestion(free.name, bounds) if bounds else "there is no [variables] table"
-                raise DesignFileError(file, free.key, f'"{free.name}" is not a variable, {known}')
-            other = units.setdefault(free.name, unit)
-            if other != unit:
-                problem = f"{free.name} stands for {_quantity(unit)} here and for {_quantity(other)} elsewhere"
-                raise DesignFileError(file, free.key, problem)
-            for end, bound in zip(("low", "high"), bounds[free.name]):
-                if problem := outside(free.number, bound):
-                    raise DesignFileError(file, f"variables.{free.name}.{end}", f"{problem} as {free.key}")
-    for name, table in tables.items():
-        if name not in units:
-            raise DesignFileError(file, f"variables.{name}", "is declared but used in no modification")
-        unit = table.get("unit")
-        if unit is not None and unit != units[name]:
-            raise DesignFileError(file, f"variables.{name}.unit", f'"{unit}" must be "{units[name]}" as it is used')
-    for part in parts:
-        for end in (0, 1):
-            part.checked(file, {name: limits[end] for name, limits in bounds.items()})
-    return bounds, {name: units[name] for name in bounds}
-
-
-def _quantity(unit: str) -> str:
-    return f"a quantity in {unit}" if unit else "a pure number"
-
-
-def _increasing(file: Path, key: str, low: float, high: float, unit: str = "") -> None:
-    if high <= low:
-        raise DesignFileError(file, key, f"{high:g}{unit} must be greater than {low:g}{unit}")

@@ -68,6 +68,8 @@ class Real(Kind):
 
     def read(self, value: Any) -> Any:
         if self.open and isinstance(value, str) and value:
+            if _is_number(value):
+                raise refusal("a number", value)
             return value
         if isinstance(value, bool) or not isinstance(value, int if self.number.whole else int | float):
             raise refusal(self.words, value)
@@ -255,6 +257,15 @@ def not_of_kind(wanted: str, value: Any) -> str:
 def not_known(value: object, names: Iterable[str]) -> str:
     """`"x" is not known`, and what to write instead."""
     return f'"{value}" is not known, {suggestion(value, names)}'
+
+
+def _is_number(text: str) -> bool:
+    """Whether a number was put into quotes."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _kind(value: Any) -> str:

@@ -35,13 +35,12 @@ class Section(BaseModel):
 
 
 @cache
-def section_of(cls: type[eqx.Module], without: tuple[str, ...] = (), *, open: bool = True) -> type[Section]:
+def section_of(cls: type[eqx.Module], without: tuple[str, ...] = ()) -> type[Section]:
     """The keys of a class: its fields that can be written in a file.
 
     Args:
         cls: the class.
         without: fields that stand elsewhere.
-        open: the name of a variable may stand for a number.
 
     Raises:
         TypeError: where a field without default cannot be written.
@@ -50,7 +49,7 @@ def section_of(cls: type[eqx.Module], without: tuple[str, ...] = (), *, open: bo
     for field in dataclasses.fields(cls):
         if not field.init or field.name in without:
             continue
-        kind = _kind(cls, field, open)
+        kind = _kind(cls, field)
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
         if kind is None:
             if needed:
@@ -116,10 +115,10 @@ def summary(of: Any) -> str:
     return inspect.cleandoc(of.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
 
 
-def _kind(cls, field: dataclasses.Field, open: bool) -> Kind | None:
+def _kind(cls, field: dataclasses.Field) -> Kind | None:
     number = fields_of(cls).get(field.name)
     if number is not None:
-        return _number(number, open)
+        return _number(number)
     hint = _hint(cls, field)
     module = _module(hint)
     if module is not None:
@@ -131,10 +130,10 @@ def _kind(cls, field: dataclasses.Field, open: bool) -> Kind | None:
     return plain.get(hint) if isinstance(hint, type) else None
 
 
-def _number(number: Number, open: bool) -> Kind | None:
+def _number(number: Number) -> Kind | None:
     if not number.checked:
         return None
-    kind: Kind = Real(number, open=open and not (number.static or number.whole))
+    kind: Kind = Real(number, open=not (number.static or number.whole))
     for _ in number.shape:
         kind = ListOf(kind)
     return kind

@@ -119,6 +119,8 @@ def optimize_request(design: DesignFile, *, method: str | None = None, quick: bo
         raise DesignFileError(design.path, "optimize.method", f'"{name}" is not known, {suggestion(name, _KNOWN)}')
     if not design.bounds and name not in schema.METHODS_WITHOUT_VARIABLES:
         raise DesignFileError(design.path, "variables", "missing, nothing to optimize; use jaxgear analyze")
+    for free in design.open_case:
+        raise DesignFileError(design.path, free.key, f'"{free.name}" is a variable, which a sweep alone can vary here')
     options = {key: _options(design, key) for key in schema.METHOD_OPTIONS}.get(name, {})
     for key in ("starts", "steps"):
         value = getattr(section, key)

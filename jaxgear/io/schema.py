@@ -51,7 +51,7 @@ class FileSection(Section):
     tolerance: Annotated[Tables | None, Table()] = None
 
 
-class GearSection(section_of(Gear, open=False)):  # type: ignore[misc]
+class GearSection(section_of(Gear)):  # type: ignore[misc]
     """A gear and what is taken off its flanks.
 
     Attributes:
@@ -61,7 +61,7 @@ class GearSection(section_of(Gear, open=False)):  # type: ignore[misc]
     modification: Annotated[list[Tables], _TABLES] = []
 
 
-PairSection = section_of(GearPair, ("pinion", "wheel"), open=False)
+PairSection = section_of(GearPair, ("pinion", "wheel"))
 
 
 class LoadSection(Section):
@@ -74,7 +74,7 @@ class LoadSection(Section):
         friction: mean coefficient of friction, used with a speed only.
     """
 
-    torque: Annotated[float, positive("N m")]
+    torque: Annotated[Any, Real(Number("N m", low=0.0, open_low=True), open=True)]
     torque_range: Annotated[list[float] | None, ListOf(positive("N m"), length=2)] = None
     speed: Annotated[float | None, positive("rpm")] = None
     friction: Annotated[float | None, positive("")] = None
@@ -126,7 +126,7 @@ class ResolutionSection(Section):
 
 
 class VariableSection(Section):
-    """A number of the file that is left open: modifications name it in place of a number.
+    """A number of the file that is left open: it is named in place of a number.
 
     Attributes:
         low: least value, in the unit of the number that it stands for.

@@ -1,8 +1,13 @@
 """What the tables [sweep] and [tolerance] of a design file ask for."""
 
 import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
 
 from ..conditions import LoadSpectrum
+from ..contact import Operation
 from ..metrics import RESULTS
 from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
@@ -29,7 +34,8 @@ class SweepRequest:
 
     Attributes:
         plan: the variants.
-        load: torques and their weights.
+        load: torques and their weights, or the operation as a function of the variables.
+        highest_torque: that a variant can have [N m].
         results: names of results.
         part_rows: variants per file of the table, None for the library's default.
         tolerance: of the gears, None where the file has none.
@@ -37,7 +43,8 @@ class SweepRequest:
     """
 
     plan: AbstractPlan
-    load: LoadSpectrum
+    load: LoadSpectrum | Callable[[Mapping[str, Any]], Operation]
+    highest_torque: float
     results: tuple[str, ...]
     part_rows: int | None
     tolerance: Tolerance | None
@@ -74,15 +81,33 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
         if name in wanted[:index]:
             raise DesignFileError(design.path, f"sweep.results[{index}]", f'"{name}" is there twice')
     tolerance = design.tolerance
+    load, highest = _load(design, section)
     return SweepRequest(
         plan=_plan(design, section),
-        load=load_of(design, "sweep", section.torques, section.weights),
+        load=load,
+        highest_torque=highest,
         results=wanted,
         part_rows=section.part_rows,
         tolerance=None if tolerance is None else tolerance_of(design, tolerance),
         samples=None if tolerance is None else tolerance.samples,
         seed=0 if tolerance is None else tolerance.seed,
     )
+
+
+def _load(design: DesignFile, section: schema_sweep.SweepSection):
+    """The load and the highest torque."""
+    variable = next((free for free in design.open_case if free.key == "load.torque"), None)
+    if variable is None:
+        load = load_of(design, "sweep", section.torques, section.weights)
+        return load, float(np.max(load.torques))
+    for key in ("torques", "weights"):
+        if getattr(section, key) is not None:
+            raise DesignFileError(design.path, f"sweep.{key}", f'has no effect, load.torque is "{variable.name}"')
+
+    def operation(parameters: Mapping[str, Any]) -> Operation:
+        return Operation(parameters[variable.name], design.speed, design.friction)
+
+    return operation, design.bounds[variable.name][1]
 
 
 def _plan(design: DesignFile, section: schema_sweep.SweepSection) -> AbstractPlan:

@@ -89,7 +89,7 @@ def build(parts: list[Part], parameters: Mapping[str, Any]) -> AbstractModificat
     return NoModification() if total is None else total
 
 
-def parse(file: Path, key: str, table: Mapping[str, Any], cls: type[eqx.Module], *, open: bool = True) -> Part:
+def parse(file: Path, key: str, table: Mapping[str, Any], cls: type[eqx.Module]) -> Part:
     """An object from its table; `type` says which class derived from an abstract one it is of.
 
     Args:
@@ -97,7 +97,6 @@ def parse(file: Path, key: str, table: Mapping[str, Any], cls: type[eqx.Module],
         key: dotted key of the table.
         table: the table.
         cls: its class.
-        open: the name of a variable may stand for a number.
 
     Raises:
         DesignFileError: for an unknown type, unknown or missing keys, wrong types and numbers out of range.
@@ -109,27 +108,28 @@ def parse(file: Path, key: str, table: Mapping[str, Any], cls: type[eqx.Module],
         if not isinstance(name, str) or name not in known:
             raise DesignFileError(file, join(key, "type"), not_known(name, known))
         cls, table = known[name], {other: value for other, value in table.items() if other != "type"}
-    return part_of(file, key, decode(file, key, table, section_of(cls, open=open)), cls, open=open)
+    return part_of(file, key, decode(file, key, table, section_of(cls)), cls)
 
 
-def part_of(file: Path, key: str, section: Section, cls: type[eqx.Module], *, open: bool = True) -> Part:
+def part_of(file: Path, key: str, section: Section, cls: type[eqx.Module]) -> Part:
     """An object from its decoded table."""
     numbers, modules = fields_of(cls), modules_of(cls)
     fields: dict[str, Any] = {}
     for name, value in section.given().items():
         here = join(key, name)
         if name in modules:
-            fields[name] = parse(file, here, value, modules[name], open=open)
+            fields[name] = parse(file, here, value, modules[name])
         elif name in numbers:
-            fields[name] = _opened(value, here, numbers[name])
+            fields[name] = opened(value, here, numbers[name])
         elif name in section_of(cls).model_fields:
             fields[name] = value
     return Part(cls, fields, key)
 
 
-def _opened(value, key: str, number: Number):
+def opened(value, key: str, number: Number):
+    """A value of a file, with `Free` in place of the names of variables."""
     if isinstance(value, list):
-        return [_opened(item, f"{key}[{i}]", number) for i, item in enumerate(value)]
+        return [opened(item, f"{key}[{i}]", number) for i, item in enumerate(value)]
     return Free(value, key, number) if isinstance(value, str) else value
 
 
