@@ -55,6 +55,7 @@ from .geometry import path_of_contact as path_of_contact
 from .geometry import roll_angle as roll_angle
 from .geometry import roll_length as roll_length
 from .geometry import tooth_thickness as tooth_thickness
+from .metrics import Quantity as Quantity
 from .metrics import contact_shock as contact_shock
 from .metrics import effective_contact_ratio as effective_contact_ratio
 from .metrics import flash_temperature as flash_temperature
@@ -65,6 +66,7 @@ from .metrics import max_relief as max_relief
 from .metrics import ohlendorf_loss_factor as ohlendorf_loss_factor
 from .metrics import peak_to_peak as peak_to_peak
 from .metrics import profile_relief as profile_relief
+from .metrics import quantities as quantities
 from .metrics import relief_reversal as relief_reversal
 from .metrics import removed_volume as removed_volume
 from .metrics import root_factors as root_factors
@@ -93,7 +95,6 @@ from .microgeometry import TipRelief as TipRelief
 from .optimize import CMAES as CMAES
 from .optimize import LBFGS as LBFGS
 from .optimize import Adam as Adam
-from .optimize import Candidate as Candidate
 from .optimize import Constraint as Constraint
 from .optimize import CVaR as CVaR
 from .optimize import DifferentialEvolution as DifferentialEvolution
@@ -101,16 +102,20 @@ from .optimize import Factorial as Factorial
 from .optimize import Front as Front
 from .optimize import Genetic as Genetic
 from .optimize import Iterate as Iterate
+from .optimize import Limit as Limit
 from .optimize import Mean as Mean
 from .optimize import Minimax as Minimax
 from .optimize import Optimum as Optimum
 from .optimize import Pareto as Pareto
+from .optimize import Problem as Problem
 from .optimize import Projection as Projection
 from .optimize import Quantile as Quantile
 from .optimize import Worst as Worst
 from .optimize import free_form as free_form
 from .optimize import iterate_transmission_error as iterate_transmission_error
+from .optimize import make_problem as make_problem
 from .optimize import minimize as minimize
+from .optimize import pareto as pareto
 from .optimize import project as project
 from .sizing import crowning_for_misalignment as crowning_for_misalignment
 from .sizing import crowning_for_tolerance as crowning_for_tolerance

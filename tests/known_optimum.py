@@ -43,9 +43,14 @@ class Known:
         relief = jg.TipRelief(x["amount"], self.length, jg.Linear())
         return relief, relief
 
+    def pareto(self, design, box, **options):
+        """`jaxgear.pareto`."""
+        return jg.pareto(design, box, mesh=self.mesh, torque=self.torque, **options)
+
     def minimize(self, design, box, **options):
         """`jaxgear.minimize`, of four start points unless a method is given."""
-        options = {"torque": self.torque} | options | ({} if "method" in options else {"starts": 4})
+        # the optimum is known at the positions of the mesh
+        options = {"torque": self.torque, "positions": None} | options | ({} if "method" in options else {"starts": 4})
         return jg.minimize(design, box, mesh=self.mesh, **options)
 
 

@@ -124,7 +124,7 @@ def test_a_relief_to_start_from_also_softens_the_entry(nominal, relieved):
 
 def test_a_loose_tolerance_ends_early(mesh, nominal):
     result, _ = nominal
-    hasty = jg.iterate_transmission_error(mesh, TORQUE, tolerance=20.0)
+    hasty = jg.iterate_transmission_error(mesh, TORQUE, rtol=20.0)
     assert len(hasty.iterations) < len(result.iterations)
     last = hasty.iterations[-1]
     assert last.ppte - last.limit <= 20.0 * last.limit
@@ -137,7 +137,7 @@ def test_a_loose_tolerance_ends_early(mesh, nominal):
         (0.0, {}, "torque"),
         (float("nan"), {}, "torque"),
         (TORQUE, {"max_relief": 0.0}, "max_relief"),
-        (TORQUE, {"tolerance": -0.1}, "tolerance"),
+        (TORQUE, {"rtol": -0.1}, "rtol"),
         (TORQUE, {"steps": 0}, "steps = 0"),
         (TORQUE, {"steps": 2.5}, "steps = 2.5"),
     ],

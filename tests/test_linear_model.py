@@ -1,5 +1,6 @@
 """Sequential linear programming: slopes of the linearized problem, and the best step of the linear program."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import equinox as eqx
@@ -10,9 +11,10 @@ import pytest
 from catalogue import POWER_BOX, power_reliefs, solve_any
 
 import jaxgear as jg
-from jaxgear.conditions import conditions
+from jaxgear.numerics.reductions import Range
 from jaxgear.optimize.linear_model import PENALTY, Model
-from jaxgear.optimize.problem import Linearization, Pieces, Roughness, make_problem
+from jaxgear.optimize.linearization import Linearization, Pieces
+from jaxgear.optimize.problem import Roughness, make_problem
 from jaxgear.tolerance import GearTolerance
 
 TORQUES = (50.0, 30.0)
@@ -21,8 +23,8 @@ STEP = 1e-5  # of the central differences, in the unit box
 
 
 def problem_of(mesh, loads=TORQUES, objective="ppte", constraints=(), **deviations):
-    judged = conditions("test", mesh, jg.LoadSpectrum(loads), **deviations).on(mesh)
-    return make_problem(power_reliefs, POWER_BOX, mesh, judged, (objective,), jg.Mean(), constraints)
+    given = {"torque": jg.LoadSpectrum(loads), "objective": objective, "constraints": constraints}
+    return make_problem(power_reliefs, POWER_BOX, mesh=mesh, **given, **deviations)
 
 
 @eqx.filter_jit
@@ -66,8 +68,47 @@ def test_slopes_of_the_transmission_error(mesh):
         np.testing.assert_allclose(pieces.slope[case], expected, atol=2e-4 * np.abs(expected).max())
 
 
-def effort(candidate):
-    return candidate.parameters["pinion"] ** 2 * candidate.parameters["length"]
+def test_every_extreme_has_its_pieces(mesh):
+    """Objectives and limits of one's own, and pressures: every value with its slope, by whichever way is the cheapest.
+
+    Two slopes of a pair's pressure take fewer gradients than four parameters; of a curve that is not known to be local
+    every parameter has a direction.
+    """
+    ripple = jg.Quantity("ripple", lambda cycle: cycle.transmission_error, "um", reduction=Range())
+    pressure = jg.quantities["max_flank_pressure"]
+    elsewhere = replace(pressure, name="elsewhere", local=False)
+    many = replace(pressure, name="many", of=lambda cycle: jnp.concatenate([cycle.contact_pressure] * 3))
+    limits = [jg.Constraint(of, high=700.0) for of in (pressure, elsewhere, many)] + [jg.Constraint("ppte", high=0.5)]
+    problem = problem_of(mesh, loads=TORQUES[:1], objective=ripple, constraints=limits)
+    found = linearize(problem, jnp.asarray(POINT))
+    own, named = found.objectives[0], found.limits[3]
+    np.testing.assert_allclose((own.upper - 0.5) / 0.5, named.upper, atol=1e-9)
+    np.testing.assert_allclose(own.slope / 0.5, named.slope, atol=1e-6)
+    np.testing.assert_allclose(named.value, [problem_value(problem) / 0.5 - 1], rtol=1e-9)
+
+    local, other, thrice = found.limits[:3]
+
+    def excess(x):
+        return (
+            np.asarray(jg.solve(mesh, TORQUES[0], **dict(zip(("pinion", "wheel"), reliefs(x)))).contact_pressure) / 700
+            - 1
+        )
+
+    np.testing.assert_allclose(local.upper[0], excess(POINT).ravel(), atol=1e-9)
+    np.testing.assert_allclose(local.slope, other.slope, atol=1e-8)
+    np.testing.assert_allclose(thrice.slope[0], np.concatenate([local.slope[0]] * 3), atol=1e-8)
+    expected = differences(excess).reshape(-1, len(POINT))
+    # a contact that begins or ends within the step of the differences has no slope
+    close = np.isclose(local.slope[0], expected, atol=2e-4 * np.abs(expected).max())
+    assert close.all(axis=1).mean() > 0.9
+
+
+def problem_value(problem):
+    return float(problem.score(jnp.asarray(POINT)).value[0])
+
+
+def effort(cycle):
+    return cycle.pinion.amount**2 * cycle.pinion.length
 
 
 def test_slopes_of_another_objective_and_of_constraints(mesh):
@@ -83,8 +124,7 @@ def test_slopes_of_another_objective_and_of_constraints(mesh):
     # the objective is the single upper piece, above nothing
     (pieces,) = found.objectives
     np.testing.assert_allclose(pieces.upper[0], value(POINT), rtol=1e-12)
-    np.testing.assert_array_equal(pieces.lower, 0.0)
-    np.testing.assert_array_equal(pieces.lower_slope, 0.0)
+    assert pieces.lower is None
     np.testing.assert_allclose(pieces.slope[0], differences(value), atol=1e-5)
 
     volume = eqx.filter_jit(jg.removed_volume)
@@ -93,8 +133,10 @@ def test_slopes_of_another_objective_and_of_constraints(mesh):
         combined = 2.0 * 20.0 * x[0] - (1.0 + 4.7 * x[2])
         return np.array([float(volume(mesh, *reliefs(x))) / 40.0 - 1, combined / 5.0 - 1, 1 - combined / 3.0])
 
-    np.testing.assert_allclose(found.excess, excess(POINT), rtol=1e-9)
-    np.testing.assert_allclose(found.excess_slope, differences(excess), atol=1e-4)
+    limits = [(limit.upper[0, 0], limit.slope[0, 0]) for limit in found.limits]
+    passed, slopes = zip(*limits)
+    np.testing.assert_allclose(passed, excess(POINT), rtol=1e-9)
+    np.testing.assert_allclose(slopes, differences(excess), atol=1e-4)
 
 
 def model(values, slope, x, *, measure=None, weights=None, excess=None, excess_slope=None, forms=None, weight=0.0):
@@ -107,8 +149,9 @@ def model(values, slope, x, *, measure=None, weights=None, excess=None, excess_s
     )
     excess = np.zeros(0) if excess is None else np.asarray(excess, float)
     excess_slope = np.zeros((0, len(x))) if excess_slope is None else np.asarray(excess_slope, float)
-    objective = Pieces(values, values, slope, slope)
-    return Model(problem, x, Linearization((objective,), excess, excess_slope, np.True_), penalty=PENALTY)
+    objective = Pieces(values, slope, values, slope)
+    limits = tuple(Pieces(over[None, None], rise[None, None]) for over, rise in zip(excess, excess_slope))
+    return Model(problem, x, Linearization((objective,), limits, np.True_), penalty=PENALTY)
 
 
 def test_chebyshev_polynomial():
@@ -250,11 +293,11 @@ def test_a_failed_solution_has_no_value():
     made = model([[2.0, 0.0]], [[[-1.0], [0.0]]], [0.2])
     assert made.fine and np.isfinite(made.value)
     problem = SimpleNamespace(measure=jg.Mean(), cases=SimpleNamespace(weights=jnp.ones(1)), roughness=None)
-    pieces, slope, nothing = np.zeros((1, 2)), np.zeros((1, 2, 1)), np.zeros((0, 1))
+    pieces, slope = np.zeros((1, 2)), np.zeros((1, 2, 1))
     failed = Model(
         problem,
         np.array([0.2]),
-        Linearization((Pieces(pieces, pieces, slope, slope),), np.zeros(0), nothing, np.False_),
+        Linearization((Pieces(pieces, slope, pieces, slope),), (), np.False_),
     )
     assert not failed.fine
     assert np.isnan(failed.decrease_left(1e-3))

@@ -18,7 +18,7 @@ def known():
 @pytest.fixture(scope="module")
 def searched(known):
     """PPTE against the material to grind off."""
-    return known.minimize(known.parabolas, BOX, objective=VOLUME, method=jg.Pareto(points=12))
+    return known.pareto(known.parabolas, BOX, objectives=VOLUME, method=jg.Pareto(points=12))
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def dominated(values):
 
 
 def test_no_design_beats_another(searched):
-    front = searched.front
+    front = searched
     assert front.objectives == VOLUME
     assert front.units == ("um", "mm3")
     assert len(front.values) >= 12
@@ -46,7 +46,7 @@ def test_no_design_beats_another(searched):
 
 
 def test_parameters_reproduce_the_values(searched, volume_per_amount):
-    front = searched.front
+    front = searched
     pinion, wheel = front.parameters["pinion"], front.parameters["wheel"]
     assert len(pinion) == len(front.values)
     for amounts in (pinion, wheel):
@@ -57,7 +57,7 @@ def test_parameters_reproduce_the_values(searched, volume_per_amount):
 
 def test_ends_are_the_optima_of_either_objective(searched):
     """The least PPTE, of which test_optimize tells the closed form; and nothing removed at all."""
-    front = searched.front
+    front = searched
     amount = 0.5 / (5 / 16 - 1 / 36)
     assert front.values[0, 0] == pytest.approx(DELTA0 * (0.5 + amount / 36 - amount / 4), rel=0.05)
     assert front.values[-1] == pytest.approx([0.5 * DELTA0, 0.0], abs=1e-3)
@@ -69,40 +69,51 @@ def test_front_is_the_true_one(searched, volume_per_amount):
     volume, values = (volume_per_amount * (pinion + wheel)).ravel(), ppte_of_parabolas(pinion, wheel).ravel()
     order = np.argsort(volume)
     volume, least = volume[order], np.minimum.accumulate(values[order])
-    true = least[np.searchsorted(volume, searched.front.values[:, 1] + 1e-9, side="right") - 1]
-    lost = searched.front.values[:, 0] / true - 1
+    true = least[np.searchsorted(volume, searched.values[:, 1] + 1e-9, side="right") - 1]
+    lost = searched.values[:, 0] / true - 1
     assert np.all(lost > -0.01)  # the grid is not finer
     assert np.median(lost) < 0.002
     # and it leaves no wide gap
-    assert np.diff(searched.front.values[:, 0]).max() < 0.15 * np.ptp(searched.front.values[:, 0])
+    assert np.diff(searched.values[:, 0]).max() < 0.15 * np.ptp(searched.values[:, 0])
 
 
 def test_compromise_is_a_design_of_the_front_next_to_the_ideal(searched):
-    front = searched.front
-    (index,) = np.flatnonzero(np.isclose(front.values[:, 0], searched.ppte, atol=1e-9))
-    for name, value in searched.parameters.items():
+    front = searched
+    compromise = searched.compromise
+    (index,) = np.flatnonzero(np.isclose(front.values[:, 0], compromise.ppte, atol=1e-9))
+    assert searched.chosen == index
+    for name, value in compromise.parameters.items():
         assert value == pytest.approx(front.parameters[name][index], rel=1e-12)
     low, high = front.values.min(axis=0), front.values.max(axis=0)
     distance = ((front.values - low) / (high - low)).max(axis=1)
     assert distance[index] < 1.05 * distance.min()
-    assert searched.objective == pytest.approx(distance[index], rel=0.05)
-    assert searched.objective_name == "distance from the ideal of ppte and removed_volume"
-    assert np.isnan(searched.gradient_norm)
+    assert compromise.objective == pytest.approx(distance[index], rel=0.05)
+    assert compromise.objective_name == "distance from the ideal of ppte and removed_volume"
     # a contact analysis with two gradients counts as five; every design is linearized at the start of each round
-    linearized, rest = divmod(searched.evaluations, 5)
+    linearized, rest = divmod(compromise.evaluations, 5)
     assert rest == 0 and 3 * 12 <= linearized < 3 * 12 * 20
+
+
+def test_every_design_of_the_front_has_first_order_evidence(searched, volume_per_amount):
+    """What is left is what no direction improves in both objectives; beside the front there is such a direction."""
+    front = searched
+    assert front.decrease_left.shape == (len(front.values),)
+    assert np.isfinite(front.decrease_left).all() and (front.decrease_left >= 0).all()
+    # most designs were sought, each until no step was left
+    assert np.median(front.decrease_left) < 0.05
+    assert front.compromise.decrease_left == front.decrease_left[front.chosen]
 
 
 def test_three_objectives_within_a_limit(known, volume_per_amount):
     limit = jg.Constraint({"pinion": 1.0, "wheel": -1.0}, high=-4.0)
-    result = known.minimize(
+    result = known.pareto(
         known.parabolas,
         BOX,
-        objective=(*VOLUME, "max_relief"),
+        objectives=(*VOLUME, "max_relief"),
         constraints=[limit],
         method=jg.Pareto(points=12),
     )
-    front = result.front
+    front = result
     assert front.values.shape[1] == 3
     assert not dominated(front.values).any()
     assert np.all(np.diff(front.values[:, 0]) >= 0)
@@ -110,13 +121,13 @@ def test_three_objectives_within_a_limit(known, volume_per_amount):
     assert np.all(pinion - wheel <= -4.0 * (1 - 1e-3))
     expected = ppte_of_parabolas(pinion, wheel), volume_per_amount * (pinion + wheel), np.maximum(pinion, wheel)
     np.testing.assert_allclose(front.values, np.stack(expected, axis=1), atol=1e-5)
-    assert result.violation <= 1e-3
+    assert result.compromise.violation <= 1e-3
 
 
 @pytest.mark.slow
 def test_four_objectives(known):
     names = ("ppte", "removed_volume", "max_relief", "mesh_loss_factor")
-    front = known.minimize(known.parabolas, BOX, objective=names, method=jg.Pareto(points=8, steps=5)).front
+    front = known.pareto(known.parabolas, BOX, objectives=names, method=jg.Pareto(points=8, steps=5))
     assert front.objectives == names
     assert front.values.shape[1] == 4 and np.isfinite(front.values).all()
     assert not dominated(front.values).any()
@@ -125,7 +136,7 @@ def test_four_objectives(known):
 def test_limits_that_no_design_keeps(known):
     limit = jg.Constraint({"pinion": 1.0}, low=41.0)
     with pytest.raises(RuntimeError, match="keeps the constraints"):
-        known.minimize(known.parabolas, BOX, objective=VOLUME, constraints=[limit], method=jg.Pareto(points=4, steps=2))
+        known.pareto(known.parabolas, BOX, objectives=VOLUME, constraints=[limit], method=jg.Pareto(points=4, steps=2))
 
 
 @pytest.mark.parametrize(("options", "words"), [({"points": 1}, "points = 1"), ({"steps": 0}, "steps = 0")])

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..contact import Mesh
 from ..io import DesignFile, describe
-from ..optimize import QUANTITIES, Optimum, Projection
+from ..optimize import Front, Optimum, Projection
 
 _SHOWN_BOUNDS = 8
 
@@ -21,11 +21,11 @@ def verdict(
     if optimum.objective_name != "ppte":
         yield f"{optimum.objective_name}: {optimum.objective:.4g}"
     yield from _bounds(file, optimum)
-    for name, value in optimum.constraints.items():
-        unit = QUANTITIES[name].unit if name in QUANTITIES else ""
-        yield f"{name} {value:.4g} {unit}".rstrip()
-    if optimum.violation > 0:
-        yield f"constraints are passed by {100 * optimum.violation:.2g} % of their limit"
+    for name, limit in optimum.constraints.items():
+        yield f"{name} {limit}"
+    if not optimum.feasible:
+        passed = f"the nearest passes one by {100 * optimum.violation:.2g} %"
+        yield f"NOT FEASIBLE: the search met no design within all limits, {passed}"
     for step, state in enumerate(optimum.iterations):
         yield (
             f"iteration {step}: PPTE {state.ppte:.3f} um (lower limit {state.limit:.3f}), up to "
@@ -34,10 +34,11 @@ def verdict(
         )
     if projection is not None:
         yield from str(projection).splitlines()
-    if optimum.front is not None:
-        yield f"{len(optimum.front.values)} designs on the Pareto front, in front.csv; the optimum is the compromise"
-    if np.isfinite(optimum.gradient_norm):
-        yield f"gradient norm at the optimum {optimum.gradient_norm:.2g} per full range of the variables"
+    if np.isfinite(optimum.grid_change):
+        change = f"{optimum.grid_change:+.2g} {optimum.objective_unit}".rstrip()
+        yield f"evaluated at {optimum.positions} positions; twice as many change the objective by {change}"
+    if np.isfinite(optimum.decrease_left):
+        yield f"decrease left at the optimum {optimum.decrease_left:.2g} per full range of the variables"
     price = "one with gradient counts as three, each further gradient as two"
     yield f"{optimum.evaluations} contact analyses by method {optimum.method} ({price})"
 
@@ -63,7 +64,16 @@ def summary(file: DesignFile, optimum: Optimum, projection: Projection | None) -
     return data
 
 
-def write_figures(folder: Path, mesh: Mesh, optimum: Optimum, surface: tuple[np.ndarray, np.ndarray]) -> None:
+def front_lines(front: Front) -> Iterator[str]:
+    """Lines about a front, whose compromise is the optimum of the run."""
+    yield f"{len(front.values)} designs on the Pareto front, in front.csv; the optimum is the compromise"
+    left = float(np.nanmax(front.decrease_left, initial=0.0))
+    yield f"no step improves all objectives of one of them by more than {left:.2g} spans per full range"
+
+
+def write_figures(
+    folder: Path, mesh: Mesh, optimum: Optimum, front: Front | None, surface: tuple[np.ndarray, np.ndarray]
+) -> None:
     """Writes the figures of the search and of the optimum over all loads."""
     from .. import plot
 
@@ -78,19 +88,10 @@ def write_figures(folder: Path, mesh: Mesh, optimum: Optimum, surface: tuple[np.
     if optimum.iterations:
         axes["iterations_relief"] = plot.iterations_relief(mesh, optimum)
         axes["iterations_transmission_error"] = plot.iterations_transmission_error(optimum, mesh.phase)
-    if optimum.front is not None:
-        axes["front"] = plot.optimum_front(optimum.front, chosen=_chosen(optimum))
+    if front is not None:
+        axes["front"] = plot.optimum_front(front, chosen=front.chosen)
     for name, drawn in axes.items():
         plot.save(np.ravel(drawn)[0].figure, folder / f"{name}.png")
-
-
-def _chosen(optimum: Optimum) -> int:
-    """Row of the front that the optimum is."""
-    front = optimum.front
-    assert front is not None
-    table = np.stack([front.parameters[name] for name in optimum.parameters], axis=1)
-    values = np.asarray(list(optimum.parameters.values()))
-    return int(np.abs(table - values).max(axis=1).argmin())
 
 
 def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[str]:

@@ -15,7 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from ..contact import Mesh
 from ..io import DesignFile, OptimizeRequest, load_design, result_folder, write_flanks, write_front, write_summary
 from ..microgeometry import AbstractModification
-from ..optimize import Optimum, Projection, project
+from ..optimize import Front, Optimum, Projection, project
 from . import interrupt, optimum_report, report
 from .cache import enable_cache
 from .study import Evaluation, Evaluator
@@ -29,6 +29,7 @@ class Run:
         self._target, self._folder, self._stages = target, folder, stages
         self._evaluations: dict[str, Evaluation] = {}
         self._optimum: Optimum | None = None
+        self._front: Front | None = None
         self._projection: Projection | None = None
         self._resolution, self._quick = design.resolution(), False
 
@@ -59,7 +60,9 @@ class Run:
         """Finds the optimum, and for flanks without parameters the named curve in their place."""
         self._stages.begin(f"searching the optimum ({request.method})")
         began = time.perf_counter()
-        self._optimum = optimum = request(self._mesh, self._stages.step)
+        found = request(self._mesh, self._stages.step)
+        self._front = found if isinstance(found, Front) else None
+        self._optimum = optimum = found.compromise if isinstance(found, Front) else found
         self.evaluate("optimum", optimum.pinion, optimum.wheel)
         spent = time.perf_counter() - began
         self._evaluations["optimum"] = dataclasses.replace(self._evaluations["optimum"], seconds=spent)
@@ -76,13 +79,13 @@ class Run:
             data["optimum"] = optimum_report.summary(self.design, self._optimum, self._projection)
         write_summary(self._folder / "summary.json", {**data, "quick": self._quick})
         write_flanks(self._folder / "flanks.csv", self._mesh, report.flanks(self._evaluations))
-        if self._optimum is not None and self._optimum.front is not None:
-            write_front(self._folder / "front.csv", self._optimum.front)
+        if self._front is not None:
+            write_front(self._folder / "front.csv", self._front)
         if figures:
             report.write_figures(self._folder, self.design, self._mesh, self._evaluations, self._torques)
             if self._optimum is not None:
                 surface = self._evaluator.response_surface(self._optimum.pinion, self._optimum.wheel)
-                optimum_report.write_figures(self._folder, self._mesh, self._optimum, surface)
+                optimum_report.write_figures(self._folder, self._mesh, self._optimum, self._front, surface)
 
     def show(self) -> bool:
         """Prints the comparison, after the results are in place; False when a contact solution failed."""
@@ -97,6 +100,8 @@ class Run:
                 reduction=report.reduction(self._evaluations),
             )
             for line in lines:
+                out.print(line, soft_wrap=True)
+            for line in optimum_report.front_lines(self._front) if self._front is not None else ():
                 out.print(line, soft_wrap=True)
         if self._quick:
             out.print("quick run: coarse positions and a short search, not a result to build on", soft_wrap=True)

@@ -4,11 +4,21 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import jax.numpy as jnp
-
 from ..contact import Mesh
+from ..metrics import quantities
 from ..numerics import AbstractMeasure, CVaR, Mean, Quantile, Worst
-from ..optimize import METHODS, QUANTITIES, Constraint, Optimum, free_form, iterate_transmission_error, minimize
+from ..optimize import (
+    METHODS,
+    Constraint,
+    Front,
+    Optimum,
+    Pareto,
+    free_form,
+    iterate_from_low_pressure,
+    iterate_transmission_error,
+    minimize,
+    pareto,
+)
 from ..optimize.projection import CURVES
 from ..optimize.search import Callback
 from ..tolerance import Tolerance
@@ -21,7 +31,9 @@ from .toml import decode
 _DEFAULT_METHOD = "minimax"
 _CURVE = "cubic"  # on which flanks without parameters are projected
 _FRONT = ("ppte", "max_contact_pressure")  # of a Pareto front where the file names no objectives
-_KNOWN = (*METHODS, *schema.METHODS_WITHOUT_VARIABLES)
+_PARETO = "pareto"
+_MADE = {**METHODS, _PARETO: Pareto}
+_KNOWN = (*_MADE, *schema.METHODS_WITHOUT_VARIABLES)
 _STARTS = ("minimax", "adam", "lbfgs")  # methods of `starts` and `steps`
 _MEASURES: Mapping[str, Callable[..., AbstractMeasure]] = {
     "mean": Mean,
@@ -63,43 +75,30 @@ class OptimizeRequest:
     _common: dict[str, Any]
     _first: dict[str, Any]  # options of the search for a relief to start from
 
-    def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum:
+    def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum | Front:
         """Runs it on a prepared mesh."""
         design = self._design
         if self.method == "free_form":
             return free_form(mesh, callback=callback, **self._common, **self._options)
         if self.method == "te_iteration":
             return self._iterate(mesh, callback)
+        if self.method == _PARETO:
+            common = self._common | {"objectives": self._common["objective"], "method": Pareto(**self._options)}
+            del common["objective"]
+            return pareto(design.design, design.bounds, mesh=mesh, callback=callback, **common)
         kind = METHODS[self.method](**self._options)
         return minimize(design.design, design.bounds, mesh=mesh, method=kind, callback=callback, **self._common)
 
     def _iterate(self, mesh: Mesh, callback: Callback | None) -> Optimum:
         design, options = self._design, dict(self._options)
-        start, spent, seconds = options.pop("start"), 0, 0.0
-        pinion, wheel = None, None
+        start, pinion, wheel = options.pop("start"), None, None
+        if start == "low_pressure":
+            method = METHODS[_DEFAULT_METHOD](**self._first)
+            given = {"mesh": mesh, "torque": design.torque, "method": method, "callback": callback}
+            return iterate_from_low_pressure(design.design, design.bounds, **given, **options)
         if start == "given":
             pinion, wheel = design.design({})
-        elif start == "low_pressure":
-            first = minimize(
-                design.design,
-                design.bounds,
-                mesh=mesh,
-                torque=design.torque,
-                objective="max_contact_pressure",
-                constraints=(Constraint("max_relief", high=options["max_relief"]),),
-                method=METHODS[_DEFAULT_METHOD](**self._first),
-                callback=callback,
-            )
-            pinion, wheel, spent, seconds = first.pinion, first.wheel, first.evaluations, first.seconds
-        found = iterate_transmission_error(
-            mesh, jnp.asarray(design.torque), pinion=pinion, wheel=wheel, callback=callback, **options
-        )
-        return dataclasses.replace(
-            found,
-            evaluations=found.evaluations + spent,
-            history_evaluations=found.history_evaluations + spent,
-            seconds=found.seconds + seconds,
-        )
+        return iterate_transmission_error(mesh, design.torque, pinion=pinion, wheel=wheel, callback=callback, **options)
 
 
 def optimize_request(design: DesignFile, *, method: str | None = None, quick: bool = False) -> OptimizeRequest:
@@ -143,9 +142,11 @@ def optimize_request(design: DesignFile, *, method: str | None = None, quick: bo
         common = {}
     elif name != "free_form":
         _check_levels(design, options.get("levels"))
-        refused(design.path, f"optimize.{name}", lambda: METHODS[name](**options))
+        refused(design.path, f"optimize.{name}", lambda: _MADE[name](**options))
     if quick:
         options = {**options, **_QUICK[name]}
+        if name not in (_PARETO, "te_iteration"):  # a quick look stays on its mesh
+            common = {**common, "positions": None}
     return OptimizeRequest(name, curve, design, options, common, _QUICK[_DEFAULT_METHOD] if quick else {})
 
 
@@ -166,8 +167,8 @@ def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quic
     """Objective, cases and constraints."""
     objectives = _objectives(section, name)
     for objective in objectives:
-        if objective not in QUANTITIES:
-            problem = f'"{objective}" is not known, {suggestion(objective, QUANTITIES)}'
+        if objective not in quantities:
+            problem = f'"{objective}" is not known, {suggestion(objective, quantities)}'
             raise DesignFileError(design.path, "optimize.objective", problem)
     if (len(objectives) > 1) != (name == "pareto"):
         problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
@@ -181,7 +182,9 @@ def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quic
         "seed": section.seed or 0,
         **_gears(design, section, quick),
     }
-    return found if name == "free_form" else {**found, "objective": tuple(objectives)}
+    if name == "free_form":
+        return found
+    return {**found, "objective": tuple(objectives) if name == _PARETO else objectives[0]}
 
 
 def _objectives(section: schema.OptimizeSection, name: str) -> list[str]:
@@ -221,9 +224,9 @@ def _constraint(design: DesignFile, key: str, table: schema.Tables) -> Constrain
     section = decode(design.path, key, table, schema.ConstraintSection)
     if (section.of is None) == (section.variables is None):
         raise DesignFileError(design.path, key, "needs either of = a quantity or variables = a table of coefficients")
-    if section.of is not None and section.of not in QUANTITIES:
+    if section.of is not None and section.of not in quantities:
         raise DesignFileError(
-            design.path, f"{key}.of", f'"{section.of}" is not known, {suggestion(section.of, QUANTITIES)}'
+            design.path, f"{key}.of", f'"{section.of}" is not known, {suggestion(section.of, quantities)}'
         )
     for name in section.variables or {}:
         if name not in design.bounds:

@@ -239,7 +239,7 @@ class ParetoOptions(Section):
 class IterationOptions(Section):
     start: Annotated[str, Choice(("unmodified", "given", "low_pressure"))] = "unmodified"
     max_relief: Annotated[float, positive("um")] = 7.0
-    tolerance: Annotated[float | None, positive("um")] = None
+    rtol: Annotated[float | None, positive("")] = None
     steps: Annotated[int | None, count(1, 1000)] = None
     curve: Annotated[str | None, Text()] = None
 

@@ -5,7 +5,7 @@ from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
 from ..numerics import over_batch
-from .registry import RESULTS, result_key
+from .quantity import quantities
 
 _SUMMARY = (
     "ppte",
@@ -29,6 +29,6 @@ def summary(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
     """The numbers that engineers ask for first, by name and unit; traceable, so it can be vmapped."""
     return {
         "torque_Nm": cycle.torque,
-        **{result_key(name): RESULTS[name].of(cycle) for name in _SUMMARY},
+        **{quantities[name].key: quantities[name](cycle) for name in _SUMMARY},
         "converged": jnp.all(cycle.converged),
     }

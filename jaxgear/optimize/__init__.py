@@ -1,4 +1,4 @@
-"""Choosing a modification: sizing rules, gradient and evolutionary optimization, iterated and free-form flanks."""
+"""Choosing a modification: gradient and evolutionary optimization, fronts, iterated and free-form flanks."""
 
 from ..numerics import CVaR as CVaR
 from ..numerics import Mean as Mean
@@ -10,17 +10,23 @@ from .evolution import Genetic as Genetic
 from .factorial import Factorial as Factorial
 from .first_order import Adam as Adam
 from .free_form import free_form as free_form
-from .goal import QUANTITIES as QUANTITIES
-from .goal import Candidate as Candidate
 from .goal import Constraint as Constraint
+from .iteration import iterate_from_low_pressure as iterate_from_low_pressure
 from .iteration import iterate_transmission_error as iterate_transmission_error
 from .methods import METHODS as METHODS
 from .minimax import Minimax as Minimax
 from .minimize import minimize as minimize
-from .pareto import Pareto as Pareto
+from .pareto_search import Pareto as Pareto
+from .pareto_search import pareto as pareto
+from .problem import Problem as Problem
+from .problem import make_problem as make_problem
 from .projection import Projection as Projection
 from .projection import project as project
 from .quasi_newton import LBFGS as LBFGS
 from .result import Front as Front
 from .result import Iterate as Iterate
+from .result import Limit as Limit
 from .result import Optimum as Optimum
+from .search import AbstractMethod as AbstractMethod
+from .search import Callback as Callback
+from .search import Record as Record

@@ -6,12 +6,11 @@ from abc import abstractmethod
 from contextlib import contextmanager
 from dataclasses import replace
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..numerics import whole
+from ..numerics.fields import Checked, count, number
 from .evaluate import fitness, scores
 from .problem import Problem
 from .search import AbstractMethod, Record
@@ -22,7 +21,7 @@ _LEAST_POPULATION = 4
 _FIRST_MUTATION, _LAST_MUTATION = 0.2, 0.002
 
 
-class _Evolution(AbstractMethod):
+class _Evolution(Checked, AbstractMethod):
     """Generations of a population in the unit box; individuals outside it are moved to its surface.
 
     Attributes:
@@ -31,15 +30,9 @@ class _Evolution(AbstractMethod):
         seed: of the random numbers.
     """
 
-    population: int = eqx.field(static=True, default=100)
-    generations: int = eqx.field(static=True, default=100)
-    seed: int = eqx.field(static=True, default=0)
-
-    def __check_init__(self):
-        owner = type(self).__name__
-        whole(owner, "population", self.population, _LEAST_POPULATION)
-        whole(owner, "generations", self.generations, 1)
-        whole(owner, "seed", self.seed, 0)
+    population: int = count(low=_LEAST_POPULATION, default=100)
+    generations: int = count(default=100)
+    seed: int = count(low=0, default=0)
 
     def search(self, problem: Problem, record: Record) -> None:
         """Runs the generations."""
@@ -81,11 +74,7 @@ class Genetic(_Evolution):
         crossover: share of the genes that come from the second parent.
     """
 
-    crossover: float = eqx.field(static=True, default=0.5)
-
-    def __check_init__(self):
-        if not 0 <= self.crossover <= 1:
-            raise ValueError(f"Genetic: crossover = {self.crossover!r} must be from 0 to 1")
+    crossover: float = number("", low=0.0, high=1.0, static=True, default=0.5)
 
     @property
     def name(self) -> str:
@@ -120,12 +109,8 @@ class CMAES(_Evolution):
         spread: standard deviation of the first generation in the unit box.
     """
 
-    population: int = eqx.field(static=True, default=16)
-    spread: float = eqx.field(static=True, default=0.3)
-
-    def __check_init__(self):
-        if not 0 < self.spread <= 1:
-            raise ValueError(f"CMAES: spread = {self.spread!r} must be above 0 and at most 1")
+    population: int = count(low=_LEAST_POPULATION, default=16)
+    spread: float = number("", low=0.0, high=1.0, open_low=True, static=True, default=0.3)
 
     @property
     def name(self) -> str:

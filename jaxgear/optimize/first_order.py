@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from ..numerics import whole
+from ..numerics.fields import Checked, count
 from .problem import GRADIENT_COST, Problem
 from .search import AbstractMethod, Record
 from .smooth import STAGE_WIDTHS, Multipliers, lagrangian, merged, stages, yardstick
@@ -14,7 +14,7 @@ from .starts import real_points, start_points
 _LOOK = 20  # most steps between two looks at the search: progress and interruption
 
 
-class Adam(AbstractMethod):
+class Adam(Checked, AbstractMethod):
     """Adam (optax) on a soft objective whose width shrinks in stages, projected onto the box.
 
     All starts advance together under `jax.vmap`. Other constraints enter by an augmented Lagrangian, whose multipliers
@@ -25,12 +25,8 @@ class Adam(AbstractMethod):
         steps: gradient steps of every start, over all stages.
     """
 
-    starts: int = eqx.field(static=True, default=16)
-    steps: int = eqx.field(static=True, default=300)
-
-    def __check_init__(self):
-        whole("Adam", "starts", self.starts, 1)
-        whole("Adam", "steps", self.steps, len(STAGE_WIDTHS))
+    starts: int = count(default=16)
+    steps: int = count(low=len(STAGE_WIDTHS), default=300)
 
     @property
     def name(self) -> str:

@@ -10,20 +10,21 @@ from jaxtyping import Array, Float
 
 from ..conditions import conditions
 from ..contact import Mesh
-from ..metrics import removed_at
+from ..metrics import quantities, removed_at
 from ..microgeometry import AbstractModification, TabulatedProfile
 from ..numerics import AbstractMeasure, Mean, check, whole
 from ..sizing import iso_relief
 from ..tolerance import Tolerance
 from .goal import Constraint
 from .minimax import Search, follow
-from .minimize import optimum_of
 from .problem import Parameters, Problem, Roughness
+from .refine import POSITIONS, refined
 from .result import Optimum
 from .search import Callback, Record
+from .verdict import optimum_of
 
 _FEWEST = 4  # values per flank
-_TOLERANCE = 1e-3  # a search ends where the predicted decrease is below this part of the objective
+_RTOL = 1e-3  # a search ends where the predicted decrease is below this part of the objective
 
 
 class _Tables(eqx.Module):
@@ -55,6 +56,7 @@ def free_form(
     seed: int = 0,
     start: tuple[AbstractModification, AbstractModification] | None = None,
     steps: int = 60,
+    positions: int | None = POSITIONS,
     callback: Callback | None = None,
 ) -> Optimum:
     """Finds the flanks with the least PPTE, whatever their form, by sequential linear programming.
@@ -76,6 +78,7 @@ def free_form(
         tolerance, samples, seed: of manufactured gears, as for `minimize`.
         start: modifications to start from besides unmodified flanks; None for the rule-based relief.
         steps: most steps.
+        positions: of the finer mesh on which the search ends, as for `minimize`.
         callback: called as callback(step, steps, best objective).
 
     Returns:
@@ -90,24 +93,30 @@ def free_form(
     whole("free_form", "steps", steps, 1)
     check("free_form", "max_relief", max_relief, "um", low=0.0, open_low=True)
     check("free_form", "curvature", curvature, "um/(um/mm^2)", low=0.0)
-    if any(limit.linear for limit in constraints):
+    if any(limit.quantity is None for limit in constraints):
         raise ValueError("free_form: a linear constraint names parameters, and the values of a table have no names")
     began = time.perf_counter()
-    judged = conditions("free_form", mesh, torque, tolerance=tolerance, samples=samples, seed=seed).on(mesh)
+    judged = conditions("free_form", mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
     roll = _roll_lengths(mesh, points)
     problem = _problem(mesh, judged, roll, max_relief, curvature, measure, constraints)
-    heaviest = float(judged.torque[int(np.argmax(judged.weight))])
+    heaviest = float(judged.load.torques[int(np.argmax(judged.load.weights))])
     if start is None:
         relief = iso_relief(mesh.pair, heaviest)
         start = relief, relief
     record = Record(problem, callback)
     unmodified = np.zeros(2 * points)
     given = np.clip(_values(mesh, roll, start) / max_relief, 0.0, 1.0)
-    follow(problem, record, [Search(unmodified), Search(given)], steps=steps, tolerance=_TOLERANCE)
+    follow(problem, record, [Search(unmodified), Search(given)], steps=steps, rtol=_RTOL)
+    record.check()
+
+    def polished(problem, record, point):
+        follow(problem, record, [Search(point)], steps=steps, rtol=_RTOL)
+
+    record, change = refined(record, polished, positions)
     if not constraints:  # which may depend on what both flanks have in common
         flanks = record.point.reshape(2, points)
         record.point = (flanks - flanks.min(axis=1, keepdims=True)).ravel()
-    return optimum_of(problem, record, "free_form", began)
+    return optimum_of(record, "free_form", began, change)
 
 
 def _roll_lengths(mesh: Mesh, points: int):
@@ -130,8 +139,9 @@ def _problem(mesh, judged, roll, max_relief, curvature, measure, constraints) ->
         low=jnp.zeros(2 * points, dtype),
         high=jnp.full(2 * points, max_relief, dtype),
         mesh=mesh,
-        cases=judged,
-        objectives=("ppte",),
+        conditions=judged,
+        cases=judged.on(mesh),
+        objectives=(quantities["ppte"],),
         measure=Mean() if measure is None else measure,
         constraints=tuple(constraints),
         roughness=Roughness(jnp.asarray(forms, dtype), jnp.asarray(curvature, dtype)),

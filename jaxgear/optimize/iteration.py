@@ -1,6 +1,8 @@
 """The transmission error taken off the flank, again and again, until it is level."""
 
 import time
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -11,8 +13,12 @@ from ..metrics import max_relief as largest_relief
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, NoModification, TabulatedProfile
 from ..numerics import check, whole
-from .result import Iterate, Optimum
-from .search import Callback
+from .goal import Constraint
+from .minimax import Minimax
+from .minimize import minimize
+from .problem import Design
+from .result import Iterate, Limit, Optimum
+from .search import AbstractMethod, Callback
 
 _UNTOUCHED = 0.05  # [um]: a flank with less relief than this counts as unmodified
 _LOADED = 1e-6  # a pair with less than this share of the force carries none
@@ -33,7 +39,7 @@ def iterate_transmission_error(
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
     max_relief: float = 7.0,
-    tolerance: float = 0.1,
+    rtol: float = 0.1,
     steps: int = 5,
     callback: Callback | None = None,
 ) -> Optimum:
@@ -57,7 +63,7 @@ def iterate_transmission_error(
         torque: on the pinion, at which the transmission error is levelled [N m].
         pinion, wheel: modifications to start from (the study's type 2); None for the nominal involute (its type 1).
         max_relief: most that is left removed anywhere [um].
-        tolerance: ends the iteration where PPTE is within this part of its lower limit, or has fallen by less than
+        rtol: ends the iteration where PPTE is within this part of its lower limit, or has fallen by less than
             this part of itself.
         steps: most steps.
         callback: called as callback(step, steps, best PPTE).
@@ -71,7 +77,7 @@ def iterate_transmission_error(
     """
     check("iterate_transmission_error", "torque", torque, "N m", low=0.0, open_low=True)
     check("iterate_transmission_error", "max_relief", max_relief, "um", low=0.0, open_low=True)
-    check("iterate_transmission_error", "tolerance", tolerance, "", low=0.0, open_low=True)
+    check("iterate_transmission_error", "rtol", rtol, "", low=0.0, open_low=True)
     whole("iterate_transmission_error", "steps", steps, 1)
     began = time.perf_counter()
     flanks = _Flanks(mesh, pinion or NoModification(), wheel or NoModification(), float(max_relief))
@@ -85,7 +91,7 @@ def iterate_transmission_error(
             callback(step, steps, min(iterate.ppte for iterate in iterates))
         if step == 0:
             level = float(np.asarray(state.cycle.transmission_error)[state.alone].max())
-        if step == steps or _ended(iterates, tolerance):
+        if step == steps or _ended(iterates, rtol):
             break
         flanks.take_off(level - np.asarray(state.cycle.transmission_error), state.alone)
     best = int(np.argmin([iterate.ppte for iterate in iterates]))
@@ -99,9 +105,12 @@ def iterate_transmission_error(
         cycle=states[best].cycle,
         ppte=iterates[best].ppte,
         objective=iterates[best].ppte,
-        gradient_norm=float("nan"),
+        objective_unit="um",
+        positions=mesh.resolution.positions,
+        grid_change=float("nan"),
+        decrease_left=float("nan"),
         active_bounds={},
-        constraints={"max_relief": iterates[best].max_relief},
+        constraints={"max_relief": Limit(iterates[best].max_relief, None, float(max_relief), "um", True)},
         violation=0.0,
         evaluations=len(states),
         history=np.minimum.accumulate([iterate.ppte for iterate in iterates]),
@@ -111,11 +120,58 @@ def iterate_transmission_error(
     )
 
 
-def _ended(iterates: list[Iterate], tolerance: float) -> bool:
+def iterate_from_low_pressure(
+    design: Design,
+    bounds: Mapping[str, tuple[float, float]],
+    *,
+    mesh: Mesh,
+    torque,
+    max_relief: float = 7.0,
+    method: AbstractMethod = Minimax(),
+    callback: Callback | None = None,
+    **options,
+) -> Optimum:
+    """The iteration from the relief of a design that has the least contact pressure (the study's type 3).
+
+    Args:
+        design, bounds: of the relief to start from, as for `minimize`.
+        mesh: prepared mesh.
+        torque: on the pinion [N m].
+        max_relief: most that is left removed anywhere, by the start too [um].
+        method: of the search for the start.
+        callback: of the search for the start and of the iteration.
+        options: further ones of `iterate_transmission_error`.
+
+    Returns:
+        as `iterate_transmission_error`, with the analyses and the time of the start.
+    """
+    limit = Constraint("max_relief", high=max_relief)
+    start = minimize(
+        design,
+        bounds,
+        mesh=mesh,
+        torque=torque,
+        objective="max_contact_pressure",
+        constraints=(limit,),
+        method=method,
+        positions=None,
+        callback=callback,
+    )
+    options |= {"max_relief": max_relief, "callback": callback}
+    found = iterate_transmission_error(mesh, torque, pinion=start.pinion, wheel=start.wheel, **options)
+    return replace(
+        found,
+        evaluations=found.evaluations + start.evaluations,
+        history_evaluations=found.history_evaluations + start.evaluations,
+        seconds=found.seconds + start.seconds,
+    )
+
+
+def _ended(iterates: list[Iterate], rtol: float) -> bool:
     last = iterates[-1]
-    if last.ppte - last.limit <= tolerance * last.limit:
+    if last.ppte - last.limit <= rtol * last.limit:
         return True
-    return len(iterates) > 2 and iterates[-2].ppte - last.ppte < tolerance * iterates[-2].ppte
+    return len(iterates) > 2 and iterates[-2].ppte - last.ppte < rtol * iterates[-2].ppte
 
 
 class _Flanks:

@@ -19,7 +19,8 @@ from scipy.sparse import coo_array
 
 from ..numerics import CVaR, Worst
 from .goal import FEASIBLE
-from .problem import Linearization, Pieces, Problem
+from .linearization import Linearization, Pieces
+from .problem import Problem
 
 # Weight of a relative violation of 1 against the objective at the start of a search (at least 1 in its own unit): above
 # the multiplier of any sensible constraint, so that the penalty is exact.
@@ -109,7 +110,7 @@ class Model:
     @property
     def violation(self) -> float:
         """Largest relative excess over a constraint."""
-        return float(np.maximum(self._lin.excess, 0.0).max(initial=0.0))
+        return max([0.0, *(float(pieces.value.max()) for pieces in self._lin.limits)])
 
     @property
     def merit(self) -> float:
@@ -122,9 +123,11 @@ class Model:
         low, high = np.maximum(-radius, -x), np.minimum(radius, 1 - x)
         program = _Program(len(x))
         cost, offset = self._cost(program, low, high)
-        if len(self._lin.excess):
+        if self._lin.limits:
             (slack,) = program.variables(1, low=0.0)  # the largest violation
-            program.at_most(self._lin.excess_slope, -self._lin.excess, {slack: -1.0})
+            for pieces in self._lin.limits:
+                for case in range(len(pieces.upper)):
+                    _below(program, pieces, case, low, high, slack)
             cost[slack] = self.penalty
         if len(self._forms):
             (rough,) = program.variables(1)
@@ -144,15 +147,15 @@ class Model:
         """
         if not self.fine:
             return np.nan
-        settled, excess = copy(self), self._lin.excess
-        settled._lin = self._lin._replace(excess=jnp.where(excess <= FEASIBLE, jnp.minimum(excess, 0.0), excess))
+        settled = copy(self)
+        settled._lin = self._lin._replace(limits=tuple(map(_settled, self._lin.limits)))
         return max(settled.best_step(reach).decrease / reach, 0.0)
 
     def _measured_cases(self) -> tuple[list[np.ndarray], np.ndarray]:
         """Shares of the cases in every objective, and the objectives."""
         if not self.fine:
             return [], np.full(len(self._lin.objectives), np.inf)
-        cases = [pieces.upper.max(axis=1) - pieces.lower.min(axis=1) for pieces in self._lin.objectives]
+        cases = [pieces.value for pieces in self._lin.objectives]
         shares = [np.asarray(self._measure.shares(jnp.asarray(each), jnp.asarray(self._weights))) for each in cases]
         return shares, np.asarray([share @ each for share, each in zip(shares, cases)])
 
@@ -177,7 +180,7 @@ class Model:
         measure = self._measure
         weights = self._weights if isinstance(measure, Worst | CVaR) else shares
         carrying = np.flatnonzero(weights > 0)
-        spans = [_span(program, pieces, case, low, high) for case in carrying]
+        spans = [_span(program, pieces, int(case), low, high) for case in carrying]
         weights = weights[carrying]
         if isinstance(measure, Worst):
             (worst,) = program.variables(1)
@@ -196,19 +199,42 @@ class Model:
         return {column: weight * sign for span, weight in zip(spans, weights) for column, sign in span.items()}
 
 
-def _span(program: "_Program", pieces: Pieces, case: np.integer, low, high) -> Mapping[int, float]:
-    """Variables above all upper and below all lower pieces of a case, with their signs in the objective."""
-    top, bottom = program.variables(2)
-    for sign, values, slope, bound in (
-        (1.0, pieces.upper[case], pieces.slope[case], top),
-        (-1.0, -pieces.lower[case], -pieces.lower_slope[case], bottom),
-    ):
-        # a piece that no step within reach makes the extreme one is left out
-        most = values + np.maximum(slope * low, slope * high).sum(axis=1)
-        least = values + np.minimum(slope * low, slope * high).sum(axis=1)
-        near = most >= least.max()
-        program.at_most(slope[near], -values[near], {bound: -sign})
-    return {top: 1.0, bottom: -1.0}
+def _settled(pieces: Pieces) -> Pieces:
+    """Pieces of a limit; where it is passed within the tolerance it is met exactly."""
+    excess = pieces.value
+    passed = np.where((excess > 0) & (excess <= FEASIBLE), excess, 0.0)
+    return pieces._replace(upper=pieces.upper - passed[:, None])
+
+
+def _span(program: "_Program", pieces: Pieces, case: int, low, high) -> Mapping[int, float]:
+    """Variables above all upper and below all lower pieces of a case, with their signs in the number."""
+    (top,) = program.variables(1)
+    _below(program, Pieces(pieces.upper, pieces.slope), case, low, high, top)
+    return {top: 1.0, **_bottom(program, pieces, case, low, high)}
+
+
+def _below(program: "_Program", pieces: Pieces, case: int, low, high, bound: int) -> None:
+    """Rows that keep the number of a case below a variable."""
+    values, slope = _reachable(pieces.upper[case], pieces.slope[case], low, high)
+    program.at_most(slope, -values, {bound: -1.0, **_bottom(program, pieces, case, low, high)})
+
+
+def _bottom(program: "_Program", pieces: Pieces, case: int, low, high) -> dict[int, float]:
+    """A variable below all lower pieces of a case, where there are any."""
+    if pieces.lower is None or pieces.lower_slope is None:
+        return {}
+    (bottom,) = program.variables(1)
+    values, slope = _reachable(-pieces.lower[case], -pieces.lower_slope[case], low, high)
+    program.at_most(slope, -values, {bottom: 1.0})
+    return {bottom: -1.0}
+
+
+def _reachable(values, slope, low, high):
+    """Pieces without those that no step within reach makes the largest."""
+    most = values + np.maximum(slope * low, slope * high).sum(axis=1)
+    least = values + np.minimum(slope * low, slope * high).sum(axis=1)
+    near = most >= least.max()
+    return values[near], slope[near]
 
 
 class _Program:

@@ -8,7 +8,6 @@ from .evolution import CMAES, DifferentialEvolution, Genetic
 from .factorial import Factorial
 from .first_order import Adam
 from .minimax import Minimax
-from .pareto import Pareto
 from .quasi_newton import LBFGS
 from .search import AbstractMethod
 
@@ -21,7 +20,6 @@ METHODS: Mapping[str, type[AbstractMethod]] = MappingProxyType(
         "cma_es": CMAES,
         "differential_evolution": DifferentialEvolution,
         "factorial": Factorial,
-        "pareto": Pareto,
     }
 )
 

@@ -7,22 +7,24 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from ..numerics import whole
+from ..numerics.fields import Checked, count, number
 from .linear_model import AbstractScalarization, Model
-from .problem import Linearization, Problem
+from .linearization import Linearization
+from .problem import Problem
 from .search import AbstractMethod, Record
 from .starts import points_nearby, real_points, start_points
 
 # Reach of the start points of a later round about the best design, in the unit box. The kinks of PPTE make many shallow
 # local optima close together; on the 19/48 pair they lie within a tenth of the range.
 _NEARBY = 0.1
+_POLISHED, _BESIDE = 4, 0.03  # searches on the finer mesh, and their reach about the design
 _FIRST_RADIUS = 0.25  # of a step in the unit box
 _LEAST_RADIUS = 1e-5
 _ACCEPT, _POOR, _GOOD = 0.05, 0.25, 0.75  # actual over predicted decrease
 _SHRINK, _GROW = 0.35, 2.0
 
 
-class Minimax(AbstractMethod):
+class Minimax(Checked, AbstractMethod):
     """Trust-region sequential linear programming from many start points, then again from around the best design.
 
     Each step solves a linear program in which every position of the transmission error is linear and the extremes are
@@ -34,20 +36,13 @@ class Minimax(AbstractMethod):
         starts: searches that advance together.
         rounds: rounds of so many searches; the first starts all over the box, each further one around the best design.
         steps: most steps of every search.
-        tolerance: a search ends where the predicted decrease is below this part of the objective.
+        rtol: a search ends where the predicted decrease is below this part of the objective.
     """
 
-    starts: int = eqx.field(static=True, default=16)
-    rounds: int = eqx.field(static=True, default=2)
-    steps: int = eqx.field(static=True, default=40)
-    tolerance: float = eqx.field(static=True, default=1e-4)
-
-    def __check_init__(self):
-        whole("Minimax", "starts", self.starts, 1)
-        whole("Minimax", "rounds", self.rounds, 1)
-        whole("Minimax", "steps", self.steps, 1)
-        if not 0 < self.tolerance < 1:
-            raise ValueError(f"Minimax: tolerance = {self.tolerance!r} must be between 0 and 1")
+    starts: int = count(default=16)
+    rounds: int = count(default=2)
+    steps: int = count(default=40)
+    rtol: float = number("", low=0.0, high=1.0, open_low=True, open_high=True, static=True, default=1e-4)
 
     @property
     def name(self) -> str:
@@ -56,17 +51,27 @@ class Minimax(AbstractMethod):
     def search(self, problem: Problem, record: Record) -> None:
         """Advances all searches of a round until none finds a better step."""
         points = start_points(problem, self.starts)
-        for number in range(self.rounds):
-            if number:
-                points = points_nearby(record.point, self.starts, reach=_NEARBY, seed=number)
+        for round_ in range(self.rounds):
+            if round_:
+                points = points_nearby(record.point, self.starts, reach=_NEARBY, seed=round_)
             follow(
                 problem,
                 record,
                 [Search(point) for point in points],
                 steps=self.steps,
-                tolerance=self.tolerance,
-                round_of=(number, self.rounds),
+                rtol=self.rtol,
+                round_of=(round_, self.rounds),
             )
+
+    def polish(self, problem: Problem, record: Record, point: np.ndarray) -> None:
+        """Searches again from the design and from beside it."""
+        polish(problem, record, point, steps=self.steps, rtol=self.rtol)
+
+
+def polish(problem: Problem, record: Record, point: np.ndarray, *, steps: int, rtol: float) -> None:
+    """Searches on a finer mesh from a design and from a few points beside it."""
+    beside = points_nearby(point, _POLISHED - 1, reach=_BESIDE, seed=0)
+    follow(problem, record, [Search(start) for start in (point, *beside)], steps=steps, rtol=rtol)
 
 
 class Ledger(Protocol):
@@ -101,13 +106,13 @@ class Search:
         """Of a violation, the same all the way."""
         return None if self._model is None else self._model.penalty
 
-    def propose(self, tolerance: float) -> bool:
+    def propose(self, rtol: float) -> bool:
         """Finds the next trial point; False when the search has ended."""
         if self._model is None or self._radius < _LEAST_RADIUS:
             return False
         step, self._predicted = self._model.best_step(self._radius)
         self.trial = self._point + step
-        return self._predicted > tolerance * abs(self._model.value)
+        return self._predicted > rtol * abs(self._model.value)
 
     def take(self, model: Model) -> None:
         """Goes to the trial point if it is as good as its model says, and adapts the radius."""
@@ -130,7 +135,7 @@ def follow(
     searches: Sequence[Search],
     *,
     steps: int,
-    tolerance: float,
+    rtol: float,
     round_of: tuple[int, int] = (0, 1),
 ) -> None:
     """Advances searches until none finds a better step; `round_of` tells the progress which round of how many it is."""
@@ -138,7 +143,7 @@ def follow(
     _linearize(problem, ledger, searches, batch)
     for step in range(steps):
         ledger.look(done * steps + step, rounds * steps)
-        moving = [search for search in searches if search.propose(tolerance)]
+        moving = [search for search in searches if search.propose(rtol)]
         if not moving:
             break
         _linearize(problem, ledger, moving, batch)
@@ -149,14 +154,19 @@ def _linearize(problem: Problem, ledger: Ledger, searches: Sequence[Search], bat
     """Linearizes at the points that the searches propose; the batch keeps its size, so that nothing is compiled anew
     when a search has ended."""
     rows = [search.trial for search in searches]
-    padded = np.stack(rows + [rows[-1]] * (batch - len(rows)))
-    leaves, tree = jax.tree.flatten(_linearizations(problem, real_points(problem, padded)))
     ledger.spend(len(rows), analyses=problem.gradient_cost)
-    for search, *parts in zip(searches, *map(np.asarray, leaves)):
-        found = jax.tree.unflatten(tree, parts)
+    for search, found in zip(searches, linearized(problem, np.stack(rows), batch)):
         model = Model(problem, search.trial, found, search.scalarization, search.penalty)
         ledger.take(search.trial, model)
         search.take(model)
+
+
+def linearized(problem: Problem, points: np.ndarray, batch: int) -> list[Linearization]:
+    """Linearizations at points of the unit box, at most a batch, on the host."""
+    padded = np.concatenate([points, np.repeat(points[-1:], batch - len(points), axis=0)])
+    leaves, tree = jax.tree.flatten(_linearizations(problem, real_points(problem, padded)))
+    leaves = [np.asarray(leaf) for leaf in leaves]
+    return [jax.tree.unflatten(tree, [leaf[row] for leaf in leaves]) for row in range(len(points))]
 
 
 @eqx.filter_jit

@@ -1,19 +1,22 @@
 """The optimization problem that all methods share: a box of parameters, cases, objectives and constraints."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
-from ..conditions import Cases, solved
-from ..contact import Mesh, removed_material, solve_removed
-from ..metrics import smooth_peak_to_peak
+from ..conditions import Cases, Conditions, conditions, solved
+from ..contact import Mesh, MeshCycle, removed_material, solve_removed
+from ..metrics import Quantity, quantity_of
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import AbstractMeasure, check, maximum, real
-from .goal import PPTE, Candidate, Constraint, Number, known, number
+from ..numerics import AbstractMeasure, Mean, check, maximum, real
+from ..tolerance import Tolerance
+from .goal import Constraint, Objective, scale_of
+from .linearization import Linearization, Pieces, Sloped, any_slopes, local_slopes, pieces_of
 
 Scalar = Float[Array, ""]
 Vector = Float[Array, " parameters"]
@@ -30,41 +33,13 @@ class Score(NamedTuple):
     """A design judged.
 
     Attributes:
-        value: the true objectives, shape (objectives,); inf where a contact solution failed.
+        value: the objectives to be made small, shape (objectives,); negative for quantities of which large values are
+            the better ones; inf where a contact solution failed.
         violation: largest relative excess over a constraint, 0 where all are kept.
     """
 
     value: Float[Array, " objectives"]
     violation: Scalar
-
-
-class Pieces(NamedTuple):
-    """An objective in every case, max(upper) - min(lower), with its slopes over the unit box.
-
-    Attributes:
-        upper, lower: shape (cases, pieces).
-        slope, lower_slope: of `upper` and `lower`, shape (cases, pieces, parameters).
-    """
-
-    upper: Float[Array, "cases pieces"]
-    lower: Float[Array, "cases pieces"]
-    slope: Float[Array, "cases pieces parameters"]
-    lower_slope: Float[Array, "cases pieces parameters"]
-
-
-class Linearization(NamedTuple):
-    """Objectives and constraints at a point with their slopes over the unit box.
-
-    Attributes:
-        objectives: of every objective its pieces.
-        excess: of the constraints, shape (constraints,), with `excess_slope`, shape (constraints, parameters).
-        fine: whether all contact solutions converged.
-    """
-
-    objectives: tuple[Pieces, ...]
-    excess: Float[Array, " constraints"]
-    excess_slope: Float[Array, "constraints parameters"]
-    fine: Bool[Array, ""]
 
 
 class Roughness(eqx.Module):
@@ -82,15 +57,19 @@ class Roughness(eqx.Module):
 
 
 class Problem(eqx.Module):
-    """Minimize measures of numbers over cases, within a box and constraints; parameters live in the unit box.
+    """Minimize measures of quantities over cases, within a box and constraints; parameters live in the unit box.
+
+    `make_problem` makes one. For an optimizer of your own: `score` is what any method needs, `linearize` what a
+    sequence of linear programs needs, `parameters` and `modifications` say what a point means. All are traceable, so
+    that `jax.vmap(problem.score)` judges many points and `jax.grad` goes through `score`.
 
     Attributes:
         design: makes (pinion, wheel) modifications from the named parameters.
         names: of the parameters.
         low, high: their bounds, shape (parameters,).
         mesh: prepared mesh.
-        cases: loads and manufactured gears.
-        objectives: names of quantities or functions of a `Candidate`.
+        conditions: loads and manufactured gears, with the `cases` that they make on the mesh.
+        objectives: quantities; those of which large values are the better ones are made large.
         measure: turns the numbers of the cases into one.
         constraints: limits that hold in every case.
         roughness: penalty on the parameters, None without.
@@ -101,16 +80,21 @@ class Problem(eqx.Module):
     low: Vector
     high: Vector
     mesh: Mesh
+    conditions: Conditions
     cases: Cases
-    objectives: tuple[str | Number, ...] = eqx.field(static=True)
+    objectives: tuple[Quantity, ...] = eqx.field(static=True)
     measure: AbstractMeasure
     constraints: tuple[Constraint, ...] = ()
     roughness: Roughness | None = None
 
+    def on(self, mesh: Mesh) -> "Problem":
+        """The same problem on another mesh."""
+        return replace(self, mesh=mesh, cases=self.conditions.on(mesh))
+
     @property
     def gradient_cost(self) -> int:
         """Contact analyses that a linearization in one case counts for."""
-        limits = sum(limit.of_contact for limit in self.constraints)
+        limits = sum(limit.quantity is not None for limit in self.constraints)
         return GRADIENT_COST + _FURTHER_GRADIENT * (len(self.objectives) - 1 + limits)
 
     def parameters(self, x: Vector) -> dict[str, Scalar]:
@@ -119,169 +103,198 @@ class Problem(eqx.Module):
         return dict(zip(self.names, values))
 
     def modifications(self, x: Vector) -> tuple[AbstractModification, AbstractModification]:
-        """Modifications at a point of the unit box."""
-        pinion, wheel = self.design(self.parameters(x))
-        return pinion or NoModification(), wheel or NoModification()
+        """Modifications at a point of the unit box.
+
+        Raises:
+            ValueError: when the design gives anything but two modifications.
+        """
+        return _two_modifications(self.design(self.parameters(x)))
 
     def score(self, x: Vector) -> Score:
         """True objectives and violation."""
+        return self._scored(self.over_cases(x, self._judged), self._linear_excess(x))
 
-        def of_case(candidate: Candidate):
-            return self._numbers(candidate, None), self._excess(candidate), solved(candidate.cycle)
+    def score_of(self, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None) -> Score:
+        """True objectives and violation of any modifications, judged by the same measure over the same cases.
 
-        numbers, excess, fine = self.over_cases(x, of_case)
+        Linear constraints on the free parameters do not apply to them.
+        """
+        both = pinion or NoModification(), wheel or NoModification()
+        found = self.cases.each(lambda torque, deviation: self._judged(self._cycle(both, torque, deviation)))
+        return self._scored(found, jnp.zeros((0,), self.low.dtype))
+
+    def _judged(self, cycle: MeshCycle):
+        values = jnp.stack([of.sign * of(cycle) for of in self.objectives])
+        return values, self._excess(cycle), solved(cycle)
+
+    def _scored(self, found, linear) -> Score:
+        numbers, excess, fine = found
         values = self._measured(numbers)
+        excess = jnp.concatenate([excess.reshape(-1), linear])
         good = jnp.all(fine) & jnp.isfinite(jnp.sum(values)) & jnp.isfinite(jnp.sum(excess))
-        return Score(jnp.where(good, values, jnp.inf), jnp.maximum(jnp.max(excess, initial=0.0), 0.0))
+        return Score(jnp.where(good, values, jnp.inf), _worst(excess))
 
     def soft_and_true(self, x: Vector, width):
         """What gradient methods need of one analysis.
 
         Args:
             x: point of the unit box.
-            width: of the soft extremes of PPTE [um].
+            width: of the soft extremes, in the unit of the objective.
 
         Returns:
-            the objectives with soft extremes, the true ones, the worst excess over every constraint, and whether all
+            the objectives with soft extremes, the true ones, the worst excess over every limit, and whether all
             contact solutions converged.
         """
 
-        def of_case(candidate: Candidate):
-            numbers = self._numbers(candidate, width), self._numbers(candidate, None)
-            return *numbers, self._excess(candidate), solved(candidate.cycle)
+        def of_case(cycle: MeshCycle):
+            soft = [of.sign * of.reduction.soft(of.values(cycle).ravel(), width) for of in self.objectives]
+            return jnp.stack(soft), *self._judged(cycle)
 
         soft, true, excess, fine = self.over_cases(x, of_case)
-        return self._measured(soft), self._measured(true), maximum(excess, axis=0), jnp.all(fine)
+        worst = jnp.concatenate([maximum(excess, 0), self._linear_excess(x)])
+        return self._measured(soft), self._measured(true), worst, jnp.all(fine)
 
     def linearize(self, x: Vector) -> Linearization:
-        """The objectives and the constraints with their slopes."""
-        fine = jnp.asarray(True)
-        found: dict[str | Number, Pieces] = {}
-        if PPTE in self.objectives:
-            curve, slope, fine = self._curves(x)
-            found[PPTE] = Pieces(curve, curve, slope, slope)
-        others = tuple(of for of in self.objectives if of != PPTE)
-        excess, excess_slope = jnp.zeros((0,), x.dtype), jnp.zeros((0, x.shape[0]), x.dtype)
-        if others or self.constraints:
-            values, slopes, converged = self._numbers_and_slopes(x, others)
-            if PPTE not in self.objectives:  # else the same contact solutions have been judged already
-                fine = jnp.all(converged)
-            for index, of in enumerate(others):
-                piece, slope = values[:, index, None], slopes[:, index, None]
-                found[of] = Pieces(piece, jnp.zeros_like(piece), slope, jnp.zeros_like(slope))
-            excess = values[:, len(others) :].reshape(-1)
-            excess_slope = slopes[:, len(others) :].reshape(-1, x.shape[0])
-        objectives = tuple(found[of] for of in self.objectives)
-        known = jnp.stack([jnp.sum(leaf) for leaf in jax.tree.leaves((objectives, excess, excess_slope))])
-        return Linearization(objectives, excess, excess_slope, jnp.all(fine) & jnp.all(jnp.isfinite(known)))
+        """The objectives and the constraints with their slopes; extremes stay exact extremes, see `Pieces`."""
+        limited = [limit.quantity for limit in self.constraints if limit.quantity is not None]
+        found, fine = self._slopes(x, tuple(dict.fromkeys((*self.objectives, *limited))))
+        objectives = tuple(pieces_of(of, found[of], of.sign) for of in self.objectives)
+        limits = []
+        for limit in self.constraints:
+            for sign, bound in limit.sides:
+                if limit.quantity is None:
+                    pieces = self._linear_pieces(x, limit, sign)
+                else:
+                    pieces = pieces_of(limit.quantity, found[limit.quantity], sign)
+                limits.append(pieces.scaled(scale_of(bound, x.dtype), sign * bound.astype(x.dtype)))
+        known = jnp.stack([jnp.sum(leaf) for leaf in jax.tree.leaves((objectives, limits))])
+        return Linearization(objectives, tuple(limits), jnp.all(fine) & jnp.all(jnp.isfinite(known)))
 
-    def _numbers_and_slopes(self, x: Vector, objectives: tuple[str | Number, ...]):
-        """Objectives and excesses of every case with their slopes, and whether the contact solutions converged."""
+    def _slopes(self, x: Vector, wanted: tuple[Quantity, ...]) -> tuple[dict[Quantity, Sloped], Array]:
+        """Values and slopes of quantities in every case, and whether the contact solutions converged."""
+        local = [of for of in wanted if of.local]
+        others = [of for of in wanted if not of.local]
 
         def at(torque, deviation):
-            def numbers(x):
-                candidate = self._candidate(x, torque, deviation)
-                each = jnp.asarray([number(of)(candidate) for of in objectives], x.dtype)
-                values = jnp.concatenate([each, self._excess(candidate)])
-                return values, (values, solved(candidate.cycle))
+            def solve(removed):
+                cycle = solve_removed(self.mesh, torque, removed + deviation)
+                return cycle, solved(cycle)
 
-            # case by case: the numbers of one do not depend on the others
-            slopes, (values, fine) = jax.jacrev(numbers, has_aux=True)(x)
-            return values, slopes, fine
+            def cycle_of(x):
+                cycle = self._cycle(self.modifications(x), torque, deviation)
+                return cycle, solved(cycle)
 
-        return self._each_case(at)
+            def removed_of(x):
+                pinion, wheel = self.modifications(x)
+                return removed_material(self.mesh, torque, pinion=pinion, wheel=wheel)
 
-    def _curves(self, x: Vector):
-        """Transmission error of every case, its slopes, and whether the contact solutions converged.
+            found, fine = local_slopes(local, solve, removed_of, x) if local else ([], jnp.asarray(True))
+            more, well = any_slopes(others, cycle_of, x) if others else ([], jnp.asarray(True))
+            return found, more, fine & well
 
-        The transmission error at a position depends on the material removed at that position alone, by as much as the
-        contacts share the load: one gradient of the contact analysis gives the slopes at all positions.
-        """
+        found, more, fine = self.cases.each(at)
+        return dict(zip((*local, *others), (*found, *more))), fine
 
-        def at(torque, deviation):
-            def material(x):
-                removed = self._removed(x, torque)
-                return removed, removed
+    def _linear_pieces(self, x: Vector, limit: Constraint, sign: int) -> Pieces:
+        factors = jnp.asarray([dict(limit.terms).get(name, 0.0) for name in self.names], x.dtype)
+        value = factors @ (self.low + x * (self.high - self.low))
+        return Pieces(sign * value[None, None], sign * (factors * (self.high - self.low))[None, None])
 
-            def curve(removed):
-                cycle = solve_removed(self.mesh, torque, removed)
-                return cycle.transmission_error, solved(cycle)
+    def over_cases(self, x: Vector, of_case: Callable):
+        """A function of the cycle in every case, cases leading."""
+        both = self.modifications(x)
+        return self.cases.each(lambda torque, deviation: of_case(self._cycle(both, torque, deviation)))
 
-            slope, removed = jax.jacfwd(material, has_aux=True)(x)
-            error, back, fine = jax.vjp(curve, removed + deviation, has_aux=True)
-            (share,) = back(jnp.ones_like(error))
-            return error, jnp.einsum("isp,ispx->px", share, slope), fine
+    def _cycle(self, both: tuple[AbstractModification, AbstractModification], torque, deviation) -> MeshCycle:
+        pinion, wheel = both
+        removed = removed_material(self.mesh, torque, pinion=pinion, wheel=wheel)
+        return solve_removed(self.mesh, torque, removed + deviation, pinion=pinion, wheel=wheel)
 
-        return self._each_case(at)
+    def _excess(self, cycle: MeshCycle):
+        limits = [limit for limit in self.constraints if limit.quantity is not None]
+        return self._stacked([excess for limit in limits for excess in limit.excess(limit.quantity(cycle))])
 
-    def _removed(self, x: Vector, torque):
-        """Material that the design removes, (pairs, slices, positions)."""
-        pinion, wheel = self.modifications(x)
-        return removed_material(self.mesh, torque, pinion=pinion, wheel=wheel)
+    def _linear_excess(self, x: Vector):
+        parameters = self.parameters(x)
+        limits = [limit for limit in self.constraints if limit.quantity is None]
+        values = [sum(factor * parameters[name] for name, factor in limit.terms) for limit in limits]
+        return self._stacked([excess for limit, value in zip(limits, values) for excess in limit.excess(value)])
 
-    def over_cases(self, x: Vector, of_case):
-        """A function of a candidate in every case, cases leading."""
-        return self._each_case(lambda torque, deviation: of_case(self._candidate(x, torque, deviation)))
-
-    def _candidate(self, x: Vector, torque, deviation) -> Candidate:
-        pinion, wheel = self.modifications(x)
-        removed = self._removed(x, torque) + deviation
-        cycle = solve_removed(self.mesh, torque, removed, pinion=pinion, wheel=wheel)
-        return Candidate(self.parameters(x), pinion, wheel, cycle)
-
-    def _each_case(self, function):
-        """A function of torque and deviation in every case, cases leading."""
-        return self.cases.each(function)
-
-    def _numbers(self, candidate: Candidate, width):
-        """Objectives of a case, with soft extremes where a width is given."""
-        values = []
-        for of in self.objectives:
-            if of == PPTE and width is not None:
-                values.append(smooth_peak_to_peak(candidate.cycle.transmission_error, width))
-            else:
-                values.append(number(of)(candidate))
-        return jnp.stack(values)
-
-    def _excess(self, candidate: Candidate):
-        over = [excess for limit in self.constraints for excess in limit.excess(limit.value(candidate))]
-        return jnp.stack(over) if over else jnp.zeros((0,), self.low.dtype)
+    def _stacked(self, excess):
+        return jnp.stack(excess) if excess else jnp.zeros((0,), self.low.dtype)
 
     def _measured(self, numbers):
         return jax.vmap(lambda column: self.measure(column, self.cases.weights), 1)(numbers)
 
 
+def _worst(excess):
+    return jnp.maximum(maximum(excess), 0.0) if excess.size else jnp.zeros((), excess.dtype)
+
+
+def _two_modifications(made) -> tuple[AbstractModification, AbstractModification]:
+    if not (isinstance(made, tuple | list) and len(made) == 2):
+        what = f"{len(made)} values" if isinstance(made, tuple | list) else f"one {type(made).__name__}"
+        raise ValueError(f"design: gives {what}, must give two modifications, (pinion, wheel); None for an involute")
+    for name, modification in zip(("pinion", "wheel"), made):
+        if not (modification is None or isinstance(modification, AbstractModification)):
+            kind = type(modification).__name__
+            raise ValueError(f"design: the {name} is of type {kind}, must be a modification or None for an involute")
+    pinion, wheel = made
+    return pinion or NoModification(), wheel or NoModification()
+
+
 def make_problem(
     design: Design,
     bounds: Mapping[str, tuple[float, float]],
+    *,
     mesh: Mesh,
-    cases: Cases,
-    objectives,
-    measure: AbstractMeasure,
-    constraints,
+    torque,
+    objective: Objective | Sequence[Objective] = "ppte",
+    measure: AbstractMeasure | None = None,
+    constraints: Sequence[Constraint] = (),
+    tolerance: Tolerance | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    owner: str = "minimize",
 ) -> Problem:
-    """Checks and collects a problem.
+    """Checks and collects a problem; the arguments are those of `minimize`, and who asks, for messages.
 
     Raises:
-        ValueError: for empty or reversed bounds, and unknown names of objectives or constrained parameters.
+        ValueError: for empty or reversed bounds, unknown names of objectives or constrained parameters, and whatever
+            the cases refuse.
     """
-    names, low, high = box(bounds)
-    for objective in objectives:
-        if isinstance(objective, str):
-            known("minimize", objective)
+    names, low, high = box(bounds, owner)
+    several = [objective] if isinstance(objective, str | Quantity) or callable(objective) else list(objective)
+    if not several:
+        raise ValueError(f"{owner}: objective must name at least one quantity")
     for constraint in constraints:
-        for name in constraint.parameters:
+        for name, _ in constraint.terms:
             if name not in names:
-                raise ValueError(f'minimize: "{name}" of a constraint must be one of {", ".join(names)}')
-    return Problem(design, names, low, high, mesh, cases, tuple(objectives), measure, tuple(constraints))
+                raise ValueError(f'{owner}: "{name}" of a constraint must be one of {", ".join(names)}')
+    judged = conditions(owner, mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
+    objectives = tuple(quantity_of(of, owner) for of in several)
+    dtype = mesh.phase.dtype
+    measure = Mean() if measure is None else measure
+    return Problem(
+        design=design,
+        names=names,
+        low=low.astype(dtype),
+        high=high.astype(dtype),
+        mesh=mesh,
+        conditions=judged,
+        cases=judged.on(mesh),
+        objectives=objectives,
+        measure=measure,
+        constraints=tuple(constraints),
+    )
 
 
-def box(bounds: Mapping[str, tuple[float, float]]):
+def box(bounds: Mapping[str, tuple[float, float]], owner: str):
     """Names, lower and upper bounds."""
     if not bounds:
-        raise ValueError("minimize: bounds must name at least one free parameter")
+        raise ValueError(f"{owner}: bounds must name at least one free parameter")
     for name, (low, high) in bounds.items():
-        check("minimize", f"lower bound of {name}", low, "")
-        check("minimize", f"upper bound of {name}", high, "", low=low, open_low=True)
+        check(owner, f"lower bound of {name}", low, "")
+        check(owner, f"upper bound of {name}", high, "", low=low, open_low=True)
     pairs = jnp.stack([jnp.stack([real(low), real(high)]) for low, high in bounds.values()])
     return tuple(bounds), pairs[:, 0], pairs[:, 1]

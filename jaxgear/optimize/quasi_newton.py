@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from ..numerics import whole
+from ..numerics.fields import Checked, count
 from .problem import GRADIENT_COST, Problem
 from .search import AbstractMethod, Record
 from .smooth import STAGE_WIDTHS, Multipliers, lagrangian, merged, stages, yardstick
@@ -18,7 +18,7 @@ _SHORTER = 0.3  # step after one that does not decrease enough, relative to it
 _LONGEST = 1.0  # step: a third of the way from one bound to the other
 
 
-class LBFGS(AbstractMethod):
+class LBFGS(Checked, AbstractMethod):
     """Limited-memory BFGS (optax) with a backtracking line search on a soft objective whose width shrinks in stages.
 
     The box is the image of the whole space under x = (1 + sin(t)) / 2; other constraints enter by an augmented
@@ -30,12 +30,8 @@ class LBFGS(AbstractMethod):
         steps: trial points of every start, over all stages.
     """
 
-    starts: int = eqx.field(static=True, default=16)
-    steps: int = eqx.field(static=True, default=150)
-
-    def __check_init__(self):
-        whole("LBFGS", "starts", self.starts, 1)
-        whole("LBFGS", "steps", self.steps, len(STAGE_WIDTHS))
+    starts: int = count(default=16)
+    steps: int = count(low=len(STAGE_WIDTHS), default=150)
 
     @property
     def name(self) -> str:

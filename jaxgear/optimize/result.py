@@ -8,6 +8,7 @@ import numpy as np
 from ..contact import Mesh, MeshCycle
 from ..microgeometry import AbstractModification
 from ..numerics import Checked
+from .goal import FEASIBLE
 
 PENALIZED = " with curvature penalty"  # what the name of an objective says of it
 _SHOWN_PARAMETERS = 12  # a table of a hundred flank values tells a reader nothing
@@ -35,20 +36,34 @@ class Iterate(Checked):
     max_corner_pressure: float
 
 
-class Front(Checked):
-    """Designs of which none is better in every objective.
+class Limit(Checked):
+    """A constraint at the optimum.
 
     Attributes:
-        objectives: their names.
-        units: their units.
-        values: shape (designs, objectives), ascending in the first objective.
-        parameters: value of every free parameter, each of shape (designs,).
+        value: of the constrained number, the worst over the cases.
+        low, high: its limits; None for none.
+        unit: of all three, "" for a pure number.
+        kept: whether it is within its limits, up to the tolerance of constraints.
     """
 
-    objectives: tuple[str, ...] = eqx.field(static=True)
-    units: tuple[str, ...] = eqx.field(static=True)
-    values: np.ndarray
-    parameters: dict[str, np.ndarray]
+    value: float
+    low: float | None
+    high: float | None
+    unit: str = eqx.field(static=True)
+    kept: bool
+
+    def __str__(self) -> str:
+        limits = [
+            f"{word} {limit:.4g}"
+            for word, limit in (("at least", self.low), ("at most", self.high))
+            if limit is not None
+        ]
+        state = "met" if self.kept else "NOT MET"
+        return f"{self.value:.4g} {self.unit}".rstrip() + f", {state}: {' and '.join(limits)}"
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers."""
+        return {"value": self.value, "low": self.low, "high": self.high, "unit": self.unit, "met": self.kept}
 
 
 class Optimum(eqx.Module):
@@ -59,16 +74,20 @@ class Optimum(eqx.Module):
         objective_name: what was minimized, such as "ppte", "95 % CVaR of ppte" or "ppte with curvature penalty".
         parameters: value of every free parameter; none where the flanks themselves were sought.
         pinion, wheel: the modifications.
-        mesh: prepared mesh of the search.
+        mesh: prepared mesh on which it was evaluated.
         cycle: mesh cycle of the optimum, of perfect gears under the torque (of a load spectrum, its heaviest weight).
         ppte: peak-to-peak transmission error of that cycle [um].
         objective: least value found of what was minimized, in its unit.
-        gradient_norm: fastest decrease of the objective that is left within bounds and constraints, per step of the
+        objective_unit: "" for a pure number.
+        positions: of the mesh on which objective, cycle and constraints were evaluated, per base pitch.
+        grid_change: by how much the objective changes when these are doubled, in its unit; NaN where nobody looked,
+            as where the search was told to stay on its mesh.
+        decrease_left: fastest decrease of the objective that is left within bounds and constraints, per step of the
             full range of every parameter; 0 at an optimum. It comes from the linearized problem (`linear_model`) and
-            counts the kinks of PPTE, where the plain gradient does not vanish. NaN of a front, where there are no
-            parameters, and where the slopes are not finite.
+            counts the kinks of extremes, where the plain gradient does not vanish. NaN where there are no parameters,
+            and where the slopes are not finite.
         active_bounds: which parameters ended at their "lower" or "upper" bound.
-        constraints: value of every constrained number, the worst over the cases.
+        constraints: the limits, by name, each with its value and whether it is kept.
         violation: largest relative excess over a constraint.
         evaluations: contact analyses spent, one per design, torque and manufactured gear; one with its gradient
             counts as three, each further gradient as two.
@@ -76,7 +95,6 @@ class Optimum(eqx.Module):
         history_evaluations: contact analyses spent until then.
         seconds: wall time of the search, compilation included [s].
         iterations: states of the transmission-error iteration, the first one before any change; else empty.
-        front: of several objectives; else None.
     """
 
     method: str = eqx.field(static=True)
@@ -88,16 +106,23 @@ class Optimum(eqx.Module):
     cycle: MeshCycle
     ppte: float
     objective: float
-    gradient_norm: float
+    objective_unit: str = eqx.field(static=True)
+    positions: int
+    grid_change: float
+    decrease_left: float
     active_bounds: dict[str, str]
-    constraints: dict[str, float]
+    constraints: dict[str, "Limit"]
     violation: float
     evaluations: int
     history: np.ndarray
     history_evaluations: np.ndarray
     seconds: float
     iterations: tuple[Iterate, ...] = ()
-    front: Front | None = None
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every constraint is kept."""
+        return self.violation <= FEASIBLE
 
     def __str__(self) -> str:
         lines = [f"Optimum by {self.method}"]
@@ -105,22 +130,24 @@ class Optimum(eqx.Module):
         return "\n".join(lines)
 
     def _rows(self):
-        yield self.objective_name, f"{self.objective:.4g}"
+        yield self.objective_name, f"{self.objective:.4g} {self.objective_unit}".rstrip()
         if self.objective_name != "ppte":
             yield "PPTE", f"{self.ppte:.4g} um"
         yield "contact analyses", f"{self.evaluations} in {self.seconds:.2f} s"
-        if np.isfinite(self.gradient_norm):
-            yield "gradient norm", f"{self.gradient_norm:.2g} per full range"
+        if np.isfinite(self.grid_change):
+            yield "at twice the positions", f"{self.grid_change:+.2g} {self.objective_unit}".rstrip()
+        if np.isfinite(self.decrease_left):
+            yield "decrease left", f"{self.decrease_left:.2g} per full range"
         if len(self.parameters) > _SHOWN_PARAMETERS:
             yield "parameters", f"{len(self.parameters)} values"
         else:
             for name, value in self.parameters.items():
                 bound = self.active_bounds.get(name)
                 yield name, f"{value:.4g}" + (f" (at its {bound} bound)" if bound else "")
-        for name, value in self.constraints.items():
-            yield name, f"{value:.4g}"
-        if self.violation > 0:
-            yield "violation", f"{100 * self.violation:.2g} % of the limit"
+        for name, limit in self.constraints.items():
+            yield name, str(limit)
+        if not self.feasible:
+            yield "NOT FEASIBLE", f"a limit is passed by {100 * self.violation:.2g} %"
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers, for a table or a file."""
@@ -129,10 +156,45 @@ class Optimum(eqx.Module):
             "objective_name": self.objective_name,
             "objective": self.objective,
             "ppte_um": self.ppte,
-            "gradient_norm_per_range": self.gradient_norm,
+            "positions": self.positions,
+            "objective_change_at_twice_the_positions": self.grid_change,
+            "decrease_left_per_range": self.decrease_left,
             "active_bounds": self.active_bounds,
-            "constraints": self.constraints,
+            "feasible": self.feasible,
+            "constraints": {name: limit.summary() for name, limit in self.constraints.items()},
             "violation": self.violation,
             "evaluations": self.evaluations,
             "history": {"evaluations": self.history_evaluations, "objective": self.history},
         }
+
+
+class Front(Checked):
+    """Designs of which none is better in every objective.
+
+    Attributes:
+        objectives: their names.
+        units: their units.
+        values: shape (designs, objectives), sorted by the first objective.
+        parameters: value of every free parameter, each of shape (designs,).
+        decrease_left: first-order evidence of every design, shape (designs,): the fastest decrease of all objectives at
+            once that is left within bounds and constraints, in spans of the front per step of the full range of every
+            parameter. It is 0 where no direction improves all of them.
+        compromise: the design whose worst distance from the ideal point, in spans of the front, is about the least; its
+            objective is that distance.
+        chosen: its row.
+    """
+
+    objectives: tuple[str, ...] = eqx.field(static=True)
+    units: tuple[str, ...] = eqx.field(static=True)
+    values: np.ndarray
+    parameters: dict[str, np.ndarray]
+    decrease_left: np.ndarray
+    compromise: Optimum
+    chosen: int
+
+    def __str__(self) -> str:
+        spans = zip(self.objectives, self.units, self.values.min(axis=0), self.values.max(axis=0))
+        lines = [f"Front of {len(self.values)} designs"]
+        lines += [f"  {name:<22} {low:.4g} to {high:.4g} {unit}".rstrip() for name, unit, low, high in spans]
+        left = float(np.nanmax(self.decrease_left, initial=0.0))
+        return "\n".join([*lines, f"  decrease left          at most {left:.2g} spans per full range"])

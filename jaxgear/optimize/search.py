@@ -1,17 +1,23 @@
 """What a method of optimization is, and the record that it keeps."""
 
 from abc import abstractmethod
-from collections.abc import Callable
+from typing import Protocol
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 
+from .evaluate import scores
 from .goal import FEASIBLE
 from .linear_model import Model
 from .problem import Problem
-from .result import Front
 
-Callback = Callable[[int, int, float], None]
+
+class Callback(Protocol):
+    """Who wants to know how far a search has come."""
+
+    def __call__(self, done: int, total: int, info: float) -> None:
+        """Is told the steps done, all steps, and the best objective so far."""
 
 
 class Record:
@@ -28,6 +34,17 @@ class Record:
         self.model: Model | None = None  # linearization at the best design, where the method made one
         self.history: list[tuple[int, float]] = []
         self._callback = callback
+
+    def on(self, problem: Problem) -> "Record":
+        """A record of the same problem on another mesh, with what was spent and the history of this one."""
+        other = Record(problem, None)
+        other.evaluations, other.history = self.evaluations, self.history
+        return other
+
+    def check(self) -> None:
+        """Raises a `RuntimeError` when nothing was found."""
+        if not np.isfinite(self.value):
+            raise RuntimeError("the search met no design within the bounds that gave a converged contact solution")
 
     def spend(self, designs: int, *, analyses: int = 1) -> None:
         """Counts contact analyses: of so many designs in every case, each worth so many."""
@@ -69,5 +86,11 @@ class AbstractMethod(eqx.Module):
         """As design files and tables call it."""
 
     @abstractmethod
-    def search(self, problem: Problem, record: Record) -> Front | None:
-        """Searches, leaving the best design in the record; of several objectives, returns their front."""
+    def search(self, problem: Problem, record: Record) -> None:
+        """Searches, leaving the best design in the record."""
+
+    def polish(self, problem: Problem, record: Record, point: np.ndarray) -> None:
+        """Goes on from a design on a finer mesh; a method that follows no slopes just judges it there."""
+        score = scores(problem, jnp.asarray(point, problem.low.dtype)[None])
+        record.spend(1)
+        record.offer(point, np.asarray(score.value)[:, 0], np.asarray(score.violation))

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from ..optimize import QUANTITIES
+from ..metrics import quantities
 from ..optimize.result import PENALIZED
 
 ANALYSES_LABEL = "contact analyses spent [-]"
@@ -28,8 +28,8 @@ def objective_label(name: str, unit: str | None = None) -> str:
         return f"{_IDEAL} [-]"
     bare = name.removesuffix(PENALIZED)
     match = _MEASURED.fullmatch(bare)
-    if match and match["of"] in QUANTITIES:
-        quantity, rest = QUANTITIES[match["of"]], name[len(bare) :]
+    if match and match["of"] in quantities:
+        quantity, rest = quantities[match["of"]], name[len(bare) :]
         return f"{match['measure'] or ''}{quantity.meaning}{rest} [{unit_text(quantity.unit) or '-'}]"
     words = name.replace("_", " ")
     return f"{words} [{unit_text(unit)}]" if unit else words

@@ -1,29 +1,33 @@
 """Pareto fronts of several objectives."""
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping, Sequence
 
-import equinox as eqx
 import numpy as np
 from scipy.stats import qmc
 
-from ..numerics import whole
+from ..contact import Mesh
+from ..numerics import AbstractMeasure
+from ..numerics.fields import Checked, count
 from ..numerics.pareto import pareto_front
-from .goal import FEASIBLE, QUANTITIES, name_of
+from ..tolerance import Tolerance
+from .goal import FEASIBLE, Constraint, Objective
 from .linear_model import AbstractScalarization, Model
-from .minimax import Search, follow
-from .problem import Problem
+from .minimax import Search, follow, linearized
+from .problem import Design, Problem, make_problem
 from .result import Front
-from .search import AbstractMethod, Record
+from .search import Callback, Record
 from .starts import start_points
+from .verdict import PROBE, optimum_of
 
 _ROUNDS = 3
-_TOLERANCE = 1e-3  # a search ends where the predicted decrease is below this part of its distance from the ideal
+_RTOL = 1e-3  # a search ends where the predicted decrease is below this part of its distance from the ideal
 _END = 1e-6  # weight of the other objectives at the ends of the front: too small to bend the way there
 _SUM = 0.05  # part of the plain sum in the scalarization, which keeps weakly dominated designs away
 _SPAN = 1e-3  # least span of an objective over the designs, relative to its ideal
 
 
-class Pareto(AbstractMethod):
+class Pareto(Checked):
     """Pareto front by the augmented Chebyshev scalarization (Steuer and Choo 1983), one weight per design.
 
     Every design minimizes the largest weighted distance from the ideal point, which reaches concave parts of the front
@@ -37,20 +41,22 @@ class Pareto(AbstractMethod):
         steps: most steps of every one in each round.
     """
 
-    points: int = eqx.field(static=True, default=32)
-    steps: int = eqx.field(static=True, default=20)
-
-    def __check_init__(self):
-        whole("Pareto", "points", self.points, 2)
-        whole("Pareto", "steps", self.steps, 1)
+    points: int = count(low=2, default=32)
+    steps: int = count(default=20)
 
     @property
     def name(self) -> str:
+        """As design files and tables call it."""
         return "pareto"
 
-    def search(self, problem: Problem, record: Record) -> Front:
-        """Runs the rounds, then sorts out the front of all designs met."""
-        met, objectives = _Met(problem, record), len(problem.objectives)
+    def search(self, problem: Problem, record: Record) -> "Met":
+        """Runs the rounds; the record keeps the compromise.
+
+        Raises:
+            ValueError: for fewer points than objectives.
+            RuntimeError: when no design keeps the constraints.
+        """
+        met, objectives = Met(problem, record), len(problem.objectives)
         if self.points < objectives:
             raise ValueError(f"Pareto: points = {self.points} must be at least the number of objectives, {objectives}")
         # in blocks: every other point of the Halton sequence covers half of the box only
@@ -62,11 +68,11 @@ class Pareto(AbstractMethod):
             if number and met.found:
                 points = [met.best(way) for way in ways]
             searches = [Search(point, way) for point, way in zip(points, ways)]
-            follow(problem, met, searches, steps=self.steps, tolerance=_TOLERANCE, round_of=(number, _ROUNDS))
+            follow(problem, met, searches, steps=self.steps, rtol=_RTOL, round_of=(number, _ROUNDS))
         if not met.found:
-            raise RuntimeError("minimize: no design that the search for a front has met keeps the constraints")
+            raise RuntimeError("pareto: no design that the search for a front has met keeps the constraints")
         record.offer(*met.compromise(), 0.0)
-        return met.front()
+        return met
 
 
 class _Chebyshev(AbstractScalarization):
@@ -84,7 +90,7 @@ class _Chebyshev(AbstractScalarization):
         return factor, -factor * low
 
 
-class _Met:
+class Met:
     """Designs met so far that keep the constraints and that no other one beats."""
 
     def __init__(self, problem: Problem, record: Record):
@@ -142,18 +148,98 @@ class _Met:
         best = int(_Chebyshev(np.ones_like(self._low), self.frame).join(self._values).argmin())
         return self._points[best], float(((self._values[best] - self._low) / self._span).max())
 
-    def front(self) -> Front:
-        """Ascending in the first objective."""
-        problem = self._problem
-        _, order = np.unique(self._values, axis=0, return_index=True)  # equal designs once, in ascending order
-        low, high = np.asarray(problem.low), np.asarray(problem.high)
-        parameters = low + self._points[order] * (high - low)
-        return Front(
-            objectives=tuple(name_of(of) for of in problem.objectives),
-            units=tuple(QUANTITIES[of].unit if isinstance(of, str) else "" for of in problem.objectives),
-            values=self._values[order],
-            parameters={name: parameters[:, index] for index, name in enumerate(problem.names)},
-        )
+    def rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points and values, ascending in the first objective; equal designs once."""
+        _, order = np.unique(self._values, axis=0, return_index=True)
+        return self._points[order], self._values[order]
+
+
+class _Descent(AbstractScalarization):
+    """Largest change of the objectives from what they are at a point, in spans of the front."""
+
+    part = 0.0
+
+    def __init__(self, values: np.ndarray, span: np.ndarray):
+        self._values, self._span = values, span
+
+    def scales(self) -> tuple[np.ndarray, np.ndarray]:
+        """Factor and offset of every objective."""
+        return 1 / self._span, -self._values / self._span
+
+
+def pareto(
+    design: Design,
+    bounds: Mapping[str, tuple[float, float]],
+    *,
+    mesh: Mesh,
+    torque,
+    objectives: Sequence[Objective] = ("ppte", "max_contact_pressure"),
+    measure: AbstractMeasure | None = None,
+    constraints: Sequence[Constraint] = (),
+    tolerance: Tolerance | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    method: Pareto = Pareto(),
+    callback: Callback | None = None,
+) -> Front:
+    """Finds the designs of which none is better in all of several objectives.
+
+    Args:
+        objectives: two or more quantities, as in `minimize`.
+        method: how many designs are sought, and in how many steps.
+        callback: called as callback(step, steps, distance of the compromise from the ideal).
+
+    The other arguments are those of `minimize`. Values are those on `mesh`.
+
+    Raises:
+        ValueError: for fewer than two objectives, and whatever `minimize` refuses.
+        RuntimeError: when no design keeps the constraints.
+    """
+    if isinstance(objectives, str) or callable(objectives) or len(objectives) < 2:
+        raise ValueError("pareto: objectives must be at least two quantities; a single one is for jaxgear.minimize")
+    began = time.perf_counter()
+    posed = make_problem(
+        design,
+        bounds,
+        mesh=mesh,
+        torque=torque,
+        objective=objectives,
+        measure=measure,
+        constraints=constraints,
+        tolerance=tolerance,
+        samples=samples,
+        seed=seed,
+        owner="pareto",
+    )
+    record = Record(posed, callback)
+    met = method.search(posed, record)
+    points, values = met.rows()
+    left = _evidence(posed, record, points, values, met.frame()[1], method.points)
+    chosen = int(np.abs(points - record.point).max(axis=1).argmin())
+    low, high = np.asarray(posed.low), np.asarray(posed.high)
+    parameters = low + points * (high - low)
+    compromise = optimum_of(record, method.name, began, left=float(left[chosen]))
+    return Front(
+        objectives=tuple(of.name for of in posed.objectives),
+        units=tuple(of.unit for of in posed.objectives),
+        values=values * np.asarray([of.sign for of in posed.objectives]),
+        parameters={name: parameters[:, index] for index, name in enumerate(posed.names)},
+        decrease_left=left,
+        compromise=compromise,
+        chosen=chosen,
+    )
+
+
+def _evidence(posed: Problem, record: Record, points, values, span, batch: int) -> np.ndarray:
+    """Fastest decrease of all objectives at once that is left at every point."""
+    left = np.empty(len(points))
+    for start in range(0, len(points), batch):
+        rows = slice(start, min(start + batch, len(points)))
+        record.spend(len(points[rows]), analyses=posed.gradient_cost)
+        for index, found in zip(range(rows.start, rows.stop), linearized(posed, points[rows], batch)):
+            way = _Descent(values[index], span)
+            left[index] = Model(posed, points[index], found, way).decrease_left(PROBE)
+    return left
 
 
 def _ends(objectives: int) -> np.ndarray:

@@ -1,0 +1,146 @@
+"""Quantities of a design in every case, with their slopes over the unit box."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from ..metrics import Quantity
+
+Vector = Float[Array, " parameters"]
+
+
+class Pieces(NamedTuple):
+    """A number in every case, max(upper) - min(lower), with its slopes over the unit box.
+
+    Attributes:
+        upper: shape (cases, pieces), with `slope`, shape (cases, pieces, parameters).
+        lower: the same with `lower_slope`; None where nothing is subtracted.
+    """
+
+    upper: Float[Array, "cases pieces"]
+    slope: Float[Array, "cases pieces parameters"]
+    lower: Float[Array, "cases pieces"] | None = None
+    lower_slope: Float[Array, "cases pieces parameters"] | None = None
+
+    @property
+    def value(self) -> Float[Array, " cases"]:
+        """The number in every case."""
+        top = self.upper.max(axis=1)
+        return top if self.lower is None else top - self.lower.min(axis=1)
+
+    def scaled(self, scale, offset) -> "Pieces":
+        """The number divided by a positive scale, after an offset has been taken off."""
+        return Pieces(
+            (self.upper - offset) / scale,
+            self.slope / scale,
+            None if self.lower is None else self.lower / scale,
+            None if self.lower_slope is None else self.lower_slope / scale,
+        )
+
+
+class Linearization(NamedTuple):
+    """Objectives and constraints at a point, linear piece by piece.
+
+    Attributes:
+        objectives: of every objective its pieces.
+        limits: the pieces of by how much each limit is passed, relative to it.
+        fine: whether all contact solutions converged and all numbers and slopes are finite.
+    """
+
+    objectives: tuple[Pieces, ...]
+    limits: tuple[Pieces, ...]
+    fine: Bool[Array, ""]
+
+
+class Sloped(NamedTuple):
+    """Values that a quantity reduces, with their slopes.
+
+    Attributes:
+        values: shape (..., values).
+        slopes: shape (..., values, parameters).
+    """
+
+    values: Float[Array, "... values"]
+    slopes: Float[Array, "... values parameters"]
+
+
+def pieces_of(quantity: Quantity, sloped: Sloped, sign: int) -> Pieces:
+    """Pieces of `sign` times a quantity, cases leading: exact where its reduction is made of extremes."""
+    values, slopes = sloped
+    factors = quantity.reduction.factors(sign)
+    if factors is None:
+        number, gradient = jax.vmap(jax.value_and_grad(quantity.reduction))(values)
+        slope = jnp.einsum("cv,cvp->cp", gradient, slopes)
+        return Pieces(sign * number[:, None], sign * slope[:, None])
+    above, below = factors
+    if below == 0:
+        return Pieces(above * values, above * slopes)
+    return Pieces(above * values, above * slopes, below * values, below * slopes)
+
+
+def local_slopes(
+    quantities: Sequence[Quantity], solve: Callable, removed_of: Callable, x: Vector
+) -> tuple[list[Sloped], Bool[Array, ""]]:
+    """Values and slopes of local quantities.
+
+    Their values at a position depend on the material removed at that position alone: one gradient of the contact
+    analysis, of the sum over the positions, gives the slopes at all of them.
+
+    Args:
+        quantities: local ones.
+        solve: makes a cycle and whether it converged from the material removed.
+        removed_of: material removed at a point of the unit box, shape (pairs, slices, positions).
+        x: the point.
+    """
+
+    def material(x):
+        removed = removed_of(x)
+        return removed, removed
+
+    def curves(removed):
+        cycle, fine = solve(removed)
+        each = [quantity.values(cycle) for quantity in quantities]
+        each = [values.reshape(-1, values.shape[-1]) for values in each]
+        return jnp.concatenate(each), (each, fine)
+
+    slope, removed = jax.jacfwd(material, has_aux=True)(x)
+    rows, back, (each, fine) = jax.vjp(curves, removed, has_aux=True)
+    if len(rows) == 1:
+        (share,) = back(jnp.ones_like(rows))
+        slopes = jnp.einsum("isp,ispx->px", share, slope)[None]
+    elif len(rows) <= len(x):
+        chosen = jnp.broadcast_to(jnp.eye(len(rows), dtype=rows.dtype)[:, :, None], (len(rows), *rows.shape))
+        (share,) = jax.vmap(back)(chosen)
+        slopes = jnp.einsum("kisp,ispx->kpx", share, slope)
+    else:  # fewer parameters than rows
+
+        def along(direction):
+            return jax.jvp(lambda removed: curves(removed)[0], (removed,), (direction,))[1]
+
+        slopes = jax.vmap(along, in_axes=-1, out_axes=-1)(slope)
+    ends = np.cumsum([len(values) for values in each])
+    return [
+        Sloped(values.ravel(), part.reshape(-1, len(x))) for values, part in zip(each, jnp.split(slopes, ends[:-1]))
+    ], fine
+
+
+def any_slopes(quantities: Sequence[Quantity], cycle_of: Callable, x: Vector) -> tuple[list[Sloped], Bool[Array, ""]]:
+    """Values and slopes of any quantities; `cycle_of` makes a cycle and whether it converged from the point."""
+
+    def numbers(x):
+        cycle, fine = cycle_of(x)
+        each = [quantity.values(cycle).ravel() for quantity in quantities]
+        return jnp.concatenate(each), (each, fine)
+
+    count = jax.eval_shape(numbers, x)[0].shape[0]
+    differentiate = jax.jacrev if count <= x.shape[0] else jax.jacfwd
+    slopes, (each, fine) = differentiate(numbers, has_aux=True)(x)
+    found, start = [], 0
+    for values in each:
+        found.append(Sloped(values, slopes[start : start + len(values)]))
+        start += len(values)
+    return found, fine

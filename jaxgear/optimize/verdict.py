@@ -1,0 +1,141 @@
+"""What is said about the best design of a search."""
+
+import time
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..conditions import in_words
+from ..contact import removed_material, solve_removed
+from ..metrics import peak_to_peak
+from .goal import FEASIBLE, Constraint
+from .linear_model import Model
+from .problem import Problem
+from .result import PENALIZED, Limit, Optimum
+from .search import Record
+from .starts import real_points
+
+_AT_BOUND = 1e-6  # a parameter this close to a bound, relative to its range, is at the bound
+PROBE = 1e-3  # step over which the decrease that is left is measured, relative to the ranges
+
+
+def optimum_of(
+    record: Record, method: str, began: float, grid_change: float = float("nan"), *, left: float | None = None
+) -> Optimum:
+    """The best design of a record with all that is said about it.
+
+    Args:
+        record: of the search.
+        method: its name.
+        began: when the search began, as `time.perf_counter` tells.
+        grid_change: of the objective at twice the positions.
+        left: decrease that is left, where it is known.
+    """
+    problem = record.problem
+    x = real_points(problem, record.point)
+    parameters, (pinion, wheel) = problem.parameters(x), problem.modifications(x)
+    heaviest = problem.cases.torque[int(np.argmax(problem.cases.weight))]
+    # the removed material as an array: the program that solves for it is the one that every other design uses
+    removed = removed_material(problem.mesh, heaviest, pinion=pinion, wheel=wheel)
+    cycle = solve_removed(problem.mesh, heaviest, removed, pinion=pinion, wheel=wheel)
+    left = _decrease_left(record) if left is None else left  # before the analyses are counted
+    several = len(problem.objectives) > 1
+    sign = 1 if several else problem.objectives[0].sign
+    return Optimum(
+        method=method,
+        objective_name=objective_name(problem),
+        objective_unit="" if several else problem.objectives[0].unit,
+        parameters={name: float(value) for name, value in parameters.items()},
+        pinion=pinion,
+        wheel=wheel,
+        mesh=problem.mesh,
+        cycle=cycle,
+        ppte=float(peak_to_peak(cycle.transmission_error)),
+        objective=sign * record.value,
+        positions=problem.mesh.resolution.positions,
+        grid_change=grid_change,
+        decrease_left=left,
+        active_bounds=_active_bounds(problem.names, record.point),
+        constraints=_limits(problem, x),
+        violation=record.violation,
+        evaluations=record.evaluations,
+        history=sign * np.asarray([value for _, value in record.history]),
+        history_evaluations=np.asarray([spent for spent, _ in record.history]),
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _decrease_left(record: Record) -> float:
+    """Fastest decrease of the objective at the best point, per step of the full range of every parameter."""
+    model = record.model
+    if model is None:
+        problem = record.problem
+        record.spend(1, analyses=problem.gradient_cost)
+        found = jax.tree.map(np.asarray, _linearization(problem, real_points(problem, record.point)))
+        model = Model(problem, record.point, found)
+    return model.decrease_left(PROBE)
+
+
+def objective_name(problem: Problem) -> str:
+    """What is minimized, in words."""
+    names = [of.name for of in problem.objectives]
+    if len(names) > 1:
+        return f"distance from the ideal of {' and '.join(names)}"
+    prefix = ""
+    if problem.cases.count > 1:
+        prefix = in_words(problem.measure) + " "
+    return prefix + names[0] + (PENALIZED if problem.roughness is not None else "")
+
+
+def _limits(problem: Problem, x) -> dict[str, Limit]:
+    if not problem.constraints:
+        return {}
+    named: dict[str, Limit] = {}
+    for constraint, values in zip(problem.constraints, _constrained(problem, x)):
+        worst = max(np.asarray(values), key=lambda value: _excess(constraint, value))
+        name, repeated = constraint.name, 2
+        while name in named:
+            name, repeated = f"{constraint.name} ({repeated})", repeated + 1
+        low, high = (None if limit is None else float(limit) for limit in (constraint.low, constraint.high))
+        named[name] = Limit(float(worst), low, high, constraint.unit, _excess(constraint, worst) <= FEASIBLE)
+    return named
+
+
+def _excess(constraint: Constraint, value) -> float:
+    return float(max(constraint.excess(jnp.asarray(value))))
+
+
+def _constrained(problem: Problem, x) -> Sequence[np.ndarray]:
+    """Values of every constraint, cases leading."""
+    parameters = problem.parameters(x)
+    of_cycle = iter(_numbers(problem, x) if any(limit.quantity for limit in problem.constraints) else ())
+    return [
+        np.asarray([sum(factor * parameters[name] for name, factor in limit.terms)])
+        if limit.quantity is None
+        else np.asarray(next(of_cycle))
+        for limit in problem.constraints
+    ]
+
+
+@eqx.filter_jit
+def _numbers(problem: Problem, x):
+    wanted = [limit.quantity for limit in problem.constraints if limit.quantity is not None]
+    return problem.over_cases(x, lambda cycle: [of(cycle) for of in wanted])
+
+
+@eqx.filter_jit
+def _linearization(problem: Problem, x):
+    return problem.linearize(x)
+
+
+def _active_bounds(names, x) -> dict[str, str]:
+    active = {}
+    for name, value in zip(names, x):
+        if value <= _AT_BOUND:
+            active[name] = "lower"
+        elif value >= 1 - _AT_BOUND:
+            active[name] = "upper"
+    return active
