@@ -17,11 +17,11 @@ TORQUE, POINTS, SMOOTHNESS = 50.0, 24, 1e-3
 @pytest.fixture(scope="module")
 def named(mesh):
     """The best relief of a power curve."""
-    return jg.minimize(power_reliefs, POWER_BOX, mesh=mesh, torque=TORQUE)
+    return jg.minimize(power_reliefs, POWER_BOX, mesh=mesh, torque=TORQUE, positions=None)
 
 
 def free(mesh, **options):
-    return jg.free_form(mesh, TORQUE, points=POINTS, **{"curvature": SMOOTHNESS} | options)
+    return jg.free_form(mesh, TORQUE, points=POINTS, positions=None, **{"curvature": SMOOTHNESS} | options)
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """Pictures of optimizations show what the results hold, name their units and draw nothing that is not finite."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import matplotlib
 import numpy as np
@@ -37,7 +37,10 @@ def optimum(method="minimax", history=(np.inf, 3.0, 1.0), spent=(0, 10, 100), **
         "cycle": None,
         "ppte": 1.0,
         "objective": history[-1],
-        "gradient_norm": 0.0,
+        "objective_unit": "um",
+        "positions": 64,
+        "grid_change": 0.0,
+        "decrease_left": 0.0,
         "active_bounds": {},
         "constraints": {},
         "violation": 0.0,
@@ -82,7 +85,8 @@ def optima():
 def front():
     ppte = np.linspace(0.6, 3.0, 12)
     values = np.stack([ppte, 900 - 80 * ppte], axis=1)
-    return Front(("ppte", "max_flank_pressure"), ("um", "MPa"), values, {"amount": np.linspace(9, 1, 12)})
+    parameters = {"amount": np.linspace(9, 1, 12)}
+    return Front(("ppte", "max_flank_pressure"), ("um", "MPa"), values, parameters, np.zeros(12), optimum(), 5)
 
 
 @pytest.fixture
@@ -300,7 +304,8 @@ def test_front_is_drawn_as_it_is_and_the_chosen_design_marked(front):
 
 def test_front_of_three_shows_the_third_as_colour(front):
     third = np.linspace(40.0, 2.0, 12)
-    three = Front((*front.objectives, "removed_volume"), (*front.units, "mm3"), np.c_[front.values, third], {})
+    names, units = (*front.objectives, "removed_volume"), (*front.units, "mm3")
+    three = replace(front, objectives=names, units=units, values=np.c_[front.values, third])
     ax = plot.optimum_front(three)
     np.testing.assert_array_equal(ax.collections[0].get_array(), third)
     assert plain(ax.figure.axes[1].get_ylabel()) == "material ground off all flanks [mm³]"

@@ -121,7 +121,10 @@ def methods(effort: Effort) -> list[Method]:
         Method("robust minimax", _robust(effort), slow=True),
         Method("iteration, type 1", _iterated),
         Method("iteration, type 2", _iterated_from_relief(effort), slow=True),
-        Method("free form", lambda task, mesh, _: _found(jg.free_form(mesh, task.torque, points=effort.points))),
+        Method(
+            "free form",
+            lambda task, mesh, _: _found(jg.free_form(mesh, task.torque, points=effort.points, positions=None)),
+        ),
         Method("free form as cubic", _projected("cubic"), after="free form"),
         Method("free form as power", _projected("power"), after="free form"),
     ]
@@ -145,7 +148,8 @@ def _rule(task: Task, mesh: jg.Mesh, _) -> Found:
 
 def _searched(method):
     def run(task: Task, mesh: jg.Mesh, _) -> Found:
-        return _found(jg.minimize(task.design, task.bounds, mesh=mesh, torque=task.torque, method=method))
+        options = {"torque": task.torque, "method": method, "positions": None}
+        return _found(jg.minimize(task.design, task.bounds, mesh=mesh, **options))
 
     return run
 
@@ -164,6 +168,7 @@ def _robust(effort: Effort):
             tolerance=task.tolerance,
             samples=effort.samples,
             method=jg.Minimax(effort.minimax_starts),
+            positions=None,
         )
         return _found(found)
 
@@ -185,6 +190,7 @@ def _iterated_from_relief(effort: Effort):
             torque=task.torque,
             objective="max_contact_pressure",
             method=jg.Minimax(effort.minimax_starts),
+            positions=None,
         )
         found = jg.iterate_transmission_error(
             mesh, task.torque, pinion=start.pinion, wheel=start.wheel, max_relief=task.max_relief
