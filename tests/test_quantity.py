@@ -8,6 +8,7 @@ import pytest
 from catalogue import ppte
 
 import jaxgear as jg
+from jaxgear.contact import Operation
 from jaxgear.metrics import Quantity, quantities, quantity_of
 from jaxgear.numerics.reductions import Average, Harmonic, Max, Min, Range, Rms, Value
 
@@ -75,6 +76,20 @@ def test_an_array_needs_a_reduction(cycle):
         Quantity("te", lambda c: {"ppte": 1.0}, reduction=Max())(cycle)
     with pytest.raises(ValueError, match="2 values"):
         Value()(jnp.ones(2))
+
+
+def test_what_takes_a_speed_says_so(mesh, cycle):
+    flash = quantities["max_flash_temperature"]
+    with pytest.raises(ValueError, match="max_flash_temperature: needs a speed"):
+        flash(cycle)
+    running = jg.solve(mesh, Operation(50.0, speed=3000.0), pinion=cycle.pinion, wheel=cycle.wheel)
+    assert float(flash(running)) == pytest.approx(float(jg.flash_temperature(running, 3000.0).max()))
+
+
+def test_margins_are_quantities(cycle):
+    margins = jg.margins(cycle.kinematics.pair)
+    assert float(quantities["pinion_tip_land"](cycle)) == pytest.approx(float(margins.pinion_tip_land))
+    assert quantities["pinion_tip_land_mm"].better == "larger"
 
 
 def test_of_many_cycles(mesh):

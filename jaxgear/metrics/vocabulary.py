@@ -4,8 +4,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
+from ..geometry import margins
 from ..numerics.reductions import Average, Harmonic, Max, Min, Range, Rms
 from .flank import max_relief, relief_reversal, removed_volume
+from .flash import flash_temperature
 from .load import contact_shock, effective_contact_ratio
 from .loss import loss_factor
 from .quantity import Quantity, quantities
@@ -42,6 +44,18 @@ def mean_removed_material(cycle: MeshCycle) -> Scalar:
     # on the path of contact unmodified flanks have no gap: what is there is the modification
     removed = jnp.where(inside, jnp.mean(cycle.gap, axis=1), 0.0)
     return jnp.sum(removed) / jnp.sum(inside.astype(removed.dtype))
+
+
+def _flash(cycle: MeshCycle) -> Load:
+    operation = cycle.operation
+    if operation.speed is None:
+        raise ValueError("max_flash_temperature: needs a speed, solve with Operation(torque, speed)")
+    options = {} if operation.friction is None else {"friction": operation.friction}
+    return flash_temperature(cycle, operation.speed, **options)
+
+
+def _margin(name: str):
+    return lambda cycle: getattr(margins(cycle.kinematics.pair), name)
 
 
 def _of_flanks(function):
@@ -103,6 +117,18 @@ quantities.add(
     Quantity(
         "wheel_root_stress", lambda c: root_stress(c).wheel, "MPa", "largest root stress, wheel", Max(), local=True
     ),
+    Quantity("max_flash_temperature", _flash, "K", "largest rise of the flank temperature", Max(), local=True),
+    *(
+        Quantity(f"{gear}_{name}", _margin(f"{gear}_{name}"), "mm", f"{meaning}, {gear}", better="larger")
+        for gear in ("pinion", "wheel")
+        for name, meaning in (
+            ("tip_land", "thickness of the tooth at the tip"),
+            ("form_clearance", "usable involute below the first contact"),
+            ("tip_clearance", "from the tip to the mate's root circle"),
+            ("rim_thickness", "from the bore to the root circle"),
+        )
+    ),
+    Quantity("backlash", _margin("backlash"), "um", "play on the line of action", better="larger"),
     Quantity("mesh_loss_factor", loss_factor, meaning="loss power per input power and coefficient of friction"),
     Quantity(
         "min_tangent_stiffness",
