@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import jaxgear as jg
-from jaxgear.metrics import RESULTS, result_key
+from jaxgear.metrics import quantities
 
 # FZG type C gears with untrimmed tips: published form and stress correction factors and loss factor
 FZG = jg.GearPair(
@@ -88,14 +88,14 @@ def test_pressure_at_the_pitch_point_is_hertz(cycle):
 
 
 def test_largest_contact_pressure_is_that_of_the_tip_edge_where_corners_touch(cycle, mesh):
-    largest = {name: float(RESULTS[f"max_{name}_pressure"].of(cycle)) for name in ("flank", "corner", "contact")}
+    largest = {name: float(quantities[f"max_{name}_pressure"](cycle)) for name in ("flank", "corner", "contact")}
     assert largest["corner"] > largest["flank"] > 0
     assert largest["contact"] == largest["corner"]
-    assert result_key("max_contact_pressure") == "max_contact_pressure_MPa"
+    assert quantities["max_contact_pressure"].key == "max_contact_pressure_MPa"
     # with less load than the corner gap needs, only flanks touch
     light = jg.solve(mesh, 0.01, pinion=jg.TipRelief(20.0, 5.0), wheel=jg.TipRelief(20.0, 5.0))
-    assert float(RESULTS["max_corner_pressure"].of(light)) == 0.0
-    assert float(RESULTS["max_contact_pressure"].of(light)) == float(RESULTS["max_flank_pressure"].of(light)) > 0
+    assert float(quantities["max_corner_pressure"](light)) == 0.0
+    assert float(quantities["max_contact_pressure"](light)) == float(quantities["max_flank_pressure"](light)) > 0
 
 
 def test_stiffness_definitions(cycle, mesh):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..metrics import result_key
+from ..metrics import quantity_of
 from ..sweeps import SweepTable
 
 _DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory does not grow with the table
@@ -27,7 +27,7 @@ def write_figures(folder: Path, table: SweepTable, results: Sequence[str]) -> No
     from .. import plot
 
     # of a load spectrum or a tolerance, the first column of every result: its mean
-    heads = [next(name for name in table.results if name.startswith(result_key(result))) for result in results]
+    heads = [next(name for name in table.results if name.startswith(quantity_of(result).key)) for result in results]
     maximize = [column.name for column in table.columns if column.better == "larger"]
     units = {**table.units, **{name: "µm" for name, unit in table.units.items() if unit == "um"}}
     labels = {name: f"{name.replace('_', ' ')} [{units[name] or '-'}]" for name in table.parameters}

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..conditions import LoadSpectrum
 from ..contact import Operation
-from ..metrics import RESULTS
+from ..metrics import quantities
 from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
 from . import schema_sweep
@@ -75,9 +75,9 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
         section = section.model_copy(update={"samples": min(section.samples, most)})
     wanted = tuple(section.results or _RESULTS)
     for index, name in enumerate(wanted):
-        if name not in RESULTS:
+        if name not in quantities:
             key = f"sweep.results[{index}]"
-            raise DesignFileError(design.path, key, f'"{name}" is not known, {suggestion(name, RESULTS)}')
+            raise DesignFileError(design.path, key, f'"{name}" is not known, {suggestion(name, quantities)}')
         if name in wanted[:index]:
             raise DesignFileError(design.path, f"sweep.results[{index}]", f'"{name}" is there twice')
     tolerance = design.tolerance

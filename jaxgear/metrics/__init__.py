@@ -18,9 +18,6 @@ from .loss import ohlendorf_loss_factor as ohlendorf_loss_factor
 from .quantity import Quantity as Quantity
 from .quantity import quantities as quantities
 from .quantity import quantity_of as quantity_of
-from .registry import RESULTS as RESULTS
-from .registry import Result as Result
-from .registry import result_key as result_key
 from .report import summary as summary
 from .root_stress import RootFactors as RootFactors
 from .root_stress import RootStress as RootStress
