@@ -87,6 +87,10 @@ class Problem(eqx.Module):
     constraints: tuple[Constraint, ...] = ()
     roughness: Roughness | None = None
 
+    def __str__(self) -> str:
+        what = ", ".join(of.name for of in self.objectives)
+        return f"Problem: {what} of {', '.join(self.names)} in {self.cases.count} cases, {len(self.constraints)} limits"
+
     def on(self, mesh: Mesh) -> "Problem":
         """The same problem on another mesh."""
         return replace(self, mesh=mesh, cases=self.conditions.on(mesh))
