@@ -15,9 +15,10 @@ from ..microgeometry import AbstractModification, TabulatedProfile
 from ..numerics import AbstractMeasure, Mean, check, whole
 from ..sizing import iso_relief
 from ..tolerance import Tolerance
+from .design import Parameters
 from .goal import Constraint
 from .minimax import Search, follow
-from .problem import Parameters, Problem, Roughness
+from .problem import Problem, Roughness
 from .refine import POSITIONS, refined
 from .result import Optimum
 from .search import Callback, Record

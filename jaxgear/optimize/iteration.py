@@ -13,10 +13,10 @@ from ..metrics import max_relief as largest_relief
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, NoModification, TabulatedProfile
 from ..numerics import check, whole
+from .design import Design
 from .goal import Constraint
 from .minimax import Minimax
 from .minimize import minimize
-from .problem import Design
 from .result import Iterate, Limit, Optimum
 from .search import AbstractMethod, Callback
 

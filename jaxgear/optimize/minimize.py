@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from ..contact import Mesh
 from ..numerics import AbstractMeasure
 from ..tolerance import Tolerance
+from .design import Design
 from .goal import Constraint, Objective
 from .methods import method_named
-from .problem import Design, make_problem
+from .problem import make_problem
 from .refine import POSITIONS, refined
 from .result import Optimum
 from .search import AbstractMethod, Callback, Record

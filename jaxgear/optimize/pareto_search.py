@@ -11,10 +11,11 @@ from ..numerics import AbstractMeasure
 from ..numerics.fields import Checked, count
 from ..numerics.pareto import pareto_front
 from ..tolerance import Tolerance
+from .design import Design
 from .goal import FEASIBLE, Constraint, Objective
 from .linear_model import AbstractScalarization, Model
 from .minimax import Search, follow, linearized
-from .problem import Design, Problem, make_problem
+from .problem import Problem, make_problem
 from .result import Front
 from .search import Callback, Record
 from .starts import start_points

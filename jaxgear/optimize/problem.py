@@ -15,14 +15,12 @@ from ..metrics import Quantity, quantity_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import AbstractMeasure, Mean, check, maximum, real
 from ..tolerance import Tolerance
+from .design import Design, two_modifications
 from .goal import Constraint, Objective, scale_of
 from .linearization import Linearization, Pieces, Sloped, any_slopes, local_slopes, pieces_of
 
 Scalar = Float[Array, ""]
 Vector = Float[Array, " parameters"]
-Parameters = Mapping[str, Scalar]
-Modifications = tuple[AbstractModification | None, AbstractModification | None]
-Design = Callable[[Parameters], Modifications]
 
 # Contact analyses that a value with its gradient counts for, and the gradient of every further number of the contact.
 GRADIENT_COST = 3
@@ -112,7 +110,7 @@ class Problem(eqx.Module):
         Raises:
             ValueError: when the design gives anything but two modifications.
         """
-        return _two_modifications(self.design(self.parameters(x)))
+        return two_modifications(self.design(self.parameters(x)))
 
     def score(self, x: Vector) -> Score:
         """True objectives and violation."""
@@ -233,18 +231,6 @@ class Problem(eqx.Module):
 
 def _worst(excess):
     return jnp.maximum(maximum(excess), 0.0) if excess.size else jnp.zeros((), excess.dtype)
-
-
-def _two_modifications(made) -> tuple[AbstractModification, AbstractModification]:
-    if not (isinstance(made, tuple | list) and len(made) == 2):
-        what = f"{len(made)} values" if isinstance(made, tuple | list) else f"one {type(made).__name__}"
-        raise ValueError(f"design: gives {what}, must give two modifications, (pinion, wheel); None for an involute")
-    for name, modification in zip(("pinion", "wheel"), made):
-        if not (modification is None or isinstance(modification, AbstractModification)):
-            kind = type(modification).__name__
-            raise ValueError(f"design: the {name} is of type {kind}, must be a modification or None for an involute")
-    pinion, wheel = made
-    return pinion or NoModification(), wheel or NoModification()
 
 
 def make_problem(
