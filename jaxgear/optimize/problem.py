@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..conditions import Cases, Conditions, conditions, solved
+from ..conditions import Cases, Conditions, Variants, check_used, conditions, solved
 from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..metrics import Quantity, quantity_of
 from ..microgeometry import AbstractModification, NoModification
@@ -265,7 +265,7 @@ def make_problem(
     objectives = tuple(quantity_of(of, owner) for of in several)
     dtype = mesh.phase.dtype
     measure = Mean() if measure is None else measure
-    return Problem(
+    posed = Problem(
         design=design,
         names=names,
         low=low.astype(dtype),
@@ -277,6 +277,9 @@ def make_problem(
         measure=measure,
         constraints=tuple(constraints),
     )
+    made = Variants(names, lambda values: two_modifications(design(values)), mesh, None, judged, posed.cases)
+    check_used("minimize", names, made.traced(posed.low)[1])
+    return posed
 
 
 def box(bounds: Mapping[str, tuple[float, float]], owner: str):
