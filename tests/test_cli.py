@@ -21,9 +21,11 @@ import pytest
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import cache, main, run
+from jaxgear.cli import cache, main, report, run
 from jaxgear.io import load_design
 from jaxgear.io.folder import RESULT_FILES, result_folder
+from jaxgear.metrics import Doubt
+from jaxgear.metrics.plausibility import Limit
 
 FIXED = """
 title = "a [small] pair"
@@ -133,6 +135,30 @@ def test_analyze_gives_what_the_library_gives(folder, analyzed):
         float(jg.peak_to_peak(solve(file.mesh(), 60.0).transmission_error))
     )
     assert table["unmodified_um"] == sorted(table["unmodified_um"])  # without relief PPTE grows with the torque
+
+
+def test_the_summary_says_what_was_computed(analyzed):
+    pinion = analyzed.summary["gears"]["pinion"]
+    assert (pinion["teeth"], pinion["module_mm"], pinion["face_width_mm"]) == (19, 3.0, 20.0)
+    assert pinion["bore_diameter_mm"] == pytest.approx(24.75) and pinion["bore_given"] is False
+    assert pinion["tip_diameter_mm"] == pytest.approx(63.0) and pinion["elastic_modulus_MPa"] == 206_000.0
+    assert analyzed.summary["center_distance_mm"] == pytest.approx(100.5)
+    assert analyzed.summary["model"]["plane"] == "stress" and "ElasticRing" in analyzed.summary["model"]["compliance"]
+    assert "bores: pinion 24.75 mm (half the root diameter, as none is given), wheel" in analyzed.out
+    assert all(design["doubts"] == [] for design in analyzed.summary["designs"].values())
+    assert "please check" not in analyzed.out
+
+
+def test_what_is_not_usual_is_said_once_of_all_designs_it_concerns():
+    usual, range_ = Limit(0.0, 1650.0, "MPa", "case-hardened"), Limit(0.0, 0.5, "", "steel")
+    found = {
+        "unmodified": (Doubt("friction", "", 3.7, range_),),
+        "optimum": (Doubt("friction", "", 3.7, range_), Doubt("flank pressure", "", 3383.0, usual)),
+    }
+    assert list(report.doubt_lines(found)) == [
+        "please check: friction 3.7 is more than 0.5 (steel)",
+        "please check: optimum: flank pressure 3383 MPa is more than 1650 (case-hardened)",
+    ]
 
 
 def test_optimize_compares_three_designs_and_improves(optimized):

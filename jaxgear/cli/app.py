@@ -32,7 +32,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     help="Flank design of spur gears by loaded tooth contact analysis. Exit codes: 0 success, 1 a contact solution did "
-    "not converge (results are written and flagged), 2 error (nothing is written), 130 interrupted (a sweep resumes).",
+    "not converge or a constraint is not met (results are written and flagged), 2 error (nothing is written), "
+    "130 interrupted (a sweep resumes).",
 )
 
 

@@ -14,7 +14,12 @@ _SHOWN_BOUNDS = 8
 
 
 def verdict(
-    file: DesignFile, optimum: Optimum, projection: Projection | None, *, unmodified: float, reduction: float
+    file: DesignFile,
+    optimum: Optimum,
+    projection: Projection | None,
+    *,
+    unmodified: float,
+    reduction: float,
 ) -> Iterator[str]:
     """Lines under the table of an optimization; the PPTE without modifications [um], and by how much it fell [%]."""
     yield f"PPTE {unmodified:.3f} -> {optimum.ppte:.3f} um: {reduction:.1f} % less than unmodified"

@@ -7,14 +7,18 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import jax
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 from ..contact import Mesh
+from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.results import unit_of
+from ..metrics import Doubt, plausibility
+from ..numerics import fields_of
 from .study import Evaluation
 
 Evaluations = Mapping[str, Evaluation]
@@ -66,6 +70,37 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
             )
 
 
+def doubts(file: DesignFile, evaluations: Evaluations) -> dict[str, tuple[Doubt, ...]]:
+    """What is not usual of every design."""
+    options: dict[str, Any] = {"torque_range": file.torque_range, "speed": file.speed, "friction": file.friction}
+    return {
+        name: plausibility(evaluation.cycle, pinion=evaluation.pinion, wheel=evaluation.wheel, **options)
+        for name, evaluation in evaluations.items()
+    }
+
+
+def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
+    """A line for everything that is not usual, with the designs that it is said of unless those are all."""
+    grouped: dict[tuple[str, str], dict[str, Doubt]] = {}
+    for design, several in found.items():
+        for doubt in several:
+            grouped.setdefault((doubt.name, doubt.where), {})[design] = doubt
+    for same in grouped.values():
+        design, doubt = list(same.items())[-1]  # the last is the one that the run is about
+        others = "" if len(same) == len(found) else f"{', '.join(same)}: "
+        yield f"please check: {others}{doubt}"
+
+
+def bores(file: DesignFile) -> str:
+    """Both bores, since the body is held there, and whether anybody has asked for them."""
+    gears = (("pinion", file.pair().pinion), ("wheel", file.pair().wheel))
+    texts = []
+    for name, gear in gears:
+        guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
+        texts.append(f"{name} {2 * float(gear.bore_radius):.4g} mm{guess}")
+    return f"bores: {', '.join(texts)}"
+
+
 def unmodified(evaluations: Evaluations) -> float:
     """PPTE of the first design, which is unmodified [um]."""
     return float(next(iter(evaluations.values())).metrics["ppte_um"])
@@ -90,7 +125,15 @@ def summary(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.
         "design_file": file.path.name,
         "torque_Nm": file.torque,
         "torque_range_Nm": file.torque_range,
-        "designs": {name: _design(evaluation) for name, evaluation in evaluations.items()},
+        "speed_rpm": file.speed,
+        "friction": file.friction,
+        "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
+        "center_distance_mm": mesh.pair.working_center_distance,
+        "model": {"compliance": _words(mesh.compliance), "plane": mesh.kinematics.plane},
+        "designs": {
+            name: {**_design(evaluation), "doubts": [_doubt(doubt) for doubt in several]}
+            for (name, evaluation), several in zip(evaluations.items(), doubts(file, evaluations).values())
+        },
         "ppte_reduction_percent": reduction(evaluations),
         "ppte_over_torque": {
             "torque_Nm": torques,
@@ -157,6 +200,30 @@ def _design(evaluation: Evaluation) -> dict[str, Any]:
         "wheel_modification": describe(evaluation.wheel),
         "time_s": evaluation.seconds,
     }
+
+
+def _gear(gear: Gear) -> dict[str, Any]:
+    """Every number of a gear, with those that follow from others where the file gives none."""
+    derived = {"tip_diameter": 2 * gear.tip_radius, "bore_diameter": 2 * gear.bore_radius}
+    data: dict[str, Any] = {}
+    for part in (gear, gear.material):
+        for name, field in fields_of(type(part)).items():
+            unit = "" if field.unit == "x module" else field.unit.replace(" ", "").replace("/", "_per_")
+            value = derived.get(name, getattr(part, name))
+            data[f"{name}_{unit}" if unit else name] = np.asarray(value)
+    data["bore_given"] = gear.bore_diameter is not None
+    return data
+
+
+def _words(part: eqx.Module) -> str:
+    """A model by the names of its parts and switches."""
+    values = (getattr(part, field.name) for field in dataclasses.fields(part))
+    inner = [_words(value) if isinstance(value, eqx.Module) else str(value) for value in values]
+    return f"{type(part).__name__}({', '.join(inner)})"
+
+
+def _doubt(doubt: Doubt) -> dict[str, Any]:
+    return {"name": doubt.name, "where": doubt.where, "value": doubt.value, **doubt.limit._asdict()}
 
 
 def _flank_cells(evaluation: Evaluation) -> Iterator[tuple[str, str]]:

@@ -88,7 +88,7 @@ class Run:
                 optimum_report.write_figures(self._folder, self._mesh, self._optimum, self._front, surface)
 
     def show(self) -> bool:
-        """Prints the comparison, after the results are in place; False when a contact solution failed."""
+        """Prints the comparison, after the results are in place; False when a solution or a constraint failed."""
         out = report.console()
         out.print(report.table(self.design, self._evaluations))
         if self._optimum is not None:
@@ -105,10 +105,16 @@ class Run:
                 out.print(line, soft_wrap=True)
         if self._quick:
             out.print("quick run: coarse positions and a short search, not a result to build on", soft_wrap=True)
+        out.print(report.bores(self.design), soft_wrap=True)
+        for line in report.doubt_lines(report.doubts(self.design, self._evaluations)):
+            out.print(line, soft_wrap=True)
         out.print(f"results in {self._target}{os.sep}, {self._stages.elapsed:.1f} s", soft_wrap=True)
         failures = list(report.failures(self._evaluations))
         for line in failures:
             report.console(stderr=True).print(f"jaxgear: warning: {line}", style="bold red", soft_wrap=True)
+        if self._optimum is not None and not self._optimum.feasible:
+            failures.append("constraints are not met")
+            report.console(stderr=True).print(f"jaxgear: warning: {failures[-1]}", style="bold red", soft_wrap=True)
         return not failures
 
 

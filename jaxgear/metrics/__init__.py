@@ -15,6 +15,8 @@ from .load import effective_contact_ratio as effective_contact_ratio
 from .load import load_sharing as load_sharing
 from .loss import loss_factor as loss_factor
 from .loss import ohlendorf_loss_factor as ohlendorf_loss_factor
+from .plausibility import Doubt as Doubt
+from .plausibility import plausibility as plausibility
 from .quantity import Quantity as Quantity
 from .quantity import quantities as quantities
 from .quantity import quantity_of as quantity_of

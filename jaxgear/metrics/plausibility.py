@@ -1,0 +1,168 @@
+"""Numbers that can be computed but hardly be meant: what an experienced engineer would ask about.
+
+One table of limits serves inputs and results alike. Nothing is refused here: a doubt is a question.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..contact import MeshCycle, Side
+from ..geometry import Gear
+from ..microgeometry import AbstractModification, NoModification
+from .flank import removed_at
+from .load import effective_contact_ratio
+from .root_stress import root_stress
+
+_PROFILE_POINTS, _FACE_POINTS = 101, 3
+
+
+class Limit(NamedTuple):
+    """What is usual of a number.
+
+    Attributes:
+        low, high: the usual range.
+        unit: of all three.
+        remark: what is likely meant, or what the number means; with its source.
+    """
+
+    low: float
+    high: float
+    unit: str
+    remark: str
+
+
+LIMITS = {
+    "torque": Limit(0.0, np.inf, "N m", "the design torque lies outside the range of torques that is looked at"),
+    "module": Limit(0.05, 100.0, "mm", "ISO 54 lists 1 to 50 mm, fine mechanics goes down to 0.1 mm"),
+    "elastic modulus": Limit(500.0, 700_000.0, "MPa", "plastics 1000 to 10000, steel 206000 MPa: is it in GPa or Pa?"),
+    "density": Limit(500.0, 25_000.0, "kg/m^3", "steel 7850 kg/m^3: is it in g/cm^3?"),
+    "bore to root diameter": Limit(0.1, 0.95, "", "the body is a ring held at its bore, which is hardly one"),
+    "face width in modules, plane stress": Limit(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "strain"'),
+    "tip edge radius in modules": Limit(0.0, 0.2, "", "an edge is broken by 0.01 to 0.1 modules"),
+    "coefficient of friction": Limit(0.0, 0.5, "", "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"),
+    "pitch line velocity": Limit(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
+    "depth of the modification": Limit(0.1, np.inf, "um", "less than flanks can be measured to: is it in mm?"),
+    "depth of the modification in modules": Limit(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
+    "length of the modification": Limit(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
+    "mean transmission error in modules": Limit(0.0, 0.02, "", "the teeth bend beyond what the model is made for"),
+    "flank pressure": Limit(0.0, 1650.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
+    "root stress": Limit(0.0, 1050.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
+    "effective contact ratio": Limit(1.0, np.inf, "", "the teeth lose contact, and shocks follow"),
+}
+
+
+class Doubt(NamedTuple):
+    """A number that is not usual.
+
+    Attributes:
+        name: key of `LIMITS`.
+        where: "pinion", "wheel", or "" for the pair.
+        value: the number, in the unit of the limit.
+        limit: what is usual.
+    """
+
+    name: str
+    where: str
+    value: float
+    limit: Limit
+
+    def __str__(self) -> str:
+        low, high, unit, remark = self.limit
+        bound = f"less than {low:.4g}" if self.value < low else f"more than {high:.4g}"
+        number = f"{self.name} {self.value:.4g}" + (f" {unit}" if unit else "")
+        return f"{f'{self.where}, ' if self.where else ''}{number} is {bound} ({remark})"
+
+
+def plausibility(
+    cycle: MeshCycle,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+    torque_range: tuple[float, float] | None = None,
+    speed: float | None = None,
+    friction: float | None = None,
+) -> tuple[Doubt, ...]:
+    """What of a solved design is not usual; empty where nothing is.
+
+    Args:
+        cycle: solved, one design and one torque, not traced.
+        pinion, wheel: modifications; None for those of the cycle.
+        torque_range: lowest and highest torque of interest [N m].
+        speed: of the pinion [rpm]; None for that of the cycle.
+        friction: coefficient of friction; None for that of the cycle.
+    """
+    flanks = tuple(given or own or NoModification() for given, own in ((pinion, cycle.pinion), (wheel, cycle.wheel)))
+    speed = cycle.operation.speed if speed is None else speed
+    friction = cycle.operation.friction if friction is None else friction
+    numbers = [*_of_gears(cycle), *_of_flanks(cycle, flanks), *_of_results(cycle)]
+    if speed is not None:
+        velocity = float(speed) * 2 * np.pi / 60 * float(cycle.kinematics.pair.pinion.pitch_radius) * 1e-3
+        numbers.append(("pitch line velocity", "", velocity, LIMITS["pitch line velocity"]))
+    if friction is not None:
+        numbers.append(("coefficient of friction", "", float(friction), LIMITS["coefficient of friction"]))
+    if torque_range is not None:
+        low, high = torque_range
+        numbers.append(("torque", "", float(cycle.torque), LIMITS["torque"]._replace(low=low, high=high)))
+    return tuple(Doubt(*each) for each in numbers if not each[3].low <= each[2] <= each[3].high)
+
+
+def _of_gears(cycle: MeshCycle) -> Iterator[tuple[str, str, float, Limit]]:
+    for where, side in zip(("pinion", "wheel"), cycle.sides):
+        gear: Gear = side.gear
+        module = float(gear.module)
+        values = {
+            "module": module,
+            "elastic modulus": gear.material.elastic_modulus,
+            "density": gear.material.density,
+            "bore to root diameter": gear.bore_radius / gear.root_circle_radius,
+            "tip edge radius in modules": gear.tip_edge_radius / module,
+        }
+        for name, value in values.items():
+            yield name, where, float(value), LIMITS[name]
+    if cycle.kinematics.plane == "stress":
+        name = "face width in modules, plane stress"
+        yield name, "", float(cycle.kinematics.pair.face_width / cycle.kinematics.pair.pinion.module), LIMITS[name]
+
+
+def _of_flanks(cycle: MeshCycle, flanks) -> Iterator[tuple[str, str, float, Limit]]:
+    for where, side, modification in zip(("pinion", "wheel"), cycle.sides, flanks):
+        if isinstance(modification, NoModification):
+            continue
+        roll = jnp.linspace(side.start_roll_length, side.tip_roll_length, _PROFILE_POINTS)
+        face = jnp.linspace(-0.5, 0.5, _FACE_POINTS, dtype=roll.dtype) * side.face_width
+        depth = float(jnp.max(jnp.abs(removed_at(side, modification, roll, face))))
+        if depth > 0:
+            yield "depth of the modification", where, depth, LIMITS["depth of the modification"]
+        name = "depth of the modification in modules"
+        yield name, where, depth / 1e3 / float(side.gear.module), LIMITS[name]
+        for length, longest in _lengths(modification, side):
+            limit = LIMITS["length of the modification"]._replace(high=longest)
+            yield "length of the modification", where, length, limit
+
+
+def _lengths(modification: AbstractModification, side: Side) -> Iterator[tuple[float, float]]:
+    """Lengths of all terms, and the longest that the flank has in their direction."""
+    terms = jax.tree.leaves(modification, is_leaf=lambda part: hasattr(part, "length"))
+    for term in terms:
+        if hasattr(term, "length"):
+            along_face = getattr(term, "varies_along_face", False)
+            longest = 0.5 * side.face_width if along_face else side.tip_roll_length - side.start_roll_length
+            yield float(term.length), float(longest)
+
+
+def _of_results(cycle: MeshCycle) -> Iterator[tuple[str, str, float, Limit]]:
+    module = float(cycle.kinematics.pair.pinion.module)
+    stress = root_stress(cycle)
+    values = (
+        ("mean transmission error in modules", "", float(np.mean(cycle.transmission_error)) / 1e3 / module),
+        ("flank pressure", "", float(np.max(cycle.contact_pressure))),
+        ("root stress", "pinion", float(np.max(stress.pinion))),
+        ("root stress", "wheel", float(np.max(stress.wheel))),
+        ("effective contact ratio", "", float(effective_contact_ratio(cycle))),
+    )
+    for name, where, value in values:
+        yield name, where, value, LIMITS[name]

@@ -1,0 +1,78 @@
+"""Doubts: usual designs raise none, and every slip of a unit or of a digit raises the one that names it."""
+
+import equinox as eqx
+import pytest
+
+import jaxgear as jg
+from jaxgear.metrics import plausibility
+
+
+def names(cycle, **options):
+    return {(doubt.name, doubt.where) for doubt in plausibility(cycle, **options)}
+
+
+@pytest.fixture(scope="module")
+def cycle(mesh):
+    relief = jg.TipRelief(6.9, 3.4)
+    return jg.solve(mesh, 50.0, pinion=relief, wheel=relief)
+
+
+def replaced(cycle, where, **values):
+    """The cycle with other numbers of a gear or of its material."""
+    for name, value in values.items():
+
+        def number(cycle, name=name):
+            gear = getattr(cycle.kinematics.pair, where)
+            return getattr(gear if hasattr(gear, name) else gear.material, name)
+
+        cycle = eqx.tree_at(number, cycle, number(cycle) * 0 + value)
+    return cycle
+
+
+def test_a_usual_design_raises_no_doubt(cycle):
+    assert plausibility(cycle, torque_range=(25.0, 100.0), speed=3000.0, friction=0.06) == ()
+
+
+@pytest.mark.parametrize(
+    "options, expected",
+    [
+        ({"pinion": jg.TipRelief(7000.0, 3.4)}, ("depth of the modification in modules", "pinion")),
+        ({"wheel": jg.TipRelief(0.007, 3.4)}, ("depth of the modification", "wheel")),
+        ({"wheel": jg.TipRelief(7.0, 34.0)}, ("length of the modification", "wheel")),
+        ({"pinion": jg.TipRelief(7.0, 3.0) + jg.RootRelief(7.0, 30.0)}, ("length of the modification", "pinion")),
+        ({"pinion": jg.EndRelief(7.0, 15.0)}, ("length of the modification", "pinion")),
+        ({"friction": 3.7}, ("coefficient of friction", "")),
+        ({"speed": 1e6}, ("pitch line velocity", "")),
+        ({"torque_range": (60.0, 100.0)}, ("torque", "")),
+    ],
+)
+def test_slips_of_flanks_and_operation(cycle, options, expected):
+    assert names(cycle, **options) == {expected}
+
+
+@pytest.mark.parametrize(
+    "values, expected",
+    [
+        ({"elastic_modulus": 2e11}, "elastic modulus"),
+        ({"elastic_modulus": 206.0}, "elastic modulus"),
+        ({"density": 7.85}, "density"),
+        ({"tip_edge_radius": 5.0}, "tip edge radius in modules"),
+        ({"face_width": 5000.0}, "face width in modules, plane stress"),
+    ],
+)
+def test_slips_of_gears(cycle, values, expected):
+    wrong = replaced(replaced(cycle, "wheel", **values), "pinion", **values)
+    assert expected in {name for name, _ in names(wrong)}
+
+
+def test_results_beyond_materials_and_contact(cycle, mesh):
+    heavy = jg.solve(mesh, 2000.0)
+    assert {("flank pressure", ""), ("root stress", "pinion"), ("root stress", "wheel")} <= names(heavy)
+    deep = jg.solve(mesh, 2.0, pinion=jg.TipRelief(60.0, 5.5), wheel=jg.TipRelief(60.0, 5.5))
+    assert ("effective contact ratio", "") in names(deep)
+
+
+def test_a_doubt_reads_like_a_question_of_a_colleague(cycle):
+    (doubt,) = plausibility(cycle, friction=3.7)
+    usual = "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"
+    assert str(doubt) == f"coefficient of friction 3.7 is more than 0.5 ({usual})"
