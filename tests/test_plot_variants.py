@@ -123,7 +123,7 @@ def test_a_given_ax_is_used_and_legends_cover_no_data(draw, name):
         "max_line_load_N_per_mm": "max line load [N/mm]",
         "min_tangent_stiffness_N_per_um": "min tangent stiffness [N/µm]",
         "mesh_loss_factor": "mesh loss factor [-]",
-        "ppte_um_50Nm_q95": "PPTE at 50 N m q95 [µm]",
+        "ppte_um_50Nm_q95": "PPTE at 50 N m, q95 over gears [µm]",
         "ppte_um_12.5Nm": "PPTE at 12.5 N m [µm]",
         "corner_force_N_worst": "corner force worst [N]",
         "number": "number [-]",
@@ -141,11 +141,15 @@ def test_radar_runs_from_the_worst_to_the_best_of_the_variants_shown(table):
     shape = {name: np.asarray(panel.lines[-1].get_ydata()) for name, panel in zip(NAMES, panels)}
     radius = np.stack([shape[name][:-1] for name in NAMES])
     np.testing.assert_allclose(radius.max(axis=0), 1.0)
-    np.testing.assert_allclose(radius.min(axis=0), radius.min())
+    values = np.stack([table[name][rows] for name in COLUMNS], axis=1)
+    span = np.ptp(values, axis=0) / np.where([name == "effective_contact_ratio" for name in COLUMNS],
+                                             values.max(axis=0), values.min(axis=0))  # fmt: skip
+    # a difference of a few percent is not stretched over the whole chart: the inner ring is a fifth from the best
+    np.testing.assert_allclose(radius.min(axis=0), 1 - 0.75 * np.minimum(span / 0.2, 1.0))
     # the unmodified variant has the highest PPTE and loss, the lowest pressure and the largest contact ratio
     np.testing.assert_array_equal(radius[0] == 1.0, [False, False, True, True])
     # in between, in proportion: relief 4.07 um of 0 to 6.10 um decides the loss
-    worst = radius.min()
+    worst = radius[:, 1].min()
     assert radius[1, 1] == pytest.approx(worst + (1 - worst) * 20 / 30)
 
 

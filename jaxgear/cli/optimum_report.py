@@ -85,11 +85,12 @@ def write_figures(
     torques, errors = surface
     unloaded = optimum.cycle.unloaded_transmission_error
     axes: dict[str, Any] = {
-        "convergence": plot.convergence({optimum.method: optimum}),
         "response_surface": plot.response_surface(
-            mesh.phase, torques, errors, unloaded, design_torque=float(optimum.cycle.torque)
+            mesh.phase, torques, errors, unloaded, design_torque=float(optimum.cycle.torque), design="optimum"
         ),
     }
+    if optimum.front is None:  # the compromise of a front is measured by the front so far, which moves
+        axes["convergence"] = plot.convergence({optimum.method: optimum})
     if optimum.iterations:
         axes["iterations_relief"] = plot.iterations_relief(mesh, optimum)
         axes["iterations_transmission_error"] = plot.iterations_transmission_error(optimum, mesh.phase)

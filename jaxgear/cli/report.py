@@ -37,6 +37,7 @@ _ROWS = {
     "max_flash_temperature_K": ("max flash temperature [K]", ".1f"),
 }
 _HARRIS_CURVES = 7
+_TITLE = 9.0  # [pt]
 
 
 def table(file: DesignFile, evaluations: Evaluations) -> Table:
@@ -114,7 +115,11 @@ def reduction(evaluations: Evaluations) -> float:
 
 def main(evaluations: Evaluations) -> Evaluation:
     """The design that the run is about: the optimum where there is one, else the last."""
-    return evaluations.get("optimum", list(evaluations.values())[-1])
+    return evaluations[_main_name(evaluations)]
+
+
+def _main_name(evaluations: Evaluations) -> str:
+    return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
 
 
 def summary(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
@@ -166,9 +171,15 @@ def write_figures(folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evalu
         "ppte_over_torque": plot.ppte_over_torque(
             torques, {name: evaluation.ppte for name, evaluation in evaluations.items()}, design_torque=file.torque
         ),
-        "harris_map": plot.harris_map(mesh.phase, torques[few], main(evaluations).transmission_error[few]),
+        "harris_map": plot.harris_map(
+            mesh.phase, torques[few], main(evaluations).transmission_error[few], design=_main_name(evaluations)
+        ),
         "k_chart": plot.k_chart(mesh, flanks(evaluations)),
     }
+    if mesh.resolution.slices > 1:
+        axes["lead_chart"] = plot.lead_chart(mesh, flanks(evaluations))
+        axes["pressure_map"] = plot.pressure_map(main(evaluations).cycle)
+        axes["pressure_map"].set_title(_main_name(evaluations), loc="left", fontsize=_TITLE)
     for name, drawn in axes.items():
         plot.save(np.ravel(drawn)[0].figure, folder / f"{name}.png")
 

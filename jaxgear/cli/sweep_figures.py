@@ -40,14 +40,18 @@ def write_figures(folder: Path, table: SweepTable, results: Sequence[str]) -> No
         if step > 1:  # the front is that of all variants, whichever of the others are drawn
             rows = np.union1d(rows, table.pareto(heads[:3]).column("variant"))
         axes["pareto"] = plot.pareto(_columns(table.take(rows), heads[:3]), *heads[:3], **options)
-    lines = _columns(table.take(np.arange(0, size, step)), [*table.parameters, *heads])
-    axes["parallel_coordinates"] = plot.parallel_coordinates(
-        lines, list(lines), heads[0], best=3 if step == 1 else 0, **options
-    )
     best = table.best(_CHARTS)
+    numbers = np.union1d(np.arange(0, size, step), best.column("variant"))  # the best of all, too
+    lines = _columns(table.take(numbers), [*table.parameters, *heads])
+    axes["parallel_coordinates"] = plot.parallel_coordinates(lines, list(lines), heads[0], numbers=numbers, **options)
     if len(heads) > 2:
         names = [f"variant {number}" for number in best.column("variant")]
-        axes["radar"] = plot.radar(_columns(best, heads), heads, names=names, **options)
+        # what is said of all results alike stands once, under the charts
+        short = {head: plot.label(name) for head, name in zip(heads, (quantity_of(result).key for result in results))}
+        common = plot.label(heads[0]).rpartition(" [")[0].removeprefix(short[heads[0]].rpartition(" [")[0]).strip()
+        axes["radar"] = plot.radar(
+            _columns(best, heads), heads, names=names, note=common, labels=short, maximize=maximize
+        )
     for name, drawn in axes.items():
         axis = np.ravel(drawn)[0]
         if step > 1 and name != "radar":

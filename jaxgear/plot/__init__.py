@@ -12,6 +12,7 @@ from .figure import save as save
 from .iterations import iterations_relief as iterations_relief
 from .iterations import iterations_transmission_error as iterations_transmission_error
 from .k_chart import k_chart as k_chart
+from .lead_chart import lead_chart as lead_chart
 from .load_sharing import load_sharing as load_sharing
 from .optimizer_comparison import optimizer_comparison as optimizer_comparison
 from .optimum_front import optimum_front as optimum_front
@@ -24,3 +25,4 @@ from .response_surface import response_surface as response_surface
 from .torque import harris_map as harris_map
 from .torque import ppte_over_torque as ppte_over_torque
 from .transmission_error import transmission_error as transmission_error
+from .variants import label as label

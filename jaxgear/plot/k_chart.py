@@ -14,7 +14,7 @@ from ..microgeometry import AbstractModification, Flank, NoModification
 from .figure import HEIGHT, legend_above, legend_over_panels, line_style, report_axes
 
 _POINTS = 201  # over the active profile
-_WIDTH = 150.0  # of the two panels together [mm]
+WIDTH = 150.0  # of the two panels together [mm]
 _ABOVE_DIAMETERS = 34.0  # [pt]; clears numbers and label of the upper axis
 
 Design = tuple[AbstractModification | None, AbstractModification | None]
@@ -35,7 +35,7 @@ def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray:
         the two Axes.
     """
     own = ax is None
-    with report_axes(ax, columns=2, width=_WIDTH, height=HEIGHT) as panels:
+    with report_axes(ax, columns=2, width=WIDTH, height=HEIGHT) as panels:
         contact, pair = mesh.path_of_contact, mesh.pair
         sides = (
             ("pinion", pair.pinion, contact.pinion_roll_length(contact.start)),
@@ -50,7 +50,7 @@ def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray:
             panel.set(xlim=(angle[0], angle[-1]), xlabel=f"roll angle of the {title} [deg]")
             _diameter_axis(panel, gear)
         panels[0].set_ylabel("material removed [µm]")
-        _downwards(panels)
+        downwards(panels)
         if own:
             legend_over_panels(panels[0].figure, panels[0])
         else:
@@ -85,7 +85,7 @@ def _diameter_axis(panel: Axes, gear: Gear) -> None:
     upper.tick_params(labelsize=panel.xaxis.label.get_fontsize(), width=0.6, length=3)
 
 
-def _downwards(panels) -> None:
+def downwards(panels) -> None:
     """One common ordinate that points down and has the nominal involute in sight."""
     lines = [line.get_ydata() for panel in panels for line in panel.lines]
     values = np.concatenate([[0.0], *lines])

@@ -28,6 +28,7 @@ def parallel_coordinates(
     *,
     best: int = 3,
     shown: int = 500,
+    numbers: Sequence[int] | None = None,
     labels: Labels | None = None,
     maximize: Collection[str] = (),
 ) -> Axes:
@@ -41,8 +42,9 @@ def parallel_coordinates(
         columns: parameters and results from left to right, at least two.
         colour_by: column of the colour, which also decides what is best.
         ax: Axes to draw into; None for a new figure.
-        best: how many of the best variants stand out, with their row number in the legend; up to 5.
+        best: how many of the best variants stand out, with their number in the legend; up to 5.
         shown: how many of the others to draw at most, at random; the picture says how many of how many.
+        numbers: of the variants; None for their row numbers.
         labels: labels with units by column; others are derived from the column's name.
         maximize: columns in which large values are the better ones; only that of `colour_by` counts.
 
@@ -66,7 +68,7 @@ def parallel_coordinates(
         ax.add_collection(LineCollection(lines, colors=colours.to_rgba(colour[cloud]), linewidths=0.6, alpha=opacity))
         what, unit = parts(label(colour_by, labels))
         for style, row in zip(_BEST_STYLES[: max(best, 0)], rank):
-            text = f"variant {row}: {what} {colour[row]:.3g} {unit}".rstrip()
+            text = f"variant {row if numbers is None else numbers[row]}: {what} {colour[row]:.3g} {unit}".rstrip()
             ax.plot(across, heights[row], label=text, **{**line_style(style), "linewidth": 1.8})
         seen = share_text(len(cloud), rows.size, len(values) - rows.size)
         ax.plot([], [], color=colours.to_rgba(np.median(colour[rows])), linewidth=0.8, label=seen)

@@ -1,5 +1,6 @@
 """Radar charts of a few variants in parallel."""
 
+import textwrap
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -10,7 +11,10 @@ from .variants import Labels, Table, columns_of, costs, label, parts
 _PANEL = (58.0, 60.0)  # width and height of one chart [mm]
 _ACROSS = 3  # charts in a row
 _INNER = 0.25  # radius of the worst value, of 1 for the best
+_LEAST_SPAN = 0.2  # of the best value, from the rim to the inner ring
 _LABEL_RADIUS = 1.13
+_LINE = 16  # characters of a label
+_LINES, _TITLE_PAD = 2, 9.0  # lines on the upper spoke, and the distance of the title that clears them [pt]
 
 
 def radar(
@@ -20,10 +24,13 @@ def radar(
     names: Sequence[str] | None = None,
     ax: np.ndarray | None = None,
     *,
+    note: str = "",
     labels: Labels | None = None,
     maximize: Collection[str] = (),
 ) -> np.ndarray:
     """One radar chart per variant, each spoke from the worst value of the variants shown, inside, to the best one.
+
+    Where they differ by less than a fifth, the inner ring is a fifth from the best.
 
     So the larger the area, the better the variant. Its values stand at the spokes, the best ones of all charts in bold;
     the first variant is drawn into every chart for comparison.
@@ -34,6 +41,7 @@ def radar(
         variants: row numbers of the variants; None for all rows, of which a page holds about nine.
         names: of the variants; None for their row numbers.
         ax: one polar Axes per variant; None for a new figure.
+        note: what all values have in common, such as "mean over torques"; it stands under the charts.
         labels: labels with units by column; others are derived from the column's name.
         maximize: columns in which large values are the better ones.
 
@@ -61,7 +69,8 @@ def radar(
         for unused in grid[len(rows) :]:
             unused.remove()
         _draw(grid[: len(rows)], radii, texts, names)
-        note = f"rim: best of these variants, inner ring: worst; dashed: {names[0]}"
+        note = f"{note}\n" if note else ""
+        note += f"rim: best of these variants, inner ring: worst, or 20 % from the best; dashed: {names[0]}"
         figure.supxlabel(note, fontsize=FONT - 1, color=GREY)
     return grid[: len(rows)]
 
@@ -78,7 +87,9 @@ def _check(values, rows, names, columns) -> None:
 def _radii(cost: np.ndarray) -> np.ndarray:
     """Distance from the centre: 1 for the best of every column, also where all are equal."""
     best, worst = cost.min(axis=0), cost.max(axis=0)
-    badness = (cost - best) / np.where(worst > best, worst - best, 1.0)
+    # small differences are not stretched over the whole chart
+    span = np.maximum(worst - best, _LEAST_SPAN * np.abs(best))
+    badness = (cost - best) / np.where(span > 0, span, 1.0)
     return 1 - (1 - _INNER) * badness
 
 
@@ -96,16 +107,14 @@ def _texts(values: np.ndarray, named) -> list[list[str]]:
 
 
 def _wrapped(what: str) -> str:
-    """Long names on two lines of about the same length."""
-    words = what.split(" ")
-    if len(what) <= 12 or len(words) == 1:
-        return what
-    breaks = [(" ".join(words[:i]), " ".join(words[i:])) for i in range(1, len(words))]
-    return "\n".join(min(breaks, key=lambda pair: max(map(len, pair))))
+    """Long names on several lines."""
+    return "\n".join(textwrap.wrap(what, _LINE, break_long_words=False))
 
 
 def _draw(panels, radii: np.ndarray, texts, names) -> None:
     angles = 2 * np.pi * np.arange(radii.shape[1]) / radii.shape[1]
+    above = max(text[0].count("\n") + 1 for text in texts)  # lines on the upper spoke
+    pad = _TITLE_PAD + max(above - _LINES, 0) * 1.15 * (FONT - 2)
     for index, (panel, radius) in enumerate(zip(panels, radii)):
         _frame(panel, angles)
         style = line_style(index)
@@ -115,7 +124,7 @@ def _draw(panels, radii: np.ndarray, texts, names) -> None:
         panel.fill(angles, radius, color=style["color"], alpha=0.15, linewidth=0, zorder=2)
         for angle, far, text in zip(angles, radius, texts[index]):
             _spoke_text(panel, angle, text, bold=far == 1.0)
-        panel.set_title(names[index], fontsize=FONT, fontweight="bold", color=style["color"], pad=9)
+        panel.set_title(names[index], fontsize=FONT, fontweight="bold", color=style["color"], pad=pad)
 
 
 def _frame(panel, angles) -> None:

@@ -12,7 +12,14 @@ _EDGE = 0.04  # part of the Axes along its edges that is too close for a label
 
 
 def response_surface(
-    phase, torques, te, unloaded, ax: Axes | None = None, *, design_torque: float | None = None
+    phase,
+    torques,
+    te,
+    unloaded,
+    ax: Axes | None = None,
+    *,
+    design_torque: float | None = None,
+    design: str | None = None,
 ) -> Axes:
     """Transmission error [um] as a surface over mesh phase and torque, with the unloaded one at its foot.
 
@@ -23,6 +30,7 @@ def response_surface(
         unloaded: transmission error at vanishing load [um], shape (positions,).
         ax: Axes to draw into; None for a new figure.
         design_torque: [N m], drawn as a line; None for none.
+        design: name of the design, for a title; None for none.
     """
     torques, te = np.asarray(torques, float), np.asarray(te, float)
     loaded = np.argsort(torques)
@@ -42,6 +50,9 @@ def response_surface(
             text = f"design torque {float(design_torque):g} N m"
             ax.axhline(float(design_torque), color="black", linewidth=1.2, linestyle=(0, (4, 2)), label=text)
             legend_above(ax)
+        if design is not None:
+            pad = 24.0 if design_torque is not None else 6.0  # [pt], above the legend
+            ax.set_title(design, loc="left", pad=pad, fontsize=ax.xaxis.label.get_fontsize())
         _labelled_lines(ax, x, rows, surface, levels)
     return ax
 

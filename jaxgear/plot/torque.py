@@ -38,7 +38,7 @@ def ppte_over_torque(
     return ax
 
 
-def harris_map(phase, torques, te, ax: Axes | None = None) -> Axes:
+def harris_map(phase, torques, te, ax: Axes | None = None, *, design: str | None = None) -> Axes:
     """Transmission error over two base pitches at several torques (Harris 1958), each curve with its torque at the end.
 
     Args:
@@ -46,6 +46,7 @@ def harris_map(phase, torques, te, ax: Axes | None = None) -> Axes:
         torques: on the pinion [N m], shape (torques,).
         te: transmission error [um], shape (torques, positions).
         ax: Axes to draw into; None for a new figure.
+        design: name of the design, for a title; None for none.
     """
     order = np.argsort(torques)
     torques = np.asarray(torques)[order]
@@ -55,6 +56,8 @@ def harris_map(phase, torques, te, ax: Axes | None = None) -> Axes:
         for curve, colour in zip(curves, colours):
             ax.plot(x, curve, color=colour, linewidth=1.3)
         ax.set(xlim=(0, 2), xlabel=PHASE_LABEL, ylabel="transmission error [µm]")
+        if design is not None:
+            ax.set_title(design, loc="left", fontsize=ax.xaxis.label.get_fontsize())
         heights = _spread(curves[:, -1], _line_height(ax))
         for torque, height, colour in zip(torques, heights, colours):
             text = f"{torque:g} N m"

@@ -25,9 +25,8 @@ _UNITS = {
     "percent": "%",
 }
 # what may follow the unit: the torque, or a statistic over torques and samples
-_NAME = re.compile(
-    rf"(?P<what>.+?)_(?P<unit>{'|'.join(_UNITS)})(?P<of>(_[-+.\de]+(Nm|rpm)|_mean|_worst|_q[.\d]+|_cvar[.\d]+)*)"
-)
+_STATISTIC = r"_[-+.\de]+(?:Nm|rpm)|_mean|_worst|_q[.\d]+|_cvar[.\d]+"
+_NAME = re.compile(rf"(?P<what>.+?)(_(?P<unit>{'|'.join(_UNITS)}))?(?P<of>({_STATISTIC})*)")
 _ACRONYMS = {"ppte": "PPTE", "te": "TE"}
 
 
@@ -41,11 +40,20 @@ def label(name: str, labels: Labels | None = None) -> str:
     if labels and name in labels:
         return labels[name]
     match = _NAME.fullmatch(name)
-    what, unit, of = (match["what"], _UNITS[match["unit"]], match["of"]) if match else (name, "-", "")
-    words = [_ACRONYMS.get(word, word) for word in (what + of).split("_")]
-    words = [re.sub(r"^([-+.\de]+)Nm$", r"at \1 N m", word) for word in words]
-    words = [re.sub(r"^([-+.\de]+)rpm$", r"at \1 rpm", word) for word in words]
-    return f"{' '.join(words)} [{unit}]"
+    what, unit, of = (match["what"], _UNITS.get(match["unit"], "-"), match["of"]) if match else (name, "-", "")
+    words = " ".join(_ACRONYMS.get(word, word) for word in what.split("_"))
+    return f"{words}{_in_words(re.findall(_STATISTIC, of))} [{unit}]"
+
+
+def _in_words(statistics: Sequence[str]) -> str:
+    """Cases and statistics of a column: the last of several is over manufactured gears, one before it over torques."""
+    texts = [re.sub(r"^([-+.\de]+)(Nm|rpm)$", lambda match: f"at {match[1]} {_UNITS[match[2]]}", one[1:])
+             for one in statistics]  # fmt: skip
+    over = [index for index, text in enumerate(texts) if not text.startswith("at ")]
+    if over and len(texts) > 1:
+        texts[over[-1]] += " over gears"
+        texts[over[0]] += " over torques" if len(over) > 1 else ""
+    return f" {', '.join(texts)}".rstrip()
 
 
 def parts(text: str) -> tuple[str, str]:
