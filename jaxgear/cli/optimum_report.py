@@ -89,7 +89,7 @@ def write_figures(
             mesh.phase, torques, errors, unloaded, design_torque=float(optimum.cycle.torque), design="optimum"
         ),
     }
-    if optimum.front is None:  # the compromise of a front is measured by the front so far, which moves
+    if front is None:  # the compromise of a front is measured by the front so far, which moves
         axes["convergence"] = plot.convergence({optimum.method: optimum})
     if optimum.iterations:
         axes["iterations_relief"] = plot.iterations_relief(mesh, optimum)
