@@ -14,7 +14,7 @@ from ..contact import Resolution
 from ..geometry import Gear, GearPair, Material
 from ..metrics import quantities
 from ..microgeometry import AbstractCurve, AbstractModification
-from ..optimize import METHODS, free_form, iterate_transmission_error
+from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from . import schema, schema_sweep
 from .kinds import Either, Kind, ListOf, Real, Table, allowed
 from .layout import Section, family, meanings, section_of, summary
@@ -27,6 +27,7 @@ size that an engineer can mean (a length up to 100 m, a torque up to 10^9 N m). 
 and what is allowed.
 """
 _EXTRAS: dict[str, Callable[..., Any]] = {
+    "pareto": Pareto,
     "te_iteration": iterate_transmission_error,
     "free_form": free_form,
 }
