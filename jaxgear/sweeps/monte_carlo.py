@@ -143,11 +143,11 @@ def monte_carlo(
     flanks = pinion or NoModification(), wheel or NoModification()
     task = (mesh, real(torque), tolerance, *flanks, jax.random.key(seed))
     curves, converged, numbers = _run(task, wanted, samples + 1)
-    return _scatter(mesh.phase, curves, converged, levels, {of.key: column for of, column in zip(wanted, numbers.T)})
+    return _scatter(mesh.phase, curves, converged, levels, {of.key: column for of, column in zip(wanted, numbers)})
 
 
-def _run(task, results: tuple[Quantity, ...], count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Transmission errors (count, positions), success (count,) and results (count, results) on the host.
+def _run(task, results: tuple[Quantity, ...], count: int) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Transmission errors (count, positions), success (count,) and of every result (count,) on the host.
 
     Number 0 is the nominal design, which rides along without its own compilation.
     """
@@ -159,7 +159,7 @@ def _run(task, results: tuple[Quantity, ...], count: int) -> tuple[np.ndarray, n
         jax.device_get(_block(task, start + jnp.arange(block), results, batch, devices))
         for start in range(0, count, block)
     ]
-    curves, converged, numbers = (np.concatenate(part)[:count] for part in zip(*parts))
+    curves, converged, *numbers = (np.concatenate(part)[:count] for part in zip(*parts))
     return curves, converged, numbers
 
 
@@ -183,8 +183,8 @@ def _solve_number(task, number, results: tuple[Quantity, ...]):
     removed = design + jnp.where(number > 0, field, 0.0)
     cycle = solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
     found = [of(cycle) for of in results]
-    numbers = jnp.stack(found) if found else jnp.zeros((0,), mesh.phase.dtype)
-    return cycle.transmission_error, solved(cycle) & jnp.all(jnp.isfinite(numbers)), numbers
+    fine = jnp.all(jnp.stack([solved(cycle), *map(jnp.isfinite, found)]))
+    return cycle.transmission_error, fine, *found
 
 
 def _scatter(phase, curves: np.ndarray, converged: np.ndarray, levels: np.ndarray, numbers=None) -> Scatter:
