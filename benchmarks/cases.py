@@ -107,7 +107,7 @@ def gear_pair(name: str) -> jg.GearPair:
 
 
 @functools.cache
-def path_of_contact(name: str) -> jg.PathOfContact:
+def path_of_contact(name: str) -> jg.geometry.PathOfContact:
     """Path of contact of the pair of that name, as Python floats."""
     return jax.tree.map(float, jg.path_of_contact(gear_pair(name)))
 

@@ -35,11 +35,11 @@ LEGACY = Model("legacy", lambda plane: jg.legacy_compliance())
 MODELS = (
     DEFAULT,
     LEGACY,
-    Model("no coupling", _default_with(body=jg.ElasticRing(coupling=False))),
+    Model("no coupling", _default_with(body=jg.compliance.ElasticRing(coupling=False))),
     Model("no edge softening", _default_with(edge_softening=False)),
     Model("no corner contact", jg.default_compliance, corner_contact=False),
-    Model("constant Hertz", _default_with(contact=jg.ConstantHertz())),
-    Model("Weber", _default_with(contact=jg.Weber())),
+    Model("constant Hertz", _default_with(contact=jg.compliance.ConstantHertz())),
+    Model("Weber", _default_with(contact=jg.compliance.Weber())),
 )
 
 

@@ -52,7 +52,7 @@ def main(fast=False) -> dict:
     found = {}
     for teeth in PUBLISHED:
         pair = gear_pair(teeth)
-        iso = jg.iso_stiffness(pair, LINE_LOAD)
+        iso = jg.sizing.iso_stiffness(pair, LINE_LOAD)
         row = {"iso_single": float(iso.single), "iso_mesh": float(iso.mesh)}
         for plane in ("stress",) if fast else ("stress", "strain"):
             compliance = jg.default_compliance(plane, hub_windup=False)

@@ -145,7 +145,7 @@ def main(fast=False) -> dict:
             f"{name}_pressure_over_phase": flank.tolist(),
             f"{name}_single_pressure": float(flank[single].mean()),
             f"{name}_single_pressure_spread": float(jnp.ptp(flank[single])),
-            f"{name}_corner_force": float(jg.contact_shock(nominal).force),
+            f"{name}_corner_force": float(jg.metrics.contact_shock(nominal).force),
         }
     return found
 

@@ -65,7 +65,7 @@ def study(fast=False):
         coupled = prepare(pair, jg.default_compliance(), resolution)
         published = prepare(pair, jg.legacy_compliance(), resolution)
         models = {"coupled": coupled, "uncoupled": uncouple(coupled), "published": published}
-        amounts = relative * jg.relief_amount(pair, torque)
+        amounts = relative * jg.sizing.relief_amount(pair, torque)
         cycles[name] = {model: over_amounts(mesh, jnp.asarray(torque), amounts) for model, mesh in models.items()}
     return relative, cycles
 

@@ -45,7 +45,7 @@ class Known:
 
     def pareto(self, design, box, **options):
         """`jaxgear.pareto`."""
-        return jg.pareto(design, box, mesh=self.mesh, torque=self.torque, **options)
+        return jg.optimize.pareto(design, box, mesh=self.mesh, torque=self.torque, **options)
 
     def minimize(self, design, box, **options):
         """`jaxgear.minimize`, of four start points unless a method is given."""

@@ -1,6 +1,9 @@
 """Layers import only what comes before them, and importing the library has no side effects."""
 
 import ast
+import importlib
+import importlib.metadata
+import inspect
 import subprocess
 import sys
 from pathlib import Path
@@ -127,3 +130,21 @@ def test_import_leaves_the_choice_of_devices_to_the_user():
 def test_modules_are_small_enough_to_read_in_one_go():
     for path in FILES:
         assert len(path.read_text(encoding="utf-8").splitlines()) <= 300, path
+
+
+def test_flat_names_are_few_and_the_rest_has_its_namespace():
+    flat = [name for name in vars(jaxgear) if not name.startswith("_") and not inspect.ismodule(vars(jaxgear)[name])]
+    assert len(flat) <= 66
+    for namespace in ("sizing", "tolerance", "optimize", "sweeps", "plot", "io"):
+        assert inspect.ismodule(getattr(jaxgear, namespace)), namespace
+
+
+def test_no_function_shadows_a_package():
+    for folder in PACKAGE.iterdir():
+        if (folder / "__init__.py").exists():
+            importlib.import_module(f"jaxgear.{folder.name}")
+            assert inspect.ismodule(getattr(jaxgear, folder.name)), folder.name
+
+
+def test_the_version_is_that_of_the_installed_package():
+    assert jaxgear.__version__ == importlib.metadata.version("jaxgear")

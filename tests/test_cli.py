@@ -125,7 +125,7 @@ def test_analyze_gives_what_the_library_gives(folder, analyzed):
     written = analyzed.summary["designs"]["modified"]
     for metric, value in eqx.filter_jit(jg.summary)(cycle).items():
         assert written[metric] == pytest.approx(float(value), rel=1e-9), metric
-    assert written["max_flash_temperature_K"] == pytest.approx(float(jg.flash_temperature(cycle, 3000.0).max()))
+    assert written["max_flash_temperature_K"] == pytest.approx(float(jg.metrics.flash_temperature(cycle, 3000.0).max()))
     assert written["pinion_modification"] == [
         {"type": "tip_relief", "amount": 6.5, "length": 5.0, "curve": {"type": "parabolic"}}
     ]
@@ -241,7 +241,10 @@ def test_a_quick_run_is_coarse_and_short(folder, tmp_path, monkeypatch):
     path.write_text(FREE.replace("positions = 8", "positions = 4096"))
     with pytest.raises(Searched), jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
         main(["optimize", str(path), "--quick", "--no-figures", "-o", str(tmp_path / "out")])
-    assert asked["method"] == jg.Minimax(starts=4, rounds=1, steps=10) and float(asked["torque"].torques[0]) == 50.0
+    assert (
+        asked["method"] == jg.optimize.Minimax(starts=4, rounds=1, steps=10)
+        and float(asked["torque"].torques[0]) == 50.0
+    )
     assert asked["bounds"] == {"height": (0.0, 20.0)} and asked["mesh"].resolution.positions == 16
     assert not (tmp_path / "out").exists()
 

@@ -90,7 +90,7 @@ def test_a_corner_softens_any_law_alike():
     wheel = tooth_load(outline(pair.wheel), jnp.full((1, 4), 12.0))
     geometry = contact_geometry(pinion, wheel, "strain", pair.face_width)
     corner = edge(pinion, wheel, jnp.zeros((1, 4)), geometry)
-    flank = jg.DepthReferenced().prepare(geometry)
+    flank = jg.compliance.DepthReferenced().prepare(geometry)
 
     def softened(law):
         return EdgeLaw(law, geometry.width_factor, 4e3 / jnp.pi * geometry.compliance, corner)

@@ -37,7 +37,7 @@ def tolerance(mesh):
 
 def test_every_torque_meets_the_same_gears(mesh, tolerance):
     judged = conditions("test", mesh, jg.LoadSpectrum(TORQUES), tolerance=tolerance, samples=3, seed=7)
-    drawn = jg.sample_deviations(tolerance, mesh, 3, seed=7)
+    drawn = jg.tolerance.sample_deviations(tolerance, mesh, 3, seed=7)
     jax.tree.map(np.testing.assert_array_equal, judged.deviations, drawn)
     cases = judged.on(mesh)
     assert cases.count == 6 and cases.weights.tolist() == pytest.approx([1 / 6] * 6)

@@ -12,13 +12,13 @@ from jaxgear.geometry import outline
 
 E, NU = 206e3, 0.3
 LAWS = {
-    "constant": jg.ConstantHertz(),
-    "depth": jg.DepthReferenced(),
-    "weber": jg.Weber(),
-    "power": jg.NonlinearPower(),
-    "johnson": jg.CenterDistance(),
-    "kovalskii": jg.Kovalskii(),
-    "palmgren": jg.Palmgren(),
+    "constant": jg.compliance.ConstantHertz(),
+    "depth": jg.compliance.DepthReferenced(),
+    "weber": jg.compliance.Weber(),
+    "power": jg.compliance.NonlinearPower(),
+    "johnson": jg.compliance.CenterDistance(),
+    "kovalskii": jg.compliance.Kovalskii(),
+    "palmgren": jg.compliance.Palmgren(),
 }
 # total approach of two steel flanks in plane strain at 266 N/mm, radii 10.26 mm, depths 1.67 mm, face width 20 mm
 EXAMPLE = {"constant": 1.50, "weber": 4.61, "power": 4.32, "johnson": 7.93, "kovalskii": 8.25, "palmgren": 7.9}
@@ -58,7 +58,7 @@ def test_depth_law_is_the_integral_of_the_strain_below_the_contact():
     sigma_z = -p0 / root
     strain = -(1 - NU**2) / E * (sigma_z - NU / (1 - NU) * sigma_x)
     total = 2 * np.trapezoid(strain, z) * 1e3
-    law = approach(jg.DepthReferenced(), [q], (radius, radius), (depth, depth))
+    law = approach(jg.compliance.DepthReferenced(), [q], (radius, radius), (depth, depth))
     assert float(law[0]) == pytest.approx(total, rel=1e-6)
 
 

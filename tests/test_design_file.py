@@ -252,16 +252,36 @@ def test_defaults_are_those_of_the_library(load):
 MODELS = [
     ('preset = "legacy"', jg.legacy_compliance()),
     ('plane = "strain"\nhub_windup = false', jg.default_compliance("strain", hub_windup=False)),
-    ("coupling = false", jg.Compliance(jg.Beam(), jg.ElasticRing(coupling=False), jg.DepthReferenced(), "stress")),
+    (
+        "coupling = false",
+        jg.Compliance(
+            jg.compliance.Beam(), jg.compliance.ElasticRing(coupling=False), jg.compliance.DepthReferenced(), "stress"
+        ),
+    ),
     (
         'body = "sainsot"\ncontact = "constant"',
-        jg.Compliance(jg.Beam(), jg.Sainsot(), jg.ConstantHertz(), "stress"),
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.Sainsot(), jg.compliance.ConstantHertz(), "stress"),
     ),
-    ('body = "half_plane"\ncontact = "weber"', jg.Compliance(jg.Beam(), jg.HalfPlane(), jg.Weber(), "stress")),
-    ('contact = "palmgren"', jg.Compliance(jg.Beam(), jg.ElasticRing(), jg.Palmgren(), "stress")),
-    ('contact = "power"', jg.Compliance(jg.Beam(), jg.ElasticRing(), jg.NonlinearPower(), "stress")),
-    ('contact = "center_distance"', jg.Compliance(jg.Beam(), jg.ElasticRing(), jg.CenterDistance(), "stress")),
-    ('contact = "kovalskii"', jg.Compliance(jg.Beam(), jg.ElasticRing(), jg.Kovalskii(), "stress")),
+    (
+        'body = "half_plane"\ncontact = "weber"',
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.HalfPlane(), jg.compliance.Weber(), "stress"),
+    ),
+    (
+        'contact = "palmgren"',
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.Palmgren(), "stress"),
+    ),
+    (
+        'contact = "power"',
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.NonlinearPower(), "stress"),
+    ),
+    (
+        'contact = "center_distance"',
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.CenterDistance(), "stress"),
+    ),
+    (
+        'contact = "kovalskii"',
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.Kovalskii(), "stress"),
+    ),
 ]
 
 

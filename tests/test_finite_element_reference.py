@@ -29,13 +29,13 @@ class PlaneStrainWeber(AbstractContact):
             poisson = side.poisson / (1 - side.poisson)
             changed = eqx.tree_at(lambda s: (s.modulus, s.poisson), side, (side.strain_modulus, poisson))
             geometry = eqx.tree_at(lambda g, n=name: getattr(g, n), geometry, changed)
-        return jg.Weber().prepare(geometry)
+        return jg.compliance.Weber().prepare(geometry)
 
 
 class PrescribedTraction(AbstractBody):
     """The elastic ring without the relaxation of the root traction: the plain solution for the three load modes."""
 
-    ring: jg.ElasticRing = jg.ElasticRing()
+    ring: jg.compliance.ElasticRing = jg.compliance.ElasticRing()
 
     def compliance(self, load, step, plane):
         tooth = load.outline
@@ -87,7 +87,7 @@ def points_of(case, compliance):
 @CASES
 def test_ring_model_column(case):
     """The same model computed elsewhere: prescribed root traction, plane-strain Weber contact."""
-    model = jg.Compliance(jg.Beam(), PrescribedTraction(), PlaneStrainWeber(), "stress")
+    model = jg.Compliance(jg.compliance.Beam(), PrescribedTraction(), PlaneStrainWeber(), "stress")
     values, share = points_of(case, model)
     for point in case.points:
         assert float(values[point.place]) == pytest.approx(point.ring, rel=0.003), point.place
@@ -97,7 +97,7 @@ def test_ring_model_column(case):
 @CASES
 def test_finite_element_column(case):
     """Recommended tooth and body model; the same contact law as the reference."""
-    model = jg.Compliance(jg.Beam(), jg.ElasticRing(), PlaneStrainWeber(), "stress")
+    model = jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), PlaneStrainWeber(), "stress")
     values, share = points_of(case, model)
     for point in case.points:
         assert float(values[point.place]) == pytest.approx(point.finite_element, rel=0.035), point.place

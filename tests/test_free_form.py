@@ -127,7 +127,7 @@ def distances(mesh, first, second):
 
 
 def test_projection_says_what_it_costs(mesh, optimum):
-    made = jg.project(optimum, "power")
+    made = jg.optimize.project(optimum, "power")
     assert made.curve == "power"
     assert made.ppte == pytest.approx(ppte(mesh, TORQUE, made.pinion, made.wheel), abs=1e-9)
     assert made.loss == pytest.approx(made.ppte - optimum.ppte, abs=1e-12)
@@ -136,12 +136,12 @@ def test_projection_says_what_it_costs(mesh, optimum):
     assert made.misfit == pytest.approx(expected, rel=0.02)
     assert made.misfit < 0.2 * tables(optimum).max()
     # every cubic can be a quadratic, and that a line
-    misfits = [jg.project(optimum, curve).misfit for curve in ("cubic", "quadratic", "linear")]
+    misfits = [jg.optimize.project(optimum, curve).misfit for curve in ("cubic", "quadratic", "linear")]
     assert misfits[0] < misfits[1] < misfits[2]
 
 
 def test_projection_of_a_named_curve_is_that_curve(mesh, named):
-    made = jg.project(named, "power")
+    made = jg.optimize.project(named, "power")
     assert made.misfit < 1e-3
     assert abs(made.loss) < 1e-3
     for relief, gear in ((made.pinion, "pinion"), (made.wheel, "wheel")):
@@ -160,7 +160,7 @@ def test_projection_of_a_named_curve_is_that_curve(mesh, named):
 )
 def test_projection_recovers_other_curves(named, curve, shape):
     reliefs = jg.TipRelief(8.0, 3.1, shape), jg.TipRelief(5.0, 2.2, shape)
-    made = jg.project(eqx.tree_at(lambda o: (o.pinion, o.wheel), named, reliefs), curve)
+    made = jg.optimize.project(eqx.tree_at(lambda o: (o.pinion, o.wheel), named, reliefs), curve)
     assert made.misfit < 0.01
     for found, relief in zip((made.pinion, made.wheel), reliefs):
         assert float(found.length) == pytest.approx(float(relief.length), rel=0.01)
@@ -186,4 +186,4 @@ def test_refuses_what_it_cannot_search(mesh, options, words):
 
 def test_refuses_an_unknown_curve(optimum):
     with pytest.raises(ValueError, match='"parabola" is not known'):
-        jg.project(optimum, "parabola")
+        jg.optimize.project(optimum, "parabola")

@@ -62,8 +62,12 @@ def test_path_of_contact_table_of_the_kahraman_pair():
     # with a contact ratio of 1.37 the double-contact zones are short: A, B, C, D, E in this order
     roll = path.pinion_roll_length(jnp.sort(points))
     np.testing.assert_allclose(roll, [19.5849, 22.8617, 25.6515, 28.4413, 31.7181], atol=1.5e-4)
-    np.testing.assert_allclose(jg.roll_angle(gear, roll), [15.9220, 18.5860, 20.8540, 23.1220, 25.7860], atol=1.5e-4)
-    np.testing.assert_allclose(jg.diameter(gear, roll), [146.2951, 148.1845, 150.0, 151.9988, 154.5709], atol=2e-4)
+    np.testing.assert_allclose(
+        jg.geometry.roll_angle(gear, roll), [15.9220, 18.5860, 20.8540, 23.1220, 25.7860], atol=1.5e-4
+    )
+    np.testing.assert_allclose(
+        jg.geometry.diameter(gear, roll), [146.2951, 148.1845, 150.0, 151.9988, 154.5709], atol=2e-4
+    )
 
 
 def test_path_of_contact_of_the_fzg_c_gears(fzg_c):
@@ -93,7 +97,7 @@ def test_backlash_free_center_distance(shift):
     assert distance == pytest.approx(51 * np.cos(alpha) / np.cos(working), rel=1e-14)
     radii = distance * 20 / 51, distance * 31 / 51
     thickness = sum(
-        2 * r * float(half_tooth_angle(gear, jg.roll_length(gear, 2 * r)))
+        2 * r * float(half_tooth_angle(gear, jg.geometry.roll_length(gear, 2 * r)))
         for r, gear in zip(radii, (pair.pinion, pair.wheel))
     )
     assert thickness == pytest.approx(2 * np.pi * radii[0] / 20, rel=1e-13)
@@ -116,7 +120,7 @@ def test_wider_center_distance_shortens_the_path():
 def test_half_tooth_angle_is_the_generated_thickness():
     """Half the rack's space width at the pitch circle, widened by the profile shift."""
     gear = jg.Gear(24, 2.0, 20.0, 0.4, face_width=10.0)
-    rho = jg.roll_length(gear, 2 * gear.pitch_radius)
+    rho = jg.geometry.roll_length(gear, 2 * gear.pitch_radius)
     thickness = 2 * gear.pitch_radius * half_tooth_angle(gear, rho)
     assert float(thickness) == pytest.approx(2.0 * (np.pi / 2 + 2 * 0.4 * np.tan(np.deg2rad(20))), rel=1e-14)
 
@@ -125,7 +129,7 @@ def test_tooth_space_coordinates():
     """Published half widths and heights of the tooth space of the 50 tooth, module 3 gear at four roll lengths."""
     gear = kahraman_gear()
     rho = jnp.asarray([18.0, 22.0, 25.6515, 29.5])
-    angle, radius = jnp.pi / 50 - half_tooth_angle(gear, rho), 0.5 * jg.diameter(gear, rho)
+    angle, radius = jnp.pi / 50 - half_tooth_angle(gear, rho), 0.5 * jg.geometry.diameter(gear, rho)
     np.testing.assert_allclose(radius * jnp.sin(angle), [1.589749, 1.926498, 2.355805, 2.953781], atol=2e-6)
     np.testing.assert_allclose(radius * jnp.cos(angle), [72.721886, 73.805749, 74.962988, 76.344778], atol=2e-6)
 
@@ -139,11 +143,11 @@ def test_involute_function_and_its_derivative():
 def test_roll_length_diameter_and_angle_round_trip():
     gear = jg.Gear(19, 3.0, face_width=10.0)
     rho = jnp.linspace(0.0, float(gear.tip_roll_length), 20)
-    np.testing.assert_allclose(jg.roll_length(gear, jg.diameter(gear, rho)), rho, atol=1e-12)
-    np.testing.assert_allclose(jg.roll_angle(gear, rho), np.rad2deg(rho / gear.base_radius), rtol=1e-15)
-    tip = jg.diameter(gear, gear.tip_roll_length)
+    np.testing.assert_allclose(jg.geometry.roll_length(gear, jg.geometry.diameter(gear, rho)), rho, atol=1e-12)
+    np.testing.assert_allclose(jg.geometry.roll_angle(gear, rho), np.rad2deg(rho / gear.base_radius), rtol=1e-15)
+    tip = jg.geometry.diameter(gear, gear.tip_roll_length)
     assert float(tip) == pytest.approx(3.0 * 21, rel=1e-15)
-    assert float(jg.roll_length(gear, 2 * gear.base_radius - 1.0)) == 0.0
+    assert float(jg.geometry.roll_length(gear, 2 * gear.base_radius - 1.0)) == 0.0
 
 
 def test_sliding_and_rolling():
@@ -174,8 +178,10 @@ def test_curvatures_add_up_to_the_distance_of_the_base_tangent_points():
 def test_path_ends_at_the_tips():
     pair = gear_pair((19, 48), 3.0)
     path = jg.path_of_contact(pair)
-    assert float(jg.diameter(pair.pinion, path.pinion_roll_length(path.end))) == pytest.approx(63.0, rel=1e-14)
-    assert float(jg.diameter(pair.wheel, path.wheel_roll_length(path.start))) == pytest.approx(150.0, rel=1e-14)
+    assert float(jg.geometry.diameter(pair.pinion, path.pinion_roll_length(path.end))) == pytest.approx(63.0, rel=1e-14)
+    assert float(jg.geometry.diameter(pair.wheel, path.wheel_roll_length(path.start))) == pytest.approx(
+        150.0, rel=1e-14
+    )
     assert float(path.outer_single - path.start) == pytest.approx(float(pair.base_pitch), rel=1e-14)
     assert float(path.end - path.inner_single) == pytest.approx(float(pair.base_pitch), rel=1e-14)
 

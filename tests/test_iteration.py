@@ -22,14 +22,14 @@ def mesh():
 def nominal(mesh):
     """From the nominal involute, and what was reported on the way."""
     looks = []
-    return jg.iterate_transmission_error(mesh, TORQUE, callback=lambda *args: looks.append(args)), looks
+    return jg.optimize.iterate_transmission_error(mesh, TORQUE, callback=lambda *args: looks.append(args)), looks
 
 
 @pytest.fixture(scope="module")
 def relieved(mesh):
     """From a tip relief of the form that the study's second type starts with: a parabola that goes on straight."""
     tip = jg.TipRelief(7.0, 3.27, jg.ParabolicLinear(0.5))
-    return jg.iterate_transmission_error(mesh, TORQUE, pinion=tip, wheel=tip)
+    return jg.optimize.iterate_transmission_error(mesh, TORQUE, pinion=tip, wheel=tip)
 
 
 def test_five_steps_take_three_quarters_off(nominal):
@@ -84,7 +84,7 @@ def test_nothing_is_removed_below_the_pitch_point(mesh, nominal):
     contact, tip = mesh.path_of_contact, float(mesh.pair.pinion.tip_roll_length)
     start, pitch = float(contact.pinion_roll_length(contact.start)), float(contact.pinion_pitch_roll_length)
     roll = np.linspace(start, tip, 101)
-    for relief in jg.profile_relief(mesh, result.pinion, result.wheel):
+    for relief in jg.metrics.profile_relief(mesh, result.pinion, result.wheel):
         relief = np.asarray(relief)
         assert np.all(relief[roll < pitch] == 0.0)
         assert np.all(relief >= 0.0)
@@ -94,7 +94,7 @@ def test_nothing_is_removed_below_the_pitch_point(mesh, nominal):
 def test_equal_gears_get_equal_flanks(mesh, nominal):
     result, _ = nominal
     for state in result.iterations:
-        pinion, wheel = jg.profile_relief(mesh, state.pinion, state.wheel)
+        pinion, wheel = jg.metrics.profile_relief(mesh, state.pinion, state.wheel)
         np.testing.assert_allclose(pinion, wheel, atol=1e-9)
         # approach mirrors recess
         error = state.transmission_error
@@ -103,7 +103,7 @@ def test_equal_gears_get_equal_flanks(mesh, nominal):
 
 def test_the_largest_relief_is_kept_in_every_state(mesh, nominal):
     result, _ = nominal
-    capped = jg.iterate_transmission_error(mesh, TORQUE, max_relief=2.0)
+    capped = jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=2.0)
     assert max(state.max_relief for state in capped.iterations) == pytest.approx(2.0, abs=1e-9)
     assert capped.constraints["max_relief"].value <= 2.0 + 1e-9
     assert result.ppte < capped.ppte < 0.75 * capped.iterations[0].ppte
@@ -124,11 +124,11 @@ def test_a_relief_to_start_from_also_softens_the_entry(nominal, relieved):
 
 def test_a_loose_tolerance_ends_early(mesh, nominal):
     result, _ = nominal
-    hasty = jg.iterate_transmission_error(mesh, TORQUE, rtol=20.0)
+    hasty = jg.optimize.iterate_transmission_error(mesh, TORQUE, rtol=20.0)
     assert len(hasty.iterations) < len(result.iterations)
     last = hasty.iterations[-1]
     assert last.ppte - last.limit <= 20.0 * last.limit
-    assert jg.iterate_transmission_error(mesh, TORQUE, steps=1).evaluations == 2
+    assert jg.optimize.iterate_transmission_error(mesh, TORQUE, steps=1).evaluations == 2
 
 
 @pytest.mark.parametrize(
@@ -144,4 +144,4 @@ def test_a_loose_tolerance_ends_early(mesh, nominal):
 )
 def test_refuses_numbers_outside_their_range(mesh, torque, options, words):
     with pytest.raises(ValueError, match=words):
-        jg.iterate_transmission_error(mesh, torque, **options)
+        jg.optimize.iterate_transmission_error(mesh, torque, **options)

@@ -127,7 +127,7 @@ def test_slopes_of_another_objective_and_of_constraints(mesh):
     assert pieces.lower is None
     np.testing.assert_allclose(pieces.slope[0], differences(value), atol=1e-5)
 
-    volume = eqx.filter_jit(jg.removed_volume)
+    volume = eqx.filter_jit(jg.metrics.removed_volume)
 
     def excess(x):
         combined = 2.0 * 20.0 * x[0] - (1.0 + 4.7 * x[2])

@@ -36,10 +36,10 @@ def pair_of(x, teeth=(19.0, 48.0)):
 
 def numbers(x):
     margins = jg.margins(pair_of(x))
-    return jnp.stack([getattr(margins, name) for name in fields_of(jg.Margins)])
+    return jnp.stack([getattr(margins, name) for name in fields_of(jg.geometry.Margins)])
 
 
-NAMES = tuple(fields_of(jg.Margins))
+NAMES = tuple(fields_of(jg.geometry.Margins))
 jacobian = jax.jit(jax.vmap(jax.jacfwd(numbers)))
 values = jax.jit(jax.vmap(numbers))
 held = jax.jit(jax.vmap(lambda x: (jg.margins(pair_of(x)).valid, jg.margins(pair_of(x)).held)))
@@ -55,7 +55,9 @@ def test_margins_of_a_pair_in_closed_form():
     assert float(margins.wheel_tip_height) == pytest.approx(3.0 * 2.25, rel=1e-12)
     assert float(margins.contact_ratio_margin) == pytest.approx(0.6456, abs=6e-5)
     assert float(margins.base_circle_clearance) == pytest.approx(100.5 * (1 - np.cos(np.deg2rad(20))), rel=1e-12)
-    assert float(margins.pinion_tip_land) == pytest.approx(float(jg.tooth_thickness(pair.pinion, 63.0)), rel=1e-12)
+    assert float(margins.pinion_tip_land) == pytest.approx(
+        float(jg.geometry.tooth_thickness(pair.pinion, 63.0)), rel=1e-12
+    )
     path = jg.path_of_contact(pair)
     reached = path.wheel_roll_length(path.end) - outline(pair.wheel).form_roll_length
     assert float(margins.wheel_form_clearance) == pytest.approx(float(reached), rel=1e-12)
@@ -68,7 +70,9 @@ def test_backlash_is_the_operating_pitch_less_both_thicknesses(extra):
     distance = float(free.working_center_distance) + extra
     pair = jg.GearPair(free.pinion, free.wheel, distance)
     diameters = 2 * distance * 20 / 51, 2 * distance * 31 / 51
-    thickness = sum(float(jg.tooth_thickness(g, jnp.asarray(d))) for g, d in zip((pair.pinion, pair.wheel), diameters))
+    thickness = sum(
+        float(jg.geometry.tooth_thickness(g, jnp.asarray(d))) for g, d in zip((pair.pinion, pair.wheel), diameters)
+    )
     on_the_circle = np.pi * diameters[0] / 20 - thickness
     normal = on_the_circle * np.cos(float(pair.working_pressure_angle))
     assert float(pair.backlash) == pytest.approx(1e3 * normal, abs=1e-8)
@@ -112,7 +116,9 @@ def test_two_micrometres_of_the_form_diameter_are_the_accuracy_of_the_outline():
     def pair(micrometres, make=jg.GearPair):
         pinion, wheel = jg.Gear(19, 3.0, face_width=10.0), jg.Gear(48, 3.0, face_width=10.0)
         form = outline(pinion)
-        reached = jg.roll_length(pinion, jg.diameter(pinion, form.form_roll_length) - 1e-3 * micrometres)
+        reached = jg.geometry.roll_length(
+            pinion, jg.geometry.diameter(pinion, form.form_roll_length) - 1e-3 * micrometres
+        )
         line = 100.5 * np.sin(np.deg2rad(20))
         tip = 2 * np.hypot(float(wheel.base_radius), line - float(reached))
         return make(pinion, jg.Gear(48, 3.0, face_width=10.0, tip_diameter=tip))

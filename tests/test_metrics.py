@@ -16,13 +16,13 @@ FZG = jg.GearPair(
 
 
 def test_ohlendorf_loss_factor():
-    assert float(jg.ohlendorf_loss_factor(FZG)) == pytest.approx(0.1986, abs=5e-5)
+    assert float(jg.metrics.ohlendorf_loss_factor(FZG)) == pytest.approx(0.1986, abs=5e-5)
 
 
 def test_root_factors_at_the_outer_point_of_single_contact():
     beyond = 0.4624 * FZG.base_pitch  # the published contact ratio, 1.4624, fixes the load point
-    pinion = jg.root_factors(FZG.pinion, FZG.pinion.tip_roll_length - beyond)
-    wheel = jg.root_factors(FZG.wheel, FZG.wheel.tip_roll_length - beyond)
+    pinion = jg.metrics.root_factors(FZG.pinion, FZG.pinion.tip_roll_length - beyond)
+    wheel = jg.metrics.root_factors(FZG.wheel, FZG.wheel.tip_roll_length - beyond)
     np.testing.assert_allclose([pinion.form, wheel.form], [1.6889, 1.5832], atol=1e-4)
     np.testing.assert_allclose([pinion.correction, wheel.correction], [1.8514, 1.9165], atol=1e-4)
     np.testing.assert_allclose([pinion.lever_arm, wheel.lever_arm], [5.0586, 5.2769], atol=1e-3)
@@ -41,7 +41,7 @@ def test_root_factors_at_the_outer_point_of_single_contact():
 )
 def test_iso_stiffness(teeth, single, mesh):
     pair = jg.GearPair(*(jg.Gear(z, 3.0, face_width=20.0) for z in teeth))
-    stiffness = jg.iso_stiffness(pair)
+    stiffness = jg.sizing.iso_stiffness(pair)
     np.testing.assert_allclose([stiffness.single, stiffness.mesh], [single, mesh], rtol=5e-5)
 
 
@@ -109,11 +109,11 @@ def test_stiffness_definitions(cycle, mesh):
 def test_loaded_teeth_touch_beyond_the_theoretical_path(cycle):
     ratio = float(cycle.kinematics.path_of_contact.contact_ratio)
     assert float(jg.effective_contact_ratio(cycle)) > ratio + 0.05
-    shock = jg.contact_shock(cycle)
+    shock = jg.metrics.contact_shock(cycle)
     assert float(shock.approach) > 0.0 and float(shock.recess) > 0.0 and float(shock.force) > 0.0
 
 
 def test_flash_temperature_vanishes_at_the_pitch_point_and_grows_with_the_root_of_speed(cycle):
-    slow, fast = (jg.flash_temperature(cycle, speed).max(axis=(0, 1)) for speed in (1000.0, 4000.0))
+    slow, fast = (jg.metrics.flash_temperature(cycle, speed).max(axis=(0, 1)) for speed in (1000.0, 4000.0))
     assert float(slow[0]) == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(fast, 2 * slow, rtol=1e-9, atol=1e-9)

@@ -108,11 +108,11 @@ def test_reaches_the_closed_form(known, best):
 
 
 METHODS = [
-    jg.Adam(starts=4, steps=200),
-    jg.LBFGS(starts=2, steps=36),
-    jg.CMAES(population=32, generations=15),
-    jg.DifferentialEvolution(population=32, generations=25),
-    jg.Genetic(population=32, generations=30),
+    jg.optimize.Adam(starts=4, steps=200),
+    jg.optimize.LBFGS(starts=2, steps=36),
+    jg.optimize.CMAES(population=32, generations=15),
+    jg.optimize.DifferentialEvolution(population=32, generations=25),
+    jg.optimize.Genetic(population=32, generations=30),
 ]
 
 
@@ -131,15 +131,15 @@ def test_every_method_finds_the_same_optimum(known, best, method):
 
 
 def test_chance_is_seeded(known):
-    genetic = jg.Genetic(population=32, generations=2)
+    genetic = jg.optimize.Genetic(population=32, generations=2)
     first, again = (known.minimize(known.parabolas, TALL, method=genetic) for _ in range(2))
-    other = known.minimize(known.parabolas, TALL, method=jg.Genetic(population=32, generations=2, seed=1))
+    other = known.minimize(known.parabolas, TALL, method=jg.optimize.Genetic(population=32, generations=2, seed=1))
     assert first.parameters == again.parameters
     assert first.parameters != other.parameters
 
 
 def test_a_table_of_variants_is_searched_whole(known):
-    result = known.minimize(known.parabolas, TALL, method=jg.Factorial({"pinion": 4, "wheel": 6}))
+    result = known.minimize(known.parabolas, TALL, method=jg.optimize.Factorial({"pinion": 4, "wheel": 6}))
     pinion, wheel = np.meshgrid(np.linspace(0.0, 40.0, 4), np.linspace(0.0, 40.0, 6))
     values = ppte_of_parabolas(pinion, wheel)
     assert result.evaluations == 24 + 3
@@ -155,7 +155,7 @@ def test_a_table_of_variants_is_searched_whole(known):
 
 def test_constraints_are_kept(known, best):
     """The volume of a relief is proportional to its amount; optima within the limits are read off a grid."""
-    volume = float(eqx.filter_jit(jg.removed_volume)(known.mesh, best.pinion, best.wheel))
+    volume = float(eqx.filter_jit(jg.metrics.removed_volume)(known.mesh, best.pinion, best.wheel))
     most = 19.4  # [um], of both amounts together
     per_amount = volume / (best.parameters["pinion"] + best.parameters["wheel"])
     limits = [
@@ -236,7 +236,7 @@ def test_another_limit_traces_nothing_anew(known):
 
 def test_a_relief_that_must_not_dip(known):
     """h = b1 s + b2 s^2 with b1 >= 2.5 levels best when it falls again towards the tip; monotone is b2 >= -b1 / 2."""
-    reversal = eqx.filter_jit(jg.relief_reversal)
+    reversal = eqx.filter_jit(jg.metrics.relief_reversal)
     box = {"b1": (2.5, 3.5), "b2": (-3.0, 1.0)}
     b1, b2 = np.meshgrid(np.linspace(2.5, 3.5, 201), np.linspace(-3.0, 1.0, 801))
     relief = DELTA0 * (b1[..., None] * depth() + b2[..., None] * depth() ** 2)
@@ -304,7 +304,7 @@ def test_manufactured_gears(known, best):
         (BOX, {"method": "adam", "steps": 1}, "steps = 1"),
         (BOX, {"method": "newton"}, '"newton" is not known'),
         (BOX, {"method": "genetic", "starts": 4}, "starts has no effect"),
-        (BOX, {"method": jg.Adam(), "steps": 30}, "steps must be given to the method"),
+        (BOX, {"method": jg.optimize.Adam(), "steps": 30}, "steps must be given to the method"),
         (BOX, {"objective": "noise"}, '"noise" is not known'),
         (BOX, {"objective": ("ppte", "removed_volume")}, "jaxgear.pareto"),
         (BOX, {"constraints": [jg.Constraint({"lenght": 1.0}, high=5.0)]}, '"lenght" of a constraint'),
@@ -312,7 +312,7 @@ def test_manufactured_gears(known, best):
         (BOX, {"objective": "pptee"}, 'did you mean "ppte"'),
         (BOX, {"samples": 8}, "samples = 8"),
         (BOX, {"torque": -1.0}, "torque"),
-        (BOX, {"method": jg.Factorial(1000)}, "1000000000 designs"),
+        (BOX, {"method": jg.optimize.Factorial(1000)}, "1000000000 designs"),
     ],
 )
 def test_refuses_what_it_cannot_search(mesh, bounds, options, words):
@@ -340,11 +340,11 @@ def test_refuses_a_design_that_makes_no_two_modifications(mesh, made, words):
         (lambda: jg.Constraint({}, high=1.0), "at least one free parameter"),
         (lambda: jg.Constraint("max_relief"), "low or high"),
         (lambda: jg.Constraint("max_relief", low=2.0, high=1.0), "high"),
-        (lambda: jg.Minimax(rtol=0.0), "rtol"),
-        (lambda: jg.Genetic(population=3), "population = 3"),
-        (lambda: jg.Genetic(crossover=1.5), "crossover"),
-        (lambda: jg.CMAES(spread=0.0), "spread"),
-        (lambda: jg.Factorial(0), "levels = 0"),
+        (lambda: jg.optimize.Minimax(rtol=0.0), "rtol"),
+        (lambda: jg.optimize.Genetic(population=3), "population = 3"),
+        (lambda: jg.optimize.Genetic(crossover=1.5), "crossover"),
+        (lambda: jg.optimize.CMAES(spread=0.0), "spread"),
+        (lambda: jg.optimize.Factorial(0), "levels = 0"),
     ],
 )
 def test_refuses_meaningless_options(make, words):

@@ -50,11 +50,11 @@ def test_fillet_starts_on_the_root_circle(teeth, angle):
 
 def test_form_diameter_of_iso_21771():
     tooth = outline(gear(30, 2.0))
-    assert float(jg.diameter(tooth.gear, tooth.form_roll_length)) == pytest.approx(57.068, abs=5e-4)
+    assert float(jg.geometry.diameter(tooth.gear, tooth.form_roll_length)) == pytest.approx(57.068, abs=5e-4)
     alpha = np.deg2rad(20.0)
     depth = 1.25 - 0.38 * (1 - np.sin(alpha))
     printed = np.hypot(60 * np.sin(alpha) - 2 * depth * 2.0 / np.sin(alpha), 60 * np.cos(alpha))
-    assert float(jg.diameter(tooth.gear, tooth.form_roll_length)) == pytest.approx(printed, rel=1e-13)
+    assert float(jg.geometry.diameter(tooth.gear, tooth.form_roll_length)) == pytest.approx(printed, rel=1e-13)
 
 
 def undercut_limit(teeth, dedendum=1.25, radius=0.38):
@@ -89,7 +89,7 @@ def test_undercut_junction_lies_on_both_curves(teeth, shift):
 
 
 def test_more_undercut_with_fewer_teeth():
-    heights = [float(jg.diameter(t.gear, t.form_roll_length)) / float(t.gear.base_radius) for t in
+    heights = [float(jg.geometry.diameter(t.gear, t.form_roll_length)) / float(t.gear.base_radius) for t in
                (outline(gear(z)) for z in (15, 12, 9))]  # fmt: skip
     assert heights[0] < heights[1] < heights[2]
 

@@ -35,10 +35,10 @@ def test_next_pairs_count_with_what_is_removed_from_them(mesh):
     """Material off every tooth keeps the next pairs away as well as it lets the carried ones go; off the carried ones
     alone it does not, and the result is flagged."""
     everywhere = jnp.full((2, 1, 16), 200.0)
-    assert bool(jg.solve_removed(mesh, 50.0, everywhere).converged.all())
+    assert bool(jg.contact.solve_removed(mesh, 50.0, everywhere).converged.all())
     # the last pair begins, and the first one ends, where their next neighbours come nearest
     some = everywhere.at[1, 0, 0].set(0.0).at[0, 0, -1].set(0.0)
-    flagged = jg.solve_removed(mesh, 50.0, some)
+    flagged = jg.contact.solve_removed(mesh, 50.0, some)
     assert float(flagged.residual.max()) < 1e-10 and not bool(flagged.converged[8])
 
 

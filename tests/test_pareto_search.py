@@ -18,14 +18,14 @@ def known():
 @pytest.fixture(scope="module")
 def searched(known):
     """PPTE against the material to grind off."""
-    return known.pareto(known.parabolas, BOX, objectives=VOLUME, method=jg.Pareto(points=12))
+    return known.pareto(known.parabolas, BOX, objectives=VOLUME, method=jg.optimize.Pareto(points=12))
 
 
 @pytest.fixture(scope="module")
 def volume_per_amount(known):
     """[mm3/um] of the sum of both amounts: the gears are equal."""
     both = known.parabolas({"pinion": 0.5, "wheel": 0.5})
-    return float(eqx.filter_jit(jg.removed_volume)(known.mesh, *both))
+    return float(eqx.filter_jit(jg.metrics.removed_volume)(known.mesh, *both))
 
 
 def dominated(values):
@@ -111,7 +111,7 @@ def test_three_objectives_within_a_limit(known, volume_per_amount):
         BOX,
         objectives=(*VOLUME, "max_relief"),
         constraints=[limit],
-        method=jg.Pareto(points=12),
+        method=jg.optimize.Pareto(points=12),
     )
     front = result
     assert front.values.shape[1] == 3
@@ -127,7 +127,7 @@ def test_three_objectives_within_a_limit(known, volume_per_amount):
 @pytest.mark.slow
 def test_four_objectives(known):
     names = ("ppte", "removed_volume", "max_relief", "mesh_loss_factor")
-    front = known.pareto(known.parabolas, BOX, objectives=names, method=jg.Pareto(points=8, steps=5))
+    front = known.pareto(known.parabolas, BOX, objectives=names, method=jg.optimize.Pareto(points=8, steps=5))
     assert front.objectives == names
     assert front.values.shape[1] == 4 and np.isfinite(front.values).all()
     assert not dominated(front.values).any()
@@ -136,10 +136,12 @@ def test_four_objectives(known):
 def test_limits_that_no_design_keeps(known):
     limit = jg.Constraint({"pinion": 1.0}, low=41.0)
     with pytest.raises(RuntimeError, match="keeps the constraints"):
-        known.pareto(known.parabolas, BOX, objectives=VOLUME, constraints=[limit], method=jg.Pareto(points=4, steps=2))
+        known.pareto(
+            known.parabolas, BOX, objectives=VOLUME, constraints=[limit], method=jg.optimize.Pareto(points=4, steps=2)
+        )
 
 
 @pytest.mark.parametrize(("options", "words"), [({"points": 1}, "points = 1"), ({"steps": 0}, "steps = 0")])
 def test_refuses_what_makes_no_front(options, words):
     with pytest.raises(ValueError, match=words):
-        jg.Pareto(**options)
+        jg.optimize.Pareto(**options)

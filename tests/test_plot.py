@@ -210,12 +210,12 @@ def test_k_chart_shows_the_relief_from_its_start_to_the_tip(mesh, designs):
     for panel, gear, start in zip(panels, (pair.pinion, pair.wheel), starts):
         nominal, relieved = panel.lines
         angle, removed = relieved.get_data()
-        assert angle[0] == pytest.approx(float(jg.roll_angle(gear, start)))
-        assert angle[-1] == pytest.approx(float(jg.roll_angle(gear, gear.tip_roll_length)))
+        assert angle[0] == pytest.approx(float(jg.geometry.roll_angle(gear, start)))
+        assert angle[-1] == pytest.approx(float(jg.geometry.roll_angle(gear, gear.tip_roll_length)))
         np.testing.assert_array_equal(nominal.get_ydata(), 0.0)
         # mid-face, where the crowning of the pinion removes nothing
         assert removed[-1] == pytest.approx(AMOUNT) and removed[0] == 0.0
-        begin = float(jg.roll_angle(gear, gear.tip_roll_length - LENGTH))
+        begin = float(jg.geometry.roll_angle(gear, gear.tip_roll_length - LENGTH))
         assert (removed[angle < begin] == 0).all() and (np.diff(removed[angle > begin]) > 0).all()
         # removed material goes down, and the upper axis ends at the tip diameter
         low, high = panel.get_ylim()
@@ -223,7 +223,7 @@ def test_k_chart_shows_the_relief_from_its_start_to_the_tip(mesh, designs):
         panel.figure.draw_without_rendering()
         diameters = panel.child_axes[0].get_xlim()
         assert diameters[1] == pytest.approx(2 * float(gear.tip_radius))
-        assert diameters[0] == pytest.approx(float(jg.diameter(gear, start)))
+        assert diameters[0] == pytest.approx(float(jg.geometry.diameter(gear, start)))
 
 
 def test_save_writes_a_report_sized_png_and_closes_the_figure(cycles, tmp_path):

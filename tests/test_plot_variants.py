@@ -58,7 +58,7 @@ def scatter():
         "quantiles": levels,
         "transmission_error_quantiles": np.quantile(curves, levels, axis=0),
     }
-    return jg.Scatter(**{name: jnp.asarray(value) for name, value in values.items()})
+    return jg.sweeps.Scatter(**{name: jnp.asarray(value) for name, value in values.items()})
 
 
 def failing(scatter, count):
@@ -75,7 +75,7 @@ def failing(scatter, count):
         "transmission_error_quantiles": jnp.asarray(quantiles),
     }
     kept = {name: getattr(scatter, name) for name in scatter.__dataclass_fields__}
-    return jg.Scatter(**{**kept, **changes})
+    return jg.sweeps.Scatter(**{**kept, **changes})
 
 
 @pytest.fixture

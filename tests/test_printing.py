@@ -12,9 +12,23 @@ from catalogue import gear_pair
 import jaxgear as jg
 from jaxgear.numerics import Checked
 
+NAMESPACES = (
+    jg,
+    jg.compliance,
+    jg.conditions,
+    jg.contact,
+    jg.geometry,
+    jg.metrics,
+    jg.microgeometry,
+    jg.optimize,
+    jg.sizing,
+    jg.sweeps,
+    jg.tolerance,
+)
 MODULES = {
     cls
-    for cls in vars(jg).values()
+    for namespace in NAMESPACES
+    for cls in vars(namespace).values()
     if inspect.isclass(cls) and issubclass(cls, eqx.Module) and not inspect.isabstract(cls)
 }
 

@@ -83,7 +83,7 @@ def test_what_takes_a_speed_says_so(mesh, cycle):
     with pytest.raises(ValueError, match="max_flash_temperature: needs a speed"):
         flash(cycle)
     running = jg.solve(mesh, Operation(50.0, speed=3000.0), pinion=cycle.pinion, wheel=cycle.wheel)
-    assert float(flash(running)) == pytest.approx(float(jg.flash_temperature(running, 3000.0).max()))
+    assert float(flash(running)) == pytest.approx(float(jg.metrics.flash_temperature(running, 3000.0).max()))
 
 
 def test_margins_are_quantities(cycle):

@@ -29,16 +29,16 @@ LIGHT = (97.4659 / 100) ** 0.25  # of the stiffness, at 50 N m: 97.4659 N/mm
 
 def test_relief_of_the_19_48_study():
     """The study states 7.81 um by its ISO row, which is F_t / (b c') to 2.5 %. The formula that it prints gives 3.1."""
-    assert float(jg.relief_amount(PAIR, 50.0)) == pytest.approx(97.4659 / (12.8315 * LIGHT), rel=1e-4)
-    assert float(jg.relief_amount(PAIR, 50.0)) == pytest.approx(7.81, rel=0.025)
+    assert float(jg.sizing.relief_amount(PAIR, 50.0)) == pytest.approx(97.4659 / (12.8315 * LIGHT), rel=1e-4)
+    assert float(jg.sizing.relief_amount(PAIR, 50.0)) == pytest.approx(7.81, rel=0.025)
     assert float(mesh_stiffness_relief(PAIR, 50.0)) == pytest.approx(97.4659 / (1.6456 * 19.0448 * LIGHT), rel=1e-4)
 
 
 def test_effective_relief_is_the_mean_deflection_of_the_mesh():
     """C_eff cos(alpha) c_gamma = C_a c' = F_t / b, and no contact ratio but that in c_gamma = c' (0.75 eps + 0.25)."""
-    ratio = float(effective_relief(PAIR, 80.0) / jg.relief_amount(PAIR, 80.0))
+    ratio = float(effective_relief(PAIR, 80.0) / jg.sizing.relief_amount(PAIR, 80.0))
     assert ratio == pytest.approx(1 / (COSINE * (0.75 * 1.6456 + 0.25)), rel=1e-4)
-    stiffness = jg.iso_stiffness(PAIR, 160.0).mesh  # above 100 N/mm, where it is constant
+    stiffness = jg.sizing.iso_stiffness(PAIR, 160.0).mesh  # above 100 N/mm, where it is constant
     line_load = 1e3 * 80.0 / 28.5 / 18.0
     assert float(effective_relief(PAIR, 80.0)) == pytest.approx(line_load / COSINE / float(stiffness), rel=1e-12)
     assert float(effective_relief(PAIR, 80.0, 1.25, mesh_load_factor=1.1)) == pytest.approx(
@@ -46,7 +46,7 @@ def test_effective_relief_is_the_mean_deflection_of_the_mesh():
     )
 
 
-@pytest.mark.parametrize("rule", [jg.relief_amount, effective_relief, mesh_stiffness_relief])
+@pytest.mark.parametrize("rule", [jg.sizing.relief_amount, effective_relief, mesh_stiffness_relief])
 def test_relief_rules_follow_the_load(rule):
     """Proportional to the line load above 100 N/mm, with its power 3/4 below, nothing without load."""
     assert float(rule(PAIR, 400.0)) == pytest.approx(2 * float(rule(PAIR, 200.0)), rel=1e-12)
@@ -65,7 +65,7 @@ def test_relief_rules_follow_the_load(rule):
 
 def test_iso_relief_takes_the_whole_double_contact():
     relief = jg.iso_relief(PAIR, 50.0, curve=jg.Linear(), application_factor=1.2)
-    assert float(relief.amount) == float(jg.relief_amount(PAIR, 50.0, 1.2))
+    assert float(relief.amount) == float(jg.sizing.relief_amount(PAIR, 50.0, 1.2))
     assert float(relief.length) == pytest.approx(5.718, abs=1e-3)
     assert float(jg.short_relief_length(PAIR)) == pytest.approx(0.5 * 5.718, abs=1e-3)
 

@@ -111,13 +111,13 @@ def test_a_tolerance_gives_mean_and_quantile_over_common_deviations(mesh):
     tolerance = jg.Tolerance.from_class(mesh.pair, 6).without_lead()
     table = run(mesh, tolerance=tolerance, samples=4, seed=9, results=("ppte", "effective_contact_ratio"))
     assert table.results[:2] == ("ppte_um_mean", "ppte_um_q95")
-    deviations = jg.sample_deviations(tolerance, mesh, 4, seed=9)
+    deviations = jg.tolerance.sample_deviations(tolerance, mesh, 4, seed=9)
     pinion, wheel = design(dict(zip(BOUNDS, PLAN.rows(7, 8)[0])))
 
     @eqx.filter_jit
     def sampled(deviation):
-        removed = jg.deviated_material(mesh, 50.0, deviation, pinion=pinion, wheel=wheel)
-        cycle = jg.solve_removed(mesh, 50.0, removed)
+        removed = jg.tolerance.deviated_material(mesh, 50.0, deviation, pinion=pinion, wheel=wheel)
+        cycle = jg.contact.solve_removed(mesh, 50.0, removed)
         return jg.peak_to_peak(cycle.transmission_error), jg.effective_contact_ratio(cycle)
 
     ppte, ratio = map(np.asarray, jax.vmap(sampled)(deviations))
@@ -421,5 +421,5 @@ def test_summary_is_made_of_the_named_results(mesh):
 def test_removed_material_is_the_mean_over_the_path(mesh):
     inside = np.asarray(mesh.outside <= 0)
     removed = np.random.default_rng(0).random((2, 1, 8))
-    cycle = jg.solve_removed(mesh, 50.0, jnp.asarray(removed))
+    cycle = jg.contact.solve_removed(mesh, 50.0, jnp.asarray(removed))
     assert float(quantities["removed_material"](cycle)) == pytest.approx(removed[:, 0][inside].mean())

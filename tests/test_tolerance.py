@@ -47,13 +47,13 @@ def solve(mesh):
     """Cycle of one deviation of the relieved design."""
 
     def solve(deviation, torque=TORQUE, design=RELIEF):
-        return jg.solve_removed(mesh, torque, jg.deviated_material(mesh, torque, deviation, **design))
+        return jg.contact.solve_removed(mesh, torque, jg.tolerance.deviated_material(mesh, torque, deviation, **design))
 
     return jax.jit(solve)
 
 
 def zero_deviation(mesh):
-    return jax.tree.map(lambda leaf: leaf[0], jg.sample_deviations(jg.Tolerance(), mesh, 1, seed=0))
+    return jax.tree.map(lambda leaf: leaf[0], jg.tolerance.sample_deviations(jg.Tolerance(), mesh, 1, seed=0))
 
 
 # Rows of the unrounded table for m = 3 mm, d = 150 mm, b = 20 mm, computed by hand from the formulas of the standard.
@@ -67,14 +67,14 @@ def zero_deviation(mesh):
     }.items(),
 )
 def test_iso_1328_table(quality, expected):
-    limits = jg.ToleranceClass(150.0, 3.0, 20.0, quality)
+    limits = jg.tolerance.ToleranceClass(150.0, 3.0, 20.0, quality)
     names = ("profile_slope", "profile_form", "profile_total", "single_pitch", "total_pitch", "helix_slope")
     values = [float(getattr(limits, name)) for name in (*names, "helix_form")]
     np.testing.assert_allclose(values, expected, atol=0.0051)
 
 
 def test_iso_1328_helix_total_and_two_classes_double():
-    fine, coarse = (jg.ToleranceClass(100.0, 2.0, 25.0, quality) for quality in (5, 7))
+    fine, coarse = (jg.tolerance.ToleranceClass(100.0, 2.0, 25.0, quality) for quality in (5, 7))
     # d = 100, b = 25: square roots are 10 and 5
     assert float(fine.helix_total) == pytest.approx(np.hypot(0.5 + 1.75 + 4, 0.7 + 2.25 + 4))
     assert float(fine.total_pitch) == pytest.approx(0.2 + 5.5 + 1.4 + 12)
@@ -83,7 +83,9 @@ def test_iso_1328_helix_total_and_two_classes_double():
 
 def test_iso_1328_rounding():
     exact = [3.74, 3.76, 4.96, 5.2, 5.3, 9.7, 9.8, 10.4, 10.6, 29.89]
-    np.testing.assert_allclose(jg.iso_rounded(np.array(exact)), [3.7, 3.8, 5.0, 5.0, 5.5, 9.5, 10, 10, 11, 30])
+    np.testing.assert_allclose(
+        jg.tolerance.iso_rounded(np.array(exact)), [3.7, 3.8, 5.0, 5.0, 5.5, 9.5, 10, 10, 11, 30]
+    )
 
 
 @pytest.mark.parametrize(
@@ -98,7 +100,7 @@ def test_iso_1328_rounding():
 )
 def test_iso_1328_range(arguments, message):
     with pytest.raises(ValueError, match=f"^ToleranceClass: {message}$"):
-        jg.ToleranceClass(*arguments)
+        jg.tolerance.ToleranceClass(*arguments)
 
 
 def test_from_class_takes_rounded_limits_of_each_gear(pair):
@@ -107,7 +109,7 @@ def test_from_class_takes_rounded_limits_of_each_gear(pair):
     assert float(tolerance.pinion.pitch) == 4.4  # 6.257 / sqrt(2)
     assert float(tolerance.wheel.pitch) == 9.0  # 6.344 * sqrt(2)
     assert float(tolerance.misalignment) == 3.0
-    smooth = jax.grad(lambda width: jg.GearTolerance.from_class(
+    smooth = jax.grad(lambda width: jg.tolerance.GearTolerance.from_class(
         jg.Gear(19, 3.0, face_width=width), 5, rounded=False).helix_slope)  # fmt: skip
     assert float(smooth(25.0)) == pytest.approx(0.35 / (2 * 5))
 
@@ -115,9 +117,9 @@ def test_from_class_takes_rounded_limits_of_each_gear(pair):
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: jg.GearTolerance(pitch=-1.0), "GearTolerance: pitch = -1 um must be at least 0 um"),
+        (lambda: jg.tolerance.GearTolerance(pitch=-1.0), "GearTolerance: pitch = -1 um must be at least 0 um"),
         (lambda: jg.Tolerance(misalignment=-2.0), "Tolerance: misalignment = -2 um must be at least 0 um"),
-        (lambda: jg.TruncatedNormal(0.0), "TruncatedNormal: sigmas = 0 must be greater than 0"),
+        (lambda: jg.tolerance.TruncatedNormal(0.0), "TruncatedNormal: sigmas = 0 must be greater than 0"),
     ],
 )
 def test_impossible_limits_are_refused(build, message):
@@ -126,27 +128,33 @@ def test_impossible_limits_are_refused(build, message):
 
 
 def test_one_slice_refuses_lead_deviations(pair, mesh, tolerance):
-    for call in (jg.sample_deviations, lambda t, m, n, seed: jg.monte_carlo(m, TORQUE, tolerance=t, samples=n)):
+    for call in (
+        jg.tolerance.sample_deviations,
+        lambda t, m, n, seed: jg.monte_carlo(m, TORQUE, tolerance=t, samples=n),
+    ):
         with pytest.raises(ValueError, match="pinion helix_slope = 6 um must be None or 0 um on a mesh of 1 slice"):
             call(tolerance, mesh, 4, 0)
         with pytest.raises(ValueError, match="misalignment = 4 um must be None or 0 um on a mesh of 1 slice"):
             call(jg.Tolerance(misalignment=4.0), mesh, 4, 0)
     with pytest.raises(ValueError, match="traced limit"):
-        jax.jit(lambda t: jg.sample_deviations(t, mesh, 4, 0))(tolerance)
-    jg.sample_deviations(tolerance.without_lead(), mesh, 4, 0)
-    jg.sample_deviations(jg.Tolerance(misalignment=0.0), mesh, 4, 0)
+        jax.jit(lambda t: jg.tolerance.sample_deviations(t, mesh, 4, 0))(tolerance)
+    jg.tolerance.sample_deviations(tolerance.without_lead(), mesh, 4, 0)
+    jg.tolerance.sample_deviations(jg.Tolerance(misalignment=0.0), mesh, 4, 0)
 
 
 @pytest.mark.parametrize(
     ("distribution", "deviation"),
     # variance of a normal distribution cut off at a: 1 - 2 a phi(a) / (2 Phi(a) - 1)
-    [(jg.TruncatedNormal(), np.sqrt(1 - 6 * 0.00443185 / 0.9973002) / 3), (jg.Uniform(), 1 / np.sqrt(3))],
+    [
+        (jg.tolerance.TruncatedNormal(), np.sqrt(1 - 6 * 0.00443185 / 0.9973002) / 3),
+        (jg.tolerance.Uniform(), 1 / np.sqrt(3)),
+    ],
     ids=["normal", "uniform"],
 )
 def test_deviations_are_distributed_within_their_limits(wide_mesh, distribution, deviation):
-    gear = jg.GearTolerance(profile_slope=4.0, profile_form=6.0, pitch=5.0, helix_slope=3.0)
+    gear = jg.tolerance.GearTolerance(profile_slope=4.0, profile_form=6.0, pitch=5.0, helix_slope=3.0)
     tolerance = jg.Tolerance(gear, gear, misalignment=2.0, distribution=distribution)
-    samples = jg.sample_deviations(tolerance, wide_mesh, 20_000, seed=3)
+    samples = jg.tolerance.sample_deviations(tolerance, wide_mesh, 20_000, seed=3)
     for values, limit in (
         (samples.pinion.profile_slope, 4.0),
         (samples.wheel.helix_slope, 3.0),
@@ -166,8 +174,8 @@ def test_deviations_are_distributed_within_their_limits(wide_mesh, distribution,
 
 def test_waviness_keeps_mean_line_and_form_tolerance(wide_mesh, pair):
     """Least-squares line through the deviation along the whole profile is zero; its height is the form deviation."""
-    tolerance = jg.Tolerance(pinion=jg.GearTolerance(profile_form=6.0), distribution=jg.Uniform())
-    waves = jg.sample_deviations(tolerance, wide_mesh, 200, seed=1).pinion.waviness
+    tolerance = jg.Tolerance(pinion=jg.tolerance.GearTolerance(profile_form=6.0), distribution=jg.tolerance.Uniform())
+    waves = jg.tolerance.sample_deviations(tolerance, wide_mesh, 200, seed=1).pinion.waviness
     flank = wide_mesh.flanks()[0]
     x = jnp.linspace(0.0, 1.0, 4001)
     length = flank.start_roll_length + x * (flank.tip_roll_length - flank.start_roll_length)
@@ -182,7 +190,7 @@ def test_waviness_keeps_mean_line_and_form_tolerance(wide_mesh, pair):
 
 
 def test_deviated_material_is_the_sum_of_modifications(wide_mesh, tolerance):
-    deviation = jax.tree.map(lambda leaf: leaf[0], jg.sample_deviations(tolerance, wide_mesh, 1, seed=5))
+    deviation = jax.tree.map(lambda leaf: leaf[0], jg.tolerance.sample_deviations(tolerance, wide_mesh, 1, seed=5))
     sides = {}
     for side, design in RELIEF.items():
         flank = getattr(deviation, side)
@@ -190,13 +198,15 @@ def test_deviated_material_is_the_sum_of_modifications(wide_mesh, tolerance):
         sides[side] = design + jg.ProfileSlope(flank.profile_slope) + Waviness(flank.waviness) + lead
     sides["pinion"] += jg.LeadSlope(deviation.misalignment)
     pitch = (deviation.pinion.pitch + deviation.wheel.pitch)[:, None, None]
-    expected = jg.removed_material(wide_mesh, TORQUE, **sides) + pitch
-    np.testing.assert_allclose(jg.deviated_material(wide_mesh, TORQUE, deviation, **RELIEF), expected, atol=1e-12)
+    expected = jg.contact.removed_material(wide_mesh, TORQUE, **sides) + pitch
+    np.testing.assert_allclose(
+        jg.tolerance.deviated_material(wide_mesh, TORQUE, deviation, **RELIEF), expected, atol=1e-12
+    )
 
 
 def test_zero_tolerance_is_the_nominal_design(mesh, solve):
-    zero, design = zero_deviation(mesh), jg.removed_material(mesh, TORQUE, **RELIEF)
-    np.testing.assert_allclose(jg.deviated_material(mesh, TORQUE, zero, **RELIEF), design, rtol=1e-14)
+    zero, design = zero_deviation(mesh), jg.contact.removed_material(mesh, TORQUE, **RELIEF)
+    np.testing.assert_allclose(jg.tolerance.deviated_material(mesh, TORQUE, zero, **RELIEF), design, rtol=1e-14)
     nominal = np.asarray(solve(zero).transmission_error)
     scatter = jg.monte_carlo(mesh, TORQUE, tolerance=jg.Tolerance(), samples=20, **RELIEF)
     # another compilation may round differently; within one, all samples are the same to the last bit
@@ -231,8 +241,8 @@ def test_all_teeth_displaced_shift_the_whole_curve(mesh, solve):
 
 def with_pitch(deviation, pairs, amount):
     pitch = deviation.pinion.pitch.at[pairs].set(amount)
-    gear = jg.GearDeviation(deviation.pinion.profile_slope, deviation.pinion.waviness, pitch, jnp.zeros(()))
-    return jg.Deviation(gear, deviation.wheel, deviation.misalignment)
+    gear = jg.tolerance.GearDeviation(deviation.pinion.profile_slope, deviation.pinion.waviness, pitch, jnp.zeros(()))
+    return jg.tolerance.Deviation(gear, deviation.wheel, deviation.misalignment)
 
 
 def test_misalignment_of_either_sign_acts_alike(wide_mesh):
@@ -240,8 +250,10 @@ def test_misalignment_of_either_sign_acts_alike(wide_mesh):
     zero = zero_deviation(wide_mesh)
 
     def solve(amount):
-        tilted = jg.Deviation(zero.pinion, zero.wheel, jnp.asarray(amount))
-        return jg.solve_removed(wide_mesh, TORQUE, jg.deviated_material(wide_mesh, TORQUE, tilted, **RELIEF))
+        tilted = jg.tolerance.Deviation(zero.pinion, zero.wheel, jnp.asarray(amount))
+        return jg.contact.solve_removed(
+            wide_mesh, TORQUE, jg.tolerance.deviated_material(wide_mesh, TORQUE, tilted, **RELIEF)
+        )
 
     plus, minus = solve(6.0), solve(-6.0)
     np.testing.assert_allclose(plus.transmission_error, minus.transmission_error, rtol=1e-10)
@@ -251,11 +263,11 @@ def test_misalignment_of_either_sign_acts_alike(wide_mesh):
 
 def test_samples_depend_on_seed_and_number_only(mesh, tolerance):
     tolerance = tolerance.without_lead()
-    few, many = (jg.sample_deviations(tolerance, mesh, samples, seed=7) for samples in (5, 9))
+    few, many = (jg.tolerance.sample_deviations(tolerance, mesh, samples, seed=7) for samples in (5, 9))
     jax.tree.map(lambda a, b: np.testing.assert_array_equal(a, b[:5]), few, many)
-    compiled = jax.jit(lambda t, seed: jg.sample_deviations(t, mesh, 5, seed))(tolerance, 7)
+    compiled = jax.jit(lambda t, seed: jg.tolerance.sample_deviations(t, mesh, 5, seed))(tolerance, 7)
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12), few, compiled)
-    other = jg.sample_deviations(tolerance, mesh, 5, seed=8)
+    other = jg.tolerance.sample_deviations(tolerance, mesh, 5, seed=8)
     assert not np.any(np.asarray(few.pinion.pitch) == np.asarray(other.pinion.pitch))
 
 
@@ -263,7 +275,7 @@ def test_common_random_numbers_scale_with_the_limits(mesh, tolerance):
     """Twice the tolerance is twice the same deviation: designs and tolerances are compared on the same gears."""
     once = tolerance.without_lead()
     twice = jg.Tolerance(*(jax.tree.map(lambda limit: 2 * limit, gear) for gear in (once.pinion, once.wheel)))
-    for a, b in zip(*(jax.tree.leaves(jg.sample_deviations(t, mesh, 6, seed=2)) for t in (once, twice))):
+    for a, b in zip(*(jax.tree.leaves(jg.tolerance.sample_deviations(t, mesh, 6, seed=2)) for t in (once, twice))):
         np.testing.assert_allclose(2 * a, b, rtol=1e-12)
 
 
@@ -272,7 +284,7 @@ def test_monte_carlo_holds_the_samples_of_its_seed(mesh, tolerance, solve):
     scatter = jg.monte_carlo(
         mesh, TORQUE, tolerance=tolerance, samples=20, seed=11, quantiles=(0.5, 0.0, 1.0), **RELIEF
     )
-    deviations = jg.sample_deviations(tolerance, mesh, 20, seed=11)
+    deviations = jg.tolerance.sample_deviations(tolerance, mesh, 20, seed=11)
     every = [jax.tree.map(lambda leaf, i=i: leaf[i], deviations) for i in range(20)]
     curves = np.stack([solve(one).transmission_error for one in every])
     np.testing.assert_allclose(scatter.ppte, np.ptp(curves, axis=1), rtol=1e-9)
@@ -293,7 +305,7 @@ def test_one_compilation_serves_every_number(mesh, tolerance, monkeypatch):
     gear = tolerance.without_lead().pinion
     for amount in (1.0, 2.0, 3.0):
         design = {"pinion": jg.TipRelief(amount, 3.0), "wheel": jg.TipRelief(5.0, 3.0)}
-        limits = jg.Tolerance(gear, jg.GearTolerance(amount, 2 * amount, 3 * amount))
+        limits = jg.Tolerance(gear, jg.tolerance.GearTolerance(amount, 2 * amount, 3 * amount))
         jg.monte_carlo(mesh, 40.0 + amount, tolerance=limits, samples=20, seed=int(amount), **design)
     assert len(traces) <= 2  # a loop is traced for its shapes too; none if an earlier test has compiled it
 
@@ -340,12 +352,12 @@ def test_gradients_of_the_mean_scatter_agree_with_differences(mesh, tolerance):
 
     def mean_energy(amount, pitch):
         """Mean square variation of the transmission error, which has no kinks, over common random numbers."""
-        pinion = jg.GearTolerance(tolerance.pinion.profile_slope, tolerance.pinion.profile_form, pitch)
-        deviations = jg.sample_deviations(jg.Tolerance(pinion, tolerance.wheel), mesh, 6, seed=4)
+        pinion = jg.tolerance.GearTolerance(tolerance.pinion.profile_slope, tolerance.pinion.profile_form, pitch)
+        deviations = jg.tolerance.sample_deviations(jg.Tolerance(pinion, tolerance.wheel), mesh, 6, seed=4)
 
         def one(deviation):
-            removed = jg.deviated_material(mesh, TORQUE, deviation, pinion=jg.TipRelief(amount, 4.0))
-            return jnp.var(jg.solve_removed(mesh, TORQUE, removed).transmission_error)
+            removed = jg.tolerance.deviated_material(mesh, TORQUE, deviation, pinion=jg.TipRelief(amount, 4.0))
+            return jnp.var(jg.contact.solve_removed(mesh, TORQUE, removed).transmission_error)
 
         return jnp.mean(jax.vmap(one)(deviations))
 

@@ -53,13 +53,15 @@ def test_beam_integrals_against_a_fine_polygon(tooth, plane):
     modulus = E if plane == "stress" else E / (1 - NU**2)
     load = loads(tooth)
     by_hand = [integrate(load, k, modulus, E / (2 * (1 + NU))) for k in range(9)]
-    np.testing.assert_allclose(jax.jit(jg.Beam().compliance, static_argnums=1)(load, plane), by_hand, rtol=2e-6)
+    np.testing.assert_allclose(
+        jax.jit(jg.compliance.Beam().compliance, static_argnums=1)(load, plane), by_hand, rtol=2e-6
+    )
 
 
 def test_beam_of_an_undercut_tooth():
     load = loads(outline(jg.Gear(11, 3.0, face_width=10.0)), 4)
     by_hand = [integrate(load, k, E, E / (2 * (1 + NU))) for k in range(4)]
-    np.testing.assert_allclose(jg.Beam().compliance(load, "stress"), by_hand, rtol=1e-5)
+    np.testing.assert_allclose(jg.compliance.Beam().compliance(load, "stress"), by_hand, rtol=1e-5)
 
 
 def test_crossing_below_the_fillet_junction():
@@ -68,14 +70,14 @@ def test_crossing_below_the_fillet_junction():
     load = tooth_load(tooth, jnp.asarray([float(tooth.form_roll_length)]))
     crossing, junction = float(load.height[0]), float(tooth.junction_height)
     assert crossing < junction
-    assert float(jg.Beam().compliance(load, "stress")[0]) == pytest.approx(
+    assert float(jg.compliance.Beam().compliance(load, "stress")[0]) == pytest.approx(
         integrate(load, 0, E, E / (2 * (1 + NU))), rel=1e-5
     )
 
 
 def test_quadrature_has_converged(tooth):
     load = loads(tooth)
-    default, fine = (jg.Beam(nodes=n).compliance(load, "stress") for n in (jg.Beam().nodes, 40))
+    default, fine = (jg.compliance.Beam(nodes=n).compliance(load, "stress") for n in (jg.compliance.Beam().nodes, 40))
     np.testing.assert_allclose(default, fine, rtol=1e-7)
 
 
@@ -99,7 +101,9 @@ def test_scaling():
         material = jg.Material(elastic_modulus=modulus)
         tooth = outline(jg.Gear(19, module, face_width=10.0, material=material))
         low, high = tooth.form_roll_length, tooth.gear.tip_roll_length
-        return jg.Beam().compliance(tooth_load(tooth, low + jnp.asarray([0.2, 0.6, 1.0]) * (high - low)), "strain")
+        return jg.compliance.Beam().compliance(
+            tooth_load(tooth, low + jnp.asarray([0.2, 0.6, 1.0]) * (high - low)), "strain"
+        )
 
     reference = compliance(3.0)
     np.testing.assert_allclose(compliance(7.0), reference, rtol=1e-9)
@@ -111,8 +115,10 @@ def test_scaling():
 def test_single_tooth_compliance_against_finite_elements(teeth, module, ratio, radii, stress, strain, tolerance):
     """Beam, ring and hub together. Softest agreement on the thinnest ring with the fewest teeth, close to its root."""
     gear = jg.Gear(teeth, module, face_width=10.0, bore_diameter=module * (teeth - 2.5) / ratio)
-    tooth, body = outline(gear), jg.ElasticRing()
-    load = tooth_load(tooth, jg.roll_length(gear, 2 * jnp.asarray(radii))[None])
+    tooth, body = outline(gear), jg.compliance.ElasticRing()
+    load = tooth_load(tooth, jg.geometry.roll_length(gear, 2 * jnp.asarray(radii))[None])
     for plane, reference in (("stress", stress), ("strain", strain)):
-        total = jg.Beam().compliance(load, plane)[0] + body.compliance(load, 1, plane)[0, 0] + body.hub(tooth)
+        total = (
+            jg.compliance.Beam().compliance(load, plane)[0] + body.compliance(load, 1, plane)[0, 0] + body.hub(tooth)
+        )
         np.testing.assert_allclose(1e3 * total, reference, rtol=tolerance)

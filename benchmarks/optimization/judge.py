@@ -40,14 +40,14 @@ class Judge:
     def __init__(self, task: Task, positions: int, gears: int):
         self._mesh = task.mesh(positions)
         self._torques = jnp.asarray(task.torque * _TORQUES)
-        samples = jg.sample_deviations(task.tolerance, self._mesh, gears, seed=_SEED)
+        samples = jg.tolerance.sample_deviations(task.tolerance, self._mesh, gears, seed=_SEED)
         self._deviations = _fields(self._mesh, jnp.asarray(task.torque), samples)
 
     def __call__(self, found: Found) -> Verdict:
         """Judges a design; a contact solution that fails makes its PPTE infinite."""
         flanks = {"pinion": found.pinion, "wheel": found.wheel}
-        removed = jnp.stack([jg.removed_material(self._mesh, torque, **flanks) for torque in self._torques])
-        relief = jg.max_relief(self._mesh, **flanks)
+        removed = jnp.stack([jg.contact.removed_material(self._mesh, torque, **flanks) for torque in self._torques])
+        relief = jg.metrics.max_relief(self._mesh, **flanks)
         ppte, pressure = (np.asarray(part) for part in _solved(self._mesh, self._torques, removed, self._deviations))
         count = len(_TORQUES)
         # the value of a sample: interpolation towards an infinite neighbour would give NaN
@@ -57,9 +57,9 @@ class Judge:
 
 
 @eqx.filter_jit
-def _fields(mesh: jg.Mesh, torque, samples: jg.Deviation):
+def _fields(mesh: jg.Mesh, torque, samples: jg.tolerance.Deviation):
     """Material that the deviations of every sample remove, shape (gears, pairs, slices, positions)."""
-    return jax.vmap(lambda one: jg.deviated_material(mesh, torque, one))(samples)
+    return jax.vmap(lambda one: jg.tolerance.deviated_material(mesh, torque, one))(samples)
 
 
 @eqx.filter_jit
@@ -70,7 +70,7 @@ def _solved(mesh: jg.Mesh, torques, designs, deviations):
     removed = jnp.concatenate([designs, designs[_DESIGN][None] + deviations])
 
     def one(case):
-        cycle = jg.solve_removed(mesh, *case)
+        cycle = jg.contact.solve_removed(mesh, *case)
         ppte = jg.peak_to_peak(cycle.transmission_error)
         fine = jnp.all(cycle.converged) & jnp.isfinite(ppte)
         pressure = jnp.max(jnp.maximum(cycle.contact_pressure, cycle.corner_pressure))

@@ -76,7 +76,7 @@ class Found:
     wheel: AbstractModification | None
     evaluations: int
     steps: int | None = None
-    optimum: jg.Optimum | None = None
+    optimum: jg.optimize.Optimum | None = None
 
 
 @dataclass(frozen=True)
@@ -109,15 +109,17 @@ def methods(effort: Effort) -> list[Method]:
     return [
         Method("unmodified", lambda task, mesh, _: Found(None, None, 0)),
         Method("rule-based", _rule),
-        Method("factorial", _searched(jg.Factorial(effort.levels))),
-        Method("genetic", _searched(jg.Genetic(population, generations)), needs=_EVOLUTION),
+        Method("factorial", _searched(jg.optimize.Factorial(effort.levels))),
+        Method("genetic", _searched(jg.optimize.Genetic(population, generations)), needs=_EVOLUTION),
         Method(
-            "differential evolution", _searched(jg.DifferentialEvolution(population, generations)), needs=_EVOLUTION
+            "differential evolution",
+            _searched(jg.optimize.DifferentialEvolution(population, generations)),
+            needs=_EVOLUTION,
         ),
-        Method("CMA-ES", _searched(jg.CMAES(effort.cma_population, effort.cma_generations)), needs=_EVOLUTION),
-        Method("Adam", _searched(jg.Adam(effort.starts, effort.steps)), slow=True),
-        Method("L-BFGS", _searched(jg.LBFGS(effort.starts, effort.lbfgs_steps)), slow=True),
-        Method("minimax", _searched(jg.Minimax(effort.minimax_starts))),
+        Method("CMA-ES", _searched(jg.optimize.CMAES(effort.cma_population, effort.cma_generations)), needs=_EVOLUTION),
+        Method("Adam", _searched(jg.optimize.Adam(effort.starts, effort.steps)), slow=True),
+        Method("L-BFGS", _searched(jg.optimize.LBFGS(effort.starts, effort.lbfgs_steps)), slow=True),
+        Method("minimax", _searched(jg.optimize.Minimax(effort.minimax_starts))),
         Method("robust minimax", _robust(effort), slow=True),
         Method("iteration, type 1", _iterated),
         Method("iteration, type 2", _iterated_from_relief(effort), slow=True),
@@ -136,7 +138,7 @@ def versions() -> dict[str, str]:
     return {name: metadata.version(name) for name in names if find_spec(name) is not None}
 
 
-def _found(optimum: jg.Optimum, before: int = 0) -> Found:
+def _found(optimum: jg.optimize.Optimum, before: int = 0) -> Found:
     steps = len(optimum.iterations) - 1 if optimum.iterations else None
     return Found(optimum.pinion, optimum.wheel, before + optimum.evaluations, steps, optimum)
 
@@ -167,7 +169,7 @@ def _robust(effort: Effort):
             measure=jg.CVaR(0.9),
             tolerance=task.tolerance,
             samples=effort.samples,
-            method=jg.Minimax(effort.minimax_starts),
+            method=jg.optimize.Minimax(effort.minimax_starts),
             positions=None,
         )
         return _found(found)
@@ -176,7 +178,7 @@ def _robust(effort: Effort):
 
 
 def _iterated(task: Task, mesh: jg.Mesh, _) -> Found:
-    return _found(jg.iterate_transmission_error(mesh, task.torque, max_relief=task.max_relief))
+    return _found(jg.optimize.iterate_transmission_error(mesh, task.torque, max_relief=task.max_relief))
 
 
 def _iterated_from_relief(effort: Effort):
@@ -189,10 +191,10 @@ def _iterated_from_relief(effort: Effort):
             mesh=mesh,
             torque=task.torque,
             objective="max_contact_pressure",
-            method=jg.Minimax(effort.minimax_starts),
+            method=jg.optimize.Minimax(effort.minimax_starts),
             positions=None,
         )
-        found = jg.iterate_transmission_error(
+        found = jg.optimize.iterate_transmission_error(
             mesh, task.torque, pinion=start.pinion, wheel=start.wheel, max_relief=task.max_relief
         )
         return _found(found, start.evaluations)
@@ -203,7 +205,7 @@ def _iterated_from_relief(effort: Effort):
 def _projected(curve: str):
     def run(task: Task, mesh: jg.Mesh, before: Found | None) -> Found:
         assert before is not None and before.optimum is not None
-        fit = jg.project(before.optimum, curve)
+        fit = jg.optimize.project(before.optimum, curve)
         return Found(fit.pinion, fit.wheel, before.evaluations + 1)
 
     return run

@@ -110,12 +110,12 @@ def monte_carlo(
     modification. Beyond the blocks it holds one transmission error curve per sample in memory. For gradients, average
     over `sample_deviations` yourself:
 
-        deviations = jg.sample_deviations(tolerance, mesh, 500, seed=0)
+        deviations = jg.tolerance.sample_deviations(tolerance, mesh, 500, seed=0)
 
         def mean_ppte(amount):
             def one(deviation):
-                removed = jg.deviated_material(mesh, torque, deviation, pinion=jg.TipRelief(amount, 4.0))
-                return jg.peak_to_peak(jg.solve_removed(mesh, torque, removed).transmission_error)
+                removed = jg.tolerance.deviated_material(mesh, torque, deviation, pinion=jg.TipRelief(amount, 4.0))
+                return jg.peak_to_peak(jg.contact.solve_removed(mesh, torque, removed).transmission_error)
 
             return jax.numpy.mean(jax.vmap(one)(deviations))
 

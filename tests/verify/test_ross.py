@@ -110,7 +110,7 @@ def test_outline(sides):
 def test_beam(sides):
     """Bending, shear and axial compression: ROSS's values less its own integrals beyond the crossing."""
     for load, gear, angles, _ in sides:
-        ours = np.asarray(jax.jit(jg.Beam().compliance, static_argnums=1)(load, "stress"))
+        ours = np.asarray(jax.jit(jg.compliance.Beam().compliance, static_argnums=1)(load, "stress"))
         whole, beside = [], []
         for a, height in zip(angles, 1e-3 * np.asarray(load.height)):
             whole.append(gear._inv_kb(a) + gear._inv_ks(a) + gear._inv_ka(a))
@@ -171,7 +171,7 @@ def test_foundation(sides):
 
 def foundation(load):
     one_pair = jax.tree.map(lambda leaf: leaf[None] if jnp.ndim(leaf) == 1 else leaf, load)
-    return np.asarray(jax.jit(jg.Sainsot().compliance, static_argnums=(1, 2))(one_pair, 1, "stress"))[0, 0]
+    return np.asarray(jax.jit(jg.compliance.Sainsot().compliance, static_argnums=(1, 2))(one_pair, 1, "stress"))[0, 0]
 
 
 def test_single_pair(gears, sides, ross):

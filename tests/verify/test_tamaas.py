@@ -66,7 +66,7 @@ def test_half_width_and_peak_pressure(solutions):
 
 def test_approach_between_two_loads(solutions):
     """Approach per load: its dependence on the load is that of the half width alone, whatever the reference depth."""
-    law = jg.DepthReferenced().prepare(geometry(5.0))
+    law = jg.compliance.DepthReferenced().prepare(geometry(5.0))
     (low, high) = LOADS
     ours = [float(law.deflection(jnp.full((1, 1, 1), q))[0, 0, 0]) / q for q in LOADS]
     theirs = [solutions[q].approach / q for q in LOADS]
@@ -90,6 +90,6 @@ def test_approach_down_to_a_depth(solutions, depth):
         normal = 0.5 * (np.log(outer) - log + squared / outer - 1)
         transverse = 0.5 * (1 - squared / outer)
         strain = 2 / np.pi * step * solution.pressure @ (normal - NU / (1 - NU) * transverse)
-        law = jg.DepthReferenced().prepare(geometry(depth))
+        law = jg.compliance.DepthReferenced().prepare(geometry(depth))
         ours = float(law.deflection(jnp.full((1, 1, 1), load))[0, 0, 0])
         assert ours == pytest.approx(1e3 * 2 * strain / STRAIN, rel=1e-3)
