@@ -14,3 +14,4 @@ from .resolution import Resolution as Resolution
 from .solve import removed_material as removed_material
 from .solve import solve as solve
 from .solve import solve_removed as solve_removed
+from .table import flank_table as flank_table
