@@ -651,7 +651,7 @@ def test_variables_stand_for_numbers_of_gears_pair_and_load(load):
         ("results", "torques = [30.0]\nresults", 'sweep.torques: has no effect, load.torque is "t"'),
         ("high = 0.2", "high = 3.0", "variables.x.high: 3 x module must be at least -1.5 x module and at most 2"),
         ('[pair]\ncenter_distance = "a"', "", "variables.a: is declared but used nowhere"),
-        ("high = 101.8", "high = 301.8", "pair.center_distance: "),
+        ("high = 101.8", "high = 301.8", "pair: contact ratio = -14.52 must be at least 1"),
     ):
         with pytest.raises(DesignFileError, match=re.escape(problem)):
             sweep_request(load(whole.replace(old, new)))
@@ -755,7 +755,8 @@ def test_a_result_folder_is_complete_or_absent(tmp_path):
         (folder / "summary.json").write_text("half")
         raise KeyboardInterrupt
     assert list(tmp_path.iterdir()) == []
-    for content in ("first", "second"):
+    first, second = (json.dumps({"versions": {"jaxgear": version}}) for version in ("1", "2"))
+    for content in (first, second):
         with result_folder(target) as folder:
             (folder / "summary.json").write_text(content)
         assert [path.name for path in target.parent.iterdir()] == ["results"]
@@ -763,13 +764,13 @@ def test_a_result_folder_is_complete_or_absent(tmp_path):
     with pytest.raises(RuntimeError), result_folder(target) as folder:
         (folder / "summary.json").write_text("third")
         raise RuntimeError
-    assert (target / "summary.json").read_text() == "second"
+    assert (target / "summary.json").read_text() == second
     assert [path.name for path in target.parent.iterdir()] == ["results"]
 
 
 def test_a_folder_of_other_things_is_never_replaced(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(ValueError, match=r"holds other files than results \(thesis.tex\)"), result_folder(tmp_path):
+    with pytest.raises(ValueError, match=r"holds other files than results of jaxgear \(thesis.tex\)"), result_folder(tmp_path):
         pytest.fail("the folder was accepted")
     for target in (tmp_path / "thesis.tex", tmp_path / "thesis.tex" / "below"):
         with pytest.raises(ValueError, match="is a file|cannot be written"), result_folder(target):
