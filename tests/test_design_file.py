@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import jaxgear as jg
+from jaxgear.compliance.laws import LinearLaw
 from jaxgear.geometry import path_of_contact
 from jaxgear.io import (
     DesignFileError,
@@ -251,15 +252,18 @@ def test_defaults_are_those_of_the_library(load):
 
 MODELS = [
     ('preset = "legacy"', jg.legacy_compliance()),
-    ('plane = "strain"\nhub_windup = false', jg.default_compliance("strain", hub_windup=False)),
     (
-        "coupling = false",
+        'plane = "strain"\nbody = { type = "elastic_ring", hub_windup = false }',
+        jg.default_compliance("strain", hub_windup=False),
+    ),
+    (
+        'body = { type = "elastic_ring", coupling = false }',
         jg.Compliance(
             jg.compliance.Beam(), jg.compliance.ElasticRing(coupling=False), jg.compliance.DepthReferenced(), "stress"
         ),
     ),
     (
-        'body = "sainsot"\ncontact = "constant"',
+        'body = "sainsot"\ncontact = "constant_hertz"',
         jg.Compliance(jg.compliance.Beam(), jg.compliance.Sainsot(), jg.compliance.ConstantHertz(), "stress"),
     ),
     (
@@ -271,7 +275,7 @@ MODELS = [
         jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.Palmgren(), "stress"),
     ),
     (
-        'contact = "power"',
+        'contact = { type = "nonlinear_power" }',
         jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.NonlinearPower(), "stress"),
     ),
     (
@@ -354,7 +358,10 @@ MALFORMED = {
         text(tail='[model]\nplane = "stres"'),
         'model.plane: "stres" is not known, did you mean "stress"?',
     ),
-    "unknown body": (text(tail='[model]\nbody = "rings"'), 'model.body: "rings" is not known, did you mean "ring"?'),
+    "unknown body": (
+        text(tail='[model]\nbody = "half_plain"'),
+        'model.body: "half_plain" is not known, did you mean "half_plane"?',
+    ),
     "unknown contact": (text(tail='[model]\ncontact = "hertz"'), 'model.contact: "hertz" is not known'),
     "missing key": (text().replace("teeth = 48\n", ""), "wheel.teeth: missing, this key is required"),
     "missing table": (text().partition("[load]")[0], "load: missing, this key is required"),
@@ -370,7 +377,10 @@ MALFORMED = {
         text(pinion=RELIEF.replace('"height"', "[1.0]")),
         "pinion.modification[0].amount: must be a number or the name of a variable, not a list",
     ),
-    "true for a number": (text(load="speed = true"), "load.speed: must be a number, not true or false"),
+    "true for a number": (
+        text(load="speed = true"),
+        "load.speed: must be a number or the name of a variable, not true or false",
+    ),
     "number for a table": ("pinion = 3\n" + text().replace("[pinion]", "[other]"), "pinion: must be a table, not"),
     "wrong length": (text(load="torque_range = [1.0]"), "load.torque_range: must be a list of length 2, not 1"),
     "wrong list element": (
@@ -450,8 +460,8 @@ MALFORMED = {
         'model.plane: cannot be combined with preset = "legacy"',
     ),
     "option of another body": (
-        text(tail='[model]\nbody = "sainsot"\ncoupling = false'),
-        'model.coupling: has no effect with body = "sainsot"',
+        text(tail='[model]\nbody = { type = "sainsot", coupling = false }'),
+        "model.body.coupling: unknown key",
     ),
     "resolution too coarse": (
         text(tail="[resolution]\npositions = 3"),
@@ -577,8 +587,8 @@ samples = 8
 seed = 3
 [model]
 plane = "stress"
-body = "ring"
-coupling = false
+body = { type = "elastic_ring", coupling = false }
+contact = "weber"
 [resolution]
 positions = 16
 pairs = 2
@@ -617,7 +627,7 @@ def test_whatever_is_written_in_a_file_it_is_read_or_refused_in_one_line(load):
 
 def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
     text = reference()
-    sections = [schema.FileSection, schema.GearSection, schema.LoadSection, schema.OptimizeSection]
+    sections = [schema.FileSection, schema.GearSection, schema.LoadSection, schema.OptimizeSection, schema.ModelSection]
     sections += [*schema.METHOD_OPTIONS.values(), schema_sweep.SweepSection, schema_sweep.ToleranceSection]
     sections += [section_of(cls) for cls in (*family(AbstractModification, users=False).values(), jg.Material)]
     for section in sections:
@@ -657,6 +667,48 @@ def test_variables_stand_for_numbers_of_gears_pair_and_load(load):
             sweep_request(load(whole.replace(old, new)))
     with pytest.raises(DesignFileError, match=r'pinion\.profile_shift: "x" is a variable, which a sweep alone'):
         optimize_request(file)
+
+
+class SoftLaw(jg.compliance.AbstractContact):
+    """A user's own contact law: so many times the compliance of the half spaces."""
+
+    softness: float = number("", low=0.0, open_low=True, default=1.0)
+
+    def prepare(self, geometry):
+        return LinearLaw(self.softness * geometry.compliance)
+
+
+def test_a_contact_law_of_a_user_needs_no_line_in_the_package(load):
+    file = load(text(tail='[model]\ncontact = { type = "soft_law", softness = 3.0 }'))
+    assert eqx.tree_equal(file._compliance, jg.Compliance(contact=SoftLaw(3.0)))
+    with pytest.raises(DesignFileError, match=r"model\.contact\.softness: 0 must be greater than 0"):
+        load(text(tail='[model]\ncontact = { type = "soft_law", softness = 0.0 }'))
+    assert "soft_law" not in reference()
+
+
+FLASH = """[optimize]
+objective = "max_flash_temperature"
+constraint = [{ of = "max_flash_temperature", high = 90.0 }]
+[sweep]
+samples = 4
+results = ["max_flash_temperature"]
+"""
+
+
+def test_speed_and_friction_reach_objective_constraint_and_sweep(load):
+    whole = text(pinion=RELIEF, load="speed = 1000.0\nfriction = 0.05", tail=VARIABLE + FLASH)
+    file = load(whole)
+    for spectrum in (optimize_request(file)._common["torque"], sweep_request(file).load):
+        assert float(spectrum.speeds[0]) == 1000.0 and float(spectrum.friction) == pytest.approx(0.05)
+    # a variable: every variant has its own
+    variable = 'n = { low = 500.0, high = 1500.0, unit = "rpm" }\n'
+    free = load(whole.replace("speed = 1000.0", 'speed = "n"').replace("[optimize]", variable + "[optimize]"))
+    assert free.speed == 1000.0 and free.units["n"] == "rpm"
+    request = sweep_request(free)
+    operation = request.load({"height": jnp.asarray(1.0), "n": jnp.asarray(700.0)})
+    assert float(operation.speed) == 700.0 and float(operation.torque) == 50.0 and request.highest_torque == 50.0
+    with pytest.raises(DesignFileError, match=r'load\.speed: "n" is a variable, which a sweep alone'):
+        optimize_request(free)
 
 
 @pytest.mark.slow
@@ -770,7 +822,8 @@ def test_a_result_folder_is_complete_or_absent(tmp_path):
 
 def test_a_folder_of_other_things_is_never_replaced(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(ValueError, match=r"holds other files than results of jaxgear \(thesis.tex\)"), result_folder(tmp_path):
+    refusal = r"holds other files than results of jaxgear \(thesis.tex\)"
+    with pytest.raises(ValueError, match=refusal), result_folder(tmp_path):
         pytest.fail("the folder was accepted")
     for target in (tmp_path / "thesis.tex", tmp_path / "thesis.tex" / "below"):
         with pytest.raises(ValueError, match="is a file|cannot be written"), result_folder(target):

@@ -1,6 +1,7 @@
 """A sweep over macro geometry flags exactly the pairs that the constructors refuse."""
 
 import numpy as np
+import pytest
 
 import jaxgear as jg
 
@@ -9,9 +10,7 @@ SLIPS = np.array([[0.2, 101.0, 64.0, 24.0], [0.2, 101.08, 64.0, 24.0], [0.2, 101
 
 
 def pair_of(v):
-    pinion = jg.Gear(
-        19, 3.0, profile_shift=v["shift"], face_width=10.0, tip_diameter=v["tip"], bore_diameter=v["bore"]
-    )
+    pinion = jg.Gear(19, 3.0, profile_shift=v["shift"], face_width=10.0, tip_diameter=v["tip"], bore_diameter=v["bore"])
     return jg.GearPair(pinion, jg.Gear(48, 3.0, face_width=10.0), v["distance"])
 
 
@@ -23,6 +22,7 @@ def accepted(row):
     return True
 
 
+@pytest.mark.slow
 def test_the_flag_of_a_sweep_is_the_verdict_of_the_constructors():
     near = {**BOUNDS, "shift": (0.0, 0.3), "distance": (100.4, 101.6), "tip": (62.0, 65.0), "bore": (20.0, 30.0)}
     rows = np.concatenate([SLIPS, jg.Sobol(BOUNDS, 20, seed=2).rows(0, 20), jg.Sobol(near, 20, seed=3).rows(0, 20)])

@@ -60,10 +60,10 @@ class Compliance(AbstractCompliance):
         edge_softening: soften the contact where a tip corner cuts it off (see `edge`).
     """
 
-    tooth: AbstractTooth
-    body: AbstractBody
-    contact: AbstractContact
-    plane: Plane = eqx.field(static=True)
+    tooth: AbstractTooth = eqx.field(default_factory=Beam)
+    body: AbstractBody = eqx.field(default_factory=ElasticRing)
+    contact: AbstractContact = eqx.field(default_factory=DepthReferenced)
+    plane: Plane = eqx.field(static=True, default="stress")
     edge_softening: bool = eqx.field(static=True, default=True)
 
     def __check_init__(self):
@@ -94,7 +94,7 @@ def default_compliance(plane: Plane = "stress", *, hub_windup: bool = True) -> C
         plane: "stress" or "strain".
         hub_windup: include the common torsion of the gear bodies between bore and root circle.
     """
-    return Compliance(Beam(), ElasticRing(hub_windup=hub_windup), DepthReferenced(), plane)
+    return Compliance(body=ElasticRing(hub_windup=hub_windup), plane=plane)
 
 
 def legacy_compliance() -> Compliance:

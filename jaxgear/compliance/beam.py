@@ -2,20 +2,19 @@
 
 from abc import abstractmethod
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry.outline import Outline, involute_point, trochoid
-from ..numerics import bracketed_root, gauss_legendre
+from ..numerics import Checked, bracketed_root, count, gauss_legendre
 from .plane import Plane, plane_modulus, shear_modulus
 from .toothload import ToothLoad
 
 _SHEAR_FACTOR = 1.2  # rectangular section (energy method, Yang & Sun 1985; Tian 2004)
 
 
-class AbstractTooth(eqx.Module):
+class AbstractTooth(Checked):
     """Compliance of the tooth alone, root circle held."""
 
     @abstractmethod
@@ -41,7 +40,7 @@ class Beam(AbstractTooth):
         K. Banaschek 1953.
     """
 
-    nodes: int = eqx.field(static=True, default=12)
+    nodes: int = count(high=1000, default=12)
 
     def compliance(self, load: ToothLoad, plane: Plane) -> Float[Array, "..."]:
         material = load.outline.gear.material

@@ -8,12 +8,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry.outline import Outline
+from ..numerics import Checked, count
 from . import ring, sainsot
 from .plane import Plane, check_plane, plane_modulus, plane_poisson
 from .toothload import ToothLoad
 
 
-class AbstractBody(eqx.Module):
+class AbstractBody(Checked):
     """Compliance of the gear body between the teeth in contact."""
 
     @abstractmethod
@@ -44,7 +45,7 @@ class ElasticRing(AbstractBody):
 
     hub_windup: bool = eqx.field(static=True, default=True)
     coupling: bool = eqx.field(static=True, default=True)
-    harmonics: int = eqx.field(static=True, default=400)
+    harmonics: int = count(high=100_000, default=400)
 
     def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
         outline, count = load.outline, load.angle.shape[0]

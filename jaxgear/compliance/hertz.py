@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import reduced_radius
+from ..numerics import Checked
 from .laws import AbstractLaw, LinearLaw, LogarithmicLaw, PowerLaw
 from .plane import Plane, plane_modulus, plane_poisson
 from .toothload import ToothLoad
@@ -92,7 +93,7 @@ def contact_geometry(pinion: ToothLoad, wheel: ToothLoad, plane: Plane, face_wid
     return ContactGeometry(side(pinion), side(wheel), field(face_width))
 
 
-class AbstractContact(eqx.Module):
+class AbstractContact(Checked):
     """A choice of contact law."""
 
     @abstractmethod

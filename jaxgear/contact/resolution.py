@@ -1,8 +1,6 @@
 """Array sizes of a mesh."""
 
-import equinox as eqx
-
-from ..numerics import Checked, count
+from ..numerics import Checked, count, number
 
 
 class Resolution(Checked):
@@ -26,11 +24,9 @@ class Resolution(Checked):
     pairs: int | None = count(low=2, optional=True, default=None)
     patch_nodes: int = count(default=4)
     newton_steps: int = count(default=8)
-    tolerance: float | None = eqx.field(static=True, default=None)
-
-    def check_together(self) -> None:
-        if self.tolerance is not None and not (isinstance(self.tolerance, float) and 0 < self.tolerance < 1):
-            raise ValueError(f"Resolution: tolerance = {self.tolerance!r} must be a number between 0 and 1, or None")
+    tolerance: float | None = number(
+        "", low=0.0, high=1.0, open_low=True, open_high=True, static=True, optional=True, default=None
+    )
 
     @property
     def leading(self) -> int:

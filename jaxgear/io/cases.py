@@ -14,9 +14,12 @@ def load_of(design: DesignFile, table: str, torques: Sequence[float] | None, wei
     if torques is None:
         if weights is not None:
             raise DesignFileError(design.path, f"{table}.weights", f"has no effect without {table}.torques")
-        return LoadSpectrum([design.torque])
-    load = refused(design.path, f"{table}.torques", LoadSpectrum, torques)
-    return load if weights is None else refused(design.path, f"{table}.weights", LoadSpectrum, torques, weights)
+        torques = [design.torque]
+    run_at = {"speeds": design.speed, "friction": design.friction}
+    load = refused(design.path, f"{table}.torques", LoadSpectrum, torques, **run_at)
+    if weights is None:
+        return load
+    return refused(design.path, f"{table}.weights", LoadSpectrum, torques, weights, **run_at)
 
 
 def tolerance_of(design: DesignFile, section: schema_sweep.ToleranceSection) -> Tolerance:

@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..compliance import Beam, Compliance, ElasticRing, legacy_compliance
+from ..compliance import Compliance, legacy_compliance
 from ..contact import Mesh, Operation, Resolution, fewest_pairs, prepare
 from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
-from ..numerics import fields_of
 from ..sizing import iso_stiffness
 from . import schema, schema_sweep, template
 from .errors import DesignFileError, refused
@@ -37,7 +36,7 @@ class DesignFile:
         title: free text, the file's stem if it has none.
         torque: design torque on the pinion [N m]; the middle of its bounds where it is a variable.
         torque_range: lowest and highest torque of interest [N m].
-        speed: of the pinion [rpm], None if the file names none.
+        speed: of the pinion [rpm], None if the file names none; the middle of its bounds where it is a variable.
         friction: mean coefficient of friction; used with a speed only, None for the library's default.
         bounds: (low, high) of every free parameter, in its unit.
         units: unit of every free parameter, "" for a pure number.
@@ -45,7 +44,7 @@ class DesignFile:
         optimize: the table of that name; `optimize_request` makes sense of it.
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
-        open_case: numbers of gears, pair and load that are variables; a sweep alone can vary them.
+        open_case: numbers of gears, pair, model and load that are variables; a sweep alone can vary them.
     """
 
     path: Path
@@ -63,7 +62,9 @@ class DesignFile:
     open_case: tuple[template.Free, ...]
     _pair: template.Part
     _middle: GearPair
+    _model: template.Part
     _compliance: Compliance
+    _load: template.Part
     _resolution: Resolution
     _pairs_given: bool
     _parts: tuple[list[template.Part], list[template.Part]]
@@ -115,9 +116,19 @@ class DesignFile:
 
     def sweep_mesh(self, resolution: Resolution) -> Mesh | Callable[[Mapping[str, Any]], Mesh]:
         """The prepared mesh; a function of the parameters that prepares it where numbers of the gears are free."""
-        if not any(True for _ in self._pair.free()):
+        if not any(True for part in (self._pair, self._model) for _ in part.free()):
             return self.mesh(resolution)
-        return lambda parameters: prepare(self.pair(parameters), compliance=self._compliance, resolution=resolution)
+        return lambda parameters: prepare(
+            self.pair(parameters), compliance=self._model.build(parameters), resolution=resolution
+        )
+
+    def operation(self, parameters: Mapping[str, Any]) -> Operation:
+        """Torque, speed and friction; pure and traceable.
+
+        Args:
+            parameters: value of every free parameter.
+        """
+        return self._load.build(parameters)
 
     def design(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
         """Modifications of pinion and wheel; pure and traceable.
@@ -158,15 +169,16 @@ def load_design(path: str | Path) -> DesignFile:
         parts.append([template.parse(file, key, table, AbstractModification) for key, table in tables])
     pair = _pair(file, *gears, top.pair or {})
     load = _load(file, section("load", schema.LoadSection))
-    torque = template.opened(load.torque, "load.torque", fields_of(Operation)["torque"])
+    operation = template.part_of(file, "load", load, Operation)
+    model = _model(file, section("model", schema.ModelSection))
     optimize = section("optimize", schema.OptimizeSection)
     if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
         raise DesignFileError(file, "optimize", "has no effect without [variables]")
-    open_load = [torque] if isinstance(torque, template.Free) else []
-    open_case = [*pair.free(), *open_load]
+    open_case = [*pair.free(), *model.free(), *operation.free()]
     bounds, units = read_variables(file, top.variables or {}, [*parts[0], *parts[1]], open_case)
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
-    design_torque = middle[torque.name] if isinstance(torque, template.Free) else torque
+    usual = operation.checked(file, middle)
+    design_torque = float(usual.torque)
     tolerance = None if top.tolerance is None else section("tolerance", schema_sweep.ToleranceSection)
     if tolerance is not None and top.sweep is None and optimize.manufactured is None:
         raise DesignFileError(file, "tolerance", "has no effect without [sweep] or optimize.manufactured")
@@ -177,8 +189,8 @@ def load_design(path: str | Path) -> DesignFile:
         title=top.title or file.stem,
         torque=design_torque,
         torque_range=_torque_range(load, design_torque),
-        speed=load.speed,
-        friction=load.friction,
+        speed=None if usual.speed is None else float(usual.speed),
+        friction=None if usual.friction is None else float(usual.friction),
         bounds=bounds,
         units=units,
         application_factor=optimize.application_factor,
@@ -188,7 +200,9 @@ def load_design(path: str | Path) -> DesignFile:
         open_case=tuple(open_case),
         _pair=pair,
         _middle=pair.checked(file, middle),
-        _compliance=_compliance(file, section("model", schema.ModelSection)),
+        _model=model,
+        _compliance=model.checked(file, middle),
+        _load=operation,
         _resolution=_resolution(file, section("resolution", schema.ResolutionSection), [*parts[0], *parts[1]], bounds),
         _pairs_given=bool(top.resolution and "pairs" in top.resolution),
         _parts=(parts[0], parts[1]),
@@ -208,7 +222,7 @@ def _load(file: Path, load: schema.LoadSection) -> schema.LoadSection:
     return load
 
 
-def _resolution(file: Path, sizes: schema.ResolutionSection, parts: list[template.Part], bounds) -> Resolution:
+def _resolution(file: Path, sizes: Section, parts: list[template.Part], bounds) -> Resolution:
     given = sizes.given()
     ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
     for part in parts:
@@ -217,7 +231,7 @@ def _resolution(file: Path, sizes: schema.ResolutionSection, parts: list[templat
         if given.setdefault("slices", _SLICES) == 1:
             problem = f"must be at least 2, 1 cannot show {part.key}, which varies along the face"
             raise DesignFileError(file, "resolution.slices", f"{problem} ({_SLICES} where the key is left out)")
-    return Resolution(**given)
+    return template.Part(Resolution, given, "resolution").checked(file, {})
 
 
 def _torque_range(load: schema.LoadSection, torque: float) -> tuple[float, float]:
@@ -225,14 +239,10 @@ def _torque_range(load: schema.LoadSection, torque: float) -> tuple[float, float
     return low, high
 
 
-def _compliance(file: Path, model: schema.ModelSection) -> Compliance:
+def _model(file: Path, model: schema.ModelSection) -> template.Part:
     given = set(model.given()) - {"preset"}
-    if model.preset == "legacy":
-        if given:
-            raise DesignFileError(file, f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
-        return legacy_compliance()
-    body, contact = schema.BODIES[model.body], schema.CONTACTS[model.contact]
-    options = {name: getattr(model, name) for name in ("hub_windup", "coupling") if name in given}
-    if options and body is not ElasticRing:
-        raise DesignFileError(file, f"model.{min(options)}", f'has no effect with body = "{model.body}"')
-    return Compliance(Beam(), body(**options), contact(), model.plane or "stress")
+    if model.preset == "default":
+        return template.part_of(file, "model", model, Compliance)
+    if given:
+        raise DesignFileError(file, f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
+    return template.Part(legacy_compliance, {}, "model")

@@ -16,7 +16,7 @@ import equinox as eqx
 from pydantic import BaseModel, ConfigDict, create_model
 
 from ..numerics import Number, fields_of
-from .kinds import Choice, Kind, ListOf, Real, Switch, Table, Text
+from .kinds import Choice, Either, Kind, ListOf, Real, Switch, Table, Text
 
 
 class Section(BaseModel):
@@ -35,12 +35,20 @@ class Section(BaseModel):
 
 
 @cache
-def section_of(cls: type[eqx.Module], without: tuple[str, ...] = ()) -> type[Section]:
+def section_of(
+    cls: type[eqx.Module],
+    without: tuple[str, ...] = (),
+    *,
+    most: tuple[tuple[str, int], ...] = (),
+    open: bool = True,
+) -> type[Section]:
     """The keys of a class: its fields that can be written in a file.
 
     Args:
         cls: the class.
         without: fields that stand elsewhere.
+        most: (field, upper limit) where a file may ask for less than a program.
+        open: the names of variables may stand for numbers.
 
     Raises:
         TypeError: where a field without default cannot be written.
@@ -50,6 +58,10 @@ def section_of(cls: type[eqx.Module], without: tuple[str, ...] = ()) -> type[Sec
         if not field.init or field.name in without:
             continue
         kind = _kind(cls, field)
+        if isinstance(kind, Real):
+            high = dict(most).get(field.name, kind.number.high)
+            number = dataclasses.replace(kind.number, high=high)
+            kind = dataclasses.replace(kind, number=number, open=kind.open and open)
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
         if kind is None:
             if needed:
@@ -122,8 +134,10 @@ def _kind(cls, field: dataclasses.Field) -> Kind | None:
     hint = _hint(cls, field)
     module = _module(hint)
     if module is not None:
+        if not is_family(module):
+            return Table()
         # what contains another of its family is made by the lists of the file
-        return None if is_family(module) and issubclass(cls, module) else Table()
+        return None if issubclass(cls, module) else Either(Text(empty=True), Table(), "the name of a type, or a table")
     if typing.get_origin(hint) is typing.Literal:
         return Choice(typing.get_args(hint))
     plain = {bool: Switch(), str: Text(), int: Real(Number(whole=True)), float: Real()}

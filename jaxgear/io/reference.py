@@ -1,23 +1,24 @@
 """The reference of design files: every table and key, generated from the classes that read them."""
 
+import dataclasses
 import inspect
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import jax
 import numpy as np
 
-from ..compliance import ElasticRing
-from ..contact import Resolution
+from ..compliance import AbstractBody, AbstractContact, AbstractTooth, Compliance
+from ..contact import Operation, Resolution
 from ..geometry import Gear, GearPair, Material
 from ..metrics import quantities
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
+from ..tolerance import Tolerance
 from . import schema, schema_sweep
 from .kinds import Either, Kind, ListOf, Real, Table, allowed
-from .layout import Section, family, meanings, section_of, summary
+from .layout import Section, family, meanings, section_of, snake, summary
 
 _HEAD = """# Design files
 
@@ -48,8 +49,11 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
         yield f'[[pinion.modification]] with type = "{name}"', section_of(cls), cls
     for name, cls in family(AbstractCurve, users=False).items():
         yield f'curve = {{ type = "{name}" }}', section_of(cls), cls
-    yield "[load]", schema.LoadSection, None
-    yield "[model]", schema.ModelSection, ElasticRing
+    yield "[load]", schema.LoadSection, Operation
+    yield "[model]", schema.ModelSection, Compliance
+    for key, base in (("tooth", AbstractTooth), ("body", AbstractBody), ("contact", AbstractContact)):
+        for name, cls in family(base, users=False).items():
+            yield f'{key} = {{ type = "{name}" }}', section_of(cls), cls
     yield "[resolution]", schema.ResolutionSection, Resolution
     yield "[variables.NAME]", schema.VariableSection, None
     yield "[optimize]", schema.OptimizeSection, None
@@ -57,12 +61,12 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     for name, section in schema.METHOD_OPTIONS.items():
         yield f"[optimize.{name}]", section, METHODS.get(name, _EXTRAS.get(name))
     yield "[sweep]", schema_sweep.SweepSection, None
-    yield "[tolerance]", schema_sweep.ToleranceSection, None
+    yield "[tolerance]", schema_sweep.ToleranceSection, Tolerance
 
 
 def _table(title: str, section: type[Section], of: Callable[..., Any] | None) -> Iterator[str]:
     own = bool(section.__doc__) and section.__doc__ != Section.__doc__
-    yield f"\n## `{title}`\n" if title.startswith(("[", "curve")) else f"\n## {title}\n"
+    yield f"\n## `{title}`\n" if title.startswith("[") or "=" in title else f"\n## {title}\n"
     yield summary(section if own or of is None else of) + "\n"
     if not section.model_fields:
         return
@@ -77,7 +81,7 @@ def _table(title: str, section: type[Section], of: Callable[..., Any] | None) ->
             f"`{name}`",
             f"a list, each {kind.item.words}" if isinstance(kind, ListOf) else kind.words,
             number.number.unit if number else "",
-            allowed(replace(number.number, unit="")) if number else "",
+            allowed(dataclasses.replace(number.number, unit="")) if number else "",
             default,
             texts.get(name, ""),
         ]
@@ -106,6 +110,9 @@ def _default(name: str, default: Any, of: Callable[..., Any] | None) -> str:
     if default is None and of is not None:
         known = inspect.signature(of).parameters.get(name)
         default = None if known is None or known.default is inspect.Parameter.empty else known.default
+        made = {field.name: field.default_factory for field in dataclasses.fields(of)} if isinstance(of, type) else {}
+        if isinstance(made.get(name), type) and inspect.isabstract(made[name].__bases__[0]):
+            default = snake(made[name].__name__)
     if isinstance(default, jax.Array | np.ndarray):
         default = np.asarray(default).tolist()
     if isinstance(default, bool):

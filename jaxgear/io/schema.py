@@ -6,10 +6,11 @@ there: None means that the key is absent.
 
 from typing import Annotated, Any
 
-from .. import compliance
+from ..compliance import Compliance
+from ..contact import Operation, Resolution
 from ..geometry import Gear, GearPair
 from ..numerics import Number
-from .kinds import LEVEL, SEED, WEIGHTS, Choice, Either, ListOf, Real, Switch, Table, Text, count, positive
+from .kinds import LEVEL, SEED, WEIGHTS, Choice, Either, ListOf, Real, Table, Text, count, positive
 from .layout import Section, section_of
 
 Tables = dict[str, Any]
@@ -64,7 +65,7 @@ class GearSection(section_of(Gear)):  # type: ignore[misc]
 PairSection = section_of(GearPair, ("pinion", "wheel"))
 
 
-class LoadSection(Section):
+class LoadSection(section_of(Operation)):  # type: ignore[misc]
     """Under what the pair runs.
 
     Attributes:
@@ -76,53 +77,23 @@ class LoadSection(Section):
 
     torque: Annotated[Any, Real(Number("N m", low=0.0, open_low=True), open=True)]
     torque_range: Annotated[list[float] | None, ListOf(positive("N m"), length=2)] = None
-    speed: Annotated[float | None, positive("rpm")] = None
-    friction: Annotated[float | None, positive("")] = None
 
 
-BODIES: dict[str, type[compliance.AbstractBody]] = {
-    "ring": compliance.ElasticRing,
-    "sainsot": compliance.Sainsot,
-    "half_plane": compliance.HalfPlane,
-}
-CONTACTS: dict[str, type[compliance.AbstractContact]] = {
-    "depth": compliance.DepthReferenced,
-    "weber": compliance.Weber,
-    "constant": compliance.ConstantHertz,
-    "center_distance": compliance.CenterDistance,
-    "kovalskii": compliance.Kovalskii,
-    "palmgren": compliance.Palmgren,
-    "power": compliance.NonlinearPower,
-}
-
-
-class ModelSection(Section):
-    """The stiffness model.
+class ModelSection(section_of(Compliance)):  # type: ignore[misc]
+    """The stiffness model: tooth, gear body and contact law, each by its name, or as a table with `type` and options.
 
     Attributes:
         preset: "legacy" is the model of older studies and takes no other key.
-        plane: of the material, for narrow (stress) or wide (strain) gears; "stress" without it.
-        body: gear body.
-        contact: contact law.
     """
 
     preset: Annotated[str, Choice(("default", "legacy"))] = "default"
-    plane: Annotated[str | None, Choice(("stress", "strain"))] = None
-    body: Annotated[str, Choice(tuple(BODIES))] = "ring"
-    hub_windup: Annotated[bool | None, Switch()] = None
-    coupling: Annotated[bool | None, Switch()] = None
-    contact: Annotated[str, Choice(tuple(CONTACTS))] = "depth"
 
 
-class ResolutionSection(Section):
-    """Array sizes. Without `pairs`, as few as the load needs; without `slices`, as many as the modifications need."""
-
-    positions: Annotated[int | None, count(4, 4096)] = None
-    slices: Annotated[int | None, count(1, 1024)] = None
-    pairs: Annotated[int | None, count(2, 12)] = None
-    patch_nodes: Annotated[int | None, count(1, 64)] = None
-    newton_steps: Annotated[int | None, count(1, 100)] = None
-    tolerance: Annotated[float | None, _SHARE] = None
+# Sizes up to these: a slip of the finger must not fill the memory or compile for hours.
+ResolutionSection = section_of(
+    Resolution,
+    most=(("positions", 4096), ("slices", 1024), ("pairs", 12), ("patch_nodes", 64), ("newton_steps", 100)),
+)
 
 
 class VariableSection(Section):

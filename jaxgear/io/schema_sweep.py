@@ -3,8 +3,9 @@
 from typing import Annotated
 
 from ..numerics import Number
+from ..tolerance import Tolerance
 from .kinds import LEVEL, SEED, WEIGHTS, Choice, Either, ListOf, Real, Table, Text, count, positive
-from .layout import Section
+from .layout import Section, section_of
 
 
 class SweepSection(Section):
@@ -43,12 +44,11 @@ class SweepSection(Section):
 _CLASS = Real(Number(whole=True))
 
 
-class ToleranceSection(Section):
+class ToleranceSection(section_of(Tolerance, ("pinion", "wheel", "distribution"), open=False)):  # type: ignore[misc]
     """Deviations of manufactured gears after ISO 1328-1.
 
     Attributes:
         quality_class: of both gears, or of pinion and wheel.
-        misalignment: of the axes over the face width.
         samples: manufactured pairs per variant of a sweep.
         seed: of their deviations.
     """
@@ -56,6 +56,5 @@ class ToleranceSection(Section):
     quality_class: Annotated[
         int | list[int], Either(_CLASS, ListOf(_CLASS, length=2), "a whole number, or a list of two")
     ]
-    misalignment: Annotated[float | None, Real(Number("um", low=0.0))] = None
     samples: Annotated[int, count(2, 100_000)] = 64
     seed: Annotated[int, SEED] = 0

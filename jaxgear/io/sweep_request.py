@@ -96,18 +96,16 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
 
 def _load(design: DesignFile, section: schema_sweep.SweepSection):
     """The load and the highest torque."""
-    variable = next((free for free in design.open_case if free.key == "load.torque"), None)
+    variable = next((free for free in design.open_case if free.key.startswith("load.")), None)
     if variable is None:
         load = load_of(design, "sweep", section.torques, section.weights)
         return load, float(np.max(load.torques))
     for key in ("torques", "weights"):
         if getattr(section, key) is not None:
-            raise DesignFileError(design.path, f"sweep.{key}", f'has no effect, load.torque is "{variable.name}"')
+            raise DesignFileError(design.path, f"sweep.{key}", f'has no effect, {variable.key} is "{variable.name}"')
 
-    def operation(parameters: Mapping[str, Any]) -> Operation:
-        return Operation(parameters[variable.name], design.speed, design.friction)
-
-    return operation, design.bounds[variable.name][1]
+    free = next((free for free in design.open_case if free.key == "load.torque"), None)
+    return design.operation, design.torque if free is None else design.bounds[free.name][1]
 
 
 def _plan(design: DesignFile, section: schema_sweep.SweepSection) -> AbstractPlan:

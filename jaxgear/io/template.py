@@ -89,20 +89,25 @@ def build(parts: list[Part], parameters: Mapping[str, Any]) -> AbstractModificat
     return NoModification() if total is None else total
 
 
-def parse(file: Path, key: str, table: Mapping[str, Any], cls: type[eqx.Module]) -> Part:
+def parse(file: Path, key: str, table: Mapping[str, Any] | str, cls: type[eqx.Module]) -> Part:
     """An object from its table; `type` says which class derived from an abstract one it is of.
 
     Args:
         file: for the message.
         key: dotted key of the table.
-        table: the table.
+        table: the table, or the name of its type where that says all.
         cls: its class.
 
     Raises:
         DesignFileError: for an unknown type, unknown or missing keys, wrong types and numbers out of range.
     """
     if is_family(cls):
-        known, name = family(cls), table.get("type")
+        known = family(cls)
+        if isinstance(table, str):
+            if table not in known:
+                raise DesignFileError(file, key, not_known(table, known))
+            table = {"type": table}
+        name = table.get("type")
         if name is None:
             raise DesignFileError(file, join(key, "type"), f"missing, must be one of {', '.join(known)}")
         if not isinstance(name, str) or name not in known:
