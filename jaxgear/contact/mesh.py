@@ -37,9 +37,11 @@ class Mesh(eqx.Module):
         lever: what a pair closes per unit of transmission error; 1 on the path of contact, less beyond it, because the
             corner's gap opens while the gears turn on.
         margins: how far the pair is from what cannot run; of traced gears, nothing else tells.
-        outer_gap: transmission error at which the pairs behind and ahead of those carried along could touch if they
-            were not modified [um], shape (2,).
-        outer_lever: their lever, shape (2,).
+        outer_gap: transmission error at which the pairs behind and ahead of those carried along touch if they are not
+            modified [um], shape (2, positions).
+        outer_lever: their lever, shape (2, positions).
+        outer_steps: by how much farther they touch the mates than the pairs at the edge do, over what those there move
+            on within one position, shape (2, positions).
         structure: compliance of both gears, (pairs, pairs, positions) [um per N/mm].
         law: prepared contact law.
         width_factor: squared half width of the contact per line load [mm^2 per N/mm].
@@ -56,8 +58,9 @@ class Mesh(eqx.Module):
     corner_gap: Field
     lever: Field
     margins: Margins
-    outer_gap: Float[Array, "2"]
-    outer_lever: Float[Array, "2"]
+    outer_gap: Float[Array, "2 positions"]
+    outer_lever: Float[Array, "2 positions"]
+    outer_steps: Float[Array, "2 positions"]
     structure: Float[Array, "pairs pairs positions"]
     law: AbstractSpring
     width_factor: Field
@@ -173,7 +176,8 @@ def _prepare(pair: GearPair, compliance: AbstractCompliance, resolution: Resolut
     pinion = tooth_load(outlines[0], points.pinion_roll_length)
     wheel = tooth_load(outlines[1], points.wheel_roll_length)
     geometry = contact_geometry(pinion, wheel, compliance.plane, pair.face_width)
-    outer = _next_pairs(pair, contact, jnp.asarray([resolution.reach], dtype))
+    base_pitch = contact.base_pitch
+    outer = contacts(pair, contact, jnp.stack([moving.path[-1] - base_pitch, moving.path[0] + base_pitch]))
     # Chebyshev nodes of the second kind integrate with the weight of the semi-elliptic pressure
     angle = jnp.pi * jnp.arange(1, resolution.patch_nodes + 1, dtype=dtype) / (resolution.patch_nodes + 1)
     return Mesh(
@@ -183,8 +187,14 @@ def _prepare(pair: GearPair, compliance: AbstractCompliance, resolution: Resolut
         corner_gap=points.corner_gap,
         lever=points.lever,
         margins=margins_between(*outlines, contact, pair.center_distance),
-        outer_gap=_closing(outer)[0],
-        outer_lever=outer.lever[0],
+        outer_gap=_closing(outer),
+        outer_lever=outer.lever,
+        outer_steps=jnp.stack(
+            [
+                _steps(points.pinion_roll_length[-1, :2], outer.pinion_roll_length[0]),
+                _steps(points.wheel_roll_length[0, :-3:-1], outer.wheel_roll_length[1]),
+            ]
+        ),
         structure=compliance.structure(pinion, wheel),
         law=compliance.law(geometry, pinion, wheel, moving.outside),
         width_factor=geometry.width_factor[:, 0],
@@ -193,6 +203,12 @@ def _prepare(pair: GearPair, compliance: AbstractCompliance, resolution: Resolut
         hub=compliance.hub(pinion, wheel),
         slice_width=moving.slice_width,
     )
+
+
+def _steps(edge: Float[Array, "2"], beyond: Float[Array, " positions"]) -> Float[Array, " positions"]:
+    edge, beyond = jax.lax.stop_gradient((edge, beyond))
+    one = jnp.maximum(jnp.abs(edge[0] - edge[1]), 1e-6 * edge[0])
+    return jnp.abs(beyond - edge[0]) / one
 
 
 def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:

@@ -17,6 +17,7 @@ from .operation import Operation, operation_of
 _MOST_PAIRS = 12
 
 Scalar = Float[Array, ""]
+Curve = Float[Array, " positions"]
 Load = Float[Array, "pairs slices positions"]
 
 
@@ -190,13 +191,17 @@ def _beyond(mesh: Mesh, cycle: MeshCycle) -> Bool[Array, " positions"]:
     return cycle.transmission_error - windup >= outermost(mesh, removed)
 
 
-def outermost(mesh: Mesh, removed: Load) -> Scalar:
-    """Transmission error at which the next pairs behind and ahead of those carried along could touch [um].
+def outermost(mesh: Mesh, removed: Load) -> Curve:
+    """Transmission error from which the next pairs behind and ahead of those carried along may touch [um].
 
-    They are nearest where the last pair begins and the first one ends the base pitch, and are modified as those there.
+    They are taken to be modified as the last pair is where it begins and the first one where it ends the base pitch.
+    What falls off there, as root relief does up the flank, may go on falling at the same rate.
     """
-    ends = jnp.stack([minimum(removed[-1, :, 0]), minimum(removed[0, :, -1])])
-    return minimum(mesh.outer_gap + ends / mesh.outer_lever)
+    removed = jax.lax.stop_gradient(removed)
+    edge = jnp.stack([removed[-1, :, 0], removed[0, :, -1]])
+    fall = jnp.minimum(edge - jnp.stack([removed[-1, :, 1], removed[0, :, -2]]), 0.0)
+    left = jnp.min(edge[..., None] + fall[..., None] * mesh.outer_steps[:, None], axis=1)
+    return jnp.min(mesh.outer_gap + left / mesh.outer_lever, axis=0)
 
 
 @eqx.filter_jit
