@@ -5,7 +5,6 @@ Installed as a module beside the package (pyproject.toml), since whatever lies i
 
 import os
 import signal
-import sys
 
 
 def main() -> None:
@@ -25,4 +24,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -4,6 +4,7 @@ import dataclasses
 import os
 import time
 from pathlib import Path
+from typing import Any
 
 import jax
 from rich.box import SIMPLE_HEAD
@@ -51,7 +52,7 @@ def run_sweep(
         size = dataclasses.replace(size, positions=min(size.positions, _QUICK_POSITIONS))
     target = output or default_folder(file, "sweep", quick=quick)
     _check(target)
-    options = {} if request.part_rows is None else {"part_rows": request.part_rows}
+    options: dict[str, Any] = {} if request.part_rows is None else {"part_rows": request.part_rows}
     with Meter(report.console(stderr=True), target) as meter:
         table = sweep(
             design.design,

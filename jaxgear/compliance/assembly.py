@@ -102,4 +102,4 @@ def legacy_compliance() -> Compliance:
 
     It overstates the variation of the transmission error by 20 to 120 % against finite elements.
     """
-    return Compliance(Beam(), Sainsot(), ConstantHertz(), "stress", edge_softening=False)
+    return Compliance(tooth=Beam(), body=Sainsot(), contact=ConstantHertz(), plane="stress", edge_softening=False)

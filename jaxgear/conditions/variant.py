@@ -1,7 +1,7 @@
 """From the variables of a problem to what is solved: the mesh, the loads and both modifications."""
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -71,11 +71,12 @@ class Variants(eqx.Module):
     conditions: Conditions
     cases: Cases | None
 
-    def __call__(self, values: Sequence) -> Variant:
+    def __call__(self, values: Iterable) -> Variant:
         """The variant of some values of the variables, in the order of their names; traceable."""
         parameters = dict(zip(self.names, values))
         pinion, wheel = self.design(parameters)
-        mesh, cases, made = self.mesh, self.cases, [pinion, wheel]
+        mesh, cases = self.mesh, self.cases
+        made: list[Any] = [pinion, wheel]
         if not isinstance(mesh, Mesh):
             mesh = mesh(parameters)
             made.append(mesh.pair)
@@ -89,13 +90,13 @@ class Variants(eqx.Module):
         possible = jnp.all(jnp.stack([jnp.asarray(True), *_in_range(made)]))
         return Variant(mesh, cases, pinion, wheel, possible)
 
-    def mesh_shape(self, values: Sequence) -> Mesh:
+    def mesh_shape(self, values: Iterable) -> Mesh:
         """The mesh, or one of shapes where every variant has its own."""
         if isinstance(self.mesh, Mesh):
             return self.mesh
         return eqx.filter_eval_shape(self.mesh, dict(zip(self.names, map(real, values))))
 
-    def traced(self, values: Sequence):
+    def traced(self, values: Iterable):
         """Jaxpr of all that the variables make, as an identity of the functions, and the variables that it uses."""
 
         def made(values, mesh):

@@ -84,7 +84,7 @@ class Kinematics(eqx.Module):
     @over_batch
     def path(self) -> Field:
         """Nominal path position of every pair [mm], shape (pairs, positions)."""
-        offset = self.resolution.leading - self._count(self.resolution.pairs)
+        offset = self.resolution.leading - self._count(self.resolution.chosen_pairs)
         return (self.phase[None] + offset[:, None]) * self.path_of_contact.base_pitch
 
     @property

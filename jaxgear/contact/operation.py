@@ -1,5 +1,6 @@
 """What a mesh is run at: torque, speed and friction."""
 
+import jax
 from jaxtyping import Array, Float
 
 from ..numerics import Checked, check, number, real
@@ -38,5 +39,4 @@ def operation_of(owner: str, torque, dtype) -> Operation:
             )
         check(owner, "torque", torque, "N m", low=0.0)
         torque = Operation(torque)
-    given = torque.torque, torque.speed, torque.friction
-    return Operation(*(None if part is None else part.astype(dtype) for part in given))
+    return jax.tree.map(lambda part: part.astype(dtype), torque)

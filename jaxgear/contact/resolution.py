@@ -29,27 +29,27 @@ class Resolution(Checked):
     )
 
     @property
+    def chosen_pairs(self) -> int:
+        """Number of pairs, which `prepare` has chosen where it was not given."""
+        if self.pairs is None:
+            raise ValueError("Resolution: pairs = None has no number yet: prepare chooses it")
+        return self.pairs
+
+    @property
     def leading(self) -> int:
         """Base pitches by which the first pair leads the reference pair."""
-        return _leading(chosen(self.pairs))
+        return _leading(self.chosen_pairs)
 
     @property
     def reach(self) -> tuple[int, int]:
         """Base pitches behind and ahead of the pitch point that the pairs cover."""
-        return reach(chosen(self.pairs))
+        return reach(self.chosen_pairs)
 
 
 def reach(pairs: int) -> tuple[int, int]:
     """Base pitches behind and ahead of the pitch point that a number of pairs covers."""
     ahead = _leading(pairs) + 1
     return pairs - ahead, ahead
-
-
-def chosen(pairs: int | None) -> int:
-    """The number of pairs, which `prepare` has chosen where it was not given."""
-    if pairs is None:
-        raise ValueError("Resolution: pairs = None has no number yet: prepare chooses it")
-    return pairs
 
 
 def _leading(pairs: int) -> int:

@@ -175,12 +175,12 @@ def _cycle(mesh: Mesh, operation: Operation, contact: dict[str, Array], pinion=N
 def _wider(mesh: Mesh, cycle: MeshCycle) -> Mesh | None:
     """The mesh with more pairs, where their number was left open, is too small and can be known."""
     failed = concrete(cycle.converged) if mesh.automatic else None
-    if failed is None or failed.all() or mesh.resolution.pairs >= _MOST_PAIRS:
+    if failed is None or failed.all() or mesh.resolution.chosen_pairs >= _MOST_PAIRS:
         return None
     beyond = concrete(_beyond(mesh, cycle))
     if beyond is None or not beyond.any():
         return None
-    sizes = replace(mesh.resolution, pairs=mesh.resolution.pairs + 1)
+    sizes = replace(mesh.resolution, pairs=mesh.resolution.chosen_pairs + 1)
     wider = prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes)
     return replace(wider, automatic=True)
 

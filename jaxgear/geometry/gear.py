@@ -14,9 +14,8 @@ Scalar = Float[Array, ""]
 
 # A rack tooth whose flanks meet cannot generate anything: dedendum * tan(pressure angle) stays below pi / 4 well inside
 # these limits, which also hold every basic rack in use (ISO 53, AGMA fine pitch, stub and high-contact-ratio racks).
-_PRESSURE_ANGLES = {"low": 10.0, "high": 35.0}
-_RACK_HEIGHTS = {"low": 0.5, "high": 2.0}
-_POSITIVE = {"low": 0.0, "open_low": True}
+_PRESSURE_ANGLES = 10.0, 35.0
+_RACK_HEIGHTS = 0.5, 2.0
 
 
 class Gear(Checked):
@@ -44,16 +43,16 @@ class Gear(Checked):
     """
 
     teeth: Scalar = number("", low=5.0, whole=True)
-    module: Scalar = number("mm", **_POSITIVE)
-    pressure_angle: Scalar = number("deg", **_PRESSURE_ANGLES, default=20.0)
+    module: Scalar = number("mm", low=0.0, open_low=True)
+    pressure_angle: Scalar = number("deg", low=_PRESSURE_ANGLES[0], high=_PRESSURE_ANGLES[1], default=20.0)
     profile_shift: Scalar = number("x module", low=-1.5, high=2.0, default=0.0)
-    face_width: Scalar = number("mm", **_POSITIVE, kw_only=True)
-    addendum: Scalar = number("x module", **_RACK_HEIGHTS, default=1.0, kw_only=True)
-    dedendum: Scalar = number("x module", **_RACK_HEIGHTS, default=1.25, kw_only=True)
+    face_width: Scalar = number("mm", low=0.0, open_low=True, kw_only=True)
+    addendum: Scalar = number("x module", low=_RACK_HEIGHTS[0], high=_RACK_HEIGHTS[1], default=1.0, kw_only=True)
+    dedendum: Scalar = number("x module", low=_RACK_HEIGHTS[0], high=_RACK_HEIGHTS[1], default=1.25, kw_only=True)
     root_radius: Scalar = number("x module", low=0.0, default=0.38, kw_only=True)
-    tip_diameter: Scalar | None = number("mm", **_POSITIVE, optional=True, default=None, kw_only=True)
-    bore_diameter: Scalar | None = number("mm", **_POSITIVE, optional=True, default=None, kw_only=True)
-    tip_edge_radius: Scalar = number("mm", **_POSITIVE, default=0.1, kw_only=True)
+    tip_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
+    bore_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
+    tip_edge_radius: Scalar = number("mm", low=0.0, open_low=True, default=0.1, kw_only=True)
     material: Material = eqx.field(default_factory=Material, kw_only=True)
 
     def check_together(self) -> None:

@@ -20,6 +20,8 @@ T = TypeVar("T", bound=Section)
 
 # Tooth pairs are carried along up to this many times the deflection of a single pair after ISO 6336-1.
 _DEFLECTIONS = 2.0
+# Where gears are left open, at least as many as `prepare` takes for traced gears: contact ratios up to 3.
+_OPEN_PAIRS = 4
 # Slices where a modification varies along the face: the mean of a parabola over the middles of n slices is 1 / n^2 too
 # small, so that 11 show a lead crowning to 1 %.
 _SLICES = 11
@@ -98,7 +100,7 @@ class DesignFile:
             problem = f"{given} {deflection / _DEFLECTIONS:.3g} um: give the torque in N m, elastic moduli in MPa"
             raise DesignFileError(self.path, "load.torque", problem) from None
         if any(True for _ in self._pair.free()):  # other variants can have a larger contact ratio
-            pairs = max(pairs, self._resolution.pairs)
+            pairs = max(pairs, _OPEN_PAIRS)
         return replace(self._resolution, pairs=pairs)
 
     def mesh(self, resolution: Resolution | None = None) -> Mesh:
@@ -167,7 +169,7 @@ def load_design(path: str | Path) -> DesignFile:
         keys = [f"{name}.modification[{i}]" for i in range(len(gear.modification))]
         tables = zip(keys, gear.modification)
         parts.append([template.parse(file, key, table, AbstractModification) for key, table in tables])
-    pair = _pair(file, *gears, top.pair or {})
+    pair = _pair(file, gears[0], gears[1], top.pair or {})
     load = _load(file, section("load", schema.LoadSection))
     operation = template.part_of(file, "load", load, Operation)
     model = _model(file, section("model", schema.ModelSection))
@@ -216,7 +218,8 @@ def _pair(file: Path, pinion: template.Part, wheel: template.Part, table: schema
 
 def _load(file: Path, load: schema.LoadSection) -> schema.LoadSection:
     if load.torque_range is not None:
-        increasing(file, "load.torque_range[1]", *load.torque_range, unit=" N m")
+        low, high = load.torque_range
+        increasing(file, "load.torque_range[1]", low, high, unit=" N m")
     if load.friction is not None and load.speed is None:
         raise DesignFileError(file, "load.friction", "has no effect without load.speed (flash temperature)")
     return load

@@ -33,7 +33,10 @@ TAGS = ("<list>", "<table>", "<other>")
 class Kind:
     """What may stand after a key."""
 
-    words: str
+    @property
+    def words(self) -> str:
+        """What is allowed, for messages and the reference."""
+        raise NotImplementedError
 
     def schema(self) -> CoreSchema:
         """For pydantic."""
@@ -175,12 +178,16 @@ class Either(Kind):
     Attributes:
         plain: kind of a plain value.
         many: `ListOf` or `Table`.
-        words: for messages.
+        allowed: in words, for messages.
     """
 
     plain: Kind
     many: ListOf | Table
-    words: str
+    allowed: str
+
+    @property
+    def words(self) -> str:
+        return self.allowed
 
     def schema(self) -> CoreSchema:
         kind, tag = (list, TAGS[0]) if isinstance(self.many, ListOf) else (dict, TAGS[1])

@@ -32,7 +32,7 @@ _DEFAULT_METHOD = "minimax"
 _CURVE = "cubic"  # on which flanks without parameters are projected
 _FRONT = ("ppte", "max_contact_pressure")  # of a Pareto front where the file names no objectives
 _PARETO = "pareto"
-_MADE = {**METHODS, _PARETO: Pareto}
+_MADE: Mapping[str, Callable[..., Any]] = {**METHODS, _PARETO: Pareto}
 _KNOWN = (*_MADE, *schema.METHODS_WITHOUT_VARIABLES)
 _STARTS = ("minimax", "adam", "lbfgs")  # methods of `starts` and `steps`
 _MEASURES: Mapping[str, Callable[..., AbstractMeasure]] = {
@@ -94,7 +94,7 @@ class OptimizeRequest:
         start, pinion, wheel = options.pop("start"), None, None
         if start == "low_pressure":
             method = METHODS[_DEFAULT_METHOD](**self._first)
-            given = {"mesh": mesh, "torque": design.torque, "method": method, "callback": callback}
+            given: dict[str, Any] = {"mesh": mesh, "torque": design.torque, "method": method, "callback": callback}
             return iterate_from_low_pressure(design.design, design.bounds, **given, **options)
         if start == "given":
             pinion, wheel = design.design({})

@@ -111,8 +111,9 @@ def _default(name: str, default: Any, of: Callable[..., Any] | None) -> str:
         known = inspect.signature(of).parameters.get(name)
         default = None if known is None or known.default is inspect.Parameter.empty else known.default
         made = {field.name: field.default_factory for field in dataclasses.fields(of)} if isinstance(of, type) else {}
-        if isinstance(made.get(name), type) and inspect.isabstract(made[name].__bases__[0]):
-            default = snake(made[name].__name__)
+        maker = made.get(name)
+        if isinstance(maker, type) and inspect.isabstract(maker.__bases__[0]):
+            default = snake(maker.__name__)
     if isinstance(default, jax.Array | np.ndarray):
         default = np.asarray(default).tolist()
     if isinstance(default, bool):

@@ -49,8 +49,8 @@ def read_variables(
         if unit is not None and unit != units[name]:
             raise DesignFileError(file, f"variables.{name}.unit", f'"{unit}" must be "{units[name]}" as it is used')
     for part in parts:
-        for end in (0, 1):
-            part.checked(file, {name: limits[end] for name, limits in bounds.items()})
+        for i in (0, 1):
+            part.checked(file, {name: limits[i] for name, limits in bounds.items()})
     return bounds, {name: units[name] for name in bounds}
 
 

@@ -4,7 +4,7 @@ One table of limits serves inputs and results alike. Nothing is refused here: a 
 """
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -96,14 +96,14 @@ def plausibility(
         friction: coefficient of friction; None for that of the cycle.
     """
     flanks = tuple(given or own or NoModification() for given, own in ((pinion, cycle.pinion), (wheel, cycle.wheel)))
-    speed = cycle.operation.speed if speed is None else speed
-    friction = cycle.operation.friction if friction is None else friction
+    rpm = cycle.operation.speed if speed is None else speed
+    coefficient = cycle.operation.friction if friction is None else friction
     numbers = [*_of_gears(cycle), *_of_flanks(cycle, flanks), *_of_results(cycle)]
-    if speed is not None:
-        velocity = float(speed) * 2 * np.pi / 60 * float(cycle.kinematics.pair.pinion.pitch_radius) * 1e-3
+    if rpm is not None:
+        velocity = float(rpm) * 2 * np.pi / 60 * float(cycle.kinematics.pair.pinion.pitch_radius) * 1e-3
         numbers.append(("pitch line velocity", "", velocity, LIMITS["pitch line velocity"]))
-    if friction is not None:
-        numbers.append(("coefficient of friction", "", float(friction), LIMITS["coefficient of friction"]))
+    if coefficient is not None:
+        numbers.append(("coefficient of friction", "", float(coefficient), LIMITS["coefficient of friction"]))
     if torque_range is not None:
         low, high = torque_range
         numbers.append(("torque", "", float(cycle.torque), LIMITS["torque"]._replace(low=low, high=high)))
@@ -114,7 +114,7 @@ def _of_gears(cycle: MeshCycle) -> Iterator[tuple[str, str, float, Limit]]:
     for where, side in zip(("pinion", "wheel"), cycle.sides):
         gear: Gear = side.gear
         module = float(gear.module)
-        values = {
+        values: dict[str, Any] = {
             "module": module,
             "elastic modulus": gear.material.elastic_modulus,
             "density": gear.material.density,

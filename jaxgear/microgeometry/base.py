@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, concrete, number, result
+from ..numerics import Checked, concrete, number, real, result
 
 
 class Flank(Checked):
@@ -62,12 +62,12 @@ class AbstractModification(Checked):
     def __mul__(self, factor) -> "Scaled":
         if not isinstance(factor, int | float | np.ndarray | np.generic | jax.Array):
             raise TypeError(f"{factor!r} * {self!r}: only a number can scale a modification")
-        return Scaled(factor, self)
+        return Scaled(real(factor), self)
 
     __rmul__ = __mul__
 
     def __neg__(self) -> "Scaled":
-        return Scaled(-1.0, self)
+        return Scaled(real(-1.0), self)
 
     def __sub__(self, other: "AbstractModification") -> "Sum":
         return self + (-other if isinstance(other, AbstractModification) else other)

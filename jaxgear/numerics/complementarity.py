@@ -220,7 +220,7 @@ def _newton(problem: ContactProblem, v: Rows, secant: Rows, slope: Rows) -> tupl
     active, carried = _active(problem, v), _carried(v)
     factors = factorize(problem.compliance, problem.lever, active, slope)
     known = [-gap - (c - s) * q for gap, c, s, q in zip(problem.gap, secant, slope, carried)]
-    if problem.load is None:
+    if problem.approach is not None:
         load, approach = at_approach(factors, known, problem.approach), problem.approach
     else:
         load, approach = balance(problem.weight, factors, known, problem.load)

@@ -24,8 +24,8 @@ def maximum(x: Float[Array, "..."], axis: Axes = None) -> Float[Array, "..."]:
         x: any array that is not empty.
         axis: axis or axes; None for all of them.
     """
-    axes = range(x.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)
-    axes = sorted(a % x.ndim for a in axes)
+    given = range(x.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)
+    axes = sorted(a % x.ndim for a in given)
     if not axes:
         return x
     first = axes[0]

@@ -6,7 +6,7 @@ therefore goes through `real`. Ranges are checked on concrete values only, trace
 
 import dataclasses
 from dataclasses import MISSING
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, Literal, dataclass_transform, get_args, get_origin
 
 import equinox as eqx
 import jax
@@ -80,6 +80,7 @@ def fields_of(cls: type) -> dict[str, Number]:
     return {field.name: field.metadata[_KEY] for field in dataclasses.fields(cls) if _KEY in field.metadata}
 
 
+@dataclass_transform(field_specifiers=(eqx.field, number, count, result))  # type checkers know their defaults
 class Checked(eqx.Module):
     """A Module whose fields are checked when it is made, and which prints its numbers with their units.
 
@@ -163,7 +164,7 @@ def check(
     )
 
 
-def whole(owner: str, name: str, value, low: int = 1, high: int = _MOST) -> int:
+def whole(owner: str, name: str, value, low: float = 1, high: float = _MOST) -> int:
     """The value as an int; raises a one-line `ValueError` unless it is a whole number from `low` to `high`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
         raise ValueError(f"{owner}: {name} = {value!r} must be a whole number of at least {low}")
@@ -209,6 +210,7 @@ def _check_number(owner: str, name: str, value, kind: Number) -> None:
         return
     if kind.static:
         if kind.whole:
+            assert kind.low is not None and kind.high is not None  # `count` gives both
             whole(owner, name, value, kind.low, kind.high)
             return
         if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):

@@ -213,8 +213,8 @@ class Problem(eqx.Module):
         return solve_removed(self.mesh, torque, removed + deviation, pinion=pinion, wheel=wheel)
 
     def _excess(self, cycle: MeshCycle):
-        limits = [limit for limit in self.constraints if limit.quantity is not None]
-        return self._stacked([excess for limit in limits for excess in limit.excess(limit.quantity(cycle))])
+        limited = [(limit, limit.quantity) for limit in self.constraints if limit.quantity is not None]
+        return self._stacked([excess for limit, quantity in limited for excess in limit.excess(quantity(cycle))])
 
     def _linear_excess(self, x: Vector):
         parameters = self.parameters(x)

@@ -16,7 +16,7 @@ from .problem import Problem
 class Callback(Protocol):
     """Who wants to know how far a search has come."""
 
-    def __call__(self, done: int, total: int, info: float) -> None:
+    def __call__(self, done: int, total: int, info: float, /) -> None:
         """Is told the steps done, all steps, and the best objective so far."""
 
 

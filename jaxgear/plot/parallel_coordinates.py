@@ -28,7 +28,7 @@ def parallel_coordinates(
     *,
     best: int = 3,
     shown: int = 500,
-    numbers: Sequence[int] | None = None,
+    numbers: Sequence[int] | np.ndarray | None = None,
     labels: Labels | None = None,
     maximize: Collection[str] = (),
 ) -> Axes:

@@ -201,7 +201,7 @@ def _measures(conditions: Conditions, given: Sequence[AbstractMeasure] | None) -
     """The measures that are asked for; the usual ones where nothing is said, none for a single case."""
     if given is None:
         if conditions.samples > 1:
-            return Mean(), Quantile(0.95)
+            return Mean(), Quantile()
         return (Mean(), Worst()) if conditions.count > 1 else ()
     if conditions.count == 1:
         raise ValueError("sweep: measures have no effect: one torque and perfect gears are a single case")

@@ -218,7 +218,7 @@ def _column(field) -> Column:
     """A column of the table from the field that `_schema` makes of it."""
     notes = {key.decode(): value.decode() for key, value in field.metadata.items()}
     limits = {key: float(notes[key]) for key in ("low", "high") if key in notes}
-    return Column(field.name, notes["unit"], notes["kind"], notes.get("better", ""), **limits)  # type: ignore[arg-type]
+    return Column(field.name, notes["unit"], notes["kind"], notes.get("better", ""), **limits)
 
 
 def _parquet(table) -> memoryview:

@@ -181,7 +181,7 @@ def _gear_deviation(limits: GearTolerance, draw: AbstractDistribution, mesh: Mes
     return GearDeviation(
         profile_slope=_within(limits.profile_slope, draw(slope, (), dtype)),
         waviness=_within(limits.profile_form, draw(height, (), dtype)) * _random_shape(shape, dtype),
-        pitch=_within(0.5 * limits.pitch, draw(pitch, (mesh.resolution.pairs,), dtype)),
+        pitch=_within(0.5 * limits.pitch, draw(pitch, (mesh.resolution.chosen_pairs,), dtype)),
         helix_slope=_within(limits.helix_slope, draw(helix, (), dtype)),
     )
 
