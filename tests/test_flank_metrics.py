@@ -44,10 +44,10 @@ def test_volume_of_reliefs_of_6_um(mesh, start, curve, volume):
     reliefs from the end of single contact, and 2.5 and 1.73 times as much for the linear and parabolic ones from the
     pitch point."""
     relief = jg.TipRelief(6.0, lengths(mesh)[start], curve)
-    found = float(removed_volume(mesh, relief))
+    found = float(removed_volume(mesh, pinion=relief))
     assert found == pytest.approx(volume, rel=1e-3)
-    assert float(removed_volume(mesh, None, relief)) == pytest.approx(found, rel=1e-12), "equal gears"
-    assert float(removed_volume(mesh, relief, relief)) == pytest.approx(2 * found, rel=1e-12)
+    assert float(removed_volume(mesh, wheel=relief)) == pytest.approx(found, rel=1e-12), "equal gears"
+    assert float(removed_volume(mesh, pinion=relief, wheel=relief)) == pytest.approx(2 * found, rel=1e-12)
 
 
 def test_volume_is_the_integral_over_the_flank(unequal):
@@ -59,7 +59,7 @@ def test_volume_is_the_integral_over_the_flank(unequal):
         area = (rho * length / 2 + length**2 / 3) / float(gear.base_radius)
         total += 2 * float(gear.teeth) * 18.0 * 1e-3 * amount * area
     relief = jg.TipRelief(amount, length, jg.Linear())
-    assert float(removed_volume(unequal, relief, relief)) == pytest.approx(total, rel=2e-4)
+    assert float(removed_volume(unequal, pinion=relief, wheel=relief)) == pytest.approx(total, rel=2e-4)
 
 
 def test_volume_along_the_face(mesh):
@@ -67,16 +67,16 @@ def test_volume_along_the_face(mesh):
     contact, gear = mesh.path_of_contact, mesh.pair.pinion
     start, tip = float(contact.pinion_roll_length(contact.start)), float(gear.tip_roll_length)
     flanks = 2 * 50 * 20.0 * 1e-3 * (tip**2 - start**2) / (2 * float(gear.base_radius))
-    assert float(removed_volume(mesh, jg.LeadCrowning(9.0))) == pytest.approx(flanks * 3.0, rel=1e-9)
-    ends = float(removed_volume(mesh, jg.EndRelief(9.0, 2.0)))
+    assert float(removed_volume(mesh, pinion=jg.LeadCrowning(9.0))) == pytest.approx(flanks * 3.0, rel=1e-9)
+    ends = float(removed_volume(mesh, pinion=jg.EndRelief(9.0, 2.0)))
     assert ends == pytest.approx(flanks * 9.0 * 0.1, rel=5e-3)
     # an eighth of its amount: a slope removes on one half of the face, what it would add on the other does not count
-    assert float(removed_volume(mesh, jg.LeadSlope(8.0))) == pytest.approx(flanks * 8.0 / 8, rel=1e-3)
+    assert float(removed_volume(mesh, pinion=jg.LeadSlope(8.0))) == pytest.approx(flanks * 8.0 / 8, rel=1e-3)
 
 
 def test_volume_grows_with_the_amount_from_zero_on(mesh):
     """The slope is the volume per um, also at an amount of zero; that by the length against central differences."""
-    volume = lambda amount, length: removed_volume(mesh, jg.TipRelief(amount, length))  # noqa: E731
+    volume = lambda amount, length: removed_volume(mesh, pinion=jg.TipRelief(amount, length))  # noqa: E731
     per_um = float(volume(1.0, 3.0))
     for amount in (0.0, 6.0):
         assert float(jax.grad(volume)(amount, 3.0)) == pytest.approx(per_um, rel=1e-12)
@@ -104,17 +104,19 @@ def test_profile_from_the_start_of_the_active_profile_to_the_tip(unequal):
 
 
 def test_max_relief_adds_up_over_profile_and_face(mesh):
-    assert float(max_relief(mesh, jg.TipRelief(7.0, 3.0))) == pytest.approx(7.0)
-    assert float(max_relief(mesh, jg.TipRelief(7.0, 3.0), jg.TipRelief(8.0, 2.0))) == pytest.approx(8.0)
+    assert float(max_relief(mesh, pinion=jg.TipRelief(7.0, 3.0))) == pytest.approx(7.0)
+    assert float(max_relief(mesh, pinion=jg.TipRelief(7.0, 3.0), wheel=jg.TipRelief(8.0, 2.0))) == pytest.approx(8.0)
     both = jg.TipRelief(7.0, 3.0) + jg.LeadCrowning(4.0)
-    assert float(max_relief(mesh, both)) == pytest.approx(11.0), "the corner of the flank"
+    assert float(max_relief(mesh, pinion=both)) == pytest.approx(11.0), "the corner of the flank"
     # 4 d (1 - d) is highest in the middle of the relief
-    assert float(max_relief(mesh, jg.TipRelief(6.0, 3.0, jg.Quadratic(0.0, 4.0, -4.0)))) == pytest.approx(6.0, rel=1e-3)
+    assert float(max_relief(mesh, pinion=jg.TipRelief(6.0, 3.0, jg.Quadratic(0.0, 4.0, -4.0)))) == pytest.approx(
+        6.0, rel=1e-3
+    )
 
 
 def test_failed_designs_stay_visible(mesh):
     broken = jax.tree.map(lambda leaf: leaf * jnp.nan, jg.LeadCrowning(1.0))
-    assert np.isnan(float(max_relief(mesh, broken)))
+    assert np.isnan(float(max_relief(mesh, pinion=broken)))
 
 
 @pytest.mark.parametrize(
@@ -123,26 +125,26 @@ def test_failed_designs_stay_visible(mesh):
      jg.LeadCrowning(5.0), jg.TipRelief(6.0, 3.0, jg.Quadratic(0.2, 0.0, 0.8))],
 )  # fmt: skip
 def test_reliefs_that_only_grow_do_not_reverse(unequal, relief):
-    assert float(relief_reversal(unequal, relief, relief)) == pytest.approx(0.0, abs=1e-12)
+    assert float(relief_reversal(unequal, pinion=relief, wheel=relief)) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_reversal_is_the_depth_of_the_dips(mesh):
     """4 d (1 - d) rises to its amount and falls back to zero: the whole amount is taken back. Of both gears the worse
     one counts, and what one place loses another does not make good."""
     hump = jg.TipRelief(6.0, 3.0, jg.Quadratic(0.0, 4.0, -4.0))
-    assert float(relief_reversal(mesh, hump)) == pytest.approx(6.0, rel=1e-3)
-    assert float(relief_reversal(mesh, None, hump)) == pytest.approx(6.0, rel=1e-3)
+    assert float(relief_reversal(mesh, pinion=hump)) == pytest.approx(6.0, rel=1e-3)
+    assert float(relief_reversal(mesh, wheel=hump)) == pytest.approx(6.0, rel=1e-3)
     half = jg.TipRelief(3.0, 3.0, jg.Quadratic(0.0, 4.0, -4.0))
-    assert float(relief_reversal(mesh, half, hump)) == pytest.approx(6.0, rel=1e-3)
+    assert float(relief_reversal(mesh, pinion=half, wheel=hump)) == pytest.approx(6.0, rel=1e-3)
     root = jg.RootRelief(2.0, 2.0, jg.Quadratic(0.0, 4.0, -4.0))
-    assert float(relief_reversal(mesh, hump + root)) == pytest.approx(8.0, rel=1e-3)
+    assert float(relief_reversal(mesh, pinion=hump + root)) == pytest.approx(8.0, rel=1e-3)
 
 
 def test_reversal_of_a_profile_slope_is_what_it_adds_on_one_side(mesh):
     """A slope of 6 um over the profile falls from the pitch point to the root."""
     contact = mesh.path_of_contact
     below = float(-contact.start / (contact.end - contact.start))
-    assert float(relief_reversal(mesh, jg.ProfileSlope(6.0))) == pytest.approx(6.0 * below, rel=1e-9)
+    assert float(relief_reversal(mesh, pinion=jg.ProfileSlope(6.0))) == pytest.approx(6.0 * below, rel=1e-9)
 
 
 def test_flank_metrics_under_grad_and_vmap(mesh):

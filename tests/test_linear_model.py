@@ -131,7 +131,13 @@ def test_slopes_of_another_objective_and_of_constraints(mesh):
 
     def excess(x):
         combined = 2.0 * 20.0 * x[0] - (1.0 + 4.7 * x[2])
-        return np.array([float(volume(mesh, *reliefs(x))) / 40.0 - 1, combined / 5.0 - 1, 1 - combined / 3.0])
+        return np.array(
+            [
+                float(volume(mesh, **dict(zip(("pinion", "wheel"), reliefs(x))))) / 40.0 - 1,
+                combined / 5.0 - 1,
+                1 - combined / 3.0,
+            ]
+        )
 
     limits = [(limit.upper[0, 0], limit.slope[0, 0]) for limit in found.limits]
     passed, slopes = zip(*limits)

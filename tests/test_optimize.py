@@ -155,7 +155,7 @@ def test_a_table_of_variants_is_searched_whole(known):
 
 def test_constraints_are_kept(known, best):
     """The volume of a relief is proportional to its amount; optima within the limits are read off a grid."""
-    volume = float(eqx.filter_jit(jg.metrics.removed_volume)(known.mesh, best.pinion, best.wheel))
+    volume = float(eqx.filter_jit(jg.metrics.removed_volume)(known.mesh, pinion=best.pinion, wheel=best.wheel))
     most = 19.4  # [um], of both amounts together
     per_amount = volume / (best.parameters["pinion"] + best.parameters["wheel"])
     limits = [
@@ -246,11 +246,11 @@ def test_a_relief_that_must_not_dip(known):
     result = known.minimize(known.quadratics, box, constraints=[limit])
     assert result.objective == pytest.approx(values[monotone].min(), rel=1e-2)
     assert result.violation <= 1e-3
-    assert float(reversal(known.mesh, result.pinion, result.wheel)) <= 1e-3
+    assert float(reversal(known.mesh, pinion=result.pinion, wheel=result.wheel)) <= 1e-3
     # a dip from the largest depth, b1^2 / (4 |b2|), down to that of the tip, b1 + b2
     dipping, _ = known.quadratics({"b1": 2.5, "b2": -1.5})
     dip = DELTA0 * (2.5**2 / 6.0 - 1.0)
-    assert float(reversal(known.mesh, dipping, dipping)) == pytest.approx(dip, rel=1e-3)
+    assert float(reversal(known.mesh, pinion=dipping, wheel=dipping)) == pytest.approx(dip, rel=1e-3)
 
 
 def test_worst_of_two_torques_is_equal_at_both(known):

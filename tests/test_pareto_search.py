@@ -24,8 +24,8 @@ def searched(known):
 @pytest.fixture(scope="module")
 def volume_per_amount(known):
     """[mm3/um] of the sum of both amounts: the gears are equal."""
-    both = known.parabolas({"pinion": 0.5, "wheel": 0.5})
-    return float(eqx.filter_jit(jg.metrics.removed_volume)(known.mesh, *both))
+    pinion, wheel = known.parabolas({"pinion": 0.5, "wheel": 0.5})
+    return float(eqx.filter_jit(jg.metrics.removed_volume)(known.mesh, pinion=pinion, wheel=wheel))
 
 
 def dominated(values):

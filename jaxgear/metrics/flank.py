@@ -51,7 +51,10 @@ def profile_relief(
 
 @eqx.filter_jit
 def max_relief(
-    mesh: Mesh | Kinematics, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None
+    mesh: Mesh | Kinematics,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
 ) -> Scalar:
     """Largest material removed anywhere on either flank [um]."""
     face = jnp.linspace(-0.5, 0.5, _FACE_POINTS, dtype=_dtype(mesh)) * mesh.pair.face_width
@@ -68,7 +71,10 @@ def max_relief(
 
 @eqx.filter_jit
 def relief_reversal(
-    mesh: Mesh | Kinematics, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None
+    mesh: Mesh | Kinematics,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
 ) -> Scalar:
     """By how much the material removed fails to grow steadily from the pitch point towards tip and root [um].
 
@@ -81,7 +87,10 @@ def relief_reversal(
 
 @eqx.filter_jit
 def removed_volume(
-    mesh: Mesh | Kinematics, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None
+    mesh: Mesh | Kinematics,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
 ) -> Scalar:
     """Material ground off all teeth of both gears, both flanks of every tooth alike [mm^3].
 

@@ -59,7 +59,7 @@ def _margin(name: str):
 
 
 def _of_flanks(function):
-    return lambda cycle: function(cycle.kinematics, cycle.pinion, cycle.wheel)
+    return lambda cycle: function(cycle.kinematics, pinion=cycle.pinion, wheel=cycle.wheel)
 
 
 quantities.add(

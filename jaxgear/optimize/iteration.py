@@ -255,7 +255,7 @@ def _iterate(mesh: Mesh, state: _State, pinion, wheel) -> Iterate:
         transmission_error=error,
         ppte=state.ppte,
         limit=float(np.ptp(error[state.alone])),
-        max_relief=float(largest_relief(mesh, pinion, wheel)),
+        max_relief=float(largest_relief(mesh, pinion=pinion, wheel=wheel)),
         max_flank_pressure=float(np.max(np.asarray(state.cycle.contact_pressure))),
         max_corner_pressure=float(np.max(np.asarray(state.cycle.corner_pressure))),
     )
