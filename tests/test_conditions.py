@@ -54,8 +54,8 @@ def test_one_quantile_in_every_engine(mesh, tolerance):
     plan, measures = jg.VariantList(("amount",), [[AMOUNT]]), (jg.Quantile(0.95), jg.CVaR(0.5))
     table = jg.sweep(design, plan, mesh=mesh, torque=50.0, measures=measures, **made)
     assert table.results == ("ppte_um_q95", "ppte_um_cvar50")
-    cases = conditions("minimize", mesh, 50.0, **made).on(mesh)
-    problem = make_problem(design, {"amount": (0.0, 10.0)}, mesh, cases, ("ppte",), jg.Quantile(0.95), ())
+    bounds = {"amount": (0.0, 10.0)}
+    problem = make_problem(design, bounds, mesh=mesh, torque=50.0, measure=jg.Quantile(0.95), **made)
     searched = float(jax.jit(lambda x: problem.score(x).value[0])(jnp.asarray([AMOUNT / 10])))
     expected = float(hdquantiles(np.asarray(scatter.ppte), [0.95])[0])
     assert np.ptp(scatter.ppte) > 0.1
