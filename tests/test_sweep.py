@@ -141,7 +141,7 @@ def test_impossible_variants_are_rows(mesh, table):
 
 
 def test_unsolved_variants_are_rows(mesh, tmp_path):
-    coarse = jg.prepare(mesh.pair, resolution=replace(mesh.resolution, tolerance=1e-30))
+    coarse = jg.prepare(mesh.pair, resolution=replace(mesh.resolution, rtol=1e-30))
     table = run(coarse, output=tmp_path / "out", results=("ppte",))
     assert len(table) == 40 and not table.column("converged").any()
     assert np.isnan(table.column("ppte_um")).all()

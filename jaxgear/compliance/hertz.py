@@ -11,13 +11,12 @@ nu' = nu/(1 - nu), which gives the usual forms; plane stress has E and nu in the
 
 from abc import abstractmethod
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import reduced_radius
-from ..numerics import Checked
+from ..numerics import Checked, result
 from .laws import AbstractLaw, LinearLaw, LogarithmicLaw, PowerLaw
 from .plane import Plane, plane_modulus, plane_poisson
 from .toothload import ToothLoad
@@ -29,7 +28,7 @@ Real = Float[Array, "..."]
 _DEPTH_TERMS = 10
 
 
-class ContactSide(eqx.Module):
+class ContactSide(Checked):
     """One flank at the contact; arrays of shape (pairs, 1, positions).
 
     Attributes:
@@ -41,20 +40,20 @@ class ContactSide(eqx.Module):
         strain_modulus: E / (1 - nu^2) [MPa], whatever the plane.
     """
 
-    radius: Field
-    depth: Field
-    young: Field
-    modulus: Field
-    poisson: Field
-    strain_modulus: Field
+    radius: Field = result("mm")
+    depth: Field = result("mm")
+    young: Field = result("MPa")
+    modulus: Field = result("MPa")
+    poisson: Field = result()
+    strain_modulus: Field = result("MPa")
 
 
-class ContactGeometry(eqx.Module):
+class ContactGeometry(Checked):
     """Both flanks at the contact and the face width [mm], shape (pairs, 1, positions)."""
 
     pinion: ContactSide
     wheel: ContactSide
-    face_width: Field
+    face_width: Field = result("mm")
 
     @property
     def sides(self) -> tuple[ContactSide, ContactSide]:

@@ -1,16 +1,16 @@
 """Where the load line crosses a tooth: the quantities that every compliance model needs."""
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry.involute import load_angle
 from ..geometry.outline import Outline, involute_point
+from ..numerics import Checked, result
 
 Real = Float[Array, "..."]
 
 
-class ToothLoad(eqx.Module):
+class ToothLoad(Checked):
     """Load normal to the involute at given points of one gear's flank. All arrays share one shape.
 
     Attributes:
@@ -22,10 +22,10 @@ class ToothLoad(eqx.Module):
     """
 
     outline: Outline
-    roll_length: Real
-    angle: Real
-    height: Real
-    depth: Real
+    roll_length: Real = result("mm")
+    angle: Real = result("rad")
+    height: Real = result("mm")
+    depth: Real = result("mm")
 
 
 def tooth_load(outline: Outline, roll_length: Real) -> ToothLoad:

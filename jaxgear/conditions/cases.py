@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from ..contact import Mesh, Operation
 from ..contact.operation import operation_of
-from ..numerics import real, whole
+from ..numerics import Checked, real, result, whole
 from ..tolerance import Deviation, Tolerance, sample_deviations
 from ..tolerance.deviation import deviation_field, flank_basis
 from .load import LoadSpectrum
@@ -15,7 +15,7 @@ from .load import LoadSpectrum
 SAMPLES = 64  # manufactured pairs, where nothing is said
 
 
-class Conditions(eqx.Module):
+class Conditions(Checked):
     """Under what designs are judged, whatever their mesh: loads, and the gears that run under every one of them.
 
     All designs meet the same gears, and so do all loads (common random numbers): what is compared differs by the design
@@ -49,7 +49,7 @@ class Conditions(eqx.Module):
         return Cases(torques, speeds, friction, self.load.weights.astype(dtype), removed)
 
 
-class Cases(eqx.Module):
+class Cases(Checked):
     """Conditions on a mesh.
 
     What a deviation removes depends on the mesh and the torque, not on the flanks' design: it is worked out once.
@@ -63,11 +63,11 @@ class Cases(eqx.Module):
             perfect gears.
     """
 
-    torque: Float[Array, " torques"]
-    speed: Float[Array, " torques"] | None
-    friction: Float[Array, ""] | None
-    weight: Float[Array, " torques"]
-    removed: Float[Array, "torques samples pairs slices positions"] | None
+    torque: Float[Array, " torques"] = result("N m")
+    speed: Float[Array, " torques"] | None = result("rpm")
+    friction: Float[Array, ""] | None = result()
+    weight: Float[Array, " torques"] = result()
+    removed: Float[Array, "torques samples pairs slices positions"] | None = result("um")
 
     @property
     def samples(self) -> int:

@@ -47,7 +47,7 @@ class Variant(NamedTuple):
     possible: Bool[Array, ""]
 
 
-class Variants(eqx.Module):
+class Variants(Checked):
     """What the named variables of a problem make.
 
     A variable is used wherever a function asks for it: in the flanks (`design`), in the pair (a `mesh` that is a

@@ -36,7 +36,7 @@ class MeshCycle(eqx.Module):
         gap: gap of the undeformed flanks at zero transmission error [um]: corner gap plus both modifications.
         tangent_stiffness: d force / d transmission error at fixed position [N/um].
         residual: largest relative violation of the contact conditions, shape (positions,).
-        converged: where the residual is below the resolution's tolerance, no pair beyond those carried along could
+        converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
             touch and the gears are valid, shape (positions,).
     """
 

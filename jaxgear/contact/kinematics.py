@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 from ..compliance import Plane
 from ..geometry import Gear, GearPair, PathOfContact, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import over_batch
+from ..numerics import Checked, over_batch, result
 from .corner import REACH, corner_gap
 from .resolution import Resolution
 
@@ -16,7 +16,7 @@ Scalar = Float[Array, ""]
 Field = Float[Array, "pairs positions"]
 
 
-class Side(eqx.Module):
+class Side(Checked):
     """One gear's side of the contact.
 
     Attributes:
@@ -28,10 +28,10 @@ class Side(eqx.Module):
     """
 
     gear: Gear
-    start_roll_length: Scalar
-    pitch_roll_length: Scalar
-    contact_roll_length: Field
-    face_width: Scalar
+    start_roll_length: Scalar = result("mm")
+    pitch_roll_length: Scalar = result("mm")
+    contact_roll_length: Field = result("mm")
+    face_width: Scalar = result("mm")
 
     @property
     def base_radius(self) -> Scalar:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..microgeometry import AbstractModification
-from ..numerics import ContactProblem, check, real, solve_contact, tangent_stiffness
+from ..numerics import Checked, ContactProblem, check, real, result, solve_contact, tangent_stiffness
 from .mesh import Mesh
 from .operation import operation_of
 from .solve import check_mesh, outermost, removed_material
@@ -17,7 +17,7 @@ Curve = Float[Array, " positions"]
 Load = Float[Array, "pairs slices positions"]
 
 
-class PrescribedContact(eqx.Module):
+class PrescribedContact(Checked):
     """Result of `solve_at`.
 
     Attributes:
@@ -27,17 +27,17 @@ class PrescribedContact(eqx.Module):
         line_load: [N/mm], shape (pairs, slices, positions); exactly zero where nothing touches, as are the forces.
         tangent_stiffness: d force / d transmission error [N/um]; it counts only where there is contact.
         residual: largest relative violation of the contact conditions, shape (positions,).
-        converged: where the residual is below the resolution's tolerance, no pair beyond those carried along could
+        converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
             touch, and the gears can run, shape (positions,).
     """
 
-    transmission_error: Curve
-    force: Curve
-    pair_force: Float[Array, "pairs positions"]
-    line_load: Load
-    tangent_stiffness: Curve
-    residual: Curve
-    converged: Bool[Array, " positions"]
+    transmission_error: Curve = result("um")
+    force: Curve = result("N")
+    pair_force: Float[Array, "pairs positions"] = result("N")
+    line_load: Load = result("N/mm")
+    tangent_stiffness: Curve = result("N/um")
+    residual: Curve = result()
+    converged: Bool[Array, " positions"] = result()
 
 
 def solve_at(
@@ -86,7 +86,7 @@ def solve_at(
 def _solve_at(mesh: Mesh, error: Curve, removed: Load) -> PrescribedContact:
     gap = mesh.corner_gap[:, None] + removed
     problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, approach=error)
-    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.tolerance)
+    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
     pair_force = mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1)
     return PrescribedContact(
         transmission_error=error,

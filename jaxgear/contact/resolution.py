@@ -15,7 +15,7 @@ class Resolution(Checked):
         patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks
             and steep flanks over its own width; 1 takes the nominal contact point alone.
         newton_steps: largest number of steps of the contact solution.
-        tolerance: residual at which the contact solution ends, relative to the transmission error and to the force;
+        rtol: residual at which the contact solution ends, relative to the transmission error and to the force;
             None for 1e-11 in double and 5e-6 in single precision.
     """
 
@@ -24,7 +24,7 @@ class Resolution(Checked):
     pairs: int | None = count(low=2, optional=True, default=None)
     patch_nodes: int = count(default=4)
     newton_steps: int = count(default=8)
-    tolerance: float | None = number(
+    rtol: float | None = number(
         "", low=0.0, high=1.0, open_low=True, open_high=True, static=True, optional=True, default=None
     )
 

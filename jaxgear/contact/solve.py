@@ -215,7 +215,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> dict[str, Array
     removed = removed.astype(force.dtype)
     gap = mesh.corner_gap[:, None] + removed
     problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, force)
-    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.tolerance)
+    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
     windup = mesh.hub * force / mesh.pair.face_width
     contact_stiffness = tangent_stiffness(problem, solution)
     unloaded = minimum(gap / mesh.lever[:, None], axis=(0, 1))

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import bracketed_root
+from ..numerics import Checked, bracketed_root, result
 from .gear import Gear
 from .involute import half_tooth_angle
 
@@ -18,7 +18,7 @@ Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
 
 
-class Outline(eqx.Module):
+class Outline(Checked):
     """One flank of the generated tooth.
 
     Attributes:
@@ -30,10 +30,10 @@ class Outline(eqx.Module):
     """
 
     gear: Gear
-    junction: Scalar
-    form_roll_length: Scalar
-    root_half_angle: Scalar
-    undercut: Scalar
+    junction: Scalar = result("rad")
+    form_roll_length: Scalar = result("mm")
+    root_half_angle: Scalar = result("rad")
+    undercut: Scalar = result()
 
     @property
     def junction_height(self) -> Scalar:
