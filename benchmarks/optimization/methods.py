@@ -49,7 +49,7 @@ class Effort:
 # populations as large as the factorial, so that one program scores all
 QUICK = Effort(
     positions=16,
-    fine=16,
+    fine=32,
     gears=243,
     levels=4,
     population=64,

@@ -116,11 +116,10 @@ def optimize(
             if quick:
                 current.coarsen(positions=_QUICK_POSITIONS)
             current.prepare(torques=_QUICK_TORQUES if quick else _TORQUES)
-            current.evaluate("unmodified", NoModification(), NoModification())
             factor = design.application_factor
             relief = eqx.filter_jit(iso_relief)(design.pair(), design.torque, application_factor=factor)
-            current.evaluate("rule-based", relief, relief)
-            current.search(request)
+            involute = NoModification()
+            current.search(request, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
             current.write(figures=not no_figures)
     return OK if current.show() else NOT_CONVERGED
 

@@ -9,6 +9,8 @@ import numpy as np
 from ..contact import Mesh
 from ..io import DesignFile, describe
 from ..optimize import Front, Optimum, Projection
+from ..optimize.result import PENALIZED
+from . import report
 
 _SHOWN_BOUNDS = 8
 
@@ -17,13 +19,24 @@ def verdict(
     file: DesignFile,
     optimum: Optimum,
     projection: Projection | None,
+    evaluations: report.Evaluations,
     *,
-    unmodified: float,
-    reduction: float,
+    searched_at: int,
 ) -> Iterator[str]:
-    """Lines under the table of an optimization; the PPTE without modifications [um], and by how much it fell [%]."""
-    yield f"PPTE {unmodified:.3f} -> {optimum.ppte:.3f} um: {reduction:.1f} % less than unmodified"
-    if optimum.objective_name != "ppte":
+    """Lines under the table of an optimization, from the numbers of the table.
+
+    Args:
+        file, optimum, projection: what was asked and found.
+        evaluations: of all designs.
+        searched_at: positions of the mesh on which the search began.
+    """
+    before, after = next(iter(evaluations.values())), report.main(evaluations)
+    ppte = [evaluation.metrics["ppte_um"] for evaluation in (before, after)]
+    fall = report.reduction(evaluations)
+    yield f"PPTE at {file.torque:g} N m {ppte[0]:.3f} -> {ppte[1]:.3f} um: {fall:.1f} % less than unmodified"
+    for label in report.objectives(evaluations):
+        yield f"{label} {before.objectives[label]:.4g} -> {after.objectives[label]:.4g}"
+    if optimum.objective_name.endswith(PENALIZED):  # no other design pays it
         yield f"{optimum.objective_name}: {optimum.objective:.4g}"
     yield from _bounds(file, optimum)
     for name, limit in optimum.constraints.items():
@@ -39,9 +52,7 @@ def verdict(
         )
     if projection is not None:
         yield from str(projection).splitlines()
-    if np.isfinite(optimum.grid_change):
-        change = f"{optimum.grid_change:+.2g} {optimum.objective_unit}".rstrip()
-        yield f"evaluated at {optimum.positions} positions; twice as many change the objective by {change}"
+    yield _positions(optimum, searched_at)
     if np.isfinite(optimum.decrease_left):
         yield f"decrease left at the optimum {optimum.decrease_left:.2g} per full range of the variables"
     price = "one with gradient counts as three, each further gradient as two"
@@ -114,6 +125,14 @@ def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[str]:
         yield f"and {len(free) - _SHOWN_BOUNDS} more variables are at a bound"
     if not free:
         yield "no variable is at a bound"
+
+
+def _positions(optimum: Optimum, searched_at: int) -> str:
+    said = f"searched at {searched_at} positions, " if searched_at != optimum.positions else ""
+    said += f"evaluated at {optimum.positions} positions"
+    if np.isfinite(optimum.grid_change):
+        said += f"; twice as many change the objective by {optimum.grid_change:+.2g} {optimum.objective_unit}".rstrip()
+    return said
 
 
 def _with_unit(file: DesignFile, name: str) -> str:

@@ -50,6 +50,8 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
         cells = [evaluation.metrics.get(metric) for evaluation in evaluations.values()]
         if None not in cells:
             result.add_row(label, *(format(cell, form) for cell in cells))
+    for label in objectives(evaluations):
+        result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
     result.add_section()
     flanks = [dict(_flank_cells(evaluation)) for evaluation in evaluations.values()]
     for label in dict.fromkeys(label for cells in flanks for label in cells):
@@ -100,6 +102,12 @@ def bores(file: DesignFile) -> str:
         guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
         texts.append(f"{name} {2 * float(gear.bore_radius):.4g} mm{guess}")
     return f"bores: {', '.join(texts)}"
+
+
+def objectives(evaluations: Evaluations) -> list[str]:
+    """What an optimization made small, without what is a row of the table anyhow."""
+    known = {name.rpartition("_")[0] + f" [{name.rpartition('_')[2]}]" for name in _ROWS}
+    return [label for label in next(iter(evaluations.values())).objectives if label not in known | set(_ROWS)]
 
 
 def unmodified(evaluations: Evaluations) -> float:
@@ -206,6 +214,7 @@ def console(*, stderr: bool = False) -> Console:
 def _design(evaluation: Evaluation) -> dict[str, Any]:
     return {
         **evaluation.metrics,
+        **({"objectives": evaluation.objectives} if evaluation.objectives else {}),
         "failed_torques_Nm": evaluation.failed_torques,
         "pinion_modification": describe(evaluation.pinion),
         "wheel_modification": describe(evaluation.wheel),

@@ -3,7 +3,7 @@
 import dataclasses
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -15,10 +15,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from ..contact import Mesh
 from ..io import DesignFile, OptimizeRequest, load_design, result_folder, write_flanks, write_front, write_summary
 from ..microgeometry import AbstractModification
-from ..optimize import Front, Optimum, Projection, project
+from ..optimize import Front, Optimum, Problem, Projection, judged, project
 from . import interrupt, optimum_report, report
 from .cache import enable_cache
 from .study import Evaluation, Evaluator
+
+Modifications = tuple[AbstractModification, AbstractModification]
 
 
 class Run:
@@ -47,25 +49,40 @@ class Run:
         self._stages.begin("preparing the mesh")
         self._mesh: Mesh = jax.block_until_ready(self.design.mesh(self._resolution))
         self._torques = np.linspace(*self.design.torque_range, torques)
-        self._evaluator = Evaluator(
-            self._mesh, self.design.torque, self._torques, self.design.speed, self.design.friction
-        )
+        self._judge_on(self._mesh, None)
 
     def evaluate(self, name: str, pinion: AbstractModification, wheel: AbstractModification) -> None:
         """Evaluates a design and keeps it."""
         self._stages.begin(f"solving the {name} design")
-        self._evaluations[name] = self._evaluator(pinion, wheel)
+        found = self._evaluator(pinion, wheel)
+        if self._problem is not None:
+            found = dataclasses.replace(found, objectives=judged(self._problem, pinion, wheel))
+        self._evaluations[name] = found
 
-    def search(self, request: OptimizeRequest) -> None:
-        """Finds the optimum, and for flanks without parameters the named curve in their place."""
+    def search(self, request: OptimizeRequest, beside: Mapping[str, Modifications]) -> None:
+        """Finds the optimum, and for flanks without parameters the named curve in their place.
+
+        All designs are evaluated on the mesh on which the search has ended, and by its measure.
+
+        Args:
+            request: what is sought.
+            beside: designs to compare with, by name.
+        """
         self._stages.begin(f"searching the optimum ({request.method})")
         began = time.perf_counter()
         found = request(self._mesh, self._stages.step)
         self._front = found if isinstance(found, Front) else None
-        self._optimum = optimum = found.compromise if isinstance(found, Front) else found
-        self.evaluate("optimum", optimum.pinion, optimum.wheel)
+        optimum = found.compromise if isinstance(found, Front) else found
         spent = time.perf_counter() - began
-        self._evaluations["optimum"] = dataclasses.replace(self._evaluations["optimum"], seconds=spent)
+        self._judge_on(optimum.mesh, optimum.problem)
+        for name, modifications in beside.items():
+            self.evaluate(name, *modifications)
+        self.evaluate("optimum", optimum.pinion, optimum.wheel)
+        evaluated = dataclasses.replace(self._evaluations["optimum"], seconds=spent)
+        self._evaluations["optimum"] = evaluated
+        # of several torques it shows another one than the table does
+        ppte = float(evaluated.metrics["ppte_um"])
+        self._optimum = optimum = dataclasses.replace(optimum, cycle=evaluated.cycle, ppte=ppte)
         if request.curve is not None:
             self._stages.begin(f"projecting the flanks on a {request.curve} curve")
             self._projection = projection = project(optimum, request.curve)
@@ -96,8 +113,8 @@ class Run:
                 self.design,
                 self._optimum,
                 self._projection,
-                unmodified=report.unmodified(self._evaluations),
-                reduction=report.reduction(self._evaluations),
+                self._evaluations,
+                searched_at=self._resolution.positions,
             )
             for line in lines:
                 out.print(line, soft_wrap=True)
@@ -116,6 +133,11 @@ class Run:
             failures.append("constraints are not met")
             report.console(stderr=True).print(f"jaxgear: warning: {failures[-1]}", style="bold red", soft_wrap=True)
         return not failures
+
+    def _judge_on(self, mesh: Mesh, problem: Problem | None) -> None:
+        """Evaluates from now on on this mesh, and by the measure of a problem."""
+        self._mesh, self._problem = mesh, problem
+        self._evaluator = Evaluator(mesh, self.design.torque, self._torques, self.design.speed, self.design.friction)
 
 
 class Stages:

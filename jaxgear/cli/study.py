@@ -1,7 +1,7 @@
 """Evaluation of designs over the torques of a design file, by one compiled program for all of them."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import equinox as eqx
 import jax
@@ -27,6 +27,7 @@ class Evaluation:
         metrics: numbers at the design torque, by name and unit.
         transmission_error: over the torques, shape (torques, positions) [um].
         ppte: peak-to-peak transmission error over the torques [um].
+        objectives: what an optimization made small, by name and unit, of this design; empty without one.
         failed_torques: torques without a converged contact solution [N m], the design torque included.
         seconds: what finding and evaluating it took, without compilation [s].
     """
@@ -39,6 +40,7 @@ class Evaluation:
     ppte: np.ndarray
     failed_torques: list[float]
     seconds: float
+    objectives: dict[str, float] = field(default_factory=dict)
 
 
 class Evaluator:
@@ -66,7 +68,7 @@ class Evaluator:
         return Evaluation(
             pinion=pinion,
             wheel=wheel,
-            cycle=cycle,
+            cycle=replace(cycle, pinion=pinion, wheel=wheel),
             metrics={name: value.item() for name, value in metrics.items()},
             transmission_error=curves[1:],
             ppte=np.ptp(curves[1:], axis=1),

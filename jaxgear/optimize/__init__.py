@@ -30,3 +30,4 @@ from .result import Optimum as Optimum
 from .search import AbstractMethod as AbstractMethod
 from .search import Callback as Callback
 from .search import Record as Record
+from .verdict import judged as judged

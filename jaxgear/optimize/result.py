@@ -9,6 +9,7 @@ from ..contact import Mesh, MeshCycle
 from ..microgeometry import AbstractModification
 from ..numerics import Checked
 from .goal import FEASIBLE
+from .problem import Problem
 
 PENALIZED = " with curvature penalty"  # what the name of an objective says of it
 _SHOWN_PARAMETERS = 12  # a table of a hundred flank values tells a reader nothing
@@ -95,6 +96,8 @@ class Optimum(eqx.Module):
         history_evaluations: contact analyses spent until then.
         seconds: wall time of the search, compilation included [s].
         iterations: states of the transmission-error iteration, the first one before any change; else empty.
+        problem: what was solved, on `mesh`; `judged` tells by it what other designs are worth. None of the
+            transmission-error iteration, which levels one curve.
     """
 
     method: str = eqx.field(static=True)
@@ -118,6 +121,7 @@ class Optimum(eqx.Module):
     history_evaluations: np.ndarray
     seconds: float
     iterations: tuple[Iterate, ...] = ()
+    problem: Problem | None = None
 
     @property
     def feasible(self) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from ..conditions import in_words
 from ..contact import removed_material, solve_removed
 from ..metrics import peak_to_peak
+from ..microgeometry import AbstractModification
 from .goal import FEASIBLE, Constraint
 from .linear_model import Model
 from .problem import Problem
@@ -65,6 +66,7 @@ def optimum_of(
         history=sign * np.asarray([value for _, value in record.history]),
         history_evaluations=np.asarray([spent for spent, _ in record.history]),
         seconds=time.perf_counter() - began,
+        problem=problem,
     )
 
 
@@ -84,10 +86,29 @@ def objective_name(problem: Problem) -> str:
     names = [of.name for of in problem.objectives]
     if len(names) > 1:
         return f"distance from the ideal of {' and '.join(names)}"
-    prefix = ""
-    if problem.cases.count > 1:
-        prefix = in_words(problem.measure) + " "
-    return prefix + names[0] + (PENALIZED if problem.roughness is not None else "")
+    return _over_cases(problem) + names[0] + (PENALIZED if problem.roughness is not None else "")
+
+
+def judged(
+    problem: Problem, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None
+) -> dict[str, float]:
+    """What any modifications are worth in a problem: its objectives, by name and unit as "95 % CVaR of ppte [um]".
+
+    They are joined by its measure over its cases; infinite where a contact solution failed. No penalty is added.
+    """
+    values = np.asarray(_score_of(problem, pinion, wheel).value)
+    units = (f" [{of.unit}]" if of.unit else "" for of in problem.objectives)
+    names = (f"{_over_cases(problem)}{of.name}{unit}" for of, unit in zip(problem.objectives, units))
+    return {name: of.sign * float(value) for name, of, value in zip(names, problem.objectives, values)}
+
+
+def _over_cases(problem: Problem) -> str:
+    return f"{in_words(problem.measure)} " if problem.cases.count > 1 else ""
+
+
+@eqx.filter_jit
+def _score_of(problem: Problem, pinion, wheel):
+    return problem.score_of(pinion, wheel)
 
 
 def _limits(problem: Problem, x) -> dict[str, Limit]:
