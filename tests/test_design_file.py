@@ -627,8 +627,8 @@ def test_whatever_is_written_in_a_file_it_is_read_or_refused_in_one_line(load):
 
 def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
     text = reference()
-    sections = [schema.FileSection, schema.GearSection, schema.LoadSection, schema.OptimizeSection, schema.ModelSection]
-    sections += [*schema.METHOD_OPTIONS.values(), schema_sweep.SweepSection, schema_sweep.ToleranceSection]
+    sections = [schema.FileSection, schema.GearSection, schema.LoadSection, schema.optimize_section(), schema.ModelSection]
+    sections += [*schema.method_options().values(), schema_sweep.SweepSection, schema_sweep.ToleranceSection]
     sections += [section_of(cls) for cls in (*family(AbstractModification, users=False).values(), jg.Material)]
     for section in sections:
         assert not [name for name in section.model_fields if f"| `{name}` | " not in text]

@@ -173,7 +173,7 @@ def load_design(path: str | Path) -> DesignFile:
     load = _load(file, section("load", schema.LoadSection))
     operation = template.part_of(file, "load", load, Operation)
     model = _model(file, section("model", schema.ModelSection))
-    optimize = section("optimize", schema.OptimizeSection)
+    optimize = section("optimize", schema.optimize_section())
     if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
         raise DesignFileError(file, "optimize", "has no effect without [variables]")
     open_case = [*pair.free(), *model.free(), *operation.free()]

@@ -26,22 +26,19 @@ from . import schema
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
 from .errors import DesignFileError, refused, suggestion
+from .layout import Section
 from .toml import decode
 
 _DEFAULT_METHOD = "minimax"
 _CURVE = "cubic"  # on which flanks without parameters are projected
 _FRONT = ("ppte", "max_contact_pressure")  # of a Pareto front where the file names no objectives
 _PARETO = "pareto"
-_MADE: Mapping[str, Callable[..., Any]] = {**METHODS, _PARETO: Pareto}
-_KNOWN = (*_MADE, *schema.METHODS_WITHOUT_VARIABLES)
-_STARTS = ("minimax", "adam", "lbfgs")  # methods of `starts` and `steps`
 _MEASURES: Mapping[str, Callable[..., AbstractMeasure]] = {
     "mean": Mean,
     "worst": Worst,
     "quantile": Quantile,
     "cvar": CVaR,
 }
-_WITH_SEED = ("genetic", "cma_es", "differential_evolution")
 _WITH_LEVEL = ("quantile", "cvar")
 # Options of a quick look.
 _QUICK: Mapping[str, dict[str, Any]] = {
@@ -114,16 +111,18 @@ def optimize_request(design: DesignFile, *, method: str | None = None, quick: bo
     """
     section = design.optimize
     name = method or section.method or _DEFAULT_METHOD
-    if name not in _KNOWN:
-        raise DesignFileError(design.path, "optimize.method", f'"{name}" is not known, {suggestion(name, _KNOWN)}')
+    known = (*METHODS, _PARETO, *schema.METHODS_WITHOUT_VARIABLES)
+    if name not in known:
+        raise DesignFileError(design.path, "optimize.method", f'"{name}" is not known, {suggestion(name, known)}')
     if not design.bounds and name not in schema.METHODS_WITHOUT_VARIABLES:
         raise DesignFileError(design.path, "variables", "missing, nothing to optimize; use jaxgear analyze")
     for free in design.open_case:
         raise DesignFileError(design.path, free.key, f'"{free.name}" is a variable, which a sweep alone can vary here')
-    options = {key: _options(design, key) for key in schema.METHOD_OPTIONS}.get(name, {})
+    options = {key: _options(design, key, table) for key, table in schema.method_options().items()}.get(name, {})
+    shared = {field.name for field in dataclasses.fields(METHODS[name])} if name in METHODS else set()
     for key in ("starts", "steps"):
         value = getattr(section, key)
-        if value is not None and name in _STARTS:
+        if value is not None and key in shared:
             options[key] = value
         elif value is not None and method is None:
             raise DesignFileError(design.path, f"optimize.{key}", f'has no effect with method "{name}"')
@@ -132,7 +131,7 @@ def optimize_request(design: DesignFile, *, method: str | None = None, quick: bo
         raise DesignFileError(
             design.path, f"optimize.{name}.curve", f'"{curve}" is not known, {suggestion(curve, CURVES)}'
         )
-    if name in _WITH_SEED:
+    if "seed" in shared:
         options["seed"] = section.seed or 0
     elif section.seed is not None and section.manufactured is None and method is None:
         raise DesignFileError(design.path, "optimize.seed", f'has no effect with method "{name}" and perfect gears')
@@ -142,9 +141,9 @@ def optimize_request(design: DesignFile, *, method: str | None = None, quick: bo
         common = {}
     elif name != "free_form":
         _check_levels(design, options.get("levels"))
-        refused(design.path, f"optimize.{name}", lambda: _MADE[name](**options))
+        refused(design.path, f"optimize.{name}", lambda: {**METHODS, _PARETO: Pareto}[name](**options))
     if quick:
-        options = {**options, **_QUICK[name]}
+        options = {**options, **_QUICK.get(name, {})}
         if name not in (_PARETO, "te_iteration"):  # a quick look stays on its mesh
             common = {**common, "positions": None}
     return OptimizeRequest(name, curve, design, options, common, _QUICK[_DEFAULT_METHOD] if quick else {})
@@ -156,10 +155,10 @@ def _check_levels(design: DesignFile, levels) -> None:
         raise DesignFileError(design.path, "optimize.factorial.levels", problem)
 
 
-def _options(design: DesignFile, name: str) -> dict[str, Any]:
+def _options(design: DesignFile, name: str, section: type[Section]) -> dict[str, Any]:
     """The table of one method."""
     table = getattr(design.optimize, name) or {}
-    options = decode(design.path, f"optimize.{name}", table, schema.METHOD_OPTIONS[name])
+    options = decode(design.path, f"optimize.{name}", table, section)
     return {key: value for key in type(options).model_fields if (value := getattr(options, key)) is not None}
 
 

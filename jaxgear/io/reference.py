@@ -56,9 +56,9 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
             yield f'{key} = {{ type = "{name}" }}', section_of(cls), cls
     yield "[resolution]", schema.ResolutionSection, Resolution
     yield "[variables.NAME]", schema.VariableSection, None
-    yield "[optimize]", schema.OptimizeSection, None
+    yield "[optimize]", schema.optimize_section(), None
     yield "[[optimize.constraint]]", schema.ConstraintSection, None
-    for name, section in schema.METHOD_OPTIONS.items():
+    for name, section in schema.method_options().items():
         yield f"[optimize.{name}]", section, METHODS.get(name, _EXTRAS.get(name))
     yield "[sweep]", schema_sweep.SweepSection, None
     yield "[tolerance]", schema_sweep.ToleranceSection, Tolerance

@@ -6,10 +6,13 @@ there: None means that the key is absent.
 
 from typing import Annotated, Any
 
+from pydantic import create_model
+
 from ..compliance import Compliance
 from ..contact import Operation, Resolution
 from ..geometry import Gear, GearPair
 from ..numerics import Number
+from ..optimize import METHODS, Pareto
 from .kinds import LEVEL, SEED, WEIGHTS, Choice, Either, ListOf, Real, Table, Text, count, positive
 from .layout import Section, section_of
 
@@ -126,14 +129,6 @@ class OptimizeSection(Section):
         steps: most steps of every search, of the same methods.
         application_factor: K_A of the rule-based relief.
         constraint: limits of quantities or of combinations of variables.
-        minimax: options of the method.
-        genetic: options of the method.
-        cma_es: options of the method.
-        differential_evolution: options of the method.
-        factorial: options of the method.
-        pareto: options of the method.
-        te_iteration: options of the method.
-        free_form: options of the method.
     """
 
     method: Annotated[str | None, Text()] = None
@@ -148,14 +143,6 @@ class OptimizeSection(Section):
     steps: Annotated[int | None, count(10, 100_000)] = None
     application_factor: Annotated[float, Real(Number(low=0.0, high=100.0, open_low=True))] = 1.0
     constraint: Annotated[list[Tables], _TABLES] = []
-    minimax: Annotated[Tables | None, Table()] = None
-    genetic: Annotated[Tables | None, Table()] = None
-    cma_es: Annotated[Tables | None, Table()] = None
-    differential_evolution: Annotated[Tables | None, Table()] = None
-    factorial: Annotated[Tables | None, Table()] = None
-    pareto: Annotated[Tables | None, Table()] = None
-    te_iteration: Annotated[Tables | None, Table()] = None
-    free_form: Annotated[Tables | None, Table()] = None
 
 
 class ConstraintSection(Section):
@@ -174,37 +161,11 @@ class ConstraintSection(Section):
     high: Annotated[float | None, _NUMBER] = None
 
 
-class MinimaxOptions(Section):
-    rounds: Annotated[int | None, count(1, 1000)] = None
-
-
-class _EvolutionOptions(Section):
-    population: Annotated[int | None, count(4, 100_000)] = None
-    generations: Annotated[int | None, count(1, 100_000)] = None
-
-
-class GeneticOptions(_EvolutionOptions):
-    crossover: Annotated[float | None, Real(Number(low=0.0, high=1.0))] = None
-
-
-class CMAESOptions(_EvolutionOptions):
-    spread: Annotated[float | None, Real(Number(low=0.0, high=1.0, open_low=True))] = None
-
-
-class DifferentialEvolutionOptions(_EvolutionOptions):
-    pass
-
-
 class FactorialOptions(Section):
     levels: Annotated[
         int | dict[str, int] | None,
         Either(LEVEL, Table(LEVEL), "a whole number, or a table with one entry per variable"),
     ] = None
-
-
-class ParetoOptions(Section):
-    points: Annotated[int | None, count(2, 4096)] = None
-    steps: Annotated[int | None, count(1, 100_000)] = None
 
 
 class IterationOptions(Section):
@@ -225,14 +186,22 @@ class FreeFormOptions(Section):
 
 # They seek the flanks themselves.
 METHODS_WITHOUT_VARIABLES = ("te_iteration", "free_form")
-# The tables [optimize.<method>] of the methods that have one.
-METHOD_OPTIONS: dict[str, type[Section]] = {
-    "minimax": MinimaxOptions,
-    "genetic": GeneticOptions,
-    "cma_es": CMAESOptions,
-    "differential_evolution": DifferentialEvolutionOptions,
-    "factorial": FactorialOptions,
-    "pareto": ParetoOptions,
-    "te_iteration": IterationOptions,
-    "free_form": FreeFormOptions,
-}
+# Options that are keys of [optimize] itself, for all methods that have them.
+SHARED_OPTIONS = ("starts", "steps", "seed")
+
+
+def method_options() -> dict[str, type[Section]]:
+    """The tables [optimize.<method>] of the methods that have one, of a user's own too: the fields of their classes."""
+    found = {name: section_of(cls, SHARED_OPTIONS, open=False) for name, cls in METHODS.items()}
+    found |= {"factorial": FactorialOptions, "pareto": section_of(Pareto)}
+    found |= {"te_iteration": IterationOptions, "free_form": FreeFormOptions}
+    return {name: section for name, section in found.items() if section.model_fields}
+
+
+def optimize_section() -> type[OptimizeSection]:
+    """The table [optimize] with those of the methods."""
+    methods = method_options()
+    texts = "".join(f"\n        {name}: options of the method." for name in methods)
+    tables: dict[str, Any] = {name: (Annotated[Tables | None, Table()], None) for name in methods}
+    text = (OptimizeSection.__doc__ or "").rstrip() + texts + "\n    "
+    return create_model("OptimizeSection", __base__=OptimizeSection, __doc__=text, **tables)

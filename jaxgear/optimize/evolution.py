@@ -15,7 +15,7 @@ from .evaluate import fitness, scores
 from .problem import Problem
 from .search import AbstractMethod, Record
 
-_LEAST_POPULATION = 4
+_LEAST_POPULATION, _MOST = 4, 100_000
 # Mutation of the genetic algorithm: standard deviation in the unit box, falling geometrically over the generations so
 # that it explores first and refines then.
 _FIRST_MUTATION, _LAST_MUTATION = 0.2, 0.002
@@ -30,9 +30,9 @@ class _Evolution(Checked, AbstractMethod):
         seed: of the random numbers.
     """
 
-    population: int = count(low=_LEAST_POPULATION, default=100)
-    generations: int = count(default=100)
-    seed: int = count(low=0, default=0)
+    population: int = count(low=_LEAST_POPULATION, high=_MOST, default=100)
+    generations: int = count(high=_MOST, default=100)
+    seed: int = count(low=0, high=2**31 - 1, default=0)
 
     def search(self, problem: Problem, record: Record) -> None:
         """Runs the generations."""

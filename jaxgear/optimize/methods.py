@@ -1,8 +1,6 @@
 """The methods of optimization by name."""
 
-from collections.abc import Mapping
 from dataclasses import fields
-from types import MappingProxyType
 
 from .evolution import CMAES, DifferentialEvolution, Genetic
 from .factorial import Factorial
@@ -11,17 +9,17 @@ from .minimax import Minimax
 from .quasi_newton import LBFGS
 from .search import AbstractMethod
 
-METHODS: Mapping[str, type[AbstractMethod]] = MappingProxyType(
-    {
-        "minimax": Minimax,
-        "adam": Adam,
-        "lbfgs": LBFGS,
-        "genetic": Genetic,
-        "cma_es": CMAES,
-        "differential_evolution": DifferentialEvolution,
-        "factorial": Factorial,
-    }
-)
+# Known by name, here and in design files, where the fields of a class are its options. A method of your own joins them
+# by `METHODS["name"] = Class`.
+METHODS: dict[str, type[AbstractMethod]] = {
+    "minimax": Minimax,
+    "adam": Adam,
+    "lbfgs": LBFGS,
+    "genetic": Genetic,
+    "cma_es": CMAES,
+    "differential_evolution": DifferentialEvolution,
+    "factorial": Factorial,
+}
 
 
 def method_named(

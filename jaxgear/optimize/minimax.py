@@ -39,9 +39,9 @@ class Minimax(Checked, AbstractMethod):
         rtol: a search ends where the predicted decrease is below this part of the objective.
     """
 
-    starts: int = count(default=16)
-    rounds: int = count(default=2)
-    steps: int = count(default=40)
+    starts: int = count(high=4096, default=16)
+    rounds: int = count(high=1000, default=2)
+    steps: int = count(high=100_000, default=40)
     rtol: float = number("", low=0.0, high=1.0, open_low=True, open_high=True, static=True, default=1e-4)
 
     @property

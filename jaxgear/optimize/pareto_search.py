@@ -42,8 +42,8 @@ class Pareto(Checked):
         steps: most steps of every one in each round.
     """
 
-    points: int = count(low=2, default=32)
-    steps: int = count(default=20)
+    points: int = count(low=2, high=4096, default=32)
+    steps: int = count(high=100_000, default=20)
 
     @property
     def name(self) -> str:
