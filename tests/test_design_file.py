@@ -148,60 +148,6 @@ def test_every_modification_and_curve_of_the_library_has_a_name_in_design_files(
     assert set(family(AbstractCurve).values()) >= of_library(AbstractCurve)
 
 
-class BumpAtPitch(AbstractModification):
-    """A user's own modification: a bump around a roll length.
-
-    Attributes:
-        height: of the bump.
-        place: roll length of its top.
-        curve: by which it fades.
-        rounded: whether its top is.
-    """
-
-    height: jax.Array = number("um", low=0.0, high=50.0)
-    place: jax.Array = number("mm", low=0.0)
-    curve: "HalfCosine" = eqx.field(default_factory=lambda: HalfCosine(1.0))
-    rounded: bool = eqx.field(static=True, default=True)
-    varies_along_face = False
-
-    def __call__(self, flank):
-        distance = jnp.abs(flank.roll_length - self.place) / 3.0
-        return self.height * (1.0 - self.curve(jnp.clip(distance, 0.0, 1.0)))
-
-
-class HalfCosine(AbstractCurve):
-    """A user's own curve."""
-
-    power: jax.Array = number("", low=0.5, default=1.0)
-
-    def __call__(self, d):
-        return (0.5 - 0.5 * jnp.cos(jnp.pi * d)) ** self.power
-
-
-def test_a_modification_and_a_curve_of_a_user_need_no_line_in_the_package(load):
-    """Defined above, outside the package: their fields are the keys, with units, ranges and defaults."""
-    table = '[[pinion.modification]]\ntype = "bump_at_pitch"\nheight = "height"\nplace = 9.0\n'
-    variables = "[variables]\nheight = { low = 0.0, high = 20.0 }\n"
-    file = load(text(pinion=table, tail=variables))
-    assert file.units == {"height": "um"}
-    pinion, _ = file.design({"height": 6.0})
-    assert isinstance(pinion, BumpAtPitch)
-    np.testing.assert_allclose(removed(pinion), removed(BumpAtPitch(6.0, 9.0)))
-    assert removed(pinion).max() == pytest.approx(6.0, rel=1e-2)
-    # the curve in another relief, and the ranges of both
-    relief = '[[pinion.modification]]\ntype = "tip_relief"\namount = 5.0\nlength = 3.0\ncurve = {}\n'
-    curved, _ = load(text(pinion=relief.format('{ type = "half_cosine", power = 2 }'))).design({})
-    np.testing.assert_allclose(removed(curved), removed(jg.TipRelief(5.0, 3.0, HalfCosine(2.0))))
-    assert describe(curved)[0]["curve"] == {"type": "half_cosine", "power": 2.0}
-    for content, problem in (
-        (text(pinion=table, tail=variables.replace("20.0", "60.0")), "variables.height.high: 60 um must be at least 0"),
-        (text(pinion=table.replace('"height"\n', "-1\n")), "pinion.modification[0].height: -1 um must be at least 0"),
-        (text(pinion=relief.format('{ type = "half_cosine", power = 0.1 }')), "[0].curve.power: 0.1 must be at least"),
-    ):
-        with pytest.raises(DesignFileError, match=re.escape(problem)):
-            load(content)
-
-
 def test_modifications_of_one_gear_add_up(load):
     tables = "".join(f"[[pinion.modification]]\n{table}\n" for table, _ in MODIFICATIONS)
     pinion, wheel = load(text(pinion=tables)).design({})
@@ -627,7 +573,8 @@ def test_whatever_is_written_in_a_file_it_is_read_or_refused_in_one_line(load):
 
 def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
     text = reference()
-    sections = [schema.FileSection, schema.GearSection, schema.LoadSection, schema.optimize_section(), schema.ModelSection]
+    sections = [schema.FileSection, schema.GearSection, schema.LoadSection, schema.ModelSection]
+    sections.append(schema.optimize_section())
     sections += [*schema.method_options().values(), schema_sweep.SweepSection, schema_sweep.ToleranceSection]
     sections += [section_of(cls) for cls in (*family(AbstractModification, users=False).values(), jg.Material)]
     for section in sections:
