@@ -153,7 +153,8 @@ class Problem(eqx.Module):
             return jnp.stack(soft), *self._judged(cycle)
 
         soft, true, excess, fine = self.over_cases(x, of_case)
-        worst = jnp.concatenate([maximum(excess, 0), self._linear_excess(x)])
+        worst = maximum(excess, 0) if excess.size else excess[0]
+        worst = jnp.concatenate([worst, self._linear_excess(x)])
         return self._measured(soft), self._measured(true), worst, jnp.all(fine)
 
     def linearize(self, x: Vector) -> Linearization:
