@@ -58,7 +58,7 @@ def scatter():
         "quantiles": levels,
         "transmission_error_quantiles": np.quantile(curves, levels, axis=0),
     }
-    return jg.sweeps.Scatter(**{name: jnp.asarray(value) for name, value in values.items()})
+    return jg.sweeps.Scatter(**{name: jnp.asarray(value) for name, value in values.items()}, numbers={})
 
 
 def failing(scatter, count):

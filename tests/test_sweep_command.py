@@ -123,7 +123,7 @@ def test_a_quick_sweep_is_coarse_short_and_says_so(folder, tmp_path, monkeypatch
 
 
 def test_failed_variants_are_loud(folder, tmp_path):
-    (tmp_path / "gear.toml").write_text(SWEEP.replace("positions = 8", "positions = 8\ntolerance = 1e-30"))
+    (tmp_path / "gear.toml").write_text(SWEEP.replace("positions = 8", "positions = 8\nrtol = 1e-30"))
     result = sweep(tmp_path / "gear.toml", "-o", tmp_path / "out")
     assert result.code == 1 and "60 variants failed" in result.err
     assert len(jg.open_sweep(tmp_path / "out" / "table")) == 60

@@ -232,7 +232,8 @@ def outside(number: Number, value: float, *, plausible: bool = True) -> str:
         return f"{shown} must be {_range(number, unit)}"
     least, most = PLAUSIBLE.get(number.unit, _PURE)
     positive = low is not None and low >= 0 and number.open_low
-    if plausible and (abs(value) > most or (positive and value < least)):
+    limited = low is not None and high is not None  # the class itself says what can be meant
+    if plausible and not limited and (abs(value) > most or (positive and value < least)):
         floor = least if positive else -most if low is None else low
         return f"{shown} must be at least {floor:g}{unit} and at most {most:g}{unit}"
     return ""
