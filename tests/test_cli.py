@@ -262,6 +262,45 @@ def test_the_numbers_are_those_of_the_mesh_on_which_the_search_ended(optimized):
 
 
 @pytest.fixture(scope="module")
+def robust(folder):
+    """The worst of two torques, neither the one of the table, within a limit that no design keeps."""
+    os.environ["JAXGEAR_NO_CACHE"] = "1"
+    asked = FREE.replace("starts = 2\nsteps = 100", 'method = "factorial"\nmeasure = "worst"\ntorques = [30.0, 60.0]')
+    (folder / "robust.toml").write_text(asked + 'constraint = [{ of = "max_flank_pressure", high = 100.0 }]\n')
+    result = call("optimize", folder / "robust.toml", "--quick", "--no-figures", "-o", folder / "robust")
+    return SimpleNamespace(**vars(result), summary=json.loads((folder / "robust" / "summary.json").read_text()))
+
+
+def test_table_and_verdict_are_of_one_torque_and_one_measure(folder, robust):
+    optimum, designs = robust.summary["optimum"], robust.summary["designs"]
+    before, after = designs["unmodified"], designs["optimum"]
+    assert optimum["ppte_um"] == pytest.approx(after["ppte_um"], rel=1e-9)
+    assert f"PPTE at 50 N m {before['ppte_um']:.3f} -> {after['ppte_um']:.3f} um" in robust.out
+    mesh = load_design(folder / "robust.toml").mesh()
+    relief = designs["rule-based"]["pinion_modification"][0]
+    tip = jg.TipRelief(relief["amount"], relief["length"])
+    solve = eqx.filter_jit(
+        lambda torque, tip: jg.peak_to_peak(jg.solve(mesh, torque, pinion=tip, wheel=tip).transmission_error)
+    )
+    worst = max(float(solve(np.float64(torque), tip)) for torque in (30.0, 60.0))
+    assert designs["rule-based"]["objectives"] == {"worst ppte [um]": pytest.approx(worst, rel=1e-6)}
+    assert after["objectives"]["worst ppte [um]"] == pytest.approx(optimum["objective"], rel=1e-6)
+    (row,) = (line for line in robust.out.splitlines() if "worst ppte [um]" in line and "->" not in line)
+    assert all(f"{design['objectives']['worst ppte [um]']:.4g}" in row for design in designs.values())
+    both = [design["objectives"]["worst ppte [um]"] for design in (before, after)]
+    assert f"worst ppte [um] {both[0]:.4g} -> {both[1]:.4g}" in robust.out
+
+
+def test_a_limit_that_no_design_keeps_is_no_success(robust):
+    assert robust.code == 1
+    limit = robust.summary["optimum"]["constraints"]["max_flank_pressure"]
+    assert limit["met"] is False and limit["high"] == 100.0 and limit["value"] > 300.0
+    assert robust.summary["optimum"]["feasible"] is False
+    assert f"max_flank_pressure {limit['value']:.4g} MPa, NOT MET: at most 100" in robust.out
+    assert "constraints are not met" in robust.err
+
+
+@pytest.fixture(scope="module")
 def iterated(folder):
     """A quick run of another method on the same file."""
     os.environ["JAXGEAR_NO_CACHE"] = "1"
@@ -336,7 +375,7 @@ def files_of_at_most(size):
 
 def test_a_failed_contact_solution_is_loud(folder, tmp_path):
     path = tmp_path / "fails.toml"
-    path.write_text(FIXED.replace("positions = 8", "positions = 8\ntolerance = 1e-30"))
+    path.write_text(FIXED.replace("positions = 8", "positions = 8\nrtol = 1e-30"))
     result = call("analyze", path, "--no-figures", "-o", tmp_path / "out")
     assert result.code == 1
     assert "CONTACT SOLUTION NOT CONVERGED: unmodified at 30" in result.err

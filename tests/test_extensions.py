@@ -1,6 +1,7 @@
 """What extends the package from outside: a class, and where it shall have a name, one line more."""
 
 import re
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -9,16 +10,21 @@ import numpy as np
 import pytest
 from catalogue import gear_pair
 from jaxtyping import Array
+from test_cli import FREE, call
 from test_design_file import load, removed, text  # noqa: F401
 
 import jaxgear as jg
 from jaxgear.compliance import AbstractCompliance, ContactGeometry, Plane
-from jaxgear.io import DesignFileError, describe
+from jaxgear.io import DesignFileError, describe, optimize_request
+from jaxgear.metrics import Quantity, quantities
 from jaxgear.microgeometry import AbstractCurve, AbstractModification
-from jaxgear.numerics import AbstractSpring, number
+from jaxgear.numerics import AbstractSpring, Checked, number
+from jaxgear.numerics.fields import count
+from jaxgear.numerics.reductions import Harmonic
 
 ROLL_LENGTH = np.linspace(0.0, 60.0, 13)
 SMALL = jg.Resolution(positions=16, pairs=2)
+BY_FACTORIAL = FREE.replace("starts = 2\nsteps = 100", 'method = "factorial"')
 
 
 class BumpAtPitch(AbstractModification):
@@ -125,3 +131,78 @@ def test_a_tabulated_compliance_needs_nothing_of_the_package():
     np.testing.assert_allclose(slope, line_load, rtol=1e-9)
     # elsewhere two pairs share it
     assert float(cycle.transmission_error.min()) < 0.8 * float(te)
+
+
+SECOND = Quantity(
+    "te_second_harmonic", lambda c: c.transmission_error, "um", "second mesh harmonic", Harmonic(2), local=True
+)
+
+
+@pytest.fixture
+def known(monkeypatch):
+    """The vocabulary with a quantity more, until the end of the test."""
+    monkeypatch.setattr(quantities, "_known", dict(quantities._known))
+    quantities.add(SECOND)
+
+
+def test_a_quantity_of_a_user_is_swept_searched_limited_and_reported(known, tmp_path, monkeypatch):
+    """By its name after one line: in sweeps, and as objective and limit of a design file, in the table."""
+    mesh = jg.prepare(gear_pair(), resolution=SMALL)
+    plan = jg.VariantList(["amount"], [[0.0], [6.0]])
+    table = jg.sweep(
+        lambda v: (jg.TipRelief(v["amount"], 4.0), None), plan, mesh=mesh, torque=50.0, results=("te_second_harmonic",)
+    )
+    error = np.asarray(eqx.filter_jit(lambda: jg.solve(mesh, 50.0).transmission_error)())
+    expected = 2 * abs(np.fft.fft(error)[2]) / len(error)
+    assert table.column("te_second_harmonic")[0] == pytest.approx(expected, rel=1e-9)
+    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
+    asked = 'objective = "te_second_harmonic"\nconstraint = [{ of = "te_second_harmonic_um", high = 1.0 }]\n'
+    (tmp_path / "gear.toml").write_text(BY_FACTORIAL + asked)
+    said = call("optimize", tmp_path / "gear.toml", "--quick", "--no-figures", "-o", tmp_path / "out")
+    assert said.code == 0, said.err
+    assert re.search(r"te_second_harmonic \[um\] +[|│] +\d", said.out)
+    assert re.search(r"te_second_harmonic \S+ um, met: at most 1\b", said.out)
+
+
+class Scatter(Checked, jg.optimize.AbstractMethod):
+    """A user's own method: designs at random.
+
+    Attributes:
+        designs: how many.
+        seed: of the random numbers.
+    """
+
+    designs: int = count(high=1000, default=32)
+    seed: int = count(low=0, default=0)
+
+    @property
+    def name(self):
+        return "scatter"
+
+    def search(self, problem, record):
+        points = np.random.default_rng(self.seed).random((self.designs, len(problem.names)))
+        score = eqx.filter_jit(lambda points: jax.lax.map(problem.score, points))(
+            jnp.asarray(points, problem.low.dtype)
+        )
+        record.spend(self.designs)
+        record.offer(points, score.value[:, 0], score.violation)
+        record.look(1, 1)
+
+
+def test_a_method_of_a_user_is_given_as_an_object_or_known_by_name(load, monkeypatch):  # noqa: F811
+    file = load(BY_FACTORIAL)
+    mesh = file.mesh(replace(file.resolution(), positions=8))
+    options = {"mesh": mesh, "torque": 50.0, "positions": None}
+    given = jg.minimize(file.design, file.bounds, method=Scatter(5, seed=3), **options)
+    height = 20.0 * np.random.default_rng(3).random(5)
+    assert np.abs(height - given.parameters["height"]).min() < 1e-9 and given.method == "scatter"
+    monkeypatch.setitem(jg.optimize.METHODS, "scatter", Scatter)
+    asked = BY_FACTORIAL.replace("factorial", "scatter") + "seed = 3\nscatter = { designs = 5 }\n"
+    named = optimize_request(load(asked), quick=True)(mesh)
+    assert named.parameters == given.parameters and named.objective == given.objective
+    for wrong, problem in (
+        ("designs = 0", "optimize.scatter.designs: 0 must be at least 1 and at most 1000"),
+        ("design = 5", 'optimize.scatter.design: unknown key, did you mean "designs"?'),
+    ):
+        with pytest.raises(DesignFileError, match=re.escape(problem)):
+            optimize_request(load(asked.replace("designs = 5", wrong)))

@@ -151,11 +151,12 @@ def test_flank_metrics_under_grad_and_vmap(mesh):
     """Derivatives against central differences at a relief that dips; a batch is its members."""
 
     def design(x):
-        return jg.TipRelief(x[0], x[1], jg.Quadratic(0.0, x[2], 1 - x[2])), jg.TipRelief(x[3], x[1])
+        pinion = jg.TipRelief(x[0], x[1], jg.Quadratic(0.0, x[2], 1 - x[2]))
+        return {"pinion": pinion, "wheel": jg.TipRelief(x[3], x[1])}
 
     x, h = jnp.asarray([6.0, 3.0, 2.5, 4.0]), 1e-6
     for metric in (max_relief, relief_reversal, removed_volume):
-        value = jax.jit(lambda y, metric=metric: metric(mesh, *design(y)))
+        value = jax.jit(lambda y, metric=metric: metric(mesh, **design(y)))
         gradient = jax.grad(value)(x)
         central = [(value(x + h * e) - value(x - h * e)) / (2 * h) for e in jnp.eye(4)]
         np.testing.assert_allclose(gradient, central, atol=1e-5)
@@ -167,4 +168,4 @@ def test_flank_metrics_do_not_depend_on_the_resolution(mesh):
     fine = jg.prepare(mesh.pair, resolution=jg.Resolution(positions=COARSE.positions, slices=3))
     relief = jg.TipRelief(6.0, 3.0) + jg.LeadCrowning(4.0)
     for metric in (max_relief, removed_volume):
-        assert float(metric(fine, relief)) == pytest.approx(float(metric(mesh, relief)), rel=1e-12)
+        assert float(metric(fine, pinion=relief)) == pytest.approx(float(metric(mesh, pinion=relief)), rel=1e-12)

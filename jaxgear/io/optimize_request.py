@@ -141,7 +141,8 @@ def optimize_request(design: DesignFile, *, method: str | None = None, quick: bo
         common = {}
     elif name != "free_form":
         _check_levels(design, options.get("levels"))
-        refused(design.path, f"optimize.{name}", lambda: {**METHODS, _PARETO: Pareto}[name](**options))
+        make: type[Any] = Pareto if name == _PARETO else METHODS[name]
+        refused(design.path, f"optimize.{name}", lambda: make(**options))
     if quick:
         options = {**options, **_QUICK.get(name, {})}
         if name not in (_PARETO, "te_iteration"):  # a quick look stays on its mesh
