@@ -35,6 +35,7 @@ def test_only_the_modifications_are_trainable(model):
     assert sorted(float(leaf) for leaf in jax.tree.leaves(trainable)) == [AMOUNT, AMOUNT, LENGTH, LENGTH]
 
 
+@pytest.mark.slow
 def test_training_lowers_ppte_and_leaves_the_mesh_alone(model, mesh):
     """With weight decay, which reaches whatever counts as a parameter, gradient or not."""
     optimizer = optax.adamw(0.3, weight_decay=0.01)
@@ -55,6 +56,7 @@ def test_training_lowers_ppte_and_leaves_the_mesh_alone(model, mesh):
         np.testing.assert_array_equal(ours, theirs)
 
 
+@pytest.mark.slow
 def test_gradients_are_those_of_the_modifications(model, mesh):
     slope = eqx.filter_jit(eqx.filter_grad(ppte))(model)
 

@@ -80,6 +80,7 @@ def test_host_and_device_join_alike(measure):
     assert worst == -np.inf and float(joined(measure, jnp.asarray(values), jnp.ones(40))) == np.inf
 
 
+@pytest.mark.slow
 def test_a_sweep_of_geometry_load_and_flanks_is_a_loop_over_them():
     """Traced through `prepare`; what cannot be is a row that says so, be it the first one."""
     rows = [[AMOUNT, 0.9, 0.0, 50.0], [AMOUNT, 0.0, 0.0, 50.0], [8.0, 0.2, 0.1, 30.0], [8.0, 0.2, 0.0, -30.0]]

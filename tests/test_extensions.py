@@ -145,6 +145,7 @@ def known(monkeypatch):
     quantities.add(SECOND)
 
 
+@pytest.mark.slow
 def test_a_quantity_of_a_user_is_swept_searched_limited_and_reported(known, tmp_path, monkeypatch):
     """By its name after one line: in sweeps, and as objective and limit of a design file, in the table."""
     mesh = jg.prepare(gear_pair(), resolution=SMALL)
@@ -189,6 +190,7 @@ class Scatter(Checked, jg.optimize.AbstractMethod):
         record.look(1, 1)
 
 
+@pytest.mark.slow
 def test_a_method_of_a_user_is_given_as_an_object_or_known_by_name(load, monkeypatch):  # noqa: F811
     file = load(BY_FACTORIAL)
     mesh = file.mesh(replace(file.resolution(), positions=8))

@@ -177,6 +177,7 @@ def test_a_search_by_gradients_is_held_by_the_margins():
     assert np.isclose(np.asarray(rule(bound.x)), 0.0, atol=1e-6).sum() >= 2, "margins, not the box, end the search"
 
 
+@pytest.mark.slow
 def test_traced_gears_that_cannot_run_do_not_converge():
     """A profile shift of 0.9 leaves 12 teeth no tip: refused when concrete, and no less wrong while being traced."""
 

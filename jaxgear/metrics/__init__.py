@@ -3,6 +3,14 @@
 Those of `flank` take a prepared `Mesh` and the modifications instead: what has to be ground.
 """
 
+from ..numerics.reductions import AbstractReduction as AbstractReduction
+from ..numerics.reductions import Average as Average
+from ..numerics.reductions import Harmonic as Harmonic
+from ..numerics.reductions import Max as Max
+from ..numerics.reductions import Min as Min
+from ..numerics.reductions import Range as Range
+from ..numerics.reductions import Rms as Rms
+from ..numerics.reductions import Value as Value
 from .flank import max_relief as max_relief
 from .flank import profile_relief as profile_relief
 from .flank import relief_reversal as relief_reversal
