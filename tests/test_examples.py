@@ -157,7 +157,7 @@ def test_the_robust_optimum_is_better_for_gears_that_it_has_not_seen(manufacture
 def test_two_loaded_pairs_average_their_deviations(manufactured):
     """Deep relief leaves one pair alone with its own deviations.
 
-    Sixteen gears, which meet every torque, pull less than a different sixteen under each of five torques (three times).
+    With different gears under every torque the factor was above 3; with the same gears under all of them it is 1.9.
     """
     deepest = {
         name: max(manufactured[f"{name}_{gear}_amount"] for gear in ("pinion", "wheel"))
