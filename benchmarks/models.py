@@ -13,7 +13,7 @@ import jaxgear as jg
 
 from .cases import Case, Curves, gear_pair, reliefs, strong
 
-POSITIONS = 128  # those of the reference
+POSITIONS, PAIRS = 128, 4  # those of the reference
 _APART = 1e6  # corner gap that keeps tip corners out of contact [um]
 
 
@@ -74,7 +74,7 @@ _solve = eqx.filter_jit(jg.solve)
 
 @functools.cache
 def _mesh(model: Model, pair: str, plane: str) -> jg.Mesh:
-    compliance, resolution = model.compliance(plane), jg.Resolution(positions=POSITIONS)
+    compliance, resolution = model.compliance(plane), jg.Resolution(positions=POSITIONS, pairs=PAIRS)
     mesh = strong(_prepare(gear_pair(pair), compliance=compliance, resolution=resolution))
     if model.corner_contact:
         return mesh

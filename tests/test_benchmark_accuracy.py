@@ -86,7 +86,7 @@ def test_solution_is_that_of_the_public_functions():
     """The benchmark solves all models under one compliance label to save compilations: that must change nothing."""
     model = next(model for model in models.MODELS if model.name == "constant Hertz")
     curves = models.run(model, [CASE])[CASE]
-    resolution = jg.Resolution(positions=models.POSITIONS)
+    resolution = jg.Resolution(positions=models.POSITIONS, pairs=models.PAIRS)
     mesh = jg.prepare(cases.gear_pair(CASE.pair), compliance=model.compliance(CASE.plane), resolution=resolution)
     pinion, wheel = cases.reliefs(CASE)
     cycle = jg.solve(mesh, CASE.torque, pinion=pinion, wheel=wheel)

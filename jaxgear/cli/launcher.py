@@ -5,6 +5,9 @@ Installed as a module beside the package (pyproject.toml), since whatever lies i
 
 import os
 import signal
+import sys
+
+_INTERRUPTED = 130  # as shells have it: 128 and the number of the signal
 
 
 def main() -> None:
@@ -12,15 +15,21 @@ def main() -> None:
 
     def leave(*_) -> None:  # at once: nothing is open, and an exception could be lost in a module that starts
         os.write(2, b"jaxgear: interrupted, nothing was written\n")
-        os._exit(130)
+        os._exit(_INTERRUPTED)
 
     signal.signal(signal.SIGINT, leave)
     from jaxgear.cli import main as command
 
     try:
         command()
-    finally:
+    except SystemExit as end:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said and done
+        if end.code == _INTERRUPTED:
+            # a thread that still compiles would fall over what the interpreter takes down: a segmentation fault
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(_INTERRUPTED)
+        raise
 
 
 if __name__ == "__main__":

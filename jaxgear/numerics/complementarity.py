@@ -113,11 +113,10 @@ def _iterate(
     six digits, at half the cost.
     """
     dtype = common.dtype
-    rounding = jnp.finfo(dtype).eps * jnp.maximum(jnp.abs(common), jnp.max(jnp.abs(problem.gap), axis=(0, 1)))
 
     def evaluated(v, approach):
         secant = _secants(problem, _carried(v))
-        return v, approach, secant, _residual(problem, v, approach, secant, common, rounding)
+        return v, approach, secant, _residual(problem, v, approach, secant, common)
 
     def advance(state):
         step, (v, _, secant, _) = state
@@ -242,25 +241,23 @@ def _total(problem, load: Rows) -> Curve:
     return sum(lever * jnp.sum(problem.weight[:, None] * q, axis=0) for lever, q in zip(problem.lever, load))
 
 
-def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Rows, common: Curve, rounding: Curve) -> Curve:
+def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Rows, common: Curve) -> Curve:
     """Largest violation of any condition, relative to the approach and to the load.
 
-    Neither is measured against less than the rounding error of the largest gap, and the load that such an error makes:
-    vanishing load is not measured against zero.
+    Vanishing approach and load are not measured against zero, but against the rounding errors of `common` and of the
+    load below which springs are linear.
     """
     load = _carried(v)
-    worst, softest = jnp.zeros_like(approach), jnp.zeros_like(approach)
-    scale = jnp.maximum(jnp.abs(common), rounding)
+    worst, scale, softest = jnp.zeros_like(approach), jnp.abs(common), jnp.zeros_like(approach)
     for i, (q, y, c, lever) in enumerate(zip(load, _opening(problem, load, approach), secant, problem.lever)):
         mismatch = y + c * q
         closing = jnp.abs(mismatch + (lever * approach)[None])
         worst = jnp.maximum(worst, jnp.max(jnp.where(q > 0, jnp.abs(mismatch), -mismatch), axis=0))
         scale = jnp.maximum(scale, jnp.max(jnp.where(q > 0, closing, 0.0), axis=0))
         softest = jnp.maximum(softest, problem.compliance[i, i] + jnp.max(c, axis=0))
-    tiny = jnp.finfo(worst.dtype).tiny
-    violation = worst / (scale + tiny)
+    eps = jnp.finfo(worst.dtype).eps
+    violation = worst / (scale + eps * LOAD_FLOOR * softest)
     if problem.load is None:
         return violation
-    least = rounding * jnp.sum(problem.weight) / softest
-    unbalanced = jnp.abs(_total(problem, load) - problem.load)
-    return jnp.maximum(violation, unbalanced / (jnp.abs(problem.load) + least + tiny))
+    rounding = eps * (jnp.abs(common) / softest + LOAD_FLOOR) * jnp.sum(problem.weight)
+    return jnp.maximum(violation, jnp.abs(_total(problem, load) - problem.load) / (jnp.abs(problem.load) + rounding))

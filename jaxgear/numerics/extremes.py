@@ -12,6 +12,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+_MOST_PLACES = 1 << 16  # leaves 36 bits of the mantissa, ten digits
+
 Axes = int | tuple[int, ...] | None
 
 
@@ -24,14 +26,7 @@ def maximum(x: Float[Array, "..."], axis: Axes = None) -> Float[Array, "..."]:
         x: any array that is not empty.
         axis: axis or axes; None for all of them.
     """
-    given = range(x.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)
-    axes = sorted(a % x.ndim for a in given)
-    if not axes:
-        return x
-    first = axes[0]
-    together = jnp.moveaxis(x, axes, [first + i for i in range(len(axes))])
-    rest = together.shape[first + len(axes) :]
-    return _largest(first, together.reshape((*together.shape[:first], -1, *rest)))
+    return _largest(*_together(x, axis))
 
 
 def minimum(x: Float[Array, "..."], axis: Axes = None) -> Float[Array, "..."]:
@@ -41,18 +36,61 @@ def minimum(x: Float[Array, "..."], axis: Axes = None) -> Float[Array, "..."]:
 
 def spread(x: Float[Array, "..."], axis: Axes = None) -> Float[Array, "..."]:
     """Largest minus smallest entry along axes, otherwise as `maximum`; zero derivative where all entries are equal."""
-    return maximum(x, axis) - minimum(x, axis)
+    return _spread(*_together(x, axis))
+
+
+def _together(x, axis: Axes):
+    """An axis and the array with all given axes merged into that one."""
+    given = range(x.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)
+    axes = sorted(a % x.ndim for a in given)
+    if not axes:
+        return 0, x[None]
+    first = axes[0]
+    together = jnp.moveaxis(x, axes, [first + i for i in range(len(axes))])
+    rest = together.shape[first + len(axes) :]
+    return first, together.reshape((*together.shape[:first], -1, *rest))
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _largest(axis: int, x):
-    return jnp.where(jnp.any(jnp.isnan(x), axis), jnp.nan, jnp.max(x, axis))
+    return _unless_nan(axis, x, jnp.max(x, axis))
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _spread(axis: int, x):
+    return _unless_nan(axis, x, jnp.max(x, axis) - jnp.min(x, axis))
+
+
+def _unless_nan(axis: int, x, value):
+    return jnp.where(jnp.any(jnp.isnan(x), axis), jnp.nan, value)
 
 
 @_largest.defjvp
 def _largest_jvp(axis, primals, tangents):
     (x,), (x_dot,) = primals, tangents
-    place = jnp.argmax(x, axis, keepdims=True)
-    # a mask and not an index: its transpose is a selection, which fuses with what follows, and no scatter
-    chosen = jax.lax.broadcasted_iota(place.dtype, x.shape, axis) == place
-    return _largest(axis, x), jnp.sum(jnp.where(chosen, x_dot, 0.0), axis)
+    return _largest(axis, x), jnp.sum(jnp.where(_place(axis, x), x_dot, 0.0), axis)
+
+
+@_spread.defjvp
+def _spread_jvp(axis, primals, tangents):
+    (x,), (x_dot,) = primals, tangents
+    gain, loss = jnp.where(_place(axis, x), x_dot, 0.0), jnp.where(_place(axis, -x), x_dot, 0.0)
+    return _spread(axis, x), jnp.sum(gain - loss, axis)
+
+
+def _place(axis: int, x):
+    """Where the first largest entry is; a mask, since its transpose is a selection and no scatter.
+
+    In double precision the last bits of the mantissa make way for the place: the largest integer along an axis is found
+    in a third of the time of an argmax, at the price that entries equal to ten digits count as equal.
+    """
+    size = x.shape[axis]
+    if x.dtype != jnp.float64 or size > _MOST_PLACES:
+        place = jnp.argmax(x, axis, keepdims=True)
+        return jax.lax.broadcasted_iota(place.dtype, x.shape, axis) == place
+    ordered = jax.lax.bitcast_convert_type(x, jnp.int64)
+    ordered = jnp.where(ordered < 0, ordered ^ jnp.iinfo(jnp.int64).max, ordered)
+    behind = size - 1 - jax.lax.broadcasted_iota(jnp.int64, x.shape, axis)
+    last = (1 << (size - 1).bit_length()) - 1
+    largest = jnp.max((ordered & ~last) | behind, axis, keepdims=True)
+    return behind == (largest & last)
