@@ -1,10 +1,14 @@
-"""Settings of every test: double precision, no silent promotion of dtypes or ranks, compiled functions kept on disk."""
+"""Settings of every test: double precision, no silent promotion of dtypes or ranks, annotated shapes checked, compiled
+functions kept on disk."""
 
 import os
 from pathlib import Path
 
 import jax
+import jaxtyping
 import pytest
+
+jaxtyping.install_import_hook("jaxgear", "typechecker.arrays")  # before anything imports jaxgear
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")

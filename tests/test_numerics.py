@@ -1,7 +1,8 @@
-"""Roots, safe functions, quadrature and the field checks."""
+"""Roots, safe functions, quadrature, the field checks and those of annotations."""
 
 import jax
 import jax.numpy as jnp
+import jaxtyping
 import numpy as np
 import pytest
 
@@ -16,6 +17,7 @@ from jaxgear.numerics import (
     safe_power,
     safe_sqrt,
 )
+from jaxgear.numerics.spline import interpolate
 
 
 def kepler(eccentricity):
@@ -115,3 +117,12 @@ def test_check_lets_good_values_none_and_tracers_pass():
     check("A", "x", 0.0, "", low=0.0, high=1.0)
     check("A", "x", None, "", low=0.0)
     jax.jit(lambda x: check("A", "x", x, "", low=0.0))(-1.0)
+
+
+def test_annotations_of_arrays_are_checked_while_the_tests_run():
+    """Shape, dtype and agreement of several arrays; mypy sees none of them."""
+    x, positions, values = jnp.asarray([0.5]), jnp.asarray([0.0, 1.0, 2.0]), jnp.asarray([0.0, 1.0, 4.0])
+    assert float(interpolate(x, positions, values, "linear")[0]) == 0.5
+    for wrong in ((x, positions, values[:2]), (x, positions[None], values), (x.astype(int), positions, values)):
+        with pytest.raises(jaxtyping.TypeCheckError):
+            interpolate(*wrong, "linear")

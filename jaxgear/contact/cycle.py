@@ -11,7 +11,6 @@ from .kinematics import Kinematics, Side
 from .operation import Operation
 from .pressure import corner_pressure, flank_pressure
 
-Scalar = Float[Array, ""]
 Curve = Float[Array, " positions"]
 Load = Float[Array, "pairs slices positions"]
 
@@ -71,12 +70,12 @@ class MeshCycle(eqx.Module):
         return self.margins.valid
 
     @property
-    def torque(self) -> Scalar:
+    def torque(self) -> Float[Array, "*cycles"]:
         """On the pinion [N m]."""
         return self.operation.torque
 
     @property
-    def force(self) -> Scalar:
+    def force(self) -> Float[Array, "*cycles"]:
         """Total force on the line of action [N]."""
         return 1e3 * self.torque / self.kinematics.pair.pinion.base_radius
 

@@ -34,12 +34,12 @@ class Side(Checked):
     face_width: Scalar = result("mm")
 
     @property
-    def base_radius(self) -> Scalar:
+    def base_radius(self) -> Float[Array, "*cycles"]:
         """[mm]"""
         return self.gear.base_radius
 
     @property
-    def tip_roll_length(self) -> Scalar:
+    def tip_roll_length(self) -> Float[Array, "*cycles"]:
         """Roll length at the tip [mm]."""
         return self.gear.tip_roll_length
 

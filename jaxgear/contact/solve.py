@@ -58,7 +58,7 @@ def solve(
 def solve_removed(
     mesh: Mesh,
     torque: Any,
-    removed: Load,
+    removed: Any,
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,

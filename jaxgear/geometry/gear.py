@@ -11,6 +11,7 @@ from .involute import half_tooth_angle
 from .material import Material
 
 Scalar = Float[Array, ""]
+Real = Float[Array, "*gears"]  # one number of each gear, where `jax.vmap` made many
 
 # A rack tooth whose flanks meet cannot generate anything: dedendum * tan(pressure angle) stays below pi / 4 well inside
 # these limits, which also hold every basic rack in use (ISO 53, AGMA fine pitch, stub and high-contact-ratio racks).
@@ -72,54 +73,54 @@ class Gear(Checked):
         return text
 
     @property
-    def pitch_radius(self) -> Scalar:
+    def pitch_radius(self) -> Real:
         """Reference pitch radius [mm]."""
         return 0.5 * self.module * self.teeth
 
     @property
-    def base_radius(self) -> Scalar:
+    def base_radius(self) -> Real:
         """[mm]"""
         return self.pitch_radius * jnp.cos(jnp.deg2rad(self.pressure_angle))
 
     @property
-    def base_pitch(self) -> Scalar:
+    def base_pitch(self) -> Real:
         """[mm]"""
         return jnp.pi * self.module * jnp.cos(jnp.deg2rad(self.pressure_angle))
 
     @property
-    def tip_radius(self) -> Scalar:
+    def tip_radius(self) -> Real:
         """[mm]"""
         if self.tip_diameter is not None:
             return 0.5 * self.tip_diameter
         return self.pitch_radius + self.module * (self.profile_shift + self.addendum)
 
     @property
-    def root_circle_radius(self) -> Scalar:
+    def root_circle_radius(self) -> Real:
         """Radius of the root circle [mm]."""
         return self.pitch_radius + self.module * (self.profile_shift - self.dedendum)
 
     @property
-    def bore_radius(self) -> Scalar:
+    def bore_radius(self) -> Real:
         """[mm]"""
         return 0.5 * self.root_circle_radius if self.bore_diameter is None else 0.5 * self.bore_diameter
 
     @property
-    def tip_roll_length(self) -> Scalar:
+    def tip_roll_length(self) -> Real:
         """Roll length at the tip [mm]; 0 for a traced gear whose tip lies inside the base circle."""
         return safe_sqrt(self.tip_radius**2 - self.base_radius**2)
 
     @property
-    def tip_land(self) -> Scalar:
+    def tip_land(self) -> Real:
         """Thickness of the tooth at the tip as an arc [mm]; not positive where the tooth is pointed."""
         return 2 * self.tip_radius * half_tooth_angle(self, self.tip_roll_length)
 
     @property
-    def tip_height(self) -> Scalar:
+    def tip_height(self) -> Real:
         """Radial height of the tip above base and root circle [mm], the smaller of the two."""
         return self.tip_radius - jnp.maximum(self.base_radius, self.root_circle_radius)
 
     @property
-    def rim_thickness(self) -> Scalar:
+    def rim_thickness(self) -> Real:
         """Radial distance from the bore to the root circle [mm]."""
         return self.root_circle_radius - self.bore_radius
 

@@ -51,21 +51,21 @@ def load_angle(gear: Toothed, rho: Real) -> Real:
     return jnp.arctan(rho / gear.base_radius) - half_tooth_angle(gear, rho)
 
 
-def tooth_thickness(gear: Toothed, diameter: Real) -> Real:
+def tooth_thickness(gear: Toothed, diameter: Real | float) -> Real:
     """Thickness of the tooth as an arc [mm] on a diameter [mm] not below the base circle."""
     return diameter * half_tooth_angle(gear, roll_length(gear, diameter))
 
 
-def roll_length(gear: Toothed, diameter: Real) -> Real:
+def roll_length(gear: Toothed, diameter: Real | float) -> Real:
     """Roll length [mm] of the involute point on a diameter [mm]; 0 below the base circle."""
     return safe_sqrt((0.5 * diameter) ** 2 - gear.base_radius**2)
 
 
-def roll_angle(gear: Toothed, rho: Real) -> Real:
+def roll_angle(gear: Toothed, rho: Real | float) -> Real:
     """Roll angle [deg] from the roll length [mm]."""
     return jnp.rad2deg(rho / gear.base_radius)
 
 
-def diameter(gear: Toothed, rho: Real) -> Real:
+def diameter(gear: Toothed, rho: Real | float) -> Real:
     """Diameter [mm] of the involute point with a roll length [mm]."""
     return 2 * jnp.sqrt(gear.base_radius**2 + rho**2)

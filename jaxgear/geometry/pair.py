@@ -12,6 +12,7 @@ from .outline import outline
 from .path import PathOfContact, path_between, working_pressure_angle
 
 Scalar = Float[Array, ""]
+Real = Float[Array, "*pairs"]  # one number of each pair, where `jax.vmap` made many
 
 
 class GearPair(Checked):
@@ -43,12 +44,12 @@ class GearPair(Checked):
             raise ValueError(fault)
 
     @property
-    def working_pressure_angle(self) -> Scalar:
+    def working_pressure_angle(self) -> Real:
         """Operating pressure angle [rad]."""
         return working_pressure_angle(self.pinion, self.wheel, self.center_distance)
 
     @property
-    def working_center_distance(self) -> Scalar:
+    def working_center_distance(self) -> Real:
         """[mm]"""
         if self.center_distance is not None:
             return self.center_distance
@@ -60,17 +61,17 @@ class GearPair(Checked):
         return margins(self).backlash
 
     @property
-    def face_width(self) -> Scalar:
+    def face_width(self) -> Real:
         """Common face width [mm], the smaller of the two."""
         return jnp.minimum(self.pinion.face_width, self.wheel.face_width)
 
     @property
-    def base_pitch(self) -> Scalar:
+    def base_pitch(self) -> Real:
         """[mm]"""
         return self.pinion.base_pitch
 
     @property
-    def gear_ratio(self) -> Scalar:
+    def gear_ratio(self) -> Real:
         """Teeth of the wheel over teeth of the pinion."""
         return self.wheel.teeth / self.pinion.teeth
 

@@ -38,30 +38,30 @@ class PathOfContact(Checked):
     wheel_base_radius: Scalar = result("mm")
 
     @property
-    def contact_ratio(self) -> Scalar:
+    def contact_ratio(self) -> Real:
         """Transverse contact ratio."""
         return (self.end - self.start) / self.base_pitch
 
-    def pinion_roll_length(self, path: Real) -> Real:
+    def pinion_roll_length(self, path: Real | float) -> Real:
         """Roll length of the pinion [mm], also its radius of curvature, at a path position [mm]."""
         return self.pinion_pitch_roll_length + path
 
-    def wheel_roll_length(self, path: Real) -> Real:
+    def wheel_roll_length(self, path: Real | float) -> Real:
         """Roll length of the wheel [mm], also its radius of curvature, at a path position [mm]."""
         return self.wheel_pitch_roll_length - path
 
-    def rolling_speeds(self, path: Real, speed: Real) -> tuple[Real, Real]:
+    def rolling_speeds(self, path: Real | float, speed: Real | float) -> tuple[Real, Real]:
         """Speeds of the two surfaces through the contact [m/s] at a pinion speed [rpm]."""
         omega = speed * jnp.pi / 30
         ratio = self.pinion_base_radius / self.wheel_base_radius
         return omega * self.pinion_roll_length(path) * 1e-3, omega * ratio * self.wheel_roll_length(path) * 1e-3
 
-    def sliding_speed(self, path: Real, speed: Real) -> Real:
+    def sliding_speed(self, path: Real | float, speed: Real | float) -> Real:
         """Pinion surface speed minus wheel surface speed [m/s] at a pinion speed [rpm]; zero at the pitch point."""
         pinion, wheel = self.rolling_speeds(path, speed)
         return pinion - wheel
 
-    def reduced_radius(self, path: Real) -> Real:
+    def reduced_radius(self, path: Real | float) -> Real:
         """Reduced radius of curvature [mm], 1 / (1 / rho_pinion + 1 / rho_wheel)."""
         return reduced_radius(self.pinion_roll_length(path), self.wheel_roll_length(path))
 
@@ -72,7 +72,7 @@ def reduced_radius(first: Real, second: Real) -> Real:
 
 
 @eqx.filter_jit
-def working_pressure_angle(pinion: Gear, wheel: Gear, center_distance: Scalar | None) -> Scalar:
+def working_pressure_angle(pinion: Gear, wheel: Gear, center_distance: Real | None) -> Real:
     """Operating pressure angle [rad] at a centre distance [mm], or without backlash (None)."""
     if center_distance is not None:
         ratio = (pinion.base_radius + wheel.base_radius) / center_distance
@@ -83,14 +83,14 @@ def working_pressure_angle(pinion: Gear, wheel: Gear, center_distance: Scalar | 
     return jnp.arctan(bracketed_root(_missing_involute, low, high, target))
 
 
-def backlash_free_involute(pinion: Gear, wheel: Gear) -> Scalar:
+def backlash_free_involute(pinion: Gear, wheel: Gear) -> Real:
     """inv(alpha_w) = inv(alpha) + 2 tan(alpha) (x1 + x2) / (z1 + z2) [rad] (ISO 21771)."""
     tangent = jnp.tan(jnp.deg2rad(pinion.pressure_angle))
     shift = (pinion.profile_shift + wheel.profile_shift) / (pinion.teeth + wheel.teeth)
     return involute(tangent) + 2 * tangent * shift
 
 
-def _missing_involute(tangent: Scalar, wanted: Scalar) -> Scalar:
+def _missing_involute(tangent: Real, wanted: Real) -> Real:
     return involute(tangent) - wanted
 
 

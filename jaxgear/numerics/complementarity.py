@@ -31,6 +31,7 @@ from .spring import LOAD_FLOOR, AbstractSpring
 from .tangents import jvp_of_given
 
 Rows = list[Float[Array, "slices positions"]]
+Slopes = list[Float[Array, "#slices positions"]]  # one row where a secant is the same in every slice
 Curve = Float[Array, " positions"]
 
 # Steps with the secants of the springs under equal loads: they find most of the active set at a tenth of the cost.
@@ -157,7 +158,7 @@ def _solve_jvp(steps, tolerance, primals, tangents):
     return (v, approach, residual), (v_dot, approach_dot, jnp.zeros_like(residual))
 
 
-def _start(problem: ContactProblem) -> tuple[Rows, Rows]:
+def _start(problem: ContactProblem) -> tuple[Rows, Slopes]:
     """Equal loads on every spring that can be in contact at all, and the secants of the springs under them.
 
     The secants do not depend on the gaps: for many problems that differ in their gaps alone they are evaluated once.
@@ -175,7 +176,7 @@ def _start(problem: ContactProblem) -> tuple[Rows, Rows]:
     return [(lever * bound)[None] - gap for lever, gap in zip(problem.lever, problem.gap)], secant
 
 
-def _start_at(problem: ContactProblem) -> tuple[Rows, Rows]:
+def _start_at(problem: ContactProblem) -> tuple[Rows, Slopes]:
     """Contact wherever the approach closes the gap, and the secants under the loads of every spring on its own."""
     closed = [(lever * problem.approach)[None] - gap for lever, gap in zip(problem.lever, problem.gap)]
     load = [jnp.ones_like(row) for row in closed]
@@ -203,18 +204,18 @@ def _laws(problem: ContactProblem) -> list[AbstractSpring]:
     return [jax.tree.map(itemgetter(i), problem.law) for i in range(problem.lever.shape[0])]
 
 
-def _secants(problem: ContactProblem, load: Rows) -> Rows:
+def _secants(problem: ContactProblem, load: Rows) -> Slopes:
     return [law.secant(jnp.maximum(q, LOAD_FLOOR)) for law, q in zip(_laws(problem), load)]
 
 
-def _slopes(problem: ContactProblem, load: Rows, secant: Rows) -> Rows:
+def _slopes(problem: ContactProblem, load: Rows, secant: Slopes) -> Slopes:
     return [
         jnp.where(q > LOAD_FLOOR, law.slope(jnp.maximum(q, LOAD_FLOOR), c), c)
         for law, q, c in zip(_laws(problem), load, secant)
     ]
 
 
-def _newton(problem: ContactProblem, v: Rows, secant: Rows, slope: Rows) -> tuple[Rows, Curve]:
+def _newton(problem: ContactProblem, v: Rows, secant: Slopes, slope: Slopes) -> tuple[Rows, Curve]:
     """One Newton step on the active set; `secant` and `slope` belong to the loads of v."""
     active, carried = _active(problem, v), _carried(v)
     factors = factorize(problem.compliance, problem.lever, active, slope)
@@ -241,7 +242,7 @@ def _total(problem, load: Rows) -> Curve:
     return sum(lever * jnp.sum(problem.weight[:, None] * q, axis=0) for lever, q in zip(problem.lever, load))
 
 
-def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Rows, common: Curve) -> Curve:
+def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Slopes, common: Curve) -> Curve:
     """Largest violation of any condition, relative to the approach and to the load.
 
     Vanishing approach and load are not measured against zero, but against the rounding errors of `common` and of the

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 Rows = list[Float[Array, "slices positions"]]
+Slopes = list[Float[Array, "#slices positions"]]  # one row where a slope is the same in every slice
 Curve = Float[Array, " positions"]
 
 
@@ -20,14 +21,17 @@ class Factors(NamedTuple):
     """
 
     rows: list[Rows]
-    diagonal: Rows
-    inverse: Rows
+    diagonal: Slopes
+    inverse: Slopes
     lever: Rows
     active: Rows
 
 
 def factorize(
-    compliance: Float[Array, "pairs pairs positions"], lever: Float[Array, "pairs positions"], active: list, slope: Rows
+    compliance: Float[Array, "pairs pairs positions"],
+    lever: Float[Array, "pairs positions"],
+    active: list,
+    slope: Slopes,
 ) -> Factors:
     """Eliminates the active springs from C + slope.
 
@@ -35,12 +39,12 @@ def factorize(
         compliance: C.
         lever: what a spring closes per unit of common approach.
         active: which springs are in contact, (slices, positions) each.
-        slope: dh/dq of every spring, (slices, positions) each.
+        slope: dh/dq of every spring, (slices, positions) or (1, positions) each.
     """
     mask = [row.astype(compliance.dtype) for row in active]
     rows: list[Rows] = []
-    diagonal: Rows = []
-    inverse: Rows = []
+    diagonal: Slopes = []
+    inverse: Slopes = []
     for i in range(len(mask)):
         row = [mask[i] * mask[j] * compliance[i, j][None] for j in range(i)]
         for j in range(i):
@@ -56,7 +60,7 @@ def factorize(
     return Factors(rows, diagonal, inverse, _forward(rows, inverse, levers), mask)
 
 
-def _forward(rows: list[Rows], inverse: Rows, right: Rows) -> Rows:
+def _forward(rows: list[Rows], inverse: Slopes, right: Rows) -> Rows:
     """L^-1 right"""
     result: Rows = []
     for i, value in enumerate(right):

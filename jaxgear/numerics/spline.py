@@ -95,6 +95,6 @@ def _end_slope(near, next_one, secant, next_secant):
     return jnp.where(jnp.sign(slope) == jnp.sign(secant), slope, jnp.zeros_like(slope))
 
 
-def _widths(positions: Points, values: Table) -> Table:
+def _widths(positions: Points, values: Table) -> Float[Array, "points-1 ..."]:
     """Of the intervals, along the first of the table's axes."""
     return jnp.diff(positions).reshape(-1, *(1,) * (values.ndim - 1))
