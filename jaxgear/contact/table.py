@@ -1,9 +1,8 @@
 """Fields over the contacts of a mesh cycle as tables over one gear's flank: what wears it away, for one."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
 
 from ..microgeometry import TabulatedFlank, TabulatedProfile
 from .kinematics import Kinematics
@@ -11,7 +10,7 @@ from .kinematics import Kinematics
 
 def flank_table(
     kinematics: Kinematics,
-    field: Float[Array, "pairs slices positions"],
+    field: Any,
     gear: Literal["pinion", "wheel"],
     method: Literal["linear", "cubic2", "monotonic"] = "linear",
 ) -> TabulatedFlank | TabulatedProfile:

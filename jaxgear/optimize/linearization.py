@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float
 from ..metrics import Quantity
 
 Vector = Float[Array, " parameters"]
+Either = Array | np.ndarray  # traced, and taken to the host for a linear program
 
 
 class Pieces(NamedTuple):
@@ -21,13 +22,13 @@ class Pieces(NamedTuple):
         lower: the same with `lower_slope`; None where nothing is subtracted.
     """
 
-    upper: Float[Array, "cases pieces"]
-    slope: Float[Array, "cases pieces parameters"]
-    lower: Float[Array, "cases pieces"] | None = None
-    lower_slope: Float[Array, "cases pieces parameters"] | None = None
+    upper: Float[Either, "cases pieces"]
+    slope: Float[Either, "cases pieces parameters"]
+    lower: Float[Either, "cases pieces"] | None = None
+    lower_slope: Float[Either, "cases pieces parameters"] | None = None
 
     @property
-    def value(self) -> Float[Array, " cases"]:
+    def value(self) -> Float[Either, " cases"]:
         """The number in every case."""
         top = self.upper.max(axis=1)
         return top if self.lower is None else top - self.lower.min(axis=1)
