@@ -22,13 +22,13 @@ _STIFFNESS = 10.0  # of the penalty: objective per squared relative violation, r
 
 
 class Multipliers(eqx.Module):
-    """Multipliers of the constraints, of every start.
+    """Multipliers of the constraints, of every start or of one.
 
     Attributes:
-        value: shape (starts, constraints).
+        value: shape (starts, constraints), or (constraints,).
     """
 
-    value: Float[Array, "starts constraints"]
+    value: Float[Array, "*starts constraints"]
 
     @classmethod
     def zeros(cls, problem: Problem, starts: int) -> "Multipliers":
