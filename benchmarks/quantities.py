@@ -101,7 +101,7 @@ def _away_from_edges(case: Case, curves: Curves) -> np.ndarray:
     pairs, positions = curves.force.shape
     travelled = np.arange(positions) / positions + (pairs - 2) / 2 - np.arange(pairs)[:, None]
     position = travelled * path.base_pitch
-    roll_lengths = path.pinion_roll_length(position), path.wheel_roll_length(position)
+    roll_lengths = path.pinion_pitch_roll_length + position, path.wheel_pitch_roll_length - position
     half_width = _half_width(case, curves.force, roll_lengths)
     clear = np.isfinite(curves.pressure)
     for gear, relief, roll_length in zip((pair.pinion, pair.wheel), reliefs(case), roll_lengths):

@@ -7,12 +7,14 @@ derivatives stay finite at the base circle.
 from typing import Protocol
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..numerics import safe_sqrt
 
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
+Given = Float[Array | np.ndarray, "..."] | float  # by whoever asks for one relation alone
 
 
 class Toothed(Protocol):
@@ -51,21 +53,21 @@ def load_angle(gear: Toothed, rho: Real) -> Real:
     return jnp.arctan(rho / gear.base_radius) - half_tooth_angle(gear, rho)
 
 
-def tooth_thickness(gear: Toothed, diameter: Real | float) -> Real:
+def tooth_thickness(gear: Toothed, diameter: Given) -> Real:
     """Thickness of the tooth as an arc [mm] on a diameter [mm] not below the base circle."""
-    return diameter * half_tooth_angle(gear, roll_length(gear, diameter))
+    return half_tooth_angle(gear, roll_length(gear, diameter)) * diameter
 
 
-def roll_length(gear: Toothed, diameter: Real | float) -> Real:
+def roll_length(gear: Toothed, diameter: Given) -> Real:
     """Roll length [mm] of the involute point on a diameter [mm]; 0 below the base circle."""
     return safe_sqrt((0.5 * diameter) ** 2 - gear.base_radius**2)
 
 
-def roll_angle(gear: Toothed, rho: Real | float) -> Real:
+def roll_angle(gear: Toothed, rho: Given) -> Real:
     """Roll angle [deg] from the roll length [mm]."""
     return jnp.rad2deg(rho / gear.base_radius)
 
 
-def diameter(gear: Toothed, rho: Real | float) -> Real:
+def diameter(gear: Toothed, rho: Given) -> Real:
     """Diameter [mm] of the involute point with a roll length [mm]."""
     return 2 * jnp.sqrt(gear.base_radius**2 + rho**2)

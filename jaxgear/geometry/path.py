@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from ..numerics import Checked, bracketed_root, result
 from .gear import Gear
-from .involute import involute
+from .involute import Given, involute
 
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
@@ -42,26 +42,26 @@ class PathOfContact(Checked):
         """Transverse contact ratio."""
         return (self.end - self.start) / self.base_pitch
 
-    def pinion_roll_length(self, path: Real | float) -> Real:
+    def pinion_roll_length(self, path: Given) -> Real:
         """Roll length of the pinion [mm], also its radius of curvature, at a path position [mm]."""
         return self.pinion_pitch_roll_length + path
 
-    def wheel_roll_length(self, path: Real | float) -> Real:
+    def wheel_roll_length(self, path: Given) -> Real:
         """Roll length of the wheel [mm], also its radius of curvature, at a path position [mm]."""
         return self.wheel_pitch_roll_length - path
 
-    def rolling_speeds(self, path: Real | float, speed: Real | float) -> tuple[Real, Real]:
+    def rolling_speeds(self, path: Given, speed: Given) -> tuple[Real, Real]:
         """Speeds of the two surfaces through the contact [m/s] at a pinion speed [rpm]."""
         omega = speed * jnp.pi / 30
         ratio = self.pinion_base_radius / self.wheel_base_radius
-        return omega * self.pinion_roll_length(path) * 1e-3, omega * ratio * self.wheel_roll_length(path) * 1e-3
+        return self.pinion_roll_length(path) * omega * 1e-3, ratio * omega * self.wheel_roll_length(path) * 1e-3
 
-    def sliding_speed(self, path: Real | float, speed: Real | float) -> Real:
+    def sliding_speed(self, path: Given, speed: Given) -> Real:
         """Pinion surface speed minus wheel surface speed [m/s] at a pinion speed [rpm]; zero at the pitch point."""
         pinion, wheel = self.rolling_speeds(path, speed)
         return pinion - wheel
 
-    def reduced_radius(self, path: Real | float) -> Real:
+    def reduced_radius(self, path: Given) -> Real:
         """Reduced radius of curvature [mm], 1 / (1 / rho_pinion + 1 / rho_wheel)."""
         return reduced_radius(self.pinion_roll_length(path), self.wheel_roll_length(path))
 
