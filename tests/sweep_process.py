@@ -21,7 +21,7 @@ def design(x):
     return jg.TipRelief(x["pinion"], 4.0), jg.TipRelief(x["wheel"], 4.0)
 
 
-seen: list[tuple[int, int]] = []
+seen: list[tuple] = []
 gears = (jg.Gear(teeth=teeth, module=3.0, face_width=18.0) for teeth in (19, 48))
 sizes = jg.Resolution(positions=8, patch_nodes=1, pairs=2, newton_steps=6)
 jg.sweep(
@@ -35,4 +35,4 @@ jg.sweep(
     callback=lambda *progress: seen.append(progress),
 )
 share = VARIANTS // (int(OTHERS[1]) if OTHERS else 1)
-assert seen[-1] == (share, share), seen
+assert seen[-1] == (share, share, None), seen

@@ -104,6 +104,18 @@ def test_operation_carries_what_the_contact_does_not_need(mesh):
         jg.Operation(50.0, speed=-1.0)
 
 
+def test_one_design_over_torques_is_that_of_each(mesh):
+    """In the order given, from zero torque on, and with the flanks in every cycle."""
+    relief, torques = jg.TipRelief(6.0, 3.4), [60.0, 0.0, 20.0]
+    cycles = jg.sweeps.over_torques(mesh, torques, pinion=relief, wheel=relief)
+    assert [float(cycle.torque) for cycle in cycles] == torques and all(cycle.pinion is relief for cycle in cycles)
+    for cycle, torque in zip(cycles, torques):
+        expected = design(mesh, torque, 6.0).transmission_error
+        np.testing.assert_allclose(cycle.transmission_error, expected, rtol=1e-12, atol=1e-12)
+    lowest = np.asarray([cycle.transmission_error.min() for cycle in cycles])
+    assert lowest[1] < lowest[2] < lowest[0] and lowest[1] == pytest.approx(0.0, abs=1e-9)
+
+
 WRONG = {
     "a pair": (lambda mesh: jg.solve(mesh.pair, 50.0), TypeError, "solve: mesh is a GearPair, must be a Mesh"),
     "torques": (

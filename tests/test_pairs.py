@@ -102,3 +102,40 @@ def test_no_pair_beyond_touches_before_it_is_expected(mesh):
     tips = jnp.zeros((len(usual), 12)).at[:, [0, 6]].set(usual).at[:, [1, 3, 7, 9]].set(3.0)
     removed = jax.vmap(lambda x: removed_material(wide, 10.0, **deep(x)))(tips)
     assert bool((jax.vmap(lambda r: outermost(mesh, r[1:3]))(removed) >= plain[None] - 1e-9).all())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("positions", [16, 25])
+def test_what_two_pairs_call_converged_four_confirm(positions):
+    designs, torques = random_designs(500, [50.0, 400.0, 1000.0]), jnp.asarray([10.0, 10.0, 50.0, 200.0, 600.0])
+
+    def solved(pairs):
+        mesh = jg.prepare(gear_pair(), resolution=jg.Resolution(positions=positions, pairs=pairs))
+
+        def one(x):
+            cycle = jg.solve(mesh, x[0], **deep(x[1:]))
+            return cycle.transmission_error, cycle.converged
+
+        many = jnp.concatenate([jnp.resize(torques, len(designs))[:, None], designs], axis=1)
+        return jax.jit(lambda many: jax.lax.map(one, many, batch_size=128))(many)
+
+    (few, sure), (more, _) = solved(2), solved(4)
+    assert 0.5 < float(sure.mean()) < 1.0
+    np.testing.assert_allclose(few[sure], more[sure], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("teeth, torque", [((19, 48), 50.0), ((30, 30), 80.0), ((20, 30), 50.0), ((50, 50), 150.0)])
+def test_the_default_gives_what_four_pairs_give(teeth, torque):
+    """Also at three times the torque, traced, where nothing can take more pairs; no realistic design is flagged."""
+    designs = jnp.asarray([[0.0] * 12, [6.0, 4.0, 0.0, 1.0, 0.0, 0.0] * 2, [12.0, 2.0, 8.0, 2.0, 5.0, -4.0] * 2])
+    results = []
+    for pairs in (None, 4):
+        mesh = jg.prepare(gear_pair(teeth), resolution=jg.Resolution(positions=16, pairs=pairs))
+        assert pairs is not None or mesh.resolution.pairs < 4
+        cycles = jax.jit(jax.vmap(lambda t, mesh=mesh: jax.vmap(lambda x: jg.solve(mesh, t, **deep(x)))(designs)))(
+            torque * jnp.asarray([0.1, 1.0, 3.0])
+        )
+        assert bool(cycles.converged.all())
+        results.append(cycles.transmission_error)
+    np.testing.assert_allclose(*results, rtol=1e-9, atol=1e-9)

@@ -63,6 +63,7 @@ def draw(mesh, designs, cycles, curves):
         "ppte_over_torque": lambda ax=None: plot.ppte_over_torque(TORQUES, ppte, ax, design_torque=TORQUE),
         "harris_map": lambda ax=None: plot.harris_map(mesh.phase, TORQUES, curves["long relief"], ax),
         "k_chart": lambda ax=None: plot.k_chart(mesh, designs, ax),
+        "lead_chart": lambda ax=None: plot.lead_chart(mesh, designs, ax),
     }
 
 
@@ -74,6 +75,7 @@ UNITS = {
     "ppte_over_torque": ("[N m]", "[µm]"),
     "harris_map": ("[base pitches]", "[µm]"),
     "k_chart": ("[deg]", "[µm]"),
+    "lead_chart": ("[mm]", "[µm]"),
 }
 
 
@@ -87,7 +89,7 @@ def test_axes_name_their_units(draw, name):
 @pytest.mark.parametrize("name", UNITS)
 def test_a_given_ax_is_used_and_its_figure_gains_no_other(draw, name):
     figure, ax = plt.subplots(1, 2)
-    given = ax if name == "k_chart" else ax[0]
+    given = ax if name in ("k_chart", "lead_chart") else ax[0]
     returned = draw[name](given)
     assert np.all(np.atleast_1d(returned) == np.atleast_1d(given))
     assert plt.get_fignums() == [figure.number]
@@ -224,6 +226,18 @@ def test_k_chart_shows_the_relief_from_its_start_to_the_tip(mesh, designs):
         diameters = panel.child_axes[0].get_xlim()
         assert diameters[1] == pytest.approx(2 * float(gear.tip_radius))
         assert diameters[0] == pytest.approx(float(jg.geometry.diameter(gear, start)))
+
+
+def test_lead_chart_shows_the_crowning_of_the_pinion_at_the_pitch_point(mesh, designs):
+    """There is no relief there; the crowning is a parabola, with its amount at both ends of the face."""
+    pinion, wheel = plot.lead_chart(mesh, designs)
+    face, removed = pinion.lines[1].get_data()
+    assert face[0] == -face[-1] == pytest.approx(-0.5 * float(mesh.pair.face_width))
+    np.testing.assert_allclose(removed, 4.0 * (face / face[-1]) ** 2, atol=1e-12)
+    np.testing.assert_array_equal(pinion.lines[0].get_ydata(), 0.0)
+    np.testing.assert_array_equal([line.get_ydata() for line in wheel.lines], 0.0)
+    low, high = pinion.get_ylim()
+    assert low > 4.0 and high < 0 and wheel.get_ylim() == (low, high)
 
 
 def test_save_writes_a_report_sized_png_and_closes_the_figure(cycles, tmp_path):

@@ -282,7 +282,7 @@ def test_a_resumed_sweep_computes_what_is_missing_and_only_that(mesh, table, fol
     resumed = run(mesh, output=folder, callback=lambda *progress: seen.append(progress))
     assert_same(table, resumed)
     assert parts[0].stat().st_mtime_ns == before
-    assert seen == [(16, 40), (32, 40), (40, 40)]
+    assert seen == [(16, 40, None), (32, 40, None), (40, 40, None)]
     assert {path.name for path in folder.iterdir()} == {*(path.name for path in parts), "_sweep.parquet"}
     assert [record.getMessage() for record in caplog.records if record.name == "jaxgear"] == [
         f"{parts[1]}: is damaged or displaced, its variants are evaluated again"

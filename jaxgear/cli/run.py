@@ -168,7 +168,7 @@ class Stages:
         if not self._console.is_terminal:
             self._console.print(f"jaxgear: {stage}")
 
-    def step(self, step: int, total: int, best: float) -> None:
+    def step(self, step: int, total: int, best: float | None) -> None:
         """Callback of the search."""
         interrupt.check()
         self._progress.update(self._task, completed=step, total=total, note=f"best {best:.4g}")

@@ -1,4 +1,4 @@
-"""Evaluation of designs over the torques of a design file, by one compiled program for all of them."""
+"""Evaluation of a design over the torques of a design file."""
 
 import time
 from dataclasses import dataclass, field, replace
@@ -8,9 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact import Mesh, MeshCycle, removed_material, solve_removed
+from ..contact import Mesh, MeshCycle
 from ..metrics import flash_temperature, summary
 from ..microgeometry import AbstractModification
+from ..sweeps import over_torques
 
 Metrics = dict[str, float | bool]
 
@@ -29,7 +30,7 @@ class Evaluation:
         ppte: peak-to-peak transmission error over the torques [um].
         objectives: what an optimization made small, by name and unit, of this design; empty without one.
         failed_torques: torques without a converged contact solution [N m], the design torque included.
-        seconds: what finding and evaluating it took, without compilation [s].
+        seconds: what finding and evaluating it took, without compilation of the latter [s].
     """
 
     pinion: AbstractModification
@@ -43,36 +44,43 @@ class Evaluation:
     objectives: dict[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
 class Evaluator:
-    """Evaluates designs of one mesh at the design torque and over a range of torques.
+    """Evaluates designs of one mesh.
 
-    The contact solution takes the material removed in the contacts, not the modifications: it is compiled once for
-    every kind of design.
+    Attributes:
+        mesh: prepared mesh.
+        torque: design torque [N m].
+        torques: further ones [N m].
+        speed, friction: of the flash temperature; None where it is not known, or for the default.
     """
 
-    def __init__(self, mesh: Mesh, torque: float, torques: np.ndarray, speed: float | None, friction: float | None):
-        self._mesh = mesh
-        self._torques = np.concatenate([[torque], torques])
-        self._heat = tuple(None if value is None else jnp.asarray(value) for value in (speed, friction))
+    mesh: Mesh
+    torque: float
+    torques: np.ndarray
+    speed: float | None
+    friction: float | None
 
     def __call__(self, pinion: AbstractModification, wheel: AbstractModification) -> Evaluation:
         """Evaluates one design."""
-        removed = self._removed(self._torques, pinion, wheel)
-        cycle = self._solve(removed, 0)  # compiles, where it has to
-        metrics = jax.tree.map(np.asarray, _numbers(cycle, *self._heat))
+        torques = np.concatenate([[self.torque], self.torques])
+        over_torques(self.mesh, torques[:1], pinion=pinion, wheel=wheel)  # compiles, where it has to
         began = time.perf_counter()
-        cycles = [self._solve(removed, index) for index in range(len(self._torques))]
+        cycles = over_torques(self.mesh, torques, pinion=pinion, wheel=wheel)
+        seconds = time.perf_counter() - began
         curves = np.asarray([cycle.transmission_error for cycle in cycles])
         converged = np.asarray([cycle.converged for cycle in cycles]) & np.isfinite(curves)
-        seconds = time.perf_counter() - began
+        # without the flanks: one program serves every kind of them
+        heat = (None if value is None else jnp.asarray(value) for value in (self.speed, self.friction))
+        metrics = jax.tree.map(np.asarray, _numbers(replace(cycles[0], pinion=None, wheel=None), *heat))
         return Evaluation(
             pinion=pinion,
             wheel=wheel,
-            cycle=replace(cycle, pinion=pinion, wheel=wheel),
+            cycle=cycles[0],
             metrics={name: value.item() for name, value in metrics.items()},
             transmission_error=curves[1:],
             ppte=np.ptp(curves[1:], axis=1),
-            failed_torques=sorted({float(torque) for torque in self._torques[~converged.all(axis=1)]}),
+            failed_torques=sorted({float(torque) for torque in torques[~converged.all(axis=1)]}),
             seconds=seconds,
         )
 
@@ -82,19 +90,9 @@ class Evaluator:
         Returns:
             the torques [N m], shape (torques,), and the transmission error [um], shape (torques, positions).
         """
-        torques = np.linspace(0.0, _SURFACE_REACH * self._torques[0], _SURFACE_TORQUES)
-        removed = self._removed(torques, pinion, wheel)
-        cycles = [solve_removed(self._mesh, float(t), jnp.asarray(r)) for t, r in zip(torques, removed)]
+        torques = np.linspace(0.0, _SURFACE_REACH * self.torque, _SURFACE_TORQUES)
+        cycles = over_torques(self.mesh, torques, pinion=pinion, wheel=wheel)
         return torques, np.asarray([cycle.transmission_error for cycle in cycles])
-
-    def _removed(self, torques: np.ndarray, pinion: AbstractModification, wheel: AbstractModification):
-        """Material removed from both flanks [um], (torques, pairs, slices, positions)."""
-        return np.asarray(
-            [removed_material(self._mesh, torque, pinion=pinion, wheel=wheel) for torque in jnp.asarray(torques)]
-        )
-
-    def _solve(self, removed: np.ndarray, index: int) -> MeshCycle:
-        return solve_removed(self._mesh, float(self._torques[index]), jnp.asarray(removed[index]))
 
 
 @eqx.filter_jit

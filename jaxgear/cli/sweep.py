@@ -146,7 +146,7 @@ class Meter:
     def __exit__(self, *exception) -> None:
         self._progress.stop()
 
-    def __call__(self, done: int, total: int) -> None:
+    def __call__(self, done: int, total: int, best: float | None) -> None:
         """Callback of the sweep."""
         if self.done is None:
             self._first, self._since = done, time.perf_counter()

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..contact import Mesh
 from ..metrics import quantities
-from ..numerics import AbstractMeasure, CVaR, Mean, Quantile, Worst
+from ..numerics import AbstractMeasure, Callback, CVaR, Mean, Quantile, Worst
 from ..optimize import (
     METHODS,
     Constraint,
@@ -20,7 +20,6 @@ from ..optimize import (
     pareto,
 )
 from ..optimize.projection import CURVES
-from ..optimize.search import Callback
 from ..tolerance import Tolerance
 from . import schema
 from .cases import load_of, tolerance_of

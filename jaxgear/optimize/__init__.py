@@ -1,5 +1,6 @@
 """Choosing a modification: gradient and evolutionary optimization, fronts, iterated and free-form flanks."""
 
+from ..numerics import Callback as Callback
 from ..numerics import CVaR as CVaR
 from ..numerics import Mean as Mean
 from ..numerics import Quantile as Quantile
@@ -28,6 +29,5 @@ from .result import Iterate as Iterate
 from .result import Limit as Limit
 from .result import Optimum as Optimum
 from .search import AbstractMethod as AbstractMethod
-from .search import Callback as Callback
 from .search import Record as Record
 from .verdict import judged as judged

@@ -12,7 +12,7 @@ from ..conditions import conditions
 from ..contact import Mesh
 from ..metrics import quantities, removed_at
 from ..microgeometry import AbstractModification, TabulatedProfile
-from ..numerics import AbstractMeasure, Mean, check, whole
+from ..numerics import AbstractMeasure, Callback, Mean, check, whole
 from ..sizing import iso_relief
 from ..tolerance import Tolerance
 from .design import Parameters
@@ -21,7 +21,7 @@ from .minimax import Search, follow
 from .problem import Problem, Roughness
 from .refine import POSITIONS, refined
 from .result import Optimum
-from .search import Callback, Record
+from .search import Record
 from .verdict import optimum_of
 
 _FEWEST = 4  # values per flank

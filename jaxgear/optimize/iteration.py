@@ -12,13 +12,13 @@ from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..metrics import max_relief as largest_relief
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, NoModification, TabulatedProfile
-from ..numerics import check, whole
+from ..numerics import Callback, check, whole
 from .design import Design
 from .goal import Constraint
 from .minimax import Minimax
 from .minimize import minimize
 from .result import Iterate, Limit, Optimum
-from .search import AbstractMethod, Callback
+from .search import AbstractMethod
 
 _UNTOUCHED = 0.05  # [um]: a flank with less relief than this counts as unmodified
 _LOADED = 1e-6  # a pair with less than this share of the force carries none

@@ -4,7 +4,7 @@ import time
 from collections.abc import Mapping, Sequence
 
 from ..contact import Mesh
-from ..numerics import AbstractMeasure
+from ..numerics import AbstractMeasure, Callback
 from ..tolerance import Tolerance
 from .design import Design
 from .goal import Constraint, Objective
@@ -12,7 +12,7 @@ from .methods import method_named
 from .problem import make_problem
 from .refine import POSITIONS, refined
 from .result import Optimum
-from .search import AbstractMethod, Callback, Record
+from .search import AbstractMethod, Record
 from .verdict import optimum_of
 
 

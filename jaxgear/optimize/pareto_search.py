@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ..contact import Mesh
-from ..numerics import AbstractMeasure
+from ..numerics import AbstractMeasure, Callback
 from ..numerics.fields import Checked, count
 from ..numerics.pareto import pareto_front
 from ..tolerance import Tolerance
@@ -17,7 +17,7 @@ from .linear_model import AbstractScalarization, Model
 from .minimax import Search, follow, linearized
 from .problem import Problem, make_problem
 from .result import Front
-from .search import Callback, Record
+from .search import Record
 from .starts import start_points
 from .verdict import PROBE, optimum_of
 

@@ -1,23 +1,16 @@
 """What a method of optimization is, and the record that it keeps."""
 
 from abc import abstractmethod
-from typing import Protocol
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from ..numerics import Callback
 from .evaluate import scores
 from .goal import FEASIBLE
 from .linear_model import Model
 from .problem import Problem
-
-
-class Callback(Protocol):
-    """Who wants to know how far a search has come."""
-
-    def __call__(self, done: int, total: int, info: float, /) -> None:
-        """Is told the steps done, all steps, and the best objective so far."""
 
 
 class Record:

@@ -38,6 +38,7 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<")
 GREY = "#595959"
 PALE = "#D9D9D9"
 _LEGEND_LINE = 12.0  # [pt]
+ABOVE = 4.0  # [pt]; between the Axes and a legend over them
 ABOVE_MARKS = 16.0  # [pt]; clears a line of text that stands on the Axes
 
 _STYLE = {
@@ -105,7 +106,7 @@ def report_figure(width: float, height: float) -> Iterator[Figure]:
         yield plt.figure(figsize=(width / _INCH, height / _INCH), layout="constrained")
 
 
-def legend_above(ax: Axes, *, distance: float = 4.0) -> int:
+def legend_above(ax: Axes, *, distance: float = ABOVE) -> int:
     """Legend over the Axes, where it covers no data, in as many columns as fit.
 
     Args:

@@ -8,16 +8,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from ..contact import Mesh
-from ..geometry import Gear, roll_angle
-from ..microgeometry import AbstractModification, Flank, NoModification
-from .figure import HEIGHT, legend_above, legend_over_panels, line_style, report_axes
+from ..contact import Mesh, Side
+from ..geometry import roll_angle
+from ..microgeometry import AbstractModification
+from .flank_panels import Design, flank_panels
 
 _POINTS = 201  # over the active profile
-WIDTH = 150.0  # of the two panels together [mm]
 _ABOVE_DIAMETERS = 34.0  # [pt]; clears numbers and label of the upper axis
-
-Design = tuple[AbstractModification | None, AbstractModification | None]
 
 
 def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray:
@@ -34,44 +31,20 @@ def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray:
     Returns:
         the two Axes.
     """
-    own = ax is None
-    with report_axes(ax, columns=2, width=WIDTH, height=HEIGHT) as panels:
-        contact, pair = mesh.path_of_contact, mesh.pair
-        sides = (
-            ("pinion", pair.pinion, contact.pinion_roll_length(contact.start)),
-            ("wheel", pair.wheel, contact.wheel_roll_length(contact.end)),
-        )
-        for side, (panel, (title, gear, start)) in enumerate(zip(panels, sides)):
-            flank = _profile(gear, start, pair.face_width)
-            angle = np.asarray(roll_angle(gear, flank.roll_length))
-            for index, (name, design) in enumerate(designs.items()):
-                removed = (design[side] or NoModification())(flank)
-                panel.plot(angle, np.broadcast_to(removed, angle.shape), label=name, **line_style(index))
-            panel.set(xlim=(angle[0], angle[-1]), xlabel=f"roll angle of the {title} [deg]")
-            _diameter_axis(panel, gear)
-        panels[0].set_ylabel("material removed [µm]")
-        downwards(panels)
-        if own:
-            legend_over_panels(panels[0].figure, panels[0])
-        else:
-            legend_above(panels[0], distance=_ABOVE_DIAMETERS)
-    return np.asarray(panels)
+    return flank_panels(mesh, designs, ax, _profile, _over_roll_angle, above=_ABOVE_DIAMETERS)
 
 
-def _profile(gear: Gear, start, face_width) -> Flank:
-    """Equally spaced points of the active profile, in the middle of the face."""
-    return Flank(
-        roll_length=jnp.linspace(start, gear.tip_roll_length, _POINTS),
-        tip_roll_length=gear.tip_roll_length,
-        start_roll_length=start,
-        base_radius=gear.base_radius,
-        face_coordinate=jnp.zeros_like(gear.base_radius),
-        face_width=face_width,
-    )
+def _profile(side: Side, modification: AbstractModification) -> tuple[np.ndarray, np.ndarray]:
+    """The active profile in the middle of the face."""
+    rho = jnp.linspace(side.start_roll_length, side.tip_roll_length, _POINTS)
+    removed = modification(side.flank(rho, jnp.zeros_like(side.face_width)))
+    angle = np.asarray(roll_angle(side.gear, rho))
+    return angle, np.broadcast_to(removed, angle.shape)
 
 
-def _diameter_axis(panel: Axes, gear: Gear) -> None:
-    base = 2 * float(gear.base_radius)
+def _over_roll_angle(panel: Axes, side: Side, title: str) -> None:
+    panel.set_xlabel(f"roll angle of the {title} [deg]")
+    base = 2 * float(side.base_radius)
 
     def to_diameter(angle):
         return base * np.hypot(1, np.deg2rad(angle))
@@ -83,13 +56,3 @@ def _diameter_axis(panel: Axes, gear: Gear) -> None:
     upper.set_xlabel("diameter [mm]", fontsize=panel.xaxis.label.get_fontsize())
     upper.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     upper.tick_params(labelsize=panel.xaxis.label.get_fontsize(), width=0.6, length=3)
-
-
-def downwards(panels) -> None:
-    """One common ordinate that points down and has the nominal involute in sight."""
-    lines = [line.get_ydata() for panel in panels for line in panel.lines]
-    values = np.concatenate([[0.0], *lines])
-    low, high = values.min(), max(values.max(), values.min() + 1.0)
-    air = 0.06 * (high - low)
-    for panel in panels:
-        panel.set_ylim(high + air, low - air)

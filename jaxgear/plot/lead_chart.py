@@ -4,12 +4,12 @@ from collections.abc import Mapping
 
 import jax.numpy as jnp
 import numpy as np
+from matplotlib.axes import Axes
 
-from ..contact import Mesh
+from ..contact import Mesh, Side
 from ..metrics import removed_at
-from ..microgeometry import NoModification
-from .figure import HEIGHT, legend_above, legend_over_panels, line_style, report_axes
-from .k_chart import WIDTH, Design, downwards
+from ..microgeometry import AbstractModification
+from .flank_panels import Design, flank_panels
 
 _POINTS = 201  # across the common face
 
@@ -27,19 +27,15 @@ def lead_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray
     Returns:
         the two Axes.
     """
-    own = ax is None
-    with report_axes(ax, columns=2, width=WIDTH, height=HEIGHT) as panels:
-        for index, (panel, title, side) in enumerate(zip(panels, ("pinion", "wheel"), mesh.sides)):
-            face = jnp.linspace(-0.5, 0.5, _POINTS) * side.face_width
-            place = jnp.reshape(side.pitch_roll_length, (1,))
-            for style, (name, design) in enumerate(designs.items()):
-                removed = removed_at(side, design[index] or NoModification(), place, face)
-                panel.plot(np.asarray(face), np.asarray(removed)[:, 0], label=name, **line_style(style))
-            panel.set(xlim=(float(face[0]), float(face[-1])), xlabel=f"face coordinate of the {title} [mm]")
-        panels[0].set_ylabel("material removed [µm]")
-        downwards(panels)
-        if own:
-            legend_over_panels(panels[0].figure, panels[0])
-        else:
-            legend_above(panels[0])
-    return np.asarray(panels)
+    return flank_panels(mesh, designs, ax, _line, _over_face)
+
+
+def _line(side: Side, modification: AbstractModification) -> tuple[np.ndarray, np.ndarray]:
+    """The flank line through the pitch point."""
+    face = jnp.linspace(-0.5, 0.5, _POINTS) * side.face_width
+    removed = removed_at(side, modification, jnp.reshape(side.pitch_roll_length, (1,)), face)
+    return np.asarray(face), np.asarray(removed)[:, 0]
+
+
+def _over_face(panel: Axes, side: Side, title: str) -> None:
+    panel.set_xlabel(f"face coordinate of the {title} [mm]")

@@ -10,3 +10,4 @@ from .sampling import LatinHypercube as LatinHypercube
 from .sampling import Sobol as Sobol
 from .table import SweepTable as SweepTable
 from .table import open_sweep as open_sweep
+from .torques import over_torques as over_torques

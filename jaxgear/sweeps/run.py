@@ -19,15 +19,13 @@ from ..conditions import Conditions, Variants, check_used, label, variants
 from ..conditions.variant import Design, Parameters
 from ..contact import Mesh, solve
 from ..metrics import Quantity, quantities, quantity_of
-from ..numerics import AbstractMeasure, Mean, Quantile, Worst, whole
+from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
 from ..tolerance import Tolerance
 from .columns import CONVERGED, VARIANT, Column, parameter_columns
 from .evaluate import Evaluator, Pending
 from .plan import AbstractPlan
 from .store import MANIFEST, Manifest, Store
 from .table import SweepTable, in_memory, open_sweep
-
-Callback = Callable[[int, int], None]
 
 PART_ROWS = 2**17
 _IN_FLIGHT = 2  # parts: one that the devices work on while the host writes the other
@@ -86,8 +84,8 @@ def sweep(
         part_rows: variants per file.
         title: of the table.
         units: of the parameters, for the table.
-        callback: called as callback(variants done, variants of this process) before the first part, when those of an
-            earlier call are done already, and after every part.
+        callback: called as callback(variants done, variants of this process, None) before the first part, when those of
+            an earlier call are done already, and after every part.
 
     Returns:
         the table. A variant whose modification, gear pair or load is impossible or whose contact solution failed is a
@@ -155,8 +153,8 @@ def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts: dict[int
     """Evaluates parts and hands them to `keep(part, columns)` in order; `parts` tells of each whether it is missing."""
     rows = {part: store.span(part)[1] - store.span(part)[0] for part in parts}
     done, total = sum(rows[part] for part in parts if not parts[part]), sum(rows.values())
-    report = callback or (lambda done, total: None)
-    report(done, total)
+    report = callback or (lambda done, total, best: None)
+    report(done, total, None)
     writer = ThreadPoolExecutor(1)
     under_way: deque[tuple[int, Future]] = deque()
 
@@ -168,7 +166,7 @@ def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts: dict[int
         part, future = under_way.popleft()
         future.result()
         done += rows[part]
-        report(done, total)
+        report(done, total, None)
 
     try:
         for part in (part for part in parts if parts[part]):

@@ -1,0 +1,69 @@
+"""Two panels of material removed, pinion beside wheel, as on the print of a gear measuring machine."""
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..contact import Mesh, Side
+from ..microgeometry import AbstractModification, NoModification
+from .figure import ABOVE, HEIGHT, legend_above, legend_over_panels, line_style, report_axes
+
+WIDTH = 150.0  # of the two panels together [mm]
+
+Design = tuple[AbstractModification | None, AbstractModification | None]
+
+
+class Trace(Protocol):
+    """What one panel shows of a flank."""
+
+    def __call__(self, side: Side, modification: AbstractModification, /) -> tuple[np.ndarray, np.ndarray]:
+        """Abscissa and material removed [um], of one shape."""
+
+
+class Frame(Protocol):
+    """What a chart adds to the panel of one gear."""
+
+    def __call__(self, panel: Axes, side: Side, title: str, /) -> Any:
+        """Labels the abscissa."""
+
+
+def flank_panels(
+    mesh: Mesh, designs: Mapping[str, Design], ax, trace: Trace, frame: Frame, *, above: float = ABOVE
+) -> np.ndarray:
+    """The two Axes: material removed goes down, and the nominal involute is the zero line.
+
+    Args:
+        mesh: prepared mesh.
+        designs: (pinion, wheel) modifications by the name of the design; None for the nominal involute.
+        ax: two Axes, for pinion and wheel; None for a new figure.
+        trace: one line.
+        frame: labels of one panel.
+        above: distance of a legend from a panel of a given figure [pt].
+    """
+    own = ax is None
+    with report_axes(ax, columns=2, width=WIDTH, height=HEIGHT) as panels:
+        for index, (panel, title, side) in enumerate(zip(panels, ("pinion", "wheel"), mesh.sides)):
+            for style, (name, design) in enumerate(designs.items()):
+                abscissa, removed = trace(side, design[index] or NoModification())
+                panel.plot(abscissa, removed, label=name, **line_style(style))
+                panel.set_xlim(abscissa[0], abscissa[-1])
+            frame(panel, side, title)
+        panels[0].set_ylabel("material removed [µm]")
+        _downwards(panels)
+        if own:
+            legend_over_panels(panels[0].figure, panels[0])
+        else:
+            legend_above(panels[0], distance=above)
+    return np.asarray(panels)
+
+
+def _downwards(panels) -> None:
+    """One common ordinate that points down and has the nominal involute in sight."""
+    lines = [line.get_ydata() for panel in panels for line in panel.lines]
+    values = np.concatenate([[0.0], *lines])
+    low, high = values.min(), max(values.max(), values.min() + 1.0)
+    air = 0.06 * (high - low)
+    for panel in panels:
+        panel.set_ylim(high + air, low - air)
