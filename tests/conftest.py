@@ -8,11 +8,15 @@ import jax
 import jaxtyping
 import pytest
 
-jaxtyping.install_import_hook("jaxgear", "typechecker.arrays")  # before anything imports jaxgear
-
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
+
+
+def pytest_configure(config):
+    """Before anything imports jaxgear. Slow tests run what users run, without the checks of annotations."""
+    if config.option.markexpr != "slow":
+        jaxtyping.install_import_hook("jaxgear", "typechecker.arrays")
 
 
 def _compilation_cache() -> Path:
