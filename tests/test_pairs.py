@@ -125,7 +125,7 @@ def test_what_two_pairs_call_converged_four_confirm(positions):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("teeth, torque", [((19, 48), 50.0), ((30, 30), 80.0), ((20, 30), 50.0), ((50, 50), 150.0)])
+@pytest.mark.parametrize("teeth, torque", [((19, 48), 50.0), ((30, 30), 80.0), ((20, 30), 50.0)])
 def test_the_default_gives_what_four_pairs_give(teeth, torque):
     """Also at three times the torque, traced, where nothing can take more pairs; no realistic design is flagged."""
     designs = jnp.asarray([[0.0] * 12, [6.0, 4.0, 0.0, 1.0, 0.0, 0.0] * 2, [12.0, 2.0, 8.0, 2.0, 5.0, -4.0] * 2])
