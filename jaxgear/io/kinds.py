@@ -4,8 +4,8 @@ Pydantic finds its way through the tables and says where a value is wrong; these
 """
 
 import datetime
-import math
-from collections.abc import Iterable, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,45 +13,41 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from ..numerics import Number
 from .errors import suggestion
+from .ranges import outside
 
-# Magnitudes that an engineer can mean, by unit: (least of a number that must be positive, most). Beyond them the number
-# or its unit is a slip, and arithmetic on it overflows or loses all digits.
-PLAUSIBLE: Mapping[str, tuple[float, float]] = {
-    "mm": (1e-3, 1e5),
-    "um": (1e-6, 1e5),
-    "N m": (1e-6, 1e9),
-    "rpm": (1e-3, 1e7),
-    "MPa": (1.0, 1e7),
-    "kg/m^3": (50.0, 5e4),
-    "N/(m s^0.5 K)": (1.0, 1e6),
-}
-_PURE = (1e-9, 1e9)
 # Tags of alternatives; they are no part of a key.
 TAGS = ("<list>", "<table>", "<other>")
 
 
-class Kind:
+class Kind(ABC):
     """What may stand after a key."""
 
     @property
+    @abstractmethod
     def words(self) -> str:
         """What is allowed, for messages and the reference."""
-        raise NotImplementedError
 
+    @abstractmethod
     def schema(self) -> CoreSchema:
         """For pydantic."""
-        return core_schema.no_info_plain_validator_function(self.read)
-
-    def read(self, value: Any) -> Any:
-        """The value as it is used; raises `PydanticCustomError` for what is not allowed."""
-        raise NotImplementedError
 
     def __get_pydantic_core_schema__(self, source, handler) -> CoreSchema:
         return self.schema()
 
 
+class Plain(Kind):
+    """One value, neither a list nor a table."""
+
+    @abstractmethod
+    def read(self, value: Any) -> Any:
+        """The value as it is used; raises `PydanticCustomError` for what is not allowed."""
+
+    def schema(self) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+
 @dataclass(frozen=True)
-class Real(Kind):
+class Real(Plain):
     """A number.
 
     Attributes:
@@ -83,7 +79,7 @@ class Real(Kind):
 
 
 @dataclass(frozen=True)
-class Text(Kind):
+class Text(Plain):
     """A string.
 
     Attributes:
@@ -102,7 +98,7 @@ class Text(Kind):
 
 
 @dataclass(frozen=True)
-class Switch(Kind):
+class Switch(Plain):
     """True or false."""
 
     words = "true or false"
@@ -114,7 +110,7 @@ class Switch(Kind):
 
 
 @dataclass(frozen=True)
-class Choice(Kind):
+class Choice(Plain):
     """One of several names."""
 
     names: tuple[str, ...]
@@ -219,39 +215,6 @@ LEVEL = count(2, 10_000)
 WEIGHTS = ListOf(Real(Number(low=0.0)))
 
 
-def outside(number: Number, value: float, *, plausible: bool = True) -> str:
-    """What is wrong with a number, "" if it is finite and within its range and, if `plausible`, an engineer's."""
-    unit = f" {number.unit}" if number.unit else ""
-    if isinstance(value, float) and not math.isfinite(value):
-        return f"{value} must be finite"
-    shown = f"{shorten(value)}{unit}"
-    low, high = number.low, number.high
-    if low is not None and (value <= low if number.open_low else value < low):
-        return f"{shown} must be {_range(number, unit)}"
-    if high is not None and (value >= high if number.open_high else value > high):
-        return f"{shown} must be {_range(number, unit)}"
-    least, most = PLAUSIBLE.get(number.unit, _PURE)
-    positive = low is not None and low >= 0 and number.open_low
-    limited = low is not None and high is not None  # the class itself says what can be meant
-    if plausible and not limited and (abs(value) > most or (positive and value < least)):
-        floor = least if positive else -most if low is None else low
-        return f"{shown} must be at least {floor:g}{unit} and at most {most:g}{unit}"
-    return ""
-
-
-def shorten(value: float) -> str:
-    """A number as text, of any size."""
-    if isinstance(value, float) or abs(value) < 10**12:
-        return f"{value:g}" if isinstance(value, float) else str(value)
-    digits = int(abs(value).bit_length() * math.log10(2)) + 1
-    return f"a whole number of about {digits} digits"
-
-
-def allowed(number: Number) -> str:
-    """The range as text, "" without limits."""
-    return _range(number, f" {number.unit}" if number.unit else "")
-
-
 def refusal(wanted: str, value: Any) -> PydanticCustomError:
     """A value of another kind than wanted."""
     return PydanticCustomError("kind", "{problem}", {"problem": not_of_kind(wanted, value)})
@@ -286,13 +249,3 @@ def _kind(value: Any) -> str:
     if isinstance(value, datetime.date | datetime.time):
         return "a date or time"
     return "a list" if isinstance(value, list) else "a table"
-
-
-def _range(number: Number, unit: str) -> str:
-    parts = []
-    if number.low is not None:
-        parts.append(f"{'greater than' if number.open_low else 'at least'} {number.low:g}{unit}")
-    if number.high is not None:
-        high = str(number.high) if number.whole else f"{number.high:g}"
-        parts.append(f"{'less than' if number.open_high else 'at most'} {high}{unit}")
-    return " and ".join(parts)

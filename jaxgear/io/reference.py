@@ -17,8 +17,9 @@ from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from ..tolerance import Tolerance
 from . import schema, schema_sweep
-from .kinds import Either, Kind, ListOf, Real, Table, allowed
+from .kinds import Either, Kind, ListOf, Real, Table
 from .layout import Section, family, meanings, section_of, snake, summary
+from .ranges import allowed
 
 _HEAD = """# Design files
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from . import schema, template
 from .errors import DesignFileError, suggestion
-from .kinds import outside
+from .ranges import outside
 from .toml import decode
 
 

@@ -82,7 +82,7 @@ def _place(axis: int, x):
     """Where the first largest entry is; a mask, since its transpose is a selection and no scatter.
 
     In double precision the last bits of the mantissa make way for the place: the largest integer along an axis is found
-    in a third of the time of an argmax, at the price that entries equal to ten digits count as equal.
+    faster than an argmax (3 % of a gradient of the PPTE), at the price that entries equal to ten digits count as equal.
     """
     size = x.shape[axis]
     if x.dtype != jnp.float64 or size > _MOST_PLACES:

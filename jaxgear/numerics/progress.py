@@ -1,9 +1,8 @@
 """How long work tells how far it has come."""
 
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 
-@runtime_checkable
 class Callback(Protocol):
     """Who wants to know how far a sweep or a search has come; an exception in it ends the work."""
 

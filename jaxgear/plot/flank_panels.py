@@ -1,7 +1,6 @@
 """Two panels of material removed, pinion beside wheel, as on the print of a gear measuring machine."""
 
-from collections.abc import Mapping
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,18 +14,10 @@ WIDTH = 150.0  # of the two panels together [mm]
 Design = tuple[AbstractModification | None, AbstractModification | None]
 
 
-class Trace(Protocol):
-    """What one panel shows of a flank."""
-
-    def __call__(self, side: Side, modification: AbstractModification, /) -> tuple[np.ndarray, np.ndarray]:
-        """Abscissa and material removed [um], of one shape."""
-
-
-class Frame(Protocol):
-    """What a chart adds to the panel of one gear."""
-
-    def __call__(self, panel: Axes, side: Side, title: str, /) -> Any:
-        """Labels the abscissa."""
+# abscissa and material removed [um] of a flank, of one shape
+Trace = Callable[[Side, AbstractModification], tuple[np.ndarray, np.ndarray]]
+# labels the abscissa of the panel of one gear, "pinion" or "wheel"
+Frame = Callable[[Axes, Side, str], None]
 
 
 def flank_panels(
