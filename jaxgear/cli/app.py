@@ -80,9 +80,8 @@ def analyze(
     with opened(file, cache=not no_cache) as (design, stages):
         if design.bounds:
             free = ", ".join(design.bounds)
-            raise DesignFileError(
-                file, "variables", f"analyze needs numbers, these are free: {free}; use jaxgear optimize"
-            )
+            problem = f"analyze needs numbers, these are free: {free}; use jaxgear optimize"
+            raise DesignFileError("variables", problem, file)
         with run(design, output or default_folder(file, "analyze"), stages) as current:
             current.prepare(torques=_TORQUES)
             current.evaluate("unmodified", NoModification(), NoModification())
@@ -116,7 +115,7 @@ def optimize(
             if quick:
                 current.coarsen(positions=_QUICK_POSITIONS)
             current.prepare(torques=_QUICK_TORQUES if quick else _TORQUES)
-            factor = design.application_factor
+            factor = design.optimize.application_factor
             relief = eqx.filter_jit(iso_relief)(design.pair(), design.torque, application_factor=factor)
             involute = NoModification()
             current.search(request, {"unmodified": (involute, involute), "rule-based": (relief, relief)})

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from ..compliance import Compliance, legacy_compliance
 from ..contact import Mesh, Operation, Resolution, fewest_pairs, prepare
@@ -11,12 +11,9 @@ from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
 from ..sizing import iso_stiffness
 from . import schema, schema_sweep, template
-from .errors import DesignFileError, refused
-from .layout import Section
+from .errors import DesignFileError, naming, refuse_given, refused
 from .toml import decode, read
 from .variables import increasing, read_variables
-
-T = TypeVar("T", bound=Section)
 
 # Tooth pairs are carried along up to this many times the deflection of a single pair after ISO 6336-1.
 _DEFLECTIONS = 2.0
@@ -42,7 +39,6 @@ class DesignFile:
         friction: mean coefficient of friction; used with a speed only, None for the library's default.
         bounds: (low, high) of every free parameter, in its unit.
         units: unit of every free parameter, "" for a pure number.
-        application_factor: K_A of the rule-based relief.
         optimize: the table of that name; `optimize_request` makes sense of it.
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
@@ -57,7 +53,6 @@ class DesignFile:
     friction: float | None
     bounds: dict[str, tuple[float, float]]
     units: dict[str, str]
-    application_factor: float
     optimize: schema.OptimizeSection
     sweep: schema_sweep.SweepSection | None
     tolerance: schema_sweep.ToleranceSection | None
@@ -68,8 +63,7 @@ class DesignFile:
     _compliance: Compliance
     _load: template.Part
     _resolution: Resolution
-    _pairs_given: bool
-    _parts: tuple[list[template.Part], list[template.Part]]
+    _flanks: tuple[list[template.Part], list[template.Part]]
 
     def pair(self, parameters: Mapping[str, Any] | None = None) -> GearPair:
         """The gear pair.
@@ -88,7 +82,7 @@ class DesignFile:
         Raises:
             DesignFileError: when no number of pairs is enough, because of a torque or modulus in another unit.
         """
-        if self._pairs_given:
+        if self._resolution.pairs is not None:
             return self._resolution
         torque = max(self.torque, self.torque_range[1]) if torque is None else torque
         line_load = 1e3 * torque / float(self._middle.pinion.base_radius * self._middle.face_width)
@@ -98,8 +92,8 @@ class DesignFile:
         except ValueError:
             given = f"{torque:g} N m deflects a pair of teeth of module {float(self._middle.pinion.module):g} mm by"
             problem = f"{given} {deflection / _DEFLECTIONS:.3g} um: give the torque in N m, elastic moduli in MPa"
-            raise DesignFileError(self.path, "load.torque", problem) from None
-        if any(True for _ in self._pair.free()):  # other variants can have a larger contact ratio
+            raise DesignFileError("load.torque", problem, self.path) from None
+        if self._pair.free():  # other variants can have a larger contact ratio
             pairs = max(pairs, _OPEN_PAIRS)
         return replace(self._resolution, pairs=pairs)
 
@@ -112,13 +106,13 @@ class DesignFile:
         Raises:
             DesignFileError: when the resolution does not cover the path of contact.
         """
-        resolution = self.resolution() if resolution is None else resolution
-        key, compliance = "resolution", self._compliance
-        return refused(self.path, key, prepare, self._middle, compliance=compliance, resolution=resolution)
+        options = {"compliance": self._compliance, "resolution": resolution or self.resolution()}
+        with naming(self.path):
+            return refused("resolution", prepare, self._middle, **options)
 
     def sweep_mesh(self, resolution: Resolution) -> Mesh | Callable[[Mapping[str, Any]], Mesh]:
         """The prepared mesh; a function of the parameters that prepares it where numbers of the gears are free."""
-        if not any(True for part in (self._pair, self._model) for _ in part.free()):
+        if not self._pair.free() and not self._model.free():
             return self.mesh(resolution)
         return lambda parameters: prepare(
             self.pair(parameters), compliance=self._model.build(parameters), resolution=resolution
@@ -143,8 +137,8 @@ class DesignFile:
                 f"design: parameters {', '.join(sorted(parameters)) or '(none)'} must be those of the file: "
                 f"{', '.join(sorted(self.bounds)) or '(none)'}"
             )
-        pinion, wheel = self._parts
-        return template.build(pinion, parameters), template.build(wheel, parameters)
+        pinion, wheel = (template.build(parts, parameters) for parts in self._flanks)
+        return pinion, wheel
 
 
 def load_design(path: str | Path) -> DesignFile:
@@ -157,95 +151,94 @@ def load_design(path: str | Path) -> DesignFile:
         DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
     """
     file = Path(path)
-    top = decode(file, "", read(file), schema.FileSection)
+    with naming(file):
+        return _checked(file, decode("", read(file), schema.FileSection))
 
-    def section(name: str, struct: type[T]) -> T:
-        return decode(file, name, getattr(top, name) or {}, struct)
 
-    gears, parts = [], []
-    for name in ("pinion", "wheel"):
-        gear = section(name, schema.GearSection)
-        gears.append(template.part_of(file, name, gear, Gear))
-        keys = [f"{name}.modification[{i}]" for i in range(len(gear.modification))]
-        tables = zip(keys, gear.modification)
-        parts.append([template.parse(file, key, table, AbstractModification) for key, table in tables])
-    pair = _pair(file, gears[0], gears[1], top.pair or {})
-    load = _load(file, section("load", schema.LoadSection))
-    operation = template.part_of(file, "load", load, Operation)
-    model = _model(file, section("model", schema.ModelSection))
-    optimize = section("optimize", schema.optimize_section())
+def _checked(file: Path, top: schema.FileSection) -> DesignFile:
+    pinion, pinion_flank = _gear("pinion", top.pinion)
+    wheel, wheel_flank = _gear("wheel", top.wheel)
+    flanks = [*pinion_flank, *wheel_flank]
+    mounting = template.part_of("pair", decode("pair", top.pair or {}, schema.PairSection), GearPair)
+    pair = replace(mounting, fields={"pinion": pinion, "wheel": wheel, **mounting.fields})
+    load = _load(top.load)
+    operation = template.part_of("load", load, Operation)
+    model = _model(top.model or {})
+    optimize = decode("optimize", top.optimize or {}, schema.optimize_section())
     if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
-        raise DesignFileError(file, "optimize", "has no effect without [variables]")
+        raise DesignFileError("optimize", "has no effect without [variables]")
     open_case = [*pair.free(), *model.free(), *operation.free()]
-    bounds, units = read_variables(file, top.variables or {}, [*parts[0], *parts[1]], open_case)
+    open_flanks = [free for part in flanks for free in part.free()]
+    bounds, units = read_variables(top.variables or {}, [*open_flanks, *open_case])
+    ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
-    usual = operation.checked(file, middle)
-    design_torque = float(usual.torque)
-    tolerance = None if top.tolerance is None else section("tolerance", schema_sweep.ToleranceSection)
-    if tolerance is not None and top.sweep is None and optimize.manufactured is None:
-        raise DesignFileError(file, "tolerance", "has no effect without [sweep] or optimize.manufactured")
+    built = {part.key: [part.build(end) for end in ends] for part in flanks}
+    uneven = [key for key, both in built.items() if any(one.varies_along_face for one in both)]
+    usual = operation.build(middle)
+    torque = float(usual.torque)
+    tolerance = None
+    if top.tolerance is not None:
+        tolerance = decode("tolerance", top.tolerance, schema_sweep.ToleranceSection)
+        if top.sweep is None and optimize.manufactured is None:
+            raise DesignFileError("tolerance", "has no effect without [sweep] or optimize.manufactured")
     if top.sweep is not None and not top.variables:
-        raise DesignFileError(file, "sweep", "has no effect without [variables]")
+        raise DesignFileError("sweep", "has no effect without [variables]")
+    low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
     return DesignFile(
         path=file,
         title=top.title or file.stem,
-        torque=design_torque,
-        torque_range=_torque_range(load, design_torque),
+        torque=torque,
+        torque_range=(low, high),
         speed=None if usual.speed is None else float(usual.speed),
         friction=None if usual.friction is None else float(usual.friction),
         bounds=bounds,
         units=units,
-        application_factor=optimize.application_factor,
         optimize=optimize,
-        sweep=None if top.sweep is None else section("sweep", schema_sweep.SweepSection),
+        sweep=None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection),
         tolerance=tolerance,
         open_case=tuple(open_case),
         _pair=pair,
-        _middle=pair.checked(file, middle),
+        _middle=pair.build(middle),
         _model=model,
-        _compliance=model.checked(file, middle),
+        _compliance=model.build(middle),
         _load=operation,
-        _resolution=_resolution(file, section("resolution", schema.ResolutionSection), [*parts[0], *parts[1]], bounds),
-        _pairs_given=bool(top.resolution and "pairs" in top.resolution),
-        _parts=(parts[0], parts[1]),
+        _resolution=_resolution(top.resolution or {}, uneven),
+        _flanks=(pinion_flank, wheel_flank),
     )
 
 
-def _pair(file: Path, pinion: template.Part, wheel: template.Part, table: schema.Tables) -> template.Part:
-    rest = template.part_of(file, "pair", decode(file, "pair", table, schema.PairSection), GearPair)
-    return template.Part(GearPair, {"pinion": pinion, "wheel": wheel, **rest.fields}, "pair")
+def _gear(name: str, table: schema.Tables) -> tuple[template.Part, list[template.Part]]:
+    """A gear and its modifications."""
+    section = decode(name, table, schema.GearSection)
+    tables = enumerate(section.modification)
+    flank = [template.parse(f"{name}.modification[{i}]", each, AbstractModification) for i, each in tables]
+    return template.part_of(name, section, Gear), flank
 
 
-def _load(file: Path, load: schema.LoadSection) -> schema.LoadSection:
+def _load(table: schema.Tables) -> schema.LoadSection:
+    load = decode("load", table, schema.LoadSection)
     if load.torque_range is not None:
         low, high = load.torque_range
-        increasing(file, "load.torque_range[1]", low, high, unit=" N m")
-    if load.friction is not None and load.speed is None:
-        raise DesignFileError(file, "load.friction", "has no effect without load.speed (flash temperature)")
+        increasing("load.torque_range[1]", low, high, unit=" N m")
+    if load.speed is None:
+        refuse_given("load", load, ["friction"], " without load.speed (flash temperature)")
     return load
 
 
-def _resolution(file: Path, sizes: Section, parts: list[template.Part], bounds) -> Resolution:
-    given = sizes.given()
-    ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
-    for part in parts:
-        if not any(part.build(parameters).varies_along_face for parameters in ends):
-            continue
-        if given.setdefault("slices", _SLICES) == 1:
-            problem = f"must be at least 2, 1 cannot show {part.key}, which varies along the face"
-            raise DesignFileError(file, "resolution.slices", f"{problem} ({_SLICES} where the key is left out)")
-    return template.Part(Resolution, given, "resolution").checked(file, {})
-
-
-def _torque_range(load: schema.LoadSection, torque: float) -> tuple[float, float]:
-    low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
-    return low, high
-
-
-def _model(file: Path, model: schema.ModelSection) -> template.Part:
-    given = set(model.given()) - {"preset"}
+def _model(table: schema.Tables) -> template.Part:
+    model = decode("model", table, schema.ModelSection)
     if model.preset == "default":
-        return template.part_of(file, "model", model, Compliance)
+        return template.part_of("model", model, Compliance)
+    given = set(model.given()) - {"preset"}
     if given:
-        raise DesignFileError(file, f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
+        raise DesignFileError(f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
     return template.Part(legacy_compliance, {}, "model")
+
+
+def _resolution(table: schema.Tables, uneven: list[str]) -> Resolution:
+    """The array sizes; `uneven` are the keys of the modifications that vary along the face."""
+    sizes = decode("resolution", table, schema.ResolutionSection).given()
+    if uneven and sizes.setdefault("slices", _SLICES) == 1:
+        problem = f"must be at least 2, 1 cannot show {uneven[0]}, which varies along the face"
+        raise DesignFileError("resolution.slices", f"{problem} ({_SLICES} where the key is left out)")
+    return template.Part(Resolution, sizes, "resolution").build({})

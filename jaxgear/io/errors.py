@@ -2,7 +2,8 @@
 
 import difflib
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -11,22 +12,50 @@ T = TypeVar("T")
 class DesignFileError(ValueError):
     """A design file that cannot be used; the message is one line and names the file and the dotted key."""
 
-    def __init__(self, file, key: str, problem: object):
-        parts = [str(file), key, str(problem)]
+    def __init__(self, key: str, problem: object, file: object = ""):
+        self.key, self.problem, self.file = key, str(problem), str(file)
+        parts = [self.file, key, self.problem]
         super().__init__(" ".join(": ".join(part for part in parts if part).split()))
 
 
-def refused(file, key: str, make: Callable[..., T], *args, **kwargs) -> T:
+@contextmanager
+def naming(file: object) -> Iterator[None]:
+    """Says of which file the keys are that are refused in a block."""
+    try:
+        yield
+    except DesignFileError as error:
+        raise DesignFileError(error.key, error.problem, error.file or file) from None
+
+
+def refused(key: str, make: Callable[..., T], *args, **kwargs) -> T:
     """What `make` returns; what it refuses is wrong with the key of the design file."""
     try:
         return make(*args, **kwargs)
     except (ValueError, OverflowError) as error:
-        raise DesignFileError(file, key, problem(error)) from None
+        raise DesignFileError(key, problem(error)) from None
+
+
+def refuse_given(table: str, section: object, keys: Iterable[str], why: str) -> None:
+    """Refuses the keys of a table that have no effect."""
+    for key in keys:
+        if getattr(section, key) not in (None, []):
+            raise DesignFileError(f"{table}.{key}", f"has no effect{why}")
+
+
+def check_known(key: str, name: str, names: Collection[str]) -> None:
+    """Refuses a name that is none of several."""
+    if name not in names:
+        raise DesignFileError(key, not_known(name, names))
 
 
 def problem(error: Exception) -> str:
     """What the library refuses, without the class that refuses it: a design file has keys."""
     return re.sub(r"\A[A-Z]\w*: ", "", str(error))
+
+
+def not_known(name: object, names: Iterable[str]) -> str:
+    """`"x" is not known`, and what to write instead."""
+    return f'"{name}" is not known, {suggestion(name, names)}'
 
 
 def suggestion(name: object, valid: Iterable[str]) -> str:

@@ -5,14 +5,13 @@ Pydantic finds its way through the tables and says where a value is wrong; these
 
 import datetime
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import CoreSchema, core_schema
 
 from ..numerics import Number
-from .errors import suggestion
+from .errors import not_known
 from .ranges import outside
 
 # Tags of alternatives; they are no part of a key.
@@ -40,7 +39,7 @@ class Plain(Kind):
 
     @abstractmethod
     def read(self, value: Any) -> Any:
-        """The value as it is used; raises `PydanticCustomError` for what is not allowed."""
+        """The value as it is used; raises a `ValueError` that says what is wrong with it."""
 
     def schema(self) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
@@ -68,13 +67,12 @@ class Real(Plain):
     def read(self, value: Any) -> Any:
         if self.open and isinstance(value, str) and value:
             if _is_number(value):
-                raise refusal("a number", value)
+                raise ValueError(not_of_kind("a number", value))
             return value
         if isinstance(value, bool) or not isinstance(value, int if self.number.whole else int | float):
-            raise refusal(self.words, value)
-        problem = outside(self.number, value, plausible=self.plausible)
-        if problem:
-            raise PydanticCustomError("range", "{problem}", {"problem": problem})
+            raise ValueError(not_of_kind(self.words, value))
+        if problem := outside(self.number, value, plausible=self.plausible):
+            raise ValueError(problem)
         return value if self.number.whole else float(value)
 
 
@@ -91,9 +89,9 @@ class Text(Plain):
 
     def read(self, value: Any) -> str:
         if not isinstance(value, str):
-            raise refusal(self.words, value)
+            raise ValueError(not_of_kind(self.words, value))
         if not value and not self.empty:
-            raise PydanticCustomError("empty", '"" is empty')
+            raise ValueError('"" is empty')
         return value
 
 
@@ -105,7 +103,7 @@ class Switch(Plain):
 
     def read(self, value: Any) -> bool:
         if not isinstance(value, bool):
-            raise refusal(self.words, value)
+            raise ValueError(not_of_kind(self.words, value))
         return value
 
 
@@ -121,9 +119,9 @@ class Choice(Plain):
 
     def read(self, value: Any) -> str:
         if not isinstance(value, str):
-            raise refusal("a string", value)
+            raise ValueError(not_of_kind("a string", value))
         if value not in self.names:
-            raise PydanticCustomError("choice", "{problem}", {"problem": not_known(value, self.names)})
+            raise ValueError(not_known(value, self.names))
         return value
 
 
@@ -140,10 +138,7 @@ class ListOf(Kind):
     item: Kind
     length: int | None = None
     empty: bool = False
-
-    @property
-    def words(self) -> str:
-        return "a list"
+    words = "a list"
 
     def schema(self) -> CoreSchema:
         least = 0 if self.empty else self.length or 1
@@ -162,9 +157,9 @@ class Table(Kind):
     words = "a table"
 
     def schema(self) -> CoreSchema:
-        values = core_schema.any_schema() if self.item is None else self.item.schema()
-        least = None if self.item is None else 1
-        return core_schema.dict_schema(core_schema.str_schema(), values, min_length=least, strict=True)
+        if self.item is None:
+            return core_schema.dict_schema(core_schema.str_schema(), strict=True)
+        return core_schema.dict_schema(core_schema.str_schema(), self.item.schema(), min_length=1, strict=True)
 
 
 @dataclass(frozen=True)
@@ -215,19 +210,9 @@ LEVEL = count(2, 10_000)
 WEIGHTS = ListOf(Real(Number(low=0.0)))
 
 
-def refusal(wanted: str, value: Any) -> PydanticCustomError:
-    """A value of another kind than wanted."""
-    return PydanticCustomError("kind", "{problem}", {"problem": not_of_kind(wanted, value)})
-
-
 def not_of_kind(wanted: str, value: Any) -> str:
     """`must be a number, not a string`."""
     return f"must be {wanted}, not {_kind(value)}"
-
-
-def not_known(value: object, names: Iterable[str]) -> str:
-    """`"x" is not known`, and what to write instead."""
-    return f'"{value}" is not known, {suggestion(value, names)}'
 
 
 def _is_number(text: str) -> bool:

@@ -26,7 +26,7 @@ class Section(BaseModel):
 
     def given(self) -> dict[str, Any]:
         """The keys that the file sets."""
-        return {name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set}
+        return {name: value for name, value in self if name in self.model_fields_set}
 
     @classmethod
     def kind(cls, name: str) -> Kind:
@@ -98,11 +98,6 @@ def family(base: type[eqx.Module], *, users: bool = True) -> dict[str, type[eqx.
     return found
 
 
-def is_family(cls: type[eqx.Module]) -> bool:
-    """Whether a table of this class says with `type` which derived class it describes."""
-    return inspect.isabstract(cls)
-
-
 def snake(name: str) -> str:
     """`TipRelief` -> `tip_relief`."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
@@ -134,7 +129,7 @@ def _kind(cls, field: dataclasses.Field) -> Kind | None:
     hint = _hint(cls, field)
     module = _module(hint)
     if module is not None:
-        if not is_family(module):
+        if not inspect.isabstract(module):
             return Table()
         # what contains another of its family is made by the lists of the file
         return None if issubclass(cls, module) else Either(Text(empty=True), Table(), "the name of a type, or a table")

@@ -20,12 +20,10 @@ from ..optimize import (
     pareto,
 )
 from ..optimize.projection import CURVES
-from ..tolerance import Tolerance
 from . import schema
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
-from .errors import DesignFileError, refused, suggestion
-from .layout import Section
+from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
 from .toml import decode
 
 _DEFAULT_METHOD = "minimax"
@@ -49,7 +47,6 @@ _QUICK: Mapping[str, dict[str, Any]] = {
     "differential_evolution": {"population": 20, "generations": 10},
     "factorial": {"levels": 3},
     "pareto": {"points": 8, "steps": 5},
-    "te_iteration": {},
     "free_form": {"points": 12, "steps": 10},
 }
 _QUICK_GEARS = 4
@@ -67,34 +64,26 @@ class OptimizeRequest:
     method: str
     curve: str | None
     _design: DesignFile
-    _options: dict[str, Any]
-    _common: dict[str, Any]
-    _first: dict[str, Any]  # options of the search for a relief to start from
+    _common: dict[str, Any]  # what its function takes besides design, mesh and callback
 
     def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum | Front:
         """Runs it on a prepared mesh."""
         design = self._design
         if self.method == "free_form":
-            return free_form(mesh, callback=callback, **self._common, **self._options)
+            return free_form(mesh, callback=callback, **self._common)
         if self.method == "te_iteration":
             return self._iterate(mesh, callback)
         if self.method == _PARETO:
-            common = self._common | {"objectives": self._common["objective"], "method": Pareto(**self._options)}
-            del common["objective"]
-            return pareto(design.design, design.bounds, mesh=mesh, callback=callback, **common)
-        kind = METHODS[self.method](**self._options)
-        return minimize(design.design, design.bounds, mesh=mesh, method=kind, callback=callback, **self._common)
+            return pareto(design.design, design.bounds, mesh=mesh, callback=callback, **self._common)
+        return minimize(design.design, design.bounds, mesh=mesh, callback=callback, **self._common)
 
     def _iterate(self, mesh: Mesh, callback: Callback | None) -> Optimum:
-        design, options = self._design, dict(self._options)
-        start, pinion, wheel = options.pop("start"), None, None
+        design, options = self._design, {"callback": callback, **self._common}
+        start, torque = options.pop("start"), design.torque
         if start == "low_pressure":
-            method = METHODS[_DEFAULT_METHOD](**self._first)
-            given: dict[str, Any] = {"mesh": mesh, "torque": design.torque, "method": method, "callback": callback}
-            return iterate_from_low_pressure(design.design, design.bounds, **given, **options)
-        if start == "given":
-            pinion, wheel = design.design({})
-        return iterate_transmission_error(mesh, design.torque, pinion=pinion, wheel=wheel, callback=callback, **options)
+            return iterate_from_low_pressure(design.design, design.bounds, mesh=mesh, torque=torque, **options)
+        pinion, wheel = design.design({}) if start == "given" else (None, None)
+        return iterate_transmission_error(mesh, torque, pinion=pinion, wheel=wheel, **options)
 
 
 def optimize_request(design: DesignFile, *, method: str | None = None, quick: bool = False) -> OptimizeRequest:
@@ -108,143 +97,128 @@ def optimize_request(design: DesignFile, *, method: str | None = None, quick: bo
     Raises:
         DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
     """
+    with naming(design.path):
+        return _request(design, method, quick)
+
+
+def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeRequest:
     section = design.optimize
     name = method or section.method or _DEFAULT_METHOD
-    known = (*METHODS, _PARETO, *schema.METHODS_WITHOUT_VARIABLES)
-    if name not in known:
-        raise DesignFileError(design.path, "optimize.method", f'"{name}" is not known, {suggestion(name, known)}')
-    if not design.bounds and name not in schema.METHODS_WITHOUT_VARIABLES:
-        raise DesignFileError(design.path, "variables", "missing, nothing to optimize; use jaxgear analyze")
+    flanks_alone = name in schema.METHODS_WITHOUT_VARIABLES
+    check_known("optimize.method", name, (*METHODS, _PARETO, *schema.METHODS_WITHOUT_VARIABLES))
+    if not design.bounds and not flanks_alone:
+        raise DesignFileError("variables", "missing, nothing to optimize; use jaxgear analyze")
     for free in design.open_case:
-        raise DesignFileError(design.path, free.key, f'"{free.name}" is a variable, which a sweep alone can vary here')
-    options = {key: _options(design, key, table) for key, table in schema.method_options().items()}.get(name, {})
-    shared = {field.name for field in dataclasses.fields(METHODS[name])} if name in METHODS else set()
-    for key in ("starts", "steps"):
-        value = getattr(section, key)
-        if value is not None and key in shared:
-            options[key] = value
-        elif value is not None and method is None:
-            raise DesignFileError(design.path, f"optimize.{key}", f'has no effect with method "{name}"')
-    curve = options.pop("curve", _CURVE) if name in schema.METHODS_WITHOUT_VARIABLES else None
-    if curve is not None and curve not in CURVES:
-        raise DesignFileError(
-            design.path, f"optimize.{name}.curve", f'"{curve}" is not known, {suggestion(curve, CURVES)}'
-        )
-    if "seed" in shared:
-        options["seed"] = section.seed or 0
-    elif section.seed is not None and section.manufactured is None and method is None:
-        raise DesignFileError(design.path, "optimize.seed", f'has no effect with method "{name}" and perfect gears')
+        raise DesignFileError(free.key, f'"{free.name}" is a variable, which a sweep alone can vary here')
+    options = _options(section, name, of_the_file=method is None)
+    curve = options.pop("curve", _CURVE) if flanks_alone else None
+    if curve is not None:
+        check_known(f"optimize.{name}.curve", curve, CURVES)
     common = _common(design, section, name, quick)
+    fewer = _QUICK.get(name, {}) if quick else {}
     if name == "te_iteration":
         _check_iteration(design, options["start"], section)
-        common = {}
-    elif name != "free_form":
+        if options["start"] == "low_pressure":
+            options["method"] = METHODS[_DEFAULT_METHOD](**(_QUICK[_DEFAULT_METHOD] if quick else {}))
+        return OptimizeRequest(name, curve, design, options)
+    if name == "free_form":
+        common |= {**options, **fewer}
+    else:
         _check_levels(design, options.get("levels"))
         make: type[Any] = Pareto if name == _PARETO else METHODS[name]
-        refused(design.path, f"optimize.{name}", lambda: make(**options))
-    if quick:
-        options = {**options, **_QUICK.get(name, {})}
-        if name not in (_PARETO, "te_iteration"):  # a quick look stays on its mesh
-            common = {**common, "positions": None}
-    return OptimizeRequest(name, curve, design, options, common, _QUICK[_DEFAULT_METHOD] if quick else {})
+        common["method"] = dataclasses.replace(refused(f"optimize.{name}", make, **options), **fewer)
+    if quick and name != _PARETO:  # a quick look stays on its mesh
+        common["positions"] = None
+    return OptimizeRequest(name, curve, design, common)
+
+
+def _options(section: schema.OptimizeSection, name: str, *, of_the_file: bool) -> dict[str, Any]:
+    """The options of a method; the file may name others where it is not the file that asks for the method."""
+    layouts = schema.method_options().items()
+    tables = {key: decode(f"optimize.{key}", getattr(section, key) or {}, layout) for key, layout in layouts}
+    options = {key: value for key, value in tables.get(name, ()) if value is not None}
+    shared = {"starts": section.starts, "steps": section.steps, "seed": section.seed or 0}
+    taken = {field.name for field in dataclasses.fields(METHODS[name])} if name in METHODS else set()
+    if of_the_file:
+        why = f' with method "{name}"'
+        refuse_given("optimize", section, [key for key in ("starts", "steps") if key not in taken], why)
+        if "seed" not in taken and section.manufactured is None:
+            refuse_given("optimize", section, ["seed"], f"{why} and perfect gears")
+    return options | {key: value for key, value in shared.items() if key in taken and value is not None}
 
 
 def _check_levels(design: DesignFile, levels) -> None:
     if isinstance(levels, dict) and set(levels) != set(design.bounds):
         problem = f"must name all variables and nothing else: {', '.join(design.bounds)}"
-        raise DesignFileError(design.path, "optimize.factorial.levels", problem)
-
-
-def _options(design: DesignFile, name: str, section: type[Section]) -> dict[str, Any]:
-    """The table of one method."""
-    table = getattr(design.optimize, name) or {}
-    options = decode(design.path, f"optimize.{name}", table, section)
-    return {key: value for key in type(options).model_fields if (value := getattr(options, key)) is not None}
+        raise DesignFileError("optimize.factorial.levels", problem)
 
 
 def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
     """Objective, cases and constraints."""
-    objectives = _objectives(section, name)
-    for objective in objectives:
-        if objective not in quantities:
-            problem = f'"{objective}" is not known, {suggestion(objective, quantities)}'
-            raise DesignFileError(design.path, "optimize.objective", problem)
-    if (len(objectives) > 1) != (name == "pareto"):
-        problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
-        raise DesignFileError(design.path, "optimize.objective", problem)
-    if objectives != ["ppte"] and name in schema.METHODS_WITHOUT_VARIABLES:
-        raise DesignFileError(design.path, "optimize.objective", f'must be "ppte" with method "{name}"')
     found: dict[str, Any] = {
-        "torque": load_of(design, "optimize", section.torques, section.weights),
-        "measure": _measure(design, section),
-        "constraints": _constraints(design, section),
+        **_objective(section, name),
+        "torque": load_of(design, "optimize", section),
+        "measure": _measure(section),
+        "constraints": tuple(_constraint(design, number, each) for number, each in enumerate(section.constraint)),
         "seed": section.seed or 0,
-        **_gears(design, section, quick),
     }
-    if name == "free_form":
-        return found
-    return {**found, "objective": tuple(objectives) if name == _PARETO else objectives[0]}
+    if section.manufactured is not None:
+        if design.tolerance is None:
+            raise DesignFileError("optimize.manufactured", "needs the table [tolerance]")
+        found["tolerance"] = tolerance_of(design)
+        found["samples"] = min(section.manufactured, _QUICK_GEARS) if quick else section.manufactured
+    return found
 
 
-def _objectives(section: schema.OptimizeSection, name: str) -> list[str]:
-    if section.objective is None:
-        return list(_FRONT) if name == "pareto" else ["ppte"]
-    return section.objective if isinstance(section.objective, list) else [section.objective]
-
-
-def _constraints(design: DesignFile, section: schema.OptimizeSection) -> tuple[Constraint, ...]:
-    tables = enumerate(section.constraint)
-    return tuple(_constraint(design, f"optimize.constraint[{number}]", table) for number, table in tables)
-
-
-def _measure(design: DesignFile, section: schema.OptimizeSection) -> AbstractMeasure:
-    kind = section.measure or "mean"
-    if section.measure is not None and section.torques is None and section.manufactured is None:
-        problem = "has no effect on a single case: give optimize.torques or optimize.manufactured"
-        raise DesignFileError(design.path, "optimize.measure", problem)
-    if section.level is None:
-        return _MEASURES[kind]()
-    if kind not in _WITH_LEVEL:
-        raise DesignFileError(design.path, "optimize.level", f'has no effect with measure = "{kind}"')
-    return _MEASURES[kind](section.level)
-
-
-def _gears(design: DesignFile, section: schema.OptimizeSection, quick: bool) -> dict[str, Any]:
-    if section.manufactured is None:
+def _objective(section: schema.OptimizeSection, name: str) -> dict[str, Any]:
+    """What the function of a method takes for the objective; nothing where it knows its own."""
+    asked = section.objective or (_FRONT if name == _PARETO else "ppte")
+    objectives = (asked,) if isinstance(asked, str) else tuple(asked)
+    for objective in objectives:
+        check_known("optimize.objective", objective, quantities)
+    if (len(objectives) > 1) != (name == _PARETO):
+        problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
+        raise DesignFileError("optimize.objective", problem)
+    if name in schema.METHODS_WITHOUT_VARIABLES:
+        if objectives != ("ppte",):
+            raise DesignFileError("optimize.objective", f'must be "ppte" with method "{name}"')
         return {}
-    if design.tolerance is None:
-        raise DesignFileError(design.path, "optimize.manufactured", "needs the table [tolerance]")
-    tolerance: Tolerance = tolerance_of(design, design.tolerance)
-    samples = min(section.manufactured, _QUICK_GEARS) if quick else section.manufactured
-    return {"tolerance": tolerance, "samples": samples}
+    return {"objectives": objectives} if name == _PARETO else {"objective": objectives[0]}
 
 
-def _constraint(design: DesignFile, key: str, table: schema.Tables) -> Constraint:
-    section = decode(design.path, key, table, schema.ConstraintSection)
-    if (section.of is None) == (section.variables is None):
-        raise DesignFileError(design.path, key, "needs either of = a quantity or variables = a table of coefficients")
-    if section.of is not None and section.of not in quantities:
-        raise DesignFileError(
-            design.path, f"{key}.of", f'"{section.of}" is not known, {suggestion(section.of, quantities)}'
-        )
-    for name in section.variables or {}:
-        if name not in design.bounds:
-            problem = f'"{name}" is not a variable, {suggestion(name, design.bounds)}'
-            raise DesignFileError(design.path, f"{key}.variables", problem)
-    of = section.of if section.of is not None else section.variables
-    return refused(design.path, key, lambda: Constraint(of, low=section.low, high=section.high))  # type: ignore[arg-type]
+def _measure(section: schema.OptimizeSection) -> AbstractMeasure:
+    kind = section.measure or "mean"
+    if section.torques is None and section.manufactured is None:
+        why = " on a single case: give optimize.torques or optimize.manufactured"
+        refuse_given("optimize", section, ["measure"], why)
+    if kind not in _WITH_LEVEL:
+        refuse_given("optimize", section, ["level"], f' with measure = "{kind}"')
+    return _MEASURES[kind]() if section.level is None else _MEASURES[kind](section.level)
+
+
+def _constraint(design: DesignFile, number: int, table: schema.Tables) -> Constraint:
+    key = f"optimize.constraint[{number}]"
+    section = decode(key, table, schema.ConstraintSection)
+    of = section.variables if section.of is None else section.of
+    if of is None or (section.of is not None and section.variables is not None):
+        raise DesignFileError(key, "needs either of = a quantity or variables = a table of coefficients")
+    if isinstance(of, str):
+        check_known(f"{key}.of", of, quantities)
+    else:
+        for name in of:
+            if name not in design.bounds:
+                problem = f'"{name}" is not a variable, {suggestion(name, design.bounds)}'
+                raise DesignFileError(f"{key}.variables", problem)
+    return refused(key, Constraint, of, low=section.low, high=section.high)
 
 
 def _check_iteration(design: DesignFile, start: str, section: schema.OptimizeSection) -> None:
     """The iteration levels the transmission error at the design torque and knows nothing else."""
-    for key in ("measure", "level", "torques", "weights", "manufactured"):
-        if getattr(section, key) is not None:
-            raise DesignFileError(design.path, f"optimize.{key}", 'has no effect with method "te_iteration"')
-    if section.constraint:
-        raise DesignFileError(design.path, "optimize.constraint", 'has no effect with method "te_iteration"')
+    keys = ("measure", "level", "torques", "weights", "manufactured", "constraint")
+    refuse_given("optimize", section, keys, ' with method "te_iteration"')
     if start == "given" and design.bounds:
         problem = '"given" needs numbers in the modifications, these are free: ' + ", ".join(design.bounds)
-        raise DesignFileError(design.path, "optimize.te_iteration.start", problem)
+        raise DesignFileError("optimize.te_iteration.start", problem)
     if start == "low_pressure" and not design.bounds:
         problem = '"low_pressure" needs [variables], of which the relief of the start is designed'
-        raise DesignFileError(design.path, "optimize.te_iteration.start", problem)
+        raise DesignFileError("optimize.te_iteration.start", problem)

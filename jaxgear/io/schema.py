@@ -186,13 +186,11 @@ class FreeFormOptions(Section):
 
 # They seek the flanks themselves.
 METHODS_WITHOUT_VARIABLES = ("te_iteration", "free_form")
-# Options that are keys of [optimize] itself, for all methods that have them.
-SHARED_OPTIONS = ("starts", "steps", "seed")
 
 
 def method_options() -> dict[str, type[Section]]:
     """The tables [optimize.<method>] of the methods that have one, of a user's own too: the fields of their classes."""
-    found = {name: section_of(cls, SHARED_OPTIONS, open=False) for name, cls in METHODS.items()}
+    found = {name: section_of(cls, ("starts", "steps", "seed"), open=False) for name, cls in METHODS.items()}
     found |= {"factorial": FactorialOptions, "pareto": section_of(Pareto)}
     found |= {"te_iteration": IterationOptions, "free_form": FreeFormOptions}
     return {name: section for name, section in found.items() if section.model_fields}

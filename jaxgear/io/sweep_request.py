@@ -11,10 +11,10 @@ from ..contact import Operation
 from ..metrics import quantities
 from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
-from . import schema_sweep
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
-from .errors import DesignFileError, refused, suggestion
+from .errors import DesignFileError, check_known, naming, refuse_given, refused
+from .schema_sweep import SweepSection
 from .variants import read_variants
 
 # The keys that a kind of sampling takes; what another kind takes has no effect and is refused.
@@ -63,23 +63,26 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
     Raises:
         DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
     """
+    with naming(design.path):
+        return _request(design, samples, most)
+
+
+def _request(design: DesignFile, samples: int | None, most: int | None) -> SweepRequest:
     section = design.sweep
     if section is None:
-        raise DesignFileError(design.path, "sweep", "missing, nothing says which variants to evaluate")
+        raise DesignFileError("sweep", "missing, nothing says which variants to evaluate")
     if samples is not None:
         if "samples" not in _KEYS[section.sampling]:
             problem = f'"{section.sampling}" takes no number of samples from the command line'
-            raise DesignFileError(design.path, "sweep.sampling", problem)
+            raise DesignFileError("sweep.sampling", problem)
         section = section.model_copy(update={"samples": samples})
     if most is not None and section.samples is not None:
         section = section.model_copy(update={"samples": min(section.samples, most)})
     wanted = tuple(section.results or _RESULTS)
     for index, name in enumerate(wanted):
-        if name not in quantities:
-            key = f"sweep.results[{index}]"
-            raise DesignFileError(design.path, key, f'"{name}" is not known, {suggestion(name, quantities)}')
+        check_known(f"sweep.results[{index}]", name, quantities)
         if name in wanted[:index]:
-            raise DesignFileError(design.path, f"sweep.results[{index}]", f'"{name}" is there twice')
+            raise DesignFileError(f"sweep.results[{index}]", f'"{name}" is there twice')
     tolerance = design.tolerance
     load, highest = _load(design, section)
     return SweepRequest(
@@ -88,38 +91,35 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
         highest_torque=highest,
         results=wanted,
         part_rows=section.part_rows,
-        tolerance=None if tolerance is None else tolerance_of(design, tolerance),
+        tolerance=tolerance_of(design),
         samples=None if tolerance is None else tolerance.samples,
         seed=0 if tolerance is None else tolerance.seed,
     )
 
 
-def _load(design: DesignFile, section: schema_sweep.SweepSection):
+def _load(design: DesignFile, section: SweepSection):
     """The load and the highest torque."""
-    variable = next((free for free in design.open_case if free.key.startswith("load.")), None)
-    if variable is None:
-        load = load_of(design, "sweep", section.torques, section.weights)
+    variables = {free.key: free.name for free in design.open_case if free.key.startswith("load.")}
+    if not variables:
+        load = load_of(design, "sweep", section)
         return load, float(np.max(load.torques))
-    for key in ("torques", "weights"):
-        if getattr(section, key) is not None:
-            raise DesignFileError(design.path, f"sweep.{key}", f'has no effect, {variable.key} is "{variable.name}"')
-
-    free = next((free for free in design.open_case if free.key == "load.torque"), None)
-    return design.operation, design.torque if free is None else design.bounds[free.name][1]
+    key, name = next(iter(variables.items()))
+    refuse_given("sweep", section, ["torques", "weights"], f', {key} is "{name}"')
+    torque = variables.get("load.torque")
+    return design.operation, design.torque if torque is None else design.bounds[torque][1]
 
 
-def _plan(design: DesignFile, section: schema_sweep.SweepSection) -> AbstractPlan:
+def _plan(design: DesignFile, section: SweepSection) -> AbstractPlan:
     kind = section.sampling
     for key in ("samples", "seed", "levels", "file"):
-        given = getattr(section, key) is not None
-        if given and key not in _KEYS[kind]:
-            raise DesignFileError(design.path, f"sweep.{key}", f'has no effect with sampling = "{kind}"')
-        if not given and key in _KEYS[kind] and key not in _OPTIONAL:
-            raise DesignFileError(design.path, f"sweep.{key}", f'missing, sampling = "{kind}" needs it')
+        if key not in _KEYS[kind]:
+            refuse_given("sweep", section, [key], f' with sampling = "{kind}"')
+        elif getattr(section, key) is None and key not in _OPTIONAL:
+            raise DesignFileError(f"sweep.{key}", f'missing, sampling = "{kind}" needs it')
     bounds, seed = design.bounds, section.seed or 0
     if kind == "list":
         return read_variants(design.path.parent / str(section.file), bounds, design.units)
     if kind == "full_factorial":
-        return refused(design.path, "sweep.levels", lambda: FullFactorial(bounds, section.levels or 0))
+        return refused("sweep.levels", FullFactorial, bounds, section.levels or 0)
     make = Sobol if kind == "sobol" else LatinHypercube
-    return refused(design.path, "sweep.samples", lambda: make(bounds, section.samples or 0, seed=seed))
+    return refused("sweep.samples", make, bounds, section.samples or 0, seed=seed)

@@ -1,9 +1,11 @@
 """Objects of the library with named free parameters: what a design file holds before the parameters have values."""
 
+import inspect
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from functools import reduce
+from operator import add
 from typing import Any
 
 import equinox as eqx
@@ -11,9 +13,8 @@ import jax.numpy as jnp
 
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Number, fields_of
-from .errors import DesignFileError, problem
-from .kinds import not_known
-from .layout import Section, family, is_family, modules_of, section_of
+from .errors import DesignFileError, check_known, not_known, problem
+from .layout import Section, family, modules_of, section_of
 from .toml import decode, join
 
 # `tip_diameter = 3 mm must be`, `wheel module = 4 mm must be`: what the library says of a field
@@ -47,23 +48,12 @@ class Part:
     key: str
 
     def build(self, parameters: Mapping[str, Any]) -> Any:
-        """The object with the parameters in place of the open numbers; they may be tracers."""
-        return self.make(**{name: _fill(value, parameters) for name, value in self.fields.items()})
-
-    def checked(self, file: Path, parameters: Mapping[str, Any]) -> Any:
-        """The object with concrete parameters.
-
-        Args:
-            file: for the message.
-            parameters: in place of the open numbers.
+        """The object with the parameters in place of the open numbers; they may be tracers.
 
         Raises:
             DesignFileError: for what the class refuses, with the key of the field where the file gives it.
         """
-        given = {
-            name: value.checked(file, parameters) if isinstance(value, Part) else _fill(value, parameters)
-            for name, value in self.fields.items()
-        }
+        given = {name: _fill(value, parameters) for name, value in self.fields.items()}
         try:
             return self.make(**given)
         except (ValueError, OverflowError) as error:
@@ -71,29 +61,24 @@ class Part:
             field = _FIELD.match(text)
             owner = self.fields.get(field["part"]) if field and field["part"] else self
             if field and isinstance(owner, Part) and field["name"] in owner.fields:
-                raise DesignFileError(file, join(owner.key, field["name"]), text[field.end() :]) from None
-            raise DesignFileError(file, self.key, text) from None
+                raise DesignFileError(join(owner.key, field["name"]), text[field.end() :]) from error
+            raise DesignFileError(self.key, text) from error
 
-    def free(self) -> Iterator[Free]:
+    def free(self) -> list[Free]:
         """Every open number."""
-        for value in self.fields.values():
-            yield from _open(value)
+        return _open([*self.fields.values()])
 
 
 def build(parts: list[Part], parameters: Mapping[str, Any]) -> AbstractModification:
     """The sum of the parts."""
-    total = None
-    for part in parts:
-        term = part.build(parameters)
-        total = term if total is None else total + term
-    return NoModification() if total is None else total
+    terms = [part.build(parameters) for part in parts]
+    return reduce(add, terms) if terms else NoModification()
 
 
-def parse(file: Path, key: str, table: Mapping[str, Any] | str, cls: type[eqx.Module]) -> Part:
+def parse(key: str, table: Mapping[str, Any] | str, cls: type[eqx.Module]) -> Part:
     """An object from its table; `type` says which class derived from an abstract one it is of.
 
     Args:
-        file: for the message.
         key: dotted key of the table.
         table: the table, or the name of its type where that says all.
         cls: its class.
@@ -101,51 +86,48 @@ def parse(file: Path, key: str, table: Mapping[str, Any] | str, cls: type[eqx.Mo
     Raises:
         DesignFileError: for an unknown type, unknown or missing keys, wrong types and numbers out of range.
     """
-    if is_family(cls):
+    if inspect.isabstract(cls):
         known = family(cls)
         if isinstance(table, str):
-            if table not in known:
-                raise DesignFileError(file, key, not_known(table, known))
+            check_known(key, table, known)
             table = {"type": table}
         name = table.get("type")
         if name is None:
-            raise DesignFileError(file, join(key, "type"), f"missing, must be one of {', '.join(known)}")
+            raise DesignFileError(join(key, "type"), f"missing, must be one of {', '.join(known)}")
         if not isinstance(name, str) or name not in known:
-            raise DesignFileError(file, join(key, "type"), not_known(name, known))
+            raise DesignFileError(join(key, "type"), not_known(name, known))
         cls, table = known[name], {other: value for other, value in table.items() if other != "type"}
-    return part_of(file, key, decode(file, key, table, section_of(cls)), cls)
+    return part_of(key, decode(key, table, section_of(cls)), cls)
 
 
-def part_of(file: Path, key: str, section: Section, cls: type[eqx.Module]) -> Part:
+def part_of(key: str, section: Section, cls: type[eqx.Module]) -> Part:
     """An object from its decoded table."""
     numbers, modules = fields_of(cls), modules_of(cls)
     fields: dict[str, Any] = {}
     for name, value in section.given().items():
         here = join(key, name)
         if name in modules:
-            fields[name] = parse(file, here, value, modules[name])
+            fields[name] = parse(here, value, modules[name])
         elif name in numbers:
-            fields[name] = opened(value, here, numbers[name])
+            fields[name] = _opened(value, here, numbers[name])
         elif name in section_of(cls).model_fields:
             fields[name] = value
     return Part(cls, fields, key)
 
 
-def opened(value, key: str, number: Number):
+def _opened(value, key: str, number: Number):
     """A value of a file, with `Free` in place of the names of variables."""
     if isinstance(value, list):
-        return [opened(item, f"{key}[{i}]", number) for i, item in enumerate(value)]
+        return [_opened(item, f"{key}[{i}]", number) for i, item in enumerate(value)]
     return Free(value, key, number) if isinstance(value, str) else value
 
 
-def _open(value) -> Iterator[Free]:
+def _open(value) -> list[Free]:
     if isinstance(value, Part):
-        yield from value.free()
-    elif isinstance(value, list):
-        for item in value:
-            yield from _open(item)
-    elif isinstance(value, Free):
-        yield value
+        return value.free()
+    if isinstance(value, list):
+        return [free for item in value for free in _open(item)]
+    return [value] if isinstance(value, Free) else []
 
 
 def _fill(value, parameters):
@@ -153,6 +135,6 @@ def _fill(value, parameters):
         return value.build(parameters)
     if isinstance(value, Free):
         return parameters[value.name]
-    if isinstance(value, list) and any(True for _ in _open(value)):
+    if isinstance(value, list) and _open(value):
         return jnp.stack([jnp.asarray(_fill(item, parameters), float) for item in value])
     return value

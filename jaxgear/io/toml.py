@@ -24,32 +24,29 @@ def read(path: Path) -> dict[str, Any]:
     """
     try:
         if path.exists() and not path.is_file():
-            raise DesignFileError(path, "", "is a folder, not a file" if path.is_dir() else "is not a regular file")
+            raise ValueError("is a folder, not a file" if path.is_dir() else "is not a regular file")
         content = path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: a path with a null byte
-        if isinstance(error, DesignFileError):
-            raise
-        raise DesignFileError(path, "", getattr(error, "strerror", None) or error) from None
+    except (OSError, ValueError) as error:  # ValueError: also a path with a null byte
+        raise DesignFileError("", getattr(error, "strerror", None) or error) from None
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise DesignFileError(path, "", f"line {line}: not UTF-8 text") from None
+        raise DesignFileError("", f"line {line}: not UTF-8 text") from None
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise DesignFileError(path, "", _syntax(str(error), text)) from None
+        raise DesignFileError("", _syntax(str(error), text)) from None
     except ValueError:  # of int()
-        raise DesignFileError(path, "", "a whole number has more than 4300 digits") from None
+        raise DesignFileError("", "a whole number has more than 4300 digits") from None
     except RecursionError:
-        raise DesignFileError(path, "", "tables or lists are nested too deeply") from None
+        raise DesignFileError("", "tables or lists are nested too deeply") from None
 
 
-def decode(file: Path, key: str, data: Any, section: type[S]) -> S:
+def decode(key: str, data: Any, section: type[S]) -> S:
     """Decodes one table into its section.
 
     Args:
-        file: for the message.
         key: dotted key of the table, "" at the top level.
         data: the table.
         section: its keys.
@@ -64,7 +61,7 @@ def decode(file: Path, key: str, data: Any, section: type[S]) -> S:
     first = problems[0]
     if first["type"] == "missing":  # often it is there, misspelt
         first = next((problem for problem in problems if problem["type"] == "extra_forbidden"), first)
-    raise DesignFileError(file, join(key, _dotted(first["loc"])), _worded(first, section))
+    raise DesignFileError(join(key, _dotted(first["loc"])), _worded(first, section))
 
 
 def join(key: str, name: str) -> str:
@@ -83,6 +80,8 @@ def _dotted(loc: tuple[int | str, ...]) -> str:
 
 def _worded(problem, section: type[BaseModel]) -> str:
     kind, context = problem["type"], problem.get("ctx", {})
+    if kind == "value_error":
+        return str(context["error"])
     if kind == "extra_forbidden":
         return f"unknown key, {suggestion(problem['loc'][-1], section.model_fields)}"
     if kind == "missing":
@@ -90,11 +89,8 @@ def _worded(problem, section: type[BaseModel]) -> str:
     if kind in _CONTAINERS:
         return not_of_kind(_CONTAINERS[kind], problem["input"])
     if kind in ("too_short", "too_long"):
-        if not context["actual_length"]:
-            return f"{'{}' if isinstance(problem['input'], dict) else '[]'} is empty"
-        return f"must be a list of length {context.get('min_length', context.get('max_length'))}, not " + str(
-            context["actual_length"]
-        )
+        length, wanted = context["actual_length"], context.get("min_length", context.get("max_length"))
+        return f"must be a list of length {wanted}, not {length}" if length else f"{problem['input']} is empty"
     return problem["msg"]
 
 

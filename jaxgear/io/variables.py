@@ -1,7 +1,6 @@
 """The table [variables]: numbers of the file that are left open."""
 
-from collections.abc import Iterable, Sequence
-from pathlib import Path
+from collections.abc import Iterable
 
 from . import schema, template
 from .errors import DesignFileError, suggestion
@@ -10,15 +9,13 @@ from .toml import decode
 
 
 def read_variables(
-    file: Path, tables: schema.Tables, parts: Sequence[template.Part], others: Iterable[template.Free]
+    tables: schema.Tables, open_numbers: Iterable[template.Free]
 ) -> tuple[dict[str, tuple[float, float]], dict[str, str]]:
     """Bounds and units of the free parameters, each declared once and used at least once.
 
     Args:
-        file: for messages.
         tables: the tables [variables.NAME].
-        parts: modifications, which must be possible at both bounds.
-        others: open numbers of gears, pair and load.
+        open_numbers: where they stand.
 
     Raises:
         DesignFileError: for whatever is wrong with a variable or its use.
@@ -27,30 +24,27 @@ def read_variables(
     units: dict[str, str] = {}
     for name, table in tables.items():
         key = f"variables.{name}"
-        variable = decode(file, key, table, schema.VariableSection)
-        increasing(file, f"{key}.high", variable.low, variable.high)
+        variable = decode(key, table, schema.VariableSection)
+        increasing(f"{key}.high", variable.low, variable.high)
         bounds[name] = (variable.low, variable.high)
-    for free in (*(free for part in parts for free in part.free()), *others):
+    for free in open_numbers:
         unit = free.number.unit
         if free.name not in bounds:
             known = suggestion(free.name, bounds) if bounds else "there is no [variables] table"
-            raise DesignFileError(file, free.key, f'"{free.name}" is not a variable, {known}')
+            raise DesignFileError(free.key, f'"{free.name}" is not a variable, {known}')
         other = units.setdefault(free.name, unit)
         if other != unit:
             problem = f"{free.name} stands for {_quantity(unit)} here and for {_quantity(other)} elsewhere"
-            raise DesignFileError(file, free.key, problem)
+            raise DesignFileError(free.key, problem)
         for end, bound in zip(("low", "high"), bounds[free.name]):
             if problem := outside(free.number, bound):
-                raise DesignFileError(file, f"variables.{free.name}.{end}", f"{problem} as {free.key}")
+                raise DesignFileError(f"variables.{free.name}.{end}", f"{problem} as {free.key}")
     for name, table in tables.items():
         if name not in units:
-            raise DesignFileError(file, f"variables.{name}", "is declared but used nowhere")
+            raise DesignFileError(f"variables.{name}", "is declared but used nowhere")
         unit = table.get("unit")
         if unit is not None and unit != units[name]:
-            raise DesignFileError(file, f"variables.{name}.unit", f'"{unit}" must be "{units[name]}" as it is used')
-    for part in parts:
-        for i in (0, 1):
-            part.checked(file, {name: limits[i] for name, limits in bounds.items()})
+            raise DesignFileError(f"variables.{name}.unit", f'"{unit}" must be "{units[name]}" as it is used')
     return bounds, {name: units[name] for name in bounds}
 
 
@@ -58,7 +52,7 @@ def _quantity(unit: str) -> str:
     return f"a quantity in {unit}" if unit else "a pure number"
 
 
-def increasing(file: Path, key: str, low: float, high: float, unit: str = "") -> None:
+def increasing(key: str, low: float, high: float, unit: str = "") -> None:
     """Refuses an upper limit that is not above the lower one."""
     if high <= low:
-        raise DesignFileError(file, key, f"{high:g}{unit} must be greater than {low:g}{unit}")
+        raise DesignFileError(key, f"{high:g}{unit} must be greater than {low:g}{unit}")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..sweeps import VariantList
-from .errors import DesignFileError
+from .errors import DesignFileError, naming
 
 _HEADING = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^]]*)\])?")  # as tables of sweeps are exported
 _LENGTHS = {"nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "m": 1.0}  # with micro sign and with mu
@@ -34,19 +34,18 @@ def read_variants(
     import pyarrow
 
     names, rows = list(bounds), 0
-    with tempfile.TemporaryFile() as scratch:  # the array on it outlives it
+    with naming(path), tempfile.TemporaryFile() as scratch:  # the array on it outlives it
         try:
             for piece in (_parquet if path.suffix.lower() == ".parquet" else _csv)(path, names, units or {}):
-                _check_bounds(path, piece, bounds, rows)
+                _check_bounds(piece, bounds, rows)
                 scratch.write(np.ascontiguousarray(piece, np.float64).tobytes())
                 rows += len(piece)
         except UnicodeDecodeError:
-            raise DesignFileError(path, "", "is not text in UTF-8: save it so, or as Parquet") from None
+            raise DesignFileError("", "is not text in UTF-8: save it so, or as Parquet") from None
         except (OSError, pyarrow.ArrowException) as error:
-            problem = getattr(error, "strerror", None) or str(error).partition("\n")[0]
-            raise DesignFileError(path, "", problem) from None
+            raise DesignFileError("", getattr(error, "strerror", None) or str(error).partition("\n")[0]) from None
         if not rows:
-            raise DesignFileError(path, "", "holds no variants")
+            raise DesignFileError("", "holds no variants")
         scratch.flush()
         return VariantList(names, np.memmap(scratch, np.float64, "r", shape=(rows, len(names))))
 
@@ -57,7 +56,7 @@ def _csv(path: Path, names: Sequence[str], units: Mapping[str, str]) -> Iterator
 
     with path.open(encoding="utf-8-sig", newline="") as file:
         headings = [heading.strip() for heading in next(text.reader(file), [])]
-    places, factors = _columns(path, [_parts(heading) for heading in headings], names, units)
+    places, factors = _columns([_parts(heading) for heading in headings], names, units)
     numbered = [str(place) for place in range(len(headings))]  # headings that nobody asks for may be there twice
     wanted = [numbered[place] for place in places]
     options = csv.ConvertOptions(column_types=dict.fromkeys(wanted, pyarrow.float64()), include_columns=wanted)
@@ -73,40 +72,40 @@ def _parquet(path: Path, names: Sequence[str], units: Mapping[str, str]) -> Iter
     with parquet.ParquetFile(path) as file:
         fields = list(file.schema_arrow)
         known = [(_parts(field.name)[0], _unit(field) or _parts(field.name)[1]) for field in fields]
-        places, factors = _columns(path, known, names, units)
+        places, factors = _columns(known, names, units)
         wanted = [fields[place].name for place in places]
         types = pyarrow.schema([(name, pyarrow.float64()) for name in wanted])
         for batch in file.iter_batches(columns=wanted):
             yield _numbers(batch.select(wanted).cast(types)) * factors
 
 
-def _columns(path: Path, known: Sequence[tuple[str, str | None]], names: Sequence[str], units: Mapping[str, str]):
+def _columns(known: Sequence[tuple[str, str | None]], names: Sequence[str], units: Mapping[str, str]):
     """Places of the parameters among the columns of the file, and what turns their numbers into their units."""
     places = {name: [i for i, (other, _) in enumerate(known) if other == name] for name in names}
     missing = [name for name in names if not places[name]]
     if missing:
-        raise DesignFileError(path, "", f"has no column {', '.join(missing)}")
+        raise DesignFileError("", f"has no column {', '.join(missing)}")
     for name in names:
         if len(places[name]) > 1:
-            raise DesignFileError(path, "", f"has {len(places[name])} columns {name}, must have one")
+            raise DesignFileError("", f"has {len(places[name])} columns {name}, must have one")
     chosen = [places[name][0] for name in names]
-    return chosen, np.array([_factor(path, name, known[i][1], units.get(name)) for name, i in zip(names, chosen)])
+    return chosen, np.array([_factor(name, known[i][1], units.get(name)) for name, i in zip(names, chosen)])
 
 
-def _factor(path: Path, name: str, given: str | None, wanted: str | None) -> float:
+def _factor(name: str, given: str | None, wanted: str | None) -> float:
     if given is None or wanted is None or given == wanted:
         return 1.0
     if given in _LENGTHS and wanted in _LENGTHS:
         return float(f"{_LENGTHS[given] / _LENGTHS[wanted]:.1e}")  # a power of ten to the last bit
-    raise DesignFileError(path, "", f"column {name} is in [{given}], must be in [{wanted or '-'}]")
+    raise DesignFileError("", f"column {name} is in [{given}], must be in [{wanted or '-'}]")
 
 
-def _check_bounds(path: Path, rows: np.ndarray, bounds: Mapping[str, tuple[float, float]], before: int) -> None:
+def _check_bounds(rows: np.ndarray, bounds: Mapping[str, tuple[float, float]], before: int) -> None:
     for column, (name, (low, high)) in zip(rows.T, bounds.items()):
         outside = np.flatnonzero((column < low) | (column > high))
         if outside.size:
             value, number = column[outside[0]], before + outside[0]
-            raise DesignFileError(path, "", f"{name} = {value:g} of variant {number} must be from {low:g} to {high:g}")
+            raise DesignFileError("", f"{name} = {value:g} of variant {number} must be from {low:g} to {high:g}")
 
 
 def _parts(heading: str) -> tuple[str, str | None]:
