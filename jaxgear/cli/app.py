@@ -18,11 +18,9 @@ from ..optimize import METHODS
 from ..sizing import iso_relief
 from . import interrupt, report
 from .devices import join_processes, use_all_cores
+from .progress import Stages
 from .run import default_folder, opened, run
 from .sweep import run_sweep
-
-_TORQUES, _QUICK_TORQUES = 25, 7
-_QUICK_POSITIONS = 16
 
 _METHODS = ", ".join((*METHODS, *METHODS_WITHOUT_VARIABLES))
 
@@ -77,13 +75,14 @@ def analyze(
     no_cache: NoCache = False,
 ) -> int:
     """Analyze the unmodified pair and the modification of the design file."""
-    with opened(file, cache=not no_cache) as (design, stages):
+    with Stages() as stages:
+        design = opened(file, cache=not no_cache)
         if design.bounds:
             free = ", ".join(design.bounds)
             problem = f"analyze needs numbers, these are free: {free}; use jaxgear optimize"
             raise DesignFileError("variables", problem, file)
         with run(design, output or default_folder(file, "analyze"), stages) as current:
-            current.prepare(torques=_TORQUES)
+            current.prepare()
             current.evaluate("unmodified", NoModification(), NoModification())
             pinion, wheel = design.design({})
             if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
@@ -108,13 +107,12 @@ def optimize(
     Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
     the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
     """
-    with opened(file, cache=not no_cache) as (design, stages):
+    with Stages() as stages:
+        design = opened(file, cache=not no_cache)
         request = optimize_request(design, method=method, quick=quick)
         target = output or default_folder(file, "optimize", request.method, quick=quick)
         with run(design, target, stages) as current:
-            if quick:
-                current.coarsen(positions=_QUICK_POSITIONS)
-            current.prepare(torques=_QUICK_TORQUES if quick else _TORQUES)
+            current.prepare(quick=quick)
             factor = design.optimize.application_factor
             relief = eqx.filter_jit(iso_relief)(design.pair(), design.torque, application_factor=factor)
             involute = NoModification()

@@ -107,8 +107,7 @@ def write_figures(
         axes["iterations_transmission_error"] = plot.iterations_transmission_error(optimum, mesh.phase)
     if front is not None:
         axes["front"] = plot.optimum_front(front, chosen=front.chosen)
-    for name, drawn in axes.items():
-        plot.save(np.ravel(drawn)[0].figure, folder / f"{name}.png")
+    report.save_figures(folder, axes)
 
 
 def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[str]:

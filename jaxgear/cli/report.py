@@ -38,6 +38,7 @@ _ROWS = {
 }
 _HARRIS_CURVES = 7
 _TITLE = 9.0  # [pt]
+_WIDTH = 120  # of a file [characters]
 
 
 def table(file: DesignFile, evaluations: Evaluations) -> Table:
@@ -110,15 +111,10 @@ def objectives(evaluations: Evaluations) -> list[str]:
     return [label for label in next(iter(evaluations.values())).objectives if label not in known | set(_ROWS)]
 
 
-def unmodified(evaluations: Evaluations) -> float:
-    """PPTE of the first design, which is unmodified [um]."""
-    return float(next(iter(evaluations.values())).metrics["ppte_um"])
-
-
 def reduction(evaluations: Evaluations) -> float:
-    """By how much the main design lowers the PPTE of the first [%]."""
-    before = unmodified(evaluations)
-    return 100 * (1 - float(main(evaluations).metrics["ppte_um"]) / before) if before else 0.0
+    """By how much the main design lowers the PPTE of the first, which is unmodified [%]."""
+    before = next(iter(evaluations.values())).metrics["ppte_um"]
+    return 100 * (1 - main(evaluations).metrics["ppte_um"] / before) if before else 0.0
 
 
 def main(evaluations: Evaluations) -> Evaluation:
@@ -188,6 +184,13 @@ def write_figures(folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evalu
         axes["lead_chart"] = plot.lead_chart(mesh, flanks(evaluations))
         axes["pressure_map"] = plot.pressure_map(main(evaluations).cycle)
         axes["pressure_map"].set_title(_main_name(evaluations), loc="left", fontsize=_TITLE)
+    save_figures(folder, axes)
+
+
+def save_figures(folder: Path, axes: Mapping[str, Any]) -> None:
+    """Writes the figures that hold the axes, each under its name."""
+    from .. import plot
+
     for name, drawn in axes.items():
         plot.save(np.ravel(drawn)[0].figure, folder / f"{name}.png")
 
@@ -208,7 +211,20 @@ def version() -> str:
 def console(*, stderr: bool = False) -> Console:
     """A console that takes brackets literally; wide enough for the table when it writes into a file."""
     made = Console(stderr=stderr, markup=False, highlight=False, emoji=False)
-    return made if made.is_terminal else Console(stderr=stderr, markup=False, highlight=False, emoji=False, width=120)
+    if not made.is_terminal:
+        made.width = _WIDTH
+    return made
+
+
+def say(*lines: str) -> None:
+    """Prints lines that the terminal may break."""
+    for line in lines:
+        console().print(line, soft_wrap=True)
+
+
+def warn(line: str) -> None:
+    """Prints a warning on stderr."""
+    console(stderr=True).print(f"jaxgear: warning: {line}", style="bold red", soft_wrap=True)
 
 
 def _design(evaluation: Evaluation) -> dict[str, Any]:

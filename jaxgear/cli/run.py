@@ -9,16 +9,18 @@ from pathlib import Path
 
 import jax
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from ..contact import Mesh
+from ..contact import Mesh, Resolution
 from ..io import DesignFile, OptimizeRequest, load_design, result_folder, write_flanks, write_front, write_summary
 from ..microgeometry import AbstractModification
 from ..optimize import Front, Optimum, Problem, Projection, judged, project
 from . import interrupt, optimum_report, report
 from .cache import enable_cache
+from .progress import Stages
 from .study import Evaluation, Evaluator
+
+_TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
+_QUICK_POSITIONS = 16
 
 Modifications = tuple[AbstractModification, AbstractModification]
 
@@ -26,30 +28,24 @@ Modifications = tuple[AbstractModification, AbstractModification]
 class Run:
     """Collects the designs of one run and writes them into `folder`."""
 
-    def __init__(self, design: DesignFile, target: Path, folder: Path, stages: "Stages"):
+    def __init__(self, design: DesignFile, target: Path, folder: Path, stages: Stages):
         self.design = design
         self._target, self._folder, self._stages = target, folder, stages
+        self._quick = False
         self._evaluations: dict[str, Evaluation] = {}
         self._optimum: Optimum | None = None
         self._front: Front | None = None
         self._projection: Projection | None = None
-        self._resolution, self._quick = design.resolution(), False
 
-    def coarsen(self, *, positions: int) -> None:
-        """Makes the run a quick one, with at most so many mesh positions."""
-        self._quick = True
-        self._resolution = dataclasses.replace(self._resolution, positions=min(positions, self._resolution.positions))
-
-    def prepare(self, *, torques: int) -> None:
-        """Prepares the mesh.
-
-        Args:
-            torques: number of torques over the range of the file.
-        """
+    def prepare(self, *, quick: bool = False) -> None:
+        """Prepares the mesh, of a quick run a coarse one."""
         self._stages.begin("preparing the mesh")
-        self._mesh: Mesh = jax.block_until_ready(self.design.mesh(self._resolution))
-        self._torques = np.linspace(*self.design.torque_range, torques)
-        self._judge_on(self._mesh, None)
+        self._quick = quick
+        size = self.design.resolution()
+        mesh = jax.block_until_ready(self.design.mesh(coarse(size) if quick else size))
+        self._searched_at = mesh.resolution.positions
+        self._torques = np.linspace(*self.design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
+        self._judge_on(mesh, None)
 
     def evaluate(self, name: str, pinion: AbstractModification, wheel: AbstractModification) -> None:
         """Evaluates a design and keeps it."""
@@ -106,87 +102,41 @@ class Run:
 
     def show(self) -> bool:
         """Prints the comparison, after the results are in place; False when a solution or a constraint failed."""
-        out = report.console()
-        out.print(report.table(self.design, self._evaluations))
+        report.console().print(report.table(self.design, self._evaluations))
         if self._optimum is not None:
-            lines = optimum_report.verdict(
-                self.design,
-                self._optimum,
-                self._projection,
-                self._evaluations,
-                searched_at=self._resolution.positions,
-            )
-            for line in lines:
-                out.print(line, soft_wrap=True)
-            for line in optimum_report.front_lines(self._front) if self._front is not None else ():
-                out.print(line, soft_wrap=True)
+            found = self._optimum, self._projection, self._evaluations
+            report.say(*optimum_report.verdict(self.design, *found, searched_at=self._searched_at))
+        if self._front is not None:
+            report.say(*optimum_report.front_lines(self._front))
         if self._quick:
-            out.print("quick run: coarse positions and a short search, not a result to build on", soft_wrap=True)
-        out.print(report.bores(self.design), soft_wrap=True)
-        for line in report.doubt_lines(report.doubts(self.design, self._evaluations)):
-            out.print(line, soft_wrap=True)
-        out.print(f"results in {self._target}{os.sep}, {self._stages.elapsed:.1f} s", soft_wrap=True)
+            report.say("quick run: coarse positions and a short search, not a result to build on")
+        report.say(report.bores(self.design))
+        report.say(*report.doubt_lines(report.doubts(self.design, self._evaluations)))
+        report.say(f"results in {self._target}{os.sep}, {self._stages.elapsed:.1f} s")
         failures = list(report.failures(self._evaluations))
-        for line in failures:
-            report.console(stderr=True).print(f"jaxgear: warning: {line}", style="bold red", soft_wrap=True)
         if self._optimum is not None and not self._optimum.feasible:
             failures.append("constraints are not met")
-            report.console(stderr=True).print(f"jaxgear: warning: {failures[-1]}", style="bold red", soft_wrap=True)
+        for line in failures:
+            report.warn(line)
         return not failures
 
     def _judge_on(self, mesh: Mesh, problem: Problem | None) -> None:
         """Evaluates from now on on this mesh, and by the measure of a problem."""
         self._mesh, self._problem = mesh, problem
-        self._evaluator = Evaluator(mesh, self.design.torque, self._torques, self.design.speed, self.design.friction)
+        self._evaluator = Evaluator(self.design, mesh, self._torques)
 
 
-class Stages:
-    """Progress on stderr: a bar on a terminal, a line per stage elsewhere."""
-
-    def __init__(self, console: Console):
-        self._console, self._began = console, time.perf_counter()
-        columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn()
-        self._progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-        self._task = self._progress.add_task("reading the design file", total=None, note="")
-
-    def __enter__(self) -> "Stages":
-        self._progress.start()
-        return self
-
-    def __exit__(self, *exception) -> None:
-        self._progress.stop()
-
-    @property
-    def elapsed(self) -> float:
-        """Since the start of the run [s]."""
-        return time.perf_counter() - self._began
-
-    def begin(self, stage: str) -> None:
-        """Names the next stage."""
-        interrupt.check()
-        self._progress.update(self._task, description=stage, total=None, completed=0, note="")
-        if not self._console.is_terminal:
-            self._console.print(f"jaxgear: {stage}")
-
-    def step(self, step: int, total: int, best: float | None) -> None:
-        """Callback of the search."""
-        interrupt.check()
-        self._progress.update(self._task, completed=step, total=total, note=f"best {best:.4g}")
-
-
-@contextmanager
-def opened(file: Path, *, cache: bool) -> Iterator[tuple[DesignFile, Stages]]:
-    """A design file and the progress of the command.
-
-    Args:
-        file: design file.
-        cache: keep compiled programs on disk.
-    """
+def opened(file: Path, *, cache: bool) -> DesignFile:
+    """A design file, in double precision; `cache` keeps compiled programs on disk."""
     jax.config.update("jax_enable_x64", True)
     if cache:
         enable_cache()
-    with Stages(report.console(stderr=True)) as stages:
-        yield load_design(file), stages
+    return load_design(file)
+
+
+def coarse(size: Resolution) -> Resolution:
+    """The array sizes of a quick run."""
+    return dataclasses.replace(size, positions=min(size.positions, _QUICK_POSITIONS))
 
 
 def default_folder(file: Path, *command: str, quick: bool = False) -> Path:
@@ -197,13 +147,7 @@ def default_folder(file: Path, *command: str, quick: bool = False) -> Path:
 
 @contextmanager
 def run(design: DesignFile, target: Path, stages: Stages) -> Iterator[Run]:
-    """Opens the result folder; the results appear when the block ends without an exception.
-
-    Args:
-        design: design file.
-        target: result folder.
-        stages: progress of the command.
-    """
+    """Opens the result folder; the results appear when the block ends without an exception."""
     with ExitStack() as putting_in_place:
         with result_folder(target) as folder:
             yield Run(design, target, folder, stages)

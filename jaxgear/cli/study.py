@@ -9,11 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact import Mesh, MeshCycle
+from ..io import DesignFile
 from ..metrics import flash_temperature, summary
 from ..microgeometry import AbstractModification
 from ..sweeps import over_torques
-
-Metrics = dict[str, float | bool]
 
 _SURFACE_REACH, _SURFACE_TORQUES = 2.0, 21
 
@@ -36,7 +35,7 @@ class Evaluation:
     pinion: AbstractModification
     wheel: AbstractModification
     cycle: MeshCycle
-    metrics: Metrics
+    metrics: dict[str, float | bool]
     transmission_error: np.ndarray
     ppte: np.ndarray
     failed_torques: list[float]
@@ -49,21 +48,18 @@ class Evaluator:
     """Evaluates designs of one mesh.
 
     Attributes:
+        file: design torque, speed and friction.
         mesh: prepared mesh.
-        torque: design torque [N m].
-        torques: further ones [N m].
-        speed, friction: of the flash temperature; None where it is not known, or for the default.
+        torques: besides the design torque [N m].
     """
 
+    file: DesignFile
     mesh: Mesh
-    torque: float
     torques: np.ndarray
-    speed: float | None
-    friction: float | None
 
     def __call__(self, pinion: AbstractModification, wheel: AbstractModification) -> Evaluation:
         """Evaluates one design."""
-        torques = np.concatenate([[self.torque], self.torques])
+        torques = np.concatenate([[self.file.torque], self.torques])
         over_torques(self.mesh, torques[:1], pinion=pinion, wheel=wheel)  # compiles, where it has to
         began = time.perf_counter()
         cycles = over_torques(self.mesh, torques, pinion=pinion, wheel=wheel)
@@ -71,7 +67,7 @@ class Evaluator:
         curves = np.asarray([cycle.transmission_error for cycle in cycles])
         converged = np.asarray([cycle.converged for cycle in cycles]) & np.isfinite(curves)
         # without the flanks: one program serves every kind of them
-        heat = (None if value is None else jnp.asarray(value) for value in (self.speed, self.friction))
+        heat = (None if value is None else jnp.asarray(value) for value in (self.file.speed, self.file.friction))
         metrics = jax.tree.map(np.asarray, _numbers(replace(cycles[0], pinion=None, wheel=None), *heat))
         return Evaluation(
             pinion=pinion,
@@ -90,7 +86,7 @@ class Evaluator:
         Returns:
             the torques [N m], shape (torques,), and the transmission error [um], shape (torques, positions).
         """
-        torques = np.linspace(0.0, _SURFACE_REACH * self.torque, _SURFACE_TORQUES)
+        torques = np.linspace(0.0, _SURFACE_REACH * self.file.torque, _SURFACE_TORQUES)
         cycles = over_torques(self.mesh, torques, pinion=pinion, wheel=wheel)
         return torques, np.asarray([cycle.transmission_error for cycle in cycles])
 

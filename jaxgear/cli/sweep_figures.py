@@ -8,6 +8,7 @@ import numpy as np
 
 from ..metrics import quantity_of
 from ..sweeps import SweepTable
+from . import report
 
 _DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory does not grow with the table
 _CHARTS = 6  # radar charts
@@ -52,12 +53,12 @@ def write_figures(folder: Path, table: SweepTable, results: Sequence[str]) -> No
         axes["radar"] = plot.radar(
             _columns(best, heads), heads, names=names, note=common, labels=short, maximize=maximize
         )
-    for name, drawn in axes.items():
-        axis = np.ravel(drawn)[0]
-        if step > 1 and name != "radar":
-            note = f"1 in {step} of {size:,} variants".replace(",", "\u2009")
+    if step > 1:
+        note = f"1 in {step} of {size:,} variants".replace(",", "\u2009")
+        for name in axes.keys() - {"radar"}:
+            axis = np.ravel(axes[name])[0]
             axis.set_title(note, loc="left", pad=32, fontsize=axis.xaxis.label.get_fontsize())
-        plot.save(axis.figure, folder / f"{name}.png")
+    report.save_figures(folder, axes)
 
 
 def _columns(table: SweepTable, names: Sequence[str]) -> dict[str, np.ndarray]:

@@ -1,0 +1,82 @@
+"""Progress on stderr: a bar on a terminal, lines elsewhere."""
+
+import os
+import time
+from pathlib import Path
+
+from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from . import interrupt, report
+
+_LINES = 10  # of a sweep, where there is no terminal
+
+
+class _Bar(Progress):
+    def __init__(self, *columns: ProgressColumn, doing: str, note: str):
+        console = report.console(stderr=True)
+        super().__init__(*columns, console=console, transient=True, disable=not console.is_terminal)
+        self._began = time.perf_counter()
+        self._task = self.add_task(doing, total=None, note=note)
+
+    @property
+    def elapsed(self) -> float:
+        """Since the start [s]."""
+        return time.perf_counter() - self._began
+
+    def _say(self, line: str) -> None:
+        if not self.console.is_terminal:
+            self.console.print(f"jaxgear: {line}", soft_wrap=True)
+
+
+class Stages(_Bar):
+    """Progress of a command through its stages."""
+
+    def __init__(self):
+        columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn()
+        super().__init__(*columns, doing="reading the design file", note="")
+
+    def begin(self, stage: str) -> None:
+        """Names the next stage."""
+        interrupt.check()
+        self.update(self._task, description=stage, total=None, completed=0, note="")
+        self._say(stage)
+
+    def step(self, step: int, total: int, best: float | None) -> None:
+        """Callback of the search."""
+        interrupt.check()
+        self.update(self._task, completed=step, total=total, note=f"best {best:.4g}")
+
+
+class Meter(_Bar):
+    """Progress of a sweep, whose callback it is.
+
+    Attributes:
+        done: variants of this process, None before the first.
+    """
+
+    def __init__(self, target: Path):
+        columns = TextColumn("{task.fields[note]}"), BarColumn(), TextColumn("{task.percentage:.0f} %")
+        super().__init__(*columns, TimeRemainingColumn(), doing="", note="preparing")
+        self.done: int | None = None
+        self._target = target
+        self._first, self._since, self._lines = 0, self._began, 0
+
+    def __call__(self, done: int, total: int, best: float | None) -> None:
+        if self.done is None:
+            self._first, self._since = done, time.perf_counter()
+            if done:
+                self.console.print(f"jaxgear: resuming, {done:,} of {total:,} variants are there", soft_wrap=True)
+        self.done = done
+        there = f"{done:,} of {total:,} variants"
+        interrupt.note(f"{there} are in {self._target}{os.sep}, resume with the same command")
+        note = there + (f", {self.rate:,.0f}/s" if self.rate else "")
+        self.update(self._task, completed=done, total=total, note=note)
+        if done * _LINES // total > self._lines:
+            self._lines = done * _LINES // total
+            self._say(note)
+
+    @property
+    def rate(self) -> float:
+        """Variants per second of this process, with the compilation of its program."""
+        spent = time.perf_counter() - self._since
+        return ((self.done or 0) - self._first) / spent if spent > 0 else 0.0
