@@ -1,10 +1,10 @@
 """Kinds of values in a design file: what may stand after a key, how it is checked and how it is described.
 
-Pydantic finds its way through the tables and says where a value is wrong; these classes say what is wrong with it.
+Pydantic finds its way through the tables and says where a value is wrong; these functions say what is wrong with it.
 """
 
 import datetime
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,199 +15,125 @@ from .errors import not_known
 from .ranges import outside
 
 # Tags of alternatives; they are no part of a key.
-TAGS = ("<list>", "<table>", "<other>")
+TAGS = ("<plain>", "<many>")
 
 
-class Kind(ABC):
-    """What may stand after a key."""
-
-    @property
-    @abstractmethod
-    def words(self) -> str:
-        """What is allowed, for messages and the reference."""
-
-    @abstractmethod
-    def schema(self) -> CoreSchema:
-        """For pydantic."""
-
-    def __get_pydantic_core_schema__(self, source, handler) -> CoreSchema:
-        return self.schema()
-
-
-class Plain(Kind):
-    """One value, neither a list nor a table."""
-
-    @abstractmethod
-    def read(self, value: Any) -> Any:
-        """The value as it is used; raises a `ValueError` that says what is wrong with it."""
-
-    def schema(self) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
-
-
-@dataclass(frozen=True)
-class Real(Plain):
-    """A number.
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """What may stand after a key.
 
     Attributes:
-        number: unit and range.
+        words: what is allowed, for messages and the reference.
+        schema: for pydantic.
+        number: unit and range of the number or numbers; None for something else.
+    """
+
+    words: str
+    schema: CoreSchema
+    number: Number | None = None
+
+    def __get_pydantic_core_schema__(self, source, handler) -> CoreSchema:
+        return self.schema
+
+
+def real(limits: Number = Number(), *, open: bool = False, plausible: bool = True) -> Kind:
+    """A number.
+
+    Args:
+        limits: unit and range.
         open: the name of a variable may stand for it.
         plausible: it must be of an engineer's range; otherwise that is checked later, once its unit is known.
     """
+    words = "a whole number" if limits.whole else "a number"
+    words += " or the name of a variable" if open else ""
 
-    number: Number = Number()
-    open: bool = False
-    plausible: bool = True
-
-    @property
-    def words(self) -> str:
-        plain = "a whole number" if self.number.whole else "a number"
-        return f"{plain} or the name of a variable" if self.open else plain
-
-    def read(self, value: Any) -> Any:
-        if self.open and isinstance(value, str) and value:
+    def read(value: Any) -> Any:
+        if open and isinstance(value, str) and value:
             if _is_number(value):
                 raise ValueError(not_of_kind("a number", value))
             return value
-        if isinstance(value, bool) or not isinstance(value, int if self.number.whole else int | float):
-            raise ValueError(not_of_kind(self.words, value))
-        if problem := outside(self.number, value, plausible=self.plausible):
+        if isinstance(value, bool) or not isinstance(value, int if limits.whole else int | float):
+            raise ValueError(not_of_kind(words, value))
+        if problem := outside(limits, value, plausible=plausible):
             raise ValueError(problem)
-        return value if self.number.whole else float(value)
+        return value if limits.whole else float(value)
+
+    return _plain(words, read, limits)
 
 
-@dataclass(frozen=True)
-class Text(Plain):
-    """A string.
+def count(low: int, high: int) -> Kind:
+    """A whole number; the upper limits keep a slip of the finger from filling the memory or compiling for hours."""
+    return real(Number(low=low, high=high, whole=True))
 
-    Attributes:
-        empty: the empty one is allowed.
-    """
 
-    empty: bool = False
-    words = "a string"
+def positive(unit: str) -> Kind:
+    """A number greater than zero."""
+    return real(Number(unit, low=0.0, open_low=True))
 
-    def read(self, value: Any) -> str:
+
+def text(*, empty: bool = False) -> Kind:
+    """A string; `empty` allows the empty one."""
+
+    def read(value: Any) -> str:
         if not isinstance(value, str):
-            raise ValueError(not_of_kind(self.words, value))
-        if not value and not self.empty:
+            raise ValueError(not_of_kind("a string", value))
+        if not value and not empty:
             raise ValueError('"" is empty')
         return value
 
+    return _plain("a string", read)
 
-@dataclass(frozen=True)
-class Switch(Plain):
+
+def switch() -> Kind:
     """True or false."""
 
-    words = "true or false"
-
-    def read(self, value: Any) -> bool:
+    def read(value: Any) -> bool:
         if not isinstance(value, bool):
-            raise ValueError(not_of_kind(self.words, value))
+            raise ValueError(not_of_kind("true or false", value))
         return value
 
+    return _plain("true or false", read)
 
-@dataclass(frozen=True)
-class Choice(Plain):
+
+def choice(*names: str) -> Kind:
     """One of several names."""
 
-    names: tuple[str, ...]
-
-    @property
-    def words(self) -> str:
-        return "one of " + ", ".join(f'"{name}"' for name in self.names)
-
-    def read(self, value: Any) -> str:
+    def read(value: Any) -> str:
         if not isinstance(value, str):
             raise ValueError(not_of_kind("a string", value))
-        if value not in self.names:
-            raise ValueError(not_known(value, self.names))
+        if value not in names:
+            raise ValueError(not_known(value, names))
         return value
 
-
-@dataclass(frozen=True)
-class ListOf(Kind):
-    """A list.
-
-    Attributes:
-        item: kind of its items.
-        length: number of items, None for any.
-        empty: the empty list is allowed.
-    """
-
-    item: Kind
-    length: int | None = None
-    empty: bool = False
-    words = "a list"
-
-    def schema(self) -> CoreSchema:
-        least = 0 if self.empty else self.length or 1
-        return core_schema.list_schema(self.item.schema(), min_length=least, max_length=self.length, strict=True)
+    return _plain("one of " + ", ".join(f'"{name}"' for name in names), read)
 
 
-@dataclass(frozen=True)
-class Table(Kind):
-    """A table with keys of its own.
-
-    Attributes:
-        item: kind of its values; None for a table that is looked into later.
-    """
-
-    item: Kind | None = None
-    words = "a table"
-
-    def schema(self) -> CoreSchema:
-        if self.item is None:
-            return core_schema.dict_schema(core_schema.str_schema(), strict=True)
-        return core_schema.dict_schema(core_schema.str_schema(), self.item.schema(), min_length=1, strict=True)
+def list_of(item: Kind, *, length: int | None = None, empty: bool = False) -> Kind:
+    """A list of a length, None for any; `empty` allows the empty one."""
+    least = 0 if empty else length or 1
+    schema = core_schema.list_schema(item.schema, min_length=least, max_length=length, strict=True)
+    return Kind(f"a list, each {item.words}", schema, item.number)
 
 
-@dataclass(frozen=True)
-class Either(Kind):
-    """A plain value, a list or a table.
-
-    Attributes:
-        plain: kind of a plain value.
-        many: `ListOf` or `Table`.
-        allowed: in words, for messages.
-    """
-
-    plain: Kind
-    many: ListOf | Table
-    allowed: str
-
-    @property
-    def words(self) -> str:
-        return self.allowed
-
-    def schema(self) -> CoreSchema:
-        kind, tag = (list, TAGS[0]) if isinstance(self.many, ListOf) else (dict, TAGS[1])
-        other = dict if kind is list else list
-
-        def choose(value: Any) -> str | None:
-            return tag if isinstance(value, kind) else None if isinstance(value, other) else TAGS[2]
-
-        return core_schema.tagged_union_schema(
-            {tag: self.many.schema(), TAGS[2]: self.plain.schema()},
-            choose,
-            custom_error_type="kind",
-            custom_error_message=f"must be {self.words}",
-        )
+def table(item: Kind | None = None) -> Kind:
+    """A table with keys of its own and values of one kind; None for a table that is looked into later."""
+    keys = core_schema.str_schema()
+    if item is None:
+        return Kind("a table", core_schema.dict_schema(keys, strict=True))
+    return Kind("a table", core_schema.dict_schema(keys, item.schema, min_length=1, strict=True), item.number)
 
 
-def count(low: int, high: int) -> Real:
-    """A whole number; the upper limits keep a slip of the finger from filling the memory or compiling for hours."""
-    return Real(Number(low=low, high=high, whole=True))
+def either(plain: Kind, many: Kind, words: str) -> Kind:
+    """A plain value, or a list or table."""
+    wanted, other = (list, dict) if many.schema["type"] == "list" else (dict, list)
 
+    def choose(value: Any) -> str | None:
+        return None if isinstance(value, other) else TAGS[isinstance(value, wanted)]
 
-def positive(unit: str) -> Real:
-    """A number greater than zero."""
-    return Real(Number(unit, low=0.0, open_low=True))
-
-
-SEED = count(0, 2**31 - 1)  # what every generator of random numbers takes
-LEVEL = count(2, 10_000)
-WEIGHTS = ListOf(Real(Number(low=0.0)))
+    message = f"must be {words}"
+    choices = dict(zip(TAGS, (plain.schema, many.schema)))
+    schema = core_schema.tagged_union_schema(choices, choose, custom_error_type="kind", custom_error_message=message)
+    return Kind(words, schema, plain.number)
 
 
 def not_of_kind(wanted: str, value: Any) -> str:
@@ -215,10 +141,15 @@ def not_of_kind(wanted: str, value: Any) -> str:
     return f"must be {wanted}, not {_kind(value)}"
 
 
-def _is_number(text: str) -> bool:
+def _plain(words: str, read: Callable[[Any], Any], number: Number | None = None) -> Kind:
+    """One value, as `read` returns it; what is wrong with it stands in the `ValueError` that it raises."""
+    return Kind(words, core_schema.no_info_plain_validator_function(read), number)
+
+
+def _is_number(value: str) -> bool:
     """Whether a number was put into quotes."""
     try:
-        float(text)
+        float(value)
     except ValueError:
         return False
     return True
@@ -234,3 +165,8 @@ def _kind(value: Any) -> str:
     if isinstance(value, datetime.date | datetime.time):
         return "a date or time"
     return "a list" if isinstance(value, list) else "a table"
+
+
+SEED = count(0, 2**31 - 1)  # what every generator of random numbers takes
+LEVEL = count(2, 10_000)
+WEIGHTS = list_of(real(Number(low=0.0)))

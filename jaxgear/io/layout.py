@@ -16,7 +16,7 @@ import equinox as eqx
 from pydantic import BaseModel, ConfigDict, create_model
 
 from ..numerics import Number, fields_of
-from .kinds import Choice, Either, Kind, ListOf, Real, Switch, Table, Text
+from .kinds import Kind, choice, either, list_of, real, switch, table, text
 
 
 class Section(BaseModel):
@@ -57,17 +57,12 @@ def section_of(
     for field in dataclasses.fields(cls):
         if not field.init or field.name in without:
             continue
-        kind = _kind(cls, field)
-        if isinstance(kind, Real):
-            high = dict(most).get(field.name, kind.number.high)
-            number = dataclasses.replace(kind.number, high=high)
-            kind = dataclasses.replace(kind, number=number, open=kind.open and open)
+        kind = _kind(cls, field, dict(most).get(field.name), open)
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-        if kind is None:
-            if needed:
-                raise TypeError(f"{cls.__name__}: {field.name} cannot be written in a design file")
-            continue
-        keys[field.name] = (Annotated[Any, kind], ... if needed else None)
+        if kind is not None:
+            keys[field.name] = (Annotated[Any, kind], ... if needed else None)
+        elif needed:
+            raise TypeError(f"{cls.__name__}: {field.name} cannot be written in a design file")
     return create_model(cls.__name__, __base__=Section, __doc__=cls.__doc__, **keys)
 
 
@@ -122,29 +117,30 @@ def summary(of: Any) -> str:
     return inspect.cleandoc(of.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
 
 
-def _kind(cls, field: dataclasses.Field) -> Kind | None:
+def _kind(cls, field: dataclasses.Field, most: int | None, open: bool) -> Kind | None:
+    """What may stand after the key of a field; None where nothing can."""
     number = fields_of(cls).get(field.name)
     if number is not None:
-        return _number(number)
+        return _number(number if most is None else dataclasses.replace(number, high=most), open)
     hint = _hint(cls, field)
     module = _module(hint)
     if module is not None:
         if not inspect.isabstract(module):
-            return Table()
+            return table()
         # what contains another of its family is made by the lists of the file
-        return None if issubclass(cls, module) else Either(Text(empty=True), Table(), "the name of a type, or a table")
+        return None if issubclass(cls, module) else either(text(empty=True), table(), "the name of a type, or a table")
     if typing.get_origin(hint) is typing.Literal:
-        return Choice(typing.get_args(hint))
-    plain = {bool: Switch(), str: Text(), int: Real(Number(whole=True)), float: Real()}
+        return choice(*typing.get_args(hint))
+    plain = {bool: switch(), str: text(), int: real(Number(whole=True)), float: real()}
     return plain.get(hint) if isinstance(hint, type) else None
 
 
-def _number(number: Number) -> Kind | None:
+def _number(number: Number, open: bool) -> Kind | None:
     if not number.checked:
         return None
-    kind: Kind = Real(number, open=not (number.static or number.whole))
+    kind = real(number, open=open and not (number.static or number.whole))
     for _ in number.shape:
-        kind = ListOf(kind)
+        kind = list_of(kind)
     return kind
 
 

@@ -24,12 +24,12 @@ def outside(number: Number, value: float, *, plausible: bool = True) -> str:
     unit = f" {number.unit}" if number.unit else ""
     if isinstance(value, float) and not math.isfinite(value):
         return f"{value} must be finite"
-    shown = f"{shorten(value)}{unit}"
+    shown = f"{_shortened(value)}{unit}"
     low, high = number.low, number.high
     if low is not None and (value <= low if number.open_low else value < low):
-        return f"{shown} must be {_range(number, unit)}"
+        return f"{shown} must be {allowed(number)}"
     if high is not None and (value >= high if number.open_high else value > high):
-        return f"{shown} must be {_range(number, unit)}"
+        return f"{shown} must be {allowed(number)}"
     least, most = PLAUSIBLE.get(number.unit, _PURE)
     positive = low is not None and low >= 0 and number.open_low
     limited = low is not None and high is not None  # the class itself says what can be meant
@@ -39,20 +39,19 @@ def outside(number: Number, value: float, *, plausible: bool = True) -> str:
     return ""
 
 
-def shorten(value: float) -> str:
+def _shortened(value: float) -> str:
     """A number as text, of any size."""
-    if isinstance(value, float) or abs(value) < 10**12:
-        return f"{value:g}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:g}"
+    if abs(value) < 10**12:
+        return str(value)
     digits = int(abs(value).bit_length() * math.log10(2)) + 1
     return f"a whole number of about {digits} digits"
 
 
 def allowed(number: Number) -> str:
     """The range as text, "" without limits."""
-    return _range(number, f" {number.unit}" if number.unit else "")
-
-
-def _range(number: Number, unit: str) -> str:
+    unit = f" {number.unit}" if number.unit else ""
     parts = []
     if number.low is not None:
         parts.append(f"{'greater than' if number.open_low else 'at least'} {number.low:g}{unit}")

@@ -17,7 +17,6 @@ from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from ..tolerance import Tolerance
 from . import schema, schema_sweep
-from .kinds import Either, Kind, ListOf, Real, Table
 from .layout import Section, family, meanings, section_of, snake, summary
 from .ranges import allowed
 
@@ -76,13 +75,12 @@ def _table(title: str, section: type[Section], of: Callable[..., Any] | None) ->
     yield "| --- | --- | --- | --- | --- | --- |"
     for name, field in section.model_fields.items():
         kind = section.kind(name)
-        number = _number(kind)
         default = "required" if field.is_required() else _default(name, field.default, of)
         cells = [
             f"`{name}`",
-            f"a list, each {kind.item.words}" if isinstance(kind, ListOf) else kind.words,
-            number.number.unit if number else "",
-            allowed(dataclasses.replace(number.number, unit="")) if number else "",
+            kind.words,
+            kind.number.unit if kind.number else "",
+            allowed(dataclasses.replace(kind.number, unit="")) if kind.number else "",
             default,
             texts.get(name, ""),
         ]
@@ -95,15 +93,6 @@ def _quantities() -> Iterator[str]:
     yield "| --- | --- | --- |"
     for name, quantity in quantities.items():
         yield f"| `{name}` | {quantity.unit} | {quantity.meaning} |"
-
-
-def _number(kind: Kind | None) -> Real | None:
-    """The number within a value."""
-    if isinstance(kind, Real):
-        return kind
-    if isinstance(kind, Either):
-        return _number(kind.plain)
-    return _number(kind.item) if isinstance(kind, ListOf | Table) else None
 
 
 def _default(name: str, default: Any, of: Callable[..., Any] | None) -> str:

@@ -13,16 +13,16 @@ from ..contact import Operation, Resolution
 from ..geometry import Gear, GearPair
 from ..numerics import Number
 from ..optimize import METHODS, Pareto
-from .kinds import LEVEL, SEED, WEIGHTS, Choice, Either, ListOf, Real, Table, Text, count, positive
+from .kinds import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, table, text
 from .layout import Section, section_of
 
 Tables = dict[str, Any]
 
 
-_NUMBER = Real()
-_BOUND = Real(plausible=False)
-_SHARE = Real(Number(low=0.0, high=1.0, open_low=True, open_high=True))
-_TABLES = ListOf(Table(), empty=True)
+_NUMBER = real()
+_BOUND = real(plausible=False)
+_SHARE = real(Number(low=0.0, high=1.0, open_low=True, open_high=True))
+_TABLES = list_of(table(), empty=True)
 
 
 class FileSection(Section):
@@ -42,17 +42,17 @@ class FileSection(Section):
         tolerance: of manufactured gears, for a sweep or `optimize.manufactured`.
     """
 
-    pinion: Annotated[Tables, Table()]
-    wheel: Annotated[Tables, Table()]
-    load: Annotated[Tables, Table()]
-    title: Annotated[str | None, Text()] = None
-    pair: Annotated[Tables | None, Table()] = None
-    model: Annotated[Tables | None, Table()] = None
-    resolution: Annotated[Tables | None, Table()] = None
-    variables: Annotated[Tables | None, Table(Table())] = None
-    optimize: Annotated[Tables | None, Table()] = None
-    sweep: Annotated[Tables | None, Table()] = None
-    tolerance: Annotated[Tables | None, Table()] = None
+    pinion: Annotated[Tables, table()]
+    wheel: Annotated[Tables, table()]
+    load: Annotated[Tables, table()]
+    title: Annotated[str | None, text()] = None
+    pair: Annotated[Tables | None, table()] = None
+    model: Annotated[Tables | None, table()] = None
+    resolution: Annotated[Tables | None, table()] = None
+    variables: Annotated[Tables | None, table(table())] = None
+    optimize: Annotated[Tables | None, table()] = None
+    sweep: Annotated[Tables | None, table()] = None
+    tolerance: Annotated[Tables | None, table()] = None
 
 
 class GearSection(section_of(Gear)):  # type: ignore[misc]
@@ -78,8 +78,8 @@ class LoadSection(section_of(Operation)):  # type: ignore[misc]
         friction: mean coefficient of friction, used with a speed only.
     """
 
-    torque: Annotated[Any, Real(Number("N m", low=0.0, open_low=True), open=True)]
-    torque_range: Annotated[list[float] | None, ListOf(positive("N m"), length=2)] = None
+    torque: Annotated[Any, real(Number("N m", low=0.0, open_low=True), open=True)]
+    torque_range: Annotated[list[float] | None, list_of(positive("N m"), length=2)] = None
 
 
 class ModelSection(section_of(Compliance)):  # type: ignore[misc]
@@ -89,7 +89,7 @@ class ModelSection(section_of(Compliance)):  # type: ignore[misc]
         preset: "legacy" is the model of older studies and takes no other key.
     """
 
-    preset: Annotated[str, Choice(("default", "legacy"))] = "default"
+    preset: Annotated[str, choice("default", "legacy")] = "default"
 
 
 # Sizes up to these: a slip of the finger must not fill the memory or compile for hours.
@@ -110,7 +110,7 @@ class VariableSection(Section):
 
     low: Annotated[float, _BOUND]
     high: Annotated[float, _BOUND]
-    unit: Annotated[str | None, Text(empty=True)] = None
+    unit: Annotated[str | None, text(empty=True)] = None
 
 
 class OptimizeSection(Section):
@@ -131,17 +131,19 @@ class OptimizeSection(Section):
         constraint: limits of quantities or of combinations of variables.
     """
 
-    method: Annotated[str | None, Text()] = None
-    objective: Annotated[str | list[str] | None, Either(Text(), ListOf(Text()), "a string or a list of strings")] = None
-    measure: Annotated[str | None, Choice(("mean", "worst", "quantile", "cvar"))] = None
+    method: Annotated[str | None, text()] = None
+    objective: Annotated[str | list[str] | None, either(text(), list_of(text()), "a string or a list of strings")] = (
+        None
+    )
+    measure: Annotated[str | None, choice("mean", "worst", "quantile", "cvar")] = None
     level: Annotated[float | None, _SHARE] = None
-    torques: Annotated[list[float] | None, ListOf(positive("N m"))] = None
+    torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
     weights: Annotated[list[float] | None, WEIGHTS] = None
     manufactured: Annotated[int | None, count(1, 10_000)] = None
     seed: Annotated[int | None, SEED] = None
     starts: Annotated[int | None, count(1, 4096)] = None
     steps: Annotated[int | None, count(10, 100_000)] = None
-    application_factor: Annotated[float, Real(Number(low=0.0, high=100.0, open_low=True))] = 1.0
+    application_factor: Annotated[float, real(Number(low=0.0, high=100.0, open_low=True))] = 1.0
     constraint: Annotated[list[Tables], _TABLES] = []
 
 
@@ -155,8 +157,8 @@ class ConstraintSection(Section):
         high: greatest value.
     """
 
-    of: Annotated[str | None, Text()] = None
-    variables: Annotated[dict[str, float] | None, Table(_NUMBER)] = None
+    of: Annotated[str | None, text()] = None
+    variables: Annotated[dict[str, float] | None, table(_NUMBER)] = None
     low: Annotated[float | None, _NUMBER] = None
     high: Annotated[float | None, _NUMBER] = None
 
@@ -164,24 +166,24 @@ class ConstraintSection(Section):
 class FactorialOptions(Section):
     levels: Annotated[
         int | dict[str, int] | None,
-        Either(LEVEL, Table(LEVEL), "a whole number, or a table with one entry per variable"),
+        either(LEVEL, table(LEVEL), "a whole number, or a table with one entry per variable"),
     ] = None
 
 
 class IterationOptions(Section):
-    start: Annotated[str, Choice(("unmodified", "given", "low_pressure"))] = "unmodified"
+    start: Annotated[str, choice("unmodified", "given", "low_pressure")] = "unmodified"
     max_relief: Annotated[float, positive("um")] = 7.0
     rtol: Annotated[float | None, positive("")] = None
     steps: Annotated[int | None, count(1, 1000)] = None
-    curve: Annotated[str | None, Text()] = None
+    curve: Annotated[str | None, text()] = None
 
 
 class FreeFormOptions(Section):
     points: Annotated[int | None, count(4, 500)] = None
     max_relief: Annotated[float | None, positive("um")] = None
-    curvature: Annotated[float | None, Real(Number(low=0.0))] = None
+    curvature: Annotated[float | None, real(Number(low=0.0))] = None
     steps: Annotated[int | None, count(1, 10_000)] = None
-    curve: Annotated[str | None, Text()] = None
+    curve: Annotated[str | None, text()] = None
 
 
 # They seek the flanks themselves.
@@ -200,6 +202,6 @@ def optimize_section() -> type[OptimizeSection]:
     """The table [optimize] with those of the methods."""
     methods = method_options()
     texts = "".join(f"\n        {name}: options of the method." for name in methods)
-    tables: dict[str, Any] = {name: (Annotated[Tables | None, Table()], None) for name in methods}
+    tables: dict[str, Any] = {name: (Annotated[Tables | None, table()], None) for name in methods}
     text = (OptimizeSection.__doc__ or "").rstrip() + texts + "\n    "
     return create_model("OptimizeSection", __base__=OptimizeSection, __doc__=text, **tables)

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from ..numerics import Number
 from ..tolerance import Tolerance
-from .kinds import LEVEL, SEED, WEIGHTS, Choice, Either, ListOf, Real, Table, Text, count, positive
+from .kinds import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, table, text
 from .layout import Section, section_of
 
 
@@ -23,25 +23,25 @@ class SweepSection(Section):
         part_rows: variants per file of the table.
     """
 
-    sampling: Annotated[str, Choice(("sobol", "latin_hypercube", "full_factorial", "list"))] = "sobol"
+    sampling: Annotated[str, choice("sobol", "latin_hypercube", "full_factorial", "list")] = "sobol"
     samples: Annotated[int | None, count(1, 2**40)] = None
     seed: Annotated[int | None, SEED] = None
     levels: Annotated[
         int | dict[str, int | list[float]] | None,
-        Either(
+        either(
             LEVEL,
-            Table(Either(LEVEL, ListOf(Real()), "a whole number or a list of values")),
+            table(either(LEVEL, list_of(real()), "a whole number or a list of values")),
             "a whole number, or a table with one entry per variable",
         ),
     ] = None
-    file: Annotated[str | None, Text()] = None
-    torques: Annotated[list[float] | None, ListOf(positive("N m"))] = None
+    file: Annotated[str | None, text()] = None
+    torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
     weights: Annotated[list[float] | None, WEIGHTS] = None
-    results: Annotated[list[str] | None, ListOf(Text())] = None
+    results: Annotated[list[str] | None, list_of(text())] = None
     part_rows: Annotated[int | None, count(1, 2**24)] = None
 
 
-_CLASS = Real(Number(whole=True))
+_CLASS = real(Number(whole=True))
 
 
 class ToleranceSection(section_of(Tolerance, ("pinion", "wheel", "distribution"), open=False)):  # type: ignore[misc]
@@ -54,7 +54,7 @@ class ToleranceSection(section_of(Tolerance, ("pinion", "wheel", "distribution")
     """
 
     quality_class: Annotated[
-        int | list[int], Either(_CLASS, ListOf(_CLASS, length=2), "a whole number, or a list of two")
+        int | list[int], either(_CLASS, list_of(_CLASS, length=2), "a whole number, or a list of two")
     ]
     samples: Annotated[int, count(2, 100_000)] = 64
     seed: Annotated[int, SEED] = 0
