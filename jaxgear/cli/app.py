@@ -179,7 +179,7 @@ def _warnings() -> Iterator[None]:
 def _run(arguments: Sequence[str] | None) -> int:
     try:
         code = app(args=arguments, prog_name="jaxgear", standalone_mode=False)
-        if code == INTERRUPTED or interrupt.asked():
+        if code == INTERRUPTED or interrupt.state.asked:
             return _say_interrupted()
     except (KeyboardInterrupt, typer.Abort):
         return _say_interrupted()
@@ -189,7 +189,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except Exception as error:  # noqa: BLE001 - a user never sees a traceback
         if os.environ.get("JAXGEAR_DEBUG"):
             raise
-        if interrupt.asked():  # a library has made something else of it
+        if interrupt.state.asked:  # a library has made something else of it
             return _say_interrupted()
         print(f"jaxgear: error: {_one_line(error)}", file=sys.stderr)
         return FAILED
@@ -197,7 +197,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _say_interrupted() -> int:
-    print(f"jaxgear: interrupted, {interrupt.written()}", file=sys.stderr)
+    print(f"jaxgear: interrupted, {interrupt.state.written}", file=sys.stderr)
     return INTERRUPTED
 
 

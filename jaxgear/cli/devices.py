@@ -29,13 +29,7 @@ def usable_cores() -> int:
 
 
 def join_processes(coordinator: str | None, processes: int | None, process: int | None, *, automatic: bool) -> None:
-    """Joins the processes that share a sweep.
-
-    Args:
-        coordinator: HOST:PORT where process 0 listens; None for a process on its own.
-        processes: how many there are.
-        process: number of this one.
-        automatic: takes all three from the cluster's own environment.
+    """Joins the processes that share a sweep, by the options of the command.
 
     Raises:
         ValueError: for options that do not go together.

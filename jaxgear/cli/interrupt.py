@@ -11,24 +11,34 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 NOTHING = "nothing was written"
 _SOON = 0.02  # seconds in which Python is out of the callback
 
 
-class _State:
-    asked = False  # Ctrl-C was pressed
-    held = False  # it has to wait
-    written = NOTHING
+@dataclass
+class State:
+    """What has happened in the command that runs.
+
+    Attributes:
+        asked: Ctrl-C was pressed.
+        held: it has to wait.
+        written: what is on the disk.
+    """
+
+    asked: bool = False
+    held: bool = False
+    written: str = NOTHING
 
 
-_state = _State()
+state = State()
 
 
 @contextmanager
 def listening() -> Iterator[None]:
     """Takes care of Ctrl-C for a block; nothing changes outside the main thread."""
-    _state.asked, _state.held, _state.written = False, False, NOTHING
+    state.asked, state.held, state.written = False, False, NOTHING
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -43,45 +53,31 @@ def listening() -> Iterator[None]:
 
 def note(written: str) -> None:
     """Says what is on the disk from now on."""
-    _state.written = written
+    state.written = written
     check()
-
-
-def written() -> str:
-    """What is on the disk."""
-    return _state.written
-
-
-def asked() -> bool:
-    """Whether Ctrl-C was pressed."""
-    return _state.asked
 
 
 def check() -> None:
     """Raises KeyboardInterrupt where an earlier one was lost."""
-    if _state.asked and not _state.held:
+    if state.asked and not state.held:
         raise KeyboardInterrupt
 
 
 @contextmanager
 def held(then: str) -> Iterator[None]:
-    """Lets Ctrl-C wait for the end of a block that must not be left half done.
-
-    Args:
-        then: what is on the disk after it.
-    """
+    """Lets Ctrl-C wait for the end of a block that must not be left half done; `then` is what is on the disk."""
     check()
-    _state.held = True
+    state.held = True
     try:
         yield
-        _state.written = then
+        state.written = then
     finally:
-        _state.held = False
+        state.held = False
     check()
 
 
 def _interrupted(*_) -> None:
-    _state.asked = True
+    state.asked = True
     check()
 
 

@@ -11,6 +11,7 @@ from ..io import DesignFile, describe
 from ..optimize import Front, Optimum, Projection
 from ..optimize.result import PENALIZED
 from . import report
+from .study import response_surface
 
 _SHOWN_BOUNDS = 8
 
@@ -23,13 +24,7 @@ def verdict(
     *,
     searched_at: int,
 ) -> Iterator[str]:
-    """Lines under the table of an optimization, from the numbers of the table.
-
-    Args:
-        file, optimum, projection: what was asked and found.
-        evaluations: of all designs.
-        searched_at: positions of the mesh on which the search began.
-    """
+    """Lines under the table of an optimization, from its numbers; it began at so many positions."""
     before, after = next(iter(evaluations.values())), report.main(evaluations)
     ppte = [evaluation.metrics["ppte_um"] for evaluation in (before, after)]
     fall = report.reduction(evaluations)
@@ -87,13 +82,11 @@ def front_lines(front: Front) -> Iterator[str]:
     yield f"no step improves all objectives of one of them by more than {left:.2g} spans per full range"
 
 
-def write_figures(
-    folder: Path, mesh: Mesh, optimum: Optimum, front: Front | None, surface: tuple[np.ndarray, np.ndarray]
-) -> None:
+def write_figures(folder: Path, mesh: Mesh, torque: float, optimum: Optimum, front: Front | None) -> None:
     """Writes the figures of the search and of the optimum over all loads."""
     from .. import plot
 
-    torques, errors = surface
+    torques, errors = response_surface(mesh, torque, optimum.pinion, optimum.wheel)
     unloaded = optimum.cycle.unloaded_transmission_error
     axes: dict[str, Any] = {
         "response_surface": plot.response_surface(
@@ -111,18 +104,18 @@ def write_figures(
 
 
 def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[str]:
+    active = optimum.active_bounds
     if not optimum.parameters:
         return
-    free = {name: side for name, side in optimum.active_bounds.items() if name in file.bounds}
     if set(optimum.parameters) != set(file.bounds):
-        yield f"{len(optimum.parameters)} values of the flanks, {len(optimum.active_bounds)} of them at a bound"
+        yield f"{len(optimum.parameters)} values of the flanks, {len(active)} of them at a bound"
         return
-    for name, side in list(free.items())[:_SHOWN_BOUNDS]:
+    for name, side in list(active.items())[:_SHOWN_BOUNDS]:
         bound = file.bounds[name][side == "upper"]
         yield f"{name} is at its {side} bound {bound:g} {file.units[name]}".rstrip()
-    if len(free) > _SHOWN_BOUNDS:
-        yield f"and {len(free) - _SHOWN_BOUNDS} more variables are at a bound"
-    if not free:
+    if len(active) > _SHOWN_BOUNDS:
+        yield f"and {len(active) - _SHOWN_BOUNDS} more variables are at a bound"
+    if not active:
         yield "no variable is at a bound"
 
 

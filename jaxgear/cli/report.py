@@ -129,7 +129,7 @@ def _main_name(evaluations: Evaluations) -> str:
 def summary(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
     """Contents of `summary.json`."""
     size = mesh.resolution
-    data: dict[str, Any] = {
+    return {
         "title": file.title,
         "design_file": file.path.name,
         "torque_Nm": file.torque,
@@ -140,23 +140,22 @@ def summary(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.
         "center_distance_mm": mesh.pair.working_center_distance,
         "model": {"compliance": _words(mesh.compliance), "plane": mesh.kinematics.plane},
         "designs": {
-            name: {**_design(evaluation), "doubts": [_doubt(doubt) for doubt in several]}
-            for (name, evaluation), several in zip(evaluations.items(), doubts(file, evaluations).values())
+            name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
+            for name, several in doubts(file, evaluations).items()
         },
         "ppte_reduction_percent": reduction(evaluations),
         "ppte_over_torque": {
             "torque_Nm": torques,
             **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
         },
+        "resolution": {field.name: getattr(size, field.name) for field in dataclasses.fields(size)},
+        "versions": {
+            "jaxgear": version(),
+            "jax": jax.__version__,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+        },
     }
-    data["resolution"] = {field.name: getattr(size, field.name) for field in dataclasses.fields(size)}
-    data["versions"] = {
-        "jaxgear": version(),
-        "jax": jax.__version__,
-        "numpy": np.__version__,
-        "python": platform.python_version(),
-    }
-    return data
 
 
 def write_figures(folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> None:

@@ -17,7 +17,7 @@ from ..optimize import Front, Optimum, Problem, Projection, judged, project
 from . import interrupt, optimum_report, report
 from .cache import enable_cache
 from .progress import Stages
-from .study import Evaluation, Evaluator
+from .study import Evaluation, evaluate
 
 _TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
 _QUICK_POSITIONS = 16
@@ -33,6 +33,7 @@ class Run:
         self._target, self._folder, self._stages = target, folder, stages
         self._quick = False
         self._evaluations: dict[str, Evaluation] = {}
+        self._problem: Problem | None = None  # by whose measure designs are evaluated
         self._optimum: Optimum | None = None
         self._front: Front | None = None
         self._projection: Projection | None = None
@@ -42,15 +43,14 @@ class Run:
         self._stages.begin("preparing the mesh")
         self._quick = quick
         size = self.design.resolution()
-        mesh = jax.block_until_ready(self.design.mesh(coarse(size) if quick else size))
-        self._searched_at = mesh.resolution.positions
+        self._mesh: Mesh = jax.block_until_ready(self.design.mesh(coarse(size) if quick else size))
+        self._searched_at = self._mesh.resolution.positions
         self._torques = np.linspace(*self.design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
-        self._judge_on(mesh, None)
 
     def evaluate(self, name: str, pinion: AbstractModification, wheel: AbstractModification) -> None:
         """Evaluates a design and keeps it."""
         self._stages.begin(f"solving the {name} design")
-        found = self._evaluator(pinion, wheel)
+        found = evaluate(self.design, self._mesh, self._torques, pinion, wheel)
         if self._problem is not None:
             found = dataclasses.replace(found, objectives=judged(self._problem, pinion, wheel))
         self._evaluations[name] = found
@@ -58,11 +58,7 @@ class Run:
     def search(self, request: OptimizeRequest, beside: Mapping[str, Modifications]) -> None:
         """Finds the optimum, and for flanks without parameters the named curve in their place.
 
-        All designs are evaluated on the mesh on which the search has ended, and by its measure.
-
-        Args:
-            request: what is sought.
-            beside: designs to compare with, by name.
+        All designs, those `beside` it too, are evaluated on the mesh on which the search has ended and by its measure.
         """
         self._stages.begin(f"searching the optimum ({request.method})")
         began = time.perf_counter()
@@ -70,7 +66,7 @@ class Run:
         self._front = found if isinstance(found, Front) else None
         optimum = found.compromise if isinstance(found, Front) else found
         spent = time.perf_counter() - began
-        self._judge_on(optimum.mesh, optimum.problem)
+        self._mesh, self._problem = optimum.mesh, optimum.problem
         for name, modifications in beside.items():
             self.evaluate(name, *modifications)
         self.evaluate("optimum", optimum.pinion, optimum.wheel)
@@ -97,8 +93,7 @@ class Run:
         if figures:
             report.write_figures(self._folder, self.design, self._mesh, self._evaluations, self._torques)
             if self._optimum is not None:
-                surface = self._evaluator.response_surface(self._optimum.pinion, self._optimum.wheel)
-                optimum_report.write_figures(self._folder, self._mesh, self._optimum, self._front, surface)
+                optimum_report.write_figures(self._folder, self._mesh, self.design.torque, self._optimum, self._front)
 
     def show(self) -> bool:
         """Prints the comparison, after the results are in place; False when a solution or a constraint failed."""
@@ -119,11 +114,6 @@ class Run:
         for line in failures:
             report.warn(line)
         return not failures
-
-    def _judge_on(self, mesh: Mesh, problem: Problem | None) -> None:
-        """Evaluates from now on on this mesh, and by the measure of a problem."""
-        self._mesh, self._problem = mesh, problem
-        self._evaluator = Evaluator(self.design, mesh, self._torques)
 
 
 def opened(file: Path, *, cache: bool) -> DesignFile:

@@ -43,52 +43,41 @@ class Evaluation:
     objectives: dict[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Evaluator:
-    """Evaluates designs of one mesh.
+def evaluate(
+    file: DesignFile, mesh: Mesh, torques: np.ndarray, pinion: AbstractModification, wheel: AbstractModification
+) -> Evaluation:
+    """Evaluates a design at the torque of its file and at further ones [N m]."""
+    every = np.concatenate([[file.torque], torques])
+    over_torques(mesh, every[:1], pinion=pinion, wheel=wheel)  # compiles, where it has to
+    began = time.perf_counter()
+    cycles = over_torques(mesh, every, pinion=pinion, wheel=wheel)
+    seconds = time.perf_counter() - began
+    curves = np.asarray([cycle.transmission_error for cycle in cycles])
+    converged = np.asarray([cycle.converged for cycle in cycles]) & np.isfinite(curves)
+    # without the flanks: one program serves every kind of them
+    heat = (None if value is None else jnp.asarray(value) for value in (file.speed, file.friction))
+    metrics = jax.tree.map(np.asarray, _numbers(replace(cycles[0], pinion=None, wheel=None), *heat))
+    return Evaluation(
+        pinion=pinion,
+        wheel=wheel,
+        cycle=cycles[0],
+        metrics={name: value.item() for name, value in metrics.items()},
+        transmission_error=curves[1:],
+        ppte=np.ptp(curves[1:], axis=1),
+        failed_torques=sorted({float(torque) for torque in every[~converged.all(axis=1)]}),
+        seconds=seconds,
+    )
 
-    Attributes:
-        file: design torque, speed and friction.
-        mesh: prepared mesh.
-        torques: besides the design torque [N m].
+
+def response_surface(mesh: Mesh, torque: float, pinion: AbstractModification, wheel: AbstractModification):
+    """Transmission error from zero load to twice the design torque.
+
+    Returns:
+        the torques [N m], shape (torques,), and the transmission error [um], shape (torques, positions).
     """
-
-    file: DesignFile
-    mesh: Mesh
-    torques: np.ndarray
-
-    def __call__(self, pinion: AbstractModification, wheel: AbstractModification) -> Evaluation:
-        """Evaluates one design."""
-        torques = np.concatenate([[self.file.torque], self.torques])
-        over_torques(self.mesh, torques[:1], pinion=pinion, wheel=wheel)  # compiles, where it has to
-        began = time.perf_counter()
-        cycles = over_torques(self.mesh, torques, pinion=pinion, wheel=wheel)
-        seconds = time.perf_counter() - began
-        curves = np.asarray([cycle.transmission_error for cycle in cycles])
-        converged = np.asarray([cycle.converged for cycle in cycles]) & np.isfinite(curves)
-        # without the flanks: one program serves every kind of them
-        heat = (None if value is None else jnp.asarray(value) for value in (self.file.speed, self.file.friction))
-        metrics = jax.tree.map(np.asarray, _numbers(replace(cycles[0], pinion=None, wheel=None), *heat))
-        return Evaluation(
-            pinion=pinion,
-            wheel=wheel,
-            cycle=cycles[0],
-            metrics={name: value.item() for name, value in metrics.items()},
-            transmission_error=curves[1:],
-            ppte=np.ptp(curves[1:], axis=1),
-            failed_torques=sorted({float(torque) for torque in torques[~converged.all(axis=1)]}),
-            seconds=seconds,
-        )
-
-    def response_surface(self, pinion: AbstractModification, wheel: AbstractModification):
-        """Transmission error from zero load to twice the design torque.
-
-        Returns:
-            the torques [N m], shape (torques,), and the transmission error [um], shape (torques, positions).
-        """
-        torques = np.linspace(0.0, _SURFACE_REACH * self.file.torque, _SURFACE_TORQUES)
-        cycles = over_torques(self.mesh, torques, pinion=pinion, wheel=wheel)
-        return torques, np.asarray([cycle.transmission_error for cycle in cycles])
+    torques = np.linspace(0.0, _SURFACE_REACH * torque, _SURFACE_TORQUES)
+    cycles = over_torques(mesh, torques, pinion=pinion, wheel=wheel)
+    return torques, np.asarray([cycle.transmission_error for cycle in cycles])
 
 
 @eqx.filter_jit

@@ -15,13 +15,7 @@ _CHARTS = 6  # radar charts
 
 
 def write_figures(folder: Path, table: SweepTable, results: Sequence[str]) -> None:
-    """Writes all figures that the results allow.
-
-    Args:
-        folder: of the table.
-        table: the table, with at least one variant that did not fail.
-        results: names of its results.
-    """
+    """Writes all figures that the results allow, of a table with at least one variant that did not fail."""
     import matplotlib
 
     matplotlib.use("Agg")  # the command line never shows a window

@@ -49,18 +49,16 @@ def result_folder(target: str | Path) -> Iterator[Path]:
     _check_target(target)
     parent = target.absolute().parent
     missing = [folder for folder in (parent, *parent.parents) if not folder.exists()]
-    try:
-        parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".tmp", dir=parent))
-    except OSError as error:
-        _remove_empty(missing)
-        raise ValueError(f"{target}: cannot be written: {error.strerror or error}") from None
+    temporary = None
     try:
         with writing(target):
+            parent.mkdir(parents=True, exist_ok=True)
+            temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".tmp", dir=parent))
             yield temporary
-        _replace(temporary, target)
+            _replace(temporary, target)
     except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
+        if temporary is not None:
+            shutil.rmtree(temporary, ignore_errors=True)
         _remove_empty(missing)
         raise
 
@@ -79,14 +77,12 @@ def writing(path: str | Path) -> Iterator[None]:
 
 
 def _check_target(target: Path) -> None:
-    try:
+    with writing(target):
         if not target.exists() and not target.is_symlink():
             return
         if not target.is_dir():
             raise ValueError(f"{target}: is a file, not a folder")
         names = sorted(entry.name for entry in target.iterdir())
-    except OSError as error:
-        raise ValueError(f"{target}: cannot be written: {error.strerror or error}") from None
     others = [name for name in names if name not in RESULT_FILES]
     if names and (others or not _is_ours(target)):
         found = (others or names)[0]
@@ -106,28 +102,21 @@ def _is_ours(folder: Path) -> bool:
 
 
 def _replace(temporary: Path, target: Path) -> None:
-    os.chmod(temporary, 0o777 & ~_umask())  # mkdtemp makes private folders, results are ordinary files
+    umask = os.umask(0)
+    os.umask(umask)
+    os.chmod(temporary, 0o777 & ~umask)  # mkdtemp makes private folders, results are ordinary files
     target = target.resolve()  # a link to a folder keeps pointing at it
+    if not target.exists():
+        temporary.rename(target)
+        return
+    earlier = Path(f"{temporary}.earlier")
+    target.rename(earlier)
     try:
-        if not target.exists():
-            temporary.rename(target)
-            return
-        earlier = Path(f"{temporary}.earlier")
-        target.rename(earlier)
-        try:
-            temporary.rename(target)
-        except BaseException:
-            earlier.rename(target)
-            raise
-        shutil.rmtree(earlier, ignore_errors=True)
-    except OSError as error:
-        raise ValueError(f"{target}: cannot be written: {error.strerror or error}") from None
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+        temporary.rename(target)
+    except BaseException:
+        earlier.rename(target)
+        raise
+    shutil.rmtree(earlier, ignore_errors=True)
 
 
 def _remove_empty(folders: list[Path]) -> None:

@@ -81,16 +81,11 @@ def family(base: type[eqx.Module], *, users: bool = True) -> dict[str, type[eqx.
         base: the abstract class.
         users: with those that are defined outside the library.
     """
-    found: dict[str, type[eqx.Module]] = {}
-    for cls in _descendants(base):
-        name = snake(cls.__name__)
-        if not (_users(cls) and users or cls.__module__.startswith(base.__module__.rpartition(".")[0])):
-            continue  # a part of another layer, no choice of the user
-        if name in found and _users(cls) and not _users(found[name]):
-            continue
-        if not (cls.__name__.startswith("_") or inspect.isabstract(cls)) and _writable(cls):
-            found[name] = cls
-    return found
+    classes = [cls for cls in _descendants(base) if _writable(cls)]
+    layer = base.__module__.rpartition(".")[0]  # what another layer derives is a part of it, no choice of the user
+    library = {snake(cls.__name__): cls for cls in classes if cls.__module__.startswith(layer)}
+    own = {snake(cls.__name__): cls for cls in classes if not cls.__module__.startswith("jaxgear.")}
+    return {**library, **own, **library} if users else library
 
 
 def snake(name: str) -> str:
@@ -105,8 +100,7 @@ def meanings(of: Any) -> dict[str, str]:
         block = re.search(r"\n\s*(Attributes|Args):\n(?P<list>.*?)(\n\s*\n|\Z)", owner.__doc__ or "", re.DOTALL)
         if block is None:
             continue
-        lines = inspect.cleandoc("\n" + block["list"]).splitlines()
-        for entry in re.split(r"\n(?=\S)", "\n".join(lines)):
+        for entry in re.split(r"\n(?=\S)", inspect.cleandoc("\n" + block["list"])):
             names, _, text = entry.partition(": ")
             found.update(dict.fromkeys(names.split(", "), " ".join(text.split())))
     return found
@@ -168,11 +162,10 @@ def _descendants(base):
         yield from _descendants(cls)
 
 
-def _users(cls) -> bool:
-    return not cls.__module__.startswith("jaxgear.")
-
-
 def _writable(cls) -> bool:
+    """Whether a file can describe an object of the class."""
+    if cls.__name__.startswith("_") or inspect.isabstract(cls):
+        return False
     try:
         section_of(cls)
     except TypeError:

@@ -45,7 +45,8 @@ def describe(modification: AbstractModification) -> list[dict[str, Any]]:
 
 def unit_of(kind: str, name: str) -> str:
     """Unit of a number of a modification, both in the words of a design file; "" for a pure number."""
-    number = fields_of(family(AbstractModification)[kind]).get(name) if kind in family(AbstractModification) else None
+    cls = family(AbstractModification).get(kind)
+    number = None if cls is None else fields_of(cls).get(name)
     return number.unit if number else ""
 
 
@@ -54,8 +55,9 @@ def flank_rows(mesh: Mesh, designs: Designs) -> Iterator[tuple[str, str, float, 
 
     Rows are in the middle of the face, and on further lines across it where the modification varies along the face.
     """
-    for design, modifications in designs.items():
-        for gear, *columns, face, removed in _profiles(mesh, *modifications):
+    for design, (pinion, wheel) in designs.items():
+        profiles = jax.tree.map(np.asarray, _profiles(mesh, pinion, wheel))
+        for gear, (*columns, face, removed) in zip(("pinion", "wheel"), profiles):
             lines = range(len(face)) if np.ptp(removed, axis=0).any() else [len(face) // 2]
             for line in lines:
                 for angle, length, size, amount in zip(*columns, removed[line]):
@@ -86,21 +88,16 @@ def write_summary(path: Path, data: Mapping[str, Any]) -> None:
     path.write_text(json.dumps(_jsonable(data), indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def _profiles(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification):
-    """Per gear: its name, roll angle, roll length, diameter, face coordinate and the material removed."""
-    columns = jax.tree.map(np.asarray, _evaluate(mesh, pinion, wheel))
-    return [(name, *values) for name, values in zip(("pinion", "wheel"), columns)]
-
-
 @eqx.filter_jit
-def _evaluate(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification):
+def _profiles(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification):
+    """Per gear: roll angle, roll length, diameter, face coordinate and the material removed."""
     face = jnp.linspace(-0.5, 0.5, _FACE_POINTS) * mesh.pair.face_width
-    columns = []
+    profiles = []
     for side, modification in zip(mesh.sides, (pinion, wheel)):
         rho = jnp.linspace(side.start_roll_length, side.tip_roll_length, _PROFILE_POINTS)
         removed = removed_at(side, modification, rho, face)
-        columns.append((roll_angle(side.gear, rho), rho, diameter(side.gear, rho), face, removed))
-    return columns
+        profiles.append((roll_angle(side.gear, rho), rho, diameter(side.gear, rho), face, removed))
+    return profiles
 
 
 def _plain(part: eqx.Module) -> dict[str, Any]:

@@ -18,10 +18,10 @@ from .layout import Section, section_of
 
 Tables = dict[str, Any]
 
-
 _NUMBER = real()
 _BOUND = real(plausible=False)
 _SHARE = real(Number(low=0.0, high=1.0, open_low=True, open_high=True))
+_NAMES = either(text(), list_of(text()), "a string or a list of strings")
 _TABLES = list_of(table(), empty=True)
 
 
@@ -132,9 +132,7 @@ class OptimizeSection(Section):
     """
 
     method: Annotated[str | None, text()] = None
-    objective: Annotated[str | list[str] | None, either(text(), list_of(text()), "a string or a list of strings")] = (
-        None
-    )
+    objective: Annotated[str | list[str] | None, _NAMES] = None
     measure: Annotated[str | None, choice("mean", "worst", "quantile", "cvar")] = None
     level: Annotated[float | None, _SHARE] = None
     torques: Annotated[list[float] | None, list_of(positive("N m"))] = None

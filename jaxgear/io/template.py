@@ -76,15 +76,9 @@ def build(parts: list[Part], parameters: Mapping[str, Any]) -> AbstractModificat
 
 
 def parse(key: str, table: Mapping[str, Any] | str, cls: type[eqx.Module]) -> Part:
-    """An object from its table; `type` says which class derived from an abstract one it is of.
+    """An object from its table, or from the name of its type where that says all.
 
-    Args:
-        key: dotted key of the table.
-        table: the table, or the name of its type where that says all.
-        cls: its class.
-
-    Raises:
-        DesignFileError: for an unknown type, unknown or missing keys, wrong types and numbers out of range.
+    Its `type` says which class derived from an abstract one it is of.
     """
     if inspect.isabstract(cls):
         known = family(cls)

@@ -44,12 +44,7 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def decode(key: str, data: Any, section: type[S]) -> S:
-    """Decodes one table into its section.
-
-    Args:
-        key: dotted key of the table, "" at the top level.
-        data: the table.
-        section: its keys.
+    """A table as its section; the table's own key is "" at the top level.
 
     Raises:
         DesignFileError: for unknown or missing keys, values of a wrong type and numbers out of range.

@@ -11,15 +11,7 @@ from .toml import decode
 def read_variables(
     tables: schema.Tables, open_numbers: Iterable[template.Free]
 ) -> tuple[dict[str, tuple[float, float]], dict[str, str]]:
-    """Bounds and units of the free parameters, each declared once and used at least once.
-
-    Args:
-        tables: the tables [variables.NAME].
-        open_numbers: where they stand.
-
-    Raises:
-        DesignFileError: for whatever is wrong with a variable or its use.
-    """
+    """Bounds and units of the free parameters, each declared once and used at least once."""
     bounds: dict[str, tuple[float, float]] = {}
     units: dict[str, str] = {}
     for name, table in tables.items():
