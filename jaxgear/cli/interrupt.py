@@ -19,17 +19,11 @@ _SOON = 0.02  # seconds in which Python is out of the callback
 
 @dataclass
 class State:
-    """What has happened in the command that runs.
+    """What has happened in the command that runs."""
 
-    Attributes:
-        asked: Ctrl-C was pressed.
-        held: it has to wait.
-        written: what is on the disk.
-    """
-
-    asked: bool = False
-    held: bool = False
-    written: str = NOTHING
+    asked: bool = False  # Ctrl-C was pressed
+    held: bool = False  # it has to wait
+    written: str = NOTHING  # what is on the disk
 
 
 state = State()

@@ -57,7 +57,7 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
     flanks = [dict(_flank_cells(evaluation)) for evaluation in evaluations.values()]
     for label in dict.fromkeys(label for cells in flanks for label in cells):
         result.add_row(label, *(cells.get(label, "-") for cells in flanks))
-    if flanks and any(flanks):
+    if any(flanks):
         result.add_section()
     result.add_row("time [s]", *(f"{evaluation.seconds:.2f}" for evaluation in evaluations.values()))
     return result

@@ -122,11 +122,15 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
             options["method"] = METHODS[_DEFAULT_METHOD](**(_QUICK[_DEFAULT_METHOD] if quick else {}))
         return OptimizeRequest(name, curve, design, options)
     if name == "free_form":
-        common |= {**options, **fewer}
+        common |= options | fewer
     else:
-        _check_levels(design, options.get("levels"))
+        levels = options.get("levels")
+        if isinstance(levels, dict) and set(levels) != set(design.bounds):
+            problem = f"must name all variables and nothing else: {', '.join(design.bounds)}"
+            raise DesignFileError("optimize.factorial.levels", problem)
         make: type[Any] = Pareto if name == _PARETO else METHODS[name]
-        common["method"] = dataclasses.replace(refused(f"optimize.{name}", make, **options), **fewer)
+        refused(f"optimize.{name}", make, **options)
+        common["method"] = make(**options | fewer)
     if quick and name != _PARETO:  # a quick look stays on its mesh
         common["positions"] = None
     return OptimizeRequest(name, curve, design, common)
@@ -145,12 +149,6 @@ def _options(section: schema.OptimizeSection, name: str, *, of_the_file: bool) -
         if "seed" not in taken and section.manufactured is None:
             refuse_given("optimize", section, ["seed"], f"{why} and perfect gears")
     return options | {key: value for key, value in shared.items() if key in taken and value is not None}
-
-
-def _check_levels(design: DesignFile, levels) -> None:
-    if isinstance(levels, dict) and set(levels) != set(design.bounds):
-        problem = f"must name all variables and nothing else: {', '.join(design.bounds)}"
-        raise DesignFileError("optimize.factorial.levels", problem)
 
 
 def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
