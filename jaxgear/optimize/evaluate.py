@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 
 from ..conditions.batches import padded, side_by_side
-from .goal import FEASIBLE
+from .goal import counted
 from .problem import Problem, Score
 
 _INFEASIBLE = 1e6  # rank of a design that passes a limit, above any objective
@@ -13,7 +13,8 @@ _INFEASIBLE = 1e6  # rank of a design that passes a limit, above any objective
 
 def scores(problem: Problem, points) -> Score:
     """Scores of points of the unit box, leading axis (points,), in batches that fit the cache."""
-    count, batch = len(points), min(batch_size(problem), len(points))
+    count = len(points)
+    batch = min(side_by_side(problem.mesh, problem.cases.count), count)
     return jax.tree.map(lambda part: part[:count], _scores(problem, padded(points, batch), batch))
 
 
@@ -22,13 +23,8 @@ def _scores(problem: Problem, points, batch: int) -> Score:
     return jax.lax.map(problem.score, points, batch_size=batch)
 
 
-def batch_size(problem: Problem) -> int:
-    """Designs side by side."""
-    return side_by_side(problem.mesh, problem.cases.count)
-
-
 def fitness(score: Score):
     """One number to rank by: the objective, and far above any of them the violation."""
-    value = score.value[..., 0]
-    rank = jnp.where(score.violation > FEASIBLE, _INFEASIBLE * (1 + score.violation), value)
+    value, excess = score.value[..., 0], counted(score.violation)
+    rank = jnp.where(excess > 0, _INFEASIBLE * (1 + excess), value)
     return jnp.where(jnp.isfinite(value), rank, jnp.inf)

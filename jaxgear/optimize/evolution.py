@@ -5,13 +5,13 @@ import importlib
 from abc import abstractmethod
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from ..numerics.fields import Checked, count, number
-from .evaluate import fitness, scores
+from .evaluate import fitness
 from .problem import Problem
 from .search import AbstractMethod, Record
 
@@ -45,7 +45,7 @@ class _Evolution(Checked, AbstractMethod):
             with _relaxed():
                 points, state = algorithm.ask(ask, state, parameters)
                 points = jnp.clip(points, 0.0, 1.0).astype(problem.low.dtype)
-            ranks = _judge(problem, record, points)
+            ranks = fitness(record.judge(points))
             with _relaxed():
                 state, _ = algorithm.tell(tell, points, ranks, state, parameters)
             record.look(generation + self.generations - rest, self.generations)
@@ -53,7 +53,7 @@ class _Evolution(Checked, AbstractMethod):
     def _begin(self, algorithm, parameters, problem, record, key):
         """State before the next generation, and how many generations are left."""
         points = jax.random.uniform(key, (self.population, len(problem.names)), problem.low.dtype)
-        ranks = _judge(problem, record, points)
+        ranks = fitness(record.judge(points))
         record.look(1, self.generations)
         with _relaxed():
             return algorithm.init(key, points, ranks, parameters), self.generations - 1
@@ -74,11 +74,8 @@ class Genetic(_Evolution):
         crossover: share of the genes that come from the second parent.
     """
 
+    name: ClassVar[str] = "genetic"
     crossover: float = number("", low=0.0, high=1.0, static=True, default=0.5)
-
-    @property
-    def name(self) -> str:
-        return "genetic"
 
     def _algorithm(self, example):
         last = max(self.generations - 1, 1)
@@ -93,9 +90,7 @@ class Genetic(_Evolution):
 class DifferentialEvolution(_Evolution):
     """Differential evolution (Storn and Price 1997; evosax.DifferentialEvolution), about the best individual."""
 
-    @property
-    def name(self) -> str:
-        return "differential_evolution"
+    name: ClassVar[str] = "differential_evolution"
 
     def _algorithm(self, example):
         made = _evosax().DifferentialEvolution(self.population, example)
@@ -109,12 +104,9 @@ class CMAES(_Evolution):
         spread: standard deviation of the first generation in the unit box.
     """
 
+    name: ClassVar[str] = "cma_es"
     population: int = count(low=_LEAST_POPULATION, default=16)
     spread: float = number("", low=0.0, high=1.0, open_low=True, static=True, default=0.3)
-
-    @property
-    def name(self) -> str:
-        return "cma_es"
 
     def _algorithm(self, example):
         made = _evosax().CMA_ES(self.population, example)
@@ -129,14 +121,6 @@ class CMAES(_Evolution):
 def _made(method: _Evolution, parameters: int, dtype):
     """Made once: algorithms hash by identity, and a new one would compile all its functions anew."""
     return method._algorithm(jnp.full(parameters, 0.5, dtype))
-
-
-def _judge(problem: Problem, record: Record, points):
-    """Ranks of designs, which are also counted and offered."""
-    score = scores(problem, points)
-    record.spend(len(points))
-    record.offer(np.asarray(points), np.asarray(score.value)[:, 0], np.asarray(score.violation))
-    return fitness(score)
 
 
 @contextmanager

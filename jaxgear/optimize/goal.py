@@ -18,6 +18,11 @@ Objective = str | Quantity | Callable[[MeshCycle], Any]
 FEASIBLE = 1e-3
 
 
+def counted(violation):
+    """A violation as designs are compared by it: one within the tolerance is none."""
+    return jnp.where(violation <= FEASIBLE, 0.0, violation)
+
+
 class Constraint(Checked):
     """A number of the design that has to stay within limits, in every case.
 

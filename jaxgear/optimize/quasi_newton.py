@@ -1,15 +1,16 @@
 """Quasi-Newton search from many points at once."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
 
-from ..numerics.fields import Checked, count
-from .problem import GRADIENT_COST, Problem
-from .search import AbstractMethod, Record
-from .smooth import STAGE_WIDTHS, Multipliers, lagrangian, merged, stages, yardstick
+from ..numerics import count
+from .problem import Problem
+from .smooth import STAGE_WIDTHS, AbstractStaged, Multipliers, lagrangian, merged
 from .starts import real_points, start_points
 
 _INSIDE = 0.01  # start points keep this distance from the bounds, where the map of the box is flat
@@ -18,7 +19,7 @@ _SHORTER = 0.3  # step after one that does not decrease enough, relative to it
 _LONGEST = 1.0  # step: a third of the way from one bound to the other
 
 
-class LBFGS(Checked, AbstractMethod):
+class LBFGS(AbstractStaged):
     """Limited-memory BFGS (optax) with a backtracking line search on a soft objective whose width shrinks in stages.
 
     The box is the image of the whole space under x = (1 + sin(t)) / 2; other constraints enter by an augmented
@@ -30,30 +31,40 @@ class LBFGS(Checked, AbstractMethod):
         steps: trial points of every start, over all stages.
     """
 
-    starts: int = count(default=16)
+    name: ClassVar[str] = "lbfgs"
     steps: int = count(low=len(STAGE_WIDTHS), default=150)
+    further_analyses: ClassVar[int] = 1  # the first trial is the point itself
 
-    @property
-    def name(self) -> str:
-        return "lbfgs"
-
-    def search(self, problem: Problem, record: Record) -> None:
-        """Runs the stages."""
+    def begin(self, problem: Problem):
         points = np.clip(start_points(problem, self.starts), _INSIDE, 1 - _INSIDE)
-        angles = real_points(problem, np.arcsin(2 * points - 1))
-        multipliers = Multipliers.zeros(problem, self.starts)
+        return real_points(problem, np.arcsin(2 * points - 1))
 
-        def advance(width, scale, count):
-            made = [jnp.asarray(value, angles.dtype) for value in (width, scale)]
-            moved, followed, *best = _advance(problem, angles, multipliers, jnp.asarray(count), *made)
-            record.spend(self.starts * (count + 1), analyses=GRADIENT_COST)
-            record.offer(*best)
-            return moved, followed, best[1]
+    @staticmethod
+    @eqx.filter_jit
+    def advance(problem: Problem, angles, multipliers: Multipliers, analyses, width, rate, scale):
+        method = optax.scale_by_lbfgs()
 
-        scale = yardstick(advance(1.0, 1.0, 0)[2])
-        for stage in stages(self.steps, self.steps):
-            angles, multipliers, _ = advance(stage.width * scale, scale, stage.steps)
-            record.look(stage.done, self.steps)
+        def loss(angle, rest):
+            return lagrangian(problem, _box(angle), Multipliers(rest), width, scale)
+
+        gradient = jax.vmap(jax.value_and_grad(loss, has_aux=True))
+
+        def step(_, carry):
+            trial, best, excess = carry
+            angles = trial.next
+            (values, (true, violation, new)), slopes = gradient(angles, multipliers.value)
+            best = merged(best, (_box(angles), true, violation))
+            finite = jnp.isfinite(slopes).all(axis=1, keepdims=True)
+            values, slopes = jnp.where(finite[:, 0], values, jnp.inf), jnp.where(finite, slopes, 0.0)
+            moved = jax.vmap(lambda trial, *seen: trial.take(method, *seen))(trial, angles, values, slopes)
+            return moved, best, jnp.where((moved.value < trial.value)[:, None], new, excess)
+
+        nothing = jnp.full(angles.shape[0], jnp.inf, angles.dtype)
+        zero = jnp.zeros_like(angles)
+        first = _Trial(angles, nothing, zero, zero, jnp.ones_like(nothing), jax.vmap(method.init)(angles))
+        start = first, (_box(angles), nothing, nothing), jnp.zeros_like(multipliers.value)
+        trial, best, excess = jax.lax.fori_loop(0, analyses, step, start)
+        return trial.angle, multipliers.follow(excess, scale), best
 
 
 class _Trial(eqx.Module):
@@ -85,35 +96,6 @@ class _Trial(eqx.Module):
         taken = _Trial(angle, value, slope, direction, jnp.ones_like(value), memory)
         shorter = eqx.tree_at(lambda trial: trial.stretch, self, _SHORTER * self.stretch)
         return jax.tree.map(lambda new, old: jnp.where(low, new.astype(old.dtype), old), taken, shorter)
-
-
-@eqx.filter_jit
-def _advance(problem: Problem, angles, multipliers: Multipliers, count, width, scale):
-    """A stage: angles, multipliers and the best true design of every start on the way."""
-    method = optax.scale_by_lbfgs()
-
-    def loss(angle, rest):
-        return lagrangian(problem, _box(angle), Multipliers(rest), width, scale)
-
-    gradient = jax.vmap(jax.value_and_grad(loss, has_aux=True))
-
-    def step(_, carry):
-        trial, best, excess = carry
-        angles = trial.next
-        (values, (true, violation, new)), slopes = gradient(angles, multipliers.value)
-        best = merged(best, (_box(angles), true, violation))
-        finite = jnp.isfinite(slopes).all(axis=1, keepdims=True)
-        values, slopes = jnp.where(finite[:, 0], values, jnp.inf), jnp.where(finite, slopes, 0.0)
-        moved = jax.vmap(lambda trial, *seen: trial.take(method, *seen))(trial, angles, values, slopes)
-        return moved, best, jnp.where((moved.value < trial.value)[:, None], new, excess)
-
-    nothing = jnp.full(angles.shape[0], jnp.inf, angles.dtype)
-    zero = jnp.zeros_like(angles)
-    first = _Trial(angles, nothing, zero, zero, jnp.ones_like(nothing), jax.vmap(method.init)(angles))
-    start = first, (_box(angles), nothing, nothing), jnp.zeros_like(multipliers.value)
-    # one more: the first trial is the point itself
-    trial, best, excess = jax.lax.fori_loop(0, count + 1, step, start)
-    return trial.angle, multipliers.follow(excess, scale), *best
 
 
 def _box(angle):

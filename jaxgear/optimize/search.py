@@ -3,14 +3,16 @@
 from abc import abstractmethod
 
 import equinox as eqx
-import jax.numpy as jnp
+import jax
 import numpy as np
 
+from ..conditions.batches import padded
 from ..numerics import Callback
 from .evaluate import scores
-from .goal import FEASIBLE
+from .goal import counted
 from .linear_model import Model
-from .problem import Problem
+from .problem import Problem, Score
+from .starts import real_points
 
 
 class Record:
@@ -46,14 +48,27 @@ class Record:
     def offer(self, points, values, violations, model: Model | None = None) -> None:
         """Designs with their true objective and violation; anything that is not finite is no candidate."""
         points, values, violations = np.atleast_2d(points), np.ravel(values), np.ravel(violations)
-        excess = np.where(violations <= FEASIBLE, 0.0, violations)
-        good = np.isfinite(values) & np.isfinite(excess)
+        good = np.isfinite(values) & np.isfinite(violations)
         if not good.any():
             return
-        best = np.lexsort((np.where(good, values, np.inf), np.where(good, excess, np.inf)))[0]
-        if (excess[best], values[best]) < (0.0 if self.violation <= FEASIBLE else self.violation, self.value):
+        points, values, violations = points[good], values[good], violations[good]
+        best = np.lexsort((values, counted(violations)))[0]
+        if (counted(violations[best]), values[best]) < (counted(self.violation), self.value):
             self.point, self.value, self.violation = points[best].copy(), float(values[best]), float(violations[best])
             self.model = model
+
+    def judge(self, points, chunk: int = 1) -> Score:
+        """True scores of points of the unit box, which are counted and offered.
+
+        Args:
+            points: shape (points, parameters).
+            chunk: of so many or a multiple of it the program is compiled, where calls differ in their number.
+        """
+        found = scores(self.problem, real_points(self.problem, padded(points, chunk)))
+        score = jax.tree.map(lambda part: np.asarray(part)[: len(points)], found)
+        self.spend(len(points))
+        self.offer(points, score.value[:, 0], score.violation)
+        return score
 
     def take(self, point, model: Model) -> None:
         """A design with its linearization."""
@@ -84,6 +99,4 @@ class AbstractMethod(eqx.Module):
 
     def polish(self, problem: Problem, record: Record, point: np.ndarray) -> None:
         """Goes on from a design on a finer mesh; a method that follows no slopes just judges it there."""
-        score = scores(problem, jnp.asarray(point, problem.low.dtype)[None])
-        record.spend(1)
-        record.offer(point, np.asarray(score.value)[:, 0], np.asarray(score.violation))
+        record.judge(point[None])

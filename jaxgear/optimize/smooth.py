@@ -1,15 +1,19 @@
 """The smooth problem that gradient methods follow: soft extremes, augmented Lagrangian, stages."""
 
+import math
+from abc import abstractmethod
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .goal import FEASIBLE
-from .problem import Problem
+from ..numerics import Checked, count
+from .goal import counted
+from .problem import GRADIENT_COST, Problem
+from .search import AbstractMethod, Record
 
 Scalar = Float[Array, ""]
 
@@ -55,9 +59,8 @@ def lagrangian(problem: Problem, x, multipliers: Multipliers, width, scale):
 def merged(best, new):
     """The better of two designs of every start: (points, values, violations) each."""
     (points, values, violations), (other, value, violation) = best, new
-    excess, others = (jnp.where(v <= FEASIBLE, 0.0, v) for v in (violations, violation))
-    better = (others < excess) | ((others == excess) & (value < values))
-    better = better & jnp.isfinite(value)
+    excess, others = counted(violations), counted(violation)
+    better = ((others < excess) | ((others == excess) & (value < values))) & jnp.isfinite(value)
     return (
         jnp.where(better[:, None], other, points),
         jnp.where(better, value, values),
@@ -81,17 +84,62 @@ class Stage(NamedTuple):
     rate: float
 
 
-def stages(steps: int, most: int) -> Iterator[Stage]:
+def stages(steps: int, most: float) -> Iterator[Stage]:
     """Stages of a search of so many steps, each of about as many as `most`; widths and rates fall."""
-    count = max(-(-steps // most), len(STAGE_WIDTHS))
-    ends = np.linspace(0, steps, count + 1).astype(int)
-    rates = np.geomspace(_FIRST_RATE, _LAST_RATE, count)
+    number = max(math.ceil(steps / most), len(STAGE_WIDTHS))
+    ends = np.linspace(0, steps, number + 1).astype(int)
+    rates = np.geomspace(_FIRST_RATE, _LAST_RATE, number)
     for index, rate in enumerate(rates):
         before, after = int(ends[index]), int(ends[index + 1])
-        yield Stage(after - before, after, STAGE_WIDTHS[index * len(STAGE_WIDTHS) // count], float(rate))
+        yield Stage(after - before, after, STAGE_WIDTHS[index * len(STAGE_WIDTHS) // number], float(rate))
 
 
 def yardstick(values) -> float:
     """Scale of the stage widths [um], from the true objective of the start points."""
     known = np.abs(np.asarray(values)[np.isfinite(values)])
     return max(float(known.min()), _LEAST_SCALE) if len(known) else 1.0
+
+
+class AbstractStaged(Checked, AbstractMethod):
+    """A search from many points at once on a soft objective whose width shrinks in stages.
+
+    All starts advance together under `jax.vmap`. Constraints enter by an augmented Lagrangian, whose multipliers follow
+    once per stage.
+
+    Attributes:
+        starts: number of start points; the first is the middle of the box.
+        steps: of every start, over all stages.
+    """
+
+    starts: int = count(default=16)
+    steps: int = count(low=len(STAGE_WIDTHS), default=300)
+
+    longest_stage: ClassVar[float] = math.inf  # in steps: between two looks at the search
+    further_analyses: ClassVar[int] = 0  # of a stage, beside one for each of its steps
+
+    @abstractmethod
+    def begin(self, problem: Problem):
+        """Start points, as the method holds them."""
+
+    @staticmethod
+    @abstractmethod
+    def advance(problem: Problem, points, multipliers: Multipliers, analyses, width, rate, scale):
+        """A stage of so many analyses: the new points and multipliers, and the best true design of every start."""
+
+    def search(self, problem: Problem, record: Record) -> None:
+        """Runs the stages."""
+        state = self.begin(problem), Multipliers.zeros(problem, self.starts)
+
+        def advance(analyses, *numbers):
+            converted = [jnp.asarray(value, problem.low.dtype) for value in numbers]
+            *moved, best = self.advance(problem, *state, jnp.asarray(analyses), *converted)
+            record.spend(self.starts * analyses, analyses=GRADIENT_COST)
+            record.offer(*best)
+            return moved, best
+
+        _, (_, values, _) = advance(1, 1.0, 0.0, 1.0)  # a step of length zero judges the start points
+        scale = yardstick(values)
+        for stage in stages(self.steps, self.longest_stage):
+            analyses = stage.steps + self.further_analyses
+            state, _ = advance(analyses, stage.width * scale, stage.rate, scale)
+            record.look(stage.done, self.steps)
