@@ -10,7 +10,10 @@ from .join import label as label
 from .join import ranked as ranked
 from .load import LoadSpectrum as LoadSpectrum
 from .solved import solved as solved
+from .variant import Design as Design
+from .variant import Parameters as Parameters
 from .variant import Variant as Variant
 from .variant import Variants as Variants
 from .variant import check_used as check_used
+from .variant import two_modifications as two_modifications
 from .variant import variants as variants

@@ -41,12 +41,9 @@ class Conditions(Checked):
 
     def on(self, mesh: Mesh) -> "Cases":
         """The cases on a mesh; traceable, where every design has a mesh of its own."""
-        dtype = mesh.phase.dtype
-        torques = self.load.torques.astype(dtype)
-        speeds = None if self.load.speeds is None else self.load.speeds.astype(dtype)
-        removed = None if self.deviations is None else _removed(mesh, torques, self.deviations)
-        friction = None if self.load.friction is None else self.load.friction.astype(dtype)
-        return Cases(torques, speeds, friction, self.load.weights.astype(dtype), removed)
+        load = jax.tree.map(lambda numbers: numbers.astype(mesh.phase.dtype), self.load)
+        removed = None if self.deviations is None else _removed(mesh, load.torques, self.deviations)
+        return Cases(load.torques, load.speeds, load.friction, load.weights, removed)
 
 
 class Cases(Checked):
@@ -90,18 +87,18 @@ class Cases(Checked):
         A single case is not mapped, so that it costs no more than a plain call.
         """
 
-        def at(torque, speed, removed):
+        def at(load, removed):
+            torque, speed = load
             return function(Operation(torque, speed, self.friction), removed)
 
-        by_speed = None if self.speed is None else 0
+        loads = self.torque, self.speed
         if self.removed is not None:
-            found = jax.vmap(jax.vmap(at, (None, None, 0)), (0, by_speed, 0))(self.torque, self.speed, self.removed)
+            found = jax.vmap(jax.vmap(at, (None, 0)))(loads, self.removed)
             return jax.tree.map(lambda part: part.reshape(self.count, *part.shape[2:]), found)
         nothing = jnp.zeros((), self.torque.dtype)
         if self.count == 1:
-            speed = None if self.speed is None else self.speed[0]
-            return jax.tree.map(lambda part: part[None], at(self.torque[0], speed, nothing))
-        return jax.vmap(at, (0, by_speed, None))(self.torque, self.speed, nothing)
+            return jax.tree.map(lambda part: part[None], at(jax.tree.map(lambda part: part[0], loads), nothing))
+        return jax.vmap(at, (0, None))(loads, nothing)
 
 
 def conditions(

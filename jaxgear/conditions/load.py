@@ -39,9 +39,7 @@ class LoadSpectrum(Checked):
         self.torques = real(torques)
         if self.torques.ndim != 1 or not len(self.torques):
             raise ValueError("LoadSpectrum: torques must be a list of at least one torque")
-        self.speeds = None
-        if speeds is not None:
-            self.speeds = self._as_many("speeds", real(speeds))
+        self.speeds = None if speeds is None else self._as_many("speeds", real(speeds))
         self.friction = optional_real(friction)
         self._check_different()
         shares = jnp.ones_like(self.torques) if weights is None else real(weights)

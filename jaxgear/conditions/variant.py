@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..contact import Mesh, removed_material
 from ..contact.operation import operation_of
-from ..microgeometry import AbstractModification
+from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Checked, fields_of, real
 from .cases import Cases, Conditions, conditions
 from .load import LoadSpectrum
@@ -21,7 +21,6 @@ Scalar = Float[Array, ""]
 Parameters = Mapping[str, Scalar]
 Modifications = tuple[AbstractModification | None, AbstractModification | None]
 Design = Callable[[Parameters], Modifications]
-
 
 # where the variables of an engine can be used
 _USES = {
@@ -42,8 +41,8 @@ class Variant(NamedTuple):
 
     mesh: Mesh
     cases: Cases
-    pinion: AbstractModification | None
-    wheel: AbstractModification | None
+    pinion: AbstractModification
+    wheel: AbstractModification
     possible: Bool[Array, ""]
 
 
@@ -74,7 +73,7 @@ class Variants(Checked):
     def __call__(self, values: Iterable) -> Variant:
         """The variant of some values of the variables, in the order of their names; traceable."""
         parameters = dict(zip(self.names, values))
-        pinion, wheel = self.design(parameters)
+        pinion, wheel = two_modifications(self.design(parameters))
         mesh, cases = self.mesh, self.cases
         made: list[Any] = [pinion, wheel]
         if not isinstance(mesh, Mesh):
@@ -148,7 +147,7 @@ def variants(
     given = 0.0 if callable(torque) else torque
     judged = conditions(owner, example, given, tolerance=tolerance, samples=samples, seed=seed)
     fixed = isinstance(mesh, Mesh) and not callable(torque)
-    made = Variants(
+    return Variants(
         names=tuple(names),
         design=design,
         mesh=mesh,
@@ -156,7 +155,6 @@ def variants(
         conditions=judged,
         cases=judged.on(example) if fixed else None,
     )
-    return made
 
 
 def check_used(owner: str, names: Sequence[str], used: Sequence[str]) -> None:
@@ -164,6 +162,23 @@ def check_used(owner: str, names: Sequence[str], used: Sequence[str]) -> None:
     unused = [f'"{name}"' for name in names if name not in used]
     if unused:
         raise ValueError(f"{owner}: nothing depends on {', '.join(unused)}: use it in {_USES[owner]}, or leave it out")
+
+
+def two_modifications(made) -> tuple[AbstractModification, AbstractModification]:
+    """What a design has made, with nominal involutes for None.
+
+    Raises:
+        ValueError: for anything but two modifications.
+    """
+    if not (isinstance(made, tuple | list) and len(made) == 2):
+        what = f"{len(made)} values" if isinstance(made, tuple | list) else f"one {type(made).__name__}"
+        raise ValueError(f"design: gives {what}, must give two modifications, (pinion, wheel); None for an involute")
+    for name, modification in zip(("pinion", "wheel"), made):
+        if not (modification is None or isinstance(modification, AbstractModification)):
+            kind = type(modification).__name__
+            raise ValueError(f"design: the {name} is of type {kind}, must be a modification or None for an involute")
+    pinion, wheel = made
+    return pinion or NoModification(), wheel or NoModification()
 
 
 def _in_range(tree) -> Iterator[Bool[Array, ""]]:

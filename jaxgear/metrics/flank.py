@@ -43,7 +43,7 @@ def profile_relief(
         material removed from pinion and wheel [um], each of shape (points,).
     """
     on_pinion, on_wheel = (
-        _profile(side, modification, jnp.linspace(side.start_roll_length, side.tip_roll_length, points))
+        removed_at(side, modification, _roll_lengths(side, points))
         for side, modification in _flanks(mesh, pinion, wheel)
     )
     return on_pinion, on_wheel
@@ -58,15 +58,9 @@ def max_relief(
 ) -> Scalar:
     """Largest material removed anywhere on either flank [um]."""
     face = jnp.linspace(-0.5, 0.5, _FACE_POINTS, dtype=_dtype(mesh)) * mesh.pair.face_width
-    removed = jnp.stack(
-        [
-            _removed(
-                side, modification, jnp.linspace(side.start_roll_length, side.tip_roll_length, _PROFILE_POINTS), face
-            )
-            for side, modification in _flanks(mesh, pinion, wheel)
-        ]
-    )
-    return maximum(removed)
+    flanks = _flanks(mesh, pinion, wheel)
+    removed = [removed_at(side, flank, _roll_lengths(side, _PROFILE_POINTS), face) for side, flank in flanks]
+    return maximum(jnp.stack(removed))
 
 
 @eqx.filter_jit
@@ -105,7 +99,7 @@ def removed_volume(
     for side, modification in _flanks(mesh, pinion, wheel):
         length = side.tip_roll_length - side.start_roll_length
         rho = side.start_roll_length + along * length
-        removed = _removed(side, modification, rho, (across - 0.5) * width)
+        removed = removed_at(side, modification, rho, (across - 0.5) * width)
         # >= and not maximum: at an amount of zero the slope is that of the material which is about to be removed
         removed = jnp.where(removed >= 0, removed, 0.0)
         per_flank = face_weight @ removed @ (profile_weight * rho) * width * length / side.base_radius
@@ -129,27 +123,20 @@ def removed_at(
     Returns:
         shape (lines, points), or (points,) without a face coordinate.
     """
-    if face_coordinate is None:
-        return _profile(side, modification, roll_length)
-    return _removed(side, modification, roll_length, face_coordinate)
+    face = jnp.zeros((1,), roll_length.dtype) if face_coordinate is None else face_coordinate
+    removed = modification(side.flank(roll_length[None], face[:, None]))
+    removed = jnp.broadcast_to(removed, (face.shape[0], roll_length.shape[0]))
+    return removed[0] if face_coordinate is None else removed
 
 
 def _flanks(mesh: Mesh | Kinematics, pinion: AbstractModification | None, wheel: AbstractModification | None):
     """Every gear's side and modification."""
-    nominal = NoModification()
-    return zip(mesh.sides, (nominal if pinion is None else pinion, nominal if wheel is None else wheel))
+    return zip(mesh.sides, (pinion or NoModification(), wheel or NoModification()))
 
 
-def _removed(
-    side: Side, modification: AbstractModification, rho: Profile, face: Float[Array, " lines"]
-) -> Float[Array, "lines points"]:
-    """Material removed at roll lengths and face coordinates [um]."""
-    removed = modification(side.flank(rho[None], face[:, None]))
-    return jnp.broadcast_to(removed, (face.shape[0], rho.shape[0]))
-
-
-def _profile(side: Side, modification: AbstractModification, rho: Profile) -> Profile:
-    return _removed(side, modification, rho, jnp.zeros((1,), rho.dtype))[0]
+def _roll_lengths(side: Side, points: int) -> Profile:
+    """Evenly spaced over the active profile."""
+    return jnp.linspace(side.start_roll_length, side.tip_roll_length, points)
 
 
 def _decrease(side: Side, modification: AbstractModification) -> Scalar:
@@ -157,7 +144,7 @@ def _decrease(side: Side, modification: AbstractModification) -> Scalar:
     # profile shift can move the pitch point off the active profile: there is only one way then
     pitch = jnp.clip(side.pitch_roll_length, side.start_roll_length, tip)
     for end in (tip, side.start_roll_length):
-        step = jnp.diff(_profile(side, modification, jnp.linspace(pitch, end, _PROFILE_POINTS)))
+        step = jnp.diff(removed_at(side, modification, jnp.linspace(pitch, end, _PROFILE_POINTS)))
         total = total + jnp.sum(jnp.where(step < 0, -step, 0.0))
     return total
 

@@ -50,12 +50,16 @@ def contact_shock(cycle: MeshCycle) -> ContactShock:
     # path: contact is unbroken, so a step across an end of the path is loaded on the inside first.
     before = jnp.clip(contact.start - path, 0.0, step)
     after = jnp.clip(path + step - contact.end, 0.0, step)
-    corner_force = jnp.where(kinematics.outside > 0, cycle.pair_force, 0.0)
     return ContactShock(
         jnp.sum(jnp.maximum(fraction * step - (step - before), 0.0)),
         jnp.sum(jnp.maximum(fraction * step - (step - after), 0.0)),
-        maximum(corner_force),
+        maximum(corner_force(cycle)),
     )
+
+
+def corner_force(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
+    """Force of every pair beyond the path of contact [N]."""
+    return jnp.where(cycle.kinematics.outside > 0, cycle.pair_force, 0.0)
 
 
 def _loaded_fraction(cycle: MeshCycle) -> Float[Array, "pairs positions"]:

@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
+from ..numerics import over_batch
 from ..numerics.reductions import AbstractReduction, Value
 
 Numbers = Float[Array, "..."]
@@ -57,10 +57,7 @@ class Quantity:
 
     def __call__(self, cycle: MeshCycle) -> Numbers:
         """The number, of every cycle where the cycle has leading axes from `jax.vmap`."""
-        number = _number(self)
-        for _ in range(cycle.transmission_error.ndim - 1):
-            number = jax.vmap(number)
-        return number(cycle)
+        return over_batch(lambda cycle: self.reduction(self.values(cycle).ravel()))(cycle)
 
     def values(self, cycle: MeshCycle) -> Float[Array, "..."]:
         """What is reduced, of one cycle, in its own shape.
@@ -79,10 +76,6 @@ class Quantity:
                 "a Quantity(name, of, reduction=Max()) says what to make of it"
             )
         return values.astype(cycle.transmission_error.dtype)
-
-
-def _number(quantity: Quantity) -> Callable[[MeshCycle], Numbers]:
-    return lambda cycle: quantity.reduction(quantity.values(cycle).ravel())
 
 
 class Vocabulary(Mapping[str, Quantity]):
@@ -133,8 +126,7 @@ def quantity_of(of: str | Quantity | Callable[[MeshCycle], Any], owner: str = "q
         return Quantity(getattr(of, "__name__", type(of).__name__), of)
     if of in quantities:
         return quantities[of]
-    near = difflib.get_close_matches(
-        str(of), [*quantities, *(each.key for each in quantities.values())], n=1, cutoff=0.5
-    )
+    known = [*quantities, *(each.key for each in quantities.values())]
+    near = difflib.get_close_matches(str(of), known, n=1, cutoff=0.5)
     hint = f'did you mean "{near[0]}"?' if near else f"must be one of {', '.join(quantities)}"
     raise ValueError(f'{owner}: "{of}" is not known, {hint}')

@@ -1,10 +1,10 @@
 """Variation of a transmission error curve over one base pitch."""
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import Checked, result, spread
+from ..numerics.reductions import Range
 
 Curve = Float[Array, "... positions"]
 
@@ -37,10 +37,7 @@ def smooth_peak_to_peak(curve: Curve, smoothing) -> Float[Array, "..."]:
         curve: values at equally spaced positions.
         smoothing: width of the soft extremes in units of the curve; towards zero the result rises to `peak_to_peak`.
     """
-    count = jnp.log(jnp.asarray(curve.shape[-1], curve.dtype))
-    top = jax.nn.logsumexp(curve / smoothing, axis=-1) - count
-    bottom = jax.nn.logsumexp(-curve / smoothing, axis=-1) - count
-    return smoothing * (top + bottom)
+    return Range().soft(curve, smoothing)
 
 
 def harmonics(curve: Curve, count: int = 5) -> Harmonics:

@@ -8,7 +8,7 @@ from ..geometry import margins
 from ..numerics.reductions import Average, Harmonic, Max, Min, Range, Rms
 from .flank import max_relief, relief_reversal, removed_volume
 from .flash import flash_temperature
-from .load import contact_shock, effective_contact_ratio
+from .load import contact_shock, corner_force, effective_contact_ratio
 from .loss import loss_factor
 from .quantity import Quantity, quantities
 from .root_stress import root_stress
@@ -24,10 +24,6 @@ def _te(cycle: MeshCycle):
 def _corner_length(cycle: MeshCycle) -> Scalar:
     shock = contact_shock(cycle)
     return shock.approach + shock.recess
-
-
-def _corner_force(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
-    return jnp.where(cycle.kinematics.outside > 0, cycle.pair_force, 0.0)
 
 
 def _contact_pressure(cycle: MeshCycle) -> Load:
@@ -105,7 +101,7 @@ quantities.add(
         "effective_contact_ratio", effective_contact_ratio, meaning="mean number of loaded pairs", better="larger"
     ),
     Quantity("corner_contact_length", _corner_length, "mm", "loaded path beyond the theoretical path of contact"),
-    Quantity("corner_force", _corner_force, "N", "largest force on a pair there", Max(), local=True),
+    Quantity("corner_force", corner_force, "N", "largest force on a pair there", Max(), local=True),
     Quantity(
         "pinion_root_stress",
         lambda c: root_stress(c).pinion,

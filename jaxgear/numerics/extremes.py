@@ -36,7 +36,7 @@ def minimum(x: Float[Array, "..."], axis: Axes = None) -> Float[Array, "..."]:
 
 def spread(x: Float[Array, "..."], axis: Axes = None) -> Float[Array, "..."]:
     """Largest minus smallest entry along axes, otherwise as `maximum`; zero derivative where all entries are equal."""
-    return _spread(*_together(x, axis))
+    return maximum(x, axis) - minimum(x, axis)
 
 
 def _together(x, axis: Axes):
@@ -53,29 +53,13 @@ def _together(x, axis: Axes):
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _largest(axis: int, x):
-    return _unless_nan(axis, x, jnp.max(x, axis))
-
-
-@partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _spread(axis: int, x):
-    return _unless_nan(axis, x, jnp.max(x, axis) - jnp.min(x, axis))
-
-
-def _unless_nan(axis: int, x, value):
-    return jnp.where(jnp.any(jnp.isnan(x), axis), jnp.nan, value)
+    return jnp.where(jnp.any(jnp.isnan(x), axis), jnp.nan, jnp.max(x, axis))
 
 
 @_largest.defjvp
 def _largest_jvp(axis, primals, tangents):
     (x,), (x_dot,) = primals, tangents
     return _largest(axis, x), jnp.sum(jnp.where(_place(axis, x), x_dot, 0.0), axis)
-
-
-@_spread.defjvp
-def _spread_jvp(axis, primals, tangents):
-    (x,), (x_dot,) = primals, tangents
-    gain, loss = jnp.where(_place(axis, x), x_dot, 0.0), jnp.where(_place(axis, -x), x_dot, 0.0)
-    return _spread(axis, x), jnp.sum(gain - loss, axis)
 
 
 def _place(axis: int, x):

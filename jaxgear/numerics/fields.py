@@ -59,20 +59,21 @@ def number(unit: str, *, default: Any = MISSING, kw_only: bool = False, **limits
     """
     kind = Number(unit, **limits)
     converter = _plain if kind.static else optional_real if kind.optional else real
-    return _field(kind, default, kw_only, converter=converter, static=kind.static)
+    given = {} if default is MISSING else {"default": default}
+    return eqx.field(metadata={_KEY: kind}, kw_only=kw_only, converter=converter, static=kind.static, **given)
 
 
 def count(
     *, low: int = 1, high: int | None = None, optional: bool = False, default: Any = MISSING, kw_only: bool = False
 ) -> Any:
     """A static field that holds a whole number: a size, or how often something is done."""
-    kind = Number("", low, _MOST if high is None else high, whole=True, optional=optional, static=True)
-    return _field(kind, default, kw_only, converter=_plain, static=True)
+    limits = {"low": low, "high": _MOST if high is None else high, "optional": optional}
+    return number("", default=default, kw_only=kw_only, whole=True, static=True, **limits)
 
 
 def result(unit: str = "") -> Any:
     """A field of a result: printed with its unit, neither converted nor checked."""
-    return _field(Number(unit, checked=False), MISSING, False)
+    return eqx.field(metadata={_KEY: Number(unit, checked=False)})
 
 
 def fields_of(cls: type) -> dict[str, Number]:
@@ -171,14 +172,6 @@ def whole(owner: str, name: str, value, low: float = 1, high: float = _MOST) -> 
     if value > high:
         raise ValueError(f"{owner}: {name} = {value!r} must be at most {'2^53' if high == _MOST else high}")
     return int(value)
-
-
-def _field(kind: Number, default, kw_only: bool, **options):
-    if default is not MISSING:
-        options["default"] = default
-    if kw_only:
-        options["kw_only"] = True
-    return eqx.field(metadata={_KEY: kind}, **options)
 
 
 def _plain(value):

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .extremes import maximum, minimum
+from .extremes import maximum, minimum, spread
 from .fields import whole
 
 Values = Float[Array, "... values"]
@@ -83,7 +83,7 @@ class Range(AbstractReduction):
     """The largest minus the smallest value: peak to peak."""
 
     def __call__(self, values):
-        return maximum(values, -1) - minimum(values, -1)
+        return spread(values, -1)
 
     def soft(self, values, width):
         return _soft_maximum(values, width) + _soft_maximum(-values, width)

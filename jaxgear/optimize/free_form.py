@@ -8,14 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..conditions import conditions
+from ..conditions import Parameters, conditions
 from ..contact import Mesh
 from ..metrics import quantities, removed_at
 from ..microgeometry import AbstractModification, TabulatedProfile
 from ..numerics import AbstractMeasure, Callback, Mean, check, whole
 from ..sizing import iso_relief
 from ..tolerance import Tolerance
-from .design import Parameters
 from .goal import Constraint
 from .minimax import Search, follow
 from .problem import Problem, Roughness

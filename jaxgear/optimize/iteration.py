@@ -3,17 +3,16 @@
 import time
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 
+from ..conditions import Design, solved
 from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..metrics import max_relief as largest_relief
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, NoModification, TabulatedProfile
 from ..numerics import Callback, check, whole
-from .design import Design
 from .goal import Constraint
 from .minimax import Minimax
 from .minimize import minimize
@@ -22,14 +21,6 @@ from .search import AbstractMethod
 
 _UNTOUCHED = 0.05  # [um]: a flank with less relief than this counts as unmodified
 _LOADED = 1e-6  # a pair with less than this share of the force carries none
-
-
-class _State(NamedTuple):
-    """What the next step needs of a solved cycle."""
-
-    cycle: MeshCycle
-    ppte: float
-    alone: np.ndarray  # positions where one pair alone carries the load, on unmodified flank
 
 
 def iterate_transmission_error(
@@ -81,40 +72,43 @@ def iterate_transmission_error(
     whole("iterate_transmission_error", "steps", steps, 1)
     began = time.perf_counter()
     flanks = _Flanks(mesh, pinion or NoModification(), wheel or NoModification(), float(max_relief))
-    states, iterates = [], []
+    cycles: list[MeshCycle] = []
+    iterates: list[Iterate] = []
     level = float("nan")
     for step in range(steps + 1):
-        state = _solve(mesh, torque, *flanks.modifications())
-        states.append(state)
-        iterates.append(_iterate(mesh, state, *flanks.modifications()))
+        pinion, wheel = flanks.modifications()
+        cycles.append(cycle := _solve(mesh, torque, pinion, wheel))
+        error, alone = np.asarray(cycle.transmission_error), _alone(cycle)
+        iterates.append(_iterate(mesh, cycle, alone, pinion, wheel))
         if callback is not None:
             callback(step, steps, min(iterate.ppte for iterate in iterates))
         if step == 0:
-            level = float(np.asarray(state.cycle.transmission_error)[state.alone].max())
+            level = float(error[alone].max())
         if step == steps or _ended(iterates, rtol):
             break
-        flanks.take_off(level - np.asarray(state.cycle.transmission_error), state.alone)
-    best = int(np.argmin([iterate.ppte for iterate in iterates]))
+        flanks.take_off(level - error, alone)
+    number = int(np.argmin([iterate.ppte for iterate in iterates]))
+    best = iterates[number]
     return Optimum(
         method="te_iteration",
         objective_name="ppte",
         parameters={},
-        pinion=iterates[best].pinion,
-        wheel=iterates[best].wheel,
+        pinion=best.pinion,
+        wheel=best.wheel,
         mesh=mesh,
-        cycle=states[best].cycle,
-        ppte=iterates[best].ppte,
-        objective=iterates[best].ppte,
+        cycle=cycles[number],
+        ppte=best.ppte,
+        objective=best.ppte,
         objective_unit="um",
         positions=mesh.resolution.positions,
         grid_change=float("nan"),
         decrease_left=float("nan"),
         active_bounds={},
-        constraints={"max_relief": Limit(iterates[best].max_relief, None, float(max_relief), "um", True)},
+        constraints={"max_relief": Limit(best.max_relief, None, float(max_relief), "um", True)},
         violation=0.0,
-        evaluations=len(states),
+        evaluations=len(cycles),
         history=np.minimum.accumulate([iterate.ppte for iterate in iterates]),
-        history_evaluations=np.arange(1, len(states) + 1),
+        history_evaluations=np.arange(1, len(cycles) + 1),
         seconds=time.perf_counter() - began,
         iterations=tuple(iterates),
     )
@@ -209,7 +203,7 @@ class _Flanks:
 
     def take_off(self, missing: np.ndarray, alone: np.ndarray) -> None:
         """Takes off what is missing to the level at every position [um]; where there is too much, gives back."""
-        at_path = np.interp(self._path / self._pitch, *_periodic(self._phase, missing))
+        at_path = np.interp(self._path / self._pitch, self._phase, missing, period=1.0)
         for index, outwards in enumerate((1.0, -1.0)):
             depth = outwards * self._path
             outer = depth >= self._onset(missing, alone, outwards)
@@ -226,36 +220,34 @@ class _Flanks:
         return float(distance[side][np.argmin(missing[side])])
 
 
-def _periodic(phase: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Phase and values over the base pitches that a path of contact can have."""
-    shifts = np.arange(-3, 4)
-    return (phase[None] + shifts[:, None]).ravel(), np.tile(values, len(shifts))
-
-
-def _solve(mesh: Mesh, torque, pinion, wheel) -> _State:
+def _solve(mesh: Mesh, torque, pinion: AbstractModification, wheel: AbstractModification) -> MeshCycle:
     removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
     cycle = solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
-    error = np.asarray(cycle.transmission_error)
-    if not (np.asarray(cycle.converged).all() and np.isfinite(error).all()):
+    if not solved(cycle):
         raise RuntimeError("iterate_transmission_error: a contact solution did not converge")
+    return cycle
+
+
+def _alone(cycle: MeshCycle) -> np.ndarray:
+    """Positions where one pair alone carries the load, on unmodified flank."""
+    error = np.asarray(cycle.transmission_error)
     loaded = np.asarray(cycle.pair_force) > _LOADED * float(cycle.force)
     single = loaded.sum(axis=0) == 1
     untouched = (np.asarray(cycle.gap).min(axis=1) < _UNTOUCHED) | ~loaded
     # a relief over the whole profile leaves no such position, and a high contact ratio no single contact at all
     choices = single & untouched.all(axis=0), single, error == error.max()
-    alone = next(choice for choice in choices if choice.any())
-    return _State(cycle, float(np.ptp(error)), alone)
+    return next(choice for choice in choices if choice.any())
 
 
-def _iterate(mesh: Mesh, state: _State, pinion, wheel) -> Iterate:
-    error = np.asarray(state.cycle.transmission_error)
+def _iterate(mesh: Mesh, cycle: MeshCycle, alone: np.ndarray, pinion, wheel) -> Iterate:
+    error = np.asarray(cycle.transmission_error)
     return Iterate(
         pinion=pinion,
         wheel=wheel,
         transmission_error=error,
-        ppte=state.ppte,
-        limit=float(np.ptp(error[state.alone])),
+        ppte=float(np.ptp(error)),
+        limit=float(np.ptp(error[alone])),
         max_relief=float(largest_relief(mesh, pinion=pinion, wheel=wheel)),
-        max_flank_pressure=float(np.max(np.asarray(state.cycle.contact_pressure))),
-        max_corner_pressure=float(np.max(np.asarray(state.cycle.corner_pressure))),
+        max_flank_pressure=float(np.max(np.asarray(cycle.contact_pressure))),
+        max_corner_pressure=float(np.max(np.asarray(cycle.corner_pressure))),
     )

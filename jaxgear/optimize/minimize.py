@@ -3,10 +3,10 @@
 import time
 from collections.abc import Mapping, Sequence
 
+from ..conditions import Design
 from ..contact import Mesh
 from ..numerics import AbstractMeasure, Callback
 from ..tolerance import Tolerance
-from .design import Design
 from .goal import Constraint, Objective
 from .methods import method_named
 from .problem import make_problem

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.stats import qmc
 
+from ..conditions import Design
 from ..contact import Mesh
 from ..numerics import AbstractMeasure, Callback
 from ..numerics.fields import Checked, count
 from ..numerics.pareto import pareto_front
 from ..tolerance import Tolerance
-from .design import Design
 from .goal import FEASIBLE, Constraint, Objective
 from .linear_model import AbstractScalarization, Model
 from .minimax import Search, follow, linearized

@@ -9,13 +9,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..conditions import Cases, Conditions, Variants, check_used, conditions, solved
+from ..conditions import Cases, Conditions, Design, Variants, check_used, conditions, solved, two_modifications
 from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..metrics import Quantity, quantity_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import AbstractMeasure, Mean, check, maximum, real
 from ..tolerance import Tolerance
-from .design import Design, two_modifications
 from .goal import Constraint, Objective, scale_of
 from .linearization import Linearization, Pieces, Sloped, any_slopes, local_slopes, pieces_of
 
@@ -278,7 +277,7 @@ def make_problem(
         measure=measure,
         constraints=tuple(constraints),
     )
-    made = Variants(names, lambda values: two_modifications(design(values)), mesh, None, judged, posed.cases)
+    made = Variants(names, design, mesh, None, judged, posed.cases)
     check_used("minimize", names, made.traced(posed.low)[1])
     return posed
 

@@ -1,6 +1,7 @@
 """A free flank replaced by a named curve, and what that costs."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import MappingProxyType
 
 import equinox as eqx
@@ -103,18 +104,15 @@ def _fit(side: Side, modification: AbstractModification, curve: str):
     _, first, low, high = CURVES[curve]
     roll = jnp.linspace(side.pitch_roll_length, side.tip_roll_length, _SAMPLES)
     addendum = float(roll[-1] - roll[0])
-    flank = np.asarray(removed_at(side, modification, roll))
+    flank = removed_at(side, modification, roll)
     most = max(float(flank.max()), 1e-3)
 
-    def residual(values):
-        return np.asarray(_distance(side, jnp.asarray(values), jnp.asarray(flank), roll, curve)) / most
-
-    def slope(values):
-        return np.asarray(_slope(side, jnp.asarray(values), jnp.asarray(flank), roll, curve)) / most
+    def residual(values, of=_distance):
+        return np.asarray(of(jnp.asarray(values), side, flank, roll, curve)) / most
 
     bounds = [0.0, _LEAST_LENGTH * addendum, *low], [3 * most, addendum, *high]
     starts = [[most, share * addendum, *first] for share in _LENGTHS]
-    fits = [least_squares(residual, values, jac=slope, bounds=bounds) for values in starts]
+    fits = [least_squares(residual, values, jac=partial(residual, of=_slope), bounds=bounds) for values in starts]
     best = min(fits, key=lambda fit: fit.cost)
     return _relief(jnp.asarray(best.x), curve), float(np.abs(best.fun).max()) * most
 
@@ -124,15 +122,9 @@ def _relief(values, curve: str) -> TipRelief:
     return TipRelief(real(amount), real(length), CURVES[curve][0](*shape))
 
 
-def _difference(values, side, flank, roll, curve):
+@eqx.filter_jit
+def _distance(values, side: Side, flank, roll, curve: str):
     return removed_at(side, _relief(values, curve), roll) - flank
 
 
-@eqx.filter_jit
-def _distance(side: Side, values, flank, roll, curve: str):
-    return _difference(values, side, flank, roll, curve)
-
-
-@eqx.filter_jit
-def _slope(side: Side, values, flank, roll, curve: str):
-    return jax.jacfwd(_difference)(values, side, flank, roll, curve)
+_slope = eqx.filter_jit(jax.jacfwd(_distance))

@@ -15,8 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..conditions import Conditions, Variants, check_used, label, variants
-from ..conditions.variant import Design, Parameters
+from ..conditions import Conditions, Design, Parameters, Variants, check_used, label, variants
 from ..contact import Mesh, solve
 from ..metrics import Quantity, quantities, quantity_of
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
