@@ -9,8 +9,10 @@ from .join import joined as joined
 from .join import label as label
 from .join import ranked as ranked
 from .load import LoadSpectrum as LoadSpectrum
+from .solved import solve_case as solve_case
 from .solved import solved as solved
 from .variant import Design as Design
+from .variant import Modifications as Modifications
 from .variant import Parameters as Parameters
 from .variant import Variant as Variant
 from .variant import Variants as Variants

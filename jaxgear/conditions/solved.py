@@ -1,9 +1,32 @@
-"""When a number of a mesh cycle counts."""
+"""The cycle of one case, and when its numbers count."""
+
+from typing import Any
 
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
-from ..contact import MeshCycle
+from ..contact import Mesh, MeshCycle, removed_material, solve_removed
+from ..microgeometry import AbstractModification, NoModification
+
+
+def solve_case(
+    mesh: Mesh,
+    torque,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+    deviation: Any = 0.0,
+) -> MeshCycle:
+    """The cycle of a design by the compiled program that serves every kind of modification.
+
+    Args:
+        mesh: prepared mesh.
+        torque: on the pinion [N m], scalar; or an `Operation`.
+        pinion, wheel: modifications; None for nominal involutes.
+        deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions).
+    """
+    pinion, wheel = pinion or NoModification(), wheel or NoModification()
+    removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
+    return solve_removed(mesh, torque, removed + deviation, pinion=pinion, wheel=wheel)
 
 
 def solved(cycle: MeshCycle) -> Bool[Array, "*cycles"]:

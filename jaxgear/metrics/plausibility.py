@@ -4,14 +4,13 @@ One table of limits serves inputs and results alike. Nothing is refused here: a 
 """
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ..contact import MeshCycle, Side
-from ..geometry import Gear
 from ..microgeometry import AbstractModification, NoModification
 from .flank import removed_at
 from .load import effective_contact_ratio
@@ -101,34 +100,35 @@ def plausibility(
     numbers = [*_of_gears(cycle), *_of_flanks(cycle, flanks), *_of_results(cycle)]
     if rpm is not None:
         velocity = float(rpm) * 2 * np.pi / 60 * float(cycle.kinematics.pair.pinion.pitch_radius) * 1e-3
-        numbers.append(("pitch line velocity", "", velocity, LIMITS["pitch line velocity"]))
+        numbers.append(_doubt("pitch line velocity", "", velocity))
     if coefficient is not None:
-        numbers.append(("coefficient of friction", "", float(coefficient), LIMITS["coefficient of friction"]))
+        numbers.append(_doubt("coefficient of friction", "", coefficient))
     if torque_range is not None:
         low, high = torque_range
-        numbers.append(("torque", "", float(cycle.torque), LIMITS["torque"]._replace(low=low, high=high)))
-    return tuple(Doubt(*each) for each in numbers if not each[3].low <= each[2] <= each[3].high)
+        numbers.append(_doubt("torque", "", cycle.torque, low=low, high=high))
+    return tuple(doubt for doubt in numbers if not doubt.limit.low <= doubt.value <= doubt.limit.high)
 
 
-def _of_gears(cycle: MeshCycle) -> Iterator[tuple[str, str, float, Limit]]:
-    for where, side in zip(("pinion", "wheel"), cycle.sides):
-        gear: Gear = side.gear
-        module = float(gear.module)
-        values: dict[str, Any] = {
-            "module": module,
-            "elastic modulus": gear.material.elastic_modulus,
-            "density": gear.material.density,
-            "bore to root diameter": gear.bore_radius / gear.root_circle_radius,
-            "tip edge radius in modules": gear.tip_edge_radius / module,
-        }
-        for name, value in values.items():
-            yield name, where, float(value), LIMITS[name]
+def _doubt(name: str, where: str, value, *, low: float | None = None, high: float | None = None) -> Doubt:
+    """A doubt if the value is outside the usual range, which may be known better than the table has it."""
+    usual = LIMITS[name]
+    limit = usual._replace(low=usual.low if low is None else low, high=usual.high if high is None else high)
+    return Doubt(name, where, float(value), limit)
+
+
+def _of_gears(cycle: MeshCycle) -> Iterator[Doubt]:
+    pair = cycle.kinematics.pair
+    for where, gear in (("pinion", pair.pinion), ("wheel", pair.wheel)):
+        yield _doubt("module", where, gear.module)
+        yield _doubt("elastic modulus", where, gear.material.elastic_modulus)
+        yield _doubt("density", where, gear.material.density)
+        yield _doubt("bore to root diameter", where, gear.bore_radius / gear.root_circle_radius)
+        yield _doubt("tip edge radius in modules", where, gear.tip_edge_radius / gear.module)
     if cycle.kinematics.plane == "stress":
-        name = "face width in modules, plane stress"
-        yield name, "", float(cycle.kinematics.pair.face_width / cycle.kinematics.pair.pinion.module), LIMITS[name]
+        yield _doubt("face width in modules, plane stress", "", pair.face_width / pair.pinion.module)
 
 
-def _of_flanks(cycle: MeshCycle, flanks) -> Iterator[tuple[str, str, float, Limit]]:
+def _of_flanks(cycle: MeshCycle, flanks) -> Iterator[Doubt]:
     for where, side, modification in zip(("pinion", "wheel"), cycle.sides, flanks):
         if isinstance(modification, NoModification):
             continue
@@ -136,12 +136,10 @@ def _of_flanks(cycle: MeshCycle, flanks) -> Iterator[tuple[str, str, float, Limi
         face = jnp.linspace(-0.5, 0.5, _FACE_POINTS, dtype=roll.dtype) * side.face_width
         depth = float(jnp.max(jnp.abs(removed_at(side, modification, roll, face))))
         if depth > 0:
-            yield "depth of the modification", where, depth, LIMITS["depth of the modification"]
-        name = "depth of the modification in modules"
-        yield name, where, depth / 1e3 / float(side.gear.module), LIMITS[name]
+            yield _doubt("depth of the modification", where, depth)
+        yield _doubt("depth of the modification in modules", where, depth / 1e3 / float(side.gear.module))
         for length, longest in _lengths(modification, side):
-            limit = LIMITS["length of the modification"]._replace(high=longest)
-            yield "length of the modification", where, length, limit
+            yield _doubt("length of the modification", where, length, high=longest)
 
 
 def _lengths(modification: AbstractModification, side: Side) -> Iterator[tuple[float, float]]:
@@ -154,15 +152,11 @@ def _lengths(modification: AbstractModification, side: Side) -> Iterator[tuple[f
             yield float(term.length), float(longest)
 
 
-def _of_results(cycle: MeshCycle) -> Iterator[tuple[str, str, float, Limit]]:
+def _of_results(cycle: MeshCycle) -> Iterator[Doubt]:
     module = float(cycle.kinematics.pair.pinion.module)
     stress = root_stress(cycle)
-    values = (
-        ("mean transmission error in modules", "", float(np.mean(cycle.transmission_error)) / 1e3 / module),
-        ("flank pressure", "", float(np.max(cycle.contact_pressure))),
-        ("root stress", "pinion", float(np.max(stress.pinion))),
-        ("root stress", "wheel", float(np.max(stress.wheel))),
-        ("effective contact ratio", "", float(effective_contact_ratio(cycle))),
-    )
-    for name, where, value in values:
-        yield name, where, value, LIMITS[name]
+    yield _doubt("mean transmission error in modules", "", float(np.mean(cycle.transmission_error)) / 1e3 / module)
+    yield _doubt("flank pressure", "", np.max(cycle.contact_pressure))
+    yield _doubt("root stress", "pinion", np.max(stress.pinion))
+    yield _doubt("root stress", "wheel", np.max(stress.wheel))
+    yield _doubt("effective contact ratio", "", effective_contact_ratio(cycle))

@@ -103,12 +103,7 @@ quantities.add(
     Quantity("corner_contact_length", _corner_length, "mm", "loaded path beyond the theoretical path of contact"),
     Quantity("corner_force", corner_force, "N", "largest force on a pair there", Max(), local=True),
     Quantity(
-        "pinion_root_stress",
-        lambda c: root_stress(c).pinion,
-        "MPa",
-        "largest root stress, pinion",
-        Max(),
-        local=True,
+        "pinion_root_stress", lambda c: root_stress(c).pinion, "MPa", "largest root stress, pinion", Max(), local=True
     ),
     Quantity(
         "wheel_root_stress", lambda c: root_stress(c).wheel, "MPa", "largest root stress, wheel", Max(), local=True

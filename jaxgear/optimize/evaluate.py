@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from ..conditions.batches import padded, side_by_side
 from .goal import counted
 from .problem import Problem, Score
+from .starts import real_points
 
 _INFEASIBLE = 1e6  # rank of a design that passes a limit, above any objective
 
@@ -15,7 +16,7 @@ def scores(problem: Problem, points) -> Score:
     """Scores of points of the unit box, leading axis (points,), in batches that fit the cache."""
     count = len(points)
     batch = min(side_by_side(problem.mesh, problem.cases.count), count)
-    return jax.tree.map(lambda part: part[:count], _scores(problem, padded(points, batch), batch))
+    return jax.tree.map(lambda part: part[:count], _scores(problem, real_points(problem, padded(points, batch)), batch))
 
 
 @eqx.filter_jit

@@ -8,18 +8,14 @@ import jax.numpy as jnp
 import optax
 
 from .problem import Problem
-from .smooth import AbstractStaged, Multipliers, lagrangian, merged
+from .smooth import AbstractStaged, followed, lagrangian, merged
 from .starts import real_points, start_points
 
 
 class Adam(AbstractStaged):
     """Adam (optax) on a soft objective whose width shrinks in stages, projected onto the box.
 
-    All starts advance together under `jax.vmap`. Other constraints enter by an augmented Lagrangian, whose multipliers
-    follow once per stage.
-
     Attributes:
-        starts: number of start points; the first is the middle of the box.
         steps: gradient steps of every start, over all stages.
     """
 
@@ -31,7 +27,7 @@ class Adam(AbstractStaged):
 
     @staticmethod
     @eqx.filter_jit
-    def advance(problem: Problem, points, multipliers: Multipliers, analyses, width, rate, scale):
+    def advance(problem: Problem, points, multipliers, analyses, width, rate, scale):
         gradient = jax.vmap(jax.grad(lagrangian, argnums=1, has_aux=True), (None, 0, 0, None, None))
         adam = optax.scale_by_adam()
 
@@ -46,6 +42,6 @@ class Adam(AbstractStaged):
             return jnp.clip(points - rate * update, 0.0, 1.0), moments, best, excess
 
         nothing = jnp.full(points.shape[0], jnp.inf, points.dtype)
-        start = points, adam.init(points), (points, nothing, nothing), jnp.zeros_like(multipliers.value)
+        start = points, adam.init(points), (points, nothing, nothing), jnp.zeros_like(multipliers)
         points, _, best, excess = jax.lax.fori_loop(0, analyses, step, start)
-        return points, multipliers.follow(excess, scale), best
+        return points, followed(multipliers, excess, scale), best

@@ -7,6 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.linalg import block_diag
 
 from ..conditions import Parameters, conditions
 from ..contact import Mesh
@@ -98,7 +99,20 @@ def free_form(
     began = time.perf_counter()
     judged = conditions("free_form", mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
     roll = _roll_lengths(mesh, points)
-    problem = _problem(mesh, judged, roll, max_relief, curvature, measure, constraints)
+    width = len(str(points))
+    problem = Problem(
+        design=_Tables(roll),
+        names=tuple(f"{gear} {number + 1:0{width}d}" for gear in ("pinion", "wheel") for number in range(points)),
+        low=jnp.zeros(2 * points, roll.dtype),
+        high=jnp.full(2 * points, max_relief, roll.dtype),
+        mesh=mesh,
+        conditions=judged,
+        cases=judged.on(mesh),
+        objectives=(quantities["ppte"],),
+        measure=measure or Mean(),
+        constraints=tuple(constraints),
+        roughness=_roughness(roll, max_relief, curvature),
+    )
     heaviest = float(judged.load.torques[int(np.argmax(judged.load.weights))])
     if start is None:
         relief = iso_relief(mesh.pair, heaviest)
@@ -125,27 +139,12 @@ def _roll_lengths(mesh: Mesh, points: int):
     return jnp.linspace(first, last, points, axis=1).astype(mesh.phase.dtype)
 
 
-def _problem(mesh, judged, roll, max_relief, curvature, measure, constraints) -> Problem:
-    points, dtype = roll.shape[1], roll.dtype
-    second = np.diff(np.eye(points), 2, axis=0) * max_relief
+def _roughness(roll, max_relief: float, curvature: float) -> Roughness:
+    """Penalty on the second derivatives of both tables."""
+    second = np.diff(np.eye(roll.shape[1]), 2, axis=0) * max_relief
     steps = np.asarray(roll[:, 1] - roll[:, 0])
-    empty = np.zeros_like(second)
-    forms = np.block([[second / steps[0] ** 2, empty], [empty, second / steps[1] ** 2]])
-    width = len(str(points))
-    names = tuple(f"{gear} {number:0{width}d}" for gear in ("pinion", "wheel") for number in range(1, points + 1))
-    return Problem(
-        design=_Tables(roll),
-        names=names,
-        low=jnp.zeros(2 * points, dtype),
-        high=jnp.full(2 * points, max_relief, dtype),
-        mesh=mesh,
-        conditions=judged,
-        cases=judged.on(mesh),
-        objectives=(quantities["ppte"],),
-        measure=Mean() if measure is None else measure,
-        constraints=tuple(constraints),
-        roughness=Roughness(jnp.asarray(forms, dtype), jnp.asarray(curvature, dtype)),
-    )
+    forms = block_diag(second / steps[0] ** 2, second / steps[1] ** 2)
+    return Roughness(jnp.asarray(forms, roll.dtype), jnp.asarray(curvature, roll.dtype))
 
 
 def _values(mesh: Mesh, roll, start) -> np.ndarray:

@@ -59,6 +59,10 @@ class Constraint(Checked):
         """Free parameters of a linear constraint and their coefficients."""
         return () if isinstance(self.of, Quantity) else self.of
 
+    def of_parameters(self, parameters: Mapping[str, Any]):
+        """What a linear constraint limits."""
+        return sum(factor * parameters[name] for name, factor in self.terms)
+
     @property
     def name(self) -> str:
         """What it limits, in words."""

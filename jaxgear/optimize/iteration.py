@@ -7,8 +7,8 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 
-from ..conditions import Design, solved
-from ..contact import Mesh, MeshCycle, removed_material, solve_removed
+from ..conditions import Design, solve_case, solved
+from ..contact import Mesh, MeshCycle
 from ..metrics import max_relief as largest_relief
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, NoModification, TabulatedProfile
@@ -221,8 +221,7 @@ class _Flanks:
 
 
 def _solve(mesh: Mesh, torque, pinion: AbstractModification, wheel: AbstractModification) -> MeshCycle:
-    removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-    cycle = solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
+    cycle = solve_case(mesh, torque, pinion, wheel)
     if not solved(cycle):
         raise RuntimeError("iterate_transmission_error: a contact solution did not converge")
     return cycle

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar
 
 import numpy as np
 from scipy.stats import qmc
@@ -42,13 +43,9 @@ class Pareto(Checked):
         steps: most steps of every one in each round.
     """
 
+    name: ClassVar[str] = "pareto"
     points: int = count(low=2, high=4096, default=32)
     steps: int = count(high=100_000, default=20)
-
-    @property
-    def name(self) -> str:
-        """As design files and tables call it."""
-        return "pareto"
 
     def search(self, problem: Problem, record: Record) -> "Met":
         """Runs the rounds; the record keeps the compromise.

@@ -9,11 +9,23 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..conditions import Cases, Conditions, Design, Variants, check_used, conditions, solved, two_modifications
+from ..conditions import (
+    Cases,
+    Conditions,
+    Design,
+    Modifications,
+    Variants,
+    check_used,
+    conditions,
+    solve_case,
+    solved,
+    two_modifications,
+)
 from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..metrics import Quantity, quantity_of
-from ..microgeometry import AbstractModification, NoModification
-from ..numerics import AbstractMeasure, Mean, check, maximum, real
+from ..microgeometry import AbstractModification
+from ..numerics import AbstractMeasure, Mean, maximum, real
+from ..sweeps.plan import box
 from ..tolerance import Tolerance
 from .goal import Constraint, Objective, scale_of
 from .linearization import Linearization, Pieces, Sloped, any_slopes, local_slopes, pieces_of
@@ -120,8 +132,7 @@ class Problem(eqx.Module):
 
         Linear constraints on the free parameters do not apply to them.
         """
-        both = pinion or NoModification(), wheel or NoModification()
-        found = self.cases.each(lambda torque, deviation: self._judged(self._cycle(both, torque, deviation)))
+        found = self.cases.each(lambda *case: self._judged(self._cycle((pinion, wheel), *case)))
         return self._scored(found, jnp.zeros((0,), self.low.dtype))
 
     def _judged(self, cycle: MeshCycle):
@@ -205,25 +216,23 @@ class Problem(eqx.Module):
     def over_cases(self, x: Vector, of_case: Callable):
         """A function of the cycle in every case, cases leading."""
         both = self.modifications(x)
-        return self.cases.each(lambda torque, deviation: of_case(self._cycle(both, torque, deviation)))
+        return self.cases.each(lambda *case: of_case(self._cycle(both, *case)))
 
-    def _cycle(self, both: tuple[AbstractModification, AbstractModification], torque, deviation) -> MeshCycle:
-        pinion, wheel = both
-        removed = removed_material(self.mesh, torque, pinion=pinion, wheel=wheel)
-        return solve_removed(self.mesh, torque, removed + deviation, pinion=pinion, wheel=wheel)
+    def _cycle(self, both: Modifications, torque, deviation) -> MeshCycle:
+        return solve_case(self.mesh, torque, *both, deviation)
 
     def _excess(self, cycle: MeshCycle):
         limited = [(limit, limit.quantity) for limit in self.constraints if limit.quantity is not None]
-        return self._stacked([excess for limit, quantity in limited for excess in limit.excess(quantity(cycle))])
+        return self._stacked([limit.excess(quantity(cycle)) for limit, quantity in limited])
 
     def _linear_excess(self, x: Vector):
         parameters = self.parameters(x)
-        limits = [limit for limit in self.constraints if limit.quantity is None]
-        values = [sum(factor * parameters[name] for name, factor in limit.terms) for limit in limits]
-        return self._stacked([excess for limit, value in zip(limits, values) for excess in limit.excess(value)])
+        linear = [limit for limit in self.constraints if limit.quantity is None]
+        return self._stacked([limit.excess(limit.of_parameters(parameters)) for limit in linear])
 
-    def _stacked(self, excess):
-        return jnp.stack(excess) if excess else jnp.zeros((0,), self.low.dtype)
+    def _stacked(self, excess: list[list[Scalar]]):
+        sides = [side for sides in excess for side in sides]
+        return jnp.stack(sides) if sides else jnp.zeros((0,), self.low.dtype)
 
     def _measured(self, numbers):
         return jax.vmap(lambda column: self.measure(column, self.cases.weights), 1)(numbers)
@@ -253,7 +262,7 @@ def make_problem(
         ValueError: for empty or reversed bounds, unknown names of objectives or constrained parameters, and whatever
             the cases refuse.
     """
-    names, low, high = box(bounds, owner)
+    names, *limits = box(owner, bounds)
     several = [objective] if isinstance(objective, str | Quantity) or callable(objective) else list(objective)
     if not several:
         raise ValueError(f"{owner}: objective must name at least one quantity")
@@ -263,31 +272,19 @@ def make_problem(
                 raise ValueError(f'{owner}: "{name}" of a constraint must be one of {", ".join(names)}')
     judged = conditions(owner, mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
     objectives = tuple(quantity_of(of, owner) for of in several)
-    dtype = mesh.phase.dtype
-    measure = Mean() if measure is None else measure
+    low, high = (jnp.stack([real(limit).astype(mesh.phase.dtype) for limit in side]) for side in limits)
     posed = Problem(
         design=design,
         names=names,
-        low=low.astype(dtype),
-        high=high.astype(dtype),
+        low=low,
+        high=high,
         mesh=mesh,
         conditions=judged,
         cases=judged.on(mesh),
         objectives=objectives,
-        measure=measure,
+        measure=measure or Mean(),
         constraints=tuple(constraints),
     )
     made = Variants(names, design, mesh, None, judged, posed.cases)
     check_used("minimize", names, made.traced(posed.low)[1])
     return posed
-
-
-def box(bounds: Mapping[str, tuple[float, float]], owner: str):
-    """Names, lower and upper bounds."""
-    if not bounds:
-        raise ValueError(f"{owner}: bounds must name at least one free parameter")
-    for name, (low, high) in bounds.items():
-        check(owner, f"lower bound of {name}", low, "")
-        check(owner, f"upper bound of {name}", high, "", low=low, open_low=True)
-    pairs = jnp.stack([jnp.stack([real(low), real(high)]) for low, high in bounds.values()])
-    return tuple(bounds), pairs[:, 0], pairs[:, 1]

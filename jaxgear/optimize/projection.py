@@ -10,7 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..contact import MeshCycle, Side, removed_material, solve_removed
+from ..conditions import solve_case
+from ..contact import MeshCycle, Side
 from ..metrics import peak_to_peak, removed_at
 from ..microgeometry import (
     AbstractCurve,
@@ -92,8 +93,7 @@ def project(optimum: Optimum, curve: str = "power") -> Projection:
     mesh, torque = optimum.mesh, optimum.cycle.operation
     fits = [_fit(side, flank, curve) for side, flank in zip(mesh.sides, (optimum.pinion, optimum.wheel))]
     pinion, wheel = (relief for relief, _ in fits)
-    removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-    cycle = solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
+    cycle = solve_case(mesh, torque, pinion, wheel)
     ppte = float(peak_to_peak(cycle.transmission_error))
     misfit = max(distance for _, distance in fits)
     return Projection(curve, pinion, wheel, cycle, ppte, ppte - optimum.ppte, misfit)

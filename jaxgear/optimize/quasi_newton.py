@@ -10,7 +10,7 @@ import optax
 
 from ..numerics import count
 from .problem import Problem
-from .smooth import STAGE_WIDTHS, AbstractStaged, Multipliers, lagrangian, merged
+from .smooth import STAGE_WIDTHS, AbstractStaged, followed, lagrangian, merged
 from .starts import real_points, start_points
 
 _INSIDE = 0.01  # start points keep this distance from the bounds, where the map of the box is flat
@@ -22,12 +22,10 @@ _LONGEST = 1.0  # step: a third of the way from one bound to the other
 class LBFGS(AbstractStaged):
     """Limited-memory BFGS (optax) with a backtracking line search on a soft objective whose width shrinks in stages.
 
-    The box is the image of the whole space under x = (1 + sin(t)) / 2; other constraints enter by an augmented
-    Lagrangian, whose multipliers follow once per stage. All starts advance together under `jax.vmap`: each step judges
-    one trial point of every start, which ends the line search or shortens its step.
+    The box is the image of the whole space under x = (1 + sin(t)) / 2. Each step judges one trial point of every start,
+    which ends the line search or shortens its step.
 
     Attributes:
-        starts: number of start points; the first is the middle of the box.
         steps: trial points of every start, over all stages.
     """
 
@@ -41,18 +39,18 @@ class LBFGS(AbstractStaged):
 
     @staticmethod
     @eqx.filter_jit
-    def advance(problem: Problem, angles, multipliers: Multipliers, analyses, width, rate, scale):
+    def advance(problem: Problem, angles, multipliers, analyses, width, rate, scale):
         method = optax.scale_by_lbfgs()
 
-        def loss(angle, rest):
-            return lagrangian(problem, _box(angle), Multipliers(rest), width, scale)
+        def loss(angle, multipliers):
+            return lagrangian(problem, _box(angle), multipliers, width, scale)
 
         gradient = jax.vmap(jax.value_and_grad(loss, has_aux=True))
 
         def step(_, carry):
             trial, best, excess = carry
             angles = trial.next
-            (values, (true, violation, new)), slopes = gradient(angles, multipliers.value)
+            (values, (true, violation, new)), slopes = gradient(angles, multipliers)
             best = merged(best, (_box(angles), true, violation))
             finite = jnp.isfinite(slopes).all(axis=1, keepdims=True)
             values, slopes = jnp.where(finite[:, 0], values, jnp.inf), jnp.where(finite, slopes, 0.0)
@@ -62,9 +60,9 @@ class LBFGS(AbstractStaged):
         nothing = jnp.full(angles.shape[0], jnp.inf, angles.dtype)
         zero = jnp.zeros_like(angles)
         first = _Trial(angles, nothing, zero, zero, jnp.ones_like(nothing), jax.vmap(method.init)(angles))
-        start = first, (_box(angles), nothing, nothing), jnp.zeros_like(multipliers.value)
+        start = first, (_box(angles), nothing, nothing), jnp.zeros_like(multipliers)
         trial, best, excess = jax.lax.fori_loop(0, analyses, step, start)
-        return trial.angle, multipliers.follow(excess, scale), best
+        return trial.angle, followed(multipliers, excess, scale), best
 
 
 class _Trial(eqx.Module):

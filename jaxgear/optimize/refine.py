@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-import jax.numpy as jnp
 import numpy as np
 
 from ..contact import Mesh, prepare
@@ -46,7 +45,7 @@ def refined(record: Record, polish: Polish, positions: int | None) -> tuple[Reco
         found.check()
         finest = problem.on(_with_positions(mesh, 2 * count))
         found.spend(1)
-        change = float(scores(finest, jnp.asarray(found.point, finest.low.dtype)[None]).value[0, 0]) - found.value
+        change = float(scores(finest, found.point[None]).value[0, 0]) - found.value
         if abs(change) <= max(_BOUND * abs(found.value), _LEAST_BOUND) or 2 * count > _MOST:
             return found, finer.objectives[0].sign * change
         record, finer, count = found, finest, 2 * count

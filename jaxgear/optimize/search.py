@@ -12,7 +12,6 @@ from .evaluate import scores
 from .goal import counted
 from .linear_model import Model
 from .problem import Problem, Score
-from .starts import real_points
 
 
 class Record:
@@ -64,7 +63,7 @@ class Record:
             points: shape (points, parameters).
             chunk: of so many or a multiple of it the program is compiled, where calls differ in their number.
         """
-        found = scores(self.problem, real_points(self.problem, padded(points, chunk)))
+        found = scores(self.problem, padded(points, chunk))
         score = jax.tree.map(lambda part: np.asarray(part)[: len(points)], found)
         self.spend(len(points))
         self.offer(points, score.value[:, 0], score.violation)

@@ -5,17 +5,13 @@ from abc import abstractmethod
 from collections.abc import Iterator
 from typing import ClassVar, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 
 from ..numerics import Checked, count
 from .goal import counted
 from .problem import GRADIENT_COST, Problem
 from .search import AbstractMethod, Record
-
-Scalar = Float[Array, ""]
 
 # Widths of the soft extremes in the stages of a search, relative to the best objective among the start points: from
 # wide, where most positions pull, to narrow, where the soft objective is within about a percent of the true one.
@@ -25,34 +21,21 @@ _LEAST_SCALE = 1e-3  # [um] of the objective, where the start is perfect already
 _STIFFNESS = 10.0  # of the penalty: objective per squared relative violation, relative to the scale
 
 
-class Multipliers(eqx.Module):
-    """Multipliers of the constraints, of every start or of one.
+def followed(multipliers, excess, scale):
+    """First-order update of the multipliers of the augmented Lagrangian (Hestenes 1969, Powell 1969)."""
+    return jnp.maximum(multipliers + _STIFFNESS * scale * excess, 0.0)
 
-    Attributes:
-        value: shape (starts, constraints), or (constraints,).
+
+def lagrangian(problem: Problem, x, multipliers, width, scale):
+    """Augmented Lagrangian of the soft problem at one point, with its true value, violation and excess.
+
+    The multipliers are those of every limit, shape (limits,).
     """
-
-    value: Float[Array, "*starts constraints"]
-
-    @classmethod
-    def zeros(cls, problem: Problem, starts: int) -> "Multipliers":
-        """No multiplier yet."""
-        count = sum((limit.low is not None) + (limit.high is not None) for limit in problem.constraints)
-        return cls(jnp.zeros((starts, count), problem.low.dtype))
-
-    def follow(self, excess, scale) -> "Multipliers":
-        """First-order update of the augmented Lagrangian (Hestenes 1969, Powell 1969)."""
-        return Multipliers(jnp.maximum(self.value + _STIFFNESS * scale * excess, 0.0))
-
-
-def lagrangian(problem: Problem, x, multipliers: Multipliers, width, scale):
-    """Augmented Lagrangian of the soft problem at one point, with its true value, violation and excess."""
     values, true, excess, fine = problem.soft_and_true(x, width)
     good = fine & jnp.isfinite(jnp.sum(values))
     violation = jnp.maximum(jnp.max(excess, initial=0.0), 0.0)
-    stiffness = _STIFFNESS * scale
-    pushed = jnp.maximum(multipliers.value + stiffness * excess, 0.0)
-    penalty = jnp.sum(pushed**2 - multipliers.value**2) / (2 * stiffness)
+    pushed = followed(multipliers, excess, scale)
+    penalty = jnp.sum(pushed**2 - multipliers**2) / (2 * _STIFFNESS * scale)
     return values[0] + penalty, (jnp.where(good, true[0], jnp.inf), violation, excess)
 
 
@@ -123,12 +106,13 @@ class AbstractStaged(Checked, AbstractMethod):
 
     @staticmethod
     @abstractmethod
-    def advance(problem: Problem, points, multipliers: Multipliers, analyses, width, rate, scale):
+    def advance(problem: Problem, points, multipliers, analyses, width, rate, scale):
         """A stage of so many analyses: the new points and multipliers, and the best true design of every start."""
 
     def search(self, problem: Problem, record: Record) -> None:
         """Runs the stages."""
-        state = self.begin(problem), Multipliers.zeros(problem, self.starts)
+        limits = sum(len(limit.sides) for limit in problem.constraints)
+        state = self.begin(problem), jnp.zeros((self.starts, limits), problem.low.dtype)
 
         def advance(analyses, *numbers):
             converted = [jnp.asarray(value, problem.low.dtype) for value in numbers]

@@ -8,8 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..conditions import in_words
-from ..contact import removed_material, solve_removed
+from ..conditions import in_words, solve_case
 from ..metrics import peak_to_peak
 from ..microgeometry import AbstractModification
 from .goal import FEASIBLE, Constraint
@@ -39,9 +38,7 @@ def optimum_of(
     x = real_points(problem, record.point)
     parameters, (pinion, wheel) = problem.parameters(x), problem.modifications(x)
     heaviest = problem.cases.torque[int(np.argmax(problem.cases.weight))]
-    # the removed material as an array: the program that solves for it is the one that every other design uses
-    removed = removed_material(problem.mesh, heaviest, pinion=pinion, wheel=wheel)
-    cycle = solve_removed(problem.mesh, heaviest, removed, pinion=pinion, wheel=wheel)
+    cycle = solve_case(problem.mesh, heaviest, pinion, wheel)
     left = _decrease_left(record) if left is None else left  # before the analyses are counted
     several = len(problem.objectives) > 1
     sign = 1 if several else problem.objectives[0].sign
@@ -134,9 +131,7 @@ def _constrained(problem: Problem, x) -> Sequence[np.ndarray]:
     parameters = problem.parameters(x)
     of_cycle = iter(_numbers(problem, x) if any(limit.quantity for limit in problem.constraints) else ())
     return [
-        np.asarray([sum(factor * parameters[name] for name, factor in limit.terms)])
-        if limit.quantity is None
-        else np.asarray(next(of_cycle))
+        np.atleast_1d(limit.of_parameters(parameters) if limit.quantity is None else next(of_cycle))
         for limit in problem.constraints
     ]
 

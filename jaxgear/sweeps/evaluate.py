@@ -1,6 +1,6 @@
 """Evaluation of many variants on all local devices by one compiled program."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -10,9 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh as DeviceMesh
 
-from ..conditions import Variants, joined, solved
+from ..conditions import Variants, joined, solve_case, solved
 from ..conditions.batches import divided, everywhere, local_devices, over_devices, padded, side_by_side
-from ..contact import removed_material, solve_removed
 from ..metrics import Quantity
 from ..numerics import AbstractMeasure
 from .columns import CONVERGED, result_columns
@@ -73,28 +72,25 @@ class Evaluator:
         self._dtype = np.dtype(mesh.phase.dtype)
         jax.eval_shape(partial(_numbers, self._program, self._data), example.astype(self._dtype))
 
-    def __call__(self, rows: np.ndarray) -> "Pending":
-        """Starts the evaluation of at most `capacity` rows; the devices go on while the host does something else."""
+    def __call__(self, rows: np.ndarray) -> Callable[[], dict[str, np.ndarray]]:
+        """Starts the evaluation of at most `capacity` rows; the devices go on while the host does something else.
+
+        Returns:
+            what waits for the result columns and the flag; the numbers of failed variants are NaN.
+        """
         placed = divided(padded(rows.astype(self._dtype), self.capacity), self._devices)
-        return Pending(self, rows, *_evaluate(self._program, placed, self._data))
+        values, converged = _evaluate(self._program, placed, self._data)
 
+        def finished() -> dict[str, np.ndarray]:
+            count = len(rows)
+            fine = np.asarray(converged)[:count] & np.isfinite(rows).all(axis=1)
+            columns = {}
+            for column, of_column in zip(self.columns, values):
+                numbers = np.asarray(of_column)[:count]
+                columns[column.name] = numbers if fine.all() else np.where(fine, numbers, np.nan)
+            return {**columns, CONVERGED: fine}
 
-class Pending:
-    """An evaluation that is under way."""
-
-    def __init__(self, evaluator: Evaluator, rows: np.ndarray, values: list[jax.Array], converged: jax.Array):
-        self.rows = rows
-        self._evaluator, self._values, self._converged = evaluator, values, converged
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Waits for the result columns and the flag; the numbers of failed variants are NaN."""
-        count = len(self.rows)
-        fine = np.asarray(self._converged)[:count] & np.isfinite(self.rows).all(axis=1)
-        columns = {}
-        for column, values in zip(self._evaluator.columns, self._values):
-            numbers = np.asarray(values)[:count]
-            columns[column.name] = numbers if fine.all() else np.where(fine, numbers, np.nan)
-        return {**columns, CONVERGED: fine}
+        return finished
 
 
 @partial(jax.jit, static_argnums=0)
@@ -107,11 +103,8 @@ def _numbers(program: _Program, data, values):
     variants, measures = eqx.combine(data, program.rest)
     variant = variants(values)
 
-    flanks = {"pinion": variant.pinion, "wheel": variant.wheel}
-
     def of_case(operation, deviation):
-        removed = removed_material(variant.mesh, operation, **flanks)
-        cycle = solve_removed(variant.mesh, operation, removed + deviation, **flanks)
+        cycle = solve_case(variant.mesh, operation, variant.pinion, variant.wheel, deviation)
         numbers = jnp.stack([of(cycle) for of in program.results])
         return numbers, solved(cycle) & jnp.all(jnp.isfinite(numbers))
 

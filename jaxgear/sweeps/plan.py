@@ -3,7 +3,7 @@
 import hashlib
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,8 @@ class AbstractPlan(ABC):
         size: number of variants.
     """
 
-    def __init__(self, names: tuple[str, ...], low: tuple[float, ...], high: tuple[float, ...], size: int):
-        self.names, self.low, self.high, self.size = names, low, high, size
+    def __init__(self, names: tuple[str, ...], low: Iterable[float], high: Iterable[float], size: int):
+        self.names, self.low, self.high, self.size = names, tuple(map(float, low)), tuple(map(float, high)), size
 
     @abstractmethod
     def _rows(self, start: int, stop: int) -> np.ndarray:
@@ -119,7 +119,7 @@ class VariantList(AbstractPlan):
         pieces = [table[start : start + _PIECE] for start in range(0, len(table), _PIECE)]
         low = np.fmin.reduce([np.fmin.reduce(_finite(piece), axis=0) for piece in pieces])
         high = np.fmax.reduce([np.fmax.reduce(_finite(piece), axis=0) for piece in pieces])
-        super().__init__(tuple(names), tuple(low.tolist()), tuple(high.tolist()), len(table))
+        super().__init__(tuple(names), low, high, len(table))
         self.values = table
 
     def _rows(self, start, stop):
@@ -133,14 +133,17 @@ class VariantList(AbstractPlan):
 
 
 def box(owner: str, bounds: Bounds) -> tuple[tuple[str, ...], tuple[float, ...], tuple[float, ...]]:
-    """Names, lower and upper bounds, checked."""
+    """Names, lower and upper bounds, checked.
+
+    Raises:
+        ValueError: for no parameter, and for bounds that are not finite or do not ascend.
+    """
     if not bounds:
         raise ValueError(f"{owner}: bounds must name at least one parameter")
     for name, (low, high) in bounds.items():
         check(owner, f"lower bound of {name}", low, "")
         check(owner, f"upper bound of {name}", high, "", low=low, open_low=True)
-    limits = bounds.values()
-    return tuple(bounds), tuple(float(low) for low, _ in limits), tuple(float(high) for _, high in limits)
+    return tuple(bounds), tuple(low for low, _ in bounds.values()), tuple(high for _, high in bounds.values())
 
 
 def _finite(values: np.ndarray) -> np.ndarray:

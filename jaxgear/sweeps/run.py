@@ -21,7 +21,7 @@ from ..metrics import Quantity, quantities, quantity_of
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
 from ..tolerance import Tolerance
 from .columns import CONVERGED, VARIANT, Column, parameter_columns
-from .evaluate import Evaluator, Pending
+from .evaluate import Evaluator
 from .plan import AbstractPlan
 from .store import MANIFEST, Manifest, Store
 from .table import SweepTable, in_memory, open_sweep
@@ -157,8 +157,8 @@ def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts: dict[int
     writer = ThreadPoolExecutor(1)
     under_way: deque[tuple[int, Future]] = deque()
 
-    def finish(part: int, pending: Pending) -> None:
-        keep(part, {**dict(zip(plan.names, pending.rows.T)), **pending.arrays()})
+    def finish(part: int, values: np.ndarray, results: Callable[[], dict[str, np.ndarray]]) -> None:
+        keep(part, {**dict(zip(plan.names, values.T)), **results()})
 
     def settle() -> None:
         nonlocal done
@@ -169,8 +169,8 @@ def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts: dict[int
 
     try:
         for part in (part for part in parts if parts[part]):
-            pending = evaluator(plan.rows(*store.span(part)))
-            under_way.append((part, writer.submit(finish, part, pending)))
+            values = plan.rows(*store.span(part))
+            under_way.append((part, writer.submit(finish, part, values, evaluator(values))))
             if len(under_way) >= _IN_FLIGHT:
                 settle()
         while under_way:

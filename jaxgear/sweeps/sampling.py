@@ -1,7 +1,8 @@
 """Plans that fill the box of the parameters: Latin hypercube and Sobol sequence."""
 
 import math
-from typing import Any
+from abc import abstractmethod
+from typing import ClassVar
 
 import numpy as np
 from scipy.stats import qmc
@@ -14,7 +15,40 @@ _SOBOL_BITS = 30  # scipy's default: 2^30 points
 _PHILOX_WORDS = 4  # random numbers per counter of the generator
 
 
-class LatinHypercube(AbstractPlan):
+class _Sampling(AbstractPlan):
+    """Samples of the unit box, scaled to the bounds."""
+
+    _kind: ClassVar[str]
+
+    def __init__(self, bounds: Bounds, samples: int, *, seed: int):
+        """Makes the plan.
+
+        Args:
+            bounds: (low, high) of every parameter.
+            samples: number of variants.
+            seed: of the random numbers.
+
+        Raises:
+            ValueError: for wrong bounds, samples or seed.
+        """
+        owner = type(self).__name__
+        super().__init__(*box(owner, bounds), whole(owner, "samples", samples))
+        self.seed = whole(owner, "seed", seed, low=0)
+
+    @abstractmethod
+    def _points(self, start: int, stop: int) -> np.ndarray:
+        """Rows of a range in the unit box."""
+
+    def _rows(self, start, stop):
+        low, high = np.asarray(self.low), np.asarray(self.high)
+        return low + self._points(start, stop) * (high - low)
+
+    def describe(self):
+        bounds = {name: [low, high] for name, low, high in zip(self.names, self.low, self.high)}
+        return {"sampling": self._kind, "bounds": bounds, "samples": self.size, "seed": self.seed}
+
+
+class LatinHypercube(_Sampling):
     """Latin hypercube: each parameter's range is cut into `samples` strata and every stratum is hit exactly once.
 
     Row i lies in stratum p(i) of a parameter, at a random place in it, where p is a random permutation. Permutations
@@ -27,28 +61,18 @@ class LatinHypercube(AbstractPlan):
         J. Black, P. Rogaway, Ciphers with arbitrary finite domains, CT-RSA 2002.
     """
 
+    _kind = "latin_hypercube"
+
     def __init__(self, bounds: Bounds, samples: int, *, seed: int):
-        """Makes the plan.
-
-        Args:
-            bounds: (low, high) of every parameter.
-            samples: number of variants, and of strata.
-            seed: of permutations and places.
-
-        Raises:
-            ValueError: for wrong bounds, samples or seed.
-        """
-        names, low, high = box("LatinHypercube", bounds)
-        super().__init__(names, low, high, whole("LatinHypercube", "samples", samples))
-        self.seed = whole("LatinHypercube", "seed", seed, low=0)
-        streams = np.random.SeedSequence(self.seed).spawn(len(names) + 1)
+        super().__init__(bounds, samples, seed=seed)
+        streams = np.random.SeedSequence(self.seed).spawn(len(self.names) + 1)
         self._permutations = [Permutation(self.size, stream) for stream in streams[1:]]
         self._key = streams[0].generate_state(2, np.uint64)
 
-    def _rows(self, start, stop):
+    def _points(self, start, stop):
         number = np.arange(start, stop, dtype=np.int64)
         strata = np.stack([permutation(number) for permutation in self._permutations], axis=1)
-        return _scaled(self, (strata + self._places(start, stop)) / self.size)
+        return (strata + self._places(start, stop)) / self.size
 
     def _places(self, start: int, stop: int) -> np.ndarray:
         """Uniform random numbers in [0, 1), the same for a row in whichever range it is asked for."""
@@ -57,9 +81,6 @@ class LatinHypercube(AbstractPlan):
         stream = np.random.Philox(key=self._key)
         stream.advance(first)
         return np.random.Generator(stream).random(skipped + (stop - start) * width)[skipped:].reshape(-1, width)
-
-    def describe(self):
-        return {"sampling": "latin_hypercube", **_box(self), "samples": self.size, "seed": self.seed}
 
 
 class Permutation:
@@ -94,35 +115,23 @@ class Permutation:
         return left * self._right + right
 
 
-class Sobol(AbstractPlan):
+class Sobol(_Sampling):
     """Scrambled Sobol sequence, the one of `scipy.stats.qmc.Sobol` with the same seed.
 
     Sequential ranges continue the sequence, a range further on fast-forwards to its start, and only a range further
-    back starts anew: a sweep costs one pass over the sequence however many parts it has.
+    back starts anew: a sweep costs one pass over the sequence however many parts it has. There are at most 2^30
+    samples; a power of two is balanced best.
     """
 
+    _kind = "sobol"
+
     def __init__(self, bounds: Bounds, samples: int, *, seed: int):
-        """Makes the plan.
-
-        Args:
-            bounds: (low, high) of every parameter.
-            samples: number of variants, at most 2^30; a power of two is balanced best.
-            seed: of the scrambling.
-
-        Raises:
-            ValueError: for wrong bounds, samples or seed.
-        """
-        names, low, high = box("Sobol", bounds)
-        if whole("Sobol", "samples", samples) > 2**_SOBOL_BITS:
+        super().__init__(bounds, samples, seed=seed)
+        if self.size > 2**_SOBOL_BITS:
             raise ValueError(f"Sobol: samples = {samples} must be at most 2^{_SOBOL_BITS} = {2**_SOBOL_BITS}")
-        super().__init__(names, low, high, int(samples))
-        self.seed = whole("Sobol", "seed", seed, low=0)
         self._engine: qmc.Sobol | None = None
 
-    def _rows(self, start, stop):
-        return _scaled(self, self._points(start, stop))
-
-    def _points(self, start: int, stop: int) -> np.ndarray:
+    def _points(self, start, stop):
         engine = self._engine
         if engine is None or engine.num_generated > start:
             engine = qmc.Sobol(len(self.names), scramble=True, bits=_SOBOL_BITS, rng=self.seed)
@@ -133,15 +142,3 @@ class Sobol(AbstractPlan):
             return engine.random(stop - start) if stop > start else np.empty((0, len(self.names)))
         # scipy warns when the first call asks for other than a power of two points: a first call for one point is quiet
         return np.concatenate([engine.random(1), engine.random(stop - 1)])
-
-    def describe(self):
-        return {"sampling": "sobol", **_box(self), "samples": self.size, "seed": self.seed}
-
-
-def _scaled(plan: AbstractPlan, unit: np.ndarray) -> np.ndarray:
-    low, high = np.asarray(plan.low), np.asarray(plan.high)
-    return low + unit * (high - low)
-
-
-def _box(plan: AbstractPlan) -> dict[str, Any]:
-    return {"bounds": {name: [low, high] for name, low, high in zip(plan.names, plan.low, plan.high)}}

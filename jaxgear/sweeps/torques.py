@@ -2,7 +2,8 @@
 
 from collections.abc import Iterable
 
-from ..contact import Mesh, MeshCycle, removed_material, solve_removed
+from ..conditions import solve_case
+from ..contact import Mesh, MeshCycle
 from ..microgeometry import AbstractModification
 
 
@@ -31,9 +32,4 @@ def over_torques(
         ValueError: for a negative or non-finite torque, or a modification that varies along the face on a mesh of one
             slice.
     """
-
-    def cycle(torque: float) -> MeshCycle:
-        removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-        return solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
-
-    return tuple(cycle(float(torque)) for torque in torques)
+    return tuple(solve_case(mesh, float(torque), pinion, wheel) for torque in torques)

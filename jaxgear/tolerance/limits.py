@@ -122,16 +122,16 @@ def check_slices(owner: str, tolerance: Tolerance, mesh: Mesh) -> None:
     """
     if mesh.resolution.slices > 1:
         return
-    for name, unit, limit in (
-        ("pinion helix_slope", "um", tolerance.pinion.helix_slope),
-        ("wheel helix_slope", "um", tolerance.wheel.helix_slope),
-        ("misalignment", "um", tolerance.misalignment),
+    for name, limit in (
+        ("pinion helix_slope", tolerance.pinion.helix_slope),
+        ("wheel helix_slope", tolerance.wheel.helix_slope),
+        ("misalignment", tolerance.misalignment),
     ):
         known = None if limit is None else concrete(limit)
         if limit is None or (known is not None and not known.any()):
             continue
-        shown = "a traced limit" if known is None else f"{float(known.max()):g} {unit}"
+        shown = "a traced limit" if known is None else f"{float(known.max()):g} um"
         raise ValueError(
-            f"{owner}: {name} = {shown} must be None or 0 {unit} on a mesh of 1 slice, which cannot show it: prepare "
+            f"{owner}: {name} = {shown} must be None or 0 um on a mesh of 1 slice, which cannot show it: prepare "
             "with Resolution(slices=5), or take tolerance.without_lead()"
         )
