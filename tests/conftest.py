@@ -13,10 +13,15 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
 
+# Most of the time of a test goes into compiling a program that runs once: without optimization that takes a quarter.
+QUICK_COMPILER = "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
+
+
 def pytest_configure(config):
-    """Before anything imports jaxgear. Slow tests run what users run, without the checks of annotations."""
+    """Before anything imports jaxgear. Slow tests run what users run: optimized, without the checks of annotations."""
     if config.option.markexpr != "slow":
         jaxtyping.install_import_hook("jaxgear", "typechecker.arrays")
+        os.environ.setdefault("XLA_FLAGS", QUICK_COMPILER)
 
 
 def _compilation_cache() -> Path:

@@ -48,9 +48,9 @@ class Known:
         return jg.optimize.pareto(design, box, mesh=self.mesh, torque=self.torque, **options)
 
     def minimize(self, design, box, **options):
-        """`jaxgear.minimize`, of four start points unless a method is given."""
+        """`jaxgear.minimize`, of eight start points unless a method is given."""
         # the optimum is known at the positions of the mesh
-        options = {"torque": self.torque, "positions": None} | options | ({} if "method" in options else {"starts": 4})
+        options = {"torque": self.torque, "positions": None} | options | ({} if "method" in options else {"starts": 8})
         return jg.minimize(design, box, mesh=self.mesh, **options)
 
 

@@ -41,8 +41,10 @@ def test_nan_is_passed_on_however_large_the_array():
     assert not jnp.isnan(maximum(jnp.stack([x[:17], x[18:35]]))), "NaN that is not among the entries does no harm"
 
 
+@pytest.mark.slow
 def test_derivatives_of_several_metrics_of_sliced_contact_are_those_of_each():
-    """Compiled together, the smallest opening over the slices is evaluated twice, with other rounding each time."""
+    """Compiled together, the smallest opening over the slices is evaluated twice, with other rounding each time,
+    by the optimizing compiler: the slow tests run with it."""
     mesh = jg.prepare(gear_pair(), resolution=jg.Resolution(positions=16, pairs=2, slices=2))
 
     def metrics(x):

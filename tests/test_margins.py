@@ -174,7 +174,8 @@ def test_a_search_by_gradients_is_held_by_the_margins():
     assert bound.success and np.asarray(rule(bound.x)).min() > -1e-6
     assert -bound.fun > 1.2 * -float(objective(start)[0])
     assert bool(jg.margins(pair(bound.x + np.array([0.0, 0.0, 1e-6]))).valid)
-    assert np.isclose(np.asarray(rule(bound.x)), 0.0, atol=1e-6).sum() >= 2, "margins, not the box, end the search"
+    assert np.asarray(rule(bound.x)).min() < 1e-6, "margins end the search"
+    assert all(low + 0.1 < value < high - 0.1 for value, (low, high) in zip(bound.x, box)), "and not the box"
 
 
 @pytest.mark.slow
