@@ -5,9 +5,11 @@ Ignored, a crowning of 50 um left the transmission error of the nominal gears, a
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 import jaxgear as jg
+from jaxgear.contact import removed_material
 from jaxgear.io import DesignFileError, load_design
 
 REFUSED = "varies along the face, which a mesh of 1 slice cannot show: prepare with Resolution"
@@ -54,9 +56,11 @@ def test_searches_refuse_it_too(mesh, call):
 
 
 def test_amounts_of_zero_are_the_nominal_face(mesh):
-    cycle = jg.solve(mesh, 50.0, pinion=jg.LeadCrowning(0.0) + jg.EndRelief(0.0, 2.0))
-    nominal = jg.solve(mesh, 50.0)
-    assert bool(jnp.all(cycle.transmission_error == nominal.transmission_error))
+    nothing = jg.LeadCrowning(0.0) + jg.EndRelief(0.0, 2.0)
+    assert bool(jnp.all(removed_material(mesh, 50.0, pinion=nothing) == 0.0))
+    # two programs, which a compiler may round differently
+    cycle, nominal = jg.solve(mesh, 50.0, pinion=nothing), jg.solve(mesh, 50.0)
+    np.testing.assert_allclose(cycle.transmission_error, nominal.transmission_error, rtol=1e-12)
 
 
 FILE = """
