@@ -17,7 +17,7 @@ from ..microgeometry import NoModification
 from ..optimize import METHODS
 from ..sizing import iso_relief
 from . import interrupt, report
-from .devices import join_processes, use_all_cores
+from .devices import compile_quickly, join_processes, use_all_cores
 from .progress import Stages
 from .run import default_folder, opened, run
 from .sweep import run_sweep
@@ -75,6 +75,7 @@ def analyze(
     no_cache: NoCache = False,
 ) -> int:
     """Analyze the unmodified pair and the modification of the design file."""
+    compile_quickly()
     with Stages() as stages:
         design = opened(file, cache=not no_cache)
         if design.bounds:
@@ -107,6 +108,7 @@ def optimize(
     Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
     the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
     """
+    compile_quickly()
     with Stages() as stages:
         design = opened(file, cache=not no_cache)
         request = optimize_request(design, method=method, quick=quick)

@@ -126,8 +126,14 @@ def _main_name(evaluations: Evaluations) -> str:
     return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
 
 
-def summary(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
-    """Contents of `summary.json`."""
+def summary(
+    file: DesignFile,
+    mesh: Mesh,
+    evaluations: Evaluations,
+    torques: np.ndarray,
+    found: Mapping[str, tuple[Doubt, ...]],
+) -> dict[str, Any]:
+    """Contents of `summary.json`, with the doubts that were `found` of every design."""
     size = mesh.resolution
     return {
         "title": file.title,
@@ -141,7 +147,7 @@ def summary(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.
         "model": {"compliance": _words(mesh.compliance), "plane": mesh.kinematics.plane},
         "designs": {
             name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
-            for name, several in doubts(file, evaluations).items()
+            for name, several in found.items()
         },
         "ppte_reduction_percent": reduction(evaluations),
         "ppte_over_torque": {

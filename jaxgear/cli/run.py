@@ -83,7 +83,8 @@ class Run:
     def write(self, *, figures: bool) -> None:
         """Writes the result files."""
         self._stages.begin("writing the results")
-        data = report.summary(self.design, self._mesh, self._evaluations, self._torques)
+        self._doubts = report.doubts(self.design, self._evaluations)
+        data = report.summary(self.design, self._mesh, self._evaluations, self._torques, self._doubts)
         if self._optimum is not None:
             data["optimum"] = optimum_report.summary(self.design, self._optimum, self._projection)
         write_summary(self._folder / "summary.json", {**data, "quick": self._quick})
@@ -106,7 +107,7 @@ class Run:
         if self._quick:
             report.say("quick run: coarse positions and a short search, not a result to build on")
         report.say(report.bores(self.design))
-        report.say(*report.doubt_lines(report.doubts(self.design, self._evaluations)))
+        report.say(*report.doubt_lines(self._doubts))
         report.say(f"results in {self._target}{os.sep}, {self._stages.elapsed:.1f} s")
         failures = list(report.failures(self._evaluations))
         if self._optimum is not None and not self._optimum.feasible:

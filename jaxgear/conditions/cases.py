@@ -41,7 +41,7 @@ class Conditions(Checked):
 
     def on(self, mesh: Mesh) -> "Cases":
         """The cases on a mesh; traceable, where every design has a mesh of its own."""
-        load = jax.tree.map(lambda numbers: numbers.astype(mesh.phase.dtype), self.load)
+        load = jax.tree.map(lambda numbers: numbers.astype(mesh.slice_width.dtype), self.load)
         removed = None if self.deviations is None else _removed(mesh, load.torques, self.deviations)
         return Cases(load.torques, load.speeds, load.friction, load.weights, removed)
 
@@ -79,7 +79,7 @@ class Cases(Checked):
     @property
     def weights(self) -> Float[Array, " cases"]:
         """Weight of every case, torques first; sum 1."""
-        return jnp.repeat(self.weight / self.samples, self.samples)
+        return _repeated(self.weight, self.samples)
 
     def each(self, function):
         """function(operation, removed) in every case, with a leading axis (cases,); the torques run slowest.
@@ -127,6 +127,11 @@ def conditions(
         return Conditions(load)
     count = SAMPLES if samples is None else whole(owner, "samples", samples)
     return Conditions(load, sample_deviations(tolerance, mesh, count, seed))
+
+
+@eqx.filter_jit
+def _repeated(weight, samples: int):
+    return jnp.repeat(weight / samples, samples)
 
 
 @eqx.filter_jit

@@ -14,7 +14,7 @@ def solve_case(
     torque,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
-    deviation: Any = 0.0,
+    deviation: Any = None,
 ) -> MeshCycle:
     """The cycle of a design by the compiled program that serves every kind of modification.
 
@@ -22,11 +22,13 @@ def solve_case(
         mesh: prepared mesh.
         torque: on the pinion [N m], scalar; or an `Operation`.
         pinion, wheel: modifications; None for nominal involutes.
-        deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions).
+        deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions), or a
+            scalar; None for perfect gears.
     """
     pinion, wheel = pinion or NoModification(), wheel or NoModification()
     removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-    return solve_removed(mesh, torque, removed + deviation, pinion=pinion, wheel=wheel)
+    removed = removed if deviation is None else removed + deviation
+    return solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
 
 
 def solved(cycle: MeshCycle) -> Bool[Array, "*cycles"]:

@@ -61,12 +61,14 @@ class Kinematics(eqx.Module):
     Attributes:
         pair: the gear pair.
         path_of_contact: points A to E.
+        first_phase: mesh position with which the base pitch begins, in base pitches: that of all cycles of a batch.
         resolution: array sizes.
         plane: "stress" or "strain", of the elastic constants.
     """
 
     pair: GearPair
     path_of_contact: PathOfContact
+    first_phase: Scalar
     resolution: Resolution
     plane: Plane = eqx.field(static=True)
 
@@ -78,10 +80,11 @@ class Kinematics(eqx.Module):
     @property
     def phase(self) -> Float[Array, " positions"]:
         """Mesh positions in base pitches, shape (positions,) without batch axes."""
-        return self._count(self.resolution.positions) / self.resolution.positions
+        return _phases(self.first_phase, self.resolution.positions)
 
     @property
     @over_batch
+    @eqx.filter_jit
     def path(self) -> Field:
         """Nominal path position of every pair [mm], shape (pairs, positions)."""
         offset = self.resolution.leading - self._count(self.resolution.chosen_pairs)
@@ -89,6 +92,7 @@ class Kinematics(eqx.Module):
 
     @property
     @over_batch
+    @eqx.filter_jit
     def outside(self) -> Field:
         """Distance of every pair outside the path of contact [mm], zero on it, shape (pairs, positions)."""
         path, contact = self.path, self.path_of_contact
@@ -96,6 +100,7 @@ class Kinematics(eqx.Module):
 
     @property
     @over_batch
+    @eqx.filter_jit
     def sides(self) -> tuple[Side, Side]:
         """Pinion and wheel."""
         return sides(self.pair, self.path_of_contact, contacts(self.pair, self.path_of_contact, self.path))
@@ -120,6 +125,11 @@ class Kinematics(eqx.Module):
     @property
     def _dtype(self):
         return self.path_of_contact.start.dtype
+
+
+@eqx.filter_jit
+def _phases(first, count: int):
+    return first[(0,) * first.ndim] + jnp.arange(count, dtype=first.dtype) / count
 
 
 class Contacts(eqx.Module):
@@ -197,6 +207,7 @@ def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Sid
     )
 
 
-def kinematics(pair: GearPair, resolution: Resolution, plane: Plane) -> Kinematics:
+def kinematics(pair: GearPair, first_phase: Scalar, resolution: Resolution, plane: Plane) -> Kinematics:
     """The kinematics of a pair."""
-    return Kinematics(pair, path_of_contact(pair), resolution, plane)
+    contact = path_of_contact(pair)
+    return Kinematics(pair, contact, first_phase.astype(contact.start.dtype), resolution, plane)

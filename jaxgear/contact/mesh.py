@@ -156,7 +156,7 @@ def prepare(
     if automatic:
         resolution = replace(resolution, pairs=_pairs_for(pair, deflection))
     _check_cover(path_of_contact(pair), resolution)
-    mesh = _prepare(pair, compliance, resolution)
+    mesh = prepare_from(np.zeros(()), pair, compliance, resolution)
     return replace(mesh, automatic=True) if automatic else mesh
 
 
@@ -168,8 +168,9 @@ def _pairs_for(pair: GearPair, deflection: float | None) -> int:
 
 
 @eqx.filter_jit
-def _prepare(pair: GearPair, compliance: AbstractCompliance, resolution: Resolution) -> Mesh:
-    moving = kinematics(pair, resolution, compliance.plane)
+def prepare_from(first_phase, pair: GearPair, compliance: AbstractCompliance, resolution: Resolution) -> Mesh:
+    """The mesh over the base pitch that begins with a mesh position [base pitches]."""
+    moving = kinematics(pair, first_phase, resolution, compliance.plane)
     contact, dtype = moving.path_of_contact, moving.path.dtype
     points = contacts(pair, contact, moving.path)
     outlines = outline(pair.pinion), outline(pair.wheel)

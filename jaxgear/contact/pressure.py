@@ -1,5 +1,6 @@
 """Hertzian pressure on the flank and at the tip corners."""
 
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -11,6 +12,7 @@ from .kinematics import Kinematics
 Load = Float[Array, "pairs slices positions"]
 
 
+@eqx.filter_jit
 def flank_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     """p = sqrt(q E* / (pi R)) [MPa] with the local radii of both involutes; zero outside the path of contact.
 
@@ -22,6 +24,7 @@ def flank_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     return jnp.where(inside[:, None], _hertz(kinematics, line_load, reduced), 0.0)
 
 
+@eqx.filter_jit
 def corner_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     """Pressure of the rounded tip edge on the mate's involute [MPa]; zero on the path of contact.
 

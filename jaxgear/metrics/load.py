@@ -1,5 +1,6 @@
 """How the pairs share the load and over which part of the path they carry it."""
 
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -26,7 +27,12 @@ class ContactShock(Checked):
 @over_batch
 def load_sharing(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
     """Share of every pair in the total force; the shares of a position sum to 1, or are 0 at zero torque."""
-    return safe_divide(cycle.pair_force, cycle.force)
+    return _shares(cycle.pair_force, cycle.force)
+
+
+@eqx.filter_jit
+def _shares(pair_force, force):
+    return safe_divide(pair_force, force)
 
 
 @over_batch

@@ -4,8 +4,10 @@ One table of limits serves inputs and results alike. Nothing is refused here: a 
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -97,7 +99,9 @@ def plausibility(
     flanks = tuple(given or own or NoModification() for given, own in ((pinion, cycle.pinion), (wheel, cycle.wheel)))
     rpm = cycle.operation.speed if speed is None else speed
     coefficient = cycle.operation.friction if friction is None else friction
-    numbers = [*_of_gears(cycle), *_of_flanks(cycle, flanks), *_of_results(cycle)]
+    # without the flanks: one program serves every kind of them
+    gears, results, sides = _numbers(replace(cycle, pinion=None, wheel=None))
+    numbers = [*(_doubt(*each) for each in gears), *_of_flanks(sides, flanks), *(_doubt(*each) for each in results)]
     if rpm is not None:
         velocity = float(rpm) * 2 * np.pi / 60 * float(cycle.kinematics.pair.pinion.pitch_radius) * 1e-3
         numbers.append(_doubt("pitch line velocity", "", velocity))
@@ -116,30 +120,49 @@ def _doubt(name: str, where: str, value, *, low: float | None = None, high: floa
     return Doubt(name, where, float(value), limit)
 
 
-def _of_gears(cycle: MeshCycle) -> Iterator[Doubt]:
+@eqx.filter_jit
+def _numbers(cycle: MeshCycle):
+    """Numbers of the gears and of the solution with their names, and both sides."""
     pair = cycle.kinematics.pair
+    gears = []
     for where, gear in (("pinion", pair.pinion), ("wheel", pair.wheel)):
-        yield _doubt("module", where, gear.module)
-        yield _doubt("elastic modulus", where, gear.material.elastic_modulus)
-        yield _doubt("density", where, gear.material.density)
-        yield _doubt("bore to root diameter", where, gear.bore_radius / gear.root_circle_radius)
-        yield _doubt("tip edge radius in modules", where, gear.tip_edge_radius / gear.module)
+        gears += [
+            ("module", where, gear.module),
+            ("elastic modulus", where, gear.material.elastic_modulus),
+            ("density", where, gear.material.density),
+            ("bore to root diameter", where, gear.bore_radius / gear.root_circle_radius),
+            ("tip edge radius in modules", where, gear.tip_edge_radius / gear.module),
+        ]
+    module, stress = pair.pinion.module, root_stress(cycle)
     if cycle.kinematics.plane == "stress":
-        yield _doubt("face width in modules, plane stress", "", pair.face_width / pair.pinion.module)
+        gears.append(("face width in modules, plane stress", "", pair.face_width / module))
+    results = [
+        ("mean transmission error in modules", "", 1e-3 * jnp.mean(cycle.transmission_error) / module),
+        ("flank pressure", "", jnp.max(cycle.contact_pressure)),
+        ("root stress", "pinion", jnp.max(stress.pinion)),
+        ("root stress", "wheel", jnp.max(stress.wheel)),
+        ("effective contact ratio", "", effective_contact_ratio(cycle)),
+    ]
+    return gears, results, cycle.sides
 
 
-def _of_flanks(cycle: MeshCycle, flanks) -> Iterator[Doubt]:
-    for where, side, modification in zip(("pinion", "wheel"), cycle.sides, flanks):
+def _of_flanks(sides, flanks) -> Iterator[Doubt]:
+    for where, side, modification in zip(("pinion", "wheel"), sides, flanks):
         if isinstance(modification, NoModification):
             continue
-        roll = jnp.linspace(side.start_roll_length, side.tip_roll_length, _PROFILE_POINTS)
-        face = jnp.linspace(-0.5, 0.5, _FACE_POINTS, dtype=roll.dtype) * side.face_width
-        depth = float(jnp.max(jnp.abs(removed_at(side, modification, roll, face))))
+        depth = float(_depth(side, modification))
         if depth > 0:
             yield _doubt("depth of the modification", where, depth)
         yield _doubt("depth of the modification in modules", where, depth / 1e3 / float(side.gear.module))
         for length, longest in _lengths(modification, side):
             yield _doubt("length of the modification", where, length, high=longest)
+
+
+@eqx.filter_jit
+def _depth(side: Side, modification: AbstractModification):
+    roll = jnp.linspace(side.start_roll_length, side.tip_roll_length, _PROFILE_POINTS)
+    face = jnp.linspace(-0.5, 0.5, _FACE_POINTS, dtype=roll.dtype) * side.face_width
+    return jnp.max(jnp.abs(removed_at(side, modification, roll, face)))
 
 
 def _lengths(modification: AbstractModification, side: Side) -> Iterator[tuple[float, float]]:
@@ -148,15 +171,5 @@ def _lengths(modification: AbstractModification, side: Side) -> Iterator[tuple[f
     for term in terms:
         if hasattr(term, "length"):
             along_face = getattr(term, "varies_along_face", False)
-            longest = 0.5 * side.face_width if along_face else side.tip_roll_length - side.start_roll_length
-            yield float(term.length), float(longest)
-
-
-def _of_results(cycle: MeshCycle) -> Iterator[Doubt]:
-    module = float(cycle.kinematics.pair.pinion.module)
-    stress = root_stress(cycle)
-    yield _doubt("mean transmission error in modules", "", float(np.mean(cycle.transmission_error)) / 1e3 / module)
-    yield _doubt("flank pressure", "", np.max(cycle.contact_pressure))
-    yield _doubt("root stress", "pinion", np.max(stress.pinion))
-    yield _doubt("root stress", "wheel", np.max(stress.wheel))
-    yield _doubt("effective contact ratio", "", effective_contact_ratio(cycle))
+            tip, start, width = map(float, (side.tip_roll_length, side.start_roll_length, side.face_width))
+            yield float(term.length), 0.5 * width if along_face else tip - start

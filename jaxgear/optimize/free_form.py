@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+import scipy
 from jaxtyping import Array, Float
-from scipy.linalg import block_diag
 
 from ..conditions import Parameters, conditions
 from ..contact import Mesh
@@ -17,6 +17,7 @@ from ..numerics import AbstractMeasure, Callback, Mean, check, whole
 from ..sizing import iso_relief
 from ..tolerance import Tolerance
 from .goal import Constraint
+from .linearizer import Linearizer
 from .minimax import Search, follow
 from .problem import Problem, Roughness
 from .refine import POSITIONS, refined
@@ -120,11 +121,13 @@ def free_form(
     record = Record(problem, callback)
     unmodified = np.zeros(2 * points)
     given = np.clip(_values(mesh, roll, start) / max_relief, 0.0, 1.0)
-    follow(problem, record, [Search(unmodified), Search(given)], steps=steps, rtol=_RTOL)
+    starts = [Search(unmodified), Search(given)]
+    record.linearizer = Linearizer(problem, len(starts))
+    follow(record.linearizer, record, starts, steps=steps, rtol=_RTOL)
     record.check()
 
     def polished(problem, record, point):
-        follow(problem, record, [Search(point)], steps=steps, rtol=_RTOL)
+        follow(record.linearizer, record, [Search(point)], steps=steps, rtol=_RTOL)
 
     record, change = refined(record, polished, positions)
     if not constraints:  # which may depend on what both flanks have in common
@@ -143,7 +146,7 @@ def _roughness(roll, max_relief: float, curvature: float) -> Roughness:
     """Penalty on the second derivatives of both tables."""
     second = np.diff(np.eye(roll.shape[1]), 2, axis=0) * max_relief
     steps = np.asarray(roll[:, 1] - roll[:, 0])
-    forms = block_diag(second / steps[0] ** 2, second / steps[1] ** 2)
+    forms = scipy.linalg.block_diag(second / steps[0] ** 2, second / steps[1] ** 2)
     return Roughness(jnp.asarray(forms, roll.dtype), jnp.asarray(curvature, roll.dtype))
 
 

@@ -11,13 +11,12 @@ from collections.abc import Mapping
 from copy import copy
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
-from scipy.optimize import linprog
-from scipy.sparse import coo_array
+import scipy
 
-from ..numerics import CVaR, Worst
+from ..numerics import AbstractMeasure, CVaR, Worst
 from .goal import FEASIBLE
 from .linearization import Linearization, Pieces
 from .problem import Problem
@@ -156,7 +155,7 @@ class Model:
         if not self.fine:
             return [], np.full(len(self._lin.objectives), np.inf)
         cases = [pieces.value for pieces in self._lin.objectives]
-        shares = [np.asarray(self._measure.shares(jnp.asarray(each), jnp.asarray(self._weights))) for each in cases]
+        shares = [np.asarray(_shares(self._measure, each, self._weights)) for each in cases]
         return shares, np.asarray([share @ each for share, each in zip(shares, cases)])
 
     def _cost(self, program: "_Program", low, high) -> tuple[dict[int, float], float]:
@@ -197,6 +196,11 @@ class Model:
                 cost[beyond] = weight
             return cost
         return {column: weight * sign for span, weight in zip(spans, weights) for column, sign in span.items()}
+
+
+@eqx.filter_jit
+def _shares(measure: AbstractMeasure, values, weights):
+    return measure.shares(values, weights)
 
 
 def _settled(pieces: Pieces) -> Pieces:
@@ -274,14 +278,16 @@ class _Program:
                 values.append(np.full(count, value))
             start += count
         size = self.parameters + len(self._lows)
-        matrix = coo_array(
+        matrix = scipy.sparse.coo_array(
             (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(start, size)
         ).tocsr()
         coefficients = np.zeros(size)
         for column, value in cost.items():
             coefficients[column] = value
         bounds = [*zip(low, high), *((lowest, None) for lowest in self._lows)]
-        found = linprog(coefficients, A_ub=matrix, b_ub=np.concatenate(self._limits), bounds=bounds, method="highs")
+        found = scipy.optimize.linprog(
+            coefficients, A_ub=matrix, b_ub=np.concatenate(self._limits), bounds=bounds, method="highs"
+        )
         if not found.success:
             return None
         return np.clip(found.x[: self.parameters], low, high), float(found.fun)

@@ -54,7 +54,7 @@ class Linearization(NamedTuple):
 
     objectives: tuple[Pieces, ...]
     limits: tuple[Pieces, ...]
-    fine: Bool[Array, ""]
+    fine: Bool[Either, ""]
 
 
 class Sloped(NamedTuple):

@@ -3,16 +3,14 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-import equinox as eqx
-import jax
 import numpy as np
 
 from ..numerics.fields import Checked, count, number
 from .linear_model import AbstractScalarization, Model
-from .linearization import Linearization
+from .linearizer import Linearizer
 from .problem import Problem
 from .search import AbstractMethod, Record
-from .starts import points_nearby, real_points, start_points
+from .starts import points_nearby, start_points
 
 # Reach of the start points of a later round about the best design, in the unit box. The kinks of PPTE make many shallow
 # local optima close together; on the 19/48 pair they lie within a tenth of the range.
@@ -51,11 +49,12 @@ class Minimax(Checked, AbstractMethod):
     def search(self, problem: Problem, record: Record) -> None:
         """Advances all searches of a round until none finds a better step."""
         points = start_points(problem, self.starts)
+        record.linearizer = Linearizer(problem, self.starts)
         for round_ in range(self.rounds):
             if round_:
                 points = points_nearby(record.point, self.starts, reach=_NEARBY, seed=round_)
             follow(
-                problem,
+                record.linearizer,
                 record,
                 [Search(point) for point in points],
                 steps=self.steps,
@@ -64,14 +63,10 @@ class Minimax(Checked, AbstractMethod):
             )
 
     def polish(self, problem: Problem, record: Record, point: np.ndarray) -> None:
-        """Searches again from the design and from beside it."""
-        polish(problem, record, point, steps=self.steps, rtol=self.rtol)
-
-
-def polish(problem: Problem, record: Record, point: np.ndarray, *, steps: int, rtol: float) -> None:
-    """Searches on a finer mesh from a design and from a few points beside it."""
-    beside = points_nearby(point, _POLISHED - 1, reach=_BESIDE, seed=0)
-    follow(problem, record, [Search(start) for start in (point, *beside)], steps=steps, rtol=rtol)
+        """Searches again from the design and from a few points beside it."""
+        linearizer = record.linearizer or Linearizer(problem, _POLISHED)
+        beside = points_nearby(point, _POLISHED - 1, reach=_BESIDE, seed=0)
+        follow(linearizer, record, [Search(start) for start in (point, *beside)], steps=self.steps, rtol=self.rtol)
 
 
 class Ledger(Protocol):
@@ -130,7 +125,7 @@ class Search:
 
 
 def follow(
-    problem: Problem,
+    linearizer: Linearizer,
     ledger: Ledger,
     searches: Sequence[Search],
     *,
@@ -139,36 +134,22 @@ def follow(
     round_of: tuple[int, int] = (0, 1),
 ) -> None:
     """Advances searches until none finds a better step; `round_of` tells the progress which round of how many it is."""
-    (done, rounds), batch = round_of, len(searches)
-    _linearize(problem, ledger, searches, batch)
+    done, rounds = round_of
+    _linearize(linearizer, ledger, searches)
     for step in range(steps):
         ledger.look(done * steps + step, rounds * steps)
         moving = [search for search in searches if search.propose(rtol)]
         if not moving:
             break
-        _linearize(problem, ledger, moving, batch)
+        _linearize(linearizer, ledger, moving)
     ledger.look((done + 1) * steps, rounds * steps)
 
 
-def _linearize(problem: Problem, ledger: Ledger, searches: Sequence[Search], batch: int) -> None:
-    """Linearizes at the points that the searches propose; the batch keeps its size, so that nothing is compiled anew
-    when a search has ended."""
-    rows = [search.trial for search in searches]
-    ledger.spend(len(rows), analyses=problem.gradient_cost)
-    for search, found in zip(searches, linearized(problem, np.stack(rows), batch)):
+def _linearize(linearizer: Linearizer, ledger: Ledger, searches: Sequence[Search]) -> None:
+    """Linearizes at the points that the searches propose."""
+    problem = linearizer.problem
+    ledger.spend(len(searches), analyses=problem.gradient_cost)
+    for search, found in zip(searches, linearizer(np.stack([search.trial for search in searches]))):
         model = Model(problem, search.trial, found, search.scalarization, search.penalty)
         ledger.take(search.trial, model)
         search.take(model)
-
-
-def linearized(problem: Problem, points: np.ndarray, batch: int) -> list[Linearization]:
-    """Linearizations at points of the unit box, at most a batch, on the host."""
-    padded = np.concatenate([points, np.repeat(points[-1:], batch - len(points), axis=0)])
-    leaves, tree = jax.tree.flatten(_linearizations(problem, real_points(problem, padded)))
-    leaves = [np.asarray(leaf) for leaf in leaves]
-    return [jax.tree.unflatten(tree, [leaf[row] for leaf in leaves]) for row in range(len(points))]
-
-
-@eqx.filter_jit
-def _linearizations(problem: Problem, points) -> Linearization:
-    return jax.vmap(problem.linearize)(points)

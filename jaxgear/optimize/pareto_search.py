@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
-from scipy.stats import qmc
+import scipy
 
 from ..conditions import Design
 from ..contact import Mesh
@@ -15,7 +15,8 @@ from ..numerics.pareto import pareto_front
 from ..tolerance import Tolerance
 from .goal import FEASIBLE, Constraint, Objective
 from .linear_model import AbstractScalarization, Model
-from .minimax import Search, follow, linearized
+from .linearizer import Linearizer
+from .minimax import Search, follow
 from .problem import Problem, make_problem
 from .result import Front
 from .search import Record
@@ -60,13 +61,14 @@ class Pareto(Checked):
         # in blocks: every other point of the Halton sequence covers half of the box only
         ends = _ends(objectives)[np.arange(self.points) * objectives // self.points]
         spread = _weights(self.points, objectives)
+        linearizer = Linearizer(problem, self.points)
         points = list(start_points(problem, self.points))
         for number in range(_ROUNDS):
             ways = [_Chebyshev(weight, met.frame) for weight in (spread if number else ends)]
             if number and met.found:
                 points = [met.best(way) for way in ways]
             searches = [Search(point, way) for point, way in zip(points, ways)]
-            follow(problem, met, searches, steps=self.steps, rtol=_RTOL, round_of=(number, _ROUNDS))
+            follow(linearizer, met, searches, steps=self.steps, rtol=_RTOL, round_of=(number, _ROUNDS))
         if not met.found:
             raise RuntimeError("pareto: no design that the search for a front has met keeps the constraints")
         record.offer(*met.compromise(), 0.0)
@@ -230,11 +232,11 @@ def pareto(
 
 def _evidence(posed: Problem, record: Record, points, values, span, batch: int) -> np.ndarray:
     """Fastest decrease of all objectives at once that is left at every point."""
-    left = np.empty(len(points))
+    left, linearizer = np.empty(len(points)), Linearizer(posed, batch)
     for start in range(0, len(points), batch):
         rows = slice(start, min(start + batch, len(points)))
         record.spend(len(points[rows]), analyses=posed.gradient_cost)
-        for index, found in zip(range(rows.start, rows.stop), linearized(posed, points[rows], batch)):
+        for index, found in zip(range(rows.start, rows.stop), linearizer(points[rows])):
             way = _Descent(values[index], span)
             left[index] = Model(posed, points[index], found, way).decrease_left(PROBE)
     return left
@@ -251,5 +253,5 @@ def _weights(count: int, objectives: int) -> np.ndarray:
         first = np.linspace(_END, 1 - _END, count)
         return np.stack([first, 1 - first], axis=1)
     # spacings of sorted uniform numbers are uniform on the simplex
-    cuts = np.sort(qmc.Halton(objectives - 1, scramble=False).random(count + 1)[1:], axis=1)
+    cuts = np.sort(scipy.stats.qmc.Halton(objectives - 1, scramble=False).random(count + 1)[1:], axis=1)
     return np.diff(np.concatenate([np.zeros((count, 1)), cuts, np.ones((count, 1))], axis=1), axis=1)

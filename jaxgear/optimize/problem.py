@@ -105,6 +105,12 @@ class Problem(eqx.Module):
         return replace(self, mesh=mesh, cases=self.conditions.on(mesh))
 
     @property
+    def is_made_of_extremes(self) -> bool:
+        """Whether all that is asked for are extremes of what happens at each position by itself."""
+        limited = [limit.quantity for limit in self.constraints if limit.quantity is not None]
+        return all(of.local and of.reduction.factors(of.sign) is not None for of in (*self.objectives, *limited))
+
+    @property
     def gradient_cost(self) -> int:
         """Contact analyses that a linearization in one case counts for."""
         limits = sum(limit.quantity is not None for limit in self.constraints)
@@ -272,7 +278,7 @@ def make_problem(
                 raise ValueError(f'{owner}: "{name}" of a constraint must be one of {", ".join(names)}')
     judged = conditions(owner, mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
     objectives = tuple(quantity_of(of, owner) for of in several)
-    low, high = (jnp.stack([real(limit).astype(mesh.phase.dtype) for limit in side]) for side in limits)
+    low, high = (jnp.stack([real(limit).astype(mesh.slice_width.dtype) for limit in side]) for side in limits)
     posed = Problem(
         design=design,
         names=names,

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from ..conditions import solve_case
 from ..contact import MeshCycle, Side
@@ -112,7 +112,10 @@ def _fit(side: Side, modification: AbstractModification, curve: str):
 
     bounds = [0.0, _LEAST_LENGTH * addendum, *low], [3 * most, addendum, *high]
     starts = [[most, share * addendum, *first] for share in _LENGTHS]
-    fits = [least_squares(residual, values, jac=partial(residual, of=_slope), bounds=bounds) for values in starts]
+    fits = [
+        scipy.optimize.least_squares(residual, values, jac=partial(residual, of=_slope), bounds=bounds)
+        for values in starts
+    ]
     best = min(fits, key=lambda fit: fit.cost)
     return _relief(jnp.asarray(best.x), curve), float(np.abs(best.fun).max()) * most
 

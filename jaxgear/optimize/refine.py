@@ -8,6 +8,7 @@ import numpy as np
 from ..contact import Mesh, prepare
 from ..numerics import whole
 from .evaluate import scores
+from .linear_model import Model
 from .problem import Problem
 from .search import Record
 
@@ -43,12 +44,22 @@ def refined(record: Record, polish: Polish, positions: int | None) -> tuple[Reco
         found = record.on(finer)
         polish(finer, found, record.point)
         found.check()
-        finest = problem.on(_with_positions(mesh, 2 * count))
         found.spend(1)
-        change = float(scores(finest, found.point[None]).value[0, 0]) - found.value
-        if abs(change) <= max(_BOUND * abs(found.value), _LEAST_BOUND) or 2 * count > _MOST:
+        change = _at_twice_the_positions(found) - found.value
+        count *= 2
+        if abs(change) <= max(_BOUND * abs(found.value), _LEAST_BOUND) or count > _MOST:
             return found, finer.objectives[0].sign * change
-        record, finer, count = found, finest, 2 * count
+        record, finer = found, problem.on(_with_positions(mesh, count))
+
+
+def _at_twice_the_positions(record: Record) -> float:
+    """The objective of the best design."""
+    problem, points = record.problem, record.point[None]
+    twice = record.linearizer.at_twice_the_positions() if record.linearizer is not None else None
+    if twice is not None:
+        return Model(problem, record.point, twice(points)[0]).value
+    mesh = _with_positions(problem.mesh, 2 * problem.mesh.resolution.positions)
+    return float(scores(problem.on(mesh), points).value[0, 0])
 
 
 def _with_positions(mesh: Mesh, positions: int) -> Mesh:

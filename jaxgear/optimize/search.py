@@ -11,6 +11,7 @@ from ..numerics import Callback
 from .evaluate import scores
 from .goal import counted
 from .linear_model import Model
+from .linearizer import Linearizer
 from .problem import Problem, Score
 
 
@@ -26,6 +27,7 @@ class Record:
         self.point = np.full(len(problem.names), 0.5)
         self.value, self.violation = float("inf"), float("inf")
         self.model: Model | None = None  # linearization at the best design, where the method made one
+        self.linearizer: Linearizer | None = None  # which made it
         self.history: list[tuple[int, float]] = []
         self._callback = callback
 
@@ -33,6 +35,7 @@ class Record:
         """A record of the same problem on another mesh, with what was spent and the history of this one."""
         other = Record(problem, None)
         other.evaluations, other.history = self.evaluations, self.history
+        other.linearizer = None if self.linearizer is None else self.linearizer.on(problem)
         return other
 
     def check(self) -> None:

@@ -3,14 +3,14 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.stats import qmc
+import scipy
 
 from .problem import Problem
 
 
 def start_points(problem: Problem, count: int) -> np.ndarray:
     """The middle of the box, then a Halton sequence: deterministic, so that a design file always gives one answer."""
-    points = qmc.Halton(len(problem.names), scramble=False).random(count)
+    points = scipy.stats.qmc.Halton(len(problem.names), scramble=False).random(count)
     points[0] = 0.5
     return points.astype(np.dtype(problem.low.dtype))
 
@@ -21,7 +21,7 @@ def points_nearby(point: np.ndarray, count: int, *, reach: float, seed: int) -> 
     Every seed gives other points, always the same.
     """
     corner = np.clip(point - reach, 0.0, 1.0 - 2 * reach)
-    return corner + 2 * reach * qmc.Halton(len(point), scramble=True, seed=seed).random(count)
+    return corner + 2 * reach * scipy.stats.qmc.Halton(len(point), scramble=True, seed=seed).random(count)
 
 
 def real_points(problem: Problem, points) -> jax.Array:

@@ -8,7 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..conditions import in_words, solve_case
+from ..conditions import in_words, solve_case, solved
+from ..contact import Operation
 from ..metrics import peak_to_peak
 from ..microgeometry import AbstractModification
 from .goal import FEASIBLE, Constraint
@@ -37,7 +38,7 @@ def optimum_of(
     problem = record.problem
     x = real_points(problem, record.point)
     parameters, (pinion, wheel) = problem.parameters(x), problem.modifications(x)
-    heaviest = problem.cases.torque[int(np.argmax(problem.cases.weight))]
+    heaviest = np.asarray(problem.cases.torque)[int(np.argmax(problem.cases.weight))]
     cycle = solve_case(problem.mesh, heaviest, pinion, wheel)
     left = _decrease_left(record) if left is None else left  # before the analyses are counted
     several = len(problem.objectives) > 1
@@ -93,7 +94,13 @@ def judged(
 
     They are joined by its measure over its cases; infinite where a contact solution failed. No penalty is added.
     """
-    values = np.asarray(_score_of(problem, pinion, wheel).value)
+    cases = problem.cases
+    if cases.count == 1 and cases.removed is None:  # the program that solves the one case serves every modification
+        speed = None if cases.speed is None else np.asarray(cases.speed)[0]
+        cycle = solve_case(problem.mesh, Operation(np.asarray(cases.torque)[0], speed, cases.friction), pinion, wheel)
+        values = np.asarray(_of_one(problem.objectives, cycle))
+    else:
+        values = np.asarray(_score_of(problem, pinion, wheel).value)
     units = (f" [{of.unit}]" if of.unit else "" for of in problem.objectives)
     names = (f"{_over_cases(problem)}{of.name}{unit}" for of, unit in zip(problem.objectives, units))
     return {name: of.sign * float(value) for name, of, value in zip(names, problem.objectives, values)}
@@ -101,6 +108,12 @@ def judged(
 
 def _over_cases(problem: Problem) -> str:
     return f"{in_words(problem.measure)} " if problem.cases.count > 1 else ""
+
+
+@eqx.filter_jit
+def _of_one(objectives, cycle):
+    values = jnp.stack([of.sign * of(cycle) for of in objectives])
+    return jnp.where(solved(cycle) & jnp.all(jnp.isfinite(values)), values, jnp.inf)
 
 
 @eqx.filter_jit

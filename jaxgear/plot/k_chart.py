@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
@@ -36,10 +37,15 @@ def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray:
 
 def _profile(side: Side, modification: AbstractModification) -> tuple[np.ndarray, np.ndarray]:
     """The active profile in the middle of the face."""
+    angle, removed = _over_profile(side, modification)
+    return np.asarray(angle), np.asarray(removed)
+
+
+@eqx.filter_jit
+def _over_profile(side: Side, modification: AbstractModification):
     rho = jnp.linspace(side.start_roll_length, side.tip_roll_length, _POINTS)
     removed = modification(side.flank(rho, jnp.zeros_like(side.face_width)))
-    angle = np.asarray(roll_angle(side.gear, rho))
-    return angle, np.broadcast_to(removed, angle.shape)
+    return roll_angle(side.gear, rho), jnp.broadcast_to(removed, rho.shape)
 
 
 def _over_roll_angle(panel: Axes, side: Side, title: str) -> None:

@@ -5,6 +5,7 @@ References:
     ISO/TR 13989-1 and ISO/TS 6336-20, equation B.1; ISO 21771 for relief lengths.
 """
 
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -44,6 +45,11 @@ def iso_stiffness(pair: GearPair, line_load=_LIGHT_LOAD) -> IsoStiffness:
         line_load: F_t K_A / b [N/mm]; below 100 N/mm the stiffness is reduced.
     """
     check("iso_stiffness", "line_load", line_load, "N/mm", low=0.0)
+    return _iso_stiffness(pair, real(line_load))
+
+
+@eqx.filter_jit
+def _iso_stiffness(pair: GearPair, line_load: Scalar) -> IsoStiffness:
     pinion, wheel = pair.pinion, pair.wheel
     z1, z2, x1, x2 = pinion.teeth, wheel.teeth, pinion.profile_shift, wheel.profile_shift
     c1, c2, c3, c4, c5, c6, c7, c8, c9 = _Q
@@ -52,7 +58,7 @@ def iso_stiffness(pair: GearPair, line_load=_LIGHT_LOAD) -> IsoStiffness:
     rack = (1 + 0.5 * (1.2 - dedendum)) * (1 - 0.02 * (20.0 - pinion.pressure_angle))
     first, second = pinion.material.elastic_modulus, wheel.material.elastic_modulus
     steel = 2 * first * second / (first + second) / 206_000.0
-    light = jnp.minimum(real(line_load) / _LIGHT_LOAD, 1.0) ** 0.25
+    light = jnp.minimum(line_load / _LIGHT_LOAD, 1.0) ** 0.25
     single = _MODEL_FACTOR * rack * steel * light / q
     return IsoStiffness(1 / q, single, single * (0.75 * path_of_contact(pair).contact_ratio + 0.25))
 

@@ -2,10 +2,10 @@
 
 import math
 from abc import abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from scipy.stats import qmc
+import scipy  # its packages load when they are used: scipy.stats takes a second
 
 from ..numerics import whole
 from .plan import AbstractPlan, Bounds, box
@@ -129,12 +129,12 @@ class Sobol(_Sampling):
         super().__init__(bounds, samples, seed=seed)
         if self.size > 2**_SOBOL_BITS:
             raise ValueError(f"Sobol: samples = {samples} must be at most 2^{_SOBOL_BITS} = {2**_SOBOL_BITS}")
-        self._engine: qmc.Sobol | None = None
+        self._engine: Any = None
 
     def _points(self, start, stop):
         engine = self._engine
         if engine is None or engine.num_generated > start:
-            engine = qmc.Sobol(len(self.names), scramble=True, bits=_SOBOL_BITS, rng=self.seed)
+            engine = scipy.stats.qmc.Sobol(len(self.names), scramble=True, bits=_SOBOL_BITS, rng=self.seed)
             self._engine = engine
         if engine.num_generated < start:
             engine.fast_forward(start - engine.num_generated)
