@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .mesh import Mesh, prepare_from
@@ -25,19 +24,25 @@ def parts(mesh: Mesh, positions: int) -> list[Mesh]:
     count, left = divmod(mesh.resolution.positions, positions)
     if left or count == 1:
         return [mesh]
-    return [_part(mesh, first, count, positions) for first in range(count)]
+    return [_part(np.asarray(first), count, mesh) for first in range(count)]
 
 
-def _part(mesh: Mesh, first: int, count: int, positions: int) -> Mesh:
+@eqx.filter_jit
+def _part(first, count: int, mesh: Mesh) -> Mesh:
     """Every so many positions from the first one on."""
+
+    def take(leaf):
+        rows = leaf.reshape(*leaf.shape[:-1], -1, count)
+        return jax.lax.dynamic_index_in_dim(rows, first, axis=-1, keepdims=False)
+
     moving = mesh.kinematics
-    resolution = replace(moving.resolution, positions=positions)
-    phase = jnp.asarray(np.asarray(moving.first_phase) + first / moving.resolution.positions, moving.first_phase.dtype)
-    taken = jax.tree.map(lambda leaf: np.asarray(leaf)[..., first::count], _by_position(mesh))
-    # farther out by as much, over larger steps
-    taken[0] = taken[0] / count
-    mesh = eqx.tree_at(_by_position, mesh, taken)
-    return replace(mesh, kinematics=replace(moving, first_phase=phase, resolution=resolution))
+    positions = moving.resolution.positions
+    taken = jax.tree.map(take, _by_position(mesh))
+    taken[0] = taken[0] / count  # as far out, over larger steps
+    phase = moving.first_phase + first.astype(moving.first_phase.dtype) / positions
+    resolution = replace(moving.resolution, positions=positions // count)
+    moved = replace(moving, first_phase=phase, resolution=resolution)
+    return eqx.tree_at(lambda m: [*_by_position(m), m.kinematics], mesh, [*taken, moved])
 
 
 def _by_position(mesh: Mesh) -> list:

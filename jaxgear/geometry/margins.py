@@ -146,7 +146,7 @@ def faults_between(pinion: Gear, wheel: Gear, center_distance: Scalar | None, ma
         for name, unit in (("module", "mm"), ("pressure_angle", "deg"))
         if float(getattr(wheel, name)) != float(getattr(pinion, name))
     ]
-    missed = {name for name, held in margins.held.items() if not held}
+    missed = {name for name, held in _held(margins).items() if not held}
     if "base_circle_clearance" in missed:
         closest = float(pinion.base_radius + wheel.base_radius)
         distance = closest + float(margins.base_circle_clearance)
@@ -168,6 +168,11 @@ def faults_between(pinion: Gear, wheel: Gear, center_distance: Scalar | None, ma
                 "least 0 mm"
             )
     return tuple(faults)
+
+
+@eqx.filter_jit
+def _held(margins: Margins) -> dict[str, Bool[Array, ""]]:
+    return margins.held
 
 
 def _backlash_fault(pinion: Gear, wheel: Gear, center_distance) -> str:

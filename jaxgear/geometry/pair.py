@@ -3,7 +3,6 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from ..numerics import Checked, number
@@ -108,4 +107,4 @@ def _faults(pair: GearPair) -> tuple[str, ...]:
     known = margins(pair)
     if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((pair, known))):
         return ()
-    return faults_between(pair.pinion, pair.wheel, pair.center_distance, jax.tree.map(np.asarray, known))
+    return faults_between(pair.pinion, pair.wheel, pair.center_distance, known)
