@@ -55,7 +55,7 @@ class Side(Checked):
         )
 
 
-class Kinematics(eqx.Module):
+class Kinematics(Checked):
     """How two gears move past each other over one base pitch: a few numbers, from which everything else follows.
 
     Attributes:
@@ -68,7 +68,7 @@ class Kinematics(eqx.Module):
 
     pair: GearPair
     path_of_contact: PathOfContact
-    first_phase: Scalar
+    first_phase: Scalar = result("base pitches")
     resolution: Resolution
     plane: Plane = eqx.field(static=True)
 

@@ -4,7 +4,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
@@ -20,7 +22,8 @@ FEASIBLE = 1e-3
 
 def counted(violation):
     """A violation as designs are compared by it: one within the tolerance is none."""
-    return violation * (violation > FEASIBLE)
+    where = jnp.where if isinstance(violation, jax.Array) else np.where
+    return where(violation <= FEASIBLE, 0.0, violation)
 
 
 class Constraint(Checked):
