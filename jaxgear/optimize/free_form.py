@@ -139,7 +139,7 @@ def free_form(
 def _roll_lengths(mesh: Mesh, points: int):
     first = jnp.stack([side.pitch_roll_length for side in mesh.sides])
     last = jnp.stack([side.tip_roll_length for side in mesh.sides])
-    return jnp.linspace(first, last, points, axis=1).astype(mesh.phase.dtype)
+    return jnp.linspace(first, last, points, axis=1).astype(mesh.slice_width.dtype)
 
 
 def _roughness(roll, max_relief: float, curvature: float) -> Roughness:

@@ -69,7 +69,7 @@ class Evaluator:
         arrays, rest = eqx.partition((variants, tuple(measures)), eqx.is_array)
         self._program = _Program(rest, tuple(results), batch, self._devices)
         self._data = everywhere(arrays, self._devices)
-        self._dtype = np.dtype(mesh.phase.dtype)
+        self._dtype = np.dtype(mesh.slice_width.dtype)
         jax.eval_shape(partial(_numbers, self._program, self._data), example.astype(self._dtype))
 
     def __call__(self, rows: np.ndarray) -> Callable[[], dict[str, np.ndarray]]:

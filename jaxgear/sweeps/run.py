@@ -221,7 +221,7 @@ def _settings(made: Variants, example: np.ndarray, identity: str, plan: Abstract
         "quantities": _own_digest(made, example, results),
         "design": identity,
         "mesh": _digest(made.mesh) if fixed else None,
-        "precision": str(made.mesh_shape(example).phase.dtype),
+        "precision": str(made.mesh_shape(example).slice_width.dtype),
         "platform": jax.local_devices()[0].platform,
         "jaxgear": _version("jaxgear"),
         "jax": jax.__version__,

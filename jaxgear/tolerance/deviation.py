@@ -104,7 +104,7 @@ def _sample(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, samples: int) -
 def deviation_of(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, number) -> Deviation:
     """One sample, of the given number."""
     pinion, wheel, shafts = jax.random.split(jax.random.fold_in(key, number), 3)
-    draw, dtype = tolerance.distribution, mesh.phase.dtype
+    draw, dtype = tolerance.distribution, mesh.slice_width.dtype
     return Deviation(
         pinion=_gear_deviation(tolerance.pinion, draw, mesh, pinion),
         wheel=_gear_deviation(tolerance.wheel, draw, mesh, wheel),
@@ -150,8 +150,8 @@ def flank_basis(mesh: Mesh, torque) -> Float[Array, "terms pairs slices position
 
     The removed material is linear in the modification, so that samples differ by their coefficients only.
     """
-    unit = real(1.0).astype(mesh.phase.dtype)
-    waves = jnp.eye(2 * HARMONICS, dtype=mesh.phase.dtype)
+    unit = real(1.0).astype(mesh.slice_width.dtype)
+    waves = jnp.eye(2 * HARMONICS, dtype=mesh.slice_width.dtype)
 
     def removed(side: str, modification: AbstractModification) -> Load:
         return removed_material(mesh, torque, **{side: modification})
@@ -177,7 +177,7 @@ def _coefficients(deviation: Deviation) -> Float[Array, " terms"]:
 
 def _gear_deviation(limits: GearTolerance, draw: AbstractDistribution, mesh: Mesh, key) -> GearDeviation:
     slope, height, shape, pitch, helix = jax.random.split(key, 5)
-    dtype = mesh.phase.dtype
+    dtype = mesh.slice_width.dtype
     return GearDeviation(
         profile_slope=_within(limits.profile_slope, draw(slope, (), dtype)),
         waviness=_within(limits.profile_form, draw(height, (), dtype)) * _random_shape(shape, dtype),
