@@ -85,7 +85,7 @@ def family(base: type[eqx.Module], *, users: bool = True) -> dict[str, type[eqx.
     layer = base.__module__.rpartition(".")[0]  # what another layer derives is a part of it, no choice of the user
     library = {snake(cls.__name__): cls for cls in classes if cls.__module__.startswith(layer)}
     own = {snake(cls.__name__): cls for cls in classes if not cls.__module__.startswith("jaxgear.")}
-    return {**library, **own, **library} if users else library
+    return {**library, **own, **library} if users else library  # the library's first, and where names are the same
 
 
 def snake(name: str) -> str:

@@ -4,7 +4,6 @@ import time
 from collections.abc import Sequence
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -14,6 +13,7 @@ from ..metrics import peak_to_peak
 from ..microgeometry import AbstractModification
 from .goal import FEASIBLE, Constraint
 from .linear_model import Model
+from .linearizer import Linearizer
 from .problem import Problem
 from .result import PENALIZED, Limit, Optimum
 from .search import Record
@@ -74,7 +74,7 @@ def _decrease_left(record: Record) -> float:
     if model is None:
         problem = record.problem
         record.spend(1, analyses=problem.gradient_cost)
-        found = jax.tree.map(np.asarray, _linearization(problem, real_points(problem, record.point)))
+        (found,) = Linearizer(problem, 1)(record.point[None])
         model = Model(problem, record.point, found)
     return model.decrease_left(PROBE)
 
@@ -153,11 +153,6 @@ def _constrained(problem: Problem, x) -> Sequence[np.ndarray]:
 def _numbers(problem: Problem, x):
     wanted = [limit.quantity for limit in problem.constraints if limit.quantity is not None]
     return problem.over_cases(x, lambda cycle: [of(cycle) for of in wanted])
-
-
-@eqx.filter_jit
-def _linearization(problem: Problem, x):
-    return problem.linearize(x)
 
 
 def _active_bounds(names, x) -> dict[str, str]:
