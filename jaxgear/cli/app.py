@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, NoReturn
 
-import equinox as eqx
 import typer
 
 from ..io import DesignFileError, optimize_request
 from ..io.schema import METHODS_WITHOUT_VARIABLES
 from ..microgeometry import NoModification
+from ..numerics import program
 from ..optimize import METHODS
 from ..sizing import iso_relief
 from . import interrupt, report
@@ -116,7 +116,7 @@ def optimize(
         with run(design, target, stages) as current:
             current.prepare(quick=quick)
             factor = design.optimize.application_factor
-            relief = eqx.filter_jit(iso_relief)(design.pair(), design.torque, application_factor=factor)
+            relief = program(iso_relief)(design.pair(), design.torque, application_factor=factor)
             involute = NoModification()
             current.search(request, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
             current.write(figures=not no_figures)

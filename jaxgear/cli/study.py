@@ -3,7 +3,6 @@
 import time
 from dataclasses import dataclass, field, replace
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +11,7 @@ from ..contact import Mesh, MeshCycle
 from ..io import DesignFile
 from ..metrics import flash_temperature, summary
 from ..microgeometry import AbstractModification
+from ..numerics import program
 from ..sweeps import over_torques
 
 _SURFACE_REACH, _SURFACE_TORQUES = 2.0, 21
@@ -80,7 +80,7 @@ def response_surface(mesh: Mesh, torque: float, pinion: AbstractModification, wh
     return torques, np.asarray([cycle.transmission_error for cycle in cycles])
 
 
-@eqx.filter_jit
+@program
 def _numbers(cycle: MeshCycle, speed, friction):
     """The numbers of a cycle, with the flash temperature where there is a speed [rpm]."""
     values = summary(cycle)

@@ -1,13 +1,12 @@
 """The cases in which a design is judged: every load with every manufactured pair."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import Mesh, Operation
 from ..contact.operation import operation_of
-from ..numerics import Checked, real, result, whole
+from ..numerics import Checked, program, real, result, whole
 from ..tolerance import Deviation, Tolerance, sample_deviations
 from ..tolerance.deviation import deviation_field, flank_basis
 from .load import LoadSpectrum
@@ -129,12 +128,12 @@ def conditions(
     return Conditions(load, sample_deviations(tolerance, mesh, count, seed))
 
 
-@eqx.filter_jit
+@program
 def _repeated(weight, samples: int):
     return jnp.repeat(weight / samples, samples)
 
 
-@eqx.filter_jit
+@program
 def _removed(mesh: Mesh, torques, deviations: Deviation):
     def at(torque):
         basis = flank_basis(mesh, torque)

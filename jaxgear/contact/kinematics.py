@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 from ..compliance import Plane
 from ..geometry import Gear, GearPair, PathOfContact, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import Checked, over_batch, result
+from ..numerics import Checked, over_batch, program, result
 from .corner import REACH, corner_gap
 from .resolution import Resolution
 
@@ -84,7 +84,7 @@ class Kinematics(Checked):
 
     @property
     @over_batch
-    @eqx.filter_jit
+    @program
     def path(self) -> Field:
         """Nominal path position of every pair [mm], shape (pairs, positions)."""
         offset = self.resolution.leading - self._count(self.resolution.chosen_pairs)
@@ -92,7 +92,7 @@ class Kinematics(Checked):
 
     @property
     @over_batch
-    @eqx.filter_jit
+    @program
     def outside(self) -> Field:
         """Distance of every pair outside the path of contact [mm], zero on it, shape (pairs, positions)."""
         path, contact = self.path, self.path_of_contact
@@ -100,7 +100,7 @@ class Kinematics(Checked):
 
     @property
     @over_batch
-    @eqx.filter_jit
+    @program
     def sides(self) -> tuple[Side, Side]:
         """Pinion and wheel."""
         return sides(self.pair, self.path_of_contact, contacts(self.pair, self.path_of_contact, self.path))
@@ -127,7 +127,7 @@ class Kinematics(Checked):
         return self.path_of_contact.start.dtype
 
 
-@eqx.filter_jit
+@program
 def _phases(first, count: int):
     return first[(0,) * first.ndim] + jnp.arange(count, dtype=first.dtype) / count
 

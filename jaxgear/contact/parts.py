@@ -6,6 +6,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
+from ..numerics import program
 from .mesh import Mesh, prepare_from
 
 
@@ -27,7 +28,7 @@ def parts(mesh: Mesh, positions: int) -> list[Mesh]:
     return [_part(np.asarray(first), count, mesh) for first in range(count)]
 
 
-@eqx.filter_jit
+@program
 def _part(first, count: int, mesh: Mesh) -> Mesh:
     """Every so many positions from the first one on."""
 

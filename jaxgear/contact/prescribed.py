@@ -2,12 +2,11 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, ContactProblem, check, real, result, solve_contact, tangent_stiffness
+from ..numerics import Checked, ContactProblem, check, program, real, result, solve_contact, tangent_stiffness
 from .mesh import Mesh
 from .operation import operation_of
 from .solve import check_mesh, outermost, removed_material
@@ -82,7 +81,7 @@ def solve_at(
     return _solve_at(mesh, jnp.broadcast_to(error.astype(removed.dtype), (positions,)), removed)
 
 
-@eqx.filter_jit
+@program
 def _solve_at(mesh: Mesh, error: Curve, removed: Load) -> PrescribedContact:
     gap = mesh.corner_gap[:, None] + removed
     problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, approach=error)

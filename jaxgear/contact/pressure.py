@@ -1,18 +1,17 @@
 """Hertzian pressure on the flank and at the tip corners."""
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..compliance.plane import combined_modulus
 from ..geometry import reduced_radius
-from ..numerics import safe_sqrt
+from ..numerics import program, safe_sqrt
 from .kinematics import Kinematics
 
 Load = Float[Array, "pairs slices positions"]
 
 
-@eqx.filter_jit
+@program
 def flank_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     """p = sqrt(q E* / (pi R)) [MPa] with the local radii of both involutes; zero outside the path of contact.
 
@@ -24,7 +23,7 @@ def flank_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     return jnp.where(inside[:, None], _hertz(kinematics, line_load, reduced), 0.0)
 
 
-@eqx.filter_jit
+@program
 def corner_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     """Pressure of the rounded tip edge on the mate's involute [MPa]; zero on the path of contact.
 

@@ -5,12 +5,11 @@ the path of the rack's tip arc centre, in the parameter g, the inclination of th
 circle, g = pressure angle where a tooth without undercut passes into the involute.
 """
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, bracketed_root, result
+from ..numerics import Checked, bracketed_root, program, result
 from .gear import Gear
 from .involute import half_tooth_angle
 
@@ -46,7 +45,7 @@ class Outline(Checked):
         return self.gear.root_circle_radius * jnp.cos(self.root_half_angle)
 
 
-@eqx.filter_jit
+@program
 def outline(gear: Gear) -> Outline:
     """Generates the outline of one gear.
 

@@ -1,11 +1,10 @@
 """Two gears on their operating centre distance."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, number
+from ..numerics import Checked, number, program
 from .gear import Gear
 from .margins import Margins, faults_between, margins_between
 from .outline import outline
@@ -81,7 +80,7 @@ def path_of_contact(pair: GearPair) -> PathOfContact:
     return path_between(pair.pinion, pair.wheel, pair.center_distance)
 
 
-@eqx.filter_jit
+@program
 def margins(pair: GearPair) -> Margins:
     """How far a pair is from what cannot run; finite and differentiable for impossible gears too."""
     return margins_between(outline(pair.pinion), outline(pair.wheel), path_of_contact(pair), pair.center_distance)

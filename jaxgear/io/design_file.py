@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
+
 from ..compliance import Compliance, legacy_compliance
 from ..contact import Mesh, Operation, Resolution, fewest_pairs, prepare
 from ..geometry import Gear, GearPair
@@ -26,6 +28,45 @@ _SLICES = 11
 _TORQUE_RANGE = (0.5, 2.0)
 
 
+class FileDesign(eqx.Module):
+    """The flanks of a design file as a function of its free parameters; pure and traceable.
+
+    Attributes:
+        names: of the parameters.
+        pinion, wheel: the modifications, which are added up.
+    """
+
+    names: tuple[str, ...] = eqx.field(static=True)
+    pinion: list[template.Part]
+    wheel: list[template.Part]
+
+    def __call__(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
+        """Modifications of pinion and wheel.
+
+        Args:
+            parameters: value of every free parameter, scalar.
+        """
+        if set(parameters) != set(self.names):
+            raise ValueError(
+                f"design: parameters {', '.join(sorted(parameters)) or '(none)'} must be those of the file: "
+                f"{', '.join(sorted(self.names)) or '(none)'}"
+            )
+        return template.build(self.pinion, parameters), template.build(self.wheel, parameters)
+
+
+class FileMesh(eqx.Module):
+    """The prepared mesh of a design file as a function of its free parameters; pure and traceable."""
+
+    pair: template.Part
+    model: template.Part
+    resolution: Resolution
+
+    def __call__(self, parameters: Mapping[str, Any]) -> Mesh:
+        """The mesh."""
+        pair, compliance = self.pair.build(parameters), self.model.build(parameters)
+        return prepare(pair, compliance=compliance, resolution=self.resolution)
+
+
 @dataclass(frozen=True)
 class DesignFile:
     """A design file, checked: what it says is physically possible.
@@ -42,6 +83,7 @@ class DesignFile:
         optimize: the table of that name; `optimize_request` makes sense of it.
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
+        design: makes the modifications of pinion and wheel from the free parameters.
         open_case: numbers of gears, pair, model and load that are variables; a sweep alone can vary them.
     """
 
@@ -56,6 +98,7 @@ class DesignFile:
     optimize: schema.OptimizeSection
     sweep: schema_sweep.SweepSection | None
     tolerance: schema_sweep.ToleranceSection | None
+    design: FileDesign
     open_case: tuple[template.Free, ...]
     _pair: template.Part
     _middle: GearPair
@@ -63,7 +106,6 @@ class DesignFile:
     _compliance: Compliance
     _load: template.Part
     _resolution: Resolution
-    _flanks: tuple[list[template.Part], list[template.Part]]
 
     def pair(self, parameters: Mapping[str, Any] | None = None) -> GearPair:
         """The gear pair.
@@ -114,9 +156,7 @@ class DesignFile:
         """The prepared mesh; a function of the parameters that prepares it where numbers of the gears are free."""
         if not self._pair.free() and not self._model.free():
             return self.mesh(resolution)
-        return lambda parameters: prepare(
-            self.pair(parameters), compliance=self._model.build(parameters), resolution=resolution
-        )
+        return FileMesh(self._pair, self._model, resolution)
 
     def operation(self, parameters: Mapping[str, Any]) -> Operation:
         """Torque, speed and friction; pure and traceable.
@@ -125,20 +165,6 @@ class DesignFile:
             parameters: value of every free parameter.
         """
         return self._load.build(parameters)
-
-    def design(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
-        """Modifications of pinion and wheel; pure and traceable.
-
-        Args:
-            parameters: value of every free parameter, scalar.
-        """
-        if set(parameters) != set(self.bounds):
-            raise ValueError(
-                f"design: parameters {', '.join(sorted(parameters)) or '(none)'} must be those of the file: "
-                f"{', '.join(sorted(self.bounds)) or '(none)'}"
-            )
-        pinion, wheel = (template.build(parts, parameters) for parts in self._flanks)
-        return pinion, wheel
 
 
 def load_design(path: str | Path) -> DesignFile:
@@ -196,6 +222,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         optimize=optimize,
         sweep=None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection),
         tolerance=tolerance,
+        design=FileDesign(tuple(bounds), pinion_flank, wheel_flank),
         open_case=tuple(open_case),
         _pair=pair,
         _middle=pair.build(middle),
@@ -203,7 +230,6 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         _compliance=model.build(middle),
         _load=operation,
         _resolution=_resolution(top.resolution or {}, uneven),
-        _flanks=(pinion_flank, wheel_flank),
     )
 
 

@@ -16,7 +16,7 @@ from ..contact import Mesh
 from ..geometry import diameter, roll_angle
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, NoModification, Sum
-from ..numerics import fields_of
+from ..numerics import fields_of, program
 from ..optimize import Front
 from .layout import family, snake
 
@@ -88,7 +88,7 @@ def write_summary(path: Path, data: Mapping[str, Any]) -> None:
     path.write_text(json.dumps(_jsonable(data), indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-@eqx.filter_jit
+@program
 def _profiles(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification):
     """Per gear: roll angle, roll length, diameter, face coordinate and the material removed."""
     face = jnp.linspace(-0.5, 0.5, _FACE_POINTS) * mesh.pair.face_width

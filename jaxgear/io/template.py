@@ -12,7 +12,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import Number, fields_of
+from ..numerics import Number, fields_of, real
 from .errors import DesignFileError, check_known, not_known, problem
 from .layout import Section, family, modules_of, section_of
 from .toml import decode, join
@@ -36,16 +36,16 @@ class Free:
     number: Number
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(eqx.Module):
     """An object of the library: its class, and those of its fields that the file gives.
 
-    A field is a number, a `Free` number, a list of both, another part, or a choice among strings.
+    A field is a number, a `Free` number, a list of both, another part, or a choice among strings. Numbers are arrays:
+    a program that is compiled for a part serves the same part with other numbers.
     """
 
-    make: Callable[..., eqx.Module]
-    fields: Mapping[str, Any]
-    key: str
+    make: Callable[..., eqx.Module] = eqx.field(static=True)
+    fields: dict[str, Any]
+    key: str = eqx.field(static=True)
 
     def build(self, parameters: Mapping[str, Any]) -> Any:
         """The object with the parameters in place of the open numbers; they may be tracers.
@@ -113,7 +113,10 @@ def _opened(value, key: str, number: Number):
     """A value of a file, with `Free` in place of the names of variables."""
     if isinstance(value, list):
         return [_opened(item, f"{key}[{i}]", number) for i, item in enumerate(value)]
-    return Free(value, key, number) if isinstance(value, str) else value
+    if isinstance(value, str):
+        return Free(value, key, number)
+    # an amount of zero is known to do nothing only as long as nobody traces it
+    return real(value) if value and not number.static else value
 
 
 def _open(value) -> list[Free]:

@@ -5,14 +5,13 @@ gears (None for the nominal involute). They look at the active profile, from its
 face width. They need no solution of the contact, are differentiable, compiled, and work under `vmap`.
 """
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import Kinematics, Mesh, Side
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import gauss_legendre, maximum
+from ..numerics import gauss_legendre, maximum, program
 
 Scalar = Float[Array, ""]
 Profile = Float[Array, " points"]
@@ -23,7 +22,7 @@ _FACE_POINTS = 33  # odd: the middle of the face is one of them
 _PROFILE_CELLS, _FACE_CELLS, _NODES = 64, 16, 4
 
 
-@eqx.filter_jit
+@program
 def profile_relief(
     mesh: Mesh | Kinematics,
     pinion: AbstractModification | None = None,
@@ -49,7 +48,7 @@ def profile_relief(
     return on_pinion, on_wheel
 
 
-@eqx.filter_jit
+@program
 def max_relief(
     mesh: Mesh | Kinematics,
     *,
@@ -63,7 +62,7 @@ def max_relief(
     return maximum(jnp.stack(removed))
 
 
-@eqx.filter_jit
+@program
 def relief_reversal(
     mesh: Mesh | Kinematics,
     *,
@@ -79,7 +78,7 @@ def relief_reversal(
     return maximum(jnp.stack(worst))
 
 
-@eqx.filter_jit
+@program
 def removed_volume(
     mesh: Mesh | Kinematics,
     *,
@@ -107,7 +106,7 @@ def removed_volume(
     return total
 
 
-@eqx.filter_jit
+@program
 def removed_at(
     side: Side, modification: AbstractModification, roll_length: Profile, face_coordinate=None
 ) -> Float[Array, "*lines points"]:

@@ -1,11 +1,10 @@
 """How the pairs share the load and over which part of the path they carry it."""
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..numerics import Checked, maximum, minimum, over_batch, result, safe_divide
+from ..numerics import Checked, maximum, minimum, over_batch, program, result, safe_divide
 
 Scalar = Float[Array, ""]
 
@@ -30,7 +29,7 @@ def load_sharing(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
     return _shares(cycle.pair_force, cycle.force)
 
 
-@eqx.filter_jit
+@program
 def _shares(pair_force, force):
     return safe_divide(pair_force, force)
 

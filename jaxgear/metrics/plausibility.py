@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ..contact import MeshCycle, Side
 from ..microgeometry import AbstractModification, NoModification
+from ..numerics import program
 from .flank import removed_at
 from .load import effective_contact_ratio
 from .root_stress import root_stress
@@ -120,7 +120,7 @@ def _doubt(name: str, where: str, value, *, low: float | None = None, high: floa
     return Doubt(name, where, float(value), limit)
 
 
-@eqx.filter_jit
+@program
 def _numbers(cycle: MeshCycle):
     """Numbers of the gears and of the solution with their names, and both sides."""
     pair = cycle.kinematics.pair
@@ -158,7 +158,7 @@ def _of_flanks(sides, flanks) -> Iterator[Doubt]:
             yield _doubt("length of the modification", where, length, high=longest)
 
 
-@eqx.filter_jit
+@program
 def _depth(side: Side, modification: AbstractModification):
     roll = jnp.linspace(side.start_roll_length, side.tip_roll_length, _PROFILE_POINTS)
     face = jnp.linspace(-0.5, 0.5, _FACE_POINTS, dtype=roll.dtype) * side.face_width

@@ -21,6 +21,7 @@ from .fields import whole as whole
 from .frozen import Frozen as Frozen
 from .leading import over_batch as over_batch
 from .logarithm import log as log
+from .programs import program as program
 from .progress import Callback as Callback
 from .quadrature import gauss_legendre as gauss_legendre
 from .risk import AbstractMeasure as AbstractMeasure

@@ -2,11 +2,11 @@
 
 from typing import ClassVar
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optax
 
+from ..numerics import program
 from .problem import Problem
 from .smooth import AbstractStaged, followed, lagrangian, merged
 from .starts import real_points, start_points
@@ -26,7 +26,7 @@ class Adam(AbstractStaged):
         return real_points(problem, start_points(problem, self.starts))
 
     @staticmethod
-    @eqx.filter_jit
+    @program
     def advance(problem: Problem, points, multipliers, analyses, width, rate, scale):
         gradient = jax.vmap(jax.grad(lagrangian, argnums=1, has_aux=True), (None, 0, 0, None, None))
         adam = optax.scale_by_adam()

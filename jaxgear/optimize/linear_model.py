@@ -11,12 +11,11 @@ from collections.abc import Mapping
 from copy import copy
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import numpy as np
 import scipy
 
-from ..numerics import AbstractMeasure, CVaR, Worst
+from ..numerics import AbstractMeasure, CVaR, Worst, program
 from .goal import FEASIBLE
 from .linearization import Linearization, Pieces
 from .problem import Problem
@@ -198,7 +197,7 @@ class Model:
         return {column: weight * sign for span, weight in zip(spans, weights) for column, sign in span.items()}
 
 
-@eqx.filter_jit
+@program
 def _shares(measure: AbstractMeasure, values, weights):
     return measure.shares(values, weights)
 
@@ -264,29 +263,24 @@ class _Program:
 
     def solve(self, cost: dict[int, float], low, high) -> tuple[np.ndarray, float] | None:
         """The step and the optimal cost; None when the solver gives up."""
-        rows, columns, values, start = [], [], [], 0
-        for slope, others in self._rows:
-            count = len(slope)
-            here = np.arange(start, start + count)
-            for column in range(self.parameters):
-                rows.append(here)
-                columns.append(np.full(count, column))
-                values.append(slope[:, column])
-            for column, value in others.items():
-                rows.append(here)
-                columns.append(np.full(count, column))
-                values.append(np.full(count, value))
-            start += count
         size = self.parameters + len(self._lows)
-        matrix = scipy.sparse.coo_array(
-            (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(start, size)
-        ).tocsr()
+        matrix = np.zeros((sum(map(len, self._limits)), size))
+        start = 0
+        for slope, others in self._rows:
+            rows = slice(start, start + len(slope))
+            matrix[rows, : self.parameters] = slope
+            for column, value in others.items():
+                matrix[rows, column] = value
+            start = rows.stop
         coefficients = np.zeros(size)
         for column, value in cost.items():
             coefficients[column] = value
-        bounds = [*zip(low, high), *((lowest, None) for lowest in self._lows)]
-        found = scipy.optimize.linprog(
-            coefficients, A_ub=matrix, b_ub=np.concatenate(self._limits), bounds=bounds, method="highs"
+        lowest = [-np.inf if bound is None else bound for bound in self._lows]
+        # a linear program is a mixed-integer one without integers: the same solver with half the ado
+        found = scipy.optimize.milp(
+            coefficients,
+            constraints=scipy.optimize.LinearConstraint(matrix, -np.inf, np.concatenate(self._limits)),
+            bounds=scipy.optimize.Bounds([*low, *lowest], [*high, *np.full(len(lowest), np.inf)]),
         )
         if not found.success:
             return None

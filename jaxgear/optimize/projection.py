@@ -22,7 +22,7 @@ from ..microgeometry import (
     Power,
     TipRelief,
 )
-from ..numerics import real
+from ..numerics import program, real
 from .result import Optimum
 
 _SAMPLES = 201  # points of the fit, from the pitch point to the tip
@@ -125,9 +125,9 @@ def _relief(values, curve: str) -> TipRelief:
     return TipRelief(real(amount), real(length), CURVES[curve][0](*shape))
 
 
-@eqx.filter_jit
+@program
 def _distance(values, side: Side, flank, roll, curve: str):
     return removed_at(side, _relief(values, curve), roll) - flank
 
 
-_slope = eqx.filter_jit(jax.jacfwd(_distance))
+_slope = program(jax.jacfwd(_distance))

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from ..numerics import count
+from ..numerics import count, program
 from .problem import Problem
 from .smooth import STAGE_WIDTHS, AbstractStaged, followed, lagrangian, merged
 from .starts import real_points, start_points
@@ -38,7 +38,7 @@ class LBFGS(AbstractStaged):
         return real_points(problem, np.arcsin(2 * points - 1))
 
     @staticmethod
-    @eqx.filter_jit
+    @program
     def advance(problem: Problem, angles, multipliers, analyses, width, rate, scale):
         method = optax.scale_by_lbfgs()
 

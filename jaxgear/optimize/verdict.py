@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
@@ -11,6 +10,7 @@ from ..conditions import in_words, solve_case, solved
 from ..contact import Operation
 from ..metrics import peak_to_peak
 from ..microgeometry import AbstractModification
+from ..numerics import program
 from .goal import FEASIBLE, Constraint
 from .linear_model import Model
 from .linearizer import Linearizer
@@ -110,13 +110,13 @@ def _over_cases(problem: Problem) -> str:
     return f"{in_words(problem.measure)} " if problem.cases.count > 1 else ""
 
 
-@eqx.filter_jit
+@program
 def _of_one(objectives, cycle):
     values = jnp.stack([of.sign * of(cycle) for of in objectives])
     return jnp.where(solved(cycle) & jnp.all(jnp.isfinite(values)), values, jnp.inf)
 
 
-@eqx.filter_jit
+@program
 def _score_of(problem: Problem, pinion, wheel):
     return problem.score_of(pinion, wheel)
 
@@ -149,7 +149,7 @@ def _constrained(problem: Problem, x) -> Sequence[np.ndarray]:
     ]
 
 
-@eqx.filter_jit
+@program
 def _numbers(problem: Problem, x):
     wanted = [limit.quantity for limit in problem.constraints if limit.quantity is not None]
     return problem.over_cases(x, lambda cycle: [of(cycle) for of in wanted])

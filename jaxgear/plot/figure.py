@@ -20,6 +20,7 @@ _POINTS_PER_INCH = 72
 WIDTH, HEIGHT = 120.0, 75.0  # of a figure in a report [mm]
 FONT = 9.0  # [pt]
 _DPI = 200
+_MARGIN = 0.03  # of a picture about its contents [in]
 
 # Okabe and Ito's colours, which stay apart for every kind of colour vision, with a grey for the yellow that pales on
 # paper; each comes with its own dashes for a black-and-white print.
@@ -227,7 +228,11 @@ def save(fig: Figure, path: str | Path) -> Path:
     """
     path = Path(path)
     picture = BytesIO()
-    fig.savefig(picture, format="png", dpi=_DPI, bbox_inches="tight", pad_inches=0.03, facecolor="white")
+    fig.set_dpi(_DPI)
+    fig.draw_without_rendering()
+    fig.set_layout_engine("none")  # everything has its place: it would be looked for again, twice
+    contents = fig.get_tightbbox().padded(_MARGIN)
+    fig.savefig(picture, format="png", dpi=_DPI, bbox_inches=contents, facecolor="white")
     plt.close(fig)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

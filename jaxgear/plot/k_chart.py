@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from ..contact import Mesh, Side
 from ..geometry import roll_angle
 from ..microgeometry import AbstractModification
+from ..numerics import program
 from .flank_panels import Design, flank_panels
 
 _POINTS = 201  # over the active profile
@@ -41,7 +41,7 @@ def _profile(side: Side, modification: AbstractModification) -> tuple[np.ndarray
     return np.asarray(angle), np.asarray(removed)
 
 
-@eqx.filter_jit
+@program
 def _over_profile(side: Side, modification: AbstractModification):
     rho = jnp.linspace(side.start_roll_length, side.tip_roll_length, _POINTS)
     removed = modification(side.flank(rho, jnp.zeros_like(side.face_width)))

@@ -5,7 +5,6 @@ References:
     ISO/TR 13989-1 and ISO/TS 6336-20, equation B.1; ISO 21771 for relief lengths.
 """
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -13,7 +12,7 @@ from ..contact import MeshCycle
 from ..geometry import GearPair, path_of_contact
 from ..metrics import secant_stiffness
 from ..microgeometry import AbstractCurve, TipRelief
-from ..numerics import Checked, check, minimum, real, result, safe_divide
+from ..numerics import Checked, check, minimum, program, real, result, safe_divide
 
 Scalar = Float[Array, ""]
 
@@ -48,7 +47,7 @@ def iso_stiffness(pair: GearPair, line_load=_LIGHT_LOAD) -> IsoStiffness:
     return _iso_stiffness(pair, real(line_load))
 
 
-@eqx.filter_jit
+@program
 def _iso_stiffness(pair: GearPair, line_load: Scalar) -> IsoStiffness:
     pinion, wheel = pair.pinion, pair.wheel
     z1, z2, x1, x2 = pinion.teeth, wheel.teeth, pinion.profile_shift, wheel.profile_shift

@@ -2,7 +2,6 @@
 
 from functools import cache
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,7 +9,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from ..contact import Mesh, removed_material
 from ..microgeometry import AbstractModification, Flank, LeadSlope, ProfileSlope
-from ..numerics import Checked, number, real, result, spread, whole
+from ..numerics import Checked, number, program, real, result, spread, whole
 from .distribution import AbstractDistribution
 from .limits import GearTolerance, Tolerance, check_slices
 
@@ -96,7 +95,7 @@ def sample_deviations(tolerance: Tolerance, mesh: Mesh, samples: int, seed) -> D
     return _sample(tolerance, mesh, jax.random.key(seed), samples)
 
 
-@eqx.filter_jit
+@program
 def _sample(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, samples: int) -> Deviation:
     return jax.vmap(lambda number: deviation_of(tolerance, mesh, key, number))(jnp.arange(samples))
 
@@ -112,7 +111,7 @@ def deviation_of(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, number) ->
     )
 
 
-@eqx.filter_jit
+@program
 def deviated_material(
     mesh: Mesh,
     torque,

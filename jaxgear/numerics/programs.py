@@ -1,0 +1,224 @@
+"""Compiled functions, which a command keeps for the next process.
+
+`eqx.filter_jit` traces, lowers and compiles a function once per process, which takes seconds; JAX's own cache spares
+the last of the three. A `Store` keeps what comes out at the end by what it was made of: the next process loads it.
+"""
+
+import functools
+import inspect
+import io
+import pickle
+import types
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar
+
+import equinox as eqx
+import jax
+import numpy as np
+from jax.experimental.serialize_executable import deserialize_and_load, serialize
+from jax.extend.core import get_opaque_trace_state
+
+_Given = ParamSpec("_Given")
+_Found = TypeVar("_Found")
+_Run = Callable[..., Sequence[jax.Array]]
+
+# Packages whose functions and classes a program may be made of: with their versions they are what their names say.
+_KNOWN = ("jaxgear", "jax", "jaxlib", "equinox", "numpy", "builtins", "functools", "operator", "collections")
+
+
+class Shelf(Protocol):
+    """Where programs lie between two processes."""
+
+    def read(self, made_of: bytes) -> bytes | None:
+        """A program by what it is made of, as far as that differs from call to call."""
+
+    def write(self, made_of: bytes, program: bytes) -> None:
+        """Keeps a program."""
+
+
+class _Shape(NamedTuple):
+    """Stands for an array of which everything but the numbers is known."""
+
+    shape: tuple[int, ...]
+    dtype: str
+    weak: bool = False
+
+    @property
+    def struct(self) -> jax.ShapeDtypeStruct:
+        return jax.ShapeDtypeStruct(self.shape, self.dtype, weak_type=self.weak)
+
+
+class _Program(NamedTuple):
+    """A function for arrays of some shapes.
+
+    Attributes:
+        run: makes a list of arrays from arrays.
+        result: what the function returns, with a `_Shape` in place of every array.
+    """
+
+    run: Future[_Run]
+    result: Any
+
+    def __call__(self, arrays: Sequence) -> Any:
+        return _filled(self.result, self.run.result()(*arrays))
+
+
+class Store:
+    """Programs by what they are made of, compiled in threads of their own.
+
+    Args:
+        shelf: where they lie between two processes.
+        threads: that compile.
+    """
+
+    def __init__(self, shelf: Shelf, threads: int = 2):
+        self._shelf, self._pool = shelf, ThreadPoolExecutor(threads, "compiler")
+        self._programs: dict[Any, _Program] = {}
+        self._untraced = get_opaque_trace_state()
+
+    def program(self, function: Callable, arguments: Any) -> tuple[_Program, list] | None:
+        """The program of a function for some arguments, and the arrays among them; None where JAX traces them."""
+        leaves, tree = jax.tree.flatten(arguments)
+        traced = any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
+        if traced or get_opaque_trace_state() != self._untraced:
+            return None
+        fixed = [_shape_of(leaf) or leaf for leaf in leaves]
+        key = function, tree, tuple((type(leaf), leaf) for leaf in fixed)
+        try:
+            known = self._programs.get(key)
+        except TypeError:  # something that cannot be told from others
+            return None
+        if known is None:
+            known = self._programs[key] = self._made(function, jax.tree.unflatten(tree, fixed))
+        return known, [leaf for leaf, shape in zip(leaves, fixed) if isinstance(shape, _Shape)]
+
+    def _made(self, function: Callable, arguments: Any) -> _Program:
+        made_of = _recipe((function, arguments))
+        kept = None if made_of is None else self._shelf.read(made_of)
+        if kept is not None:
+            _register()
+            result, code = pickle.loads(kept)
+            return _Program(self._pool.submit(_loaded, code), result)
+        lowered, result = _lowered(function, arguments)
+
+        def compiled() -> _Run:
+            run = lowered.compile()
+            kept = None if made_of is None else _packed(run, result)
+            if made_of is not None and kept is not None:
+                self._shelf.write(made_of, kept)
+            return run
+
+        return _Program(self._pool.submit(compiled), result)
+
+
+_store: Store | None = None
+
+
+def keep(store: Store | None) -> None:
+    """From now on the programs of this process come from a store; None for no store any more."""
+    global _store
+    _store = store
+
+
+def program(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
+    """Compiles a function of arrays and other things, as `eqx.filter_jit` does; kept where a store is in use."""
+    jitted = eqx.filter_jit(function)
+
+    @functools.wraps(function)
+    def run(*args: _Given.args, **options: _Given.kwargs) -> _Found:
+        found = None if _store is None else _store.program(function, (args, options))
+        if found is None:
+            return jitted(*args, **options)
+        made, arrays = found
+        return made(arrays)
+
+    return run
+
+
+def begin(function: Callable, *args, **options) -> Any:
+    """Starts to compile a `program` for arguments of these shapes, where a store is in use.
+
+    Returns:
+        what it will return, with a `jax.ShapeDtypeStruct` in place of every array; None where there is no store.
+    """
+    found = None if _store is None else _store.program(inspect.unwrap(function), (args, options))
+    if found is None:
+        return None
+    result = found[0].result
+    return _filled(result, [shape.struct for shape in jax.tree.leaves(result, is_leaf=_is_shape) if _is_shape(shape)])
+
+
+def _shape_of(leaf) -> _Shape | None:
+    """What stands for an array; None for everything else."""
+    if isinstance(leaf, jax.Array | np.ndarray | np.generic | jax.ShapeDtypeStruct):
+        return _Shape(leaf.shape, str(leaf.dtype), getattr(leaf, "weak_type", False))
+    return None
+
+
+def _is_shape(leaf) -> bool:
+    return isinstance(leaf, _Shape)
+
+
+def _filled(tree: Any, arrays: Iterable) -> Any:
+    """A tree with arrays in the places of their shapes."""
+    left = iter(arrays)
+    return jax.tree.map(lambda leaf: next(left) if _is_shape(leaf) else leaf, tree, is_leaf=_is_shape)
+
+
+def _lowered(function: Callable, arguments: Any) -> tuple[jax.stages.Lowered, Any]:
+    """A function of arrays alone, ready to be compiled, and what it returns."""
+    shapes = [leaf.struct for leaf in jax.tree.leaves(arguments, is_leaf=_is_shape) if _is_shape(leaf)]
+    results = []
+
+    def of_arrays(*arrays):
+        args, options = _filled(arguments, arrays)
+        found, tree = jax.tree.flatten(function(*args, **options))
+        results.append(jax.tree.unflatten(tree, [_shape_of(leaf) or leaf for leaf in found]))
+        return [leaf for leaf in found if _shape_of(leaf)]
+
+    of_arrays.__name__ = of_arrays.__qualname__ = function.__name__
+    lowered = jax.jit(of_arrays).lower(*shapes)
+    return lowered, results[-1]
+
+
+def _packed(run, result: Any) -> bytes | None:
+    """A compiled program as bytes; None where that cannot be."""
+    try:
+        return pickle.dumps((result, serialize(run)))
+    except (pickle.PicklingError, AttributeError, TypeError, ValueError, NotImplementedError):
+        return None
+
+
+@functools.cache
+def _register() -> None:
+    """Loads LAPACK, which JAX does while it lowers: a program that is only loaded would call nothing."""
+    jax.jit(jax.lax.linalg.lu).lower(jax.ShapeDtypeStruct((1, 1), "float32"))
+
+
+def _loaded(code: tuple) -> _Run:
+    return deserialize_and_load(*code, execution_devices=jax.devices()[:1])
+
+
+class _Recipe(pickle.Pickler):
+    """Writes what a program is made of, to be compared: functions by their names and what they enclose."""
+
+    def persistent_id(self, obj):
+        if not isinstance(obj, type | types.FunctionType):
+            return None
+        if obj.__module__.partition(".")[0] not in _KNOWN:
+            raise pickle.PicklingError(f"{obj.__module__} can change without a word")
+        if isinstance(obj, type):
+            return "class", obj.__module__, obj.__qualname__
+        enclosed = [cell.cell_contents for cell in obj.__closure__ or ()]
+        return "function", obj.__module__, obj.__qualname__, obj.__code__.co_firstlineno, enclosed, obj.__defaults__
+
+
+def _recipe(made_of: Any) -> bytes | None:
+    """What a program is made of as bytes; None where that cannot be told."""
+    written = io.BytesIO()
+    try:
+        _Recipe(written).dump(made_of)
+    except (pickle.PicklingError, AttributeError, TypeError, ValueError, RecursionError):
+        return None
+    return written.getvalue()
