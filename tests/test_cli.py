@@ -509,14 +509,13 @@ def test_help_and_version_need_no_file():
 
 
 def test_the_cache_is_a_private_folder_and_never_an_obstacle(tmp_path, monkeypatch):
-    settings = {}
-    monkeypatch.setattr(cache.jax.config, "update", settings.__setitem__)
+    kept = []
+    monkeypatch.setattr(cache, "keep", kept.append)
     monkeypatch.delenv("JAX_COMPILATION_CACHE_DIR", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     folder = cache.enable_cache()
-    assert settings["jax_compilation_cache_dir"] == str(folder) and folder.is_relative_to(tmp_path)
+    assert len(kept) == 1 and folder.is_relative_to(tmp_path)
     assert stat.S_IMODE(folder.stat().st_mode) & 0o077 == 0
-    settings.clear()
     folder.chmod(0o777)  # others could place programs here
     assert cache.enable_cache() is None
     (tmp_path / "file").write_text("")
@@ -526,4 +525,4 @@ def test_the_cache_is_a_private_folder_and_never_an_obstacle(tmp_path, monkeypat
     folder.chmod(0o700)
     monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "/elsewhere")
     assert cache.enable_cache() is None
-    assert settings == {}
+    assert len(kept) == 1

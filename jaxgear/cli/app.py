@@ -114,7 +114,7 @@ def optimize(
         request = optimize_request(design, method=method, quick=quick)
         target = output or default_folder(file, "optimize", request.method, quick=quick)
         with run(design, target, stages) as current:
-            current.prepare(quick=quick)
+            current.prepare(quick=quick, finer=request.finer)
             factor = design.optimize.application_factor
             relief = program(iso_relief)(design.pair(), design.torque, application_factor=factor)
             involute = NoModification()

@@ -13,6 +13,7 @@ import jax
 from ..numerics.programs import Store, keep
 
 _MOST = 256 << 20  # bytes of all that is kept
+_sum = hashlib.sha256
 
 
 def enable_cache() -> Path | None:
@@ -48,29 +49,30 @@ class _Files:
             os.utime(file)  # the oldest are forgotten
         except OSError:
             return None
-        return kept
+        program = kept[: -_sum().digest_size]
+        return program if kept == program + _sum(program).digest() else None  # a damaged one is compiled again
 
     def write(self, made_of: bytes, program: bytes) -> None:
         try:
             with tempfile.NamedTemporaryFile(dir=self._folder, delete=False) as file:
-                file.write(program)
+                file.write(program + _sum(program).digest())
             os.replace(file.name, self._file(made_of))  # whole or not at all
         except OSError:  # a full disk: the next process compiles again
             return
 
     def _file(self, made_of: bytes) -> Path:
-        return self._folder / f"jaxgear-{hashlib.sha256(self._here + made_of).hexdigest()}"
+        return self._folder / _sum(self._here + made_of).hexdigest()
 
 
 def _surroundings() -> bytes:
     """What a program depends on besides what it is made of: code, compiler, its settings, and the processor."""
-    found = hashlib.sha256()
+    found = _sum()
     package = Path(__file__).parent.parent
     for file in sorted(package.rglob("*.py")):
         found.update(f"{file.relative_to(package)} ".encode() + file.read_bytes())
     versions = (version(name) for name in ("jax", "jaxlib", "equinox", "numpy"))
     settings = (f"{name}={os.environ[name]}" for name in sorted(os.environ) if name.startswith(("JAX_", "XLA_")))
-    python = platform.python_version(), jax.config.jax_enable_x64, jax.default_backend()
+    python = platform.python_version(), jax.config.read("jax_enable_x64"), jax.default_backend()
     found.update(repr((*versions, *settings, *python, _processor())).encode())
     return found.digest()
 

@@ -18,7 +18,7 @@ from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.results import unit_of
 from ..metrics import Doubt, plausibility
-from ..numerics import fields_of
+from ..numerics import fields_of, program
 from .study import Evaluation
 
 Evaluations = Mapping[str, Evaluation]
@@ -101,7 +101,7 @@ def bores(file: DesignFile) -> str:
     texts = []
     for name, gear in gears:
         guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
-        texts.append(f"{name} {2 * float(gear.bore_radius):.4g} mm{guess}")
+        texts.append(f"{name} {float(_diameters(gear)[1]):.4g} mm{guess}")
     return f"bores: {', '.join(texts)}"
 
 
@@ -143,7 +143,7 @@ def summary(
         "speed_rpm": file.speed,
         "friction": file.friction,
         "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
-        "center_distance_mm": mesh.pair.working_center_distance,
+        "center_distance_mm": _center_distance(mesh),
         "model": {"compliance": _words(mesh.compliance), "plane": mesh.kinematics.plane},
         "designs": {
             name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
@@ -245,7 +245,7 @@ def _design(evaluation: Evaluation) -> dict[str, Any]:
 
 def _gear(gear: Gear) -> dict[str, Any]:
     """Every number of a gear, with those that follow from others where the file gives none."""
-    derived = {"tip_diameter": 2 * gear.tip_radius, "bore_diameter": 2 * gear.bore_radius}
+    derived = dict(zip(("tip_diameter", "bore_diameter"), _diameters(gear)))
     data: dict[str, Any] = {}
     for part in (gear, gear.material):
         for name, field in fields_of(type(part)).items():
@@ -254,6 +254,21 @@ def _gear(gear: Gear) -> dict[str, Any]:
             data[f"{name}_{unit}" if unit else name] = np.asarray(value)
     data["bore_given"] = gear.bore_diameter is not None
     return data
+
+
+@program
+def _diameters(gear: Gear):
+    """Of tip and bore [mm]."""
+    return 2 * gear.tip_radius, 2 * gear.bore_radius
+
+
+def _center_distance(mesh: Mesh) -> float:
+    """Sum of the working pitch radii [mm]."""
+    contact = mesh.path_of_contact
+    return float(
+        np.hypot(contact.pinion_base_radius, contact.pinion_pitch_roll_length)
+        + np.hypot(contact.wheel_base_radius, contact.wheel_pitch_roll_length)
+    )
 
 
 def _words(part: eqx.Module) -> str:

@@ -38,11 +38,13 @@ class Run:
         self._front: Front | None = None
         self._projection: Projection | None = None
 
-    def prepare(self, *, quick: bool = False) -> None:
-        """Prepares the mesh, of a quick run a coarse one."""
+    def prepare(self, *, quick: bool = False, finer: int | None = None) -> None:
+        """Prepares the mesh, of a quick run a coarse one; `finer` are the positions on which a search will end."""
         self._stages.begin("preparing the mesh")
         self._quick = quick
         size = self.design.resolution()
+        if finer is not None:
+            self.design.begin_contact(size, dataclasses.replace(size, positions=max(finer, size.positions)))
         self._mesh: Mesh = jax.block_until_ready(self.design.mesh(coarse(size) if quick else size))
         self._searched_at = self._mesh.resolution.positions
         self._torques = np.linspace(*self.design.torque_range, _QUICK_TORQUES if quick else _TORQUES)

@@ -42,13 +42,15 @@ class LoadSpectrum(Checked):
         self.speeds = None if speeds is None else self._as_many("speeds", real(speeds))
         self.friction = optional_real(friction)
         self._check_different()
-        shares = jnp.ones_like(self.torques) if weights is None else real(weights)
+        shares = real(np.ones(self.torques.shape, self.torques.dtype)) if weights is None else real(weights)
         check("LoadSpectrum", "weights", shares, "", low=0.0)
         if shares.ndim != 1:
             raise ValueError(f"LoadSpectrum: weights must be a list of {len(self.torques)}, one per torque")
         shares = self._as_many("weights", shares)
-        check("LoadSpectrum", "sum of the weights", jnp.sum(shares), "", low=0.0, open_low=True)
-        self.weights = shares / jnp.sum(shares)
+        known = concrete(shares)
+        total = jnp.sum(shares) if known is None else known.sum()
+        check("LoadSpectrum", "sum of the weights", total, "", low=0.0, open_low=True)
+        self.weights = shares / total if known is None else real(known / total)
 
     def _as_many(self, name: str, values):
         if values.ndim == 0:
@@ -68,5 +70,10 @@ class LoadSpectrum(Checked):
     @staticmethod
     def of(operation: Operation) -> "LoadSpectrum":
         """A spectrum of a single load."""
-        speeds = None if operation.speed is None else operation.speed[None]
-        return LoadSpectrum(operation.torque[None], speeds=speeds, friction=operation.friction)
+        torque, speed = operation.torque, operation.speed
+        return LoadSpectrum(_alone(torque), None, None if speed is None else _alone(speed), operation.friction)
+
+
+def _alone(number):
+    known = concrete(number)
+    return number[None] if known is None else known[None]

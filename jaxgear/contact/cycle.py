@@ -9,7 +9,7 @@ from ..microgeometry import AbstractModification
 from ..numerics import over_batch
 from .kinematics import Kinematics, Side
 from .operation import Operation
-from .pressure import corner_pressure, flank_pressure
+from .pressure import pressures
 
 Curve = Float[Array, " positions"]
 Load = Float[Array, "pairs slices positions"]
@@ -91,13 +91,13 @@ class MeshCycle(eqx.Module):
 
         p = sqrt(q E* / (pi R)) (Hertz), with the plane moduli of the compliance model.
         """
-        return flank_pressure(self.kinematics, self.line_load)
+        return pressures(self.kinematics, self.line_load)[0]
 
     @property
     @over_batch
     def corner_pressure(self) -> Load:
         """Hertzian pressure of the tip edge on the mate's flank [MPa]; zero on the theoretical path of contact."""
-        return corner_pressure(self.kinematics, self.line_load)
+        return pressures(self.kinematics, self.line_load)[1]
 
     def __str__(self) -> str:
         if self.batch_ndim:

@@ -3,12 +3,13 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..compliance import Plane
 from ..geometry import Gear, GearPair, PathOfContact, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import Checked, over_batch, program, result
+from ..numerics import Checked, concrete, over_batch, program, real, result
 from .corner import REACH, corner_gap
 from .resolution import Resolution
 
@@ -127,9 +128,11 @@ class Kinematics(Checked):
         return self.path_of_contact.start.dtype
 
 
-@program
 def _phases(first, count: int):
-    return first[(0,) * first.ndim] + jnp.arange(count, dtype=first.dtype) / count
+    known = concrete(first)
+    if known is None:
+        return first[(0,) * first.ndim] + jnp.arange(count, dtype=first.dtype) / count
+    return real(known.ravel()[0] + np.arange(count, dtype=known.dtype) / count)
 
 
 class Contacts(eqx.Module):

@@ -155,8 +155,8 @@ def prepare(
     automatic = resolution.pairs is None
     if automatic:
         resolution = replace(resolution, pairs=_pairs_for(pair, deflection))
-    _check_cover(path_of_contact(pair), resolution)
     mesh = prepare_from(np.zeros(()), pair, compliance, resolution)
+    _check_cover(mesh.path_of_contact, resolution)
     return replace(mesh, automatic=True) if automatic else mesh
 
 
@@ -254,9 +254,10 @@ def _closing(points: Contacts) -> Float[Array, "..."]:
 
 
 def _check_cover(contact: PathOfContact, resolution: Resolution) -> None:
-    start, end = concrete(contact.start / contact.base_pitch), concrete(contact.end / contact.base_pitch)
-    if start is None or end is None:
+    start, end, pitch = map(concrete, (contact.start, contact.end, contact.base_pitch))
+    if start is None or end is None or pitch is None:
         return
+    start, end = start / pitch, end / pitch
     behind, ahead = resolution.reach
     if (end > ahead).any() or (-start > behind).any():
         needed = max(2 * int(float(end.max()) // 1) + 1, 2 * int(float(-start.min()) // 1) + 2)

@@ -12,6 +12,11 @@ Load = Float[Array, "pairs slices positions"]
 
 
 @program
+def pressures(kinematics: Kinematics, line_load: Load) -> tuple[Load, Load]:
+    """`flank_pressure` and `corner_pressure`."""
+    return flank_pressure(kinematics, line_load), corner_pressure(kinematics, line_load)
+
+
 def flank_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     """p = sqrt(q E* / (pi R)) [MPa] with the local radii of both involutes; zero outside the path of contact.
 
@@ -23,7 +28,6 @@ def flank_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     return jnp.where(inside[:, None], _hertz(kinematics, line_load, reduced), 0.0)
 
 
-@program
 def corner_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     """Pressure of the rounded tip edge on the mate's involute [MPa]; zero on the path of contact.
 

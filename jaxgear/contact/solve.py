@@ -6,13 +6,18 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..compliance import AbstractCompliance
+from ..geometry import GearPair
 from ..microgeometry import AbstractModification, NoModification, terms
-from ..numerics import ContactProblem, concrete, minimum, program, safe_sqrt, solve_contact, tangent_stiffness
+from ..numerics import ContactProblem, concrete, minimum, program, real, safe_sqrt, solve_contact, tangent_stiffness
+from ..numerics.programs import begin
 from .cycle import MeshCycle
-from .mesh import Mesh, prepare
+from .mesh import Mesh, prepare, prepare_from
 from .operation import Operation, operation_of
+from .resolution import Resolution
 
 _MOST_PAIRS = 12
 
@@ -119,6 +124,9 @@ def removed_material(
     check_mesh("removed_material", mesh)
     torque = operation_of("removed_material", torque, mesh.slice_width.dtype).torque
     pinion, wheel = flanks_of("removed_material", mesh, pinion, wheel)
+    if isinstance(pinion, NoModification) and isinstance(wheel, NoModification):
+        sizes = mesh.resolution
+        return real(np.zeros((sizes.chosen_pairs, sizes.slices, sizes.positions), torque.dtype))
     return _removed(mesh, torque, pinion, wheel)
 
 
@@ -135,6 +143,20 @@ def _removed(mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: Ab
         for term in terms(_in_precision(modification, dtype)):
             total = total + sum(weight * term(point) for weight, point in zip(weights, points)) / sum(weights)
     return total
+
+
+def begin_contact(pair: GearPair, compliance: AbstractCompliance, first: Resolution, resolution: Resolution) -> None:
+    """Starts to compile what prepares a pair and solves its contact, where programs are kept; gives nothing.
+
+    Who knows that this will be needed, and has something else to do until then, calls it. What prepares the pair at the
+    array sizes that are needed `first` goes ahead.
+    """
+    begin(prepare_from, np.zeros(()), pair, compliance, first)
+    mesh = begin(prepare_from, np.zeros(()), pair, compliance, resolution)
+    if mesh is not None:
+        dtype = mesh.slice_width.dtype
+        shape = resolution.chosen_pairs, resolution.slices, resolution.positions
+        begin(_solve_removed, mesh, np.zeros((), dtype), jax.ShapeDtypeStruct(shape, dtype))
 
 
 def check_mesh(owner: str, mesh: Any) -> None:

@@ -3,11 +3,13 @@
 One rule for each margin decides both: `Margins.held`. Concrete pairs are refused by it, traced ones flagged.
 """
 
+from collections.abc import Mapping
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ..numerics import Checked, program, result, safe_sqrt
+from ..numerics import Checked, result, safe_sqrt
 from .gear import Gear, shape_faults
 from .involute import diameter, involute
 from .outline import Outline, outline
@@ -135,8 +137,10 @@ def _form_accuracy(outline: Outline) -> Scalar:
     return form - safe_sqrt(lower**2 - base**2)
 
 
-def faults_between(pinion: Gear, wheel: Gear, center_distance: Scalar | None, margins: Margins) -> tuple[str, ...]:
-    """The margins that do not hold, in words; all numbers concrete."""
+def faults_between(
+    pinion: Gear, wheel: Gear, center_distance: Scalar | None, margins: Margins, held: Mapping[str, Bool[Array, ""]]
+) -> tuple[str, ...]:
+    """The margins that do not hold, in words; all numbers concrete. `held` are those of the margins."""
     faults = [
         f"{side}: {fault}" for side, gear in (("pinion", pinion), ("wheel", wheel)) for fault in shape_faults(gear)
     ]
@@ -146,7 +150,7 @@ def faults_between(pinion: Gear, wheel: Gear, center_distance: Scalar | None, ma
         for name, unit in (("module", "mm"), ("pressure_angle", "deg"))
         if float(getattr(wheel, name)) != float(getattr(pinion, name))
     ]
-    missed = {name for name, held in _held(margins).items() if not held}
+    missed = {name for name, holds in held.items() if not holds}
     if "base_circle_clearance" in missed:
         closest = float(pinion.base_radius + wheel.base_radius)
         distance = closest + float(margins.base_circle_clearance)
@@ -168,11 +172,6 @@ def faults_between(pinion: Gear, wheel: Gear, center_distance: Scalar | None, ma
                 "least 0 mm"
             )
     return tuple(faults)
-
-
-@program
-def _held(margins: Margins) -> dict[str, Bool[Array, ""]]:
-    return margins.held
 
 
 def _backlash_fault(pinion: Gear, wheel: Gear, center_distance) -> str:

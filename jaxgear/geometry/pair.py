@@ -2,7 +2,7 @@
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..numerics import Checked, number, program
 from .gear import Gear
@@ -95,7 +95,7 @@ def explain(pair: GearPair) -> tuple[str, ...]:
     Raises:
         ValueError: while being traced, or for many pairs at once.
     """
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(pair)):
+    if _traced(pair):
         raise ValueError("explain: pair is being traced, must hold concrete numbers; use `margins` inside")
     if pair.pinion.teeth.ndim:
         raise ValueError(f"explain: pair holds pairs of shape {pair.pinion.teeth.shape}, must be one")
@@ -103,7 +103,19 @@ def explain(pair: GearPair) -> tuple[str, ...]:
 
 
 def _faults(pair: GearPair) -> tuple[str, ...]:
-    known = margins(pair)
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((pair, known))):
+    if _traced(pair):
         return ()
-    return faults_between(pair.pinion, pair.wheel, pair.center_distance, known)
+    known, held = _held(pair)
+    if _traced(known):  # within a trace of something else
+        return ()
+    return faults_between(pair.pinion, pair.wheel, pair.center_distance, known, held)
+
+
+def _traced(tree) -> bool:
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(tree))
+
+
+@program
+def _held(pair: GearPair) -> tuple[Margins, dict[str, Bool[Array, ""]]]:
+    known = margins(pair)
+    return known, known.held

@@ -6,11 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Float
 
 from ..compliance import Compliance, legacy_compliance
-from ..contact import Mesh, Operation, Resolution, fewest_pairs, prepare
+from ..contact import Mesh, Operation, Resolution, begin_contact, fewest_pairs, prepare
 from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
+from ..numerics import program
 from ..sizing import iso_stiffness
 from . import schema, schema_sweep, template
 from .errors import DesignFileError, naming, refuse_given, refused
@@ -127,8 +130,7 @@ class DesignFile:
         if self._resolution.pairs is not None:
             return self._resolution
         torque = max(self.torque, self.torque_range[1]) if torque is None else torque
-        line_load = 1e3 * torque / float(self._middle.pinion.base_radius * self._middle.face_width)
-        deflection = _DEFLECTIONS * line_load / float(iso_stiffness(self._middle, line_load).single)
+        deflection = _DEFLECTIONS * float(_single_deflection(self._middle, np.asarray(torque)))
         try:
             pairs = fewest_pairs(self._middle, deflection=deflection)
         except ValueError:
@@ -152,6 +154,10 @@ class DesignFile:
         with naming(self.path):
             return refused("resolution", prepare, self._middle, **options)
 
+    def begin_contact(self, first: Resolution, resolution: Resolution) -> None:
+        """Starts to compile what prepares and solves the mesh, see `contact.begin_contact`."""
+        begin_contact(self._middle, self._compliance, first, resolution)
+
     def sweep_mesh(self, resolution: Resolution) -> Mesh | Callable[[Mapping[str, Any]], Mesh]:
         """The prepared mesh; a function of the parameters that prepares it where numbers of the gears are free."""
         if not self._pair.free() and not self._model.free():
@@ -165,6 +171,13 @@ class DesignFile:
             parameters: value of every free parameter.
         """
         return self._load.build(parameters)
+
+
+@program
+def _single_deflection(pair: GearPair, torque) -> Float[Array, ""]:
+    """Deflection of one pair of teeth that carries the torque [N m] alone, after ISO 6336-1 [um]."""
+    line_load = 1e3 * torque / (pair.pinion.base_radius * pair.face_width)
+    return line_load / iso_stiffness(pair, line_load).single
 
 
 def load_design(path: str | Path) -> DesignFile:

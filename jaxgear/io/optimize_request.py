@@ -20,6 +20,7 @@ from ..optimize import (
     pareto,
 )
 from ..optimize.projection import CURVES
+from ..optimize.refine import POSITIONS
 from . import schema
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
@@ -65,6 +66,11 @@ class OptimizeRequest:
     curve: str | None
     _design: DesignFile
     _common: dict[str, Any]  # what its function takes besides design, mesh and callback
+
+    @property
+    def finer(self) -> int | None:
+        """Positions of the finer mesh on which it ends; None where it stays on its mesh or chooses later."""
+        return self._common.get("positions", POSITIONS) if self.method in METHODS else None
 
     def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum | Front:
         """Runs it on a prepared mesh."""

@@ -9,21 +9,18 @@ from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from ..contact import Mesh
-from ..geometry import diameter, roll_angle
-from ..metrics import removed_at
+from ..metrics import flank_surface
 from ..microgeometry import AbstractModification, NoModification, Sum
-from ..numerics import fields_of, program
+from ..numerics import fields_of
 from ..optimize import Front
 from .layout import family, snake
 
 Designs = Mapping[str, tuple[AbstractModification, AbstractModification]]
 
-_PROFILE_POINTS = 101
-_FACE_POINTS = 11  # over the face width, where the modification varies along it
+_STEP = 2  # every so many of the points of a flank are written
 _COLUMNS = (
     "design",
     "gear",
@@ -55,12 +52,14 @@ def flank_rows(mesh: Mesh, designs: Designs) -> Iterator[tuple[str, str, float, 
 
     Rows are in the middle of the face, and on further lines across it where the modification varies along the face.
     """
-    for design, (pinion, wheel) in designs.items():
-        profiles = jax.tree.map(np.asarray, _profiles(mesh, pinion, wheel))
-        for gear, (*columns, face, removed) in zip(("pinion", "wheel"), profiles):
+    for design, flanks in designs.items():
+        for gear, side, modification in zip(("pinion", "wheel"), mesh.sides, flanks):
+            surface = jax.tree.map(np.asarray, flank_surface(side, modification))
+            face, removed = surface.face_coordinate, surface.removed[:, ::_STEP]
+            along = [of[::_STEP] for of in (surface.roll_angle, surface.roll_length, surface.diameter)]
             lines = range(len(face)) if np.ptp(removed, axis=0).any() else [len(face) // 2]
             for line in lines:
-                for angle, length, size, amount in zip(*columns, removed[line]):
+                for angle, length, size, amount in zip(*along, removed[line]):
                     yield design, gear, float(face[line]), float(angle), float(length), float(size), float(amount)
 
 
@@ -86,18 +85,6 @@ def write_front(path: Path, front: Front) -> None:
 def write_summary(path: Path, data: Mapping[str, Any]) -> None:
     """Writes plain data, arrays and scalars as JSON; numbers that are not finite become null."""
     path.write_text(json.dumps(_jsonable(data), indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
-
-
-@program
-def _profiles(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification):
-    """Per gear: roll angle, roll length, diameter, face coordinate and the material removed."""
-    face = jnp.linspace(-0.5, 0.5, _FACE_POINTS) * mesh.pair.face_width
-    profiles = []
-    for side, modification in zip(mesh.sides, (pinion, wheel)):
-        rho = jnp.linspace(side.start_roll_length, side.tip_roll_length, _PROFILE_POINTS)
-        removed = removed_at(side, modification, rho, face)
-        profiles.append((roll_angle(side.gear, rho), rho, diameter(side.gear, rho), face, removed))
-    return profiles
 
 
 def _plain(part: eqx.Module) -> dict[str, Any]:

@@ -5,11 +5,14 @@ gears (None for the nominal involute). They look at the active profile, from its
 face width. They need no solution of the contact, are differentiable, compiled, and work under `vmap`.
 """
 
+from typing import NamedTuple
+
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import Kinematics, Mesh, Side
+from ..geometry import diameter, roll_angle
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import gauss_legendre, maximum, program
 
@@ -17,9 +20,37 @@ Scalar = Float[Array, ""]
 Profile = Float[Array, " points"]
 
 _PROFILE_POINTS = 257  # of a search for extremes
+_SHOWN_POINTS, _SHOWN_LINES = 201, 11  # of a flank as charts and tables have it; odd, as above
 _FACE_POINTS = 33  # odd: the middle of the face is one of them
 # of the volume: nodes are dense enough that kinks, as at the start of a relief, cost less than 1e-3 of it
 _PROFILE_CELLS, _FACE_CELLS, _NODES = 64, 16, 4
+
+
+class FlankSurface(NamedTuple):
+    """One gear's active flank, from the start of its active profile to the tip and across the common face width.
+
+    Attributes:
+        roll_length: [mm], shape (points,).
+        roll_angle: [deg], shape (points,).
+        diameter: [mm], shape (points,).
+        face_coordinate: from the middle of the face [mm], shape (lines,).
+        removed: material that the modification removes [um], shape (lines, points).
+    """
+
+    roll_length: Profile
+    roll_angle: Profile
+    diameter: Profile
+    face_coordinate: Float[Array, " lines"]
+    removed: Float[Array, "lines points"]
+
+
+@program
+def flank_surface(side: Side, modification: AbstractModification) -> FlankSurface:
+    """The active flank of one gear with its modification: what charts, tables and doubts show."""
+    roll = _roll_lengths(side, _SHOWN_POINTS)
+    face = jnp.linspace(-0.5, 0.5, _SHOWN_LINES, dtype=roll.dtype) * side.face_width
+    removed = removed_at(side, modification, roll, face)
+    return FlankSurface(roll, roll_angle(side.gear, roll), diameter(side.gear, roll), face, removed)
 
 
 @program

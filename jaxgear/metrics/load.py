@@ -1,5 +1,7 @@
 """How the pairs share the load and over which part of the path they carry it."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -26,12 +28,12 @@ class ContactShock(Checked):
 @over_batch
 def load_sharing(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
     """Share of every pair in the total force; the shares of a position sum to 1, or are 0 at zero torque."""
-    return _shares(cycle.pair_force, cycle.force)
+    return _shares(replace(cycle, pinion=None, wheel=None))
 
 
 @program
-def _shares(pair_force, force):
-    return safe_divide(pair_force, force)
+def _shares(cycle: MeshCycle):
+    return safe_divide(cycle.pair_force, cycle.force)
 
 
 @over_batch

@@ -11,14 +11,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact import MeshCycle, Side
+from ..contact import MeshCycle
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import program
-from .flank import removed_at
+from .flank import flank_surface
 from .load import effective_contact_ratio
 from .root_stress import root_stress
-
-_PROFILE_POINTS, _FACE_POINTS = 101, 3
 
 
 class Limit(NamedTuple):
@@ -150,26 +148,19 @@ def _of_flanks(sides, flanks) -> Iterator[Doubt]:
     for where, side, modification in zip(("pinion", "wheel"), sides, flanks):
         if isinstance(modification, NoModification):
             continue
-        depth = float(_depth(side, modification))
+        surface = flank_surface(side, modification)
+        depth = float(np.abs(surface.removed).max())
         if depth > 0:
             yield _doubt("depth of the modification", where, depth)
         yield _doubt("depth of the modification in modules", where, depth / 1e3 / float(side.gear.module))
-        for length, longest in _lengths(modification, side):
+        start, *_, tip = np.asarray(surface.roll_length)
+        for length, longest in _lengths(modification, tip - start, 0.5 * float(side.face_width)):
             yield _doubt("length of the modification", where, length, high=longest)
 
 
-@program
-def _depth(side: Side, modification: AbstractModification):
-    roll = jnp.linspace(side.start_roll_length, side.tip_roll_length, _PROFILE_POINTS)
-    face = jnp.linspace(-0.5, 0.5, _FACE_POINTS, dtype=roll.dtype) * side.face_width
-    return jnp.max(jnp.abs(removed_at(side, modification, roll, face)))
-
-
-def _lengths(modification: AbstractModification, side: Side) -> Iterator[tuple[float, float]]:
+def _lengths(modification: AbstractModification, profile: float, half_face: float) -> Iterator[tuple[float, float]]:
     """Lengths of all terms, and the longest that the flank has in their direction."""
     terms = jax.tree.leaves(modification, is_leaf=lambda part: hasattr(part, "length"))
     for term in terms:
         if hasattr(term, "length"):
-            along_face = getattr(term, "varies_along_face", False)
-            tip, start, width = map(float, (side.tip_roll_length, side.start_roll_length, side.face_width))
-            yield float(term.length), 0.5 * width if along_face else tip - start
+            yield float(term.length), half_face if getattr(term, "varies_along_face", False) else profile

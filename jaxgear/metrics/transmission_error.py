@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, result, spread
+from ..numerics import Checked, program, result, spread
 from ..numerics.reductions import Range
 
 Curve = Float[Array, "... positions"]
@@ -21,6 +21,7 @@ class Harmonics(Checked):
     phase: Float[Array, "... harmonics"] = result("deg")
 
 
+@program
 def peak_to_peak(curve: Curve) -> Float[Array, "..."]:
     """Largest minus smallest value over the positions (PPTE for a transmission error, in um).
 

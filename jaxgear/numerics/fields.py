@@ -114,8 +114,12 @@ def real(value) -> Float[Array, "..."]:
     """
     if any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value)):
         return _inexact(value)
+    given = np.asarray(value)
     with jax.ensure_compile_time_eval():
-        return _inexact(value)
+        if given.dtype.kind not in "biuf":
+            return _inexact(value)
+        # neither NumPy's conversion nor the transfer compiles anything
+        return jax.device_put(given if given.dtype.kind == "f" else given.astype(jnp.result_type(float)))
 
 
 def _inexact(value) -> Float[Array, "..."]:

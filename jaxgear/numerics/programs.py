@@ -5,7 +5,6 @@ the last of the three. A `Store` keeps what comes out at the end by what it was 
 """
 
 import functools
-import inspect
 import io
 import pickle
 import types
@@ -43,10 +42,11 @@ class _Shape(NamedTuple):
     shape: tuple[int, ...]
     dtype: str
     weak: bool = False
+    shared: jax.sharding.Sharding | None = None  # among several devices
 
     @property
     def struct(self) -> jax.ShapeDtypeStruct:
-        return jax.ShapeDtypeStruct(self.shape, self.dtype, weak_type=self.weak)
+        return jax.ShapeDtypeStruct(self.shape, self.dtype, weak_type=self.weak, sharding=self.shared)
 
 
 class _Program(NamedTuple):
@@ -81,7 +81,7 @@ class Store:
         """The program of a function for some arguments, and the arrays among them; None where JAX traces them."""
         leaves, tree = jax.tree.flatten(arguments)
         traced = any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
-        if traced or get_opaque_trace_state() != self._untraced:
+        if traced or get_opaque_trace_state() != self._untraced or jax.process_count() > 1:
             return None
         fixed = [_shape_of(leaf) or leaf for leaf in leaves]
         key = function, tree, tuple((type(leaf), leaf) for leaf in fixed)
@@ -99,7 +99,7 @@ class Store:
         if kept is not None:
             _register()
             result, code = pickle.loads(kept)
-            return _Program(self._pool.submit(_loaded, code), result)
+            return _Program(self._pool.submit(_loaded, code, _devices(arguments)), result)
         lowered, result = _lowered(function, arguments)
 
         def compiled() -> _Run:
@@ -142,7 +142,7 @@ def begin(function: Callable, *args, **options) -> Any:
     Returns:
         what it will return, with a `jax.ShapeDtypeStruct` in place of every array; None where there is no store.
     """
-    found = None if _store is None else _store.program(inspect.unwrap(function), (args, options))
+    found = None if _store is None else _store.program(function.__wrapped__, (args, options))  # type: ignore[attr-defined]
     if found is None:
         return None
     result = found[0].result
@@ -151,6 +151,8 @@ def begin(function: Callable, *args, **options) -> Any:
 
 def _shape_of(leaf) -> _Shape | None:
     """What stands for an array; None for everything else."""
+    if isinstance(leaf, jax.Array) and not isinstance(leaf, jax.core.Tracer) and len(leaf.devices()) > 1:
+        return _Shape(leaf.shape, str(leaf.dtype), leaf.weak_type, leaf.sharding)
     if isinstance(leaf, jax.Array | np.ndarray | np.generic | jax.ShapeDtypeStruct):
         return _Shape(leaf.shape, str(leaf.dtype), getattr(leaf, "weak_type", False))
     return None
@@ -196,14 +198,24 @@ def _register() -> None:
     jax.jit(jax.lax.linalg.lu).lower(jax.ShapeDtypeStruct((1, 1), "float32"))
 
 
-def _loaded(code: tuple) -> _Run:
-    return deserialize_and_load(*code, execution_devices=jax.devices()[:1])
+def _devices(arguments: Any) -> list[jax.Device]:
+    """On which a program for such arguments runs."""
+    shapes = filter(_is_shape, jax.tree.leaves(arguments, is_leaf=_is_shape))
+    shared = {shape.shared for shape in shapes} - {None}
+    return jax.local_devices() if shared else jax.local_devices()[:1]
+
+
+def _loaded(code: tuple[bytes, Any, Any], devices: list[jax.Device]) -> _Run:
+    program, given, found = code
+    return deserialize_and_load(program, given, found, execution_devices=devices)
 
 
 class _Recipe(pickle.Pickler):
     """Writes what a program is made of, to be compared: functions by their names and what they enclose."""
 
     def persistent_id(self, obj):
+        if isinstance(obj, jax.sharding.Sharding | jax.sharding.Mesh):
+            return "devices", repr(obj)
         if not isinstance(obj, type | types.FunctionType):
             return None
         if obj.__module__.partition(".")[0] not in _KNOWN:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..conditions import (
@@ -116,12 +117,15 @@ class Problem(eqx.Module):
         limits = sum(limit.quantity is not None for limit in self.constraints)
         return GRADIENT_COST + _FURTHER_GRADIENT * (len(self.objectives) - 1 + limits)
 
-    def parameters(self, x: Vector) -> dict[str, Scalar]:
+    def parameters(self, x: Vector | np.ndarray) -> dict[str, Scalar]:
         """Parameters at a point of the unit box."""
-        values = self.low + x * (self.high - self.low)
-        return dict(zip(self.names, values))
+        low: Array | np.ndarray = self.low
+        high: Array | np.ndarray = self.high
+        if isinstance(x, np.ndarray) and not isinstance(low, jax.core.Tracer):  # on the host, where nothing compiles
+            low, high = np.asarray(low), np.asarray(high)
+        return dict(zip(self.names, low + x * (high - low)))
 
-    def modifications(self, x: Vector) -> tuple[AbstractModification, AbstractModification]:
+    def modifications(self, x: Vector | np.ndarray) -> tuple[AbstractModification, AbstractModification]:
         """Modifications at a point of the unit box.
 
         Raises:
@@ -278,7 +282,7 @@ def make_problem(
                 raise ValueError(f'{owner}: "{name}" of a constraint must be one of {", ".join(names)}')
     judged = conditions(owner, mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
     objectives = tuple(quantity_of(of, owner) for of in several)
-    low, high = (jnp.stack([real(limit).astype(mesh.slice_width.dtype) for limit in side]) for side in limits)
+    low, high = (real(np.asarray(side, np.dtype(mesh.slice_width.dtype))) for side in limits)
     posed = Problem(
         design=design,
         names=names,
@@ -292,5 +296,5 @@ def make_problem(
         constraints=tuple(constraints),
     )
     made = Variants(names, design, mesh, None, judged, posed.cases)
-    check_used("minimize", names, made.traced(posed.low)[1])
+    check_used("minimize", names, made.traced(np.asarray(posed.low))[1])
     return posed

@@ -2,13 +2,13 @@
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
 
 from ..conditions import in_words, solve_case, solved
 from ..contact import Operation
-from ..metrics import peak_to_peak
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from .goal import FEASIBLE, Constraint
@@ -17,7 +17,6 @@ from .linearizer import Linearizer
 from .problem import Problem
 from .result import PENALIZED, Limit, Optimum
 from .search import Record
-from .starts import real_points
 
 _AT_BOUND = 1e-6  # a parameter this close to a bound, relative to its range, is at the bound
 PROBE = 1e-3  # step over which the decrease that is left is measured, relative to the ranges
@@ -36,9 +35,9 @@ def optimum_of(
         left: decrease that is left, where it is known.
     """
     problem = record.problem
-    x = real_points(problem, record.point)
+    x = np.asarray(record.point, np.dtype(problem.low.dtype))
     parameters, (pinion, wheel) = problem.parameters(x), problem.modifications(x)
-    heaviest = np.asarray(problem.cases.torque)[int(np.argmax(problem.cases.weight))]
+    heaviest = np.asarray(problem.cases.torque)[np.asarray(problem.cases.weight).argmax()]
     cycle = solve_case(problem.mesh, heaviest, pinion, wheel)
     left = _decrease_left(record) if left is None else left  # before the analyses are counted
     several = len(problem.objectives) > 1
@@ -52,7 +51,7 @@ def optimum_of(
         wheel=wheel,
         mesh=problem.mesh,
         cycle=cycle,
-        ppte=float(peak_to_peak(cycle.transmission_error)),
+        ppte=float(np.ptp(np.asarray(cycle.transmission_error))),
         objective=sign * record.value,
         positions=problem.mesh.resolution.positions,
         grid_change=grid_change,
@@ -98,6 +97,8 @@ def judged(
     if cases.count == 1 and cases.removed is None:  # the program that solves the one case serves every modification
         speed = None if cases.speed is None else np.asarray(cases.speed)[0]
         cycle = solve_case(problem.mesh, Operation(np.asarray(cases.torque)[0], speed, cases.friction), pinion, wheel)
+        if all(of.local for of in problem.objectives):  # they know nothing of the flanks but what is removed
+            cycle = replace(cycle, pinion=None, wheel=None)
         values = np.asarray(_of_one(problem.objectives, cycle))
     else:
         values = np.asarray(_score_of(problem, pinion, wheel).value)

@@ -3,18 +3,16 @@
 from collections.abc import Mapping
 from typing import Any
 
-import jax.numpy as jnp
+import jax
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from ..contact import Mesh, Side
-from ..geometry import roll_angle
-from ..microgeometry import AbstractModification
-from ..numerics import program
+from ..metrics import flank_surface
+from ..microgeometry import AbstractModification, NoModification
 from .flank_panels import Design, flank_panels
 
-_POINTS = 201  # over the active profile
 _ABOVE_DIAMETERS = 34.0  # [pt]; clears numbers and label of the upper axis
 
 
@@ -37,20 +35,14 @@ def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray:
 
 def _profile(side: Side, modification: AbstractModification) -> tuple[np.ndarray, np.ndarray]:
     """The active profile in the middle of the face."""
-    angle, removed = _over_profile(side, modification)
-    return np.asarray(angle), np.asarray(removed)
-
-
-@program
-def _over_profile(side: Side, modification: AbstractModification):
-    rho = jnp.linspace(side.start_roll_length, side.tip_roll_length, _POINTS)
-    removed = modification(side.flank(rho, jnp.zeros_like(side.face_width)))
-    return roll_angle(side.gear, rho), jnp.broadcast_to(removed, rho.shape)
+    surface = flank_surface(side, modification)
+    return np.asarray(surface.roll_angle), np.asarray(surface.removed)[len(surface.removed) // 2]
 
 
 def _over_roll_angle(panel: Axes, side: Side, title: str) -> None:
     panel.set_xlabel(f"roll angle of the {title} [deg]")
-    base = 2 * float(side.base_radius)
+    surface = jax.tree.map(np.asarray, flank_surface(side, NoModification()))
+    base = float(surface.diameter[-1] / np.hypot(1, np.deg2rad(surface.roll_angle[-1])))
 
     def to_diameter(angle):
         return base * np.hypot(1, np.deg2rad(angle))

@@ -23,8 +23,8 @@ def pressure(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
     any_corner = False
     with report_axes(ax) as ax:
         for index, (name, cycle) in enumerate(cycles.items()):
-            path, flank = pair_history(cycle, np.max(cycle.contact_pressure, axis=1))
-            _, corner = pair_history(cycle, np.max(cycle.corner_pressure, axis=1))
+            path, flank = pair_history(cycle, np.asarray(cycle.contact_pressure).max(axis=1))
+            _, corner = pair_history(cycle, np.asarray(cycle.corner_pressure).max(axis=1))
             contact = cycle.kinematics.path_of_contact
             outside = (path < float(contact.start)) | (path > float(contact.end))
             highest = corner.max()

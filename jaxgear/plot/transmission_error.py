@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 
+import numpy as np
 from matplotlib.axes import Axes
 
 from ..contact import MeshCycle
-from ..metrics import peak_to_peak
 from .figure import legend_above, line_style, report_axes
 from .history import PHASE_LABEL, two_pitches
 
@@ -19,7 +19,7 @@ def transmission_error(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) 
     """
     with report_axes(ax) as ax:
         for index, (name, cycle) in enumerate(cycles.items()):
-            ppte = float(peak_to_peak(cycle.transmission_error))
+            ppte = np.ptp(np.asarray(cycle.transmission_error))
             curve = two_pitches(cycle.phase, cycle.transmission_error)
             ax.plot(*curve, label=f"{name} (PPTE {ppte:.2f} µm)", **line_style(index))
         ax.set(xlim=(0, 2), xlabel=PHASE_LABEL, ylabel="transmission error [µm]")

@@ -13,7 +13,7 @@ from jax.sharding import Mesh as DeviceMesh
 from ..conditions import Variants, joined, solve_case, solved
 from ..conditions.batches import divided, everywhere, local_devices, over_devices, padded, side_by_side
 from ..metrics import Quantity
-from ..numerics import AbstractMeasure
+from ..numerics import AbstractMeasure, program
 from .columns import CONVERGED, result_columns
 
 # A loop of one step is unrolled by the compiler and rounds differently: with two or more, the rows do not depend on how
@@ -21,7 +21,7 @@ from .columns import CONVERGED, result_columns
 _LEAST_STEPS = 2
 
 
-class _Program(NamedTuple):
+class _Task(NamedTuple):
     """What is compiled for: everything that is neither an array nor its shape."""
 
     rest: Variants
@@ -67,10 +67,10 @@ class Evaluator:
         steps = max(-(-rows // (batch * self._devices.size)), _LEAST_STEPS)
         self.capacity = steps * batch * self._devices.size
         arrays, rest = eqx.partition((variants, tuple(measures)), eqx.is_array)
-        self._program = _Program(rest, tuple(results), batch, self._devices)
+        self._task = _Task(rest, tuple(results), batch, self._devices)
         self._data = everywhere(arrays, self._devices)
         self._dtype = np.dtype(mesh.slice_width.dtype)
-        jax.eval_shape(partial(_numbers, self._program, self._data), example.astype(self._dtype))
+        jax.eval_shape(partial(_numbers, self._task, self._data), example.astype(self._dtype))
 
     def __call__(self, rows: np.ndarray) -> Callable[[], dict[str, np.ndarray]]:
         """Starts the evaluation of at most `capacity` rows; the devices go on while the host does something else.
@@ -79,7 +79,7 @@ class Evaluator:
             what waits for the result columns and the flag; the numbers of failed variants are NaN.
         """
         placed = divided(padded(rows.astype(self._dtype), self.capacity), self._devices)
-        values, converged = _evaluate(self._program, placed, self._data)
+        values, converged = _evaluate(self._task, placed, self._data)
 
         def finished() -> dict[str, np.ndarray]:
             count = len(rows)
@@ -93,24 +93,24 @@ class Evaluator:
         return finished
 
 
-@partial(jax.jit, static_argnums=0)
-def _evaluate(program: _Program, rows, data):
-    return over_devices(partial(_numbers, program), rows, data, batch=program.batch, devices=program.devices)
+@program
+def _evaluate(task: _Task, rows, data):
+    return over_devices(partial(_numbers, task), rows, data, batch=task.batch, devices=task.devices)
 
 
-def _numbers(program: _Program, data, values):
+def _numbers(task: _Task, data, values):
     """Numbers of one variant in the order of the result columns, and whether all of it converged."""
-    variants, measures = eqx.combine(data, program.rest)
+    variants, measures = eqx.combine(data, task.rest)
     variant = variants(values)
 
     def of_case(operation, deviation):
         cycle = solve_case(variant.mesh, operation, variant.pinion, variant.wheel, deviation)
-        numbers = jnp.stack([of(cycle) for of in program.results])
+        numbers = jnp.stack([of(cycle) for of in task.results])
         return numbers, solved(cycle) & jnp.all(jnp.isfinite(numbers))
 
     numbers, fine = variant.cases.each(of_case)
     flat = []
-    for of, of_cases in zip(program.results, numbers.T):
+    for of, of_cases in zip(task.results, numbers.T):
         flat += _joined(of_cases, variant.cases, measures, of.better)
     return flat, jnp.all(fine) & variant.possible
 

@@ -1,0 +1,216 @@
+"""Programs that are kept: found again by what they are made of, never mistaken for another, never an obstacle."""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import TWO_PAIRS, gear_pair
+
+import jaxgear as jg
+from jaxgear.cli import cache
+from jaxgear.contact import begin_contact
+from jaxgear.numerics import programs
+from jaxgear.numerics.programs import Store, begin, keep, program
+
+
+class Shelf(dict):
+    """Keeps programs in memory."""
+
+    read = dict.get
+    write = dict.__setitem__
+
+
+@pytest.fixture
+def shelf():
+    """A shelf that this process uses."""
+    found = Shelf()
+    keep(Store(found))
+    yield found
+    keep(None)
+
+
+@pytest.fixture
+def traced(monkeypatch):
+    """Names of the functions that were traced for a store."""
+    names, lowered = [], programs._lowered
+
+    def counted(function, arguments):
+        names.append(function.__name__)
+        return lowered(function, arguments)
+
+    monkeypatch.setattr(programs, "_lowered", counted)
+    return names
+
+
+@program
+def scaled(values, how: str, factor=1.0):
+    """A function with an array, a name, a number that is no array, and a result of arrays and other things."""
+    return {"values": values * (2.0 if how == "twice" else 3.0) * factor, "how": how, "none": None}
+
+
+def test_gives_what_the_function_gives(shelf):
+    for values in (jnp.arange(3.0), np.arange(3.0), jnp.arange(3.0, dtype=jnp.float32)):
+        found = scaled(values, "twice")
+        assert found["how"] == "twice" and found["none"] is None
+        assert found["values"].dtype == values.dtype
+        np.testing.assert_array_equal(found["values"], 2.0 * np.asarray(values))
+
+
+def test_tells_apart_what_differs_in_anything_but_numbers(shelf, traced):
+    for _ in range(2):
+        scaled(jnp.ones(3), "twice")
+        scaled(jnp.zeros(3), "twice")  # other numbers
+        assert scaled(jnp.ones(3), "thrice")["values"][0] == 3.0
+        assert scaled(jnp.ones(3), "twice", 2)["values"][0] == scaled(jnp.ones(3), "twice", 2.0)["values"][0] == 4.0
+        scaled(jnp.ones((3, 1)), "twice")
+    assert traced == ["scaled"] * 5  # 2 and 2.0 are equal, but not the same
+
+
+def test_leaves_transformations_to_jax(shelf, traced):
+    def twice(x):
+        return scaled(x, "twice")["values"]
+
+    x = jnp.arange(3.0)
+    np.testing.assert_array_equal(jax.jit(twice)(x), 2 * x)
+    np.testing.assert_array_equal(jax.vmap(twice)(x), 2 * x)
+    np.testing.assert_array_equal(jax.jacfwd(twice)(x), 2 * np.eye(3))
+    # known numbers within a trace of something else
+    np.testing.assert_array_equal(jax.jit(lambda y: y + twice(jnp.ones(3)))(x), x + 2)
+    assert traced == []
+
+
+def test_without_a_store_nothing_is_begun():
+    assert begin(scaled, jnp.ones(3), "twice") is None
+
+
+def test_what_is_begun_is_what_is_called(shelf, traced):
+    shapes = begin(scaled, jax.ShapeDtypeStruct((3,), "float64"), "twice")
+    assert shapes["values"].shape == (3,) and shapes["how"] == "twice"
+    np.testing.assert_array_equal(scaled(jnp.ones(3), "twice")["values"], 2 * np.ones(3))
+    assert traced == ["scaled"]
+
+
+def test_errors_are_those_of_the_function(shelf):
+    @program
+    def refuse(x):
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="^no"):
+        refuse(jnp.ones(2))
+
+
+def test_a_contact_that_was_begun_compiles_nothing_more(shelf, traced):
+    pair, compliance = gear_pair(), jg.default_compliance()
+    begin_contact(pair, compliance, TWO_PAIRS, TWO_PAIRS)
+    before = [name for name in traced if name in ("prepare_from", "_solve_removed")]
+    jg.solve(jg.prepare(pair, compliance=compliance, resolution=TWO_PAIRS), 50.0)
+    assert [name for name in traced if name in before] == before == ["prepare_from", "_solve_removed"]
+
+
+def test_a_function_that_can_change_without_a_word_is_not_kept(shelf):
+    scaled(jnp.ones(3), "twice")
+    assert not shelf
+
+
+def test_files_are_whole_or_not_there(tmp_path):
+    files = cache._Files(tmp_path)
+    assert files.read(b"recipe") is None
+    files.write(b"recipe", b"program")
+    (file,) = tmp_path.iterdir()
+    assert files.read(b"recipe") == b"program" and files.read(b"another") is None
+    whole = file.read_bytes()
+    for damaged in (b"", whole[:-1], b"x" + whole[1:]):
+        file.write_bytes(damaged)
+        assert files.read(b"recipe") is None
+    files = cache._Files(tmp_path / "missing")
+    files.write(b"recipe", b"program")  # an obstacle is none
+    assert files.read(b"recipe") is None
+
+
+def test_many_write_at_once(tmp_path):
+    files, programs_ = cache._Files(tmp_path), [bytes([i]) * 100_000 for i in range(8)]
+    seen = set()
+
+    def work(mine):
+        for _ in range(20):
+            files.write(b"recipe", mine)
+            seen.add(files.read(b"recipe"))
+
+    threads = [threading.Thread(target=work, args=(mine,)) for mine in programs_]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert seen <= set(programs_) and len(list(tmp_path.iterdir())) == 1
+
+
+def test_the_oldest_are_forgotten(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "_MOST", 250)
+    for age, name in enumerate("abcd"):
+        (tmp_path / name).write_bytes(bytes(100))
+        os.utime(tmp_path / name, (0, time.time() - age))
+    cache._forget_the_oldest(tmp_path)
+    assert {file.name for file in tmp_path.iterdir()} == {"a", "b"}
+
+
+def test_programs_are_those_of_their_surroundings(tmp_path, monkeypatch):
+    cache._Files(tmp_path).write(b"recipe", b"program")
+    monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_enable_fast_math=true")
+    assert cache._Files(tmp_path).read(b"recipe") is None
+
+
+_SECOND = """
+import sys, jax
+compiled = []
+jax.monitoring.register_event_duration_secs_listener(
+    lambda name, seconds, **kw: compiled.append(name) if name.endswith("backend_compile_duration") else None)
+from jaxgear.cli import main
+try:
+    main(["analyze", sys.argv[1], "--output", sys.argv[2], "--no-figures"])
+except SystemExit as end:
+    print("exit", end.code, "compiled", len(compiled))
+"""
+_FILE = """
+[pinion]
+teeth = 19
+module = 3.0
+face_width = 18.0
+[wheel]
+teeth = 48
+module = 3.0
+face_width = 18.0
+[load]
+torque = {torque}
+[resolution]
+positions = 16
+"""
+
+
+def test_a_second_command_with_another_number_compiles_nothing_and_finds_the_same(tmp_path):
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    for name in ("JAX_COMPILATION_CACHE_DIR", "JAXGEAR_NO_CACHE"):
+        environment.pop(name, None)
+
+    def compiled(torque, folder, **more):
+        (tmp_path / "file.toml").write_text(_FILE.format(torque=torque))
+        command = [sys.executable, "-c", _SECOND, str(tmp_path / "file.toml"), str(tmp_path / folder)]
+        done = subprocess.run(command, capture_output=True, text=True, env={**environment, **more}, check=False)
+        assert "exit 0" in done.stdout, done.stdout + done.stderr
+        return int(done.stdout.rsplit(maxsplit=1)[-1])
+
+    assert compiled(50.0, "first") > 5
+    assert compiled(60.0, "second") == 0
+    assert compiled(60.0, "anew", JAXGEAR_NO_CACHE="1") > 5
+    found, anew = (
+        json.loads((tmp_path / folder / "summary.json").read_text())["designs"]["unmodified"]
+        for folder in ("second", "anew")
+    )
+    assert found["ppte_um"] == pytest.approx(anew["ppte_um"], rel=1e-9)
+    assert found["mean_te_um"] == pytest.approx(anew["mean_te_um"], rel=1e-9)
