@@ -152,7 +152,7 @@ def legend_over_panels(figure: Figure, panel: Axes) -> int:
         legend = figure.legend(
             handles, labels, loc="outside upper center", ncols=columns, handlelength=2.6, frameon=False
         )
-        figure.draw_without_rendering()
+        _lay_out(figure)
         if legend.get_window_extent().width <= figure.bbox.width or columns == 1:
             return -(-len(labels) // columns)
         legend.remove()
@@ -167,9 +167,18 @@ def grow(ax: Axes, lines: int) -> None:
 
 def laid_out_size(ax: Axes) -> tuple[float, float]:
     """Width and height that the Axes have when the figure is drawn [pt]."""
-    _root(ax).draw_without_rendering()
+    _lay_out(_root(ax))
     box = ax.get_window_extent()
     return _in_points(ax, box.width), _in_points(ax, box.height)
+
+
+def _lay_out(figure: Figure) -> None:
+    """Finds the places of everything in a figure, which drawing it would do too, and more."""
+    engine = figure.get_layout_engine()
+    if engine is None:  # a figure of the user's
+        figure.draw_without_rendering()
+    else:
+        engine.execute(figure)
 
 
 def _in_points(ax: Axes, pixels: float) -> float:
@@ -229,7 +238,7 @@ def save(fig: Figure, path: str | Path) -> Path:
     path = Path(path)
     picture = BytesIO()
     fig.set_dpi(_DPI)
-    fig.draw_without_rendering()
+    _lay_out(fig)
     fig.set_layout_engine("none")  # everything has its place: it would be looked for again, twice
     contents = fig.get_tightbbox().padded(_MARGIN)
     fig.savefig(picture, format="png", dpi=_DPI, bbox_inches=contents, facecolor="white")
