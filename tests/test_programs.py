@@ -120,7 +120,7 @@ def test_a_function_that_can_change_without_a_word_is_not_kept(shelf):
 
 
 def test_files_are_whole_or_not_there(tmp_path):
-    files = cache._Files(tmp_path)
+    files = cache.Files(tmp_path)
     assert files.read(b"recipe") is None
     files.write(b"recipe", b"program")
     (file,) = tmp_path.iterdir()
@@ -129,13 +129,13 @@ def test_files_are_whole_or_not_there(tmp_path):
     for damaged in (b"", whole[:-1], b"x" + whole[1:]):
         file.write_bytes(damaged)
         assert files.read(b"recipe") is None
-    files = cache._Files(tmp_path / "missing")
+    files = cache.Files(tmp_path / "missing")
     files.write(b"recipe", b"program")  # an obstacle is none
     assert files.read(b"recipe") is None
 
 
 def test_many_write_at_once(tmp_path):
-    files, programs_ = cache._Files(tmp_path), [bytes([i]) * 100_000 for i in range(8)]
+    files, programs_ = cache.Files(tmp_path), [bytes([i]) * 100_000 for i in range(8)]
     seen = set()
 
     def work(mine):
@@ -161,9 +161,9 @@ def test_the_oldest_are_forgotten(tmp_path, monkeypatch):
 
 
 def test_programs_are_those_of_their_surroundings(tmp_path, monkeypatch):
-    cache._Files(tmp_path).write(b"recipe", b"program")
+    cache.Files(tmp_path).write(b"recipe", b"program")
     monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_enable_fast_math=true")
-    assert cache._Files(tmp_path).read(b"recipe") is None
+    assert cache.Files(tmp_path).read(b"recipe") is None
 
 
 _SECOND = """

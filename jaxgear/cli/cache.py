@@ -32,11 +32,11 @@ def enable_cache() -> Path | None:
         _forget_the_oldest(folder)
     except (OSError, RuntimeError):  # RuntimeError: no home directory
         return None
-    keep(Store(_Files(folder)))
+    keep(Store(Files(folder)))
     return folder
 
 
-class _Files:
+class Files:
     """Programs as files of a folder, named by all that they depend on."""
 
     def __init__(self, folder: Path):

@@ -84,17 +84,18 @@ class Store:
         if traced or get_opaque_trace_state() != self._untraced or jax.process_count() > 1:
             return None
         fixed = [_shape_of(leaf) or leaf for leaf in leaves]
-        key = function, tree, tuple((type(leaf), leaf) for leaf in fixed)
+        precision = jax.dtypes.canonicalize_dtype(float)  # which a context can change
+        key = function, tree, precision, tuple((type(leaf), leaf) for leaf in fixed)
         try:
             known = self._programs.get(key)
         except TypeError:  # something that cannot be told from others
             return None
         if known is None:
-            known = self._programs[key] = self._made(function, jax.tree.unflatten(tree, fixed))
+            known = self._programs[key] = self._made(function, jax.tree.unflatten(tree, fixed), str(precision))
         return known, [leaf for leaf, shape in zip(leaves, fixed) if isinstance(shape, _Shape)]
 
-    def _made(self, function: Callable, arguments: Any) -> _Program:
-        made_of = _recipe((function, arguments))
+    def _made(self, function: Callable, arguments: Any, precision: str) -> _Program:
+        made_of = _recipe((function, arguments, precision))
         kept = None if made_of is None else self._shelf.read(made_of)
         if kept is not None:
             _register()
@@ -210,7 +211,7 @@ def _loaded(code: tuple[bytes, Any, Any], devices: list[jax.Device]) -> _Run:
     return deserialize_and_load(program, given, found, execution_devices=devices)
 
 
-class _Recipe(pickle.Pickler):
+class Recipe(pickle.Pickler):
     """Writes what a program is made of, to be compared: functions by their names and what they enclose."""
 
     def persistent_id(self, obj):
@@ -230,7 +231,7 @@ def _recipe(made_of: Any) -> bytes | None:
     """What a program is made of as bytes; None where that cannot be told."""
     written = io.BytesIO()
     try:
-        _Recipe(written).dump(made_of)
+        Recipe(written).dump(made_of)
     except (pickle.PicklingError, AttributeError, TypeError, ValueError, RecursionError):
         return None
     return written.getvalue()
