@@ -63,7 +63,7 @@ def test_layers_import_only_earlier_ones(path):
 
 
 # imported where they are used, so that the library starts fast and without what it does not need
-HEAVY = {"evosax", "importlib", "matplotlib", "pyarrow", "xarray", "jaxgear.plot"}
+HEAVY = {"evosax", "importlib", "matplotlib", "optax", "pyarrow", "xarray", "jaxgear.plot"}
 # so do the commands, and their help without any of the library
 COMMANDS = {"jaxgear.cli.commands", "jaxgear.cli.devices", "jaxgear.cli.sweep"}
 
@@ -117,7 +117,7 @@ def test_import_is_silent_and_changes_nothing():
         "for name in dir(jaxgear):\n"
         "    if name != 'plot':\n"
         "        getattr(jaxgear, name)\n"
-        "assert not {'matplotlib', 'typer', 'pyarrow', 'evosax'} & set(sys.modules)\n"
+        "assert not {'matplotlib', 'optax', 'typer', 'pyarrow', 'evosax'} & set(sys.modules)\n"
         "assert dict(jax.config.values) == before\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
@@ -127,8 +127,7 @@ def test_import_is_silent_and_changes_nothing():
 @pytest.mark.parametrize("code", ["import jaxgear", "from jaxgear.cli import main; main(['optimize', '--help'])"])
 def test_what_needs_no_library_imports_none(code):
     script = (
-        "import atexit, sys\n"
-        "atexit.register(lambda: print({'equinox', 'jax', 'numpy', 'scipy'} & set(sys.modules)))\n"
+        "import atexit, sys\natexit.register(lambda: print({'equinox', 'jax', 'numpy', 'scipy'} & set(sys.modules)))\n"
     )
     done = subprocess.run([sys.executable, "-c", script + code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout.splitlines()[-1], done.stderr) == (0, "set()", "")
