@@ -127,7 +127,8 @@ def main(arguments: list[str]) -> None:
     """Runs `OUT.json script NAME` or `OUT.json jaxgear ARGUMENTS ...`."""
     out, kind, *rest = arguments
     code = 0
-    counts.listen()
+    if rest != ["--help"]:  # which comes without JAX
+        counts.listen()
     try:
         if kind == "script":
             import jax

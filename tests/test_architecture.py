@@ -63,12 +63,15 @@ def test_layers_import_only_earlier_ones(path):
 
 
 # imported where they are used, so that the library starts fast and without what it does not need
-HEAVY = {"evosax", "matplotlib", "pyarrow", "xarray", "jaxgear.plot"}
+HEAVY = {"evosax", "importlib", "matplotlib", "optax", "pyarrow", "xarray", "jaxgear.plot"}
+# so do the commands, and their help without any of the library
+COMMANDS = {"jaxgear.cli.commands", "jaxgear.cli.devices", "jaxgear.cli.sweep"}
 
 
 def hidden(path: Path):
     """Packages, of jaxgear with the layer, that a file imports anywhere but at module level."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
+    package = ("jaxgear", *path.relative_to(PACKAGE).parts[:-1])
     for node in ast.walk(tree):
         if node in tree.body:
             continue
@@ -77,7 +80,8 @@ def hidden(path: Path):
         elif isinstance(node, ast.ImportFrom) and not node.level:
             yield (node.module or "").split(".")[0]
         elif isinstance(node, ast.ImportFrom):
-            yield from (f"jaxgear.{node.module or alias.name}" for alias in node.names)
+            base = package[: len(package) - node.level + 1]
+            yield from (".".join((*base, node.module or alias.name)) for alias in node.names)
 
 
 # the launcher is no part of the package when it runs: it listens to Ctrl-C before it imports any of it
@@ -86,7 +90,7 @@ def hidden(path: Path):
 )
 def test_no_import_hides_a_circle(path):
     """None inside a function, none under TYPE_CHECKING, but for packages that are heavy."""
-    assert set(hidden(path)) <= HEAVY
+    assert set(hidden(path)) <= (HEAVY | COMMANDS if path == PACKAGE / "cli" / "app.py" else HEAVY)
 
 
 def test_the_check_sees_imports():
@@ -110,14 +114,55 @@ def test_import_is_silent_and_changes_nothing():
         "assert dict(jax.config.values) == before\n"
         "assert 'matplotlib' not in sys.modules and 'typer' not in sys.modules\n"
         "assert 'pyarrow' not in sys.modules\n"
+        "for name in dir(jaxgear):\n"
+        "    if name != 'plot':\n"
+        "        getattr(jaxgear, name)\n"
+        "assert not {'matplotlib', 'optax', 'typer', 'pyarrow', 'evosax'} & set(sys.modules)\n"
+        "assert dict(jax.config.values) == before\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
+@pytest.mark.parametrize("code", ["import jaxgear", "from jaxgear.cli import main; main(['optimize', '--help'])"])
+def test_what_needs_no_library_imports_none(code):
+    script = (
+        "import atexit, sys\natexit.register(lambda: print({'equinox', 'jax', 'numpy', 'scipy'} & set(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script + code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.splitlines()[-1], done.stderr) == (0, "set()", "")
+
+
+def test_public_names_may_be_imported_first_where_jax_traces():
+    """Nothing at module level is made by JAX, or it would be a tracer for ever."""
+    script = (
+        "import jax, sys\n"
+        "import jaxgear\n"
+        "def use(x):\n"
+        "    for name in dir(jaxgear):\n"
+        "        getattr(jaxgear, name)\n"
+        "    return x\n"
+        "jax.jit(use)(1.0)\n"
+        "assert 'jaxgear.optimize' in sys.modules\n"
+        "for name, module in list(sys.modules.items()):\n"
+        "    if name.startswith('jaxgear'):\n"
+        "        assert not [key for key, value in vars(module).items() if isinstance(value, jax.core.Tracer)], name\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_an_unknown_name_is_refused_as_python_does():
+    with pytest.raises(AttributeError, match="^module 'jaxgear' has no attribute 'tip_relief'$"):
+        jaxgear.tip_relief  # noqa: B018
+    with pytest.raises(ImportError, match="cannot import name 'tip_relief' from 'jaxgear'"):
+        from jaxgear import tip_relief  # noqa: F401
+
+
 def test_import_leaves_the_choice_of_devices_to_the_user():
     script = (
-        "import jax, jaxgear, jaxgear.cli\n"
+        "import jax, jaxgear, jaxgear.cli.commands, jaxgear.cli.sweep\n"
+        "[getattr(jaxgear, name) for name in dir(jaxgear) if name != 'STEEL']\n"
         "jax.config.update('jax_num_cpu_devices', 3)\n"
         "jax.config.update('jax_enable_x64', True)\n"
         "assert jax.device_count() == 3\n"
@@ -133,7 +178,7 @@ def test_modules_are_small_enough_to_read_in_one_go():
 
 
 def test_flat_names_are_few_and_the_rest_has_its_namespace():
-    flat = [name for name in vars(jaxgear) if not name.startswith("_") and not inspect.ismodule(vars(jaxgear)[name])]
+    flat = [name for name in dir(jaxgear) if not name.startswith("_") and not inspect.ismodule(getattr(jaxgear, name))]
     assert len(flat) <= 66
     for namespace in ("sizing", "tolerance", "optimize", "sweeps", "plot", "io"):
         assert inspect.ismodule(getattr(jaxgear, namespace)), namespace

@@ -21,9 +21,10 @@ import pytest
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import cache, main, report, run
+from jaxgear.cli import app, cache, main, report, run
 from jaxgear.io import load_design
 from jaxgear.io.folder import RESULT_FILES, result_folder
+from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
 from jaxgear.metrics import Doubt
 from jaxgear.metrics.plausibility import Limit
 
@@ -500,6 +501,10 @@ def test_the_program_starts_as_a_process_of_its_own(tmp_path):
     )
     assert_refused(SimpleNamespace(code=result.returncode, out=result.stdout, err=result.stderr), "nowhere.toml")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_help_knows_every_method():
+    assert app.METHODS == ", ".join((*jg.optimize.METHODS, *METHODS_WITHOUT_VARIABLES))
 
 
 def test_help_and_version_need_no_file():

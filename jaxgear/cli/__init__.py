@@ -1,3 +1,3 @@
-"""The command line: `jaxgear analyze FILE.toml` and `jaxgear optimize FILE.toml`."""
+"""The command line: `jaxgear analyze FILE.toml`, `jaxgear optimize FILE.toml` and `jaxgear sweep FILE.toml`."""
 
 from .app import main as main

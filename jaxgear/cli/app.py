@@ -1,4 +1,7 @@
-"""The commands, and the promise that every failure is one line."""
+"""The commands with their options, and the promise that every failure is one line.
+
+JAX and the library are imported when a command runs: help, version and what is wrong with the options need neither.
+"""
 
 import logging
 import os
@@ -10,19 +13,11 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from ..io import DesignFileError, optimize_request
-from ..io.schema import METHODS_WITHOUT_VARIABLES
-from ..microgeometry import NoModification
-from ..numerics import program
-from ..optimize import METHODS
-from ..sizing import iso_relief
-from . import interrupt, report
-from .devices import compile_quickly, join_processes, use_all_cores
-from .progress import Stages
-from .run import default_folder, opened, run
-from .sweep import run_sweep
+from . import interrupt
+from .version import version as own_version
 
-_METHODS = ", ".join((*METHODS, *METHODS_WITHOUT_VARIABLES))
+# of `optimize.METHODS` and of the search for flanks without parameters, as a test makes sure
+METHODS = "minimax, adam, lbfgs, genetic, cma_es, differential_evolution, factorial, te_iteration, free_form"
 
 OK, NOT_CONVERGED, FAILED, INTERRUPTED = 0, 1, 2, 130
 
@@ -37,7 +32,7 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        print(f"jaxgear {report.version()}")
+        print(f"jaxgear {own_version()}")
         raise typer.Exit()
 
 
@@ -75,21 +70,10 @@ def analyze(
     no_cache: NoCache = False,
 ) -> int:
     """Analyze the unmodified pair and the modification of the design file."""
-    compile_quickly()
-    with Stages() as stages:
-        design = opened(file, cache=not no_cache)
-        if design.bounds:
-            free = ", ".join(design.bounds)
-            problem = f"analyze needs numbers, these are free: {free}; use jaxgear optimize"
-            raise DesignFileError("variables", problem, file)
-        with run(design, output or default_folder(file, "analyze"), stages) as current:
-            current.prepare()
-            current.evaluate("unmodified", NoModification(), NoModification())
-            pinion, wheel = design.design({})
-            if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
-                current.evaluate("modified", pinion, wheel)
-            current.write(figures=not no_figures)
-    return OK if current.show() else NOT_CONVERGED
+    with interrupt.importing():
+        from . import commands
+    fine = commands.analyze(file, output, figures=not no_figures, cache=not no_cache)
+    return OK if fine else NOT_CONVERGED
 
 
 @app.command()
@@ -97,7 +81,7 @@ def optimize(
     file: File,
     output: Annotated[Path | None, _output("optimize/METHOD")] = None,
     method: Annotated[
-        str | None, typer.Option("--method", "-m", metavar="NAME", help=f"In place of the file's: {_METHODS}.")
+        str | None, typer.Option("--method", "-m", metavar="NAME", help=f"In place of the file's: {METHODS}.")
     ] = None,
     quick: Quick = False,
     no_figures: NoFigures = False,
@@ -108,19 +92,10 @@ def optimize(
     Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
     the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
     """
-    compile_quickly()
-    with Stages() as stages:
-        design = opened(file, cache=not no_cache)
-        request = optimize_request(design, method=method, quick=quick)
-        target = output or default_folder(file, "optimize", request.method, quick=quick)
-        with run(design, target, stages) as current:
-            current.prepare(quick=quick, finer=request.finer)
-            factor = design.optimize.application_factor
-            relief = program(iso_relief)(design.pair(), design.torque, application_factor=factor)
-            involute = NoModification()
-            current.search(request, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
-            current.write(figures=not no_figures)
-    return OK if current.show() else NOT_CONVERGED
+    with interrupt.importing():
+        from . import commands
+    fine = commands.optimize(file, output, method=method, quick=quick, figures=not no_figures, cache=not no_cache)
+    return OK if fine else NOT_CONVERGED
 
 
 @app.command()
@@ -148,9 +123,13 @@ def sweep(
     The folder "table" of the results holds it and nothing else: pandas, polars and Arrow read it as a whole. An
     interrupted sweep goes on where it was when the command is repeated.
     """
-    use_all_cores()
-    join_processes(coordinator, processes, process, automatic=distributed)
-    fine = run_sweep(file, output, samples=samples, best=best, quick=quick, figures=not no_figures, cache=not no_cache)
+    with interrupt.importing():
+        from . import devices, sweep
+    devices.use_all_cores()
+    devices.join_processes(coordinator, processes, process, automatic=distributed)
+    fine = sweep.run_sweep(
+        file, output, samples=samples, best=best, quick=quick, figures=not no_figures, cache=not no_cache
+    )
     return OK if fine else NOT_CONVERGED
 
 

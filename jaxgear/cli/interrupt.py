@@ -12,6 +12,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 NOTHING = "nothing was written"
 _SOON = 0.02  # seconds in which Python is out of the callback
@@ -24,6 +25,7 @@ class State:
     asked: bool = False  # Ctrl-C was pressed
     held: bool = False  # it has to wait
     written: str = NOTHING  # what is on the disk
+    before: Any = None  # what Ctrl-C did before `listening`, None where nothing listens
 
 
 state = State()
@@ -32,17 +34,30 @@ state = State()
 @contextmanager
 def listening() -> Iterator[None]:
     """Takes care of Ctrl-C for a block; nothing changes outside the main thread."""
-    state.asked, state.held, state.written = False, False, NOTHING
+    state.asked, state.held, state.written, state.before = False, False, NOTHING, None
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    earlier, hook = signal.signal(signal.SIGINT, _interrupted), sys.unraisablehook
+    state.before, hook = signal.signal(signal.SIGINT, _interrupted), sys.unraisablehook
     sys.unraisablehook = _lost
     try:
         yield
     finally:
         sys.unraisablehook = hook
-        signal.signal(signal.SIGINT, earlier)
+        signal.signal(signal.SIGINT, state.before)
+
+
+@contextmanager
+def importing() -> Iterator[None]:
+    """Lets Ctrl-C do in a block what it did before `listening`: an exception could be lost in a module that starts."""
+    if state.before is None:
+        yield
+        return
+    signal.signal(signal.SIGINT, state.before)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, _interrupted)
 
 
 def note(written: str) -> None:

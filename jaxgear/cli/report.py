@@ -1,7 +1,6 @@
 """What a run says and writes: table, lines, summary and figures."""
 
 import dataclasses
-import importlib.metadata
 import platform
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -20,6 +19,7 @@ from ..io.results import unit_of
 from ..metrics import Doubt, plausibility
 from ..numerics import fields_of, program
 from .study import Evaluation
+from .version import version
 
 Evaluations = Mapping[str, Evaluation]
 
@@ -203,14 +203,6 @@ def save_figures(folder: Path, axes: Mapping[str, Any]) -> None:
 def flanks(evaluations: Evaluations):
     """The modifications of every design."""
     return {name: (evaluation.pinion, evaluation.wheel) for name, evaluation in evaluations.items()}
-
-
-def version() -> str:
-    """Version of the installed package."""
-    try:
-        return importlib.metadata.version("jaxgear")
-    except importlib.metadata.PackageNotFoundError:
-        return "unknown (not installed)"
 
 
 def console(*, stderr: bool = False) -> Console:

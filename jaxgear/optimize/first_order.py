@@ -4,7 +4,6 @@ from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
-import optax
 
 from ..numerics import program
 from .problem import Problem
@@ -28,6 +27,8 @@ class Adam(AbstractStaged):
     @staticmethod
     @program
     def advance(problem: Problem, points, multipliers, analyses, width, rate, scale):
+        import optax
+
         gradient = jax.vmap(jax.grad(lagrangian, argnums=1, has_aux=True), (None, 0, 0, None, None))
         adam = optax.scale_by_adam()
 

@@ -1,12 +1,11 @@
 """Quasi-Newton search from many points at once."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optax
 
 from ..numerics import count, program
 from .problem import Problem
@@ -40,6 +39,8 @@ class LBFGS(AbstractStaged):
     @staticmethod
     @program
     def advance(problem: Problem, angles, multipliers, analyses, width, rate, scale):
+        import optax
+
         method = optax.scale_by_lbfgs()
 
         def loss(angle, multipliers):
@@ -73,7 +74,7 @@ class _Trial(eqx.Module):
     slope: jax.Array
     direction: jax.Array
     stretch: jax.Array
-    memory: optax.OptState
+    memory: Any  # of optax
 
     @property
     def next(self) -> jax.Array:

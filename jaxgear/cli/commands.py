@@ -1,0 +1,55 @@
+"""What the commands `analyze` and `optimize` do, with their options; `sweep` has its own module."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..geometry import GearPair
+from ..io import DesignFileError, optimize_request
+from ..microgeometry import NoModification
+from ..numerics import program
+from ..sizing import iso_relief
+from .devices import compile_quickly
+from .progress import Stages
+from .run import default_folder, opened, run
+
+
+def analyze(file: Path, output: Path | None, *, figures: bool, cache: bool) -> bool:
+    """Evaluates the unmodified pair and the modification of the file; False when a solution failed."""
+    compile_quickly()
+    with Stages() as stages:
+        design = opened(file, cache=cache)
+        if design.bounds:
+            free = ", ".join(design.bounds)
+            problem = f"analyze needs numbers, these are free: {free}; use jaxgear optimize"
+            raise DesignFileError("variables", problem, file)
+        with run(design, output or default_folder(file, "analyze"), stages) as current:
+            current.prepare()
+            current.evaluate("unmodified", NoModification(), NoModification())
+            pinion, wheel = design.design({})
+            if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
+                current.evaluate("modified", pinion, wheel)
+            current.write(figures=figures)
+    return current.show()
+
+
+def optimize(file: Path, output: Path | None, *, method: str | None, quick: bool, figures: bool, cache: bool) -> bool:
+    """Searches the optimum and compares it; False when a solution failed or a constraint is not met."""
+    compile_quickly()
+    with Stages() as stages:
+        design = opened(file, cache=cache)
+        request = optimize_request(design, method=method, quick=quick)
+        target = output or default_folder(file, "optimize", request.method, quick=quick)
+        with run(design, target, stages) as current:
+            current.prepare(quick=quick, finer=request.finer)
+            load = np.asarray(design.torque), np.asarray(design.optimize.application_factor)
+            relief = _iso_relief(design.pair(), *load)
+            involute = NoModification()
+            current.search(request, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
+            current.write(figures=figures)
+    return current.show()
+
+
+@program
+def _iso_relief(pair: GearPair, torque, application_factor):
+    return iso_relief(pair, torque, application_factor=application_factor)
