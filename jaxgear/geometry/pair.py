@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, number
+from ..numerics import Checked, number, on_both
 from .gear import Gear
 from .margins import Margins, faults_between, margins_between
 from .outline import outline
@@ -84,7 +84,8 @@ def path_of_contact(pair: GearPair) -> PathOfContact:
 @eqx.filter_jit
 def margins(pair: GearPair) -> Margins:
     """How far a pair is from what cannot run; finite and differentiable for impossible gears too."""
-    return margins_between(outline(pair.pinion), outline(pair.wheel), path_of_contact(pair), pair.center_distance)
+    outlines = on_both(outline, pair.pinion, pair.wheel)
+    return margins_between(*outlines, path_of_contact(pair), pair.center_distance)
 
 
 def explain(pair: GearPair) -> tuple[str, ...]:

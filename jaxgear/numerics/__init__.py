@@ -19,6 +19,7 @@ from .fields import real as real
 from .fields import result as result
 from .fields import whole as whole
 from .frozen import Frozen as Frozen
+from .leading import on_both as on_both
 from .leading import over_batch as over_batch
 from .logarithm import log as log
 from .progress import Callback as Callback
