@@ -50,7 +50,7 @@ def arc_compliance(half_angle: Scalar, thickness_ratio: Scalar, poisson: Scalar,
     cross = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [1.0, 1.0, 0.0]])
     matrix = jnp.pi * (even * jnp.asarray(same, even.dtype)[None] + odd * jnp.asarray(cross, odd.dtype)[None])
     breathing = 2 * jnp.pi * modes[2, 0, 0] ** 2 * uniform_compliance(thickness_ratio, poisson)
-    return matrix + breathing * jnp.asarray(np.diag([0.0, 0.0, 1.0]), breathing.dtype)
+    return matrix + breathing * jnp.asarray(np.diag([0.0, 0.0, 1.0]), breathing.dtype)[None]
 
 
 def relaxation(half_angle: Scalar) -> Float[Array, "3 3"]:

@@ -50,7 +50,9 @@ def solve(
     check_mesh("solve", mesh)
     operation = operation_of("solve", torque, mesh.slice_width.dtype)
     pinion, wheel = flanks_of("solve", mesh, pinion, wheel)
-    cycle = _cycle(mesh, operation, _solve(mesh, operation.torque, pinion, wheel), pinion, wheel)
+    # two programs: that of the contact, by far the longer one to compile, serves every kind of modification
+    removed = _removed(mesh, operation.torque, pinion, wheel)
+    cycle = _cycle(mesh, operation, _solve_removed(mesh, operation.torque, removed), pinion, wheel)
     wider = _wider(mesh, cycle)
     return cycle if wider is None else solve(wider, operation, pinion=pinion, wheel=wheel)
 
@@ -202,11 +204,6 @@ def outermost(mesh: Mesh, removed: Load) -> Curve:
     fall = jnp.minimum(edge - jnp.stack([removed[-1, :, 1], removed[0, :, -2]]), 0.0)
     left = jnp.min(edge[..., None] + fall[..., None] * mesh.outer_steps[:, None], axis=1)
     return jnp.min(mesh.outer_gap + left / mesh.outer_lever, axis=0)
-
-
-@eqx.filter_jit
-def _solve(mesh: Mesh, torque: Scalar, pinion, wheel) -> dict[str, Array]:
-    return _solve_removed(mesh, torque, _removed(mesh, torque, pinion, wheel))
 
 
 @eqx.filter_jit
