@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry.outline import Curves, curves
+from ..geometry.outline import Curves
 from ..numerics import Checked, bracketed_root, count, gauss_legendre
 from .plane import Plane, plane_modulus, shear_modulus
 from .toothload import ToothLoad
@@ -57,15 +57,12 @@ class Beam(AbstractTooth):
     def _integrals(self, load: ToothLoad) -> tuple[Array, Array]:
         """int (y_C - y)^2 / I dy and int 1 / A dy up to the crossing height."""
         outline, height = load.outline, load.height
-        drawn, root = curves(outline.gear).over(height.shape), jnp.full_like(height, jnp.pi / 2)
-        junction, form, tip = (
-            jnp.broadcast_to(end, height.shape)
-            for end in (outline.junction, outline.form_roll_length, outline.gear.tip_roll_length)
-        )
+        drawn, root = outline.curves.over(height.shape), jnp.full_like(height, jnp.pi / 2)
+        junction, form = (jnp.broadcast_to(end, height.shape) for end in (outline.junction, outline.form_roll_length))
         in_fillet = height < drawn.trochoid(junction)[1]
         # the ends of the fillet for heights beyond them
         fillet_end = bracketed_root(_above_fillet, junction, root, (drawn, height))
-        involute_end = bracketed_root(_above_involute, form, tip, (drawn, height))
+        involute_end = bracketed_root(_above_involute, form, drawn.tip_roll_length, (drawn, height))
         fillet = self._segment(load, Curves.trochoid, root, jnp.where(in_fillet, fillet_end, junction))
         flank = self._segment(load, Curves.involute, form, jnp.where(in_fillet, form, involute_end))
         return fillet[0] + flank[0], fillet[1] + flank[1]
@@ -79,7 +76,7 @@ class Beam(AbstractTooth):
             start[None] + nodes * (end - start)[None],
             jnp.broadcast_to(end - start, (self.nodes, *start.shape)),
         )
-        drawn = curves(load.outline.gear).over(parameter.shape)
+        drawn = load.outline.curves.over(parameter.shape)
         (x, y), (_, slope) = jax.jvp(lambda t: curve(drawn, t), (parameter,), (extent,))
         step = weights * slope
         return jnp.sum(step * (load.height[None] - y) ** 2 * 1.5 / x**3, axis=0), jnp.sum(step * 0.5 / x, axis=0)

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry.outline import Outline, curves
+from ..geometry.outline import Outline
 from ..numerics import Checked, result
 
 Real = Float[Array, "..."]
@@ -29,7 +29,7 @@ class ToothLoad(Checked):
 
 def tooth_load(outline: Outline, roll_length: Real) -> ToothLoad:
     """The load line of every point, which is the normal to the involute there."""
-    drawn = curves(outline.gear).over(roll_length.shape)
+    drawn = outline.curves.over(roll_length.shape)
     angle = jnp.arctan(roll_length / drawn.base_radius) - drawn.half_angle(roll_length)  # as `load_angle`
     x, _ = drawn.involute(roll_length)
     return ToothLoad(outline, roll_length, angle, drawn.base_radius / jnp.cos(angle), x / jnp.cos(angle))

@@ -19,11 +19,54 @@ Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
 
 
+class Curves(NamedTuple):
+    """The numbers that trochoid and involute of one gear are drawn by.
+
+    They are evaluated once and given the shape of all points (`over`): a derivative then sums over the points once for
+    each of these numbers, instead of wherever a number meets a point, and each sum is a loop to compile.
+
+    Attributes:
+        pitch_radius, base_radius: [mm].
+        base_half_angle: half tooth angle on the base circle [rad].
+        tip_roll_length: where the involute ends [mm].
+        offset, depth, rounding: `rack_tip` [mm].
+    """
+
+    pitch_radius: Real
+    base_radius: Real
+    base_half_angle: Real
+    tip_roll_length: Real
+    offset: Real
+    depth: Real
+    rounding: Real
+
+    def over(self, shape: tuple[int, ...]) -> "Curves":
+        """The same numbers at every point of an array."""
+        return Curves(*(jnp.broadcast_to(number, shape) for number in self))
+
+    def trochoid(self, g: Real) -> tuple[Real, Real]:
+        """Point (x, y) [mm] of the fillet at the parameter g [rad]."""
+        r = self.pitch_radius
+        phi = (self.depth / jnp.tan(g) + self.offset) / r
+        distance = self.depth / jnp.sin(g) + self.rounding
+        return r * jnp.sin(phi) - distance * jnp.cos(g - phi), r * jnp.cos(phi) - distance * jnp.sin(g - phi)
+
+    def half_angle(self, rho: Real) -> Real:
+        """`half_tooth_angle` [rad] at a roll length [mm]."""
+        return self.base_half_angle - involute(rho / self.base_radius)
+
+    def involute(self, rho: Real) -> tuple[Real, Real]:
+        """Point (x, y) [mm] of the involute at a roll length [mm]."""
+        r, gamma = jnp.sqrt(self.base_radius**2 + rho**2), self.half_angle(rho)
+        return r * jnp.sin(gamma), r * jnp.cos(gamma)
+
+
 class Outline(Checked):
     """One flank of the generated tooth.
 
     Attributes:
         gear: the gear.
+        curves: what fillet and involute are drawn by.
         junction: trochoid parameter where fillet and involute meet [rad].
         form_roll_length: roll length there [mm], the start of the usable involute (ISO 21771 d_Ff).
         root_half_angle: half angle subtended by the tooth at the root circle, theta_f [rad].
@@ -31,6 +74,7 @@ class Outline(Checked):
     """
 
     gear: Gear
+    curves: Curves = eqx.field(repr=False)
     junction: Scalar = result("rad")
     form_roll_length: Scalar = result("mm")
     root_half_angle: Scalar = result("rad")
@@ -39,7 +83,7 @@ class Outline(Checked):
     @property
     def junction_height(self) -> Scalar:
         """y of the junction [mm]."""
-        return trochoid(self.gear, self.junction)[1]
+        return self.curves.trochoid(self.junction)[1]
 
     @property
     def root_height(self) -> Scalar:
@@ -65,53 +109,13 @@ def outline(gear: Gear) -> Outline:
     x, y = drawn.trochoid(cut)
     rho_cut = jnp.sqrt(jnp.maximum(x**2 + y**2 - gear.base_radius**2, (1e-6 * gear.base_radius) ** 2))
     form = jnp.where(undercut, rho_cut, jnp.maximum(tangential, 0.0))
-    return Outline(gear, junction, form, jnp.arctan2(end_x, end_y), undercut.astype(form.dtype))
-
-
-class Curves(NamedTuple):
-    """The numbers that trochoid and involute of one gear are drawn by.
-
-    They are evaluated once and given the shape of all points (`over`): a derivative then sums over the points once for
-    each of these numbers, instead of wherever a number meets a point, and each sum is a loop to compile.
-
-    Attributes:
-        pitch_radius, base_radius: [mm].
-        base_half_angle: half tooth angle on the base circle [rad].
-        offset, depth, tip: `rack_tip` [mm].
-    """
-
-    pitch_radius: Real
-    base_radius: Real
-    base_half_angle: Real
-    offset: Real
-    depth: Real
-    tip: Real
-
-    def over(self, shape: tuple[int, ...]) -> "Curves":
-        """The same numbers at every point of an array."""
-        return Curves(*(jnp.broadcast_to(number, shape) for number in self))
-
-    def trochoid(self, g: Real) -> tuple[Real, Real]:
-        """Point (x, y) [mm] of the fillet at the parameter g [rad]."""
-        r = self.pitch_radius
-        phi = (self.depth / jnp.tan(g) + self.offset) / r
-        distance = self.depth / jnp.sin(g) + self.tip
-        return r * jnp.sin(phi) - distance * jnp.cos(g - phi), r * jnp.cos(phi) - distance * jnp.sin(g - phi)
-
-    def half_angle(self, rho: Real) -> Real:
-        """`half_tooth_angle` [rad] at a roll length [mm]."""
-        return self.base_half_angle - involute(rho / self.base_radius)
-
-    def involute(self, rho: Real) -> tuple[Real, Real]:
-        """Point (x, y) [mm] of the involute at a roll length [mm]."""
-        r, gamma = jnp.sqrt(self.base_radius**2 + rho**2), self.half_angle(rho)
-        return r * jnp.sin(gamma), r * jnp.cos(gamma)
+    return Outline(gear, drawn, junction, form, jnp.arctan2(end_x, end_y), undercut.astype(form.dtype))
 
 
 def curves(gear: Gear) -> Curves:
     """The numbers that the outline of a gear is drawn by."""
     at_base = half_tooth_angle(gear, jnp.zeros_like(gear.base_radius))
-    return Curves(gear.pitch_radius, gear.base_radius, at_base, *rack_tip(gear))
+    return Curves(gear.pitch_radius, gear.base_radius, at_base, gear.tip_roll_length, *rack_tip(gear))
 
 
 def rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
