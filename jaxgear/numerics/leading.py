@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from functools import wraps
-from operator import itemgetter
 from typing import TypeVar
 
 import equinox as eqx
@@ -39,8 +38,10 @@ def on_both(function: Callable[[T], Result], first: T, second: T) -> tuple[Resul
     """
     if jax.tree.structure(first) != jax.tree.structure(second) or _kinds(first) != _kinds(second):
         return function(first), function(second)
-    both = jax.vmap(function)(jax.tree.map(lambda *leaves: jnp.stack(leaves), first, second))
-    return jax.tree.map(itemgetter(0), both), jax.tree.map(itemgetter(1), both)
+    leaves, structure = jax.tree.flatten(jax.vmap(function)(jax.tree.map(lambda *pair: jnp.stack(pair), first, second)))
+    halves = zip(*(jax.lax.split(leaf, (1, 1)) for leaf in leaves))
+    one, other = (jax.tree.unflatten(structure, [leaf[0] for leaf in half]) for half in halves)
+    return one, other
 
 
 def _kinds(tree) -> list:
