@@ -52,7 +52,8 @@ class ElasticRing(AbstractBody):
     harmonics: int = count(high=100_000, default=400)
 
     def of_both(self, pinion: ToothLoad, wheel: ToothLoad, plane: Plane) -> Float[Array, "pairs pairs positions"]:
-        return sum(on_both(lambda given: self.compliance(*given, plane), (pinion, +1), (wheel, -1)))
+        first, second = on_both(lambda given: self.compliance(*given, plane), (pinion, +1), (wheel, -1))
+        return first + second
 
     def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
         outline, count = load.outline, load.angle.shape[0]

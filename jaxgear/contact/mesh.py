@@ -13,7 +13,7 @@ from ..compliance.hertz import contact_geometry
 from ..compliance.toothload import tooth_load
 from ..geometry import GearPair, Margins, PathOfContact, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import AbstractSpring, concrete, on_both
+from ..numerics import AbstractSpring, concrete, on_both, quick_jit
 from .kinematics import Contacts, Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution, reach
 
@@ -167,7 +167,7 @@ def _pairs_for(pair: GearPair, deflection: float | None) -> int:
     return fewest_pairs(pair, deflection=_DEFLECTION * float(module) if deflection is None else deflection)
 
 
-@eqx.filter_jit
+@quick_jit
 def prepare_from(first_phase, pair: GearPair, compliance: AbstractCompliance, resolution: Resolution) -> Mesh:
     """The mesh over the base pitch that begins with a mesh position [base pitches]."""
     moving = kinematics(pair, first_phase, resolution, compliance.plane)
@@ -237,7 +237,7 @@ def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
     )
 
 
-@eqx.filter_jit
+@quick_jit
 def _gaps_at(pair: GearPair, reaches):
     contact = path_of_contact(pair)
     return _closing(_next_pairs(pair, contact, jnp.asarray(reaches, jnp.result_type(contact.start))))

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..microgeometry import AbstractModification, NoModification, terms
-from ..numerics import ContactProblem, concrete, minimum, safe_sqrt, solve_contact, tangent_stiffness
+from ..numerics import ContactProblem, concrete, minimum, quick_jit, safe_sqrt, solve_contact, tangent_stiffness
 from .cycle import MeshCycle
 from .mesh import Mesh, prepare
 from .operation import Operation, operation_of
@@ -124,7 +124,7 @@ def removed_material(
     return _removed(mesh, torque, pinion, wheel)
 
 
-@eqx.filter_jit
+@quick_jit
 def _removed(mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: AbstractModification) -> Load:
     dtype = torque.dtype
     half_width = safe_sqrt(mesh.width_factor * _force(mesh, torque) / mesh.pair.face_width)
@@ -206,7 +206,7 @@ def outermost(mesh: Mesh, removed: Load) -> Curve:
     return jnp.min(mesh.outer_gap + left / mesh.outer_lever, axis=0)
 
 
-@eqx.filter_jit
+@quick_jit
 def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> dict[str, Array]:
     force = _force(mesh, torque)
     removed = removed.astype(force.dtype)

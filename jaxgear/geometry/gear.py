@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, check, concrete, number, safe_sqrt
+from ..numerics import Checked, check, concrete, number, quick_jit, safe_sqrt
 from .involute import half_tooth_angle
 from .material import Material
 
@@ -145,7 +145,7 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
     return tuple(faults)
 
 
-@eqx.filter_jit
+@quick_jit
 def _shape(gear: Gear) -> tuple[Scalar, ...]:
     """Margins of the shape, then the diameters of tip, base circle, root circle and bore [mm]."""
     radii = (gear.tip_radius, gear.base_radius, gear.root_circle_radius, gear.bore_radius)

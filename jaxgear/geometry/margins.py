@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ..numerics import Checked, result, safe_sqrt
+from ..numerics import Checked, quick_jit, result, safe_sqrt
 from .gear import Gear, shape_faults
 from .involute import diameter, involute
 from .outline import Outline, outline
@@ -170,7 +170,7 @@ def faults_between(pinion: Gear, wheel: Gear, center_distance: Scalar | None, ma
     return tuple(faults)
 
 
-@eqx.filter_jit
+@quick_jit
 def _held(margins: Margins) -> dict[str, Bool[Array, ""]]:
     return margins.held
 

@@ -11,7 +11,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, bracketed_root, result
+from ..numerics import Checked, bracketed_root, quick_jit, result
 from .gear import Gear
 from .involute import half_tooth_angle, involute
 
@@ -91,7 +91,7 @@ class Outline(Checked):
         return self.gear.root_circle_radius * jnp.cos(self.root_half_angle)
 
 
-@eqx.filter_jit
+@quick_jit
 def outline(gear: Gear) -> Outline:
     """Generates the outline of one gear.
 

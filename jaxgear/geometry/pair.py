@@ -1,11 +1,10 @@
 """Two gears on their operating centre distance."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, number, on_both
+from ..numerics import Checked, number, on_both, quick_jit
 from .gear import Gear
 from .margins import Margins, faults_between, margins_between
 from .outline import outline
@@ -81,7 +80,7 @@ def path_of_contact(pair: GearPair) -> PathOfContact:
     return path_between(pair.pinion, pair.wheel, pair.center_distance)
 
 
-@eqx.filter_jit
+@quick_jit
 def margins(pair: GearPair) -> Margins:
     """How far a pair is from what cannot run; finite and differentiable for impossible gears too."""
     outlines = on_both(outline, pair.pinion, pair.wheel)

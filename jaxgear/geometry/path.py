@@ -1,10 +1,9 @@
 """Where two gears meet: operating pressure angle and centre distance, points A to E, contact ratio, sliding."""
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, bracketed_root, result
+from ..numerics import Checked, bracketed_root, quick_jit, result
 from .gear import Gear
 from .involute import Given, involute
 
@@ -71,7 +70,7 @@ def reduced_radius(first: Real, second: Real) -> Real:
     return first * second / (first + second)
 
 
-@eqx.filter_jit
+@quick_jit
 def working_pressure_angle(pinion: Gear, wheel: Gear, center_distance: Real | None) -> Real:
     """Operating pressure angle [rad] at a centre distance [mm], or without backlash (None)."""
     if center_distance is not None:
@@ -94,7 +93,7 @@ def _missing_involute(tangent: Real, wanted: Real) -> Real:
     return involute(tangent) - wanted
 
 
-@eqx.filter_jit
+@quick_jit
 def path_between(pinion: Gear, wheel: Gear, center_distance: Scalar | None) -> PathOfContact:
     """Path of contact at a centre distance [mm], or without backlash (None), limited by the two tip circles."""
     tangent = jnp.tan(working_pressure_angle(pinion, wheel, center_distance))

@@ -24,6 +24,7 @@ from .leading import over_batch as over_batch
 from .logarithm import log as log
 from .progress import Callback as Callback
 from .quadrature import gauss_legendre as gauss_legendre
+from .quick import quick_jit as quick_jit
 from .risk import AbstractMeasure as AbstractMeasure
 from .risk import CVaR as CVaR
 from .risk import Mean as Mean

@@ -36,7 +36,7 @@ def on_both(function: Callable[[T], Result], first: T, second: T) -> tuple[Resul
 
     Things that differ in their structure, or in the shape or type of an array, are evaluated one after the other.
     """
-    if jax.tree.structure(first) != jax.tree.structure(second) or _kinds(first) != _kinds(second):
+    if _kinds(first) != _kinds(second):
         return function(first), function(second)
     leaves, structure = jax.tree.flatten(jax.vmap(function)(jax.tree.map(lambda *pair: jnp.stack(pair), first, second)))
     halves = zip(*(jax.lax.split(leaf, (1, 1)) for leaf in leaves))
@@ -44,5 +44,6 @@ def on_both(function: Callable[[T], Result], first: T, second: T) -> tuple[Resul
     return one, other
 
 
-def _kinds(tree) -> list:
-    return [(jnp.shape(leaf), jnp.result_type(leaf)) for leaf in jax.tree.leaves(tree)]
+def _kinds(tree) -> tuple:
+    leaves, structure = jax.tree.flatten(tree)
+    return structure, [(jnp.shape(leaf), jnp.result_type(leaf)) for leaf in leaves]
