@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import AbstractSpring
+from ..numerics import AbstractSpring, on_both
 from .beam import AbstractTooth, Beam
 from .body import AbstractBody, ElasticRing, Sainsot
 from .edge import EdgeLaw, edge
@@ -70,11 +70,10 @@ class Compliance(AbstractCompliance):
         check_plane(self.plane)
 
     def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "pairs pairs positions"]:
-        total = self.body.compliance(pinion, +1, self.plane) + self.body.compliance(wheel, -1, self.plane)
-        teeth = self.tooth.compliance(pinion, self.plane) + self.tooth.compliance(wheel, self.plane)
-        for i in range(teeth.shape[0]):
-            total = total.at[i, i].add(teeth[i])
-        return total
+        bodies = self.body.of_both(pinion, wheel, self.plane)
+        first, second = on_both(lambda load: self.tooth.compliance(load, self.plane), pinion, wheel)
+        own = jnp.eye(first.shape[0], dtype=bool)[:, :, None]
+        return jnp.where(own, bodies + (first + second)[None], bodies)
 
     def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, ""]:
         return self.body.hub(pinion.outline) + self.body.hub(wheel.outline)

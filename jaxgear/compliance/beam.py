@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry.outline import Outline, involute_point, trochoid
+from ..geometry.outline import Curves
 from ..numerics import Checked, bracketed_root, count, gauss_legendre
 from .plane import Plane, plane_modulus, shear_modulus
 from .toothload import ToothLoad
@@ -57,18 +57,18 @@ class Beam(AbstractTooth):
     def _integrals(self, load: ToothLoad) -> tuple[Array, Array]:
         """int (y_C - y)^2 / I dy and int 1 / A dy up to the crossing height."""
         outline, height = load.outline, load.height
-        in_fillet = height < outline.junction_height
-        fillet_end = jnp.where(in_fillet, _fillet_parameter(outline, height), outline.junction)
-        involute_end = jnp.where(in_fillet, outline.form_roll_length, _involute_roll_length(outline, height))
-        fillet = self._segment(load, trochoid, jnp.full_like(height, jnp.pi / 2), fillet_end)
-        flank = self._segment(
-            load, involute_point, jnp.broadcast_to(outline.form_roll_length, height.shape), involute_end
-        )
+        drawn, root = outline.curves.over(height.shape), jnp.full_like(height, jnp.pi / 2)
+        junction, form = (jnp.broadcast_to(end, height.shape) for end in (outline.junction, outline.form_roll_length))
+        in_fillet = height < drawn.trochoid(junction)[1]
+        # the ends of the fillet for heights beyond them
+        fillet_end = bracketed_root(_above_fillet, junction, root, (drawn, height))
+        involute_end = bracketed_root(_above_involute, form, drawn.tip_roll_length, (drawn, height))
+        fillet = self._segment(load, Curves.trochoid, root, jnp.where(in_fillet, fillet_end, junction))
+        flank = self._segment(load, Curves.involute, form, jnp.where(in_fillet, form, involute_end))
         return fillet[0] + flank[0], fillet[1] + flank[1]
 
     def _segment(self, load: ToothLoad, curve, start, end) -> tuple[Array, Array]:
         """The two integrals over a part of the outline, with the quadrature nodes on a leading axis."""
-        gear = load.outline.gear
         nodes, weights = (
             jnp.asarray(table, start.dtype).reshape((-1,) + (1,) * start.ndim) for table in gauss_legendre(self.nodes)
         )
@@ -76,24 +76,19 @@ class Beam(AbstractTooth):
             start[None] + nodes * (end - start)[None],
             jnp.broadcast_to(end - start, (self.nodes, *start.shape)),
         )
-        (x, y), (_, slope) = jax.jvp(lambda t: curve(gear, t), (parameter,), (extent,))
+        drawn = load.outline.curves.over(parameter.shape)
+        (x, y), (_, slope) = jax.jvp(lambda t: curve(drawn, t), (parameter,), (extent,))
         step = weights * slope
         return jnp.sum(step * (load.height[None] - y) ** 2 * 1.5 / x**3, axis=0), jnp.sum(step * 0.5 / x, axis=0)
 
 
-def _fillet_parameter(outline: Outline, height):
-    """Trochoid parameter at a height of the centreline; the ends of the fillet for heights beyond them."""
-    low = jnp.broadcast_to(outline.junction, height.shape)
-    return bracketed_root(
-        lambda g, args: trochoid(args[0].gear, g)[1] - args[1],
-        low,
-        jnp.full_like(height, jnp.pi / 2),
-        (outline, height),
-    )
+def _above_fillet(g: Array, given: tuple[Curves, Array]) -> Array:
+    """Height of the trochoid above a given one."""
+    drawn, height = given
+    return drawn.trochoid(g)[1] - height
 
 
-def _involute_roll_length(outline: Outline, height):
-    """Roll length of the involute at a height of the centreline, sought up to the tip."""
-    low = jnp.broadcast_to(outline.form_roll_length, height.shape)
-    high = jnp.broadcast_to(outline.gear.tip_roll_length, height.shape)
-    return bracketed_root(lambda r, args: involute_point(args[0].gear, r)[1] - args[1], low, high, (outline, height))
+def _above_involute(rho: Array, given: tuple[Curves, Array]) -> Array:
+    """Height of the involute above a given one."""
+    drawn, height = given
+    return drawn.involute(rho)[1] - height

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry.outline import Outline
-from ..numerics import Checked, count
+from ..numerics import Checked, count, on_both
 from . import ring, sainsot
 from .plane import Plane, check_plane, plane_modulus, plane_poisson
 from .toothload import ToothLoad
@@ -27,6 +27,10 @@ class AbstractBody(Checked):
                 gear), -1 for the driven gear.
             plane: plane stress or plane strain.
         """
+
+    def of_both(self, pinion: ToothLoad, wheel: ToothLoad, plane: Plane) -> Float[Array, "pairs pairs positions"]:
+        """Sum of the compliances of driving and driven gear."""
+        return self.compliance(pinion, +1, plane) + self.compliance(wheel, -1, plane)
 
     @abstractmethod
     def hub(self, outline: Outline) -> Float[Array, ""]:
@@ -47,6 +51,10 @@ class ElasticRing(AbstractBody):
     coupling: bool = eqx.field(static=True, default=True)
     harmonics: int = count(high=100_000, default=400)
 
+    def of_both(self, pinion: ToothLoad, wheel: ToothLoad, plane: Plane) -> Float[Array, "pairs pairs positions"]:
+        first, second = on_both(lambda given: self.compliance(*given, plane), (pinion, +1), (wheel, -1))
+        return first + second
+
     def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
         outline, count = load.outline, load.angle.shape[0]
         gear = outline.gear
@@ -61,11 +69,13 @@ class ElasticRing(AbstractBody):
         arm = (load.height - outline.root_height) / gear.root_circle_radius
         cosine = jnp.cos(load.angle)
         modes = jnp.stack([-arm * cosine, cosine, -jnp.sin(load.angle)], axis=1)  # (pairs, 3, positions)
-        blocks = blocks.at[0].add(-ring.relaxation(outline.root_half_angle))
+        own = blocks[:1] - ring.relaxation(outline.root_half_angle)[None]
+        blocks = jnp.concatenate([own, blocks[1:]])
         # the responding tooth i lies (i - j) steps from the loaded tooth j; K(-phi) = K(phi)^T
-        order = step * (np.arange(count)[:, None] - np.arange(count)[None])
-        both = jnp.stack([blocks, blocks.transpose(0, 2, 1)])
+        order = np.arange(count)[:, None] - np.arange(count)[None]
+        both = jnp.stack([blocks, blocks.mT])
         between = both[(order < 0).astype(int), abs(order)]
+        between = jnp.where(step > 0, between, between.mT)
         if not self.coupling:
             between = between * jnp.eye(count, dtype=between.dtype)[:, :, None, None]
         shape = jnp.einsum("iap,ijab,jbp->ijp", modes, between, modes)

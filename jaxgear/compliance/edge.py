@@ -25,12 +25,13 @@ References:
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import AbstractSpring, log
-from .hertz import ContactGeometry
+from ..numerics import AbstractSpring, log, on_both
+from .hertz import ContactGeometry, ContactSide
 from .laws import AbstractLaw, Cut, polynomial
 from .toothload import ToothLoad
 
@@ -74,34 +75,42 @@ def edge(
         geometry: local geometry of both flanks.
     """
 
-    def inside(load):
-        gear = load.outline.gear
-        return (gear.tip_roll_length**2 - load.roll_length**2) / (2 * gear.base_radius)
+    first, second = on_both(lambda given: _corner(*given, outside), (pinion, geometry.pinion), (wheel, geometry.wheel))
+    pinion_near = first.inside < second.inside
+    near = jax.tree.map(lambda *fields: jnp.where(pinion_near, *fields), first, second)
+    return Edge(distance=(near.inside + near.beyond)[:, None], wedge=near.wedge[:, None], reach=near.reach[:, None])
 
-    def beyond(load):
-        gear = load.outline.gear
-        return -(2 * gear.tip_roll_length + outside) * outside / (2 * gear.base_radius)
 
-    pinion_near = inside(pinion) < inside(wheel)
-    near = jnp.where(pinion_near, inside(pinion) + beyond(pinion), inside(wheel) + beyond(wheel))
+class _Corner(NamedTuple):
+    """A gear's tip corner next to its contacts, fields of shape (pairs, positions).
 
-    def choose(first, second):
-        return jnp.where(pinion_near[:, None], first, second)
+    Attributes:
+        inside: distance of the contact on the path from the corner along the flank [mm].
+        beyond: what being outside the path adds to it [mm], negative.
+        wedge, reach: as in `Edge`.
+    """
 
-    return Edge(
-        distance=near[:, None],
-        wedge=choose(
-            1e3 * _wedge_excess(pinion) / geometry.pinion.modulus,
-            1e3 * _wedge_excess(wheel) / geometry.wheel.modulus,
-        ),
-        reach=_WEDGE_REACH * choose(geometry.pinion.depth, geometry.wheel.depth),
+    inside: Real
+    beyond: Real
+    wedge: Real
+    reach: Real
+
+
+def _corner(load: ToothLoad, side: ContactSide, outside: Real) -> _Corner:
+    drawn = load.outline.curves.over(outside.shape)
+    tip, base = drawn.tip_roll_length, drawn.base_radius
+    return _Corner(
+        inside=(tip**2 - load.roll_length**2) / (2 * base),
+        beyond=-(2 * tip + outside) * outside / (2 * base),
+        wedge=1e3 * _wedge_excess(load) / side.modulus[:, 0],
+        reach=_WEDGE_REACH * side.depth[:, 0],
     )
 
 
 def _wedge_excess(load: ToothLoad) -> Float[Array, ""]:
     """K - 2 / pi of the wedge between flank and top land, loaded normal to the flank."""
-    gear = load.outline.gear
-    b = 0.5 * (jnp.pi / 2 + jnp.arctan(gear.tip_roll_length / gear.base_radius))
+    drawn = load.outline.curves
+    b = 0.5 * (jnp.pi / 2 + jnp.arctan(drawn.tip_roll_length / drawn.base_radius))
     twin = 0.5 * jnp.sin(2 * b)
     return jnp.sin(b) ** 2 / (b + twin) + jnp.cos(b) ** 2 / (b - twin) - 2 / jnp.pi
 

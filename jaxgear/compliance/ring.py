@@ -20,6 +20,7 @@ from jaxtyping import Array, Float
 Scalar = Float[Array, ""]
 
 MODES = ("moment", "shear", "normal")
+_HIGHEST_SHIFT = 3  # of a harmonic by the products of sines and cosines in the load modes
 
 
 def arc_compliance(half_angle: Scalar, thickness_ratio: Scalar, poisson: Scalar, spacing, harmonics: int):
@@ -49,7 +50,7 @@ def arc_compliance(half_angle: Scalar, thickness_ratio: Scalar, poisson: Scalar,
     cross = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [1.0, 1.0, 0.0]])
     matrix = jnp.pi * (even * jnp.asarray(same, even.dtype)[None] + odd * jnp.asarray(cross, odd.dtype)[None])
     breathing = 2 * jnp.pi * modes[2, 0, 0] ** 2 * uniform_compliance(thickness_ratio, poisson)
-    return matrix.at[:, 2, 2].add(breathing)
+    return matrix + breathing * jnp.asarray(np.diag([0.0, 0.0, 1.0]), breathing.dtype)[None]
 
 
 def relaxation(half_angle: Scalar) -> Float[Array, "3 3"]:
@@ -84,12 +85,12 @@ def arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
     serves all modes.
     """
     t = half_angle
-    order = np.arange(harmonics + 1, dtype=float)
+    order = np.arange(-_HIGHEST_SHIFT, harmonics + _HIGHEST_SHIFT + 1, dtype=float)
+    frequency, zero = jnp.asarray(order, t.dtype), order == 0
+    integrals = jnp.where(zero, 2 * t, 2 * jnp.sin(frequency * t) / jnp.where(zero, 1.0, frequency))
 
     def cosine(shift):  # int cos((n + shift) theta) over the arc, for each n
-        frequency = jnp.asarray(order + shift, t.dtype)
-        zero = order + shift == 0
-        return jnp.where(zero, 2 * t, 2 * jnp.sin(frequency * t) / jnp.where(zero, 1.0, frequency))
+        return integrals[_HIGHEST_SHIFT + shift :][: harmonics + 1]
 
     def even(*terms):  # cosine series of sum of amplitude * cos(shift theta)
         return sum(a * 0.5 * (cosine(s) + cosine(-s)) for a, s in terms)
@@ -109,7 +110,7 @@ def arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
         jnp.stack(shear, axis=-1) / force_resultant,
         jnp.stack(normal, axis=-1) / force_resultant,
     ]
-    scale = np.where(order == 0, 1 / (2 * np.pi), 1 / np.pi)
+    scale = np.where(np.arange(harmonics + 1) == 0, 1 / (2 * np.pi), 1 / np.pi)
     return jnp.stack(rows) * jnp.asarray(scale, t.dtype)[None, :, None]
 
 

@@ -3,8 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry.involute import load_angle
-from ..geometry.outline import Outline, involute_point
+from ..geometry.outline import Outline
 from ..numerics import Checked, result
 
 Real = Float[Array, "..."]
@@ -30,7 +29,7 @@ class ToothLoad(Checked):
 
 def tooth_load(outline: Outline, roll_length: Real) -> ToothLoad:
     """The load line of every point, which is the normal to the involute there."""
-    gear = outline.gear
-    angle = load_angle(gear, roll_length)
-    x, _ = involute_point(gear, roll_length)
-    return ToothLoad(outline, roll_length, angle, gear.base_radius / jnp.cos(angle), x / jnp.cos(angle))
+    drawn = outline.curves.over(roll_length.shape)
+    angle = jnp.arctan(roll_length / drawn.base_radius) - drawn.half_angle(roll_length)  # as `load_angle`
+    x, _ = drawn.involute(roll_length)
+    return ToothLoad(outline, roll_length, angle, drawn.base_radius / jnp.cos(angle), x / jnp.cos(angle))

@@ -21,20 +21,20 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 Real = Float[Array, "..."]
-Scalar = Float[Array, ""]
 
 # Beyond this many base pitches outside the path the gap is hundreds of um; it goes on along its tangent there.
 REACH = 0.4
 
 
 def corner_gap(
-    x: Real, tip_roll_length: Scalar, tip_base_radius: Scalar, mate_roll_length: Scalar, mate_base_radius: Scalar
+    x: Real, tip_roll_length: Real, tip_base_radius: Real, mate_roll_length: Real, mate_base_radius: Real
 ) -> tuple[Real, Real]:
     """Gap and contact point of a tip corner outside the path of contact.
 
     Args:
         x: distance outside the path along the line of action [mm], not negative.
-        tip_roll_length: roll length of the corner on its gear [mm].
+        tip_roll_length: roll length of the corner on its gear [mm]; this and what follows one number, or one for every
+            x.
         tip_base_radius: base radius of that gear [mm].
         mate_roll_length: roll length of the mate at the end of the path [mm].
         mate_base_radius: base radius of the mate [mm].

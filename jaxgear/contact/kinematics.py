@@ -1,5 +1,7 @@
 """Where the teeth touch over one base pitch: positions of the pairs, and both gears' sides of every contact."""
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,7 +11,7 @@ from jaxtyping import Array, Float
 from ..compliance import Plane
 from ..geometry import Gear, GearPair, PathOfContact, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import Checked, concrete, over_batch, program, real, result
+from ..numerics import Checked, concrete, on_both, over_batch, program, real, result
 from .corner import REACH, corner_gap
 from .resolution import Resolution
 
@@ -158,36 +160,42 @@ def contacts(pair: GearPair, contact: PathOfContact, path: Float[Array, "..."]) 
     lags by d/2, so a corner is d/2 farther out than its nominal position and its gap grows by half its slope times d.
     """
     pinion_base, wheel_base = contact.pinion_base_radius, contact.wheel_base_radius
-    before, after = contact.start - path, path - contact.end
+    approach = pair.wheel.tip_roll_length, wheel_base, contact.pinion_roll_length(contact.start), pinion_base
+    recess = pair.pinion.tip_roll_length, pinion_base, contact.wheel_roll_length(contact.end), wheel_base
+    before, after = on_both(
+        lambda given: _corner(*given, REACH * contact.base_pitch),
+        (contact.start - path, approach),
+        (path - contact.end, recess),
+    )
     on_path = jnp.clip(path, contact.start, contact.end)
-    approach = contact.pinion_roll_length(contact.start), pinion_base
-    recess = contact.wheel_roll_length(contact.end), wheel_base
-    reach = REACH * contact.base_pitch
-    gap_before, slope_before, pinion_rho = _corner(before, reach, pair.wheel.tip_roll_length, wheel_base, *approach)
-    gap_after, slope_after, wheel_rho = _corner(after, reach, pair.pinion.tip_roll_length, pinion_base, *recess)
     return Contacts(
-        jnp.where(before > 0, pinion_rho, contact.pinion_roll_length(on_path)),
-        jnp.where(after > 0, wheel_rho, contact.wheel_roll_length(on_path)),
-        gap_before + gap_after,
-        1 - 0.5e-3 * (slope_before + slope_after),
+        jnp.where(path < contact.start, before.mate_roll_length, contact.pinion_roll_length(on_path)),
+        jnp.where(path > contact.end, after.mate_roll_length, contact.wheel_roll_length(on_path)),
+        before.gap + after.gap,
+        1 - 0.5e-3 * (before.slope + after.slope),
     )
 
 
-def _corner(x, reach, tip_rho, tip_base, mate_rho, mate_base):
-    """Corner gap [um], its slope [um/mm] and the mate's roll length [mm].
+class _Corner(NamedTuple):
+    """A tip corner at the mate's flank: gap [um], its slope [um/mm] and the mate's roll length [mm]."""
+
+    gap: Float[Array, "..."]
+    slope: Float[Array, "..."]
+    mate_roll_length: Float[Array, "..."]
+
+
+def _corner(x, lengths, reach) -> _Corner:
+    """The corner at a distance outside the path [mm], zero on it; `lengths` as `corner_gap` takes them.
 
     Beyond `reach` the gap goes on along its tangent, so that far pairs stay finite and apart.
     """
     near = jnp.clip(x, 0.0, reach)
-    (gap, rho), (slope, _) = jax.jvp(
-        lambda t: corner_gap(t, tip_rho, tip_base, mate_rho, mate_base), (near,), (jnp.ones_like(near),)
-    )
+    # one number at every point each: a derivative then sums over the points once
+    lengths = [jnp.broadcast_to(length, x.shape) for length in lengths]
+    (gap, rho), (slope, _) = jax.jvp(lambda t: corner_gap(t, *lengths), (near,), (jnp.ones_like(near),))
     outside = x > 0
-    return (
-        jnp.where(outside, gap + slope * (jnp.maximum(x, reach) - reach), 0.0),
-        jnp.where(outside, slope, 0.0),
-        rho,
-    )
+    gap = gap + slope * (jnp.maximum(x, reach) - reach)
+    return _Corner(jnp.where(outside, gap, 0.0), jnp.where(outside, slope, 0.0), rho)
 
 
 def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Side, Side]:

@@ -13,7 +13,7 @@ from ..compliance.hertz import contact_geometry
 from ..compliance.toothload import tooth_load
 from ..geometry import GearPair, Margins, PathOfContact, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import AbstractSpring, concrete, program
+from ..numerics import AbstractSpring, concrete, on_both, program
 from .kinematics import Contacts, Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution, reach
 
@@ -173,9 +173,9 @@ def prepare_from(first_phase, pair: GearPair, compliance: AbstractCompliance, re
     moving = kinematics(pair, first_phase, resolution, compliance.plane)
     contact, dtype = moving.path_of_contact, moving.path.dtype
     points = contacts(pair, contact, moving.path)
-    outlines = outline(pair.pinion), outline(pair.wheel)
-    pinion = tooth_load(outlines[0], points.pinion_roll_length)
-    wheel = tooth_load(outlines[1], points.wheel_roll_length)
+    outlines = on_both(outline, pair.pinion, pair.wheel)
+    rolls = points.pinion_roll_length, points.wheel_roll_length
+    pinion, wheel = on_both(lambda given: tooth_load(*given), *zip(outlines, rolls))
     geometry = contact_geometry(pinion, wheel, compliance.plane, pair.face_width)
     base_pitch = contact.base_pitch
     outer = contacts(pair, contact, jnp.stack([moving.path[-1] - base_pitch, moving.path[0] + base_pitch]))

@@ -55,7 +55,9 @@ def solve(
     check_mesh("solve", mesh)
     operation = operation_of("solve", torque, mesh.slice_width.dtype)
     pinion, wheel = flanks_of("solve", mesh, pinion, wheel)
-    cycle = _cycle(mesh, operation, _solve(mesh, operation.torque, pinion, wheel), pinion, wheel)
+    # two programs: that of the contact, by far the longer one to compile, serves every kind of modification
+    removed = _material(mesh, operation.torque, pinion, wheel)
+    cycle = _cycle(mesh, operation, _solve_removed(mesh, operation.torque, removed), pinion, wheel)
     wider = _wider(mesh, cycle)
     return cycle if wider is None else solve(wider, operation, pinion=pinion, wheel=wheel)
 
@@ -124,6 +126,10 @@ def removed_material(
     check_mesh("removed_material", mesh)
     torque = operation_of("removed_material", torque, mesh.slice_width.dtype).torque
     pinion, wheel = flanks_of("removed_material", mesh, pinion, wheel)
+    return _material(mesh, torque, pinion, wheel)
+
+
+def _material(mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: AbstractModification) -> Load:
     if isinstance(pinion, NoModification) and isinstance(wheel, NoModification):
         sizes = mesh.resolution
         return real(np.zeros((sizes.chosen_pairs, sizes.slices, sizes.positions), torque.dtype))
@@ -224,11 +230,6 @@ def outermost(mesh: Mesh, removed: Load) -> Curve:
     fall = jnp.minimum(edge - jnp.stack([removed[-1, :, 1], removed[0, :, -2]]), 0.0)
     left = jnp.min(edge[..., None] + fall[..., None] * mesh.outer_steps[:, None], axis=1)
     return jnp.min(mesh.outer_gap + left / mesh.outer_lever, axis=0)
-
-
-@program
-def _solve(mesh: Mesh, torque: Scalar, pinion, wheel) -> dict[str, Array]:
-    return _solve_removed(mesh, torque, _removed(mesh, torque, pinion, wheel))
 
 
 @program

@@ -5,16 +5,60 @@ the path of the rack's tip arc centre, in the parameter g, the inclination of th
 circle, g = pressure angle where a tooth without undercut passes into the involute.
 """
 
-import jax
+from typing import NamedTuple
+
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import Checked, bracketed_root, program, result
 from .gear import Gear
-from .involute import half_tooth_angle
+from .involute import half_tooth_angle, involute
 
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
+
+
+class Curves(NamedTuple):
+    """The numbers that trochoid and involute of one gear are drawn by.
+
+    They are evaluated once and given the shape of all points (`over`): a derivative then sums over the points once for
+    each of these numbers, instead of wherever a number meets a point, and each sum is a loop to compile.
+
+    Attributes:
+        pitch_radius, base_radius: [mm].
+        base_half_angle: half tooth angle on the base circle [rad].
+        tip_roll_length: where the involute ends [mm].
+        offset, depth, rounding: `rack_tip` [mm].
+    """
+
+    pitch_radius: Real
+    base_radius: Real
+    base_half_angle: Real
+    tip_roll_length: Real
+    offset: Real
+    depth: Real
+    rounding: Real
+
+    def over(self, shape: tuple[int, ...]) -> "Curves":
+        """The same numbers at every point of an array."""
+        return Curves(*(jnp.broadcast_to(number, shape) for number in self))
+
+    def trochoid(self, g: Real) -> tuple[Real, Real]:
+        """Point (x, y) [mm] of the fillet at the parameter g [rad]."""
+        r = self.pitch_radius
+        phi = (self.depth / jnp.tan(g) + self.offset) / r
+        distance = self.depth / jnp.sin(g) + self.rounding
+        return r * jnp.sin(phi) - distance * jnp.cos(g - phi), r * jnp.cos(phi) - distance * jnp.sin(g - phi)
+
+    def half_angle(self, rho: Real) -> Real:
+        """`half_tooth_angle` [rad] at a roll length [mm]."""
+        return self.base_half_angle - involute(rho / self.base_radius)
+
+    def involute(self, rho: Real) -> tuple[Real, Real]:
+        """Point (x, y) [mm] of the involute at a roll length [mm]."""
+        r, gamma = jnp.sqrt(self.base_radius**2 + rho**2), self.half_angle(rho)
+        return r * jnp.sin(gamma), r * jnp.cos(gamma)
 
 
 class Outline(Checked):
@@ -22,6 +66,7 @@ class Outline(Checked):
 
     Attributes:
         gear: the gear.
+        curves: what fillet and involute are drawn by.
         junction: trochoid parameter where fillet and involute meet [rad].
         form_roll_length: roll length there [mm], the start of the usable involute (ISO 21771 d_Ff).
         root_half_angle: half angle subtended by the tooth at the root circle, theta_f [rad].
@@ -29,6 +74,7 @@ class Outline(Checked):
     """
 
     gear: Gear
+    curves: Curves = eqx.field(repr=False)
     junction: Scalar = result("rad")
     form_roll_length: Scalar = result("mm")
     root_half_angle: Scalar = result("rad")
@@ -37,7 +83,7 @@ class Outline(Checked):
     @property
     def junction_height(self) -> Scalar:
         """y of the junction [mm]."""
-        return trochoid(self.gear, self.junction)[1]
+        return self.curves.trochoid(self.junction)[1]
 
     @property
     def root_height(self) -> Scalar:
@@ -53,17 +99,23 @@ def outline(gear: Gear) -> Outline:
         centre
     E) written as a curve; its junction angle equals the involute's half tooth angle at d_Ff (ISO 21771).
     """
-    alpha = jnp.deg2rad(gear.pressure_angle)
-    end_x, end_y = trochoid(gear, jnp.full_like(alpha, jnp.pi / 2))
+    alpha, drawn = jnp.deg2rad(gear.pressure_angle), curves(gear)
+    end_x, end_y = drawn.trochoid(jnp.full_like(alpha, jnp.pi / 2))
     tangential = _tangential_form_roll_length(gear)
     # at the limit of undercut both junctions lie on the base circle; rounding must not choose between them
     undercut = tangential < -8 * jnp.finfo(tangential.dtype).eps * gear.pitch_radius
-    cut = _undercut_junction(gear)
+    cut = _undercut_junction(drawn, alpha)
     junction = jnp.where(undercut, cut, alpha)
-    x, y = trochoid(gear, cut)
+    x, y = drawn.trochoid(cut)
     rho_cut = jnp.sqrt(jnp.maximum(x**2 + y**2 - gear.base_radius**2, (1e-6 * gear.base_radius) ** 2))
     form = jnp.where(undercut, rho_cut, jnp.maximum(tangential, 0.0))
-    return Outline(gear, junction, form, jnp.arctan2(end_x, end_y), undercut.astype(form.dtype))
+    return Outline(gear, drawn, junction, form, jnp.arctan2(end_x, end_y), undercut.astype(form.dtype))
+
+
+def curves(gear: Gear) -> Curves:
+    """The numbers that the outline of a gear is drawn by."""
+    at_base = half_tooth_angle(gear, jnp.zeros_like(gear.base_radius))
+    return Curves(gear.pitch_radius, gear.base_radius, at_base, gear.tip_roll_length, *rack_tip(gear))
 
 
 def rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
@@ -76,17 +128,12 @@ def rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
 
 def trochoid(gear: Gear, g: Real) -> tuple[Real, Real]:
     """Point (x, y) [mm] of the fillet at the parameter g [rad]."""
-    offset, depth, tip = rack_tip(gear)
-    r = gear.pitch_radius
-    phi = (depth / jnp.tan(g) + offset) / r
-    distance = depth / jnp.sin(g) + tip
-    return r * jnp.sin(phi) - distance * jnp.cos(g - phi), r * jnp.cos(phi) - distance * jnp.sin(g - phi)
+    return curves(gear).over(jnp.shape(g)).trochoid(g)
 
 
 def involute_point(gear: Gear, rho: Real) -> tuple[Real, Real]:
     """Point (x, y) [mm] of the involute at a roll length [mm]."""
-    r, gamma = jnp.sqrt(gear.base_radius**2 + rho**2), half_tooth_angle(gear, rho)
-    return r * jnp.sin(gamma), r * jnp.cos(gamma)
+    return curves(gear).over(jnp.shape(rho)).involute(rho)
 
 
 def _tangential_form_roll_length(gear: Gear) -> Scalar:
@@ -96,22 +143,20 @@ def _tangential_form_roll_length(gear: Gear) -> Scalar:
     return gear.pitch_radius * jnp.sin(alpha) - straight * gear.module / jnp.sin(alpha)
 
 
-def _undercut_junction(gear: Gear) -> Scalar:
+def _undercut_junction(drawn: Curves, alpha: Scalar) -> Scalar:
     """Trochoid parameter where the fillet crosses the involute of an undercut tooth."""
-    alpha = jnp.deg2rad(gear.pressure_angle)
-    top, bottom = alpha, jnp.full_like(alpha, jnp.pi / 2)
-    at_base = jax.lax.stop_gradient(bracketed_root(_height_above_base, top, bottom, gear))
-    return bracketed_root(_angle_outside_involute, top, at_base, gear)
+    at_base = bracketed_root(_height_above_base, alpha, jnp.full_like(alpha, jnp.pi / 2), drawn)
+    return bracketed_root(_angle_outside_involute, alpha, at_base, drawn)
 
 
 # functions of the module, not of a call: a root search compiles once for each function that it is given
-def _height_above_base(g: Real, gear: Gear) -> Real:
-    x, y = trochoid(gear, g)
-    return jnp.sqrt(x**2 + y**2) - gear.base_radius
+def _height_above_base(g: Real, drawn: Curves) -> Real:
+    x, y = drawn.trochoid(g)
+    return jnp.sqrt(x**2 + y**2) - drawn.base_radius
 
 
-def _angle_outside_involute(g: Real, gear: Gear) -> Real:
-    x, y = trochoid(gear, g)
-    squared = x**2 + y**2 - gear.base_radius**2
-    rho = jnp.sqrt(jnp.maximum(squared, (1e-9 * gear.base_radius) ** 2))
-    return jnp.arctan2(x, y) - half_tooth_angle(gear, rho)
+def _angle_outside_involute(g: Real, drawn: Curves) -> Real:
+    x, y = drawn.trochoid(g)
+    squared = x**2 + y**2 - drawn.base_radius**2
+    rho = jnp.sqrt(jnp.maximum(squared, (1e-9 * drawn.base_radius) ** 2))
+    return jnp.arctan2(x, y) - drawn.half_angle(rho)

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ..numerics import Checked, number, program
+from ..numerics import Checked, number, on_both, program
 from .gear import Gear
 from .margins import Margins, faults_between, margins_between
 from .outline import outline
@@ -83,7 +83,8 @@ def path_of_contact(pair: GearPair) -> PathOfContact:
 @program
 def margins(pair: GearPair) -> Margins:
     """How far a pair is from what cannot run; finite and differentiable for impossible gears too."""
-    return margins_between(outline(pair.pinion), outline(pair.wheel), path_of_contact(pair), pair.center_distance)
+    outlines = on_both(outline, pair.pinion, pair.wheel)
+    return margins_between(*outlines, path_of_contact(pair), pair.center_distance)
 
 
 def explain(pair: GearPair) -> tuple[str, ...]:

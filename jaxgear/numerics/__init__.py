@@ -19,11 +19,14 @@ from .fields import real as real
 from .fields import result as result
 from .fields import whole as whole
 from .frozen import Frozen as Frozen
+from .leading import on_both as on_both
 from .leading import over_batch as over_batch
 from .logarithm import log as log
+from .programs import kernel as kernel
 from .programs import program as program
 from .progress import Callback as Callback
 from .quadrature import gauss_legendre as gauss_legendre
+from .quick import quick_jit as quick_jit
 from .risk import AbstractMeasure as AbstractMeasure
 from .risk import CVaR as CVaR
 from .risk import Mean as Mean

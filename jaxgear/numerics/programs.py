@@ -16,7 +16,8 @@ import equinox as eqx
 import jax
 import numpy as np
 from jax.experimental.serialize_executable import deserialize_and_load, serialize
-from jax.extend.core import get_opaque_trace_state
+
+from .quick import is_eager, quick_jit, quick_options
 
 _Given = ParamSpec("_Given")
 _Found = TypeVar("_Found")
@@ -75,13 +76,12 @@ class Store:
     def __init__(self, shelf: Shelf, threads: int = 2):
         self._shelf, self._pool = shelf, ThreadPoolExecutor(threads, "compiler")
         self._programs: dict[Any, _Program] = {}
-        self._untraced = get_opaque_trace_state()
 
-    def program(self, function: Callable, arguments: Any) -> tuple[_Program, list] | None:
+    def program(self, function: Callable, arguments: Any, *, quick: bool) -> tuple[_Program, list] | None:
         """The program of a function for some arguments, and the arrays among them; None where JAX traces them."""
         leaves, tree = jax.tree.flatten(arguments)
         traced = any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
-        if traced or get_opaque_trace_state() != self._untraced or jax.process_count() > 1:
+        if traced or not is_eager() or jax.process_count() > 1:
             return None
         fixed = [_shape_of(leaf) or leaf for leaf in leaves]
         precision = jax.dtypes.canonicalize_dtype(float)  # which a context can change
@@ -91,11 +91,13 @@ class Store:
         except TypeError:  # something that cannot be told from others
             return None
         if known is None:
-            known = self._programs[key] = self._made(function, jax.tree.unflatten(tree, fixed), str(precision))
+            known = self._programs[key] = self._made(
+                function, jax.tree.unflatten(tree, fixed), str(precision), quick_options() if quick else None
+            )
         return known, [leaf for leaf, shape in zip(leaves, fixed) if isinstance(shape, _Shape)]
 
-    def _made(self, function: Callable, arguments: Any, precision: str) -> _Program:
-        made_of = _recipe((function, arguments, precision))
+    def _made(self, function: Callable, arguments: Any, precision: str, options: dict | None) -> _Program:
+        made_of = _recipe((function, arguments, precision, options))
         kept = None if made_of is None else self._shelf.read(made_of)
         if kept is not None:
             _register()
@@ -104,7 +106,7 @@ class Store:
         lowered, result = _lowered(function, arguments)
 
         def compiled() -> _Run:
-            run = lowered.compile()
+            run = lowered.compile(options)
             kept = None if made_of is None else _packed(run, result)
             if made_of is not None and kept is not None:
                 self._shelf.write(made_of, kept)
@@ -122,28 +124,39 @@ def keep(store: Store | None) -> None:
     _store = store
 
 
+def kernel(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
+    """`eqx.filter_jit`, for a function that runs for longer than it compiles; kept where a store is in use."""
+    return _compiled(function, quick=False)
+
+
 def program(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
-    """Compiles a function of arrays and other things, as `eqx.filter_jit` does; kept where a store is in use."""
-    jitted = eqx.filter_jit(function)
+    """`quick_jit`, for a function that compiles for longer than it runs; kept where a store is in use."""
+    return _compiled(function, quick=True)
+
+
+def _compiled(function: Callable[_Given, _Found], *, quick: bool) -> Callable[_Given, _Found]:
+    jitted = quick_jit(function) if quick else eqx.filter_jit(function)
 
     @functools.wraps(function)
     def run(*args: _Given.args, **options: _Given.kwargs) -> _Found:
-        found = None if _store is None else _store.program(function, (args, options))
+        found = None if _store is None else _store.program(function, (args, options), quick=quick)
         if found is None:
             return jitted(*args, **options)
         made, arrays = found
         return made(arrays)
 
+    run._quick = quick  # type: ignore[attr-defined]
     return run
 
 
 def begin(function: Callable, *args, **options) -> Any:
-    """Starts to compile a `program` for arguments of these shapes, where a store is in use.
+    """Starts to compile a `program` or `kernel` for arguments of these shapes, where a store is in use.
 
     Returns:
         what it will return, with a `jax.ShapeDtypeStruct` in place of every array; None where there is no store.
     """
-    found = None if _store is None else _store.program(function.__wrapped__, (args, options))  # type: ignore[attr-defined]
+    made: Any = function
+    found = None if _store is None else _store.program(made.__wrapped__, (args, options), quick=made._quick)
     if found is None:
         return None
     result = found[0].result

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from ..conditions.batches import padded, side_by_side
-from ..numerics import program
+from ..numerics import kernel
 from .goal import counted
 from .problem import Problem, Score
 from .starts import real_points
@@ -19,7 +19,7 @@ def scores(problem: Problem, points) -> Score:
     return jax.tree.map(lambda part: part[:count], _scores(problem, real_points(problem, padded(points, batch)), batch))
 
 
-@program
+@kernel
 def _scores(problem: Problem, points, batch: int) -> Score:
     return jax.lax.map(problem.score, points, batch_size=batch)
 

@@ -5,7 +5,7 @@ from typing import ClassVar
 import jax
 import jax.numpy as jnp
 
-from ..numerics import program
+from ..numerics import kernel
 from .problem import Problem
 from .smooth import AbstractStaged, followed, lagrangian, merged
 from .starts import real_points, start_points
@@ -25,7 +25,7 @@ class Adam(AbstractStaged):
         return real_points(problem, start_points(problem, self.starts))
 
     @staticmethod
-    @program
+    @kernel
     def advance(problem: Problem, points, multipliers, analyses, width, rate, scale):
         import optax
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from ..conditions.batches import padded
 from ..contact.parts import half_way, parts
-from ..numerics import program
+from ..numerics import kernel
 from .linearization import Linearization, Pieces
 from .problem import Problem
 from .starts import real_points
@@ -67,6 +67,6 @@ def _together(each: tuple[Pieces, ...]) -> Pieces:
     return jax.tree.map(lambda *arrays: np.concatenate(arrays, axis=1), *each)
 
 
-@program
+@kernel
 def _linearizations(problem: Problem, points) -> Linearization:
     return jax.vmap(problem.linearize)(points)

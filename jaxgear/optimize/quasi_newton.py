@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..numerics import count, program
+from ..numerics import count, kernel
 from .problem import Problem
 from .smooth import STAGE_WIDTHS, AbstractStaged, followed, lagrangian, merged
 from .starts import real_points, start_points
@@ -37,7 +37,7 @@ class LBFGS(AbstractStaged):
         return real_points(problem, np.arcsin(2 * points - 1))
 
     @staticmethod
-    @program
+    @kernel
     def advance(problem: Problem, angles, multipliers, analyses, width, rate, scale):
         import optax
 

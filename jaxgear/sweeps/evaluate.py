@@ -13,7 +13,7 @@ from jax.sharding import Mesh as DeviceMesh
 from ..conditions import Variants, joined, solve_case, solved
 from ..conditions.batches import divided, everywhere, local_devices, over_devices, padded, side_by_side
 from ..metrics import Quantity
-from ..numerics import AbstractMeasure, program
+from ..numerics import AbstractMeasure, kernel
 from .columns import CONVERGED, result_columns
 
 # A loop of one step is unrolled by the compiler and rounds differently: with two or more, the rows do not depend on how
@@ -93,7 +93,7 @@ class Evaluator:
         return finished
 
 
-@program
+@kernel
 def _evaluate(task: _Task, rows, data):
     return over_devices(partial(_numbers, task), rows, data, batch=task.batch, devices=task.devices)
 

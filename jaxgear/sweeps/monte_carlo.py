@@ -13,7 +13,7 @@ from ..conditions.batches import local_devices, over_devices, side_by_side
 from ..contact import Mesh, removed_material, solve_removed
 from ..metrics import Quantity, quantity_of
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import AbstractMeasure, Checked, Quantile, Worst, check, program, real, result, whole
+from ..numerics import AbstractMeasure, Checked, Quantile, Worst, check, kernel, real, result, whole
 from ..tolerance import Tolerance
 from ..tolerance.deviation import deviation_field, deviation_of, flank_basis
 from ..tolerance.limits import check_slices
@@ -163,7 +163,7 @@ def _run(task, results: tuple[Quantity, ...], count: int) -> tuple[np.ndarray, n
     return curves, converged, numbers
 
 
-@program
+@kernel
 def _block(task, numbers, results: tuple[Quantity, ...], batch: int, devices):
     mesh, torque, tolerance, pinion, wheel, key = task
     design, basis = removed_material(mesh, torque, pinion=pinion, wheel=wheel), flank_basis(mesh, torque)
