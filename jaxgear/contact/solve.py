@@ -9,7 +9,16 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..microgeometry import AbstractModification, NoModification, terms
-from ..numerics import ContactProblem, concrete, minimum, safe_sqrt, solve_contact, tangent_stiffness
+from ..numerics import (
+    ContactProblem,
+    by_numbers,
+    concrete,
+    minimum,
+    safe_sqrt,
+    solve_contact,
+    stored,
+    tangent_stiffness,
+)
 from .cycle import MeshCycle
 from .mesh import Mesh, prepare
 from .operation import Operation, operation_of
@@ -133,8 +142,14 @@ def _removed(mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: Ab
     for modification, points in zip((pinion, wheel), zip(*flanks)):
         # every term on its own, since most vary along the profile or along the face only
         for term in terms(_in_precision(modification, dtype)):
-            total = total + sum(weight * term(point) for weight, point in zip(weights, points)) / sum(weights)
+            total = total + _across_patch(term, points, weights)
     return total
+
+
+@by_numbers
+def _across_patch(term: AbstractModification, points, weights) -> Load:
+    """Weighted mean of what a modification removes at the points across the contact [um]."""
+    return sum(weight * term(point) for weight, point in zip(weights, points)) / sum(weights)
 
 
 def check_mesh(owner: str, mesh: Any) -> None:
@@ -213,7 +228,7 @@ def _solve(mesh: Mesh, torque: Scalar, pinion, wheel) -> dict[str, Array]:
 def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> dict[str, Array]:
     force = _force(mesh, torque)
     removed = removed.astype(force.dtype)
-    gap = mesh.corner_gap[:, None] + removed
+    gap = stored(mesh.corner_gap[:, None] + removed)
     problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, force)
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
     windup = mesh.hub * force / mesh.pair.face_width
