@@ -12,7 +12,18 @@ from jaxtyping import Array, Bool, Float
 from ..compliance import AbstractCompliance
 from ..geometry import GearPair
 from ..microgeometry import AbstractModification, NoModification, terms
-from ..numerics import ContactProblem, concrete, minimum, program, real, safe_sqrt, solve_contact, tangent_stiffness
+from ..numerics import (
+    ContactProblem,
+    by_numbers,
+    concrete,
+    minimum,
+    program,
+    real,
+    safe_sqrt,
+    solve_contact,
+    stored,
+    tangent_stiffness,
+)
 from ..numerics.programs import begin
 from .cycle import MeshCycle
 from .mesh import Mesh, prepare, prepare_from
@@ -147,8 +158,14 @@ def _removed(mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: Ab
     for modification, points in zip((pinion, wheel), zip(*flanks)):
         # every term on its own, since most vary along the profile or along the face only
         for term in terms(_in_precision(modification, dtype)):
-            total = total + sum(weight * term(point) for weight, point in zip(weights, points)) / sum(weights)
+            total = total + _across_patch(term, points, weights)
     return total
+
+
+@by_numbers
+def _across_patch(term: AbstractModification, points, weights) -> Load:
+    """Weighted mean of what a modification removes at the points across the contact [um]."""
+    return sum(weight * term(point) for weight, point in zip(weights, points)) / sum(weights)
 
 
 def begin_contact(pair: GearPair, compliance: AbstractCompliance, first: Resolution, resolution: Resolution) -> None:
@@ -236,7 +253,7 @@ def outermost(mesh: Mesh, removed: Load) -> Curve:
 def _solve_removed(mesh: Mesh, torque: Scalar, removed: Load) -> dict[str, Array]:
     force = _force(mesh, torque)
     removed = removed.astype(force.dtype)
-    gap = mesh.corner_gap[:, None] + removed
+    gap = stored(mesh.corner_gap[:, None] + removed)
     problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, force)
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
     windup = mesh.hub * force / mesh.pair.face_width

@@ -1,6 +1,7 @@
 """Modifications along the profile. Names of ISO 21771: C_alpha_a, C_alpha_f, C_alpha, C_H_alpha."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -11,7 +12,7 @@ from .curves import AbstractCurve, Linear, Parabolic
 
 def relief(distance, amount, length, curve: AbstractCurve) -> Float[Array, "..."]:
     """Relief [um] at a distance from its end [mm]; zero beyond its start, and everywhere for a length of zero."""
-    d = jnp.maximum(1 - jnp.maximum(distance, 0.0) * safe_divide(1.0, length), 0.0)
+    d = jax.lax.clamp(0.0, 1 - distance * safe_divide(1.0, length), 1.0)
     return jnp.where(length > 0, amount, 0.0) * jnp.where(d > 0, curve(d), 0.0)
 
 

@@ -38,3 +38,5 @@ from .safe import safe_log as safe_log
 from .safe import safe_power as safe_power
 from .safe import safe_sqrt as safe_sqrt
 from .spring import AbstractSpring as AbstractSpring
+from .stored import stored as stored
+from .tangents import by_numbers as by_numbers

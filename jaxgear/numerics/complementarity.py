@@ -28,16 +28,24 @@ from jaxtyping import Array, Bool, Float
 from .contact_problem import ContactProblem, ContactSolution
 from .elimination import at_approach, balance, factorize, product
 from .spring import LOAD_FLOOR, AbstractSpring
+from .stored import unit
 from .tangents import jvp_of_given
 
 Rows = list[Float[Array, "slices positions"]]
 Slopes = list[Float[Array, "#slices positions"]]  # one row where a secant is the same in every slice
 Curve = Float[Array, " positions"]
 
-# Steps with the secants of the springs under equal loads: they find most of the active set at a tenth of the cost.
-_SECANT_STEPS = 3
-# Newton steps in single precision before the first residual: enough to be down to its rounding, as a rule.
-_SINGLE_STEPS = 2
+# Steps with the secants of the springs under the loads of the start: they find most of the active set at a tenth of the
+# cost.
+_SECANT_STEPS = 2
+# Iterations for the load of a spring on its own at a prescribed approach.
+_OWN_STEPS = 3
+# Newton steps with secants that follow the logarithm of the load: from where they lead, one step with the laws is down
+# to the rounding of single precision, as a rule, at a third of the cost of another one with the laws.
+_LOGARITHM_STEPS = 2
+# A secant follows the logarithm between these multiples of the load at the start, and changes per logarithm by this
+# share of itself at most: slopes stay positive.
+_LEAST, _MOST, _STEEPEST = 1e-3, 5.0, 0.3
 # Residual of a solution where the caller does not choose. In double precision that is a tenth of a femtometre on an
 # approach of 10 um.
 _TOLERANCE = {jnp.dtype(jnp.float32): 5e-6, jnp.dtype(jnp.float64): 1e-11}
@@ -88,21 +96,30 @@ def tangent_stiffness(problem: ContactProblem, solution: ContactSolution) -> Cur
 def _solve(steps: int, tolerance: float, problem: ContactProblem, common: Curve) -> tuple[Rows, Curve, Curve]:
     """The iterate v, the approach and the residual; `common` is what has been taken out of the gaps."""
     single = _cast(problem, jnp.float32)
-    v, secant = _start(single)
-
-    def with_secants(_, state):
-        return _newton(single, state[0], secant, secant)
-
-    def with_laws(_, state):
-        load = _carried(state[0])
-        secant = _secants(single, load)
-        return _newton(single, state[0], secant, _slopes(single, load, secant))
-
-    state = jax.lax.fori_loop(0, _SECANT_STEPS, with_secants, (v, jnp.zeros_like(single.lever[0])))
-    state = jax.lax.fori_loop(0, _SINGLE_STEPS, with_laws, state)
-    v, approach = _cast(state, common.dtype)
+    v, approach = _cast(_near(single), common.dtype)
     approach = approach if problem.approach is None else problem.approach
     return _iterate(steps, tolerance, problem, single, common, v, approach)
+
+
+def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
+    """Iterate and approach near the solution, by one evaluation of the laws at its end."""
+    v, start, secant = _start(problem)
+    start = [jnp.maximum(q, LOAD_FLOOR) for q in start]
+    rate = [jnp.clip(k - c, -_STEEPEST * c, _STEEPEST * c) for k, c in zip(_slopes(problem, start, secant), secant)]
+
+    def with_secants(_, state):
+        return _newton(problem, state[0], secant, secant)
+
+    def with_logarithms(_, state):
+        grown = [jnp.log(jnp.clip(q / q0, _LEAST, _MOST)) for q, q0 in zip(_carried(state[0]), start)]
+        followed = [c + k * x for c, k, x in zip(secant, rate, grown)]
+        return _newton(problem, state[0], followed, [c + k for c, k in zip(followed, rate)])
+
+    state = jax.lax.fori_loop(0, _SECANT_STEPS, with_secants, (v, jnp.zeros_like(problem.lever[0])))
+    v, _ = jax.lax.fori_loop(0, _LOGARITHM_STEPS, with_logarithms, state)
+    load = _carried(v)
+    exact = _secants(problem, load)
+    return _newton(problem, v, exact, _slopes(problem, load, exact))
 
 
 def _iterate(
@@ -147,13 +164,15 @@ def _solve_jvp(steps, tolerance, primals, tangents):
 
     def conditions(data):
         d = approach if data.approach is None else data.approach
-        mismatch = [y + law.deflection(q) for y, law, q in zip(_opening(data, load, d), _laws(data), load)]
-        return mismatch, d if data.load is None else _total(data, load) - data.load
+        mismatch = [y + law.deflection(q) for y, law, q in zip(_without_gap(data, load, d), _laws(data), load)]
+        return jnp.stack(mismatch) + data.gap, d if data.load is None else _total(data, load) - data.load
 
     _, (mismatch_dot, last_dot) = jvp_of_given(conditions, problem, problem_dot)
     slope = _slopes(problem, load, _secants(problem, load))
     factors = factorize(problem.compliance, problem.lever, _active(problem, v), slope)
-    known = [-dot for dot in mismatch_dot]
+    # the sum and the division keep the loops of reverse mode apart: its rows are stored before they are put together
+    place = jnp.arange(len(v))[:, None, None]
+    known = [-jnp.sum(jnp.where(place == i, mismatch_dot, 0.0), axis=0) / unit(row) for i, row in enumerate(v)]
     if problem.load is None:
         v_dot, approach_dot = at_approach(factors, known, jnp.zeros_like(approach)), last_dot
     else:
@@ -161,32 +180,33 @@ def _solve_jvp(steps, tolerance, primals, tangents):
     return (v, approach, residual), (v_dot, approach_dot, jnp.zeros_like(residual))
 
 
-def _start(problem: ContactProblem) -> tuple[Rows, Slopes]:
-    """Equal loads on every spring that can be in contact at all, and the secants of the springs under them.
+def _start(problem: ContactProblem) -> tuple[Rows, Slopes, Slopes]:
+    """Equal loads on every spring that can be in contact at all, these loads, and the secants under them.
 
     The secants do not depend on the gaps: for many problems that differ in their gaps alone they are evaluated once.
     """
     if problem.load is None:
         return _start_at(problem)
     even = problem.load / jnp.sum(problem.weight)
-    secant = _secants(problem, [jnp.broadcast_to(even, lever[None].shape) for lever in problem.lever])
+    loads = [jnp.broadcast_to(even, lever[None].shape) for lever in problem.lever]
+    secant = _secants(problem, loads)
     # gaps wider than the approach of any one spring that bears the load alone stay open
     alone = [
         jnp.max(gap + (c + problem.compliance[i, i][None]) * even, axis=0) / lever
         for i, (gap, c, lever) in enumerate(zip(problem.gap, secant, problem.lever))
     ]
     bound = jnp.min(jnp.stack(alone), axis=0)
-    return [(lever * bound)[None] - gap for lever, gap in zip(problem.lever, problem.gap)], secant
+    return [(lever * bound)[None] - gap for lever, gap in zip(problem.lever, problem.gap)], loads, secant
 
 
-def _start_at(problem: ContactProblem) -> tuple[Rows, Slopes]:
-    """Contact wherever the approach closes the gap, and the secants under the loads of every spring on its own."""
+def _start_at(problem: ContactProblem) -> tuple[Rows, Slopes, Slopes]:
+    """Contact wherever the approach closes the gap, the loads of every spring on its own, and their secants."""
     closed = [(lever * problem.approach)[None] - gap for lever, gap in zip(problem.lever, problem.gap)]
     load = [jnp.ones_like(row) for row in closed]
-    for _ in range(_SECANT_STEPS):
+    for _ in range(_OWN_STEPS):
         secant = _secants(problem, load)
         load = [row / (c + problem.compliance[i, i][None]) for i, (row, c) in enumerate(zip(closed, secant))]
-    return closed, _secants(problem, load)
+    return closed, load, _secants(problem, load)
 
 
 def _active(problem: ContactProblem, v: Rows) -> list[Bool[Array, "slices positions"]]:
@@ -235,9 +255,13 @@ def _newton(problem: ContactProblem, v: Rows, secant: Slopes, slope: Slopes) -> 
 
 def _opening(problem, load: Rows, approach: Curve) -> Rows:
     """y without the springs' own deflection."""
+    return [y + gap for y, gap in zip(_without_gap(problem, load, approach), problem.gap)]
+
+
+def _without_gap(problem, load: Rows, approach: Curve) -> Rows:
     result = []
-    for row, gap, lever in zip(problem.compliance, problem.gap, problem.lever):
-        result.append(sum(c[None] * q for c, q in zip(row, load)) + gap - (lever * approach)[None])
+    for row, lever in zip(problem.compliance, problem.lever):
+        result.append(sum(c[None] * q for c, q in zip(row, load)) - (lever * approach)[None])
     return result
 
 
