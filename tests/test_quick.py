@@ -11,7 +11,7 @@ from jaxgear.numerics import quick, quick_jit
 @pytest.fixture
 def compiler(monkeypatch):
     """The options that every program was compiled with, for a version of JAX that knows them."""
-    monkeypatch.setattr(quick, "quick_options", lambda: quick._OPTIONS)
+    monkeypatch.setattr(quick, "quick_options", lambda: quick.OPTIONS)
     given, whole = [], eqx.filter_jit
 
     def recorded(function, **options):

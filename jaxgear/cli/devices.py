@@ -5,21 +5,20 @@ from importlib.metadata import version
 
 import jax
 
-# XLA without its optimizations and without the slower one of its code generators; a version that does not know a flag
-# ends the process, so these are for the versions that were tried.
-_QUICK_COMPILER = {"xla_backend_optimization_level": "0", "xla_cpu_use_fusion_emitters": "false"}
-_TRIED = "0.10."
+from ..numerics.quick import OPTIONS, TRIED
+
 _DEVICES_FLAG = "xla_force_host_platform_device_count"
 
 
 def compile_quickly() -> None:
     """Lets XLA compile in a third of the time to programs that run half as long again, unless the user has said how.
 
-    For commands whose programs take longer to compile than to run; before JAX runs anything.
+    For commands whose kernels too take longer to compile than to run; before JAX runs anything. A version that does not
+    know a flag ends the process.
     """
     given = os.environ.get("XLA_FLAGS", "")
-    if version("jaxlib").startswith(_TRIED) and not any(flag in given for flag in _QUICK_COMPILER):
-        flags = (f"--{flag}={value}" for flag, value in _QUICK_COMPILER.items())
+    if version("jaxlib").startswith(TRIED) and not any(flag in given for flag in OPTIONS):
+        flags = (f"--{flag}={str(value).lower()}" for flag, value in OPTIONS.items())
         os.environ["XLA_FLAGS"] = " ".join((given, *flags)).strip()
 
 

@@ -24,7 +24,17 @@ _Found = TypeVar("_Found")
 _Run = Callable[..., Sequence[jax.Array]]
 
 # Packages whose functions and classes a program may be made of: with their versions they are what their names say.
-_KNOWN = ("jaxgear", "jax", "jaxlib", "equinox", "numpy", "builtins", "functools", "operator", "collections")
+_KNOWN = (
+    __name__.partition(".")[0],
+    "jax",
+    "jaxlib",
+    "equinox",
+    "numpy",
+    "builtins",
+    "functools",
+    "operator",
+    "collections",
+)
 
 
 class Shelf(Protocol):

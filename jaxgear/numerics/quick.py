@@ -16,8 +16,8 @@ _Found = TypeVar("_Found")
 
 # XLA without its optimizations and without the slower one of its code generators; a version that does not know an
 # option refuses to compile, so these are for the versions that were tried.
-_OPTIONS: dict[str, Any] = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": False}
-_TRIED = "0.10."
+OPTIONS: dict[str, Any] = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": False}
+TRIED = "0.10."
 
 
 def quick_jit(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
@@ -27,7 +27,7 @@ def quick_jit(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
     another program, under `jax.jit`, `jax.vmap` or `jax.grad`, they are compiled as that one is: with all
     optimizations, unless the user says otherwise.
     """
-    options_of_jax: dict[str, Any] = {"compiler_options": _OPTIONS}
+    options_of_jax: dict[str, Any] = {"compiler_options": OPTIONS}
     quick, full = eqx.filter_jit(function, **options_of_jax), eqx.filter_jit(function)
 
     @functools.wraps(function)
@@ -41,8 +41,8 @@ def quick_jit(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
 def quick_options() -> dict[str, Any] | None:
     """Options for JAX's compiler; None where it does not know them, or the user has said how to compile."""
     given = os.environ.get("XLA_FLAGS", "")
-    tried = version("jaxlib").startswith(_TRIED) and jax.default_backend() == "cpu"
-    return _OPTIONS if tried and not any(option in given for option in _OPTIONS) else None
+    tried = version("jaxlib").startswith(TRIED) and jax.default_backend() == "cpu"
+    return OPTIONS if tried and not any(option in given for option in OPTIONS) else None
 
 
 def is_eager() -> bool:
