@@ -69,4 +69,7 @@ def _together(each: tuple[Pieces, ...]) -> Pieces:
 
 @kernel
 def _linearizations(problem: Problem, points) -> Linearization:
-    return jax.vmap(problem.linearize)(points)
+    # one point after the other: as quick on a processor, whose cores a single analysis keeps busy, and compiled in half
+    # the time; an accelerator needs all of them to be busy
+    batch = None if jax.default_backend() == "cpu" else len(points)
+    return jax.lax.map(problem.linearize, points, batch_size=batch)
