@@ -12,7 +12,9 @@ from .curves import AbstractCurve, Linear, Parabolic
 
 def relief(distance, amount, length, curve: AbstractCurve) -> Float[Array, "..."]:
     """Relief [um] at a distance from its end [mm]; zero beyond its start, and everywhere for a length of zero."""
-    d = jax.lax.clamp(0.0, 1 - distance * safe_divide(1.0, length), 1.0)
+    inside = jnp.asarray(1 - distance * safe_divide(1.0, length))
+    # no nested maxima: the derivative of a tie is a division
+    d = jax.lax.clamp(inside.dtype.type(0), inside, inside.dtype.type(1))
     return jnp.where(length > 0, amount, 0.0) * jnp.where(d > 0, curve(d), 0.0)
 
 

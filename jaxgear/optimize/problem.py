@@ -119,11 +119,10 @@ class Problem(eqx.Module):
 
     def parameters(self, x: Vector | np.ndarray) -> dict[str, Scalar]:
         """Parameters at a point of the unit box."""
-        low: Array | np.ndarray = self.low
-        high: Array | np.ndarray = self.high
-        if isinstance(x, np.ndarray) and not isinstance(low, jax.core.Tracer):  # on the host, where nothing compiles
-            low, high = np.asarray(low), np.asarray(high)
-        return dict(zip(self.names, low + x * (high - low)))
+        if isinstance(x, np.ndarray) and not isinstance(self.low, jax.core.Tracer):  # NumPy has nothing to compile
+            low, high = np.asarray(self.low), np.asarray(self.high)
+            return dict(zip(self.names, map(real, low + x * (high - low))))
+        return dict(zip(self.names, self.low + x * (self.high - self.low)))
 
     def modifications(self, x: Vector | np.ndarray) -> tuple[AbstractModification, AbstractModification]:
         """Modifications at a point of the unit box.
