@@ -1,5 +1,7 @@
 """What the commands `analyze` and `optimize` do, with their options; `sweep` has its own module."""
 
+import importlib
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,8 @@ from .devices import compile_quickly
 from .progress import Stages
 from .run import default_folder, opened, run
 
+_SEARCH, _FIGURES = ("scipy.optimize", "scipy.stats"), ("matplotlib.pyplot",)
+
 
 def analyze(file: Path, output: Path | None, *, figures: bool, cache: bool) -> bool:
     """Evaluates the unmodified pair and the modification of the file; False when a solution failed."""
@@ -24,6 +28,7 @@ def analyze(file: Path, output: Path | None, *, figures: bool, cache: bool) -> b
             problem = f"analyze needs numbers, these are free: {free}; use jaxgear optimize"
             raise DesignFileError("variables", problem, file)
         with run(design, output or default_folder(file, "analyze"), stages) as current:
+            _import_ahead(*_FIGURES * figures)
             current.prepare()
             current.evaluate("unmodified", NoModification(), NoModification())
             pinion, wheel = design.design({})
@@ -41,6 +46,7 @@ def optimize(file: Path, output: Path | None, *, method: str | None, quick: bool
         request = optimize_request(design, method=method, quick=quick)
         target = output or default_folder(file, "optimize", request.method, quick=quick)
         with run(design, target, stages) as current:
+            _import_ahead(*_SEARCH, *_FIGURES * figures)
             current.prepare(quick=quick, finer=request.finer)
             load = np.asarray(design.torque), np.asarray(design.optimize.application_factor)
             relief = _iso_relief(design.pair(), *load)
@@ -48,6 +54,11 @@ def optimize(file: Path, output: Path | None, *, method: str | None, quick: bool
             current.search(request, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
             current.write(figures=figures)
     return current.show()
+
+
+def _import_ahead(*modules: str) -> None:
+    """Imports what is needed later in another thread: this one will wait for the compiler."""
+    threading.Thread(target=lambda: [importlib.import_module(module) for module in modules]).start()
 
 
 @program
