@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import subprocess
 import sys
 import threading
@@ -117,6 +118,20 @@ def test_a_contact_that_was_begun_compiles_nothing_more(shelf, traced):
 def test_a_function_that_can_change_without_a_word_is_not_kept(shelf):
     scaled(jnp.ones(3), "twice")
     assert not shelf
+
+
+def test_a_program_that_cannot_be_loaded_is_compiled_again(traced, monkeypatch):
+    class Full(dict):
+        """Has everything, and nothing of it can be loaded."""
+
+        def read(self, made_of):
+            return pickle.dumps(({"values": programs._Shape((3,), "float64")}, (b"torn", None, None)))
+
+    monkeypatch.setattr(programs, "_recipe", lambda made_of: b"recipe")
+    keep(Store(Full()))
+    np.testing.assert_array_equal(scaled(jnp.ones(3), "twice")["values"], 2 * np.ones(3))
+    keep(None)
+    assert traced == ["scaled"]
 
 
 def test_files_are_whole_or_not_there(tmp_path):

@@ -112,7 +112,14 @@ class Store:
         if kept is not None:
             _register()
             result, code = pickle.loads(kept)
-            return _Program(self._pool.submit(_loaded, code, _devices(arguments)), result)
+
+            def loaded() -> _Run:
+                try:
+                    return _loaded(code, _devices(arguments))
+                except Exception:  # noqa: BLE001 - whatever the runtime has against it, it is compiled again
+                    return _lowered(function, arguments)[0].compile(options)
+
+            return _Program(self._pool.submit(loaded), result)
         lowered, result = _lowered(function, arguments)
 
         def compiled() -> _Run:
