@@ -87,6 +87,16 @@ def test_leaves_transformations_to_jax(shelf, traced):
     assert traced == []
 
 
+def test_keys_of_random_numbers_are_left_to_jax(shelf, traced):
+    @program
+    def drawn(key, count: int):
+        return jax.random.normal(key, (count,))
+
+    key = jax.random.key(3)
+    np.testing.assert_array_equal(drawn(key, 4), jax.random.normal(key, (4,)))
+    assert traced == []
+
+
 def test_without_a_store_nothing_is_begun():
     assert begin(scaled, jnp.ones(3), "twice") is None
 

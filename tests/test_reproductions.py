@@ -1,6 +1,7 @@
 """Published static studies and the ISO stiffness table against the scripts that reproduce them."""
 
 import functools
+import importlib
 import runpy
 import sys
 

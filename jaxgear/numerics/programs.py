@@ -90,8 +90,7 @@ class Store:
     def program(self, function: Callable, arguments: Any, *, quick: bool) -> tuple[_Program, list] | None:
         """The program of a function for some arguments, and the arrays among them; None where JAX traces them."""
         leaves, tree = jax.tree.flatten(arguments)
-        traced = any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
-        if traced or not is_eager() or jax.process_count() > 1:
+        if any(map(_is_left_to_jax, leaves)) or not is_eager() or jax.process_count() > 1:
             return None
         fixed = [_shape_of(leaf) or leaf for leaf in leaves]
         precision = jax.dtypes.canonicalize_dtype(float)  # which a context can change
@@ -178,6 +177,13 @@ def begin(function: Callable, *args, **options) -> Any:
         return None
     result = found[0].result
     return _filled(result, [shape.struct for shape in jax.tree.leaves(result, is_leaf=_is_shape) if _is_shape(shape)])
+
+
+def _is_left_to_jax(leaf) -> bool:
+    """Whether an argument is being traced, or of a type that no file holds, such as a key of random numbers."""
+    if isinstance(leaf, jax.core.Tracer):
+        return True
+    return isinstance(leaf, jax.Array) and jax.dtypes.issubdtype(leaf.dtype, jax.dtypes.extended)
 
 
 def _shape_of(leaf) -> _Shape | None:
