@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.experimental.serialize_executable import deserialize_and_load, serialize
 
@@ -183,7 +184,7 @@ def _is_left_to_jax(leaf) -> bool:
     """Whether an argument is being traced, or of a type that no file holds, such as a key of random numbers."""
     if isinstance(leaf, jax.core.Tracer):
         return True
-    return isinstance(leaf, jax.Array) and jax.dtypes.issubdtype(leaf.dtype, jax.dtypes.extended)
+    return isinstance(leaf, jax.Array) and jnp.issubdtype(leaf.dtype, jax.dtypes.extended)
 
 
 def _shape_of(leaf) -> _Shape | None:
