@@ -107,6 +107,10 @@ def test_numerics_has_no_gear_word():
         assert not [word for word in words if word in text], path.name
 
 
+def in_a_new_process(script):
+    return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+
+
 def test_import_is_silent_and_changes_nothing():
     script = (
         "import jax, sys\n"
@@ -121,7 +125,7 @@ def test_import_is_silent_and_changes_nothing():
         "assert not {'matplotlib', 'optax', 'typer', 'pyarrow', 'evosax'} & set(sys.modules)\n"
         "assert dict(jax.config.values) == before\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    done = in_a_new_process(script)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
@@ -130,7 +134,7 @@ def test_what_needs_no_library_imports_none(code):
     script = (
         "import atexit, sys\natexit.register(lambda: print({'equinox', 'jax', 'numpy', 'scipy'} & set(sys.modules)))\n"
     )
-    done = subprocess.run([sys.executable, "-c", script + code], capture_output=True, text=True, check=False)
+    done = in_a_new_process(script + code)
     assert (done.returncode, done.stdout.splitlines()[-1], done.stderr) == (0, "set()", "")
 
 
@@ -149,7 +153,7 @@ def test_public_names_may_be_imported_first_where_jax_traces():
         "    if name.startswith('jaxgear'):\n"
         "        assert not [key for key, value in vars(module).items() if isinstance(value, jax.core.Tracer)], name\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    done = in_a_new_process(script)
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -169,7 +173,7 @@ def test_import_leaves_the_choice_of_devices_to_the_user():
         "assert jax.device_count() == 3\n"
         "assert jaxgear.STEEL.density.dtype == 'float64'\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    done = in_a_new_process(script)
     assert (done.returncode, done.stderr) == (0, "")
 
 

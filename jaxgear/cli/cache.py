@@ -4,13 +4,13 @@ import hashlib
 import os
 import platform
 import sys
-import tempfile
 from importlib.metadata import version
 from pathlib import Path
 
 import jax
 
 from ..numerics.programs import Store, keep
+from ..sweeps.store import write_durably
 
 _MOST = 256 << 20  # bytes of all that is kept
 _sum = hashlib.sha256
@@ -54,9 +54,7 @@ class Files:
 
     def write(self, made_of: bytes, program: bytes) -> None:
         try:
-            with tempfile.NamedTemporaryFile(dir=self._folder, delete=False) as file:
-                file.write(program + _sum(program).digest())
-            os.replace(file.name, self._file(made_of))  # whole or not at all
+            write_durably(self._file(made_of), lambda file: file.write(program + _sum(program).digest()))
         except OSError:  # a full disk: the next process compiles again
             return
 

@@ -38,6 +38,10 @@ _KNOWN = (
 )
 
 
+# what pickle raises for something that cannot be written
+_UNFIT = (pickle.PicklingError, AttributeError, TypeError, ValueError)
+
+
 class Shelf(Protocol):
     """Where programs lie between two processes."""
 
@@ -226,7 +230,7 @@ def _packed(run, result: Any) -> bytes | None:
     """A compiled program as bytes; None where that cannot be."""
     try:
         return pickle.dumps((result, serialize(run)))
-    except (pickle.PicklingError, AttributeError, TypeError, ValueError, NotImplementedError):
+    except (*_UNFIT, NotImplementedError):  # what JAX raises for programs that hold large constants
         return None
 
 
@@ -269,6 +273,6 @@ def _recipe(made_of: Any) -> bytes | None:
     written = io.BytesIO()
     try:
         Recipe(written).dump(made_of)
-    except (pickle.PicklingError, AttributeError, TypeError, ValueError, RecursionError):
+    except (*_UNFIT, RecursionError):
         return None
     return written.getvalue()
