@@ -46,7 +46,8 @@ class Judge:
     def __call__(self, found: Found) -> Verdict:
         """Judges a design; a contact solution that fails makes its PPTE infinite."""
         flanks = {"pinion": found.pinion, "wheel": found.wheel}
-        removed = jnp.stack([jg.contact.removed_material(self._mesh, torque, **flanks) for torque in self._torques])
+        each = [jg.contact.removed_material(self._mesh, torque, **flanks) for torque in self._torques]
+        removed = jax.tree.map(lambda *fields: jnp.stack(fields), *each)
         relief = jg.metrics.max_relief(self._mesh, **flanks)
         ppte, pressure = (np.asarray(part) for part in _solved(self._mesh, self._torques, removed, self._deviations))
         count = len(_TORQUES)
@@ -59,7 +60,7 @@ class Judge:
 @eqx.filter_jit
 def _fields(mesh: jg.Mesh, torque, samples: jg.tolerance.Deviation):
     """Material that the deviations of every sample remove, shape (gears, pairs, slices, positions)."""
-    return jax.vmap(lambda one: jg.tolerance.deviated_material(mesh, torque, one))(samples)
+    return jax.vmap(lambda one: jg.tolerance.deviated_material(mesh, torque, one).amount)(samples)
 
 
 @eqx.filter_jit
@@ -67,7 +68,8 @@ def _solved(mesh: jg.Mesh, torques, designs, deviations):
     """PPTE and largest pressure at every torque, then of every manufactured gear at the design torque."""
     gears = len(deviations)
     loads = jnp.concatenate([torques, jnp.full((gears,), torques[_DESIGN])])
-    removed = jnp.concatenate([designs, designs[_DESIGN][None] + deviations])
+    deviated = jax.vmap(lambda one: jax.tree.map(lambda field: field[_DESIGN], designs) + one)(deviations)
+    removed = jax.tree.map(lambda *fields: jnp.concatenate(fields), designs, deviated)
 
     def one(case):
         cycle = jg.contact.solve_removed(mesh, *case)

@@ -54,12 +54,15 @@ class Edge(eqx.Module):
     """Where the nearest tip corner is; fields of shape (pairs, 1, positions).
 
     Attributes:
-        distance: of the contact's centre from the corner along the tip's flank [mm], negative beyond the corner.
+        distance: of the contact's centre from the corner along the tip's flank [mm], negative beyond the corner; of
+            slices on their own where the contacts of these have moved.
+        side: +1 where the corner is that of the pinion, -1 where it is that of the wheel.
         wedge: excess apex compliance of the tip wedge over the half plane, (K - 2 / pi) / E' [um per N/mm].
         reach: distance from the corner at which that excess ends [mm].
     """
 
-    distance: Field
+    distance: Float[Array, "pairs anyslices positions"]
+    side: Field
     wedge: Field
     reach: Field
 
@@ -78,7 +81,12 @@ def edge(
     first, second = on_both(lambda given: _corner(*given, outside), (pinion, geometry.pinion), (wheel, geometry.wheel))
     pinion_near = first.inside < second.inside
     near = jax.tree.map(lambda *fields: jnp.where(pinion_near, *fields), first, second)
-    return Edge(distance=(near.inside + near.beyond)[:, None], wedge=near.wedge[:, None], reach=near.reach[:, None])
+    return Edge(
+        distance=(near.inside + near.beyond)[:, None],
+        side=jnp.where(pinion_near, 1.0, -1.0).astype(near.inside.dtype)[:, None],
+        wedge=near.wedge[:, None],
+        reach=near.reach[:, None],
+    )
 
 
 class _Corner(NamedTuple):
@@ -148,6 +156,10 @@ class EdgeLaw(AbstractSpring):
         change = change + self.edge.wedge * share * patch.mean_slope * squared * (1 / patch.mean_distance)
         bending = self.truncation * (patch.bending_slope * squared - patch.bending)
         return ((secant + change) * squared + bending) / squared
+
+    def moved(self, distance: Real) -> "EdgeLaw":
+        """The law with the centre of contact moved along the flanks towards the pinion tip [mm]."""
+        return eqx.tree_at(lambda law: law.edge.distance, self, self.edge.distance - self.edge.side * distance)
 
     def _cut(self, squared: Real, patch: "Patch") -> Cut:
         return Cut(squared, patch.squared_extent, patch.widening, 0.5 * self.truncation)

@@ -32,7 +32,10 @@ class MeshCycle(eqx.Module):
         pair_force: force on the line of action that every pair contributes [N], shape (pairs, positions); the pairs of
             a position sum to `force`.
         opening: remaining gap [um] where positive, minus the contact deflection where loaded.
-        gap: gap of the undeformed flanks at zero transmission error [um]: corner gap plus both modifications.
+        gap: gap of the undeformed flanks at zero transmission error [um]: corner gap plus both modifications, where the
+            contact slides to.
+        bend: what the modifications add to the relative curvature of the flanks, times their relative radius; shape
+            (pairs, slices or 1, positions).
         tangent_stiffness: d force / d transmission error at fixed position [N/um].
         residual: largest relative violation of the contact conditions, shape (positions,).
         converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
@@ -50,6 +53,7 @@ class MeshCycle(eqx.Module):
     pair_force: Float[Array, "pairs positions"]
     opening: Load
     gap: Load
+    bend: Float[Array, "pairs #slices positions"]
     tangent_stiffness: Curve
     residual: Curve
     converged: Array
@@ -89,15 +93,16 @@ class MeshCycle(eqx.Module):
     def contact_pressure(self) -> Load:
         """Largest Hertzian pressure on the flank [MPa]; zero where the pair is apart or touches with a tip corner.
 
-        p = sqrt(q E* / (pi R)) (Hertz), with the plane moduli of the compliance model.
+        p = sqrt(q E* / (pi R)) (Hertz), with the plane moduli of the compliance model and the curvature 1 / R of both
+        involutes and of what is removed from them.
         """
-        return pressures(self.kinematics, self.line_load)[0]
+        return pressures(self.kinematics, self.line_load, self.bend)[0]
 
     @property
     @over_batch
     def corner_pressure(self) -> Load:
         """Hertzian pressure of the tip edge on the mate's flank [MPa]; zero on the theoretical path of contact."""
-        return pressures(self.kinematics, self.line_load)[1]
+        return pressures(self.kinematics, self.line_load, self.bend)[1]
 
     def __str__(self) -> str:
         if self.batch_ndim:

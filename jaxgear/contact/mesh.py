@@ -45,8 +45,6 @@ class Mesh(eqx.Module):
         structure: compliance of both gears, (pairs, pairs, positions) [um per N/mm].
         law: prepared contact law.
         width_factor: squared half width of the contact per line load [mm^2 per N/mm].
-        patch_place, patch_weight: points across the contact, relative to its half width, and their weights, shape
-            (patch_nodes,).
         hub: common wind-up of the gear bodies [um per N/mm].
         slice_width: [mm], shape (slices,).
         automatic: whether the number of pairs was left to `prepare`: `solve` takes more where they are too few.
@@ -64,8 +62,6 @@ class Mesh(eqx.Module):
     structure: Float[Array, "pairs pairs positions"]
     law: AbstractSpring
     width_factor: Field
-    patch_place: Float[Array, " patch_nodes"]
-    patch_weight: Float[Array, " patch_nodes"]
     hub: Scalar
     slice_width: Float[Array, " slices"]
     automatic: bool = eqx.field(static=True, default=False)
@@ -171,7 +167,7 @@ def _pairs_for(pair: GearPair, deflection: float | None) -> int:
 def prepare_from(first_phase, pair: GearPair, compliance: AbstractCompliance, resolution: Resolution) -> Mesh:
     """The mesh over the base pitch that begins with a mesh position [base pitches]."""
     moving = kinematics(pair, first_phase, resolution, compliance.plane)
-    contact, dtype = moving.path_of_contact, moving.path.dtype
+    contact = moving.path_of_contact
     points = contacts(pair, contact, moving.path)
     outlines = on_both(outline, pair.pinion, pair.wheel)
     rolls = points.pinion_roll_length, points.wheel_roll_length
@@ -179,8 +175,6 @@ def prepare_from(first_phase, pair: GearPair, compliance: AbstractCompliance, re
     geometry = contact_geometry(pinion, wheel, compliance.plane, pair.face_width)
     base_pitch = contact.base_pitch
     outer = contacts(pair, contact, jnp.stack([moving.path[-1] - base_pitch, moving.path[0] + base_pitch]))
-    # Chebyshev nodes of the second kind integrate with the weight of the semi-elliptic pressure
-    angle = jnp.pi * jnp.arange(1, resolution.patch_nodes + 1, dtype=dtype) / (resolution.patch_nodes + 1)
     return Mesh(
         kinematics=moving,
         compliance=compliance,
@@ -199,8 +193,6 @@ def prepare_from(first_phase, pair: GearPair, compliance: AbstractCompliance, re
         structure=compliance.structure(pinion, wheel),
         law=compliance.law(geometry, pinion, wheel, moving.outside),
         width_factor=geometry.width_factor[:, 0],
-        patch_place=jnp.cos(angle),
-        patch_weight=jnp.sin(angle) ** 2,
         hub=compliance.hub(pinion, wheel),
         slice_width=moving.slice_width,
     )

@@ -9,6 +9,7 @@ from ..microgeometry import AbstractModification
 from ..numerics import Checked, ContactProblem, check, program, real, result, solve_contact, tangent_stiffness
 from .mesh import Mesh
 from .operation import operation_of
+from .slide import RemovedMaterial
 from .solve import check_mesh, outermost, removed_material
 
 Scalar = Float[Array, ""]
@@ -78,13 +79,13 @@ def solve_at(
     check("solve_at", "transmission_error", error, "um")
     torque = operation_of("solve_at", torque, mesh.slice_width.dtype).torque
     removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-    return _solve_at(mesh, jnp.broadcast_to(error.astype(removed.dtype), (positions,)), removed)
+    return _solve_at(mesh, jnp.broadcast_to(error.astype(removed.amount.dtype), (positions,)), removed)
 
 
 @program
-def _solve_at(mesh: Mesh, error: Curve, removed: Load) -> PrescribedContact:
-    gap = mesh.corner_gap[:, None] + removed
-    problem = ContactProblem(mesh.structure, mesh.law, gap, mesh.lever, mesh.slice_width, approach=error)
+def _solve_at(mesh: Mesh, error: Curve, removed: RemovedMaterial) -> PrescribedContact:
+    gap, law = mesh.corner_gap[:, None] + removed.amount, mesh.law.moved(removed.shift)
+    problem = ContactProblem(mesh.structure, law, gap, mesh.lever, mesh.slice_width, approach=error)
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
     pair_force = mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1)
     return PrescribedContact(
@@ -94,5 +95,5 @@ def _solve_at(mesh: Mesh, error: Curve, removed: Load) -> PrescribedContact:
         line_load=solution.line_load,
         tangent_stiffness=tangent_stiffness(problem, solution),
         residual=solution.residual,
-        converged=solution.solved & mesh.margins.valid & (error < outermost(mesh, removed)),
+        converged=solution.solved & mesh.margins.valid & (error < outermost(mesh, removed.amount)),
     )

@@ -2,6 +2,9 @@
 
 from ..numerics import Checked, count, number
 
+_SLIDING_NODES = 3  # a parabola
+_SLIDE_STEPS = 1
+
 
 class Resolution(Checked):
     """Array sizes of a mesh, all static.
@@ -14,6 +17,8 @@ class Resolution(Checked):
             point: contact ratios up to 3.
         patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks
             and steep flanks over its own width; 1 takes the nominal contact point alone.
+        slide_steps: steps in which the contact slides down the slope of a modification; 0 keeps it at its nominal
+            place. None for 1, and 0 where fewer than 3 points across the contact do not see slope and curvature.
         newton_steps: largest number of steps of the contact solution.
         rtol: residual at which the contact solution ends, relative to the transmission error and to the force;
             None for 1e-11 in double and 5e-6 in single precision.
@@ -23,10 +28,25 @@ class Resolution(Checked):
     slices: int = count(default=1)
     pairs: int | None = count(low=2, optional=True, default=None)
     patch_nodes: int = count(default=4)
+    slide_steps: int | None = count(low=0, high=20, optional=True, default=None)
     newton_steps: int = count(default=8)
     rtol: float | None = number(
         "", low=0.0, high=1.0, open_low=True, open_high=True, static=True, optional=True, default=None
     )
+
+    def check_together(self) -> None:
+        if self.slide_steps and self.patch_nodes < _SLIDING_NODES:
+            raise ValueError(
+                f"Resolution: slide_steps = {self.slide_steps} needs patch_nodes >= {_SLIDING_NODES}, is "
+                f"{self.patch_nodes}: fewer points across the contact do not see slope and curvature of a flank"
+            )
+
+    @property
+    def chosen_slide_steps(self) -> int:
+        """`slide_steps`, with its default."""
+        if self.slide_steps is not None:
+            return self.slide_steps
+        return _SLIDE_STEPS if self.patch_nodes >= _SLIDING_NODES else 0
 
     @property
     def chosen_pairs(self) -> int:

@@ -17,6 +17,7 @@ are unrolled, so that a compiler fuses a step into few loops. Intermediate resul
 division: compilers store those, but evaluate cheaper expressions again in every loop.
 """
 
+from dataclasses import replace
 from functools import partial, reduce
 from operator import itemgetter
 
@@ -103,9 +104,10 @@ def _solve(steps: int, tolerance: float, problem: ContactProblem, common: Curve)
 
 def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
     """Iterate and approach near the solution, by one evaluation of the laws at its end."""
-    v, start, secant = _start(problem)
+    shared = problem if problem.start_law is None else replace(problem, law=problem.start_law)
+    v, start, secant = _start(shared)
     start = [jnp.maximum(q, LOAD_FLOOR) for q in start]
-    rate = [jnp.clip(k - c, -_STEEPEST * c, _STEEPEST * c) for k, c in zip(_slopes(problem, start, secant), secant)]
+    rate = [jnp.clip(k - c, -_STEEPEST * c, _STEEPEST * c) for k, c in zip(_slopes(shared, start, secant), secant)]
 
     def with_secants(_, state):
         return _newton(problem, state[0], secant, secant)

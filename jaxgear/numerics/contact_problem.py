@@ -17,6 +17,8 @@ class ContactProblem(eqx.Module):
         weight: width of each slice, shape (slices,).
         load: total load, scalar; None where the approach is prescribed.
         approach: prescribed common approach d, shape (positions,); None where the load is.
+        start_law: a law like h that many problems share, which spares each of them the evaluations that its solution
+            starts from; None for h.
 
     Raises:
         ValueError: unless one of load and approach is given.
@@ -29,6 +31,7 @@ class ContactProblem(eqx.Module):
     weight: Float[Array, " slices"]
     load: Float[Array, ""] | None = None
     approach: Float[Array, " positions"] | None = None
+    start_law: AbstractSpring | None = None
 
     def __check_init__(self):
         if (self.load is None) == (self.approach is None):

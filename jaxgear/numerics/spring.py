@@ -27,3 +27,7 @@ class AbstractSpring(eqx.Module):
     def deflection(self, load: Real) -> Real:
         """Deflection at any load that is not negative; zero at zero."""
         return load * self.secant(jnp.maximum(load, LOAD_FLOOR))
+
+    def moved(self, distance: Real) -> "AbstractSpring":
+        """The spring of a contact that has moved by a distance; of most springs the same."""
+        return self

@@ -1,5 +1,7 @@
 """Forward derivatives that cost nothing along what does not move."""
 
+from functools import partial
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -26,8 +28,8 @@ def jvp_of_given(function, primal, tangent):
 def by_numbers(function):
     """The function, with its derivative by every single number of its arguments formed in forward mode.
 
-    Reverse mode then keeps one array per number, the derivative by it, and none of what led there. That pays where an
-    elementwise chain follows from a few numbers. Arrays of several numbers are differentiated as always.
+    Reverse mode then keeps one array per number and result, the derivative by it, and none of what led there. That pays
+    where an elementwise chain follows from a few numbers. Arrays of several numbers are differentiated as always.
     """
     wrapped = eqx.filter_custom_jvp(function)
 
@@ -47,13 +49,17 @@ def by_numbers(function):
 
             return jax.jvp(of_moving, ([values[i] for i in places],), (directions,))[1]
 
-        changes = [leaves[i] * stored(along([i], [jnp.ones_like(values[i])])) for i in numbers]
+        changes = [jax.tree.map(partial(_times, leaves[i]), along([i], [jnp.ones_like(values[i])])) for i in numbers]
         if arrays:
             changes.append(along(arrays, [leaves[i] for i in arrays]))
-        return wrapped(*primals), sum(changes)
+        return wrapped(*primals), jax.tree.map(lambda *parts: sum(parts), *changes)
 
     wrapped.def_jvp(rule)
     return wrapped
+
+
+def _times(change, derivative):
+    return change * stored(derivative)
 
 
 def _nothing(leaf) -> bool:

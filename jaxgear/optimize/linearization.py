@@ -94,7 +94,7 @@ def local_slopes(
     Args:
         quantities: local ones.
         solve: makes a cycle and whether it converged from the material removed.
-        removed_of: material removed at a point of the unit box, shape (pairs, slices, positions).
+        removed_of: material removed at a point of the unit box: fields of shape (pairs, slices or 1, positions).
         x: the point.
     """
 
@@ -112,11 +112,11 @@ def local_slopes(
     rows, back, (each, fine) = jax.vjp(curves, removed, has_aux=True)
     if len(rows) == 1:
         (share,) = back(jnp.ones_like(rows))
-        slopes = jnp.einsum("isp,ispx->px", share, slope)[None]
+        slopes = _along(share, slope, "isp,ispx->px")[None]
     elif len(rows) <= len(x):
         chosen = jnp.broadcast_to(jnp.eye(len(rows), dtype=rows.dtype)[:, :, None], (len(rows), *rows.shape))
         (share,) = jax.vmap(back)(chosen)
-        slopes = jnp.einsum("kisp,ispx->kpx", share, slope)
+        slopes = _along(share, slope, "kisp,ispx->kpx")
     else:  # fewer parameters than rows
 
         def along(direction):
@@ -127,6 +127,11 @@ def local_slopes(
     return [
         Sloped(values.ravel(), part.reshape(-1, len(x))) for values, part in zip(each, jnp.split(slopes, ends[:-1]))
     ], fine
+
+
+def _along(share, slope, axes: str) -> Float[Array, "... positions parameters"]:
+    """Derivatives by every field of the material removed, along those of the fields by the parameters."""
+    return sum(jnp.einsum(axes, *both) for both in zip(jax.tree.leaves(share), jax.tree.leaves(slope)))
 
 
 def any_slopes(quantities: Sequence[Quantity], cycle_of: Callable, x: Vector) -> tuple[list[Sloped], Bool[Array, ""]]:

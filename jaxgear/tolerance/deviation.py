@@ -7,8 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from ..contact import Mesh, removed_material
-from ..microgeometry import AbstractModification, Flank, LeadSlope, ProfileSlope
+from ..contact import Mesh, RemovedMaterial, removed_material
+from ..contact.operation import operation_of
+from ..contact.slide import nominal_material
+from ..microgeometry import AbstractModification, Flank, LeadSlope, NoModification, ProfileSlope
 from ..numerics import Checked, number, program, real, result, spread, whole
 from .distribution import AbstractDistribution
 from .limits import GearTolerance, Tolerance, check_slices
@@ -119,8 +121,8 @@ def deviated_material(
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
-) -> Load:
-    """Material removed from both flanks of one manufactured pair, for `solve_removed`: design plus deviations [um].
+) -> RemovedMaterial:
+    """Material removed from both flanks of one manufactured pair, for `solve_removed`: design plus deviations.
 
     Differentiable with respect to design and deviation, hence to the tolerance limits behind it.
 
@@ -132,7 +134,7 @@ def deviated_material(
         wheel: modification of the wheel flank; None for the nominal involute.
 
     Returns:
-        shape (pairs, slices, positions).
+        that of the design, with the deviations added to its amount.
     """
     design = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
     return design + deviation_field(deviation, flank_basis(mesh, torque))
@@ -147,13 +149,15 @@ def deviation_field(deviation: Deviation, basis: Float[Array, "terms pairs slice
 def flank_basis(mesh: Mesh, torque) -> Float[Array, "terms pairs slices positions"]:
     """Material that every flank deviation of unit size removes [um per um].
 
-    The removed material is linear in the modification, so that samples differ by their coefficients only.
+    Around its nominal place, where the contact meets a deviation, that is linear, so that samples differ by their
+    coefficients only: contacts slide down the slopes of the design and not down those of a deviation.
     """
     unit = real(1.0).astype(mesh.slice_width.dtype)
     waves = jnp.eye(2 * HARMONICS, dtype=mesh.slice_width.dtype)
 
     def removed(side: str, modification: AbstractModification) -> Load:
-        return removed_material(mesh, torque, **{side: modification})
+        flanks = {"pinion": NoModification(), "wheel": NoModification(), side: modification}
+        return nominal_material(mesh, operation_of("flank_basis", torque, mesh.slice_width.dtype).torque, **flanks)
 
     def terms(side: str):
         yield removed(side, ProfileSlope(unit))[None]
