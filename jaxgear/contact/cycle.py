@@ -93,8 +93,8 @@ class MeshCycle(eqx.Module):
     def contact_pressure(self) -> Load:
         """Largest Hertzian pressure on the flank [MPa]; zero where the pair is apart or touches with a tip corner.
 
-        p = sqrt(q E* / (pi R)) (Hertz), with the plane moduli of the compliance model and the curvature 1 / R of both
-        involutes and of what is removed from them.
+        p = sqrt(q E* / (pi R)) (Hertz) with the curvature 1 / R of both involutes and of what is removed from them, in
+        plane strain unless the compliance model is in plane stress throughout.
         """
         return pressures(self.kinematics, self.line_load, self.bend)[0]
 

@@ -28,7 +28,7 @@ def flank_pressure(kinematics: Kinematics, line_load: Load, bend: Bend) -> Load:
     `bend` is what modifications add to 1 / R, relative to that of the involutes, as seen over the contact. At a kink,
     where the pressure is singular, that is its mean over the contact: finite elements have up to 40 % more there.
 
-    E* uses the plane moduli of the compliance model, so plane stress gives 5 % less than the usual plane strain form.
+    E* is that of plane strain, the usual form, unless the compliance model is in plane stress throughout: 5 % less.
     """
     pinion, wheel = kinematics.sides
     reduced = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)

@@ -9,12 +9,12 @@ the mean taken over the contact with the weight of the Hertzian pressure. Beyond
 touches, o away from the virtual centre of the contact; there, and before the corner on the path, u cannot pass the
 corner. A slope s moves the virtual centre by -R s and lets the gap fall by R s^2 / 2.
 
-The means over the contact at u = 0, at one Newton step from there and so on also give slope and curvature of c as the
-contact sees them, by least squares with the same weight, which kinks and corners of a table do not upset. Two steps, the
-second held between the points that bracket the least gap, and the parabola through the last one are within what the
-four points across the contact leave of the mean itself: 0.02 um, 0.08 um on a relief of 15 um over a millimetre. The
-nominal contact is never given up for a wider gap. Everything is differentiated as it is computed, so that derivatives
-of any order belong to these very numbers.
+The slope over the middle of the nominal contact leads to a first place. The points across the contact there give mean,
+slope and curvature of c by least squares with the weight of the pressure, which kinks and corners of a table do not
+upset, and the parabola through them gives the least gap; where the first step has led over a kink, the parabola's
+curvature is that between both places. Against a fine search with 16 points across the contact, PPTE of 240 random tip
+reliefs (19/48, module 3, 0 to 20 um over 1 to 5 mm, 50 and 150 N m) is off by 0.016 um at most. More steps go on from
+there. Everything is differentiated as it is computed, so that derivatives of any order belong to these very numbers.
 """
 
 from functools import reduce
