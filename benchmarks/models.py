@@ -15,9 +15,9 @@ import jaxgear as jg
 from .cases import PAIR_COUNT, Case, Curves, gear_pair, modifications, reference, strong
 from .goals import DEFAULT_GOALS, Goal
 
-# The reference has 128 positions or every other one of them. Every model is solved at all, so that one compilation serves
-# all pairs, and compared at those of the reference: the peak-to-peak value of fewer positions is smaller, in pair L by
-# up to 0.17 um.
+# The reference has 128 positions or every other one of them. Every model is solved at all, so that one compilation
+# serves all pairs, and compared at those of the reference: the peak-to-peak value of fewer positions is smaller, in
+# pair L by up to 0.17 um.
 RESOLUTION = jg.Resolution(positions=128, pairs=PAIR_COUNT)
 _APART = 1e6  # corner gap that keeps tip corners out of contact [um]
 
