@@ -18,13 +18,11 @@ class Quantity:
         key: short name.
         title: what it is.
         unit: of the error.
-        why: what the remaining error of the default model comes from.
     """
 
     key: str
     title: str
     unit: str
-    why: str
 
 
 def errors(case: Case, model: Curves, truth: Curves, aligned: Curves) -> dict[str, float]:
@@ -125,32 +123,24 @@ def _half_width(case: Case, force: np.ndarray, roll_lengths: tuple[np.ndarray, n
     return np.sqrt(4 / np.pi * force / float(pair.face_width) * reduced * compliance)
 
 
-_SOFT = "The tooth's beam on the elastic ring is slightly softer than the finite elements."
-_SLIDE = (
-    "On the slope of a relief or a crowning the contact slides towards the thicker material, which the model leaves "
-    "out: short steep reliefs close up to 2 um earlier than it finds."
-)
-_PRESSURE = (
+# What the errors of the pressures of every model here come from.
+PRESSURE_NOTE = (
     "The model gives Hertz's pressure of the involutes. Where the patch covers the kinked start of a relief the finite "
     "elements find up to 55 % more (singular for linear reliefs, so it grows with every refinement). Clear of kinks "
     "and tip corners the difference is that of the load."
 )
-_SMALL = (
-    "A well relieved pair has a small PPTE on a large mean: there the one percent by which a pair alone is too soft "
-    "counts in full. "
-)
 QUANTITIES = (
-    Quantity("mean", "mean TE", "%", f"{_SOFT} {_SLIDE}"),
-    Quantity("ppte", "PPTE, of at least 2 um", "%", _SMALL + _SLIDE),
-    Quantity("ppte_um", "PPTE", "um", ""),
-    Quantity("rms", "TE curve, rms / mean TE", "%", f"{_SOFT} {_SLIDE}"),
-    Quantity("shape", "TE variation, rms / mean TE", "%", _SLIDE),
-    Quantity("k1", "single-pair stiffness", "%", _SOFT),
-    Quantity("k2", "double-pair stiffness", "%", ""),
-    Quantity("share_points", "load share at A, B, C, D, E", "", _SLIDE),
-    Quantity("share_flank", "load share, flank only", "", _SLIDE),
-    Quantity("share", "load share, whole cycle", "", _SLIDE),
-    Quantity("pressure_max", "largest flank pressure", "%", _PRESSURE),
-    Quantity("pressure", "flank pressure, everywhere", "%", ""),
-    Quantity("pressure_smooth", "flank pressure, smooth flank", "%", ""),
+    Quantity("mean", "mean TE", "%"),
+    Quantity("ppte", "PPTE, of at least 2 um", "%"),
+    Quantity("ppte_um", "PPTE", "um"),
+    Quantity("rms", "TE curve, rms / mean TE", "%"),
+    Quantity("shape", "TE variation, rms / mean TE", "%"),
+    Quantity("k1", "single-pair stiffness", "%"),
+    Quantity("k2", "double-pair stiffness", "%"),
+    Quantity("share_points", "load share at A, B, C, D, E", ""),
+    Quantity("share_flank", "load share, flank only", ""),
+    Quantity("share", "load share, whole cycle", ""),
+    Quantity("pressure_max", "largest flank pressure", "%"),
+    Quantity("pressure", "flank pressure, everywhere", "%"),
+    Quantity("pressure_smooth", "flank pressure, smooth flank", "%"),
 )
