@@ -3,7 +3,7 @@
 import csv
 import functools
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import jax
@@ -13,23 +13,22 @@ import numpy as np
 import jaxgear as jg
 
 REFERENCE = Path(__file__).parent / "reference"
-PAIRS = ("A", "B", "C", "D")
+PAIRS = ("A", "B", "C", "D", "E", "I", "L")
 PLANES = ("stress", "strain")
 PAIR_COUNT = 4
-_ROOT_RADIUS = 0.25 / (1 - np.sin(np.deg2rad(20.0)))  # full rounding of the finite-element rack's clearance
 
 
 @dataclass(frozen=True)
 class Case:
-    """One operating point: gear pair, plane state, torque on the pinion [N m] and name of the relief."""
+    """One operating point: gear pair, plane state, torque on the pinion [N m] and name of the modification."""
 
     pair: str
     plane: str
     torque: float
-    relief: str
+    modification: str
 
     def __str__(self) -> str:
-        return f"{self.pair} {self.plane} {self.torque:g} N m {self.relief}"
+        return f"{self.pair} {self.plane} {self.torque:g} N m {self.modification}"
 
 
 @dataclass(frozen=True)
@@ -53,15 +52,19 @@ class Curves:
         """Share of every pair in the total force."""
         return self.force / self.force.sum(axis=0)
 
+    def every(self, step: int) -> "Curves":
+        """The same curves at every `step`-th position."""
+        return Curves(*(getattr(self, field.name)[..., ::step] for field in fields(self)))
+
 
 @functools.cache
 def inputs() -> dict:
-    """Gear data, torques and reliefs of every pair, as stored."""
+    """Gear data, planes, torques and modifications of every pair, as stored."""
     return json.loads((REFERENCE / "cases.json").read_text())
 
 
 def select(pairs=PAIRS, planes=PLANES) -> list[Case]:
-    """All cases of the given pairs and planes.
+    """All cases of the given pairs and planes, where the reference has them.
 
     Raises:
         ValueError: for an unknown pair or plane, and when nothing is left.
@@ -70,11 +73,12 @@ def select(pairs=PAIRS, planes=PLANES) -> list[Case]:
     if unknown:
         raise ValueError(f"unknown cases {', '.join(unknown)}: choose from {', '.join(PAIRS + PLANES)}")
     found = [
-        Case(pair, plane, float(torque), relief)
+        Case(pair, plane, float(torque), modification)
         for pair in pairs
         for plane in planes
+        if plane in inputs()[pair]["planes"]
         for torque in inputs()[pair]["torques"]
-        for relief in inputs()[pair]["reliefs"]
+        for modification in inputs()[pair]["modifications"]
     ]
     if not found:
         raise ValueError("no cases selected: nothing to compare")
@@ -95,11 +99,12 @@ def gear_pair(name: str) -> jg.GearPair:
         jg.Gear(
             gear["teeth"],
             data["module"],
+            profile_shift=gear["profile_shift"],
             face_width=data["face_width"],
             bore_diameter=gear["bore_diameter"],
             tip_diameter=gear["tip_diameter"],
-            root_radius=_ROOT_RADIUS,
             material=material,
+            **data["rack"],
         )
         for gear in data["gears"]
     ]
@@ -113,20 +118,33 @@ def path_of_contact(name: str) -> jg.geometry.PathOfContact:
 
 
 @functools.cache
-def reliefs(case: Case) -> tuple[jg.TipRelief, jg.TipRelief]:
-    """Tip reliefs of pinion and wheel; "none" is a relief of zero amount, so that it shares the compiled solution."""
-    data = inputs()[case.pair]["reliefs"][case.relief]
-    pair = gear_pair(case.pair)
-    path = path_of_contact(case.pair)
-    lengths = {"long": (jg.long_relief_length(pair),) * 2, "pitch": (path.end, -path.start)}
-    pinion, wheel = lengths.get(data["length"], (data["length"],) * 2)
-    curve = jg.Polynomial(data["coefficients"])
-    return strong((jg.TipRelief(data["amount"], pinion, curve), jg.TipRelief(data["amount"], wheel, curve)))
+def modifications(case: Case) -> tuple[jg.microgeometry.Sum, jg.microgeometry.Sum]:
+    """Modifications of pinion and wheel: a tip relief and a profile crowning in every case, of zero amount where the
+    case has none, so that all cases share one compiled solution.
+    """
+    data = inputs()[case.pair]["modifications"][case.modification]
+    relief = data.get("tip_relief", {"amount": 0.0, "coefficients": [0.0, 0.0, 0.0]})
+    crowning = jg.ProfileCrowning(data.get("profile_crowning", {"amount": 0.0})["amount"])
+    curve = jg.Polynomial(relief["coefficients"])
+    pinion, wheel = (jg.TipRelief(relief["amount"], length, curve) + crowning for length in relief_lengths(case))
+    return strong(pinion), strong(wheel)
+
+
+def relief_lengths(case: Case) -> tuple[float, float]:
+    """Lengths of the tip reliefs of pinion and wheel [mm], zero where a case has none."""
+    data = inputs()[case.pair]["modifications"][case.modification]
+    length = data.get("tip_relief", {"length": 0.0})["length"]
+    if length == "long":
+        length = float(jg.long_relief_length(gear_pair(case.pair)))
+    elif length == "pitch":
+        path = path_of_contact(case.pair)
+        return path.end, -path.start
+    return length, length
 
 
 def reference(case: Case) -> Curves:
     """Finite-element result of a case."""
-    return _table(case.pair, case.plane)[case.torque, case.relief]
+    return _table(case.pair, case.plane)[case.torque, case.modification]
 
 
 def aligned(case: Case) -> Curves:
@@ -160,7 +178,7 @@ def _table(pair: str, plane: str) -> dict[tuple[float, str], Curves]:
         rows = list(csv.DictReader(file))
     groups: dict[tuple[float, str], list] = {}
     for row in rows:
-        groups.setdefault((float(row["torque_Nm"]), row["relief"]), []).append(row)
+        groups.setdefault((float(row["torque_Nm"]), row["modification"]), []).append(row)
 
     def column(group, name):
         return np.array([float(row[name] or "nan") for row in group])

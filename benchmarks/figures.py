@@ -6,8 +6,7 @@ import matplotlib
 import numpy as np
 
 from .cases import Case, aligned, inputs
-from .models import DEFAULT, LEGACY, POSITIONS, run
-from .quantities import QUANTITIES
+from .models import DEFAULT, LEGACY, run
 from .report import Errors
 
 PANELS = (
@@ -17,12 +16,18 @@ PANELS = (
     Case("C", "stress", 300.0, "lin10long"),
     Case("D", "stress", 200.0, "none"),
     Case("D", "stress", 200.0, "par6pitch"),
+    Case("E", "stress", 80.0, "lin8x1.5"),
+    Case("I", "stress", 1500.0, "lin"),
+    Case("L", "stress", 100.0, "linshort"),
 )
-_RELIEF_NAMES = {
+_MODIFICATION_NAMES = {
     "none": "no relief",
     "par7.81x5.05": "parabolic relief 7.8 um x 5.05 mm",
     "lin10long": "long linear relief 10 um",
     "par6pitch": "parabolic relief 6 um from C",
+    "lin8x1.5": "linear relief 8 um x 1.5 mm",
+    "lin": "linear relief 18 um x 6 mm",
+    "linshort": "linear relief 15 um x 1.2 mm",
 }
 _FINITE_ELEMENTS, _DEFAULT, _LEGACY = "#B0B0B0", "#0072B2", "#D55E00"  # the last two of Okabe and Ito
 _STYLE = {"font.size": 8, "axes.titlesize": 8, "axes.spines.top": False, "axes.spines.right": False}
@@ -33,8 +38,8 @@ def write_figures(folder: Path, results: Errors) -> list[Path]:
     import matplotlib.pyplot as plt
 
     with matplotlib.rc_context(_STYLE):
-        figure = plt.figure(figsize=(8.4, 7.6), layout="constrained")
-        top, bottom = figure.subfigures(2, 1, height_ratios=(1.75, 1.0))
+        figure = plt.figure(figsize=(8.4, 9.8), layout="constrained")
+        top, bottom = figure.subfigures(2, 1, height_ratios=(2.6, 1.0))
         _draw_curves(top)
         _draw_models(bottom.subplots(), results)
         folder.mkdir(parents=True, exist_ok=True)
@@ -45,13 +50,12 @@ def write_figures(folder: Path, results: Errors) -> list[Path]:
 
 
 def _draw_curves(figure) -> None:
-    panels = figure.subplots(2, len(PANELS) // 2)
+    panels = figure.subplots(3, len(PANELS) // 3)
     curves = {model.name: run(model, PANELS) for model in (DEFAULT, LEGACY)}
-    # one position more closes the period
-    phase = np.arange(POSITIONS + 1) / POSITIONS
 
     def draw(ax, curve, **style):
-        ax.plot(phase, np.append(curve, curve[0]), **style)
+        # one position more closes the period
+        ax.plot(np.linspace(0.0, 1.0, curve.size + 1), np.append(curve, curve[0]), **style)
 
     for ax, case in zip(panels.flat, PANELS):
         draw(ax, aligned(case).transmission_error, color=_FINITE_ELEMENTS, lw=4, label="finite elements")
@@ -64,12 +68,8 @@ def _draw_curves(figure) -> None:
             ls=(0, (5, 2)),
             label="usual published model (uncoupled, constant Hertz)",
         )
-        ax.set_title(
-            f"{inputs()[case.pair]['description']}, {case.torque:g} N m\n{_RELIEF_NAMES[case.relief]}".replace(
-                "um", "µm"
-            ),
-            loc="left",
-        )
+        title = f"{inputs()[case.pair]['description']}, {case.torque:g} N m\n{_MODIFICATION_NAMES[case.modification]}"
+        ax.set_title(title.replace("um", "µm"), loc="left")
         ax.set(xlim=(0, 1), xticks=(0, 0.5, 1))
         ax.grid(color="#E6E6E6", lw=0.5)
     for ax in panels[:, 0]:
@@ -80,19 +80,19 @@ def _draw_curves(figure) -> None:
 
 
 def _draw_models(ax, results: Errors) -> None:
-    quantity = next(q for q in QUANTITIES if q.key == "ppte")
+    goal = next(goal for goal in DEFAULT.goals if goal.key == "ppte")
     generator = np.random.default_rng(0)
     for row, (name, cases) in enumerate(results.items()):
-        values = np.array([abs(error[quantity.key]) for error in cases.values()])
+        values = np.array([abs(error[goal.key]) for error in cases.values()])
         height = row + generator.uniform(-0.22, 0.22, values.size)
         colour = _DEFAULT if name == DEFAULT.name else _LEGACY if name == LEGACY.name else "#595959"
         # errors below the axis are as good as zero
         ax.scatter(np.maximum(values, 0.1), height, s=9, color=colour, alpha=0.55, lw=0)
         ax.plot([values.mean()] * 2, [row - 0.33, row + 0.33], color="black", lw=2)
-    ax.axvline(quantity.goal, color="#009E73", lw=1.2, ls=(0, (4, 2)))
+    ax.axvline(goal.limit, color="#009E73", lw=1.2, ls=(0, (4, 2)))
     ax.annotate(
-        f"goal {quantity.goal:g} %",
-        (quantity.goal, -0.62),
+        f"goal {goal.limit:g} %",
+        (goal.limit, -0.62),
         xytext=(-3, 0),
         textcoords="offset points",
         ha="right",
