@@ -29,8 +29,10 @@ from jaxtyping import Array, Float
 
 from ..geometry import reduced_radius
 from ..microgeometry import AbstractModification, Flank, NoModification, terms
-from ..numerics import by_numbers, program, safe_sqrt, stored
+from ..numerics import by_numbers, program, real, safe_sqrt, stored
+from .kinematics import Side
 from .mesh import Mesh
+from .resolution import Resolution
 
 Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
@@ -63,16 +65,16 @@ class RemovedMaterial(eqx.Module):
     __radd__ = __add__
 
 
-def nothing_removed(mesh: Mesh, dtype) -> RemovedMaterial:
+def nothing_removed(sizes: Resolution, dtype) -> RemovedMaterial:
     """That of nominal involutes."""
-    sizes = mesh.resolution
-    return as_removed(mesh, np.zeros((sizes.chosen_pairs, sizes.slices, sizes.positions), dtype))
+    return as_removed(sizes, np.zeros((sizes.chosen_pairs, sizes.slices, sizes.positions), dtype))
 
 
-def as_removed(mesh: Mesh, amount: Any) -> RemovedMaterial:
+def as_removed(sizes: Resolution, amount: Any) -> RemovedMaterial:
     """A bare amount [um], met at the nominal contact."""
-    flat = np.zeros((mesh.resolution.chosen_pairs, 1, mesh.resolution.positions), mesh.slice_width.dtype)
-    return RemovedMaterial(jnp.asarray(amount), jnp.asarray(flat), jnp.asarray(flat))
+    amount = real(amount)
+    flat = real(np.zeros((sizes.chosen_pairs, 1, sizes.positions), amount.dtype))
+    return RemovedMaterial(amount, flat, flat)
 
 
 @program
@@ -94,14 +96,13 @@ def slid_material(
 ) -> RemovedMaterial:
     """What the contacts meet of the modifications; its arguments in the precision of the mesh."""
     place, sizes, dtype = _place(mesh, torque), mesh.resolution, torque.dtype
-    along, across = [], []  # the profile, which the contact slides down, and the rest
-    for sided in _terms(mesh, dtype, pinion, wheel):
-        (along if _varies_along_profile(sided, place) else across).append(sided)
+    given = [(sided, _varies_along_profile(sided, place)) for sided in _terms(mesh, dtype, pinion, wheel)]
+    along = [sided for sided, slopes in given if slopes]  # what the contact slides down
     amount = jnp.zeros((sizes.chosen_pairs, sizes.slices, sizes.positions), dtype)
-    for side, term in across:
+    for side, term in (sided for sided, slopes in given if not slopes):
         amount = amount + term(_flank(side, place, jnp.zeros_like(place.radius)))
     if not along:
-        return as_removed(mesh, amount)
+        return as_removed(sizes, amount)
     found = _slide(along, place, _patch(sizes.patch_nodes), sizes.chosen_slide_steps)
     return RemovedMaterial(amount + found[0], found[1], found[2])
 
@@ -160,22 +161,25 @@ def _place(mesh: Mesh, torque: Scalar) -> _Place:
         jnp.maximum(side.tip_roll_length**2 - side.contact_roll_length**2, 0.0) / (2 * side.base_radius)
         for side in (first, second)
     ]
-    number = lambda value: jnp.reshape(value, (1, 1, 1))  # noqa: E731
-    sides = tuple(
-        _Side(
-            direction,
-            side.contact_roll_length[:, None],
-            number(side.base_radius),
-            number(side.tip_roll_length),
-            number(side.start_roll_length),
-            mesh.face_coordinate[None, :, None],
-            number(side.face_width),
-        )
-        for direction, side in ((1.0, first), (-1.0, second))
-    )
+    sides = _side(mesh, first, 1.0), _side(mesh, second, -1.0)
     narrowest = _NARROWEST * radius
     half_width = jnp.sqrt(patch(mesh, torque) ** 2 + narrowest**2)
     return _Place(radius, half_width, beyond[:, None], -inside[1][:, None], inside[0][:, None], sides)
+
+
+def _side(mesh: Mesh, side: Side, direction: float) -> _Side:
+    def number(value):
+        return jnp.reshape(value, (1, 1, 1))
+
+    return _Side(
+        direction,
+        side.contact_roll_length[:, None],
+        number(side.base_radius),
+        number(side.tip_roll_length),
+        number(side.start_roll_length),
+        mesh.face_coordinate[None, :, None],
+        number(side.face_width),
+    )
 
 
 def _terms(mesh: Mesh, dtype, pinion: AbstractModification, wheel: AbstractModification):

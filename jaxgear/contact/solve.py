@@ -85,7 +85,7 @@ def solve_removed(
     """
     check_mesh("solve_removed", mesh)
     operation = operation_of("solve_removed", torque, mesh.slice_width.dtype)
-    removed = removed if isinstance(removed, RemovedMaterial) else as_removed(mesh, removed)
+    removed = removed if isinstance(removed, RemovedMaterial) else as_removed(mesh.resolution, removed)
     wanted = (mesh.resolution.pairs, mesh.resolution.slices, mesh.resolution.positions)
     if removed.amount.shape != wanted:
         raise ValueError(
@@ -134,7 +134,7 @@ def removed_material(
 
 def _material(mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: AbstractModification) -> RemovedMaterial:
     if isinstance(pinion, NoModification) and isinstance(wheel, NoModification):
-        return nothing_removed(mesh, torque.dtype)
+        return nothing_removed(mesh.resolution, torque.dtype)
     return slid_material(mesh, torque, pinion, wheel)
 
 
@@ -148,11 +148,7 @@ def begin_contact(pair: GearPair, compliance: AbstractCompliance, first: Resolut
     mesh = begin(prepare_from, np.zeros(()), pair, compliance, resolution)
     if mesh is not None:
         dtype = mesh.slice_width.dtype
-        amount, single = (
-            jax.ShapeDtypeStruct((resolution.chosen_pairs, slices, resolution.positions), dtype)
-            for slices in (resolution.slices, 1)
-        )
-        begin(_solve_removed, mesh, np.zeros((), dtype), RemovedMaterial(amount, single, single))
+        begin(_solve_removed, mesh, np.zeros((), dtype), jax.eval_shape(lambda: nothing_removed(resolution, dtype)))
 
 
 def check_mesh(owner: str, mesh: Any) -> None:

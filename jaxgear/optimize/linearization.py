@@ -1,6 +1,7 @@
 """Quantities of a design in every case, with their slopes over the unit box."""
 
 from collections.abc import Callable, Sequence
+from functools import reduce
 from typing import NamedTuple
 
 import jax
@@ -131,7 +132,8 @@ def local_slopes(
 
 def _along(share, slope, axes: str) -> Float[Array, "... positions parameters"]:
     """Derivatives by every field of the material removed, along those of the fields by the parameters."""
-    return sum(jnp.einsum(axes, *both) for both in zip(jax.tree.leaves(share), jax.tree.leaves(slope)))
+    each = [jnp.einsum(axes, *both) for both in zip(jax.tree.leaves(share), jax.tree.leaves(slope))]
+    return reduce(jnp.add, each)
 
 
 def any_slopes(quantities: Sequence[Quantity], cycle_of: Callable, x: Vector) -> tuple[list[Sloped], Bool[Array, ""]]:
