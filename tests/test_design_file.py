@@ -205,32 +205,32 @@ MODELS = [
     (
         'body = { type = "elastic_ring", coupling = false }',
         jg.Compliance(
-            jg.compliance.Beam(), jg.compliance.ElasticRing(coupling=False), jg.compliance.DepthReferenced(), "stress"
+            jg.compliance.Beam(), jg.compliance.ElasticRing(coupling=False), jg.compliance.DepthReferenced(), "auto"
         ),
     ),
     (
         'body = "sainsot"\ncontact = "constant_hertz"',
-        jg.Compliance(jg.compliance.Beam(), jg.compliance.Sainsot(), jg.compliance.ConstantHertz(), "stress"),
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.Sainsot(), jg.compliance.ConstantHertz()),
     ),
     (
         'body = "half_plane"\ncontact = "weber"',
-        jg.Compliance(jg.compliance.Beam(), jg.compliance.HalfPlane(), jg.compliance.Weber(), "stress"),
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.HalfPlane(), jg.compliance.Weber()),
     ),
     (
         'contact = "palmgren"',
-        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.Palmgren(), "stress"),
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.Palmgren()),
     ),
     (
         'contact = { type = "nonlinear_power" }',
-        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.NonlinearPower(), "stress"),
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.NonlinearPower()),
     ),
     (
         'contact = "center_distance"',
-        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.CenterDistance(), "stress"),
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.CenterDistance()),
     ),
     (
         'contact = "kovalskii"',
-        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.Kovalskii(), "stress"),
+        jg.Compliance(jg.compliance.Beam(), jg.compliance.ElasticRing(), jg.compliance.Kovalskii()),
     ),
 ]
 

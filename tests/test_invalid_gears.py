@@ -197,7 +197,7 @@ def test_too_few_pairs_for_the_path_of_contact():
 
 
 def test_plane_and_load():
-    refused(lambda: jg.default_compliance(plane="shell"), "plane = 'shell'", '"stress" or "strain"')
+    refused(lambda: jg.default_compliance(plane="shell"), "plane = 'shell'", '"auto", "stress" or "strain"')
     mesh = jg.prepare(jg.GearPair(gear(), gear(30)), resolution=jg.Resolution(positions=4))
     refused(lambda: jg.solve(mesh, -5.0), "solve: torque = -5 N m", "at least 0 N m")
     refused(lambda: jg.solve(mesh, jnp.nan), "solve: torque = nan N m")

@@ -93,7 +93,7 @@ def plain(mesh) -> Problem:
         np.maximum(roll + sign * offset * float(gear.base_radius) / roll, 0.0) - float(gear.tip_roll_length)
         for roll, gear, sign in zip(rolls, gears, (+1, -1))
     ]
-    geometry = contact_geometry(*loads, mesh.compliance.plane, mesh.pair.face_width)
+    geometry = contact_geometry(*loads, mesh.kinematics.plane, mesh.pair.face_width)
     edge = mesh.law.edge
 
     def of_both(value):

@@ -144,7 +144,7 @@ def summary(
         "friction": file.friction,
         "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
         "center_distance_mm": _center_distance(mesh),
-        "model": {"compliance": _words(mesh.compliance), "plane": mesh.kinematics.plane},
+        "model": {"compliance": _words(mesh.compliance), "plane": mesh.compliance.plane},
         "designs": {
             name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
             for name, several in found.items()

@@ -27,4 +27,6 @@ from .hertz import Palmgren as Palmgren
 from .hertz import Weber as Weber
 from .laws import AbstractLaw as AbstractLaw
 from .plane import Plane as Plane
+from .plane import PlaneState as PlaneState
+from .plane import plane_stress_share as plane_stress_share
 from .toothload import ToothLoad as ToothLoad

@@ -11,7 +11,7 @@ from .beam import AbstractTooth, Beam
 from .body import AbstractBody, ElasticRing, Sainsot
 from .edge import EdgeLaw, edge
 from .hertz import AbstractContact, ConstantHertz, ContactGeometry, DepthReferenced
-from .plane import Plane, check_plane
+from .plane import PlaneState, check_plane_state, plane_stress_share, structure_planes
 from .toothload import ToothLoad
 
 
@@ -19,10 +19,11 @@ class AbstractCompliance(eqx.Module):
     """What a prepared mesh needs to know of the elasticity of both gears: composed of models, or a table.
 
     Attributes:
-        plane: "stress" or "strain", of the elastic constants.
+        plane: "auto", "stress" or "strain". The contact and its pressure are in plane stress for "stress" only; what
+            the structure makes of it is its own affair (`plane_stress_share` tells where a gear lies between both).
     """
 
-    plane: eqx.AbstractVar[Plane]
+    plane: eqx.AbstractVar[PlaneState]
 
     @abstractmethod
     def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "pairs pairs positions"]:
@@ -55,25 +56,28 @@ class Compliance(AbstractCompliance):
         tooth: the tooth alone, root held.
         body: gear body with hub wind-up and coupling of neighbouring teeth.
         contact: approach of the flanks.
-        plane: "stress" for narrow faces, "strain" for wide ones (face width above about five tooth heights; Cornell
-            1981).
+        plane: "auto" for teeth and bodies between plane stress and plane strain, each gear by the common face width
+            over its root chord, and the contact in plane strain; "stress" or "strain" for everything in one of them, as
+            two-dimensional references are.
         edge_softening: soften the contact where a tip corner cuts it off (see `edge`).
     """
 
     tooth: AbstractTooth = eqx.field(default_factory=Beam)
     body: AbstractBody = eqx.field(default_factory=ElasticRing)
     contact: AbstractContact = eqx.field(default_factory=DepthReferenced)
-    plane: Plane = eqx.field(static=True, default="stress")
+    plane: PlaneState = eqx.field(static=True, default="auto")
     edge_softening: bool = eqx.field(static=True, default=True)
 
     def __check_init__(self):
-        check_plane(self.plane)
+        check_plane_state(self.plane)
 
     def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "pairs pairs positions"]:
-        bodies = self.body.of_both(pinion, wheel, self.plane)
-        first, second = on_both(lambda load: self.tooth.compliance(load, self.plane), pinion, wheel)
-        own = jnp.eye(first.shape[0], dtype=bool)[:, :, None]
-        return jnp.where(own, bodies + (first + second)[None], bodies)
+        planes = structure_planes(self.plane)
+        shares = on_both(lambda load: plane_stress_share(load.outline, load.face_width), pinion, wheel)
+        bodies = _sum(shares, self.body.of_both(pinion, wheel, planes))
+        teeth = _sum(shares, on_both(lambda load: self.tooth.in_planes(load, planes), pinion, wheel))
+        own = jnp.eye(teeth.shape[0], dtype=bool)[:, :, None]
+        return jnp.where(own, bodies + teeth[None], bodies)
 
     def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, ""]:
         return self.body.hub(pinion.outline) + self.body.hub(wheel.outline)
@@ -86,11 +90,23 @@ class Compliance(AbstractCompliance):
         return EdgeLaw(law, geometry.width_factor, truncation, edge(pinion, wheel, outside, geometry))
 
 
-def default_compliance(plane: Plane = "stress", *, hub_windup: bool = True) -> Compliance:
+def _sum(shares: tuple[Array, Array], in_planes: tuple[Array, Array]) -> Array:
+    """Sum of both gears' compliances, which have the planes of `structure_planes` on their leading axis."""
+    first, second = (_between(share, *planes) for share, planes in zip(shares, in_planes))
+    return first + second
+
+
+def _between(plane_stress: Array, first: Array, *second: Array) -> Array:
+    """Of plane strain and plane stress, or of the only plane."""
+    return sum((plane_stress * (stress - first) for stress in second), start=first)
+
+
+def default_compliance(plane: PlaneState = "auto", *, hub_windup: bool = True) -> Compliance:
     """Beam over the true outline, coupled elastic ring, depth-referenced Hertz contact.
 
     Args:
-        plane: "stress" or "strain".
+        plane: "auto" for the real gear, between plane stress and plane strain by its face width; "stress" or "strain"
+            to compare with two-dimensional references.
         hub_windup: include the common torsion of the gear bodies between bore and root circle.
     """
     return Compliance(body=ElasticRing(hub_windup=hub_windup), plane=plane)

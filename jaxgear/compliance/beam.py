@@ -19,7 +19,16 @@ class AbstractTooth(Checked):
 
     @abstractmethod
     def compliance(self, load: ToothLoad, plane: Plane) -> Float[Array, "..."]:
-        """Displacement of the crossing point along the load line, in um per N/mm; shape of the load."""
+        """Displacement of the crossing point along the load line, in um per N/mm; shape of the load.
+
+        Args:
+            load: loads on the tooth.
+            plane: "stress" or "strain"; what lies between them is put together from both.
+        """
+
+    def in_planes(self, load: ToothLoad, planes: tuple[Plane, ...]) -> Float[Array, "planes ..."]:
+        """`compliance` in each of several planes."""
+        return jnp.stack([self.compliance(load, plane) for plane in planes])
 
 
 class Beam(AbstractTooth):
@@ -43,16 +52,21 @@ class Beam(AbstractTooth):
     nodes: int = count(high=1000, default=12)
 
     def compliance(self, load: ToothLoad, plane: Plane) -> Float[Array, "..."]:
+        return self.in_planes(load, (plane,))[0]
+
+    def in_planes(self, load: ToothLoad, planes: tuple[Plane, ...]) -> Float[Array, "planes ..."]:
         material = load.outline.gear.material
         bending, area = self._integrals(load)
         cosine, sine = jnp.cos(load.angle), jnp.sin(load.angle)
-        modulus = plane_modulus(material, plane)
-        total = (
-            bending * cosine**2 / modulus
-            + _SHEAR_FACTOR * area * cosine**2 / shear_modulus(material)
-            + area * sine**2 / modulus
-        )
-        return 1e3 * total
+
+        def total(modulus):
+            return (
+                bending * cosine**2 / modulus
+                + _SHEAR_FACTOR * area * cosine**2 / shear_modulus(material)
+                + area * sine**2 / modulus
+            )
+
+        return 1e3 * jnp.stack([total(plane_modulus(material, plane)) for plane in planes])
 
     def _integrals(self, load: ToothLoad) -> tuple[Array, Array]:
         """int (y_C - y)^2 / I dy and int 1 / A dy up to the crossing height."""

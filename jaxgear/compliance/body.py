@@ -3,6 +3,7 @@
 from abc import abstractmethod
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -12,6 +13,8 @@ from ..numerics import Checked, count, on_both
 from . import ring, sainsot
 from .plane import Plane, check_plane, plane_modulus, plane_poisson
 from .toothload import ToothLoad
+
+Matrices = Float[Array, "planes pairs pairs positions"]
 
 
 class AbstractBody(Checked):
@@ -25,12 +28,16 @@ class AbstractBody(Checked):
             load: loads on neighbouring teeth in the order of mesh, arrays of shape (pairs, positions).
             step: +1 where the following tooth lies counter-clockwise when the load pushes counter-clockwise (driving
                 gear), -1 for the driven gear.
-            plane: plane stress or plane strain.
+            plane: "stress" or "strain"; what lies between them is put together from both.
         """
 
-    def of_both(self, pinion: ToothLoad, wheel: ToothLoad, plane: Plane) -> Float[Array, "pairs pairs positions"]:
-        """Sum of the compliances of driving and driven gear."""
-        return self.compliance(pinion, +1, plane) + self.compliance(wheel, -1, plane)
+    def of_both(self, pinion: ToothLoad, wheel: ToothLoad, planes: tuple[Plane, ...]) -> tuple[Matrices, Matrices]:
+        """`compliance` of driving and driven gear, each in several planes."""
+        first, second = (
+            jnp.stack([self.compliance(load, step, plane) for plane in planes])
+            for load, step in ((pinion, +1), (wheel, -1))
+        )
+        return first, second
 
     @abstractmethod
     def hub(self, outline: Outline) -> Float[Array, ""]:
@@ -51,18 +58,29 @@ class ElasticRing(AbstractBody):
     coupling: bool = eqx.field(static=True, default=True)
     harmonics: int = count(high=100_000, default=400)
 
-    def of_both(self, pinion: ToothLoad, wheel: ToothLoad, plane: Plane) -> Float[Array, "pairs pairs positions"]:
-        first, second = on_both(lambda given: self.compliance(*given, plane), (pinion, +1), (wheel, -1))
-        return first + second
+    def of_both(self, pinion: ToothLoad, wheel: ToothLoad, planes: tuple[Plane, ...]) -> tuple[Matrices, Matrices]:
+        def of_one(given):
+            load, step = given
+            material = load.outline.gear.material
+            constants = [(plane_modulus(material, plane), plane_poisson(material, plane)) for plane in planes]
+            # one program for all planes: the ring's equations are most of what there is to compile
+            return jax.vmap(lambda *each: self._compliance(load, step, *each))(*map(jnp.stack, zip(*constants)))
+
+        return on_both(of_one, (pinion, +1), (wheel, -1))
 
     def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
+        material = load.outline.gear.material
+        return self._compliance(load, step, plane_modulus(material, plane), plane_poisson(material, plane))
+
+    def _compliance(self, load: ToothLoad, step: int, modulus, poisson) -> Float[Array, "pairs pairs positions"]:
+        """`compliance` with the elastic constants of the plane problem."""
         outline, count = load.outline, load.angle.shape[0]
         gear = outline.gear
         spacing = jnp.arange(count, dtype=load.angle.dtype) * (2 * jnp.pi / gear.teeth)
         blocks = ring.arc_compliance(
             outline.root_half_angle,
             gear.root_circle_radius / gear.bore_radius,
-            plane_poisson(gear.material, plane),
+            poisson,
             spacing,
             self.harmonics,
         )
@@ -79,7 +97,7 @@ class ElasticRing(AbstractBody):
         if not self.coupling:
             between = between * jnp.eye(count, dtype=between.dtype)[:, :, None, None]
         shape = jnp.einsum("iap,ijab,jbp->ijp", modes, between, modes)
-        return 1e3 / plane_modulus(gear.material, plane) * shape
+        return 1e3 / modulus * shape
 
     def hub(self, outline: Outline) -> Float[Array, ""]:
         """(1 + nu) (h^2 - 1) / (2 pi E) (r_b / r_f)^2: torsion of the ring, the same in both plane states."""
@@ -131,8 +149,7 @@ class HalfPlane(AbstractBody):
 def _arm_over_chord(load: ToothLoad) -> Float[Array, "..."]:
     """u_f / S_f: height of the crossing above the root circle over the root chord."""
     outline = load.outline
-    radius = outline.gear.root_circle_radius
-    return (load.height - radius) / (2 * radius * jnp.sin(outline.root_half_angle))
+    return (load.height - outline.gear.root_circle_radius) / outline.root_chord
 
 
 def _diagonal(values: Float[Array, "pairs positions"]) -> Float[Array, "pairs pairs positions"]:

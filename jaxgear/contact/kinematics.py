@@ -66,7 +66,7 @@ class Kinematics(Checked):
         path_of_contact: points A to E.
         first_phase: mesh position with which the base pitch begins, in base pitches: that of all cycles of a batch.
         resolution: array sizes.
-        plane: "stress" or "strain", of the elastic constants.
+        plane: "stress" or "strain", of the contact.
     """
 
     pair: GearPair

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from ..compliance import AbstractCompliance, default_compliance
 from ..compliance.hertz import contact_geometry
+from ..compliance.plane import contact_plane
 from ..compliance.toothload import tooth_load
 from ..geometry import GearPair, Margins, PathOfContact, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
@@ -170,13 +171,14 @@ def _pairs_for(pair: GearPair, deflection: float | None) -> int:
 @program
 def prepare_from(first_phase, pair: GearPair, compliance: AbstractCompliance, resolution: Resolution) -> Mesh:
     """The mesh over the base pitch that begins with a mesh position [base pitches]."""
-    moving = kinematics(pair, first_phase, resolution, compliance.plane)
+    plane = contact_plane(compliance.plane)
+    moving = kinematics(pair, first_phase, resolution, plane)
     contact, dtype = moving.path_of_contact, moving.path.dtype
     points = contacts(pair, contact, moving.path)
     outlines = on_both(outline, pair.pinion, pair.wheel)
     rolls = points.pinion_roll_length, points.wheel_roll_length
-    pinion, wheel = on_both(lambda given: tooth_load(*given), *zip(outlines, rolls))
-    geometry = contact_geometry(pinion, wheel, compliance.plane, pair.face_width)
+    pinion, wheel = on_both(lambda given: tooth_load(*given, pair.face_width), *zip(outlines, rolls))
+    geometry = contact_geometry(pinion, wheel, plane, pair.face_width)
     base_pitch = contact.base_pitch
     outer = contacts(pair, contact, jnp.stack([moving.path[-1] - base_pitch, moving.path[0] + base_pitch]))
     # Chebyshev nodes of the second kind integrate with the weight of the semi-elliptic pressure

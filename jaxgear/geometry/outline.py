@@ -90,6 +90,11 @@ class Outline(Checked):
         """y of the root end of the trochoid [mm], r_f cos(theta_f)."""
         return self.gear.root_circle_radius * jnp.cos(self.root_half_angle)
 
+    @property
+    def root_chord(self) -> Scalar:
+        """Thickness of the tooth where it stands on the root circle [mm], 2 r_f sin(theta_f)."""
+        return 2 * self.gear.root_circle_radius * jnp.sin(self.root_half_angle)
+
 
 @program
 def outline(gear: Gear) -> Outline:
