@@ -159,7 +159,9 @@ def _joined(tooth_block, foot_block, ring_block, arcs: np.ndarray, tooth: Tooth)
     """The right half from its three blocks, (2, v, u) each, and its mirror image."""
     blocks = tooth_block, foot_block, ring_block
     starts = np.cumsum([0, *(block[0].size for block in blocks)])
-    top, foot, ring = (start + np.arange(block[0].size).reshape(block.shape[1:]) for start, block in zip(starts, blocks))
+    top, foot, ring = (
+        start + np.arange(block[0].size).reshape(block.shape[1:]) for start, block in zip(starts, blocks)
+    )
     foot[:, 0] = top[:, -1]
     ring[0] = foot[-1]
     half = np.concatenate([block.reshape(2, -1) for block in blocks], axis=1)

@@ -75,9 +75,7 @@ class Tooth:
         r = self.pitch
         phi = (self._depth / np.tan(g) + self._offset) / r
         distance = self._depth / np.sin(g) + self.shape.root_radius
-        return np.stack(
-            [r * np.sin(phi) - distance * np.cos(g - phi), r * np.cos(phi) - distance * np.sin(g - phi)]
-        )
+        return np.stack([r * np.sin(phi) - distance * np.cos(g - phi), r * np.cos(phi) - distance * np.sin(g - phi)])
 
     def half_angle(self, rho):
         """Between centreline and involute [rad]."""

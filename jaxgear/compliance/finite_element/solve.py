@@ -1,8 +1,8 @@
 """Plane elasticity of a gear as a ring of equal sectors, held at the bore.
 
-The sector is factorised once with its cuts free. What joins the sectors are forces on the cuts: for each harmonic of the
-ring, in which a sector moves as its neighbour does but for a phase exp(2 pi i n / z), they follow from a small dense
-system. A load on one tooth is the mean of its harmonics, so that the effort does not grow with the number of teeth.
+The sector is factorised once with its cuts free. What joins the sectors are forces on the cuts: for each harmonic of
+the ring, in which a sector moves as its neighbour does but for a phase exp(2 pi i n / z), they follow from a small
+dense system. A load on one tooth is the mean of its harmonics: the effort hardly grows with the number of teeth.
 """
 
 from typing import NamedTuple
