@@ -26,7 +26,7 @@ from .build import build, hub
 from .files import read_table
 from .kept import cached, default_folder
 from .shape import Shape
-from .table import GearTable, Scale, different, scaled, shape_of, table_arrays
+from .table import GearTable, Scale, different, scaled, shape_of
 
 Matrix = Float[Array, "pairs pairs positions"]
 
@@ -70,7 +70,7 @@ class TabulatedCompliance(AbstractCompliance):
 
     def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside) -> AbstractSpring:
         plane = contact_plane(self.plane)
-        missing = sum(_local(*given, plane) for given in ((self.pinion[0], pinion), (self.wheel[0], wheel)))
+        missing = _local(self.pinion[0], pinion, plane) + _local(self.wheel[0], wheel, plane)
         law = DepthReferenced().prepare(geometry)
         constant, *rest = law.series
         law = eqx.tree_at(lambda each: each.series, law, (constant + missing[:, None], *rest))
@@ -82,7 +82,7 @@ class TabulatedCompliance(AbstractCompliance):
             if any(concrete(leaf) is None for leaf in jax.tree.leaves(gear)):
                 continue
             for table, plane in zip(tables, structure_planes(self.plane)):
-                fault = different(table, shape_of(gear, plane))
+                fault = different(table, _concrete(gear, plane)[0])
                 if fault:
                     raise ValueError(f"finite_element_compliance: {name} {fault}: make one for every shape of gear")
 
@@ -103,7 +103,7 @@ def _structure(table: GearTable, load: ToothLoad, plane: Plane, driven: bool) ->
     apart = jnp.asarray(steps == np.arange(1, most + 1)[:, None, None], weights.dtype)
     below = jnp.einsum("kij,jpm,kmn,ipn->ijp", apart, weights, neighbours, weights)
     own = weights @ (table.center - table.hub)
-    return scale.value * (below + below.swapaxes(0, 1) + jnp.eye(pairs, dtype=own.dtype)[:, :, None] * own)
+    return scale.value * (below + below.swapaxes(0, 1) + jnp.eye(pairs, dtype=own.dtype)[:, :, None] * own[None])
 
 
 def _local(table: GearTable, load: ToothLoad, plane: Plane) -> Float[Array, "pairs positions"]:
@@ -140,13 +140,13 @@ def finite_element_compliance(
     """
     check_plane_state(plane)
     folder = default_folder() if cache is True else Path(cache) if cache else None
-    tables = []
+    tables: dict[str, tuple[GearTable, ...]] = {}
     for name, path in (("pinion", pinion_table), ("wheel", wheel_table)):
         gear: Gear = getattr(pair, name)
         if any(concrete(leaf) is None for leaf in jax.tree.leaves(gear)):
             raise ValueError(f"finite_element_compliance: pair: {name} is traced, must be of concrete numbers")
-        tables.append(_tables(gear, plane, None if path is None else Path(path), folder))
-    return TabulatedCompliance(*tables, plane)
+        tables[name] = _tables(gear, plane, None if path is None else Path(path), folder)
+    return TabulatedCompliance(pinion=tables["pinion"], wheel=tables["wheel"], plane=plane)
 
 
 def _tables(gear: Gear, state: PlaneState, path: Path | None, folder: Path | None) -> tuple[GearTable, ...]:
@@ -154,16 +154,17 @@ def _tables(gear: Gear, state: PlaneState, path: Path | None, folder: Path | Non
     if path is not None:
         shape, modulus = _concrete(gear, planes[0])
         wind_up = hub(shape) * 1e3 / modulus
-        return (table_arrays(read_table(path, shape, float(gear.module), modulus, wind_up)),)
+        return (read_table(path, shape, float(gear.module), modulus, wind_up),)
     found = []
     for plane in planes:
         shape, modulus = _concrete(gear, plane)
         numbers = cached(folder, shape, build)
-        found.append(table_arrays(scaled(shape, numbers, hub(shape), float(gear.module), modulus)))
+        found.append(scaled(shape, numbers, hub(shape), float(gear.module), modulus))
     return tuple(found)
 
 
 def _concrete(gear: Gear, plane: Plane) -> tuple[Shape, float]:
     """The rounded numbers of a gear and its plane modulus [MPa], also while something else is being traced."""
     with jax.ensure_compile_time_eval():
-        return shape_of(gear, plane).rounded(), float(plane_modulus(gear.material, plane))
+        numbers = map(float, np.asarray(shape_of(gear, plane)))
+        return Shape(*numbers).rounded(), float(plane_modulus(gear.material, plane))

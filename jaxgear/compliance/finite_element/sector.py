@@ -207,7 +207,7 @@ def _check(found: Sector, tooth: Tooth) -> None:
     rim = tooth.root - tooth.bore
     blame = (
         f"bore_diameter leaves a rim of {rim:.3g} x module"
-        if rim < _INSIDE
+        if rim < 0.5 * _INSIDE
         else f"teeth = {tooth.shape.teeth:g} with profile_shift = {tooth.shape.profile_shift:g}"
     )
     raise ValueError(

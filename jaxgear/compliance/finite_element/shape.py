@@ -34,7 +34,7 @@ class Shape(NamedTuple):
 
     def rounded(self) -> "Shape":
         """Seven significant digits: what single precision holds."""
-        return Shape(*(float(f"{float(value):.{_DIGITS}g}") for value in self))
+        return Shape(*(float(f"{value:.{_DIGITS}g}") for value in self))
 
 
 class Tooth:

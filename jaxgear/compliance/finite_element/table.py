@@ -22,6 +22,12 @@ _ALIKE = 3e-6
 # numbers of a gear on which its table depends in a way that the table does not know
 _HELD = ("teeth", "pressure_angle", "profile_shift", "dedendum", "root_radius")
 
+_WORDS = {
+    "tip_ratio": "tip_diameter over 2 module",
+    "bore_ratio": "bore_diameter over 2 module",
+    "poisson": "Poisson's ratio of the plane problem",
+}
+
 
 class GearTable(eqx.Module):
     """What one gear gives way along its load lines, bore held; roll lengths from the form circle to the tip.
@@ -74,12 +80,17 @@ class GearTable(eqx.Module):
 def gear_table(shape: Shape, module: float, modulus: float, numbers: Numbers, hub: float) -> GearTable:
     """A table of arrays that are those of a gear of that module [mm] and plane modulus [MPa]; fields as there."""
     slopes = CubicSpline(numbers.roll_length, np.eye(len(numbers.roll_length)))(numbers.roll_length, 1)
-    return GearTable(np.asarray(shape), module, modulus, *numbers, hub, slopes)
-
-
-def table_arrays(table: GearTable) -> GearTable:
-    """The table with JAX arrays of the current precision."""
-    return jax.tree.map(real, table)
+    return GearTable(
+        shape=real(np.asarray(shape)),
+        module=real(module),
+        modulus=real(modulus),
+        roll_length=real(numbers.roll_length),
+        center=real(numbers.center),
+        local=real(numbers.local),
+        neighbours=real(numbers.neighbours),
+        hub=real(hub),
+        slopes=real(slopes),
+    )
 
 
 def scaled(shape: Shape, numbers: Numbers, hub: float, module: float, modulus: float) -> GearTable:
@@ -89,17 +100,19 @@ def scaled(shape: Shape, numbers: Numbers, hub: float, module: float, modulus: f
     return gear_table(shape, module, modulus, sized, factor * hub)
 
 
-def shape_of(gear: Gear, plane: Plane) -> Shape:
-    """The numbers that a gear's table depends on; they may be traced."""
-    return Shape(
-        gear.teeth,
-        gear.pressure_angle,
-        gear.profile_shift,
-        gear.dedendum,
-        gear.root_radius,
-        gear.tip_radius / gear.module,
-        gear.bore_radius / gear.module,
-        plane_poisson(gear.material, plane),
+def shape_of(gear: Gear, plane: Plane) -> Float[Array, " numbers"]:
+    """The numbers that a gear's table depends on, in the order of `Shape`; they may be traced."""
+    return jnp.stack(
+        [
+            gear.teeth,
+            gear.pressure_angle,
+            gear.profile_shift,
+            gear.dedendum,
+            gear.root_radius,
+            gear.tip_radius / gear.module,
+            gear.bore_radius / gear.module,
+            plane_poisson(gear.material, plane),
+        ]
     )
 
 
@@ -117,22 +130,17 @@ class Scale(eqx.Module):
     @classmethod
     def of(cls, table: GearTable, gear: Gear, plane: Plane) -> "Scale":
         gear = _without_unknown_derivatives(gear)
-        apart = differences(table, shape_of(gear, plane))
+        given = jax.lax.stop_gradient(shape_of(gear, plane))
+        apart = jnp.abs(given - table.shape) / jnp.maximum(jnp.abs(table.shape), 1.0)
         factor = table.modulus / plane_modulus(gear.material, plane)
         return cls(table.module / gear.module, jnp.where(jnp.any(apart > _ALIKE), jnp.nan, factor))
 
 
-def differences(table: GearTable, shape: Shape) -> Float[Array, " numbers"]:
-    """How far a gear's numbers lie from those of a table, relative to their size and to one."""
-    given = jax.lax.stop_gradient(jnp.stack([jnp.asarray(each, table.shape.dtype) for each in shape]))
-    return jnp.abs(given - table.shape) / jnp.maximum(jnp.abs(table.shape), 1.0)
-
-
 def different(table: GearTable, shape: Shape) -> str | None:
     """The first number of a gear that is not that of its table, in words; both are concrete."""
-    for name, there, here in zip(Shape._fields, np.asarray(table.shape, float), map(float, shape)):
+    for name, there, here in zip(Shape._fields, np.asarray(table.shape, float), shape):
         if abs(here - there) > _ALIKE * max(abs(there), 1.0):
-            return f"{name} = {here:.7g} differs from {there:.7g} of its table"
+            return f"{_WORDS.get(name, name)} = {here:.7g} differs from {there:.7g} of its table"
     return None
 
 
@@ -171,7 +179,7 @@ def _held(name: str, value):
 
 def _refusal(name: str) -> str:
     if name == "module":
-        why = "moves bore and tip against the module where bore_diameter or tip_diameter is given: leave both None"
+        why = "it moves bore and tip against the module where bore_diameter or tip_diameter is given: leave both None"
     else:
-        why = "changes the shape of the gear, which its table holds: use default_compliance"
-    return f"finite_element_compliance: no derivative by {name}, which {why}"
+        why = "its table is of one value: use default_compliance"
+    return f"finite_element_compliance: no derivative by {name}: {why}"
