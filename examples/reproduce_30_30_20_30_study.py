@@ -68,7 +68,8 @@ def gear_pair(name):
 
 @eqx.filter_jit
 def prepare(pair, resolution):
-    return jg.prepare(pair, resolution=resolution)
+    # two-dimensional, as the study and the finite elements named above
+    return jg.prepare(pair, compliance=jg.default_compliance("stress"), resolution=resolution)
 
 
 def without_coupling(mesh):

@@ -64,7 +64,8 @@ def gear_pair():
 
 @eqx.filter_jit
 def prepare(pair, resolution):
-    return jg.prepare(pair, resolution=resolution)
+    # two-dimensional, as the study's finite elements
+    return jg.prepare(pair, compliance=jg.default_compliance("stress"), resolution=resolution)
 
 
 @eqx.filter_jit

@@ -1,5 +1,7 @@
 """Doubts: usual designs raise none, and every slip of a unit or of a digit raises the one that names it."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import pytest
 
@@ -57,12 +59,21 @@ def test_slips_of_flanks_and_operation(cycle, options, expected):
         ({"elastic_modulus": 206.0}, "elastic modulus"),
         ({"density": 7.85}, "density"),
         ({"tip_edge_radius": 5.0}, "tip edge radius in modules"),
-        ({"face_width": 5000.0}, "face width in modules, plane stress"),
+        ({"face_width": 5000.0}, "face width in modules"),
+        ({"face_width": 5.0}, "face width in modules"),
     ],
 )
 def test_slips_of_gears(cycle, values, expected):
     wrong = replaced(replaced(cycle, "wheel", **values), "pinion", **values)
     assert expected in {name for name, _ in names(wrong)}
+
+
+def test_wide_teeth_are_not_in_plane_stress(cycle):
+    """20 modules are usual between the planes."""
+    wide = replaced(replaced(cycle, "wheel", face_width=63.0), "pinion", face_width=63.0)
+    assert names(wide) == set()
+    stress = eqx.tree_at(lambda c: c.kinematics, wide, replace(wide.kinematics, plane="stress"))
+    assert names(stress) == {("face width in modules, plane stress", "")}
 
 
 def test_results_beyond_materials_and_contact(cycle, mesh):

@@ -89,7 +89,7 @@ class MeshCycle(eqx.Module):
     def contact_pressure(self) -> Load:
         """Largest Hertzian pressure on the flank [MPa]; zero where the pair is apart or touches with a tip corner.
 
-        p = sqrt(q E* / (pi R)) (Hertz), with the plane moduli of the compliance model.
+        p = sqrt(q E* / (pi R)) (Hertz), in plane strain unless the compliance model is in plane stress throughout.
         """
         return pressures(self.kinematics, self.line_load)[0]
 

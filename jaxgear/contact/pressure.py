@@ -20,7 +20,7 @@ def pressures(kinematics: Kinematics, line_load: Load) -> tuple[Load, Load]:
 def flank_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     """p = sqrt(q E* / (pi R)) [MPa] with the local radii of both involutes; zero outside the path of contact.
 
-    E* uses the plane moduli of the compliance model, so plane stress gives 5 % less than the usual plane strain form.
+    E* is that of plane strain, the usual form, unless the compliance model is in plane stress throughout: 5 % less.
     """
     pinion, wheel = kinematics.sides
     reduced = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)

@@ -40,7 +40,8 @@ LIMITS = {
     "elastic modulus": Limit(500.0, 700_000.0, "MPa", "plastics 1000 to 10000, steel 206000 MPa: is it in GPa or Pa?"),
     "density": Limit(500.0, 25_000.0, "kg/m^3", "steel 7850 kg/m^3: is it in g/cm^3?"),
     "bore to root diameter": Limit(0.1, 0.95, "", "the body is a ring held at its bore, which is hardly one"),
-    "face width in modules, plane stress": Limit(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "strain"'),
+    "face width in modules, plane stress": Limit(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
+    "face width in modules": Limit(2.0, 48.0, "", "as compared with finite elements; narrower contacts are softer"),
     "tip edge radius in modules": Limit(0.0, 0.2, "", "an edge is broken by 0.01 to 0.1 modules"),
     "coefficient of friction": Limit(0.0, 0.5, "", "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"),
     "pitch line velocity": Limit(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
@@ -132,8 +133,9 @@ def _numbers(cycle: MeshCycle):
             ("tip edge radius in modules", where, gear.tip_edge_radius / gear.module),
         ]
     module, stress = pair.pinion.module, root_stress(cycle)
-    if cycle.kinematics.plane == "stress":
-        gears.append(("face width in modules, plane stress", "", pair.face_width / module))
+    in_stress = cycle.kinematics.plane == "stress"
+    name = "face width in modules, plane stress" if in_stress else "face width in modules"
+    gears.append((name, "", pair.face_width / module))
     results = [
         ("mean transmission error in modules", "", 1e-3 * jnp.mean(cycle.transmission_error) / module),
         ("flank pressure", "", jnp.max(cycle.contact_pressure)),
