@@ -1,15 +1,18 @@
 """The finite-element model of a gear: outline, mesh, reciprocity, a closed form, and compliances of another program."""
 
-import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline, RectBivariateSpline
 
 import jaxgear as jg
-from jaxgear.compliance.finite_element.build import POINTS, build, hub
+from jaxgear.compliance.assembly import with_edge
+from jaxgear.compliance.finite_element.build import POINTS, _wedge, build, hub
 from jaxgear.compliance.finite_element.sector import sector, shape_gradients, sines
 from jaxgear.compliance.finite_element.shape import Shape, Tooth
 from jaxgear.compliance.finite_element.solve import Places, along_edge, responses
+from jaxgear.compliance.hertz import contact_geometry
+from jaxgear.compliance.toothload import tooth_load
 from jaxgear.geometry import outline
 
 FULL = 0.25 / (1 - np.sin(np.deg2rad(20.0)))  # root radius that leaves no flat on the tip of the rack
@@ -35,8 +38,8 @@ def test_the_outline_is_that_of_the_geometry(teeth, shift):
     rho = np.linspace(tooth.form_roll_length, tooth.tip_roll_length, 5)
     g = np.linspace(tooth.junction, np.pi / 2, 5)
     curves = drawn.curves.over((5,))
-    np.testing.assert_allclose(tooth.involute(rho), curves.involute(jax.numpy.asarray(rho)), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(tooth.trochoid(g), curves.trochoid(jax.numpy.asarray(g)), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(tooth.involute(rho), curves.involute(jnp.asarray(rho)), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(tooth.trochoid(g), curves.trochoid(jnp.asarray(g)), rtol=1e-9, atol=1e-9)
 
 
 SHAPES = {
@@ -169,6 +172,21 @@ def test_compliances_are_those_of_another_program(name):
         matrix = numbers.neighbours[0] if step > 0 else numbers.neighbours[0].T
         beside = RectBivariateSpline(numbers.roll_length, numbers.roll_length, matrix)(rho, rho - step * pitch)
         assert beside.item() == pytest.approx(coupled * to_unit, rel=2e-3)
+
+
+def test_the_wedge_of_the_tip_that_is_taken_out_is_that_of_the_law():
+    """It is read with a pressure near the tip, where the law softens too."""
+    gears = jg.GearPair(*(jg.Gear(z, 1.0, face_width=5.0) for z in (19, 48)))
+    tooth = Tooth(shape(19, radius=0.38))
+    rho = np.sqrt(tooth.tip_roll_length**2 - 2 * tooth.base * np.array([0.13, 0.2, 0.4]))
+    pinion = tooth_load(outline(gears.pinion), jnp.asarray(rho)[None])
+    wheel = tooth_load(outline(gears.wheel), jnp.full((1, 3), 3.0))
+    geometry = contact_geometry(pinion, wheel, "stress", gears.face_width)
+    flank = jg.compliance.DepthReferenced().prepare(geometry)
+    law = with_edge(flank, geometry, pinion, wheel, jnp.zeros((1, 3)))
+    load = 0.06**2 / geometry.width_factor
+    softer = np.asarray(law.secant(load) - flank.secant(load))[0, 0]
+    np.testing.assert_allclose(softer, 1e3 / 206e3 * _wedge(tooth, rho), rtol=1e-6)
 
 
 def test_a_finer_mesh_changes_nothing():

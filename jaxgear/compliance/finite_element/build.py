@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ..edge import APEX_DISTANCE, WEDGE_REACH
 from .sector import Sector, sector
 from .shape import Shape, Tooth
 from .solve import Places, along_edge, responses
@@ -19,8 +20,6 @@ _PATCH = 0.06
 _PATCH_POINTS = 64  # of its quadrature
 # Distance of its middle from the tip corner, over its half width: closer the corner bends the patch.
 _CLEAR = 2.0
-# as in `edge`: reach of the tip wedge, over the depth, and the distance at which its apex solution holds
-_WEDGE_REACH, _APEX_DISTANCE = 0.25, 1.82
 
 
 class Numbers(NamedTuple):
@@ -126,14 +125,14 @@ def _law(tooth: Tooth, rho: np.ndarray) -> np.ndarray:
 
 
 def _wedge(tooth: Tooth, rho: np.ndarray) -> np.ndarray:
-    """What `EdgeLaw` adds for the tip's wedge under the patch."""
+    """What `EdgeLaw` adds for the tip's wedge under the patch, so that it is not counted twice."""
     b = 0.5 * (np.pi / 2 + np.arctan(tooth.tip_roll_length / tooth.base))
     twin = 0.5 * np.sin(2 * b)
     excess = np.sin(b) ** 2 / (b + twin) + np.cos(b) ** 2 / (b - twin) - 2 / np.pi
     distance = tooth.arc(tooth.tip_roll_length) - tooth.arc(rho)
     inner = distance + np.sqrt(distance**2 - _PATCH**2)
     mean = 0.5 * inner * np.exp(0.5 * (_PATCH / inner) ** 2)
-    span = _WEDGE_REACH * tooth.depth(rho) / (_APEX_DISTANCE * mean)
+    span = WEDGE_REACH * tooth.depth(rho) / (APEX_DISTANCE * mean)
     return excess * 0.25 * np.log1p(span**4)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from .shape import Tooth
 
-# Edges in modules. Twice as fine changes centre and neighbours by 0.01 %, the local term by 1 % of itself.
+# Edges in modules. Twice as fine: centre within 0.007 %, neighbours 0.03 % (thin rim), local term 3 % of itself.
 _FLANK_EDGE = 0.03
 _FILLET_EDGE = 0.045
 _ROOT_EDGE = 0.09
