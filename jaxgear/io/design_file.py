@@ -214,7 +214,6 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
     usual_pair = pair.build(middle)
-    model = with_tables(model, stiffness, file.parent, pair, usual_pair)
     built = {part.key: [part.build(end) for end in ends] for part in flanks}
     uneven = [key for key, both in built.items() if any(one.varies_along_face for one in both)]
     usual = operation.build(middle)
@@ -227,6 +226,9 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     if top.sweep is not None and not top.variables:
         raise DesignFileError("sweep", "has no effect without [variables]")
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
+    sweep = None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection)
+    resolution = _resolution(top.resolution or {}, uneven)
+    model = with_tables(model, stiffness, file.parent, pair, usual_pair)  # last, as it takes longer than all the rest
     return DesignFile(
         path=file,
         title=top.title or file.stem,
@@ -237,7 +239,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         bounds=bounds,
         units=units,
         optimize=optimize,
-        sweep=None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection),
+        sweep=sweep,
         tolerance=tolerance,
         design=FileDesign(tuple(bounds), pinion_flank, wheel_flank),
         open_case=tuple(open_case),
@@ -246,7 +248,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         _model=model,
         _compliance=model.build(middle),
         _load=operation,
-        _resolution=_resolution(top.resolution or {}, uneven),
+        _resolution=resolution,
     )
 
 

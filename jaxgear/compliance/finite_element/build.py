@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy  # its packages load when they are used
 
 from ..edge import APEX_DISTANCE, WEDGE_REACH
 from .sector import Sector, sector
@@ -138,6 +138,6 @@ def _wedge(tooth: Tooth, rho: np.ndarray) -> np.ndarray:
 
 def _extended(arcs: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """A curve over the involute: along its tangent towards the fillet, constant towards the tip, where it is level."""
-    curve = CubicSpline(arcs, values)
+    curve = scipy.interpolate.CubicSpline(arcs, values)
     inside = np.clip(wanted, arcs[0], arcs[-1])
     return curve(inside) + curve(arcs[0], 1) * np.minimum(wanted - arcs[0], 0.0)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...geometry import Gear, GearPair
-from ...numerics import AbstractSpring, concrete
+from ...numerics import AbstractSpring, concrete, program
 from ..assembly import AbstractCompliance, between_planes, with_edge
 from ..hertz import ContactGeometry, DepthReferenced
 from ..plane import (
@@ -166,5 +166,10 @@ def _tables(gear: Gear, state: PlaneState, path: Path | None, folder: Path | Non
 def _concrete(gear: Gear, plane: Plane) -> tuple[Shape, float]:
     """The rounded numbers of a gear and its plane modulus [MPa], also while something else is being traced."""
     with jax.ensure_compile_time_eval():
-        numbers = map(float, np.asarray(shape_of(gear, plane)))
-        return Shape(*numbers).rounded(), float(plane_modulus(gear.material, plane))
+        numbers, modulus = map(np.asarray, _numbers(gear, plane))
+    return Shape(*map(float, numbers)).rounded(), float(modulus)
+
+
+@program
+def _numbers(gear: Gear, plane: Plane) -> tuple[Float[Array, " numbers"], Float[Array, ""]]:
+    return shape_of(gear, plane), plane_modulus(gear.material, plane)

@@ -7,7 +7,7 @@ also where JAX computes in single precision or is tracing.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy  # its packages load when they are used
 
 _DIGITS = 7  # significant ones of the numbers, so that both precisions mean the same table
 
@@ -109,8 +109,8 @@ class Tooth:
         tangential = self.pitch * np.sin(alpha) - straight / np.sin(alpha)
         if tangential > -1e-12 * self.pitch:
             return float(alpha), max(float(tangential), 0.0)
-        at_base = brentq(lambda g: np.hypot(*self.trochoid(g)) - self.base, alpha, np.pi / 2)
-        cut = brentq(self._beside_involute, alpha, at_base)
+        at_base = scipy.optimize.brentq(lambda g: np.hypot(*self.trochoid(g)) - self.base, alpha, np.pi / 2)
+        cut = scipy.optimize.brentq(self._beside_involute, alpha, at_base)
         return float(cut), float(np.sqrt(max(np.sum(self.trochoid(cut) ** 2) - self.base**2, 0.0)))
 
     def _beside_involute(self, g: float) -> float:

@@ -8,8 +8,7 @@ dense system. A load on one tooth is the mean of its harmonics: the effort hardl
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sparse
-from scipy.sparse.linalg import splu
+import scipy  # its packages load when they are used
 
 from .sector import Sector, quadratic, shape_gradients
 
@@ -70,7 +69,9 @@ def responses(sector: Sector, poisson: float, teeth: int, loads: Places, seen: P
     asked = np.concatenate([left, right, seen.weights], axis=1)[keep]
     stiffness = _stiffness(sector, poisson)[keep][:, keep].tocsc()
     # ordering and pivots of a symmetric positive definite matrix
-    factor = splu(stiffness, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    factor = scipy.sparse.linalg.splu(
+        stiffness, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
     flexibility = asked.T @ factor.solve(acting)
     return _ring(flexibility, left.shape[1], teeth, neighbours)
 
@@ -121,4 +122,4 @@ def _stiffness(sector: Sector, poisson: float):
     numbers = (2 * sector.elements[:, :, None] + np.arange(2)).reshape(-1, 18)
     rows, columns = np.broadcast_arrays(numbers[:, :, None], numbers[:, None, :])
     size = 2 * len(sector.points)
-    return sparse.csr_matrix((element.reshape(-1), (rows.ravel(), columns.ravel())), shape=(size, size))
+    return scipy.sparse.csr_matrix((element.reshape(-1), (rows.ravel(), columns.ravel())), shape=(size, size))

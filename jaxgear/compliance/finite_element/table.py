@@ -4,8 +4,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy  # its packages load when they are used
 from jaxtyping import Array, Float
-from scipy.interpolate import CubicSpline
 
 from ...geometry import Gear
 from ...numerics import real
@@ -79,7 +79,8 @@ class GearTable(eqx.Module):
 
 def gear_table(shape: Shape, module: float, modulus: float, numbers: Numbers, hub: float) -> GearTable:
     """A table of arrays that are those of a gear of that module [mm] and plane modulus [MPa]; fields as there."""
-    slopes = CubicSpline(numbers.roll_length, np.eye(len(numbers.roll_length)))(numbers.roll_length, 1)
+    unit = np.eye(len(numbers.roll_length))
+    slopes = scipy.interpolate.CubicSpline(numbers.roll_length, unit)(numbers.roll_length, 1)
     return GearTable(
         shape=real(np.asarray(shape)),
         module=real(module),
