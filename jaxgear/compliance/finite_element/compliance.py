@@ -121,8 +121,8 @@ def finite_element_compliance(
 ) -> TabulatedCompliance:
     """Teeth and gear bodies by finite elements: two-dimensional, whole ring, bore held rigidly, once per gear.
 
-    Takes one to three seconds per gear and plane, then comes from the disk. A table holds for every module, modulus, face
-    width, centre distance, torque and modification of the gear.
+    Takes one to three seconds per gear and plane, then comes from the disk. A table holds for every module, modulus,
+    face width, centre distance, torque and modification of the gear.
 
     Args:
         pair: gear pair of concrete numbers.
