@@ -5,6 +5,7 @@ The pipeline in reading order, every step differentiable and vmappable:
     Gear, GearPair              geometry of an external involute spur pair
     TipRelief + LeadCrowning    microgeometry, composed with `+`
     default_compliance          teeth, gear bodies with coupled neighbours, Hertzian contact
+    finite_element_compliance   teeth and bodies by finite elements, for gears that stay as they are
     prepare, solve              loaded tooth contact over one base pitch -> MeshCycle
     peak_to_peak, ...           metrics on the MeshCycle
     monte_carlo                 what manufacturing tolerances make of it

@@ -15,6 +15,7 @@ from . import sweeps as sweeps
 from . import tolerance as tolerance
 from .compliance import Compliance as Compliance
 from .compliance import default_compliance as default_compliance
+from .compliance import finite_element_compliance as finite_element_compliance
 from .compliance import legacy_compliance as legacy_compliance
 from .conditions import LoadSpectrum as LoadSpectrum
 from .contact import Mesh as Mesh

@@ -1,9 +1,11 @@
 """Compliance of the teeth, the gear bodies and the contact, in um/N per unit face width (um mm/N).
 
     tooth (beam) + body (elastic ring with neighbouring teeth, or Sainsot's polynomial) + contact law (Hertz)
+    tooth and body by finite elements, as a table per gear + contact law
 
 `Compliance` composes the parts; `default_compliance` is the recommended set, `legacy_compliance` the one that most
-published spur-gear studies use. Anything else that knows the elasticity of both gears is an `AbstractCompliance`.
+published spur-gear studies use, `finite_element_compliance` the most accurate one for gears that stay as they are.
+Anything else that knows the elasticity of both gears is an `AbstractCompliance`.
 """
 
 from .assembly import AbstractCompliance as AbstractCompliance
@@ -16,6 +18,10 @@ from .body import AbstractBody as AbstractBody
 from .body import ElasticRing as ElasticRing
 from .body import HalfPlane as HalfPlane
 from .body import Sainsot as Sainsot
+from .finite_element import GearTable as GearTable
+from .finite_element import TabulatedCompliance as TabulatedCompliance
+from .finite_element import finite_element_compliance as finite_element_compliance
+from .finite_element import write_table as write_table
 from .hertz import AbstractContact as AbstractContact
 from .hertz import CenterDistance as CenterDistance
 from .hertz import ConstantHertz as ConstantHertz

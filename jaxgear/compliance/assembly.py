@@ -6,11 +6,13 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..geometry import GearPair
 from ..numerics import AbstractSpring, on_both
 from .beam import AbstractTooth, Beam
 from .body import AbstractBody, ElasticRing, Sainsot
 from .edge import EdgeLaw, edge
 from .hertz import AbstractContact, ConstantHertz, ContactGeometry, DepthReferenced
+from .laws import AbstractLaw
 from .plane import PlaneState, check_plane_state, plane_stress_share, structure_planes
 from .toothload import ToothLoad
 
@@ -47,6 +49,13 @@ class AbstractCompliance(eqx.Module):
         outside: Float[Array, "pairs positions"],
     ) -> AbstractSpring:
         """The prepared contact law, for contacts at a distance `outside` the path of contact [mm]."""
+
+    def check(self, pair: GearPair) -> None:
+        """Refuses a pair that it does not hold for, as far as its numbers are concrete; asked by `prepare`.
+
+        Raises:
+            ValueError: naming the gear and the number.
+        """
 
 
 class Compliance(AbstractCompliance):
@@ -86,18 +95,29 @@ class Compliance(AbstractCompliance):
         law = self.contact.prepare(geometry)
         if not self.edge_softening:
             return law
-        truncation = 4e3 / jnp.pi * geometry.compliance
-        return EdgeLaw(law, geometry.width_factor, truncation, edge(pinion, wheel, outside, geometry))
+        return with_edge(law, geometry, pinion, wheel, outside)
+
+
+def with_edge(
+    law: AbstractLaw,
+    geometry: ContactGeometry,
+    pinion: ToothLoad,
+    wheel: ToothLoad,
+    outside: Float[Array, "pairs positions"],
+) -> EdgeLaw:
+    """The law of the uninterrupted flanks with the softening of the nearest tip corner."""
+    truncation = 4e3 / jnp.pi * geometry.compliance
+    return EdgeLaw(law, geometry.width_factor, truncation, edge(pinion, wheel, outside, geometry))
 
 
 def _sum(shares: tuple[Array, Array], in_planes: tuple[Array, Array]) -> Array:
     """Sum of both gears' compliances, which have the planes of `structure_planes` on their leading axis."""
-    first, second = (_between(share, *planes) for share, planes in zip(shares, in_planes))
+    first, second = (between_planes(share, *planes) for share, planes in zip(shares, in_planes))
     return first + second
 
 
-def _between(plane_stress: Array, first: Array, *second: Array) -> Array:
-    """Of plane strain and plane stress, or of the only plane."""
+def between_planes(plane_stress: Array, first: Array, *second: Array) -> Array:
+    """Between plane strain and plane stress by the share of the latter, or that of the only plane."""
     return sum((plane_stress * (stress - first) for stress in second), start=first)
 
 

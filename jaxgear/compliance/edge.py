@@ -41,10 +41,10 @@ Real = Float[Array, "..."]
 # Distance from the corner, relative to the depth of the centreline below it, at which the wedge's excess compliance
 # ends. Found once from finite-element compliances of single teeth of 17 to 75 mm radius loaded close to their tips:
 # 0.24 ... 0.28.
-_WEDGE_REACH = 0.25
+WEDGE_REACH = 0.25
 # Point load at unit distance from the apex of a wedge: its apex solution holds from 1.82 times that distance on (Mellin
 # transform of the wedge, interior angles of 110 to 130 degrees: 1.77 ... 1.88).
-_APEX_DISTANCE = 1.82
+APEX_DISTANCE = 1.82
 # Distances from the corner below this one [mm] count as this one: no contact is as small.
 _SHORTEST = 1e-6
 _FULL_TERMS = 12  # of a polynomial that is exact to 1e-8
@@ -111,7 +111,7 @@ def _corner(load: ToothLoad, side: ContactSide, outside: Real) -> _Corner:
         inside=(tip**2 - load.roll_length**2) / (2 * base),
         beyond=-(2 * tip + outside) * outside / (2 * base),
         wedge=1e3 * _wedge_excess(load) / side.modulus[:, 0],
-        reach=_WEDGE_REACH * side.depth[:, 0],
+        reach=WEDGE_REACH * side.depth[:, 0],
     )
 
 
@@ -165,7 +165,7 @@ class EdgeLaw(AbstractSpring):
         return Cut(squared, patch.squared_extent, patch.widening, 0.5 * self.truncation)
 
     def _span(self, patch: "Patch") -> Real:
-        return self.edge.reach / _APEX_DISTANCE * (1 / patch.mean_distance)
+        return self.edge.reach / APEX_DISTANCE * (1 / patch.mean_distance)
 
 
 class Patch(NamedTuple):

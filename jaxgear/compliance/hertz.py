@@ -125,7 +125,7 @@ class DepthReferenced(AbstractContact):
         C. Weber, K. Banaschek 1953; E. McEwen, Phil. Mag. 40 (1949) 454-459 for the stress field it integrates.
     """
 
-    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
+    def prepare(self, geometry: ContactGeometry) -> LogarithmicLaw:
         def brackets(squared):
             reaches = [jnp.sqrt(side.depth**2 + squared) + side.depth for side in geometry.sides]
             # asinh(h / a) = ln((h + sqrt(h^2 + a^2)) / a)

@@ -145,9 +145,11 @@ def prepare(
         the mesh, to be shared by any number of modifications and torques.
 
     Raises:
-        ValueError: when the path of contact is longer than the pairs of the resolution can cover.
+        ValueError: when the path of contact is longer than the pairs of the resolution can cover, or the compliance is
+            a table of other gears.
     """
     compliance = default_compliance() if compliance is None else compliance
+    compliance.check(pair)
     resolution = Resolution() if resolution is None else resolution
     automatic = resolution.pairs is None
     if automatic:

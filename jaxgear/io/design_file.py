@@ -9,7 +9,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..compliance import Compliance, legacy_compliance
+from ..compliance import AbstractCompliance
 from ..contact import Mesh, Operation, Resolution, begin_contact, fewest_pairs, prepare
 from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
@@ -17,6 +17,7 @@ from ..numerics import program
 from ..sizing import iso_stiffness
 from . import schema, schema_sweep, template
 from .errors import DesignFileError, naming, refuse_given, refused
+from .stiffness import model_part, with_tables
 from .toml import decode, read
 from .variables import increasing, read_variables
 
@@ -106,7 +107,7 @@ class DesignFile:
     _pair: template.Part
     _middle: GearPair
     _model: template.Part
-    _compliance: Compliance
+    _compliance: AbstractCompliance
     _load: template.Part
     _resolution: Resolution
 
@@ -202,7 +203,8 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     pair = replace(mounting, fields={"pinion": pinion, "wheel": wheel, **mounting.fields})
     load = _load(top.load)
     operation = template.part_of("load", load, Operation)
-    model = _model(top.model or {})
+    stiffness = decode("model", top.model or {}, schema.ModelSection)
+    model = model_part(stiffness)
     optimize = decode("optimize", top.optimize or {}, schema.optimize_section())
     if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
         raise DesignFileError("optimize", "has no effect without [variables]")
@@ -211,6 +213,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     bounds, units = read_variables(top.variables or {}, [*open_flanks, *open_case])
     ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
+    usual_pair = pair.build(middle)
     built = {part.key: [part.build(end) for end in ends] for part in flanks}
     uneven = [key for key, both in built.items() if any(one.varies_along_face for one in both)]
     usual = operation.build(middle)
@@ -223,6 +226,9 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     if top.sweep is not None and not top.variables:
         raise DesignFileError("sweep", "has no effect without [variables]")
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
+    sweep = None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection)
+    resolution = _resolution(top.resolution or {}, uneven)
+    model = with_tables(model, stiffness, file.parent, pair, usual_pair)  # last, as it takes longer than all the rest
     return DesignFile(
         path=file,
         title=top.title or file.stem,
@@ -233,16 +239,16 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         bounds=bounds,
         units=units,
         optimize=optimize,
-        sweep=None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection),
+        sweep=sweep,
         tolerance=tolerance,
         design=FileDesign(tuple(bounds), pinion_flank, wheel_flank),
         open_case=tuple(open_case),
         _pair=pair,
-        _middle=pair.build(middle),
+        _middle=usual_pair,
         _model=model,
         _compliance=model.build(middle),
         _load=operation,
-        _resolution=_resolution(top.resolution or {}, uneven),
+        _resolution=resolution,
     )
 
 
@@ -262,16 +268,6 @@ def _load(table: schema.Tables) -> schema.LoadSection:
     if load.speed is None:
         refuse_given("load", load, ["friction"], " without load.speed (flash temperature)")
     return load
-
-
-def _model(table: schema.Tables) -> template.Part:
-    model = decode("model", table, schema.ModelSection)
-    if model.preset == "default":
-        return template.part_of("model", model, Compliance)
-    given = set(model.given()) - {"preset"}
-    if given:
-        raise DesignFileError(f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
-    return template.Part(legacy_compliance, {}, "model")
 
 
 def _resolution(table: schema.Tables, uneven: list[str]) -> Resolution:

@@ -87,9 +87,16 @@ class ModelSection(section_of(Compliance)):  # type: ignore[misc]
 
     Attributes:
         preset: "legacy" is the model of older studies and takes no other key.
+        structure: "finite_element" takes tooth and body from finite elements, made once per gear and then kept; `plane`
+            and the tables are its only other keys.
+        pinion_table: CSV file, beside the design file, with the table of another finite-element program in place of it.
+        wheel_table: the same for the wheel.
     """
 
     preset: Annotated[str, choice("default", "legacy")] = "default"
+    structure: Annotated[str, choice("closed_form", "finite_element")] = "closed_form"
+    pinion_table: Annotated[str | None, text()] = None
+    wheel_table: Annotated[str | None, text()] = None
 
 
 # Sizes up to these: a slip of the finger must not fill the memory or compile for hours.

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
 from ..geometry import PathOfContact
-from ..sweeps.store import write_durably
+from ..numerics.durable import write_durably
 
 _INCH = 25.4  # mm
 _POINTS_PER_INCH = 72

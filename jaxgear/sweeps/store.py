@@ -12,17 +12,16 @@ import json
 import logging
 import os
 import re
-import uuid
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..numerics.durable import write_durably
 from .columns import CONVERGED, VARIANT, Column
 
 MANIFEST = "_sweep.parquet"  # Arrow and Spark pass over such names, others find no row in it
-_TEMPORARY = ".tmp"
 _PART = re.compile(r"part-(\d+)-[0-9a-f]+\.parquet")
 _LEFTOVER = re.compile(r"\.part-(\d+)-.*\.tmp")
 
@@ -170,26 +169,6 @@ def load_manifest(folder: Path) -> Manifest:
     except (ValueError, KeyError, TypeError, AttributeError):
         raise ValueError(f"{folder}: is not a sweep: {MANIFEST}: is damaged, or of another version") from None
     return manifest
-
-
-def write_durably(path: Path, write) -> None:
-    """Lets `write(file)` fill a temporary file that takes the place of `path` once it is on the disk."""
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}{_TEMPORARY}")
-    try:
-        with temporary.open("wb") as file:
-            write(file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    if os.name == "posix":  # the new name, too, has to reach the disk
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
 
 
 def _schema(manifest: Manifest):

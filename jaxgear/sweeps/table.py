@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..numerics.durable import write_durably
 from .columns import CONVERGED, VARIANT, Column
 from .selection import front, smallest
-from .store import Store, load_manifest, write_durably
+from .store import Store, load_manifest
 
 _SHOWN = 5  # rows of the printed table
 

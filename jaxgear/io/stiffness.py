@@ -1,0 +1,71 @@
+"""The stiffness model that a design file asks for."""
+
+from pathlib import Path
+
+from ..compliance import AbstractCompliance, Compliance, finite_element_compliance, legacy_compliance
+from ..geometry import GearPair
+from . import schema, template
+from .errors import DesignFileError, refuse_given, refused
+
+_FINITE_ELEMENTS = "finite_element"
+_TABLES = "pinion_table", "wheel_table"
+# numbers of gears and pair that a table holds for whatever they are; the module too, where it moves no ratio
+_FREE = {
+    "face_width",
+    "center_distance",
+    "tip_edge_radius",
+    "elastic_modulus",
+    "density",
+    "thermal_contact_coefficient",
+}
+
+
+def model_part(section: schema.ModelSection) -> template.Part:
+    """The model as far as it needs no gears: all of it, or the plane of what `finite_elements` makes."""
+    if section.structure == _FINITE_ELEMENTS:
+        others = set(section.given()) - {"structure", "plane", *_TABLES}
+        if others:
+            raise DesignFileError(f"model.{min(others)}", f'cannot be combined with structure = "{_FINITE_ELEMENTS}"')
+        return template.Part(Compliance, {}, "model")
+    refuse_given("model", section, _TABLES, f' without structure = "{_FINITE_ELEMENTS}"')
+    if section.preset == "default":
+        return template.part_of("model", section, Compliance)
+    given = set(section.given()) - {"preset", "structure"}
+    if given:
+        raise DesignFileError(f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
+    return template.Part(legacy_compliance, {}, "model")
+
+
+def with_tables(
+    model: template.Part, section: schema.ModelSection, folder: Path, pair: template.Part, middle: GearPair
+) -> template.Part:
+    """The model, with the tables of the gears where the file asks for finite elements.
+
+    Args:
+        model: what `model_part` made.
+        section: what the file says.
+        folder: of the design file, in which paths begin.
+        pair: gears whose numbers may be variables.
+        middle: the gears with all variables in the middle of their bounds.
+    """
+    if section.structure != _FINITE_ELEMENTS:
+        return model
+    for free in pair.free():
+        name = free.key.rpartition(".")[2]
+        moves = name == "module" and any(
+            g.tip_diameter is not None or g.bore_diameter is not None for g in _gears(middle)
+        )
+        if moves or name not in {*_FREE, "module"}:
+            problem = f'cannot be a variable with model.structure = "{_FINITE_ELEMENTS}", whose tables are of one shape'
+            raise DesignFileError(free.key, problem)
+    paths = {name: folder / path for name in _TABLES if (path := getattr(section, name)) is not None}
+    tabulated = refused("model", finite_element_compliance, middle, section.plane or "auto", **paths)
+    return template.Part(_as_it_is, {"compliance": tabulated}, "model")
+
+
+def _gears(pair: GearPair):
+    return pair.pinion, pair.wheel
+
+
+def _as_it_is(compliance: AbstractCompliance) -> AbstractCompliance:
+    return compliance

@@ -1,0 +1,93 @@
+"""Files that are there as a whole or not at all, and what a program keeps between two processes."""
+
+import hashlib
+import os
+import sys
+import uuid
+from pathlib import Path
+
+TEMPORARY = ".tmp"  # end of the names of files that are being written
+_sum = hashlib.sha256
+
+
+def write_durably(path: Path, write) -> None:
+    """Lets `write(file)` fill a temporary file that takes the place of `path` once it is on the disk."""
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}{TEMPORARY}")
+    try:
+        with temporary.open("wb") as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+    if os.name == "posix":  # the new name, too, has to reach the disk
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+class Kept:
+    """Bytes as files of a folder, named by all that they depend on.
+
+    Args:
+        folder: where they lie.
+        surroundings: what all of them depend on.
+    """
+
+    def __init__(self, folder: Path, surroundings: bytes = b""):
+        self._folder, self._here = folder, surroundings
+
+    def read(self, made_of: bytes) -> bytes | None:
+        """What was written; None where nothing was, or where it is damaged."""
+        file = self._file(made_of)
+        try:
+            kept = file.read_bytes()
+            os.utime(file)  # the oldest are forgotten
+        except OSError:
+            return None
+        content = kept[: -_sum().digest_size]
+        return content if kept == content + _sum(content).digest() else None
+
+    def write(self, made_of: bytes, content: bytes) -> None:
+        """Keeps something, if the disk allows it."""
+        try:
+            write_durably(self._file(made_of), lambda file: file.write(content + _sum(content).digest()))
+        except OSError:  # a full disk: the next process makes it again
+            return
+
+    def _file(self, made_of: bytes) -> Path:
+        return self._folder / _sum(self._here + made_of).hexdigest()
+
+
+def user_folder(*names: str) -> Path | None:
+    """A folder below the user's cache directory that nobody else can write to; None where there can be none."""
+    try:
+        folder = _user_cache().joinpath(*names)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return folder if _is_private(folder) else None
+    except (OSError, RuntimeError):  # RuntimeError: no home directory
+        return None
+
+
+def _user_cache() -> Path:
+    if os.environ.get("XDG_CACHE_HOME"):
+        return Path(os.environ["XDG_CACHE_HOME"])
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches"
+    if sys.platform == "win32" and os.environ.get("LOCALAPPDATA"):
+        return Path(os.environ["LOCALAPPDATA"])
+    return Path.home() / ".cache"
+
+
+def _is_private(folder: Path) -> bool:
+    """What is kept may be executed: nobody else may be able to place it."""
+    if not os.access(folder, os.W_OK):
+        return False
+    if sys.platform == "win32":
+        return True
+    status = folder.stat()
+    return status.st_uid == os.getuid() and not status.st_mode & 0o022
