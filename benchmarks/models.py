@@ -13,7 +13,7 @@ import numpy as np
 import jaxgear as jg
 
 from .cases import PAIR_COUNT, Case, Curves, gear_pair, modifications, reference, strong
-from .goals import DEFAULT_GOALS, Goal
+from .goals import DEFAULT_GOALS, FINITE_ELEMENT_STRUCTURE_GOALS, Goal
 
 # The reference has 128 positions or every other one of them. Every model is solved at all, so that one compilation
 # serves all pairs, and compared at those of the reference: the peak-to-peak value of fewer positions is smaller, in
@@ -45,6 +45,10 @@ def _default(pair: jg.GearPair, plane) -> jg.Compliance:
     return jg.default_compliance(plane)
 
 
+def _finite_elements(pair: jg.GearPair, plane) -> jg.compliance.AbstractCompliance:
+    return jg.finite_element_compliance(pair, plane=plane)
+
+
 def _default_with(**changes) -> Callable[[jg.GearPair, Any], jg.Compliance]:
     return lambda pair, plane: replace(jg.default_compliance(plane), **changes)
 
@@ -54,6 +58,8 @@ LEGACY = Model("legacy", lambda pair, plane: jg.legacy_compliance())
 MODELS = (
     DEFAULT,
     LEGACY,
+    Model("finite-element structure", _finite_elements, goals=FINITE_ELEMENT_STRUCTURE_GOALS),
+    Model("no sliding", _default, resolution=replace(RESOLUTION, slide_steps=0)),
     Model("no coupling", _default_with(body=jg.compliance.ElasticRing(coupling=False))),
     Model("no edge softening", _default_with(edge_softening=False)),
     Model("no corner contact", _default, corner_contact=False),
