@@ -3,7 +3,7 @@
 from ..numerics import Checked, count, number
 
 _SLIDING_NODES = 3  # a parabola
-_SLIDE_STEPS = 1
+_SLIDE_STEPS = 2
 
 
 class Resolution(Checked):
@@ -18,7 +18,7 @@ class Resolution(Checked):
         patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks
             and steep flanks over its own width; 1 takes the nominal contact point alone.
         slide_steps: steps in which the contact slides down the slope of a modification; 0 keeps it at its nominal
-            place. None for 1, and 0 where fewer than 3 points across the contact do not see slope and curvature.
+            place. None for 2, and 0 where fewer than 3 points across the contact do not see slope and curvature.
         newton_steps: largest number of steps of the contact solution.
         rtol: residual at which the contact solution ends, relative to the transmission error and to the force;
             None for 1e-11 in double and 5e-6 in single precision.

@@ -280,13 +280,12 @@ def _slide(sided_terms, place: _Place, nodes: tuple[_Node, ...], steps: int) -> 
     moved = shift = jnp.zeros_like(place.radius)
     tried: tuple[_Tried, ...] = ()
     if steps:
-        shift = stored(-_secant_slope(sided_terms, place) / bulge)
+        shift = stored(-_secant_slope(sided_terms, place, moved) / bulge)
         tried = (_Tried(moved, -bulge * (place.beyond + shift)),)
         moved = _within(place.beyond + shift, place.lowest, place.highest)
     for _ in range(steps - 1):
-        seen = _probe(sided_terms, place, moved, nodes)
-        slope = bulge * (moved - place.beyond) + seen.slope
-        step, _ = _step(slope, seen.curvature, moved, tried, place)
+        slope = bulge * (moved - place.beyond) + _secant_slope(sided_terms, place, moved)
+        step, _ = _step(slope, jnp.zeros_like(slope), moved, tried, place)
         tried, moved = (*tried, _Tried(moved, slope)), stored(moved + step)
         shift = moved - place.beyond
     seen = _probe(sided_terms, place, moved, nodes)
@@ -337,11 +336,11 @@ def _gain_jvp(primals, tangents):
     return _gain(*primals), jax.jvp(_gain_of, (stored(slope), stored(curvature), *at), tangents)[1]
 
 
-def _secant_slope(sided_terms, place: _Place) -> Real:
+def _secant_slope(sided_terms, place: _Place, moved: Real) -> Real:
     """Slope of the removed material at the nominal contact [um/mm], over the middle half of the contact."""
     half, each = 0.5 * place.half_width, []
     for side, term in sided_terms:
-        points = [_flank(side, place, end) for end in (-half, half)]
+        points = [_flank(side, place, end) for end in (moved - half, moved + half)]
         each.append(_moments(term, points, [[-1.0], [1.0]])[0])
     return reduce(add, each) / place.half_width
 

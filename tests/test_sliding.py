@@ -1,0 +1,224 @@
+"""Contacts slide down the slope of a modification: closed forms, a fine search, corners, derivatives, slices."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import gear_pair
+
+import jaxgear as jg
+from jaxgear.contact import removed_material
+from jaxgear.contact.slide import nominal_material
+from jaxgear.geometry import reduced_radius
+from jaxgear.microgeometry import NoModification
+
+SIZES = jg.Resolution(positions=32, pairs=2)
+TORQUE = 50.0
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return jg.prepare(gear_pair(), resolution=SIZES)
+
+
+def radius(mesh):
+    return np.asarray(reduced_radius(*(side.contact_roll_length for side in mesh.sides)))
+
+
+def inner(mesh, distance=0.6):
+    """Contacts on the path and farther than a distance [mm] from its ends."""
+    path, contact = np.asarray(mesh.path), mesh.path_of_contact
+    return (path > float(contact.start) + distance) & (path < float(contact.end) - distance)
+
+
+class Straight(jg.microgeometry.AbstractModification):
+    """A constant slope along the arc of the flank, in um per mm; exact where the arc is what the model takes it for."""
+
+    slope: jax.Array
+
+    varies_along_face = False
+
+    def __call__(self, flank):
+        arc = flank.roll_length**2 / (2 * flank.base_radius)
+        return self.slope * arc
+
+
+def test_a_slope_lets_the_gap_fall_by_half_its_square_times_the_radius(mesh):
+    slope = 6.0
+    found = removed_material(mesh, TORQUE, wheel=Straight(jnp.asarray(slope)))
+    nominal = nominal_material(mesh, jnp.asarray(TORQUE), NoModification(), Straight(jnp.asarray(slope)))
+    here, gap = inner(mesh), radius(mesh)
+    gain = np.asarray(nominal - found.amount)[:, 0]
+    expected = 1e3 * gap * (1e-3 * slope) ** 2 / 2
+    # the roll length moves in proportion to the arc, which leaves a slope that grows along the arc by some percent
+    np.testing.assert_allclose(gain[here], expected[here], rtol=0.03)
+    # wheel material falls towards the pinion tip: there the flank is thicker
+    np.testing.assert_allclose(np.asarray(found.shift)[:, 0][here], (1e-3 * slope * gap)[here], rtol=0.03)
+    assert expected[here].min() > 0.05
+
+
+def test_nothing_slides_without_a_slope(mesh):
+    """Unmodified flanks, a constant, and modifications along the face alone."""
+    sliced = jg.prepare(gear_pair(), resolution=jg.Resolution(positions=16, pairs=2, slices=3))
+    constant = jg.TabulatedProfile([0.0, 50.0], [4.0, 4.0])
+    for prepared, flank in ((mesh, None), (mesh, constant), (sliced, jg.LeadCrowning(5.0) + jg.LeadSlope(3.0))):
+        found = removed_material(prepared, TORQUE, pinion=flank)
+        assert float(jnp.abs(found.shift).max()) < 1e-12 and float(jnp.abs(found.bend).max()) < 1e-10
+    assert float(jnp.ptp(removed_material(mesh, TORQUE, pinion=constant).amount)) < 1e-12
+
+
+def search(mesh, nodes=12, **flanks):
+    """Least gap over 1601 places of the contact along the flanks [um], with the mean over more points across it."""
+    pinion, wheel = (flanks.get(side) or NoModification() for side in ("pinion", "wheel"))
+    angle = np.pi * np.arange(1, nodes + 1) / (nodes + 1)
+    weights = np.sin(angle) ** 2 / np.sum(np.sin(angle) ** 2)
+    force = 1e3 * TORQUE / float(mesh.pair.pinion.base_radius)
+    half = jnp.sqrt(mesh.width_factor * force / mesh.pair.face_width)
+    inside = [(side.tip_roll_length**2 - side.contact_roll_length**2) / (2 * side.base_radius) for side in mesh.sides]
+    outside, path, contact = mesh.outside, mesh.path, mesh.path_of_contact
+    beyond = [(2 * side.tip_roll_length + outside) * outside / (2 * side.base_radius) for side in mesh.sides]
+    centre = jnp.where(path > contact.end, beyond[0], 0.0) - jnp.where(path < contact.start, beyond[1], 0.0)
+    gap = jnp.asarray(radius(mesh))
+
+    def at(place):
+        place = jnp.clip(place, -jnp.maximum(inside[1], 0.0), jnp.maximum(inside[0], 0.0))
+        points = [mesh.flanks(place + float(x) * half) for x in np.cos(angle)]
+        mean = sum(float(w) * (pinion(p) + wheel(q)) for w, (p, q) in zip(weights, points))[:, 0]
+        return 1e3 * ((place - centre) ** 2 - centre**2) / (2 * gap) + mean
+
+    return np.asarray(jax.jit(lambda: jax.lax.map(at, jnp.linspace(-0.8, 0.8, 1601)).min(axis=0))())
+
+
+RELIEF = jg.TipRelief(8.0, 3.0)
+FLANKS = {
+    "parabolic": ({"pinion": RELIEF, "wheel": jg.TipRelief(12.0, 2.0)}, 0.02),
+    "kinked": ({"pinion": jg.TipRelief(10.0, 1.5, jg.Linear()), "wheel": jg.TipRelief(8.0, 4.0, jg.Linear())}, 0.03),
+    "crowned": ({"pinion": jg.ProfileCrowning(8.0), "wheel": jg.ProfileCrowning(8.0) + jg.ProfileSlope(5.0)}, 0.005),
+    "rooted": ({"pinion": jg.RootRelief(8.0, 1.5), "wheel": RELIEF}, 0.03),
+    "table": (
+        {"pinion": jg.TabulatedProfile(np.linspace(3.0, 15.0, 13), 4 * np.sin(np.arange(13) ** 2), method="cubic2")},
+        0.05,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FLANKS)
+def test_the_gap_is_the_least_of_a_fine_search(mesh, name):
+    """On the path and beyond it, as far as corners touch under usual loads (gaps up to 40 um)."""
+    flanks, tolerance = FLANKS[name]
+    found = np.asarray(removed_material(mesh, TORQUE, **flanks).amount)[:, 0]
+    near = np.asarray(mesh.corner_gap) < 40.0
+    np.testing.assert_allclose(found[near], search(mesh, **flanks)[near], atol=tolerance)
+    pinion, wheel = flanks["pinion"], flanks.get("wheel", NoModification())
+    nominal = np.asarray(nominal_material(mesh, jnp.asarray(TORQUE), pinion, wheel))[:, 0]
+    # what the search is for: the nominal place is far off it
+    assert (nominal - found)[near].max() > 5 * tolerance
+
+
+def test_more_steps_go_on_towards_the_search(mesh):
+    """A relief as steep as they come: 15 um over a millimetre."""
+    steep = {"pinion": jg.TipRelief(15.0, 1.0, jg.Linear()), "wheel": jg.TipRelief(15.0, 1.0, jg.Linear())}
+    expected, near = search(mesh, **steep), np.asarray(mesh.corner_gap) < 40.0
+
+    def worst(steps):
+        sizes = jg.Resolution(positions=32, pairs=2, slide_steps=steps)
+        moved = eqx.tree_at(lambda m: m.kinematics, mesh, eqx.tree_at(lambda k: k.resolution, mesh.kinematics, sizes))
+        found = np.asarray(removed_material(moved, TORQUE, **steep).amount)[:, 0]
+        return np.abs(found - expected)[near].max()
+
+    none, one, four = worst(0), worst(1), worst(4)
+    assert none > 2.0 and one < 0.5 * none and four < 0.1
+
+
+def test_a_concave_or_convex_flank_changes_the_pressure(mesh):
+    """p^2 goes with the relative curvature: that of a crowning adds to the involutes' (1 / R = 1 / rho_1 + 1 / rho_2)."""
+    amount = 20.0
+    crowned = jg.solve(mesh, TORQUE, pinion=jg.ProfileCrowning(amount))
+    side = mesh.sides[0]
+    half = 0.5 * float(side.tip_roll_length - side.start_roll_length)
+    # second derivative by the arc, d rho = r_b / rho ds, at the middle of the flank
+    roll, base = np.asarray(side.contact_roll_length), float(side.base_radius)
+    middle = np.abs(roll - float(side.tip_roll_length - half)) < 0.2
+    bend = 1e-3 * 2 * amount / half**2 * (base / roll) ** 2 * radius(mesh)
+    np.testing.assert_allclose(np.asarray(crowned.bend)[:, 0][middle], bend[middle], rtol=0.05)
+    plain = jg.contact.solve_removed(mesh, TORQUE, crowned.gap - mesh.corner_gap[:, None])
+    loaded = np.asarray(crowned.line_load)[:, 0] > 0
+    ratio = np.asarray(crowned.contact_pressure / plain.contact_pressure)[:, 0]
+    here = middle & loaded & inner(mesh)
+    assert here.any()
+    np.testing.assert_allclose(ratio[here], np.sqrt(1 + bend[here]), rtol=0.01)
+
+
+def test_the_corner_law_sees_where_the_contact_has_moved(mesh):
+    """Moving towards the pinion tip is towards its corner and away from that of the wheel."""
+    law, load = mesh.law, jnp.full((2, 1, 32), 100.0)
+    moved = law.moved(jnp.full((2, 1, 32), 0.05))
+    change = np.asarray(moved.deflection(load) - law.deflection(load))[:, 0]
+    pinion = np.asarray(law.edge.side)[:, 0] > 0
+    close = np.abs(np.asarray(law.edge.distance)[:, 0]) < 0.1
+    assert (change[close & pinion] > 0).all() and (change[close & ~pinion] < 0).all()
+    assert (close & pinion).any() and (close & ~pinion).any()
+
+
+@pytest.mark.parametrize("curve", [jg.Parabolic(), jg.Linear()], ids=["parabolic", "linear"])
+def test_derivatives_are_those_of_the_numbers(mesh, curve):
+    """Of the whole curve by amount, length and torque; the first is compared in its second derivative too."""
+
+    def curves(x):
+        flanks = {"pinion": jg.TipRelief(x[0], x[1], curve), "wheel": jg.TipRelief(x[2], x[3], curve)}
+        return jg.solve(mesh, x[4], **flanks).transmission_error
+
+    x = jnp.asarray([7.3, 3.37, 6.1, 2.91, 50.0])
+    slopes = jax.jit(jax.jacfwd(curves))
+    back = jax.jit(jax.jacrev(lambda x: jnp.sum(curves(x) ** 2)))(x)
+    steps = 1e-5 * x
+    central = np.stack(
+        [(curves(x.at[i].add(h)) - curves(x.at[i].add(-h))) / (2 * h) for i, h in enumerate(steps)], axis=1
+    )
+    found = np.asarray(slopes(x))
+    # a position whose contact has a node right at the start of a relief has two slopes
+    off = np.abs(found - central).max(axis=1) / np.abs(central).max()
+    assert np.sort(off)[-3] < 1e-6
+    np.testing.assert_allclose(back, 2 * np.asarray(curves(x)) @ found, rtol=1e-9)
+    second = (slopes(x.at[0].add(1e-4)) - slopes(x.at[0].add(-1e-4)))[:, 0] / 2e-4
+    exact = np.asarray(jax.jit(jax.jacfwd(jax.jacfwd(lambda a: curves(x.at[0].set(a)))))(x[0]))
+    assert np.isfinite(exact).all()
+    assert np.sort(np.abs(exact - second))[-3] < 1e-5 * np.abs(second).max()
+
+
+def test_nothing_and_no_load_leave_finite_derivatives(mesh):
+    def error(x):
+        return jg.solve(mesh, x[2], pinion=jg.TipRelief(x[0], x[1])).transmission_error.sum()
+
+    for point in ([0.0, 3.0, 50.0], [5.0, 0.0, 50.0], [5.0, 3.0, 0.0], [0.0, 0.0, 0.0]):
+        assert bool(jnp.isfinite(jax.jit(jax.jacfwd(jax.grad(error)))(jnp.asarray(point))).all()), point
+
+
+def test_slices_slide_on_their_own():
+    """A flank that is twisted: every slice is that of a flank of its own profile."""
+    sizes = jg.Resolution(positions=16, pairs=2, slices=3)
+    sliced, single = (jg.prepare(gear_pair(), resolution=r) for r in (sizes, jg.Resolution(positions=16, pairs=2)))
+    roll = np.linspace(3.0, 16.0, 14)
+    columns = np.outer((roll - 9.0) ** 2 / 10, [0.2, 1.0, 2.0])
+    twisted = jg.TabulatedFlank(roll, sliced.face_coordinate, columns, "cubic2")
+    found = removed_material(sliced, TORQUE, pinion=twisted)
+    for number in range(3):
+        alone = removed_material(single, TORQUE, pinion=jg.TabulatedProfile(roll, columns[:, number], method="cubic2"))
+        for name in ("amount", "shift", "bend"):
+            mine, theirs = getattr(found, name)[:, number], getattr(alone, name)[:, 0]
+            np.testing.assert_allclose(mine, theirs, atol=1e-9)
+
+
+def test_a_prescribed_error_gives_the_forces_of_the_cycle(mesh):
+    flanks = {"pinion": RELIEF, "wheel": jg.TipRelief(9.0, 2.0, jg.Linear())}
+    cycle = jg.solve(mesh, TORQUE, **flanks)
+    error = cycle.transmission_error - mesh.hub * cycle.force / mesh.pair.face_width
+    found = jg.contact.solve_at(mesh, error, torque=TORQUE, **flanks)
+    np.testing.assert_allclose(found.pair_force, cycle.pair_force, rtol=1e-8, atol=1e-6)
+
+
+def test_points_across_the_contact_have_to_see_a_slope():
+    with pytest.raises(ValueError, match="slide_steps = 1 needs patch_nodes >= 3, is 2"):
+        jg.Resolution(patch_nodes=2, slide_steps=1)
+    assert jg.Resolution(patch_nodes=1).chosen_slide_steps == 0 and jg.Resolution().chosen_slide_steps == 1
