@@ -18,6 +18,7 @@ from ..io import DesignFile, describe
 from ..io.results import unit_of
 from ..metrics import Doubt, plausibility
 from ..numerics import fields_of, program
+from ..optimize import Verified
 from .study import Evaluation
 from .version import version
 
@@ -36,6 +37,7 @@ _ROWS = {
     "mesh_loss_factor": ("mesh loss factor", ".4f"),
     "max_flash_temperature_K": ("max flash temperature [K]", ".1f"),
 }
+_BY_FINITE_ELEMENTS = "  by finite elements"
 _HARRIS_CURVES = 7
 _TITLE = 9.0  # [pt]
 _WIDTH = 120  # of a file [characters]
@@ -51,8 +53,13 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
         cells = [evaluation.metrics.get(metric) for evaluation in evaluations.values()]
         if None not in cells:
             result.add_row(label, *(format(cell, form) for cell in cells))
+        if metric == "ppte_um" and verified(evaluations):
+            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.ppte, form) for each in verified(evaluations)))
     for label in objectives(evaluations):
         result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
+        if verified(evaluations):
+            cells = [each.objectives[label] for each in verified(evaluations)]
+            result.add_row(_BY_FINITE_ELEMENTS, *(format(cell, ".4g") for cell in cells))
     result.add_section()
     flanks = [dict(_flank_cells(evaluation)) for evaluation in evaluations.values()]
     for label in dict.fromkeys(label for cells in flanks for label in cells):
@@ -74,13 +81,16 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
             )
 
 
-def doubts(file: DesignFile, evaluations: Evaluations) -> dict[str, tuple[Doubt, ...]]:
+def doubts(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, tuple[Doubt, ...]]:
     """What is not usual of every design."""
     options: dict[str, Any] = {"torque_range": file.torque_range, "speed": file.speed, "friction": file.friction}
-    return {
-        name: plausibility(evaluation.cycle, pinion=evaluation.pinion, wheel=evaluation.wheel, **options)
-        for name, evaluation in evaluations.items()
-    }
+    options["compliance"] = mesh.compliance
+    found = {}
+    for name, design in evaluations.items():
+        options |= {"pinion": design.pinion, "wheel": design.wheel}
+        options["verified"] = design.verified and design.verified.ppte
+        found[name] = plausibility(design.cycle, **options)
+    return found
 
 
 def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
@@ -109,6 +119,11 @@ def objectives(evaluations: Evaluations) -> list[str]:
     """What an optimization made small, without what is a row of the table anyhow."""
     known = {name.rpartition("_")[0] + f" [{name.rpartition('_')[2]}]" for name in _ROWS}
     return [label for label in next(iter(evaluations.values())).objectives if label not in known | set(_ROWS)]
+
+
+def verified(evaluations: Evaluations) -> list[Verified]:
+    """What all designs are worth with the finite-element structure; empty where that was not asked for."""
+    return [evaluation.verified for evaluation in evaluations.values() if evaluation.verified is not None]
 
 
 def reduction(evaluations: Evaluations) -> float:
@@ -228,11 +243,17 @@ def _design(evaluation: Evaluation) -> dict[str, Any]:
     return {
         **evaluation.metrics,
         **({"objectives": evaluation.objectives} if evaluation.objectives else {}),
+        **({"verified": _verified(evaluation.verified)} if evaluation.verified else {}),
         "failed_torques_Nm": evaluation.failed_torques,
         "pinion_modification": describe(evaluation.pinion),
         "wheel_modification": describe(evaluation.wheel),
         "time_s": evaluation.seconds,
     }
+
+
+def _verified(found: Verified) -> dict[str, Any]:
+    objectives = {"objectives": found.objectives} if found.objectives else {}
+    return {"structure": "finite_element", "ppte_um": found.ppte, **objectives}
 
 
 def _gear(gear: Gear) -> dict[str, Any]:
