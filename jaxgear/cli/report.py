@@ -1,13 +1,9 @@
-"""What a run says and writes: table, lines, summary and figures."""
+"""What a run says and draws: table, lines and figures."""
 
-import dataclasses
-import platform
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
-import jax
 import numpy as np
 from rich.console import Console
 from rich.table import Table
@@ -17,10 +13,9 @@ from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.results import unit_of
 from ..metrics import Doubt, plausibility
-from ..numerics import fields_of, program
+from ..numerics import program
 from ..optimize import Verified
 from .study import Evaluation
-from .version import version
 
 Evaluations = Mapping[str, Evaluation]
 
@@ -111,8 +106,14 @@ def bores(file: DesignFile) -> str:
     texts = []
     for name, gear in gears:
         guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
-        texts.append(f"{name} {float(_diameters(gear)[1]):.4g} mm{guess}")
+        texts.append(f"{name} {float(diameters(gear)[1]):.4g} mm{guess}")
     return f"bores: {', '.join(texts)}"
+
+
+@program
+def diameters(gear: Gear):
+    """Diameters of tip and bore [mm]."""
+    return 2 * gear.tip_radius, 2 * gear.bore_radius
 
 
 def objectives(evaluations: Evaluations) -> list[str]:
@@ -139,44 +140,6 @@ def main(evaluations: Evaluations) -> Evaluation:
 
 def _main_name(evaluations: Evaluations) -> str:
     return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
-
-
-def summary(
-    file: DesignFile,
-    mesh: Mesh,
-    evaluations: Evaluations,
-    torques: np.ndarray,
-    found: Mapping[str, tuple[Doubt, ...]],
-) -> dict[str, Any]:
-    """Contents of `summary.json`, with the doubts that were `found` of every design."""
-    size = mesh.resolution
-    return {
-        "title": file.title,
-        "design_file": file.path.name,
-        "torque_Nm": file.torque,
-        "torque_range_Nm": file.torque_range,
-        "speed_rpm": file.speed,
-        "friction": file.friction,
-        "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
-        "center_distance_mm": _center_distance(mesh),
-        "model": {"compliance": _words(mesh.compliance), "plane": mesh.compliance.plane},
-        "designs": {
-            name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
-            for name, several in found.items()
-        },
-        "ppte_reduction_percent": reduction(evaluations),
-        "ppte_over_torque": {
-            "torque_Nm": torques,
-            **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
-        },
-        "resolution": {field.name: getattr(size, field.name) for field in dataclasses.fields(size)},
-        "versions": {
-            "jaxgear": version(),
-            "jax": jax.__version__,
-            "numpy": np.__version__,
-            "python": platform.python_version(),
-        },
-    }
 
 
 def write_figures(folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> None:
@@ -237,62 +200,6 @@ def say(*lines: str) -> None:
 def warn(line: str) -> None:
     """Prints a warning on stderr."""
     console(stderr=True).print(f"jaxgear: warning: {line}", style="bold red", soft_wrap=True)
-
-
-def _design(evaluation: Evaluation) -> dict[str, Any]:
-    return {
-        **evaluation.metrics,
-        **({"objectives": evaluation.objectives} if evaluation.objectives else {}),
-        **({"verified": _verified(evaluation.verified)} if evaluation.verified else {}),
-        "failed_torques_Nm": evaluation.failed_torques,
-        "pinion_modification": describe(evaluation.pinion),
-        "wheel_modification": describe(evaluation.wheel),
-        "time_s": evaluation.seconds,
-    }
-
-
-def _verified(found: Verified) -> dict[str, Any]:
-    objectives = {"objectives": found.objectives} if found.objectives else {}
-    return {"structure": "finite_element", "ppte_um": found.ppte, **objectives}
-
-
-def _gear(gear: Gear) -> dict[str, Any]:
-    """Every number of a gear, with those that follow from others where the file gives none."""
-    derived = dict(zip(("tip_diameter", "bore_diameter"), _diameters(gear)))
-    data: dict[str, Any] = {}
-    for part in (gear, gear.material):
-        for name, field in fields_of(type(part)).items():
-            unit = "" if field.unit == "x module" else field.unit.replace(" ", "").replace("/", "_per_")
-            value = derived.get(name, getattr(part, name))
-            data[f"{name}_{unit}" if unit else name] = np.asarray(value)
-    data["bore_given"] = gear.bore_diameter is not None
-    return data
-
-
-@program
-def _diameters(gear: Gear):
-    """Of tip and bore [mm]."""
-    return 2 * gear.tip_radius, 2 * gear.bore_radius
-
-
-def _center_distance(mesh: Mesh) -> float:
-    """Sum of the working pitch radii [mm]."""
-    contact = mesh.path_of_contact
-    return float(
-        np.hypot(contact.pinion_base_radius, contact.pinion_pitch_roll_length)
-        + np.hypot(contact.wheel_base_radius, contact.wheel_pitch_roll_length)
-    )
-
-
-def _words(part: eqx.Module) -> str:
-    """A model by the names of its parts and switches."""
-    values = (getattr(part, field.name) for field in dataclasses.fields(part))
-    inner = [_words(value) if isinstance(value, eqx.Module) else str(value) for value in values]
-    return f"{type(part).__name__}({', '.join(inner)})"
-
-
-def _doubt(doubt: Doubt) -> dict[str, Any]:
-    return {"name": doubt.name, "where": doubt.where, "value": doubt.value, **doubt.limit._asdict()}
 
 
 def _flank_cells(evaluation: Evaluation) -> Iterator[tuple[str, str]]:

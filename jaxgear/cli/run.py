@@ -34,7 +34,7 @@ from ..optimize import (
     structure_for,
     verification,
 )
-from . import interrupt, optimum_report, report
+from . import interrupt, optimum_report, report, written
 from .cache import enable_cache
 from .progress import Stages
 from .study import Evaluation, evaluate
@@ -138,7 +138,7 @@ class Run:
         """Writes the result files."""
         self._stages.begin("writing the results")
         self._doubts = report.doubts(self.design, self._mesh, self._evaluations)
-        data = report.summary(self.design, self._mesh, self._evaluations, self._torques, self._doubts)
+        data = written.summary(self.design, self._mesh, self._evaluations, self._torques, self._doubts)
         if self._optimum is not None:
             data["optimum"] = optimum_report.summary(self.design, self._optimum, self._projection)
         write_summary(self._folder / "summary.json", {**data, "quick": self._quick})
