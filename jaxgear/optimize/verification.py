@@ -1,6 +1,7 @@
 """A second opinion on designs: what they are worth where finite elements stand in for the structure of the mesh."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import equinox as eqx
 import jax
@@ -79,12 +80,12 @@ def verification(mesh: Mesh, compliance: TabulatedCompliance, problem: Problem |
     return Verification(chosen, None if problem is None else problem.on(chosen))
 
 
-def structure_for(mesh: Mesh, *, cache: bool = True) -> TabulatedCompliance:
+def structure_for(mesh: Mesh, *, cache: str | Path | bool | None = True) -> TabulatedCompliance:
     """Finite-element tables for the gears and the plane of a mesh, which take seconds where they are not on the disk.
 
     Args:
         mesh: prepared mesh of concrete gears.
-        cache: whether tables are read from the user's folder, and kept there.
+        cache: as in `finite_element_compliance`.
 
     Raises:
         ValueError: for a mesh whose structure is a table already, gears that are traced, and a shape that cannot be
@@ -107,7 +108,7 @@ def begin_verification(mesh: Mesh, compliance: TabulatedCompliance, positions: i
     begin(prepare_from, np.zeros(()), mesh.pair, compliance, replace(mesh.resolution, positions=count))
 
 
-def verify(optimum: Optimum, *, cache: bool = True) -> Verified:
+def verify(optimum: Optimum, *, cache: str | Path | bool | None = True) -> Verified:
     """Evaluates an optimum again with the finite-element structure on the same mesh, in the same cases.
 
     A search finds the best design of its model: what it claims below the accuracy of the model is not there. It takes
@@ -115,7 +116,7 @@ def verify(optimum: Optimum, *, cache: bool = True) -> Verified:
 
     Args:
         optimum: of any method; of a front, its compromise.
-        cache: whether tables are read from the user's folder, and kept there.
+        cache: as in `finite_element_compliance`.
 
     Raises:
         ValueError: as `structure_for`.
