@@ -124,7 +124,7 @@ def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[str]:
 def _verified(labels: list[str], before: Verified, after: Verified) -> Iterator[str]:
     """The same lines by finite elements."""
     fall = f": {100 * (1 - after.ppte / before.ppte):.1f} % less than unmodified" if before.ppte else ""
-    yield f"by finite elements {before.ppte:.3f} -> {after.ppte:.3f} um{fall}"
+    yield f"PPTE by finite elements {before.ppte:.3f} -> {after.ppte:.3f} um{fall}"
     for label in labels:
         yield f"{label} by finite elements {before.objectives[label]:.4g} -> {after.objectives[label]:.4g}"
 
