@@ -18,7 +18,7 @@ from pathlib import Path  # noqa: E402
 
 import numpy as np  # noqa: E402
 
-from .cases import PAIRS, PLANES, Case, aligned, reference, select  # noqa: E402
+from .cases import PAIRS, PLANES, Case, reference, select  # noqa: E402
 from .models import MODELS, Model, run  # noqa: E402
 from .quantities import QUANTITIES, errors  # noqa: E402
 from .report import Errors, print_detail, print_summary  # noqa: E402
@@ -42,8 +42,7 @@ def compare(models: Sequence[Model], cases: Sequence[Case]) -> Errors:
     with ThreadPoolExecutor(max_workers=2) as pool:
         curves = dict(zip((model.name for model in models), pool.map(lambda model: run(model, cases), models)))
     return {
-        name: {case: errors(case, found[case], reference(case), aligned(case)) for case in cases}
-        for name, found in curves.items()
+        name: {case: errors(case, found[case], reference(case)) for case in cases} for name, found in curves.items()
     }
 
 

@@ -3,7 +3,7 @@
 import csv
 import functools
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import jax
@@ -51,10 +51,6 @@ class Curves:
     def share(self) -> np.ndarray:
         """Share of every pair in the total force."""
         return self.force / self.force.sum(axis=0)
-
-    def every(self, step: int) -> "Curves":
-        """The same curves at every `step`-th position."""
-        return Curves(*(getattr(self, field.name)[..., ::step] for field in fields(self)))
 
 
 @functools.cache
@@ -147,28 +143,28 @@ def reference(case: Case) -> Curves:
     return _table(case.pair, case.plane)[case.torque, case.modification]
 
 
-def aligned(case: Case) -> Curves:
-    """`reference` at the phases of jaxgear, the mean position of both gears.
+def as_the_reference(case: Case, curves: Curves) -> Curves:
+    """Curves of a model of jaxgear at the positions of the reference.
 
-    The reference holds the wheel at its phase and advances the pinion, so the mean position is half a transmission
-    error further. Values are interpolated, which rounds off sharp peaks: use it to compare point by point.
+    The reference holds the wheel at its phase and advances the pinion; jaxgear counts the mean position of both gears,
+    which is half a transmission error further. The curves are interpolated, so they should be finer than the reference.
     """
-    truth = reference(case)
-    pairs, positions = truth.force.shape
-    phase = np.arange(positions) / positions
-    moved = phase + 0.5e-3 * truth.transmission_error / path_of_contact(case.pair).base_pitch
+    pairs, positions = curves.force.shape
+    count = reference(case).transmission_error.size
+    phase, wanted = np.arange(positions) / positions, np.arange(count) / count
+    wheel = phase - 0.5e-3 * curves.transmission_error / path_of_contact(case.pair).base_pitch
     # along the path one pair takes the place of its predecessor, the last of the axis being the first
     offset = np.arange(pairs)[:, None] - pairs
-    travelled, shifted = (phase + offset).ravel(), (moved + offset).ravel()
+    travelled, places = (wheel + offset).ravel(), (wanted + offset).ravel()
 
     def pair_curve(values):
-        return np.interp(travelled, shifted, values[::-1].ravel()).reshape(values.shape)[::-1]
+        return np.interp(places, travelled, values[::-1].ravel()).reshape(pairs, count)[::-1]
 
     return Curves(
-        np.interp(phase, moved, truth.transmission_error, period=1.0),
-        np.interp(phase, moved, truth.unloaded_transmission_error, period=1.0),
-        pair_curve(truth.force),
-        pair_curve(truth.pressure),
+        np.interp(wanted, wheel, curves.transmission_error, period=1.0),
+        np.interp(wanted, wheel, curves.unloaded_transmission_error, period=1.0),
+        pair_curve(curves.force),
+        pair_curve(curves.pressure),
     )
 
 

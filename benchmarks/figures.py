@@ -5,7 +5,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from .cases import Case, aligned, inputs
+from .cases import Case, inputs, reference
 from .models import DEFAULT, LEGACY, run
 from .report import Errors
 
@@ -58,7 +58,7 @@ def _draw_curves(figure) -> None:
         ax.plot(np.linspace(0.0, 1.0, curve.size + 1), np.append(curve, curve[0]), **style)
 
     for ax, case in zip(panels.flat, PANELS):
-        draw(ax, aligned(case).transmission_error, color=_FINITE_ELEMENTS, lw=4, label="finite elements")
+        draw(ax, reference(case).transmission_error, color=_FINITE_ELEMENTS, lw=4, label="finite elements")
         draw(ax, curves["default"][case].transmission_error, color=_DEFAULT, lw=1.3, label="jaxgear, default model")
         draw(
             ax,

@@ -25,34 +25,33 @@ class Quantity:
     unit: str
 
 
-def errors(case: Case, model: Curves, truth: Curves, aligned: Curves) -> dict[str, float]:
+def errors(case: Case, model: Curves, truth: Curves) -> dict[str, float]:
     """All scalar errors of one case by the key of their quantity, signed unless they are the largest of many.
 
     A stiffness is left out where the reference never has that many loaded pairs.
 
     Args:
         case: the case.
-        model: curves of the model.
+        model: curves of the model, at the positions of the reference.
         truth: curves of the reference.
-        aligned: the reference at the phases of the model.
     """
     te, expected = model.transmission_error, truth.transmission_error
     mean, ppte = expected.mean(), np.ptp(expected)
-    difference = te - aligned.transmission_error
-    share_error = np.abs(model.share - aligned.share)
-    flank = _flank_contact(model) & _flank_contact(aligned)
-    on_flank = np.isfinite(aligned.pressure) & ((aligned.force > 0) | (model.force > 0))
-    smooth = on_flank & _away_from_edges(case, aligned) & (aligned.share > _LIGHT_SHARE)
+    difference = te - truth.transmission_error
+    share_error = np.abs(model.share - truth.share)
+    flank = _flank_contact(model) & _flank_contact(truth)
+    on_flank = np.isfinite(truth.pressure) & ((truth.force > 0) | (model.force > 0))
+    smooth = on_flank & _away_from_edges(case, truth) & (truth.share > _LIGHT_SHARE)
     highest = np.nanmax(truth.pressure)
     pressure = np.nan_to_num(model.pressure)
-    pressure_error = np.abs(pressure - aligned.pressure) / highest
+    pressure_error = np.abs(pressure - truth.pressure) / highest
     found = {
         "mean": 100 * (te.mean() / mean - 1),
         "ppte": 100 * (np.ptp(te) - ppte) / max(ppte, _SMALLEST_PPTE),
         "ppte_um": np.ptp(te) - ppte,
         "rms": 100 * np.sqrt(np.mean(difference**2)) / mean,
         "shape": 100 * np.std(difference) / mean,
-        "share_points": np.abs(share_at_points(case, model) - share_at_points(case, aligned)).max(),
+        "share_points": np.abs(share_at_points(case, model) - share_at_points(case, truth)).max(),
         "share_flank": share_error[:, flank].max(),
         "share": share_error.max(),
         "pressure_max": 100 * (pressure[on_flank].max() / highest - 1),

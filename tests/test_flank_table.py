@@ -15,7 +15,7 @@ RATE = 3.0, 0.5  # um per mm of roll length and of face
 
 @pytest.fixture(scope="module")
 def mesh():
-    return jg.prepare(gear_pair(), resolution=jg.Resolution(positions=16, pairs=2, slices=3))
+    return jg.prepare(gear_pair(), resolution=jg.Resolution(positions=16, pairs=2, slices=3, slide_steps=0))
 
 
 def side_of(mesh, gear):
@@ -61,14 +61,14 @@ def test_linear_fields_are_linear_over_the_flank(mesh, gear):
 def test_the_table_removes_what_the_field_says(mesh, gear):
     """The mean over the contact leaves a linear field as it is, but for the flank's curvature."""
     field = contact_field(mesh, gear)
-    removed = removed_material(mesh, 50.0, **{gear: flank_table(mesh.kinematics, field, gear)})
+    removed = removed_material(mesh, 50.0, **{gear: flank_table(mesh.kinematics, field, gear)}).amount
     step = float(mesh.path_of_contact.base_pitch) / 16
     path, contact = mesh.path, mesh.path_of_contact
     inner = np.asarray((path > contact.start + step) & (path < contact.end - step))
     inner = np.broadcast_to(inner[:, None], removed.shape)
     np.testing.assert_allclose(np.asarray(removed)[inner], np.asarray(field)[inner], atol=2e-3)
     constant = flank_table(mesh.kinematics, jnp.full((2, 3, 16), 4.0), gear)
-    np.testing.assert_allclose(removed_material(mesh, 50.0, **{gear: constant}), 4.0, rtol=1e-13)
+    np.testing.assert_allclose(removed_material(mesh, 50.0, **{gear: constant}).amount, 4.0, rtol=1e-13)
 
 
 def test_one_slice_gives_a_profile():

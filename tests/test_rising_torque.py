@@ -38,8 +38,10 @@ def curves(mesh):
             return jnp.where(cycle.converged, cycle.transmission_error, jnp.nan)
 
         each = jax.vmap(lambda torque: removed_material(mesh, torque, **flanks))(TORQUES)
-        kept = jnp.broadcast_to(each[6], each.shape)
-        both = jax.vmap(jax.vmap(error), in_axes=(None, 0))(TORQUES, jnp.stack([each, kept]))
+        kept = jax.tree.map(lambda field: jnp.broadcast_to(field[6], field.shape), each)
+        both = jax.vmap(jax.vmap(error), in_axes=(None, 0))(
+            TORQUES, jax.tree.map(lambda *fields: jnp.stack(fields), each, kept)
+        )
         return jnp.diff(both, axis=1)
 
     tables = [stepped(side, random) for side in mesh.sides]

@@ -198,15 +198,15 @@ def test_deviated_material_is_the_sum_of_modifications(wide_mesh, tolerance):
         sides[side] = design + jg.ProfileSlope(flank.profile_slope) + Waviness(flank.waviness) + lead
     sides["pinion"] += jg.LeadSlope(deviation.misalignment)
     pitch = (deviation.pinion.pitch + deviation.wheel.pitch)[:, None, None]
-    expected = jg.contact.removed_material(wide_mesh, TORQUE, **sides) + pitch
+    expected = (jg.contact.removed_material(wide_mesh, TORQUE, **sides) + pitch).amount
     np.testing.assert_allclose(
-        jg.tolerance.deviated_material(wide_mesh, TORQUE, deviation, **RELIEF), expected, atol=1e-12
+        jg.tolerance.deviated_material(wide_mesh, TORQUE, deviation, **RELIEF).amount, expected, atol=1e-12
     )
 
 
 def test_zero_tolerance_is_the_nominal_design(mesh, solve):
-    zero, design = zero_deviation(mesh), jg.contact.removed_material(mesh, TORQUE, **RELIEF)
-    np.testing.assert_allclose(jg.tolerance.deviated_material(mesh, TORQUE, zero, **RELIEF), design, rtol=1e-14)
+    zero, design = zero_deviation(mesh), jg.contact.removed_material(mesh, TORQUE, **RELIEF).amount
+    np.testing.assert_allclose(jg.tolerance.deviated_material(mesh, TORQUE, zero, **RELIEF).amount, design, rtol=1e-14)
     nominal = np.asarray(solve(zero).transmission_error)
     scatter = jg.monte_carlo(mesh, TORQUE, tolerance=jg.Tolerance(), samples=20, **RELIEF)
     # another compilation may round differently; within one, all samples are the same to the last bit

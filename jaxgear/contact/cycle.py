@@ -34,8 +34,10 @@ class MeshCycle(eqx.Module):
         opening: remaining gap [um] where positive, minus the contact deflection where loaded.
         gap: gap of the undeformed flanks at zero transmission error [um]: corner gap plus both modifications, where the
             contact slides to.
-        bend: what the modifications add to the relative curvature of the flanks, times their relative radius; shape
-            (pairs, slices or 1, positions).
+        shift: of the centre of contact along the flanks, which the slope of the modifications brings about, positive
+            towards the pinion tip [mm]; shape (pairs, slices or 1, positions).
+        bend: what the modifications add to the relative curvature of the flanks, times their relative radius; of
+            the same shape.
         tangent_stiffness: d force / d transmission error at fixed position [N/um].
         residual: largest relative violation of the contact conditions, shape (positions,).
         converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
@@ -53,6 +55,7 @@ class MeshCycle(eqx.Module):
     pair_force: Float[Array, "pairs positions"]
     opening: Load
     gap: Load
+    shift: Float[Array, "pairs #slices positions"]
     bend: Float[Array, "pairs #slices positions"]
     tangent_stiffness: Curve
     residual: Curve

@@ -95,5 +95,5 @@ def _solve_at(mesh: Mesh, error: Curve, removed: RemovedMaterial) -> PrescribedC
         line_load=solution.line_load,
         tangent_stiffness=tangent_stiffness(problem, solution),
         residual=solution.residual,
-        converged=solution.solved & mesh.margins.valid & (error < outermost(mesh, removed.amount)),
+        converged=solution.solved & mesh.margins.valid & (error < outermost(mesh, removed)),
     )

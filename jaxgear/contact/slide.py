@@ -277,63 +277,64 @@ def _moments(term, points, shares):
 def _slide(sided_terms, place: _Place, nodes: tuple[_Node, ...], steps: int) -> tuple[Real, Real, Real]:
     """Amount [um], shift [mm] and bend of `RemovedMaterial`, of the shape that the terms have."""
     bulge = 1e3 / place.radius
-    moved = before = jnp.zeros_like(place.radius)
-    shift = moved
+    moved = shift = jnp.zeros_like(place.radius)
+    tried: tuple[_Tried, ...] = ()
     if steps:
         shift = stored(-_secant_slope(sided_terms, place) / bulge)
+        tried = (_Tried(moved, -bulge * (place.beyond + shift)),)
         moved = _within(place.beyond + shift, place.lowest, place.highest)
     for _ in range(steps - 1):
         seen = _probe(sided_terms, place, moved, nodes)
         slope = bulge * (moved - place.beyond) + seen.slope
-        step, _ = _step(slope, seen.curvature, _Limits(moved, before, place))
-        before, moved = moved, stored(moved + step)
+        step, _ = _step(slope, seen.curvature, moved, tried, place)
+        tried, moved = (*tried, _Tried(moved, slope)), stored(moved + step)
         shift = moved - place.beyond
     seen = _probe(sided_terms, place, moved, nodes)
     away = moved - place.beyond
     amount = 0.5 * bulge * (away**2 - place.beyond**2) + seen.mean
     if steps:
-        amount = amount - _gain(bulge * away + seen.slope, seen.curvature, _Limits(moved, before, place))
+        amount = amount - _gain(bulge * away + seen.slope, seen.curvature, moved, tried, place)
     return amount, shift, seen.curvature / bulge
 
 
-class _Limits(NamedTuple):
-    """Where the contact is, where it was before, and how far it may go."""
+class _Tried(NamedTuple):
+    """A place where the contact was tried [mm], and the slope of the gap there [um/mm]."""
 
     moved: Real
-    before: Real
-    place: _Place
+    slope: Real
 
 
-def _step(slope: Real, curvature: Real, at: _Limits) -> tuple[Real, Real]:
+def _step(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], place: _Place) -> tuple[Real, Real]:
     """The step to the least gap [mm] by the parabola that is seen from a place, and its curvature [um/mm^2].
 
-    Where the last step has led beyond the least gap, over a kink, the slope has changed its sign since: from what that
-    step, made with the curvature of the bulge or more, has started with.
+    Where a place that was tried before has a slope of the other sign, the least gap lies between: over a kink the
+    curvature is at least what the slopes of both tell, the latest of such places counting.
     """
-    bulge = 1e3 / at.place.radius
-    last = at.moved - at.before
-    beyond = slope * last > 0
-    across = bulge + slope / jnp.where(beyond, last, 1.0)
-    total = bulge + jnp.maximum(curvature, 0.0)
-    total = jnp.where(beyond, jnp.maximum(total, across), total)
-    return _within(at.moved - slope / total, at.place.lowest, at.place.highest) - at.moved, total
+    bulge = 1e3 / place.radius
+    total = seen = bulge + jnp.maximum(curvature, 0.0)
+    for before in tried:
+        apart = moved - before.moved
+        between = (slope * before.slope < 0) & (apart != 0)
+        across = (slope - before.slope) / jnp.where(between, apart, 1.0)
+        total = jnp.where(between, jnp.maximum(seen, across), total)
+    return _within(moved - slope / total, place.lowest, place.highest) - moved, total
 
 
-def _gain_of(slope: Real, curvature: Real, at: _Limits) -> Real:
-    step, total = _step(slope, curvature, at)
+def _gain_of(slope: Real, curvature: Real, *at) -> Real:
+    step, total = _step(slope, curvature, *at)
     return -step * (slope + 0.5 * step * total)
 
 
 @jax.custom_jvp
-def _gain(slope: Real, curvature: Real, at: _Limits) -> Real:
+def _gain(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], place: _Place) -> Real:
     """By how much the gap falls with that step [um]."""
-    return _gain_of(slope, curvature, at)
+    return _gain_of(slope, curvature, moved, tried, place)
 
 
 @_gain.defjvp
 def _gain_jvp(primals, tangents):
-    slope, curvature, at = primals
-    return _gain(*primals), jax.jvp(_gain_of, (stored(slope), stored(curvature), at), tangents)[1]
+    slope, curvature, *at = primals
+    return _gain(*primals), jax.jvp(_gain_of, (stored(slope), stored(curvature), *at), tangents)[1]
 
 
 def _secant_slope(sided_terms, place: _Place) -> Real:
