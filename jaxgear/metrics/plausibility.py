@@ -51,7 +51,7 @@ LIMITS = {
     "length of the modification": Limit(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
     "mean transmission error in modules": Limit(0.0, 0.02, "", "the teeth bend beyond what the model is made for"),
     "PPTE": Limit(0.1, np.inf, "um", "finer than the model can claim of modified flanks"),
-    "PPTE by finite elements": Limit(0.03, np.inf, "um", "finer than a two-dimensional model can claim of modified flanks"),
+    "PPTE by finite elements": Limit(0.03, np.inf, "um", "finer than a model in two dimensions can claim"),
     "flank pressure": Limit(0.0, 1650.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
     "root stress": Limit(0.0, 1050.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
     "effective contact ratio": Limit(1.0, np.inf, "", "the teeth lose contact, and shocks follow"),
