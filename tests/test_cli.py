@@ -65,6 +65,7 @@ steps = 100
 )
 
 
+STAGES = "finite-element tables", "searching", "verifying"  # in this order
 EARLIER = '{"versions": {"jaxgear": "0.1.0"}}'  # the summary of an earlier run
 
 
@@ -262,6 +263,50 @@ def test_the_numbers_are_those_of_the_mesh_on_which_the_search_ended(optimized):
     assert "ppte [um]" not in optimized.out  # the row above says it
 
 
+def test_every_design_is_verified_by_finite_elements(folder, optimized):
+    designs = optimized.summary["designs"]
+    found = {name: design["verified"] for name, design in designs.items()}
+    for name, verified in found.items():
+        assert verified["structure"] == "finite_element" and 1e-4 < abs(verified["ppte_um"] - designs[name]["ppte_um"])
+        assert verified["objectives"] == {"ppte [um]": pytest.approx(verified["ppte_um"], rel=1e-6)}
+    (row,) = (line for line in optimized.out.splitlines() if line.startswith("│   by finite elements"))
+    assert all(f"{verified['ppte_um']:.3f}" in row for verified in found.values())
+    before, after = (found[name]["ppte_um"] for name in ("unmodified", "optimum"))
+    fall = 100 * (1 - after / before)
+    assert f"by finite elements {before:.3f} -> {after:.3f} um: {fall:.1f} % less than unmodified" in optimized.out
+    file = load_design(folder / "free.toml")
+    compliance = jg.finite_element_compliance(file.pair())
+    mesh = jg.prepare(file.pair(), compliance=compliance, resolution=jg.Resolution(positions=512))
+    cycle = eqx.filter_jit(lambda mesh: jg.solve(mesh, 50.0))(mesh)
+    assert before == pytest.approx(float(jg.peak_to_peak(cycle.transmission_error)), rel=1e-6)
+    stages = optimized.err.splitlines()
+    tables, search, second = (next(i for i, line in enumerate(stages) if word in line) for word in STAGES)
+    assert tables < search < second
+
+
+def test_what_cannot_be_meshed_is_not_verified(folder, tmp_path):
+    """Few teeth on a thin rim: said before the search where it was asked for, else under the table."""
+    thin = FREE.replace("teeth = 19", "teeth = 8\nprofile_shift = 0.5\nbore_diameter = 19.2")
+    asked = tmp_path / "asked.toml"
+    asked.write_text(thin.replace("starts = 2", "verify = true\nstarts = 2"))
+    result = call("optimize", asked, "-o", tmp_path / "asked")
+    assert result.code == 2 and "searching" not in result.err and not (tmp_path / "asked").exists()
+    assert "asked.toml: optimize.verify: finite_element_compliance: bore_diameter leaves a rim of" in result.err
+    open_ = tmp_path / "open.toml"
+    open_.write_text(thin)
+    result = call("optimize", open_, "-m", "te_iteration", "-o", tmp_path / "open", "--no-figures")
+    assert "\nnot verified by finite elements: finite_element_compliance: bore_diameter leaves a rim of" in result.out
+    designs = json.loads((tmp_path / "open" / "summary.json").read_text())["designs"]
+    assert not any("verified" in design for design in designs.values())
+
+
+def test_nobody_has_to_verify(folder, tmp_path):
+    path = tmp_path / "alone.toml"
+    path.write_text(FREE.replace("starts = 2", "verify = false\nstarts = 2"))
+    result = call("optimize", path, "-m", "te_iteration", "-o", tmp_path / "alone", "--no-figures")
+    assert result.code == 0 and "finite" not in result.out + result.err
+
+
 @pytest.fixture(scope="module")
 def robust(folder):
     """The worst of two torques, neither the one of the table, within a limit that no design keeps."""
@@ -290,6 +335,11 @@ def test_table_and_verdict_are_of_one_torque_and_one_measure(folder, robust):
     assert all(f"{design['objectives']['worst ppte [um]']:.4g}" in row for design in designs.values())
     both = [design["objectives"]["worst ppte [um]"] for design in (before, after)]
     assert f"worst ppte [um] {both[0]:.4g} -> {both[1]:.4g}" in robust.out
+
+
+def test_a_quick_run_verifies_nothing(robust):
+    assert "finite" not in robust.out + robust.err
+    assert not any("verified" in design for design in robust.summary["designs"].values())
 
 
 def test_a_limit_that_no_design_keeps_is_no_success(robust):

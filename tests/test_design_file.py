@@ -401,6 +401,10 @@ MALFORMED = {
         "variables.height: must be a table, not a number",
     ),
     "optimize without variables": (text(tail="[optimize]\nstarts = 4"), "optimize: has no effect without [variables]"),
+    "verified by itself": (
+        text(pinion=RELIEF, tail=f'{VARIABLE}[optimize]\nverify = true\n[model]\nstructure = "finite_element"'),
+        'optimize.verify: has no effect with model.structure = "finite_element"',
+    ),
     "legacy with options": (
         text(tail='[model]\npreset = "legacy"\nplane = "strain"'),
         'model.plane: cannot be combined with preset = "legacy"',

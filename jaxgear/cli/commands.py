@@ -47,7 +47,7 @@ def optimize(file: Path, output: Path | None, *, method: str | None, quick: bool
         target = output or default_folder(file, "optimize", request.method, quick=quick)
         with run(design, target, stages) as current:
             _import_ahead(*_SEARCH, *_FIGURES * figures)
-            current.prepare(quick=quick, finer=request.finer)
+            current.prepare(quick=quick, finer=request.finer, verify=request.verify)
             load = np.asarray(design.torque), np.asarray(design.optimize.application_factor)
             relief = _iso_relief(design.pair(), *load)
             involute = NoModification()

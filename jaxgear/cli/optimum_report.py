@@ -8,7 +8,7 @@ import numpy as np
 
 from ..contact import Mesh
 from ..io import DesignFile, describe
-from ..optimize import Front, Optimum, Projection
+from ..optimize import Front, Optimum, Projection, Verified
 from ..optimize.result import PENALIZED
 from . import report
 from .study import response_surface
@@ -31,6 +31,8 @@ def verdict(
     yield f"PPTE at {file.torque:g} N m {ppte[0]:.3f} -> {ppte[1]:.3f} um: {fall:.1f} % less than unmodified"
     for label in report.objectives(evaluations):
         yield f"{label} {before.objectives[label]:.4g} -> {after.objectives[label]:.4g}"
+    if before.verified is not None and after.verified is not None:
+        yield from _verified(report.objectives(evaluations), before.verified, after.verified)
     if optimum.objective_name.endswith(PENALIZED):  # no other design pays it
         yield f"{optimum.objective_name}: {optimum.objective:.4g}"
     yield from _bounds(file, optimum)
@@ -117,6 +119,14 @@ def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[str]:
         yield f"and {len(active) - _SHOWN_BOUNDS} more variables are at a bound"
     if not active:
         yield "no variable is at a bound"
+
+
+def _verified(labels: list[str], before: Verified, after: Verified) -> Iterator[str]:
+    """The same lines by finite elements."""
+    fall = f": {100 * (1 - after.ppte / before.ppte):.1f} % less than unmodified" if before.ppte else ""
+    yield f"PPTE by finite elements {before.ppte:.3f} -> {after.ppte:.3f} um{fall}"
+    for label in labels:
+        yield f"{label} by finite elements {before.objectives[label]:.4g} -> {after.objectives[label]:.4g}"
 
 
 def _positions(optimum: Optimum, searched_at: int) -> str:

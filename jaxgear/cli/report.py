@@ -1,13 +1,9 @@
-"""What a run says and writes: table, lines, summary and figures."""
+"""What a run says and draws: table, lines and figures."""
 
-import dataclasses
-import platform
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
-import jax
 import numpy as np
 from rich.console import Console
 from rich.table import Table
@@ -17,9 +13,9 @@ from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.results import unit_of
 from ..metrics import Doubt, plausibility
-from ..numerics import fields_of, program
+from ..numerics import program
+from ..optimize import Verified
 from .study import Evaluation
-from .version import version
 
 Evaluations = Mapping[str, Evaluation]
 
@@ -36,6 +32,7 @@ _ROWS = {
     "mesh_loss_factor": ("mesh loss factor", ".4f"),
     "max_flash_temperature_K": ("max flash temperature [K]", ".1f"),
 }
+_BY_FINITE_ELEMENTS = "  by finite elements"
 _HARRIS_CURVES = 7
 _TITLE = 9.0  # [pt]
 _WIDTH = 120  # of a file [characters]
@@ -51,8 +48,13 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
         cells = [evaluation.metrics.get(metric) for evaluation in evaluations.values()]
         if None not in cells:
             result.add_row(label, *(format(cell, form) for cell in cells))
+        if metric == "ppte_um" and verified(evaluations):
+            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.ppte, form) for each in verified(evaluations)))
     for label in objectives(evaluations):
         result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
+        if verified(evaluations):
+            cells = [each.objectives[label] for each in verified(evaluations)]
+            result.add_row(_BY_FINITE_ELEMENTS, *(format(cell, ".4g") for cell in cells))
     result.add_section()
     flanks = [dict(_flank_cells(evaluation)) for evaluation in evaluations.values()]
     for label in dict.fromkeys(label for cells in flanks for label in cells):
@@ -74,13 +76,16 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
             )
 
 
-def doubts(file: DesignFile, evaluations: Evaluations) -> dict[str, tuple[Doubt, ...]]:
+def doubts(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, tuple[Doubt, ...]]:
     """What is not usual of every design."""
     options: dict[str, Any] = {"torque_range": file.torque_range, "speed": file.speed, "friction": file.friction}
-    return {
-        name: plausibility(evaluation.cycle, pinion=evaluation.pinion, wheel=evaluation.wheel, **options)
-        for name, evaluation in evaluations.items()
-    }
+    options["compliance"] = mesh.compliance
+    found = {}
+    for name, design in evaluations.items():
+        options |= {"pinion": design.pinion, "wheel": design.wheel}
+        options["verified"] = design.verified and design.verified.ppte
+        found[name] = plausibility(design.cycle, **options)
+    return found
 
 
 def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
@@ -101,14 +106,25 @@ def bores(file: DesignFile) -> str:
     texts = []
     for name, gear in gears:
         guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
-        texts.append(f"{name} {float(_diameters(gear)[1]):.4g} mm{guess}")
+        texts.append(f"{name} {float(diameters(gear)[1]):.4g} mm{guess}")
     return f"bores: {', '.join(texts)}"
+
+
+@program
+def diameters(gear: Gear):
+    """Diameters of tip and bore [mm]."""
+    return 2 * gear.tip_radius, 2 * gear.bore_radius
 
 
 def objectives(evaluations: Evaluations) -> list[str]:
     """What an optimization made small, without what is a row of the table anyhow."""
     known = {name.rpartition("_")[0] + f" [{name.rpartition('_')[2]}]" for name in _ROWS}
     return [label for label in next(iter(evaluations.values())).objectives if label not in known | set(_ROWS)]
+
+
+def verified(evaluations: Evaluations) -> list[Verified]:
+    """What all designs are worth with the finite-element structure; empty where that was not asked for."""
+    return [evaluation.verified for evaluation in evaluations.values() if evaluation.verified is not None]
 
 
 def reduction(evaluations: Evaluations) -> float:
@@ -124,44 +140,6 @@ def main(evaluations: Evaluations) -> Evaluation:
 
 def _main_name(evaluations: Evaluations) -> str:
     return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
-
-
-def summary(
-    file: DesignFile,
-    mesh: Mesh,
-    evaluations: Evaluations,
-    torques: np.ndarray,
-    found: Mapping[str, tuple[Doubt, ...]],
-) -> dict[str, Any]:
-    """Contents of `summary.json`, with the doubts that were `found` of every design."""
-    size = mesh.resolution
-    return {
-        "title": file.title,
-        "design_file": file.path.name,
-        "torque_Nm": file.torque,
-        "torque_range_Nm": file.torque_range,
-        "speed_rpm": file.speed,
-        "friction": file.friction,
-        "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
-        "center_distance_mm": _center_distance(mesh),
-        "model": {"compliance": _words(mesh.compliance), "plane": mesh.compliance.plane},
-        "designs": {
-            name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
-            for name, several in found.items()
-        },
-        "ppte_reduction_percent": reduction(evaluations),
-        "ppte_over_torque": {
-            "torque_Nm": torques,
-            **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
-        },
-        "resolution": {field.name: getattr(size, field.name) for field in dataclasses.fields(size)},
-        "versions": {
-            "jaxgear": version(),
-            "jax": jax.__version__,
-            "numpy": np.__version__,
-            "python": platform.python_version(),
-        },
-    }
 
 
 def write_figures(folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> None:
@@ -222,56 +200,6 @@ def say(*lines: str) -> None:
 def warn(line: str) -> None:
     """Prints a warning on stderr."""
     console(stderr=True).print(f"jaxgear: warning: {line}", style="bold red", soft_wrap=True)
-
-
-def _design(evaluation: Evaluation) -> dict[str, Any]:
-    return {
-        **evaluation.metrics,
-        **({"objectives": evaluation.objectives} if evaluation.objectives else {}),
-        "failed_torques_Nm": evaluation.failed_torques,
-        "pinion_modification": describe(evaluation.pinion),
-        "wheel_modification": describe(evaluation.wheel),
-        "time_s": evaluation.seconds,
-    }
-
-
-def _gear(gear: Gear) -> dict[str, Any]:
-    """Every number of a gear, with those that follow from others where the file gives none."""
-    derived = dict(zip(("tip_diameter", "bore_diameter"), _diameters(gear)))
-    data: dict[str, Any] = {}
-    for part in (gear, gear.material):
-        for name, field in fields_of(type(part)).items():
-            unit = "" if field.unit == "x module" else field.unit.replace(" ", "").replace("/", "_per_")
-            value = derived.get(name, getattr(part, name))
-            data[f"{name}_{unit}" if unit else name] = np.asarray(value)
-    data["bore_given"] = gear.bore_diameter is not None
-    return data
-
-
-@program
-def _diameters(gear: Gear):
-    """Of tip and bore [mm]."""
-    return 2 * gear.tip_radius, 2 * gear.bore_radius
-
-
-def _center_distance(mesh: Mesh) -> float:
-    """Sum of the working pitch radii [mm]."""
-    contact = mesh.path_of_contact
-    return float(
-        np.hypot(contact.pinion_base_radius, contact.pinion_pitch_roll_length)
-        + np.hypot(contact.wheel_base_radius, contact.wheel_pitch_roll_length)
-    )
-
-
-def _words(part: eqx.Module) -> str:
-    """A model by the names of its parts and switches."""
-    values = (getattr(part, field.name) for field in dataclasses.fields(part))
-    inner = [_words(value) if isinstance(value, eqx.Module) else str(value) for value in values]
-    return f"{type(part).__name__}({', '.join(inner)})"
-
-
-def _doubt(doubt: Doubt) -> dict[str, Any]:
-    return {"name": doubt.name, "where": doubt.where, "value": doubt.value, **doubt.limit._asdict()}
 
 
 def _flank_cells(evaluation: Evaluation) -> Iterator[tuple[str, str]]:

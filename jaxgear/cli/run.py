@@ -10,11 +10,31 @@ from pathlib import Path
 import jax
 import numpy as np
 
+from ..compliance import Compliance, TabulatedCompliance
 from ..contact import Mesh, Resolution
-from ..io import DesignFile, OptimizeRequest, load_design, result_folder, write_flanks, write_front, write_summary
+from ..io import (
+    DesignFile,
+    DesignFileError,
+    OptimizeRequest,
+    load_design,
+    result_folder,
+    write_flanks,
+    write_front,
+    write_summary,
+)
 from ..microgeometry import AbstractModification
-from ..optimize import Front, Optimum, Problem, Projection, judged, project
-from . import interrupt, optimum_report, report
+from ..optimize import (
+    Front,
+    Optimum,
+    Problem,
+    Projection,
+    begin_verification,
+    judged,
+    project,
+    structure_for,
+    verification,
+)
+from . import interrupt, optimum_report, report, written
 from .cache import enable_cache
 from .progress import Stages
 from .study import Evaluation, evaluate
@@ -37,9 +57,17 @@ class Run:
         self._optimum: Optimum | None = None
         self._front: Front | None = None
         self._projection: Projection | None = None
+        self._second: TabulatedCompliance | None = None  # by which designs are verified
+        self._unverified = ""  # why not
 
-    def prepare(self, *, quick: bool = False, finer: int | None = None) -> None:
-        """Prepares the mesh, of a quick run a coarse one; `finer` are the positions on which a search will end."""
+    def prepare(self, *, quick: bool = False, finer: int | None = None, verify: bool | None = False) -> None:
+        """Prepares the mesh.
+
+        Args:
+            quick: a coarse one.
+            finer: positions on which a search will end.
+            verify: whether the designs are evaluated with the finite-element structure too; None where that goes.
+        """
         self._stages.begin("preparing the mesh")
         self._quick = quick
         size = self.design.resolution()
@@ -48,6 +76,20 @@ class Run:
         self._mesh: Mesh = jax.block_until_ready(self.design.mesh(coarse(size) if quick else size))
         self._searched_at = self._mesh.resolution.positions
         self._torques = np.linspace(*self.design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
+        if verify or (verify is None and isinstance(self._mesh.compliance, Compliance)):
+            self._make_tables(finer, required=verify is not None)
+
+    def _make_tables(self, finer: int | None, *, required: bool) -> None:
+        """Before the search: what cannot be verified is known at once, and an interruption costs no optimum."""
+        self._stages.begin("finite-element tables of pinion and wheel, made once and kept")
+        try:
+            self._second = structure_for(self._mesh)
+        except ValueError as error:
+            if required:
+                raise DesignFileError("optimize.verify", str(error), self.design.path) from None
+            self._unverified = str(error)
+            return
+        begin_verification(self._mesh, self._second, finer)
 
     def evaluate(self, name: str, pinion: AbstractModification, wheel: AbstractModification) -> None:
         """Evaluates a design and keeps it."""
@@ -81,12 +123,22 @@ class Run:
             self._stages.begin(f"projecting the flanks on a {request.curve} curve")
             self._projection = projection = project(optimum, request.curve)
             self.evaluate(f"as {request.curve}", projection.pinion, projection.wheel)
+        if self._second is not None:
+            self._verify(self._second)
+
+    def _verify(self, second: TabulatedCompliance) -> None:
+        """Evaluates all designs again with the finite-element structure."""
+        self._stages.begin("verifying with the finite-element structure")
+        by_finite_elements = verification(self._mesh, second, self._problem)
+        for name, claimed in self._evaluations.items():
+            found = by_finite_elements(claimed.cycle, claimed.objectives, claimed.pinion, claimed.wheel)
+            self._evaluations[name] = dataclasses.replace(claimed, verified=found)
 
     def write(self, *, figures: bool) -> None:
         """Writes the result files."""
         self._stages.begin("writing the results")
-        self._doubts = report.doubts(self.design, self._evaluations)
-        data = report.summary(self.design, self._mesh, self._evaluations, self._torques, self._doubts)
+        self._doubts = report.doubts(self.design, self._mesh, self._evaluations)
+        data = written.summary(self.design, self._mesh, self._evaluations, self._torques, self._doubts)
         if self._optimum is not None:
             data["optimum"] = optimum_report.summary(self.design, self._optimum, self._projection)
         write_summary(self._folder / "summary.json", {**data, "quick": self._quick})
@@ -108,6 +160,8 @@ class Run:
             report.say(*optimum_report.front_lines(self._front))
         if self._quick:
             report.say("quick run: coarse positions and a short search, not a result to build on")
+        if self._unverified:
+            report.say(f"not verified by finite elements: {self._unverified}")
         report.say(report.bores(self.design))
         report.say(*report.doubt_lines(self._doubts))
         report.say(f"results in {self._target}{os.sep}, {self._stages.elapsed:.1f} s")

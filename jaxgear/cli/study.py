@@ -12,6 +12,7 @@ from ..io import DesignFile
 from ..metrics import flash_temperature, summary
 from ..microgeometry import AbstractModification
 from ..numerics import program
+from ..optimize import Verified
 from ..sweeps import over_torques
 
 _SURFACE_REACH, _SURFACE_TORQUES = 2.0, 21
@@ -30,6 +31,7 @@ class Evaluation:
         objectives: what an optimization made small, by name and unit, of this design; empty without one.
         failed_torques: torques without a converged contact solution [N m], the design torque included.
         seconds: what finding and evaluating it took, without compilation of the latter [s].
+        verified: what it is worth with the finite-element structure; None where nobody asked.
     """
 
     pinion: AbstractModification
@@ -41,6 +43,7 @@ class Evaluation:
     failed_torques: list[float]
     seconds: float
     objectives: dict[str, float] = field(default_factory=dict)
+    verified: Verified | None = None
 
 
 def evaluate(

@@ -17,7 +17,7 @@ from ..numerics import program
 from ..sizing import iso_stiffness
 from . import schema, schema_sweep, template
 from .errors import DesignFileError, naming, refuse_given, refused
-from .stiffness import model_part, with_tables
+from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
 from .variables import increasing, read_variables
 
@@ -208,6 +208,8 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     optimize = decode("optimize", top.optimize or {}, schema.optimize_section())
     if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
         raise DesignFileError("optimize", "has no effect without [variables]")
+    if optimize.verify and stiffness.structure == FINITE_ELEMENTS:
+        raise DesignFileError("optimize.verify", f'has no effect with model.structure = "{FINITE_ELEMENTS}"')
     open_case = [*pair.free(), *model.free(), *operation.free()]
     open_flanks = [free for part in flanks for free in part.free()]
     bounds, units = read_variables(top.variables or {}, [*open_flanks, *open_case])

@@ -60,10 +60,12 @@ class OptimizeRequest:
     Attributes:
         method: its name.
         curve: named curve on which the flanks of a method without parameters are projected; None for the others.
+        verify: whether the designs are to be evaluated with the finite-element structure too; None where that goes.
     """
 
     method: str
     curve: str | None
+    verify: bool | None
     _design: DesignFile
     _common: dict[str, Any]  # what its function takes besides design, mesh and callback
 
@@ -120,13 +122,14 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
     curve = options.pop("curve", _CURVE) if flanks_alone else None
     if curve is not None:
         check_known(f"optimize.{name}.curve", curve, CURVES)
+    verify = False if quick else section.verify
     common = _common(design, section, name, quick)
     fewer = _QUICK.get(name, {}) if quick else {}
     if name == "te_iteration":
         _check_iteration(design, options["start"], section)
         if options["start"] == "low_pressure":
             options["method"] = METHODS[_DEFAULT_METHOD](**(_QUICK[_DEFAULT_METHOD] if quick else {}))
-        return OptimizeRequest(name, curve, design, options)
+        return OptimizeRequest(name, curve, verify, design, options)
     if name == "free_form":
         common |= options | fewer
     else:
@@ -139,7 +142,7 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
         common["method"] = make(**options | fewer)
     if quick and name != _PARETO:  # a quick look stays on its mesh
         common["positions"] = None
-    return OptimizeRequest(name, curve, design, common)
+    return OptimizeRequest(name, curve, verify, design, common)
 
 
 def _options(section: schema.OptimizeSection, name: str, *, of_the_file: bool) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from ..contact import Operation, Resolution
 from ..geometry import Gear, GearPair
 from ..numerics import Number
 from ..optimize import METHODS, Pareto
-from .kinds import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, table, text
+from .kinds import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, switch, table, text
 from .layout import Section, section_of
 
 Tables = dict[str, Any]
@@ -135,6 +135,8 @@ class OptimizeSection(Section):
         starts: searches, of methods "minimax", "adam" and "lbfgs".
         steps: most steps of every search, of the same methods.
         application_factor: K_A of the rule-based relief.
+        verify: whether the designs are evaluated with the finite-element structure too; without it they are where the
+            gears can be meshed. A quick run never does.
         constraint: limits of quantities or of combinations of variables.
     """
 
@@ -149,6 +151,7 @@ class OptimizeSection(Section):
     starts: Annotated[int | None, count(1, 4096)] = None
     steps: Annotated[int | None, count(10, 100_000)] = None
     application_factor: Annotated[float, real(Number(low=0.0, high=100.0, open_low=True))] = 1.0
+    verify: Annotated[bool | None, switch()] = None
     constraint: Annotated[list[Tables], _TABLES] = []
 
 

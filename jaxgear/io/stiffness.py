@@ -7,7 +7,7 @@ from ..geometry import GearPair
 from . import schema, template
 from .errors import DesignFileError, refuse_given, refused
 
-_FINITE_ELEMENTS = "finite_element"
+FINITE_ELEMENTS = "finite_element"
 _TABLES = "pinion_table", "wheel_table"
 # numbers of gears and pair that a table holds for whatever they are; the module too, where it moves no ratio
 _FREE = {
@@ -22,12 +22,12 @@ _FREE = {
 
 def model_part(section: schema.ModelSection) -> template.Part:
     """The model as far as it needs no gears: all of it, or the plane of what `finite_elements` makes."""
-    if section.structure == _FINITE_ELEMENTS:
+    if section.structure == FINITE_ELEMENTS:
         others = set(section.given()) - {"structure", "plane", *_TABLES}
         if others:
-            raise DesignFileError(f"model.{min(others)}", f'cannot be combined with structure = "{_FINITE_ELEMENTS}"')
+            raise DesignFileError(f"model.{min(others)}", f'cannot be combined with structure = "{FINITE_ELEMENTS}"')
         return template.Part(Compliance, {}, "model")
-    refuse_given("model", section, _TABLES, f' without structure = "{_FINITE_ELEMENTS}"')
+    refuse_given("model", section, _TABLES, f' without structure = "{FINITE_ELEMENTS}"')
     if section.preset == "default":
         return template.part_of("model", section, Compliance)
     given = set(section.given()) - {"preset", "structure"}
@@ -48,7 +48,7 @@ def with_tables(
         pair: gears whose numbers may be variables.
         middle: the gears with all variables in the middle of their bounds.
     """
-    if section.structure != _FINITE_ELEMENTS:
+    if section.structure != FINITE_ELEMENTS:
         return model
     for free in pair.free():
         name = free.key.rpartition(".")[2]
@@ -56,7 +56,7 @@ def with_tables(
             g.tip_diameter is not None or g.bore_diameter is not None for g in _gears(middle)
         )
         if moves or name not in {*_FREE, "module"}:
-            problem = f'cannot be a variable with model.structure = "{_FINITE_ELEMENTS}", whose tables are of one shape'
+            problem = f'cannot be a variable with model.structure = "{FINITE_ELEMENTS}", whose tables are of one shape'
             raise DesignFileError(free.key, problem)
     paths = {name: folder / path for name in _TABLES if (path := getattr(section, name)) is not None}
     tabulated = refused("model", finite_element_compliance, middle, section.plane or "auto", **paths)

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..compliance import AbstractCompliance, TabulatedCompliance
 from ..contact import MeshCycle
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import program
@@ -49,6 +50,8 @@ LIMITS = {
     "depth of the modification in modules": Limit(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
     "length of the modification": Limit(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
     "mean transmission error in modules": Limit(0.0, 0.02, "", "the teeth bend beyond what the model is made for"),
+    "PPTE": Limit(0.1, np.inf, "um", "finer than the model can claim of modified flanks"),
+    "PPTE by finite elements": Limit(0.03, np.inf, "um", "finer than a model in two dimensions can claim"),
     "flank pressure": Limit(0.0, 1650.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
     "root stress": Limit(0.0, 1050.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
     "effective contact ratio": Limit(1.0, np.inf, "", "the teeth lose contact, and shocks follow"),
@@ -85,6 +88,8 @@ def plausibility(
     torque_range: tuple[float, float] | None = None,
     speed: float | None = None,
     friction: float | None = None,
+    compliance: AbstractCompliance | None = None,
+    verified: float | None = None,
 ) -> tuple[Doubt, ...]:
     """What of a solved design is not usual; empty where nothing is.
 
@@ -94,6 +99,8 @@ def plausibility(
         torque_range: lowest and highest torque of interest [N m].
         speed: of the pinion [rpm]; None for that of the cycle.
         friction: coefficient of friction; None for that of the cycle.
+        compliance: by which it was solved, which the cycle does not tell; None for one that is composed of models.
+        verified: PPTE of the same design by the finite-element structure, where it is known [um].
     """
     flanks = tuple(given or own or NoModification() for given, own in ((pinion, cycle.pinion), (wheel, cycle.wheel)))
     rpm = cycle.operation.speed if speed is None else speed
@@ -109,7 +116,27 @@ def plausibility(
     if torque_range is not None:
         low, high = torque_range
         numbers.append(_doubt("torque", "", cycle.torque, low=low, high=high))
-    return tuple(doubt for doubt in numbers if not doubt.limit.low <= doubt.value <= doubt.limit.high)
+    found = [doubt for doubt in numbers if not doubt.limit.low <= doubt.value <= doubt.limit.high]
+    if not all(isinstance(flank, NoModification) for flank in flanks):
+        found += doubt_of_claim(float(np.ptp(np.asarray(cycle.transmission_error))), compliance, verified)
+    return tuple(found)
+
+
+def doubt_of_claim(
+    ppte: float, compliance: AbstractCompliance | None = None, verified: float | None = None
+) -> tuple[Doubt, ...]:
+    """The doubt about a PPTE of modified flanks that is less than a model can tell; else nothing.
+
+    Args:
+        ppte: claimed [um].
+        compliance: by which it was found; None for one that is composed of models.
+        verified: PPTE of the same design by the finite-element structure, where it is known [um].
+    """
+    doubt = _doubt("PPTE by finite elements" if isinstance(compliance, TabulatedCompliance) else "PPTE", "", ppte)
+    if verified is not None:
+        remark = f"{doubt.limit.remark}; with finite-element structure: {verified:.3g} um"
+        doubt = doubt._replace(limit=doubt.limit._replace(remark=remark))
+    return () if doubt.value >= doubt.limit.low else (doubt,)
 
 
 def _doubt(name: str, where: str, value, *, low: float | None = None, high: float | None = None) -> Doubt:

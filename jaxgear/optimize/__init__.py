@@ -31,3 +31,8 @@ from .result import Optimum as Optimum
 from .search import AbstractMethod as AbstractMethod
 from .search import Record as Record
 from .verdict import judged as judged
+from .verification import Verified as Verified
+from .verification import begin_verification as begin_verification
+from .verification import structure_for as structure_for
+from .verification import verification as verification
+from .verification import verify as verify

@@ -6,6 +6,7 @@ import equinox as eqx
 import numpy as np
 
 from ..contact import Mesh, MeshCycle
+from ..metrics.plausibility import doubt_of_claim
 from ..microgeometry import AbstractModification
 from ..numerics import Checked
 from .goal import FEASIBLE
@@ -150,6 +151,8 @@ class Optimum(eqx.Module):
                 yield name, f"{value:.4g}" + (f" (at its {bound} bound)" if bound else "")
         for name, limit in self.constraints.items():
             yield name, str(limit)
+        for doubt in doubt_of_claim(self.ppte, self.mesh.compliance):
+            yield "please check", str(doubt)
         if not self.feasible:
             yield "NOT FEASIBLE", f"a limit is passed by {100 * self.violation:.2g} %"
 

@@ -1,0 +1,108 @@
+"""What a run writes as `summary.json`: every number of its designs, its gears and its model."""
+
+import dataclasses
+import platform
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from ..contact import Mesh
+from ..geometry import Gear
+from ..io import DesignFile, describe
+from ..metrics import Doubt
+from ..numerics import fields_of
+from ..optimize import Verified
+from .report import Evaluations, diameters, reduction
+from .study import Evaluation
+from .version import version
+
+
+def summary(
+    file: DesignFile,
+    mesh: Mesh,
+    evaluations: Evaluations,
+    torques: np.ndarray,
+    found: Mapping[str, tuple[Doubt, ...]],
+) -> dict[str, Any]:
+    """Contents of `summary.json`, with the doubts that were `found` of every design."""
+    size = mesh.resolution
+    return {
+        "title": file.title,
+        "design_file": file.path.name,
+        "torque_Nm": file.torque,
+        "torque_range_Nm": file.torque_range,
+        "speed_rpm": file.speed,
+        "friction": file.friction,
+        "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
+        "center_distance_mm": _center_distance(mesh),
+        "model": {"compliance": _words(mesh.compliance), "plane": mesh.compliance.plane},
+        "designs": {
+            name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
+            for name, several in found.items()
+        },
+        "ppte_reduction_percent": reduction(evaluations),
+        "ppte_over_torque": {
+            "torque_Nm": torques,
+            **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
+        },
+        "resolution": {field.name: getattr(size, field.name) for field in dataclasses.fields(size)},
+        "versions": {
+            "jaxgear": version(),
+            "jax": jax.__version__,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+        },
+    }
+
+
+def _design(evaluation: Evaluation) -> dict[str, Any]:
+    return {
+        **evaluation.metrics,
+        **({"objectives": evaluation.objectives} if evaluation.objectives else {}),
+        **({"verified": _verified(evaluation.verified)} if evaluation.verified else {}),
+        "failed_torques_Nm": evaluation.failed_torques,
+        "pinion_modification": describe(evaluation.pinion),
+        "wheel_modification": describe(evaluation.wheel),
+        "time_s": evaluation.seconds,
+    }
+
+
+def _verified(found: Verified) -> dict[str, Any]:
+    objectives = {"objectives": found.objectives} if found.objectives else {}
+    return {"structure": "finite_element", "ppte_um": found.ppte, **objectives}
+
+
+def _gear(gear: Gear) -> dict[str, Any]:
+    """Every number of a gear, with those that follow from others where the file gives none."""
+    derived = dict(zip(("tip_diameter", "bore_diameter"), diameters(gear)))
+    data: dict[str, Any] = {}
+    for part in (gear, gear.material):
+        for name, field in fields_of(type(part)).items():
+            unit = "" if field.unit == "x module" else field.unit.replace(" ", "").replace("/", "_per_")
+            value = derived.get(name, getattr(part, name))
+            data[f"{name}_{unit}" if unit else name] = np.asarray(value)
+    data["bore_given"] = gear.bore_diameter is not None
+    return data
+
+
+def _center_distance(mesh: Mesh) -> float:
+    """Sum of the working pitch radii [mm]."""
+    contact = mesh.path_of_contact
+    return float(
+        np.hypot(contact.pinion_base_radius, contact.pinion_pitch_roll_length)
+        + np.hypot(contact.wheel_base_radius, contact.wheel_pitch_roll_length)
+    )
+
+
+def _words(part: eqx.Module) -> str:
+    """A model by the names of its parts and switches."""
+    values = (getattr(part, field.name) for field in dataclasses.fields(part))
+    inner = [_words(value) if isinstance(value, eqx.Module) else str(value) for value in values]
+    return f"{type(part).__name__}({', '.join(inner)})"
+
+
+def _doubt(doubt: Doubt) -> dict[str, Any]:
+    return {"name": doubt.name, "where": doubt.where, "value": doubt.value, **doubt.limit._asdict()}
