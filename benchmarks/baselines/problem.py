@@ -71,7 +71,9 @@ def prepare(positions: int = 64, slices: int = 1):
     wheel = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=70.0)
     pair = jg.GearPair(pinion, wheel)
     pairs = jg.fewest_pairs(pair, deflection=DEFLECTION)
-    return jg.prepare(pair, resolution=jg.Resolution(positions=positions, slices=slices, pairs=pairs))
+    # the baselines leave the contacts at their nominal places
+    sizes = jg.Resolution(positions=positions, slices=slices, pairs=pairs, slide_steps=0)
+    return jg.prepare(pair, resolution=sizes)
 
 
 def plain(mesh) -> Problem:

@@ -138,9 +138,6 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a title beyond the terminal's alphabet is no reason to fail
-    # finite elements solve many small systems, at which threads of BLAS mostly wait for each other: up to eight times
-    # the time where the cores are busy
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with interrupt.listening(), _warnings():
         code = _run(arguments)
     sys.exit(code)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...geometry import Gear, GearPair
-from ...numerics import AbstractSpring, concrete, program
+from ...numerics import AbstractSpring, Checked, concrete, program
 from ..assembly import AbstractCompliance, between_planes, with_edge
 from ..hertz import ContactGeometry, DepthReferenced
 from ..plane import (
@@ -31,7 +31,7 @@ from .table import GearTable, Scale, different, scaled, shape_of
 Matrix = Float[Array, "pairs pairs positions"]
 
 
-class TabulatedCompliance(AbstractCompliance):
+class TabulatedCompliance(AbstractCompliance, Checked):
     """Teeth and bodies from tables over the roll length, the contact by the depth-referenced law and what it lacks.
 
     Per gear, in place of beam, ring and their neighbours (see `GearTable`):

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy  # its packages load when they are used
+import threadpoolctl
 
 from .sector import Sector, quadratic, shape_gradients
 
@@ -72,7 +73,9 @@ def responses(sector: Sector, poisson: float, teeth: int, loads: Places, seen: P
     factor = scipy.sparse.linalg.splu(
         stiffness, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
-    flexibility = asked.T @ factor.solve(acting)
+    # SuperLU calls BLAS for small blocks, whose threads get into each other's way: eight times slower on busy cores
+    with threadpoolctl.threadpool_limits(1, user_api="blas"):
+        flexibility = asked.T @ factor.solve(acting)
     return _ring(flexibility, left.shape[1], teeth, neighbours)
 
 

@@ -1,0 +1,200 @@
+"""What the contacts see of a modification around a place on the flank: its mean, slope and curvature."""
+
+from functools import reduce
+from operator import add
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..geometry import reduced_radius
+from ..microgeometry import AbstractModification, Flank, NoModification, terms
+from ..numerics import by_numbers, safe_sqrt
+from .kinematics import Side
+from .mesh import Mesh
+
+Scalar = Float[Array, ""]
+Real = Float[Array, "..."]
+
+# Least half width over which a modification is averaged, relative to the relative radius: without load a slope would be
+# 0/0. Contacts are as narrow at a thousandth of usual loads.
+_NARROWEST = 1e-3
+
+
+class PlaceSide(NamedTuple):
+    """One gear's side of the contacts: numbers of shape (1, 1, 1), roll length of shape (pairs, 1, positions).
+
+    Attributes:
+        direction: +1 where moving towards the pinion tip makes the roll length grow, else -1.
+    """
+
+    direction: float
+    roll_length: Real
+    base_radius: Real
+    tip_roll_length: Real
+    start_roll_length: Real
+    face_coordinate: Real
+    face_width: Real
+
+
+class Place(NamedTuple):
+    """Where the contacts are and how far they may slide [mm], positive towards the pinion tip; (pairs, 1, positions).
+
+    Attributes:
+        radius: relative radius of curvature.
+        half_width: of the contact.
+        beyond: of the virtual centre of the contact beyond the corner that touches; zero on the path.
+        lowest, highest: how far the contact may slide.
+    """
+
+    radius: Real
+    half_width: Real
+    beyond: Real
+    lowest: Real
+    highest: Real
+    sides: tuple[PlaceSide, PlaceSide]
+
+
+def place_of(mesh: Mesh, torque: Scalar) -> Place:
+    first, second = mesh.sides
+    radius = reduced_radius(first.contact_roll_length, second.contact_roll_length)[:, None]
+    outside, path, contact = mesh.outside, mesh.path, mesh.path_of_contact
+    over = []
+    for side in (first, second):
+        # arc length of the tip's involute over the path that is left out
+        tip, base = side.tip_roll_length, side.base_radius
+        over.append((2 * tip + outside) * outside / (2 * base))
+    beyond = jnp.where(path > contact.end, over[0], 0.0) - jnp.where(path < contact.start, over[1], 0.0)
+    inside = [
+        jnp.maximum(side.tip_roll_length**2 - side.contact_roll_length**2, 0.0) / (2 * side.base_radius)
+        for side in (first, second)
+    ]
+    sides = _side(mesh, first, 1.0), _side(mesh, second, -1.0)
+    narrowest = _NARROWEST * radius
+    half_width = jnp.maximum(_half_width(mesh, torque), narrowest)
+    return Place(radius, half_width, beyond[:, None], -inside[1][:, None], inside[0][:, None], sides)
+
+
+def _side(mesh: Mesh, side: Side, direction: float) -> PlaceSide:
+    def number(value):
+        return jnp.reshape(value, (1, 1, 1))
+
+    return PlaceSide(
+        direction,
+        side.contact_roll_length[:, None],
+        number(side.base_radius),
+        number(side.tip_roll_length),
+        number(side.start_roll_length),
+        mesh.face_coordinate[None, :, None],
+        number(side.face_width),
+    )
+
+
+def terms_of(mesh: Mesh, dtype, pinion: AbstractModification, wheel: AbstractModification):
+    """Every term of both modifications with the number of its side, in the precision of the mesh.
+
+    On their own, since most vary along the profile or along the face only.
+    """
+
+    def cast(leaf):
+        return leaf.astype(dtype) if eqx.is_inexact_array(leaf) else leaf
+
+    return [
+        (side, jax.tree.map(cast, term))
+        for side, modification in enumerate((pinion, wheel))
+        for term in terms(modification)
+        if not isinstance(term, NoModification)
+    ]
+
+
+def varies_along_profile(sided, place: Place) -> bool:
+    """Whether a term has other values along the profile than across the face: its array then has those axes."""
+    side, term = sided
+    shape = eqx.filter_eval_shape(lambda: term(flank_at(side, place, jnp.zeros_like(place.radius)))).shape
+    return shape[0] > 1 or shape[-1] > 1
+
+
+def flank_at(number: int, place: Place, moved: Real) -> Flank:
+    """Points of one gear's flank at a distance from the nominal contact, towards the pinion tip [mm]."""
+    side = place.sides[number]
+    # arc length of an involute: ds = rho / r_b d rho
+    roll_length = side.roll_length + side.direction * moved * (side.base_radius / side.roll_length)
+    return Flank(
+        roll_length=jnp.maximum(roll_length, 0.0),
+        tip_roll_length=side.tip_roll_length,
+        start_roll_length=side.start_roll_length,
+        base_radius=side.base_radius,
+        face_coordinate=side.face_coordinate,
+        face_width=side.face_width,
+    )
+
+
+class Node(NamedTuple):
+    """A point across the contact, relative to its half width, and what it weighs in mean, slope and curvature.
+
+    Slope and curvature are those of the parabola that fits best with the weight of the pressure.
+    """
+
+    place: float
+    mean: float
+    slope: float
+    curvature: float
+
+
+def patch_rule(nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points in (-1, 1) and weights of the mean over a semi-elliptic pressure: Chebyshev nodes of the second kind."""
+    angle = np.pi * np.arange(1, nodes + 1) / (nodes + 1)
+    return np.cos(angle), np.sin(angle) ** 2 * 2 / (nodes + 1)
+
+
+def patch_nodes(nodes: int) -> tuple[Node, ...]:
+    x, mean = patch_rule(nodes)
+    square = x**2 - mean @ x**2
+    slope = mean * x / (mean @ x**2) if nodes > 1 else 0 * x
+    curvature = 2 * mean * square / (mean @ square**2) if nodes > 2 else 0 * x
+    return tuple(Node(*map(float, row)) for row in zip(x, mean, slope, curvature))
+
+
+class Probe(NamedTuple):
+    """Removed material around a point of the flank: mean [um], slope [um/mm] and curvature [um/mm^2]."""
+
+    mean: Real
+    slope: Real
+    curvature: Real
+
+
+def probe(sided_terms, place: Place, moved: Real, nodes: tuple[Node, ...]) -> Probe:
+    inverse = 1 / place.half_width
+    each = []
+    for side, term in sided_terms:
+        points = [flank_at(side, place, moved + node.place * place.half_width) for node in nodes]
+        each.append(_moments(term, points, [list(node[1:]) for node in nodes]))
+    mean, slope, curvature = (reduce(add, parts) for parts in zip(*each))
+    return Probe(mean, slope * inverse, curvature * inverse**2)
+
+
+@by_numbers
+def _moments(term, points, shares):
+    sums = [0.0] * len(shares[0])
+    for point, weights in zip(points, shares):
+        removed = term(point)
+        sums = [total + weight * removed for total, weight in zip(sums, weights)]
+    return tuple(sums)
+
+
+def secant_slope(sided_terms, place: Place, moved: Real) -> Real:
+    """Slope of the removed material at the nominal contact [um/mm], over the middle half of the contact."""
+    half, each = 0.5 * place.half_width, []
+    for side, term in sided_terms:
+        points = [flank_at(side, place, end) for end in (moved - half, moved + half)]
+        each.append(_moments(term, points, [[-1.0], [1.0]])[0])
+    return reduce(add, each) / place.half_width
+
+
+def _half_width(mesh: Mesh, torque: Scalar) -> Float[Array, "pairs 1 positions"]:
+    """Half width of the contact over which modifications are averaged [mm]: that of one pair under the full load."""
+    force = 1e3 * torque / mesh.pair.pinion.base_radius
+    return safe_sqrt(mesh.width_factor * force / mesh.pair.face_width)[:, None]
