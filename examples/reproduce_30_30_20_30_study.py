@@ -52,8 +52,8 @@ LINES = [
         "30/30, change of QSTE at A over the relief length",
         0.0,
         "um",
-        "At A the wheel's tip meets the pinion: the amount at the tip counts, not the length, unless the relief is so short "
-        "that the contact slides off it.",
+        "At A the wheel's tip meets the pinion: the amount at the tip counts, not the length, unless the relief is so "
+        "short that the contact slides off it.",
     ),
 ]
 
