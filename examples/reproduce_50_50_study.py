@@ -51,7 +51,8 @@ LINES = [
         1630.0,
         "MPa",
         "The study's peak stands where double contact begins, at the kinked start of the relief and the tip edges. "
-        "Hertz's pressure of the involutes knows neither; contact at the tip edges is reported apart.",
+        "The pressure is singular there: jaxgear takes the mean curvature under the contact, and reports contact at "
+        "the tip edges apart.",
     ),
 ]
 
@@ -138,7 +139,10 @@ def main(fast=False) -> dict:
     for name, cycle in cycles.items():
         nominal = at_nominal(cycle)
         flank = nominal.contact_pressure[:, 0].max(axis=0)
-        single = jnp.sum(nominal.pair_force > 0, axis=0) == 1
+        loaded = nominal.pair_force > 0
+        # off the start of the relief, whose kink bends the flank under the contact
+        bend = jnp.max(jnp.where(loaded, jnp.abs(nominal.bend[:, 0]), 0.0), axis=0)
+        single = (jnp.sum(loaded, axis=0) == 1) & (bend < 0.01)
         found |= {
             f"{name}_ppte": float(ppte[name][TORQUES.index(NOMINAL)]),
             f"{name}_ppte_over_torque": ppte[name].tolist(),
@@ -171,5 +175,7 @@ if __name__ == "__main__":
         print(f"PPTE {name} [um]".ljust(20) + "".join(f"{value:7.2f}" for value in curve))
     for name in ("unmodified", "relieved"):
         level, spread = found[f"{name}_single_pressure"], found[f"{name}_single_pressure_spread"]
-        print(f"{name}: {level:.0f} MPa with one pair in contact, even within {spread:.0f} MPa, as in the study;")
+        print(
+            f"{name}: {level:.0f} MPa with one pair in contact off the start of the relief, even within {spread:.0f} MPa;"
+        )
         print(f"    {found[f'{name}_corner_force']:.0f} N at most on a tip corner")
