@@ -175,7 +175,5 @@ if __name__ == "__main__":
         print(f"PPTE {name} [um]".ljust(20) + "".join(f"{value:7.2f}" for value in curve))
     for name in ("unmodified", "relieved"):
         level, spread = found[f"{name}_single_pressure"], found[f"{name}_single_pressure_spread"]
-        print(
-            f"{name}: {level:.0f} MPa with one pair in contact off the start of the relief, even within {spread:.0f} MPa;"
-        )
+        print(f"{name}: {level:.0f} MPa with one pair in contact, even within {spread:.0f} MPa off the relief's start;")
         print(f"    {found[f'{name}_corner_force']:.0f} N at most on a tip corner")
