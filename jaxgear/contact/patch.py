@@ -144,14 +144,10 @@ class Node(NamedTuple):
     curvature: float
 
 
-def patch_rule(nodes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points in (-1, 1) and weights of the mean over a semi-elliptic pressure: Chebyshev nodes of the second kind."""
-    angle = np.pi * np.arange(1, nodes + 1) / (nodes + 1)
-    return np.cos(angle), np.sin(angle) ** 2 * 2 / (nodes + 1)
-
-
 def patch_nodes(nodes: int) -> tuple[Node, ...]:
-    x, mean = patch_rule(nodes)
+    """Chebyshev nodes of the second kind, which integrate with the weight of the semi-elliptic pressure."""
+    angle = np.pi * np.arange(1, nodes + 1) / (nodes + 1)
+    x, mean = np.cos(angle), np.sin(angle) ** 2 * 2 / (nodes + 1)
     square = x**2 - mean @ x**2
     slope = mean * x / (mean @ x**2) if nodes > 1 else 0 * x
     curvature = 2 * mean * square / (mean @ square**2) if nodes > 2 else 0 * x
@@ -186,7 +182,7 @@ def _moments(term, points, shares):
 
 
 def secant_slope(sided_terms, place: Place, moved: Real) -> Real:
-    """Slope of the removed material at the nominal contact [um/mm], over the middle half of the contact."""
+    """Slope of the removed material [um/mm] over the middle half of a contact that has moved from its nominal place."""
     half, each = 0.5 * place.half_width, []
     for side, term in sided_terms:
         points = [flank_at(side, place, end) for end in (moved - half, moved + half)]
