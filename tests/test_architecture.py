@@ -22,6 +22,7 @@ ORDER = (
     "metrics",
     "tolerance",
     "conditions",
+    "dynamics",
     "sizing",
     "sweeps",
     "optimize",

@@ -1,0 +1,84 @@
+"""The interface of a mesh force, and those of closed form."""
+
+from abc import abstractmethod
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..numerics import Checked, number
+
+Scalar = Float[Array, ""]
+
+
+class AbstractMeshForce(Checked):
+    """Force between the flanks of a mesh on the line of action, as a function of mesh position and approach.
+
+    The approach q [um] is how much farther the pinion has turned than the wheel, on the line of action: under a static
+    load it is the loaded transmission error. The force [N] is positive on the drive flanks, zero in the clearance and
+    negative on the coast flanks.
+
+    What depends on the mesh position alone is `at` that position, so that an integrator whose steps meet the same
+    positions in every cycle works it out once. Both methods are of single numbers; `jax.vmap` makes many.
+    """
+
+    # whether the force jumps at some mesh positions: the ends of an integrator's steps then lie on the step's side
+    jumps: ClassVar[bool] = False
+
+    @abstractmethod
+    def at(self, phase: Scalar) -> Any:
+        """A tree of arrays: what the force at a mesh position [base pitches, any number] depends on."""
+
+    @abstractmethod
+    def force(self, place: Any, approach: Scalar) -> Scalar:
+        """Force [N] at a place that `at` has found and an approach [um]."""
+
+    def __call__(self, phase: Scalar, approach: Scalar) -> Scalar:
+        """Force [N] at a mesh position [base pitches] and an approach [um]."""
+        return self.force(self.at(phase), approach)
+
+    def stiffness(self, phase: Scalar, approach: Scalar) -> Scalar:
+        """Slope of the force over the approach [N/um]."""
+        place = self.at(phase)
+        return jax.jvp(lambda q: self.force(place, q), (approach,), (jnp.ones_like(approach),))[1]
+
+
+class DeadZone(AbstractMeshForce):
+    """Constant stiffness on either side of a clearance (Kahraman, Singh, J. Sound Vib. 142 (1990) 49-75).
+
+    Attributes:
+        stiffness_constant: [N/um].
+        half_clearance: of the clearance about approach zero [um].
+    """
+
+    stiffness_constant: Scalar = number("N/um", low=0.0, open_low=True, default=1.0)
+    half_clearance: Scalar = number("um", low=0.0, default=1.0)
+
+    def at(self, phase: Scalar) -> tuple:
+        return ()
+
+    def force(self, place, approach: Scalar) -> Scalar:
+        half = self.half_clearance
+        return self.stiffness_constant * (jnp.maximum(approach - half, 0.0) + jnp.minimum(approach + half, 0.0))
+
+
+class RectangularStiffness(AbstractMeshForce):
+    """Two and one pair in turn, both of constant stiffness, without coast flanks: exact solutions are known for it.
+
+    Attributes:
+        double, single: stiffness with two pairs and with one in contact [N/um].
+        share: of the cycle with two pairs, from mesh position 0 on.
+    """
+
+    jumps: ClassVar[bool] = True
+
+    double: Scalar = number("N/um", low=0.0, open_low=True)
+    single: Scalar = number("N/um", low=0.0, open_low=True)
+    share: Scalar = number("", low=0.0, high=1.0)
+
+    def at(self, phase: Scalar) -> Scalar:
+        return jnp.where(phase - jnp.floor(phase) < self.share, self.double, self.single)
+
+    def force(self, place: Scalar, approach: Scalar) -> Scalar:
+        return place * jnp.maximum(approach, 0.0)

@@ -1,0 +1,69 @@
+"""Fixed steps that meet the same mesh positions in every cycle."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .oscillator import Oscillator, State
+
+Scalar = Float[Array, ""]
+
+# Ends of a step at a jump of the force lie on the step's side, by this part of the step.
+_ASIDE = 1e-6
+
+
+class Steps(NamedTuple):
+    """One mesh cycle in steps; every field has the leading axis (steps,).
+
+    Attributes:
+        first, middle, last: places of the mesh force at the begin, in the middle and at the end of every step.
+        phase: where every step begins [base pitches].
+        length: of every step [base pitches].
+    """
+
+    first: Any
+    middle: Any
+    last: Any
+    phase: Float[Array, " steps"]
+    length: Float[Array, " steps"]
+
+
+def steps_of(oscillator: Oscillator, grid: Float[Array, " nodes"]) -> Steps:
+    """The steps between the nodes of a grid from 0 to 1 [base pitches]."""
+    start, length = grid[:-1], jnp.diff(grid)
+    at = jax.vmap(oscillator.mesh_force.at)
+    if oscillator.mesh_force.jumps:
+        first, last = at(start + _ASIDE * length), at(start + (1 - _ASIDE) * length)
+    else:
+        first = at(start)
+        last = jax.tree.map(lambda part: jnp.roll(part, -1, axis=0), first)
+    return Steps(first, at(start + 0.5 * length), last, start, length)
+
+
+def one_step(oscillator: Oscillator, y: State, step: Steps, mesh_frequency: Scalar) -> State:
+    """The classical Runge-Kutta method of order four over one step."""
+    h = step.length / mesh_frequency
+
+    def rate(place, share, y):
+        return oscillator.rate(place, step.phase + share * step.length, y, mesh_frequency)
+
+    def moved(y, rate, by):
+        return jax.tree.map(lambda part, slope: part + by * slope, y, rate)
+
+    first = rate(step.first, 0.0, y)
+    second = rate(step.middle, 0.5, moved(y, first, 0.5 * h))
+    third = rate(step.middle, 0.5, moved(y, second, 0.5 * h))
+    fourth = rate(step.last, 1.0, moved(y, third, h))
+    return jax.tree.map(lambda part, a, b, c, d: part + h / 6 * (a + 2 * (b + c) + d), y, first, second, third, fourth)
+
+
+def one_cycle(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar) -> tuple[State, State]:
+    """State after a cycle, and the states at the begin of every step, leading axis (steps,)."""
+    return jax.lax.scan(lambda y, step: (one_step(oscillator, y, step, mesh_frequency), y), y, steps)
+
+
+def cycles(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar, count: int) -> tuple[State, State]:
+    """State after some cycles, and the states at the begin of every step, leading axes (count, steps)."""
+    return jax.lax.scan(lambda y, _: one_cycle(oscillator, y, steps, mesh_frequency), y, length=count)
