@@ -1,5 +1,7 @@
 """The loaded mesh over one base pitch: what a solution holds."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
@@ -8,6 +10,7 @@ from ..geometry import Margins
 from ..microgeometry import AbstractModification
 from ..numerics import over_batch
 from .kinematics import Kinematics, Side
+from .mesh import Mesh
 from .operation import Operation
 from .pressure import pressures
 
@@ -42,6 +45,7 @@ class MeshCycle(eqx.Module):
         residual: largest relative violation of the contact conditions, shape (positions,).
         converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
             touch and the gears are valid, shape (positions,).
+        mesh: the prepared mesh, for quantities that solve further on it; None in every result, see `on`.
     """
 
     kinematics: Kinematics
@@ -60,6 +64,7 @@ class MeshCycle(eqx.Module):
     tangent_stiffness: Curve
     residual: Curve
     converged: Array
+    mesh: Mesh | None = None
 
     @property
     def batch_ndim(self) -> int:
@@ -85,6 +90,28 @@ class MeshCycle(eqx.Module):
     def force(self) -> Float[Array, "*cycles"]:
         """Total force on the line of action [N]."""
         return 1e3 * self.torque / self.kinematics.pair.pinion.base_radius
+
+    def on(self, mesh: Mesh) -> "MeshCycle":
+        """The cycle with the prepared mesh that it was solved on, for quantities that solve further on it.
+
+        Whoever evaluates quantities hands it to them and keeps the cycle without it.
+
+        Raises:
+            ValueError: for a cycle with batch axes: map over it with `jax.vmap`, so that the mesh is not repeated.
+        """
+        if self.batch_ndim:
+            raise ValueError("MeshCycle.on: the cycle has batch axes, use jax.vmap(lambda cycle: cycle.on(mesh))")
+        return replace(self, mesh=mesh)
+
+    def mesh_for(self, owner: str) -> Mesh:
+        """The mesh, for whoever needs it.
+
+        Raises:
+            ValueError: where the cycle does not hold it.
+        """
+        if self.mesh is None:
+            raise ValueError(f"{owner}: needs the prepared mesh besides the cycle, give it cycle.on(mesh)")
+        return self.mesh
 
     @property
     def sides(self) -> tuple[Side, Side]:

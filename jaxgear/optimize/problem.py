@@ -228,7 +228,7 @@ class Problem(eqx.Module):
         return self.cases.each(lambda *case: of_case(self._cycle(both, *case)))
 
     def _cycle(self, both: Modifications, torque, deviation) -> MeshCycle:
-        return solve_case(self.mesh, torque, *both, deviation)
+        return solve_case(self.mesh, torque, *both, deviation).on(self.mesh)
 
     def _excess(self, cycle: MeshCycle):
         limited = [(limit, limit.quantity) for limit in self.constraints if limit.quantity is not None]

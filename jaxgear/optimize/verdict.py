@@ -99,6 +99,8 @@ def judged(
         cycle = solve_case(problem.mesh, Operation(np.asarray(cases.torque)[0], speed, cases.friction), pinion, wheel)
         if all(of.local for of in problem.objectives):  # they know nothing of the flanks but what is removed
             cycle = replace(cycle, pinion=None, wheel=None)
+        else:
+            cycle = cycle.on(problem.mesh)
         values = np.asarray(_of_one(problem.objectives, cycle))
     else:
         values = np.asarray(_score_of(problem, pinion, wheel).value)

@@ -104,7 +104,7 @@ def _numbers(task: _Task, data, values):
     variant = variants(values)
 
     def of_case(operation, deviation):
-        cycle = solve_case(variant.mesh, operation, variant.pinion, variant.wheel, deviation)
+        cycle = solve_case(variant.mesh, operation, variant.pinion, variant.wheel, deviation).on(variant.mesh)
         numbers = jnp.stack([of(cycle) for of in task.results])
         return numbers, solved(cycle) & jnp.all(jnp.isfinite(numbers))
 

@@ -182,7 +182,7 @@ def _solve_number(task, number, results: tuple[Quantity, ...]):
     field = deviation_field(deviation, basis)
     removed = design + jnp.where(number > 0, field, 0.0)
     cycle = solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
-    found = [of(cycle) for of in results]
+    found = [of(cycle.on(mesh)) for of in results]
     fine = jnp.all(jnp.stack([solved(cycle), *map(jnp.isfinite, found)]))
     return cycle.transmission_error, fine, *found
 

@@ -252,7 +252,8 @@ def _own_digest(made: Variants, example: np.ndarray, results: Sequence[Quantity]
 
     def cycle(values):
         variant = made(values)
-        return solve(variant.mesh, variant.cases.torque[0], pinion=variant.pinion, wheel=variant.wheel)
+        torque = variant.cases.torque[0]
+        return solve(variant.mesh, torque, pinion=variant.pinion, wheel=variant.wheel).on(variant.mesh)
 
     shape = eqx.filter_eval_shape(cycle, jnp.asarray(example))
     traced, _, _ = eqx.filter_make_jaxpr(lambda cycle: [of(cycle) for of in own])(shape)
