@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..metrics import quantity_of
+from ..metrics import Quantity, quantity_of
 from ..sweeps import SweepTable
 from . import report
 
@@ -14,7 +14,7 @@ _DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory
 _CHARTS = 6  # radar charts
 
 
-def write_figures(folder: Path, table: SweepTable, results: Sequence[str]) -> None:
+def write_figures(folder: Path, table: SweepTable, results: Sequence[str | Quantity]) -> None:
     """Writes all figures that the results allow, of a table with at least one variant that did not fail."""
     import matplotlib
 

@@ -2,6 +2,8 @@
 
 from .design_file import DesignFile as DesignFile
 from .design_file import load_design as load_design
+from .dynamics_request import DynamicsRequest as DynamicsRequest
+from .dynamics_request import dynamics_request as dynamics_request
 from .errors import DesignFileError as DesignFileError
 from .folder import result_folder as result_folder
 from .folder import writing as writing

@@ -15,7 +15,7 @@ from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..sizing import iso_stiffness
-from . import schema, schema_sweep, template
+from . import schema, schema_dynamics, schema_sweep, template
 from .errors import DesignFileError, naming, refuse_given, refused
 from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
@@ -87,6 +87,7 @@ class DesignFile:
         optimize: the table of that name; `optimize_request` makes sense of it.
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
+        dynamics: likewise, see `dynamics_request`.
         design: makes the modifications of pinion and wheel from the free parameters.
         open_case: numbers of gears, pair, model and load that are variables; a sweep alone can vary them.
     """
@@ -102,6 +103,7 @@ class DesignFile:
     optimize: schema.OptimizeSection
     sweep: schema_sweep.SweepSection | None
     tolerance: schema_sweep.ToleranceSection | None
+    dynamics: schema_dynamics.DynamicsSection | None
     design: FileDesign
     open_case: tuple[template.Free, ...]
     _pair: template.Part
@@ -243,6 +245,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         optimize=optimize,
         sweep=sweep,
         tolerance=tolerance,
+        dynamics=None if top.dynamics is None else decode("dynamics", top.dynamics, schema_dynamics.DynamicsSection),
         design=FileDesign(tuple(bounds), pinion_flank, wheel_flank),
         open_case=tuple(open_case),
         _pair=pair,

@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..contact import Mesh
-from ..metrics import quantities
 from ..numerics import AbstractMeasure, Callback, CVaR, Mean, Quantile, Worst
 from ..optimize import (
     METHODS,
@@ -24,6 +23,7 @@ from ..optimize.refine import POSITIONS
 from . import schema
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
+from .dynamics_request import quantity_named
 from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
 from .toml import decode
 
@@ -163,7 +163,7 @@ def _options(section: schema.OptimizeSection, name: str, *, of_the_file: bool) -
 def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
     """Objective, cases and constraints."""
     found: dict[str, Any] = {
-        **_objective(section, name),
+        **_objective(design, section, name),
         "torque": load_of(design, "optimize", section),
         "measure": _measure(section),
         "constraints": tuple(_constraint(design, number, each) for number, each in enumerate(section.constraint)),
@@ -177,12 +177,11 @@ def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quic
     return found
 
 
-def _objective(section: schema.OptimizeSection, name: str) -> dict[str, Any]:
+def _objective(design: DesignFile, section: schema.OptimizeSection, name: str) -> dict[str, Any]:
     """What the function of a method takes for the objective; nothing where it knows its own."""
     asked = section.objective or (_FRONT if name == _PARETO else "ppte")
-    objectives = (asked,) if isinstance(asked, str) else tuple(asked)
-    for objective in objectives:
-        check_known("optimize.objective", objective, quantities)
+    named = (asked,) if isinstance(asked, str) else tuple(asked)
+    objectives = tuple(quantity_named(design, "optimize.objective", each) for each in named)
     if (len(objectives) > 1) != (name == _PARETO):
         problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
         raise DesignFileError("optimize.objective", problem)
@@ -210,7 +209,7 @@ def _constraint(design: DesignFile, number: int, table: schema.Tables) -> Constr
     if of is None or (section.of is not None and section.variables is not None):
         raise DesignFileError(key, "needs either of = a quantity or variables = a table of coefficients")
     if isinstance(of, str):
-        check_known(f"{key}.of", of, quantities)
+        of = quantity_named(design, f"{key}.of", of)
     else:
         for name in of:
             if name not in design.bounds:

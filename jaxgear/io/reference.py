@@ -11,12 +11,13 @@ import numpy as np
 
 from ..compliance import AbstractBody, AbstractContact, AbstractTooth, Compliance
 from ..contact import Operation, Resolution
+from ..dynamics import Dynamics
 from ..geometry import Gear, GearPair, Material
 from ..metrics import quantities
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from ..tolerance import Tolerance
-from . import schema, schema_sweep
+from . import schema, schema_dynamics, schema_sweep
 from .layout import Section, family, meanings, section_of, snake, summary
 from .ranges import allowed
 
@@ -62,6 +63,7 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
         yield f"[optimize.{name}]", section, METHODS.get(name, _EXTRAS.get(name))
     yield "[sweep]", schema_sweep.SweepSection, None
     yield "[tolerance]", schema_sweep.ToleranceSection, Tolerance
+    yield "[dynamics]", schema_dynamics.DynamicsSection, Dynamics
 
 
 def _table(title: str, section: type[Section], of: Callable[..., Any] | None) -> Iterator[str]:

@@ -40,6 +40,7 @@ class FileSection(Section):
         optimize: what `jaxgear optimize` does.
         sweep: what `jaxgear sweep` does.
         tolerance: of manufactured gears, for a sweep or `optimize.manufactured`.
+        dynamics: at which speeds the pair runs, and what vibrates.
     """
 
     pinion: Annotated[Tables, table()]
@@ -53,6 +54,7 @@ class FileSection(Section):
     optimize: Annotated[Tables | None, table()] = None
     sweep: Annotated[Tables | None, table()] = None
     tolerance: Annotated[Tables | None, table()] = None
+    dynamics: Annotated[Tables | None, table()] = None
 
 
 class GearSection(section_of(Gear)):  # type: ignore[misc]

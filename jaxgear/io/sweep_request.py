@@ -8,12 +8,13 @@ import numpy as np
 
 from ..conditions import LoadSpectrum
 from ..contact import Operation
-from ..metrics import quantities
+from ..metrics import Quantity
 from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
-from .errors import DesignFileError, check_known, naming, refuse_given, refused
+from .dynamics_request import quantity_named
+from .errors import DesignFileError, naming, refuse_given, refused
 from .schema_sweep import SweepSection
 from .variants import read_variants
 
@@ -36,7 +37,7 @@ class SweepRequest:
         plan: the variants.
         load: torques and their weights, or the operation as a function of the variables.
         highest_torque: that a variant can have [N m].
-        results: names of results.
+        results: names of results, or quantities.
         part_rows: variants per file of the table, None for the library's default.
         tolerance: of the gears, None where the file has none.
         samples, seed: of the tolerance's deviations.
@@ -45,7 +46,7 @@ class SweepRequest:
     plan: AbstractPlan
     load: LoadSpectrum | Callable[[Mapping[str, Any]], Operation]
     highest_torque: float
-    results: tuple[str, ...]
+    results: tuple[str | Quantity, ...]
     part_rows: int | None
     tolerance: Tolerance | None
     samples: int | None
@@ -78,9 +79,9 @@ def _request(design: DesignFile, samples: int | None, most: int | None) -> Sweep
         section = section.model_copy(update={"samples": samples})
     if most is not None and section.samples is not None:
         section = section.model_copy(update={"samples": min(section.samples, most)})
-    wanted = tuple(section.results or _RESULTS)
+    wanted, results = section.results or _RESULTS, []
     for index, name in enumerate(wanted):
-        check_known(f"sweep.results[{index}]", name, quantities)
+        results.append(quantity_named(design, f"sweep.results[{index}]", name))
         if name in wanted[:index]:
             raise DesignFileError(f"sweep.results[{index}]", f'"{name}" is there twice')
     tolerance = design.tolerance
@@ -89,7 +90,7 @@ def _request(design: DesignFile, samples: int | None, most: int | None) -> Sweep
         plan=_plan(design, section),
         load=load,
         highest_torque=highest,
-        results=wanted,
+        results=tuple(results),
         part_rows=section.part_rows,
         tolerance=tolerance_of(design),
         samples=None if tolerance is None else tolerance.samples,

@@ -1,0 +1,98 @@
+"""What the table [dynamics] of a design file asks for, and the quantities that need it."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from ..dynamics import DYNAMIC_QUANTITIES, Dynamics
+from ..metrics import Quantity, quantities
+from .design_file import DesignFile
+from .errors import DesignFileError, check_known, naming
+from .schema_dynamics import DynamicsSection
+from .template import part_of
+from .variables import increasing
+
+_QUICK_NUMBER = 24
+_MINUTE = 60.0  # s
+
+
+@dataclasses.dataclass(frozen=True)
+class DynamicsRequest:
+    """A study of the vibration over the speed, checked.
+
+    Attributes:
+        settings: speeds, and what vibrates.
+        torques: on the pinion [N m], ascending.
+    """
+
+    settings: Dynamics
+    torques: tuple[float, ...]
+
+
+def dynamics_request(design: DesignFile, *, quick: bool = False) -> DynamicsRequest:
+    """Checks what a design file says about its dynamics.
+
+    Args:
+        design: the design file.
+        quick: few speeds, for a first look.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
+    """
+    with naming(design.path):
+        section = design.dynamics
+        if section is None:
+            raise DesignFileError("dynamics", "missing, nothing says at which speeds the pair runs")
+        factors = section.torque_factors
+        if len(set(factors)) != len(factors):
+            raise DesignFileError("dynamics.torque_factors", "must all be different")
+        return DynamicsRequest(
+            _settings(design, section, _QUICK_NUMBER if quick else section.number),
+            tuple(factor * design.torque for factor in sorted(factors)),
+        )
+
+
+def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
+    """What a name of the vocabulary means in a design file: quantities of the dynamics with its table [dynamics].
+
+    Args:
+        design: the design file.
+        key: where the name stands.
+        name: in either spelling.
+
+    Raises:
+        DesignFileError: for an unknown name, and for one that needs a table or a speed that the file does not have.
+    """
+    check_known(key, name, quantities)
+    plain = quantities[name].name
+    if plain not in DYNAMIC_QUANTITIES:
+        return name
+    if design.dynamics is None:
+        raise DesignFileError(key, f'"{name}" needs the table [dynamics]')
+    if DYNAMIC_QUANTITIES[plain].at_speed and design.speed is None:
+        raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{plain}" is that of all speeds of [dynamics]')
+    return _settings(design, design.dynamics, design.dynamics.number).quantity(plain)
+
+
+def _settings(design: DesignFile, section: DynamicsSection, number: int) -> Dynamics:
+    """The settings of the library."""
+    low, high = _frequencies(design, section)
+    part = part_of("dynamics", section, Dynamics)
+    fields: dict[str, Any] = {**part.fields, "mesh_frequencies": np.linspace(low, high, number)}
+    return dataclasses.replace(part, fields=fields).build({})
+
+
+def _frequencies(design: DesignFile, section: DynamicsSection) -> tuple[float, float]:
+    """Lowest and highest mesh frequency [Hz]."""
+    given = [key for key in ("mesh_frequencies", "speeds") if getattr(section, key) is not None]
+    if len(given) != 1:
+        raise DesignFileError("dynamics", "needs either mesh_frequencies or speeds")
+    low, high = getattr(section, given[0])
+    increasing(f"dynamics.{given[0]}[1]", low, high, unit=" Hz" if given == ["mesh_frequencies"] else " rpm")
+    if given == ["mesh_frequencies"]:
+        return low, high
+    if any(free.key == "pinion.teeth" for free in design.open_case):
+        raise DesignFileError("dynamics.speeds", "cannot be with pinion.teeth a variable: give mesh_frequencies")
+    per_turn = float(design.pair().pinion.teeth) / _MINUTE
+    return low * per_turn, high * per_turn

@@ -1,0 +1,23 @@
+"""The layout of the table [dynamics]."""
+
+from typing import Annotated
+
+from ..dynamics import Dynamics
+from .kinds import count, list_of, positive
+from .layout import section_of
+
+
+class DynamicsSection(section_of(Dynamics, ("mesh_frequencies",), open=False)):  # type: ignore[misc]
+    """At which speeds the pair runs, and what vibrates; for `jaxgear dynamics` and for the quantities that need it.
+
+    Attributes:
+        mesh_frequencies: lowest and highest frequency of the mesh; either these or `speeds`.
+        speeds: lowest and highest speed of the pinion.
+        number: of speeds, at equal steps.
+        torque_factors: torques of `jaxgear dynamics`, in design torques.
+    """
+
+    mesh_frequencies: Annotated[list[float] | None, list_of(positive("Hz"), length=2)] = None
+    speeds: Annotated[list[float] | None, list_of(positive("rpm"), length=2)] = None
+    number: Annotated[int, count(2, 10_000)] = 100
+    torque_factors: Annotated[list[float], list_of(positive(""))] = [0.5, 1.0, 2.0]

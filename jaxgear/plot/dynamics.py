@@ -1,0 +1,155 @@
+"""What a mesh does at speed: responses over the mesh frequency, spectra, bifurcations and phase portraits."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm
+
+from ..dynamics import SpeedResponse
+from .figure import GREY, legend_above, line_style, marker_style, report_axes
+
+FREQUENCY_LABEL = "mesh frequency [Hz]"
+_APPROACH_LABEL = "approach of the flanks [µm]"
+_RESPONSES = {"dynamic_factor": "dynamic factor $K_v$ [-]", "approach_rms": "rms of the approach [µm]"}
+_DIRECTIONS = {"up": "-", "down": (0, (4, 1.5))}
+_MARKS = 12  # on a curve
+_DECADES = 3.0  # of amplitudes that a spectrum shows
+# drive flanks, clearance, coast flanks: in lightness too
+_STATES = {"drive flanks": "#0072B2", "apart": "#E69F00", "coast flanks": "#000000"}
+
+
+def speed_response(
+    responses: Mapping[str, Sequence[SpeedResponse]],
+    of: Literal["dynamic_factor", "approach_rms"] = "dynamic_factor",
+    ax: Axes | None = None,
+) -> Axes:
+    """A number of the steady states of several designs over the mesh frequency, speed rising and falling.
+
+    Args:
+        responses: of every design, by its name: those of several runs, each with its direction.
+        of: which number: the dynamic factor or the rms of the approach about its mean.
+        ax: Axes to draw into; None for a new figure.
+    """
+    seen: dict[str, None] = {}
+    with report_axes(ax) as ax:
+        for index, (name, several) in enumerate(responses.items()):
+            style = marker_style(index)
+            for number, response in enumerate(several):
+                frequency = np.asarray(response.mesh_frequency)
+                every = max(len(frequency) // _MARKS, 1)
+                seen[response.direction] = None
+                dashes = {"linestyle": _DIRECTIONS[response.direction], "markevery": (index, every)}
+                label = {"label": name} if number == 0 else {}
+                ax.plot(frequency, np.asarray(getattr(response, of)), **{**style, **dashes, **label})
+        for direction in seen if len(seen) > 1 else ():
+            ax.plot([], [], color=GREY, linestyle=_DIRECTIONS[direction], label=f"speed {_MOVES[direction]}")
+        ax.set_ylim(bottom=1.0 if of == "dynamic_factor" else 0.0)
+        ax.set(xlabel=FREQUENCY_LABEL, ylabel=_RESPONSES[of])
+        legend_above(ax)
+    return ax
+
+
+_MOVES = {"up": "rising", "down": "falling"}
+
+
+def waterfall(
+    response: SpeedResponse, of: Literal["force", "velocity"] = "force", ax: Axes | None = None
+) -> Axes:
+    """Campbell diagram: amplitudes of the spectrum along the multiples of the mesh frequency, over the mesh frequency.
+
+    Args:
+        response: of one run.
+        of: spectrum of the mesh force or of the velocity of approach.
+        ax: Axes to draw into; None for a new figure.
+    """
+    unit, scale = ("N", 1.0) if of == "force" else ("mm/s", 1e-3)
+    frequency, orders = np.asarray(response.mesh_frequency), np.asarray(response.orders)
+    amplitude = scale * np.asarray(getattr(response, f"{of}_harmonics"))
+    varying = orders > 0
+    orders, amplitude = orders[varying], amplitude[:, varying]
+    most = max(float(np.nanmax(amplitude)), np.finfo(float).tiny)
+    norm = LogNorm(most * 10**-_DECADES, most, clip=True)
+    with report_axes(ax) as ax:
+        for order, along in zip(orders, amplitude.T):
+            points = np.stack([frequency, order * frequency], axis=1)
+            level = np.sqrt(along[1:] * along[:-1])
+            part = np.clip(norm(np.maximum(level, norm.vmin)), 0, 1)
+            lines = LineCollection(
+                np.stack([points[:-1], points[1:]], axis=1), cmap="cividis_r", norm=norm, linewidths=0.4 + 4.5 * part
+            )
+            lines.set_array(level)
+            ax.add_collection(lines)
+        ax.set_xlim(float(frequency.min()), float(frequency.max()))
+        ax.set_ylim(0, float(orders.max() * frequency.max()))
+        _name_orders(ax, orders, float(frequency.max()))
+        bar = ax.figure.colorbar(lines, ax=ax, pad=0.09)
+        bar.set_label(f"amplitude of the {'mesh force' if of == 'force' else 'velocity of approach'} [{unit}]")
+        bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
+        ax.set(xlabel=FREQUENCY_LABEL, ylabel="frequency [Hz]")
+    return ax
+
+
+def _name_orders(ax: Axes, orders, highest: float) -> None:
+    for order in orders:
+        place = {"xytext": (3, 0), "textcoords": "offset points", "va": "center", "color": GREY}
+        if order == round(order):
+            ax.annotate(f"{order:g}", (highest, order * highest), annotation_clip=False, **place)
+
+
+def bifurcation(responses: Sequence[SpeedResponse], ax: Axes | None = None) -> Axes:
+    """Bifurcation diagram: the approach once per mesh cycle over the mesh frequency.
+
+    An orbit of one mesh cycle shows as one point, one of two as two, an aperiodic one as a cloud.
+
+    Args:
+        responses: of one or several runs, each with its direction.
+        ax: Axes to draw into; None for a new figure.
+    """
+    with report_axes(ax) as ax:
+        for index, response in enumerate(responses):
+            points = np.asarray(response.poincare_approach)
+            frequency = np.broadcast_to(np.asarray(response.mesh_frequency)[:, None], points.shape)
+            style = {"color": line_style(1 + index)["color"], "marker": "^v"[index % 2]}
+            label = f"speed {_MOVES[response.direction]}"
+            ax.plot(frequency.ravel(), points.ravel(), linestyle="", markersize=2.2, mew=0, label=label, **style)
+        ax.set(xlabel=FREQUENCY_LABEL, ylabel="approach at mesh position 0 [µm]")
+        legend_above(ax)
+    return ax
+
+
+def phase_portrait(approach, velocity, force, ax: Axes | None = None, *, once: Any = None, title: str = "") -> Axes:
+    """An orbit in the plane of approach and velocity, coloured by what is in contact.
+
+    Args:
+        approach: of the flanks at equal steps of one period [um], shape (steps,).
+        velocity: of approach [um/s], shape (steps,).
+        force: of the mesh [N], shape (steps,): positive on the drive flanks, negative on the coast flanks.
+        once: (approach, velocity) once per mesh cycle, each of shape (points,); None for no marks.
+        ax: Axes to draw into; None for a new figure.
+        title: over the Axes.
+    """
+    x, y, f = np.asarray(approach), 1e-3 * np.asarray(velocity), np.asarray(force)
+    closed = np.stack([np.append(x, x[0]), np.append(y, y[0])], axis=1)
+    segments = np.stack([closed[:-1], closed[1:]], axis=1)
+    states = dict(zip(_STATES, (f > 0, f == 0, f < 0)))
+    with report_axes(ax) as ax:
+        for name, there in states.items():
+            if there.any():
+                ax.add_collection(LineCollection(segments[there], colors=_STATES[name], linewidths=1.4, label=name))
+        if once is not None:
+            ax.plot(
+                np.asarray(once[0]), 1e-3 * np.asarray(once[1]), "o", color="#D55E00", markersize=4, label="once a cycle"
+            )
+        ax.autoscale_view()
+        ax.set(xlabel=_APPROACH_LABEL, ylabel="velocity of approach [mm/s]")
+        legend_above(ax)
+        if title:
+            ax.annotate(
+                title, (0.02, 0.98), xycoords="axes fraction", ha="left", va="top", color=GREY
+            )
+    return ax
+
+
