@@ -5,3 +5,6 @@ from .force import DeadZone as DeadZone
 from .force import RectangularStiffness as RectangularStiffness
 from .oscillator import Excitation as Excitation
 from .oscillator import Oscillator as Oscillator
+from .response import SpeedResponse as SpeedResponse
+from .speed_sweep import speed_sweep as speed_sweep
+from .speed_sweep import steps_for as steps_for

@@ -1,0 +1,337 @@
+"""Steady vibration over mesh frequency, with the state carried from speed to speed as on a test rig."""
+
+import itertools
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from ..numerics import check, concrete, kernel, real, whole
+from .integrate import Steps, advanced, steps_of
+from .oscillator import Oscillator, State
+from .response import Numbers, SpeedResponse, no_sums, numbers_of, with_cycle
+from .static import Rest, at_rest, natural_frequencies
+
+Scalar = Float[Array, ""]
+Speeds = Float[Array, " speeds"]
+
+ORDERS = tuple(half / 2 for half in range(1, 13))
+
+# Steps over a period of the approach's natural frequency and of the highest one, which no more than has to be stable,
+# and over a cycle: results are then within 0.1 % of those of twice as many.
+_STEPS_PER_PERIOD, _STEPS_PER_HIGHEST_PERIOD, _FEWEST_STEPS = 64, 8, 128
+# An orbit of several cycles counts as one only if its cycles differ by so many tolerances.
+_APART = 30.0
+
+
+class _Sizes(NamedTuple):
+    """What is static in a sweep: (speeds, steps per cycle) of the groups in turn, and sizes."""
+
+    groups: tuple[tuple[int, int], ...]
+    direction: Literal["up", "down"]
+    fresh: bool
+    most_periods: int
+    points: int
+    orders: tuple[float, ...]
+
+
+def speed_sweep(
+    oscillator: Oscillator,
+    mesh_frequencies,
+    *,
+    direction: Literal["up", "down"] = "up",
+    start: State | None = None,
+    kick: float | None = None,
+    carry: bool = True,
+    steps: int | Sequence[int] | None = None,
+    tolerance: float | None = None,
+    most_cycles: int = 500,
+    most_periods: int = 4,
+    points: int = 32,
+    orders: Sequence[float] = ORDERS,
+) -> SpeedResponse:
+    """Steady state at every mesh frequency, gone through upwards or downwards.
+
+    At each speed mesh cycles are integrated until the state at mesh position 0 is that of one, two, three ... cycles
+    before, then the orbit found is recorded. `jax.vmap` of it makes many designs and loads; `speed_sweeps` shares them
+    out among devices.
+
+    Args:
+        oscillator: one oscillator.
+        mesh_frequencies: [Hz], increasing whatever the direction, shape (speeds,).
+        direction: "up" begins at the first, "down" at the last.
+        start: coordinates and velocities at mesh position 0 at which the sweep begins, each of shape (coordinates,);
+            None for the static equilibrium.
+        kick: dynamic factor, greater than 1, to which an impulse on the approach starts the oscillator, about; with 3
+            or so orbits are found that hang together with no other, such as those of two mesh cycles above twice the
+            natural frequency. None for no impulse.
+        carry: whether each speed begins with the state of the one before; otherwise each begins as the first one does.
+        steps: of the integrator per mesh cycle, one number or one for each speed; None for as many as the natural
+            frequencies need, which have to be known then: where the oscillator is being traced, `steps_for` of a
+            concrete one gives them.
+        tolerance: by how much the state may still differ, relative to its size; None for the root of the machine
+            precision.
+        most_cycles: after which a speed is left unsettled.
+        most_periods: largest number of mesh cycles of an orbit that is looked for.
+        points: mesh cycles that are recorded where no orbit was found, and Poincare points.
+        orders: of the harmonics, multiples of the mesh frequency.
+
+    Returns:
+        the response; speeds in the order of `mesh_frequencies`.
+
+    Raises:
+        ValueError: in one line for frequencies that are no increasing list of positive numbers, an oscillator that
+            holds many, or an option outside its range.
+    """
+    frequencies = checked_frequencies("speed_sweep", mesh_frequencies)
+    _check_single(oscillator)
+    sizes, limits = _prepared(
+        "speed_sweep", oscillator, frequencies, direction=direction, kick=kick, carry=carry, steps=steps,
+        tolerance=tolerance, most_cycles=most_cycles, most_periods=most_periods, points=points, orders=orders,
+    )  # fmt: skip
+    return _swept(oscillator, frequencies, _start_of(oscillator, start), limits, sizes)
+
+
+def checked_frequencies(owner: str, given) -> Speeds:
+    """Mesh frequencies as an array; raises a one-line `ValueError` unless they increase from above zero."""
+    frequencies = real(given)
+    if frequencies.ndim != 1 or not len(frequencies):
+        raise ValueError(f"{owner}: mesh_frequencies has shape {frequencies.shape}, must be a list of numbers")
+    check(owner, "mesh_frequencies", frequencies, "Hz", low=0.0, open_low=True)
+    known = concrete(frequencies)
+    if known is not None and (np.diff(known) <= 0).any():
+        raise ValueError(f"{owner}: mesh_frequencies must increase; direction says which way they are gone through")
+    return frequencies
+
+
+def steps_for(oscillator: Oscillator, mesh_frequencies) -> tuple[int, ...]:
+    """Steps per mesh cycle that `speed_sweep` takes at each speed.
+
+    Args:
+        oscillator: concrete; arrays may have batch axes in front, the stiffest then decides.
+        mesh_frequencies: [Hz], shape (speeds,).
+
+    Raises:
+        ValueError: while being traced.
+    """
+    frequencies = concrete(checked_frequencies("steps_for", mesh_frequencies))
+    if frequencies is None or any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(oscillator)):
+        raise ValueError("steps_for: what is being traced has no natural frequency yet; give steps")
+    of_many = natural_frequencies
+    for _ in range(oscillator.mass.ndim - 1):
+        of_many = jax.vmap(of_many)
+    natural = of_many(oscillator)
+    mesh, highest = float(np.max(natural.mesh)), float(np.max(natural.highest))
+    needed = max(_STEPS_PER_PERIOD * mesh, _STEPS_PER_HIGHEST_PERIOD * highest) / frequencies
+    doublings = np.ceil(np.log2(np.maximum(needed / _FEWEST_STEPS, 1.0)))
+    return tuple(int(_FEWEST_STEPS * 2**power) for power in doublings)
+
+
+def _check_single(oscillator: Oscillator) -> None:
+    if oscillator.mass.ndim != 1:
+        raise ValueError(
+            f"speed_sweep: oscillator holds oscillators of shape {oscillator.mass.shape[:-1]}, must be one; make many "
+            "with jax.vmap or speed_sweeps"
+        )
+
+
+class _Limits(NamedTuple):
+    """Numbers of a sweep that may change without a new program."""
+
+    tolerance: Scalar
+    most_cycles: Int[Array, ""]
+    kick: Scalar
+
+
+def _prepared(
+    oscillator,
+    frequencies,
+    owner,
+    *,
+    direction,
+    kick,
+    carry,
+    steps,
+    tolerance,
+    most_cycles,
+    most_periods,
+    points,
+    orders,
+) -> tuple[_Sizes, _Limits]:
+    if direction not in ("up", "down"):
+        raise ValueError(f'{owner}: direction = {direction!r} must be "up" or "down"')
+    if not isinstance(carry, bool):
+        raise ValueError(f"{owner}: carry = {carry!r} must be True or False")
+    dtype = frequencies.dtype
+    precision = float(jnp.finfo(dtype).eps)
+    tolerance = real(precision**0.5 if tolerance is None else tolerance)
+    kick = real(1.0 if kick is None else kick)
+    check(owner, "tolerance", tolerance, "", low=precision, high=0.1)
+    check(owner, "kick", kick, "", low=1.0)
+    orders = tuple(float(order) for order in np.atleast_1d(np.asarray(orders, float)))
+    check(owner, "orders", np.asarray(orders), "", low=0.0, open_low=True)
+    most_cycles = whole(owner, "most_cycles", most_cycles)
+    most_periods, points = whole(owner, "most_periods", most_periods), whole(owner, "points", points)
+    if points < most_periods:
+        raise ValueError(f"{owner}: points = {points} must be at least most_periods = {most_periods}")
+    counts = _counts(owner, oscillator, frequencies, steps)
+    if direction == "down":
+        counts = counts[::-1]
+    groups = tuple((len(tuple(same)), count) for count, same in itertools.groupby(counts))
+    sizes = _Sizes(groups, direction, not carry, most_periods, points, orders)
+    return sizes, _Limits(tolerance.astype(dtype), jnp.asarray(most_cycles), kick.astype(dtype))
+
+
+def _counts(owner, oscillator, frequencies, steps) -> tuple[int, ...]:
+    if steps is None:
+        return steps_for(oscillator, frequencies)
+    if isinstance(steps, int | np.integer):
+        return (whole(owner, "steps", steps, low=8),) * len(frequencies)
+    counts = tuple(whole(owner, "steps", count, low=8) for count in steps)
+    if len(counts) != len(frequencies):
+        raise ValueError(
+            f"{owner}: steps has {len(counts)} numbers, must have one for each of {len(frequencies)} speeds"
+        )
+    return counts
+
+
+def _start_of(oscillator: Oscillator, start: State | None) -> State | None:
+    if start is None:
+        return None
+    shape = oscillator.mass.shape
+    if not isinstance(start, tuple) or len(start) != 2 or any(jnp.shape(part) != shape for part in start):
+        raise ValueError(f"speed_sweep: start must be coordinates and velocities, each of shape {shape}")
+    x, v = (real(part) for part in start)
+    check("speed_sweep", "start", x, "um")
+    check("speed_sweep", "start", v, "um/s")
+    return x, v
+
+
+@kernel
+def _swept(
+    oscillator: Oscillator, frequencies: Speeds, start: State | None, limits: _Limits, sizes: _Sizes
+) -> SpeedResponse:
+    rest = at_rest(oscillator, jnp.zeros((), frequencies.dtype))
+    first = _kicked(oscillator, rest, start, limits.kick)
+    down = sizes.direction == "down"
+    in_turn = frequencies[::-1] if down else frequencies
+    y, begin, parts = first, 0, []
+    for count, steps in sizes.groups:
+        rows = steps_of(oscillator, oscillator.mesh_force.nodes(steps).astype(frequencies.dtype))
+
+        def at_speed(y, frequency, rows=rows):
+            found = _steady(oscillator, first if sizes.fresh else y, rows, frequency, limits, sizes, rest)
+            return found.state, found
+
+        y, found = jax.lax.scan(at_speed, y, in_turn[begin : begin + count])
+        begin += count
+        parts.append(found)
+    found = jax.tree.map(lambda *part: jnp.concatenate(part), *parts)
+    if down:
+        found = jax.tree.map(lambda part: part[::-1], found)
+    return SpeedResponse(
+        mesh_frequency=frequencies,
+        **found.numbers._asdict(),
+        period=found.period,
+        poincare_approach=found.approach,
+        poincare_velocity=found.velocity,
+        settled=found.period > 0,
+        state=found.state,
+        orders=sizes.orders,
+        direction=sizes.direction,
+    )
+
+
+def _kicked(oscillator: Oscillator, rest: Rest, start: State | None, kick: Scalar) -> State:
+    """The start with an impulse on the approach that brings the mesh force to so many times the static one.
+
+    An approach that swings by dq about its rest has the speed omega dq in it, with omega^2 = k sum(d_i^2 / m_i).
+    """
+    x, v = (rest.coordinates, jnp.zeros_like(rest.coordinates)) if start is None else start
+    along = oscillator.direction / oscillator.mass
+    share = jnp.sum(oscillator.direction * along)
+    speed = (kick - 1) * jnp.abs(rest.force) * jnp.sqrt(oscillator.newton * share / rest.stiffness)
+    return x, v + along / share * jnp.where(kick > 1, speed, 0.0)
+
+
+class _Found(NamedTuple):
+    numbers: Numbers
+    period: Int[Array, ""]
+    approach: Float[Array, " points"]
+    velocity: Float[Array, " points"]
+    state: State
+
+
+def _steady(oscillator, y, rows: Steps, frequency, limits: _Limits, sizes: _Sizes, rest: Rest) -> _Found:
+    """Steady state at one speed, and its record."""
+    y, period = _settled(oscillator, y, rows, frequency, limits, sizes.most_periods)
+    orders = jnp.asarray(sizes.orders, frequency.dtype)
+    zero = jnp.zeros((), frequency.dtype)
+    origin = oscillator.along(zero, y, frequency)[0]
+    cycles = jnp.where(period > 0, period, sizes.points)
+
+    def on(carry):
+        return carry[0] < cycles
+
+    def recorded(carry):
+        cycle, y, sums, approaches, velocities = carry
+        q, v = oscillator.along(zero, y, frequency)
+        # an orbit's points repeat, so that there are as many for every speed
+        here = jnp.arange(sizes.points) % cycles == cycle
+        approaches, velocities = jnp.where(here, q, approaches), jnp.where(here, v, velocities)
+        y, sums = with_cycle(sums, oscillator, y, rows, frequency, orders=orders, cycle=cycle, origin=origin)
+        return cycle + 1, y, sums, approaches, velocities
+
+    nothing = jnp.zeros(sizes.points, frequency.dtype)
+    begin = jnp.zeros_like(cycles), y, no_sums(orders), nothing, nothing
+    _, y, sums, approaches, velocities = jax.lax.while_loop(on, recorded, begin)
+    numbers = numbers_of(
+        sums, cycles=cycles.astype(frequency.dtype), orders=orders, origin=origin, static_force=rest.force
+    )
+    return _Found(numbers, period, approaches, velocities, y)
+
+
+def _settled(oscillator, y, rows: Steps, frequency, limits: _Limits, most_periods: int):
+    """State after as many cycles as it takes, and the cycles of its orbit, 0 where none was found."""
+    zero = jnp.zeros((), frequency.dtype)
+
+    def watched(y: State) -> Array:
+        """What repeats, all in um: of coordinates that nothing holds only the approach does."""
+        q, v = oscillator.along(zero, y, frequency)
+        turn = 1 / (2 * jnp.pi * frequency)
+        if oscillator.stiffness is None:
+            return jnp.stack([q, turn * v])
+        return jnp.concatenate([jnp.stack([q, turn * v]), y[0], turn * y[1]])
+
+    def on(carry):
+        cycle, period, *_ = carry
+        return (period == 0) & (cycle < limits.most_cycles)
+
+    def cycled(carry):
+        cycle, _, y, before = carry
+        y = advanced(oscillator, y, rows, frequency)
+        now = watched(y)
+        size = jnp.maximum(jnp.max(jnp.abs(now)), jnp.nanmax(jnp.abs(before)))
+        away = jnp.max(jnp.abs(before - now), axis=1) / size
+        return cycle + 1, _period(away, limits.tolerance), y, jnp.concatenate([now[None], before[:-1]])
+
+    first = watched(y)
+    before = jnp.full((most_periods, len(first)), jnp.nan, frequency.dtype).at[0].set(first)
+    begin: Any = jnp.zeros_like(limits.most_cycles), jnp.zeros_like(limits.most_cycles), y, before
+    _, period, y, _ = jax.lax.while_loop(on, cycled, begin)
+    return y, period
+
+
+def _period(away: Float[Array, " periods"], tolerance: Scalar) -> Int[Array, ""]:
+    """The fewest cycles after which the state repeats, 0 for none.
+
+    Fewer cycles must be clearly apart: an orbit that is still being approached along a spiral is met from afar now and
+    then.
+    """
+    closest: Bool[Array, " periods"] = away < tolerance
+    nearer = jnp.concatenate([jnp.full((1,), jnp.inf, away.dtype), jax.lax.cummin(away)[:-1]])
+    fits = closest & (nearer > _APART * tolerance)
+    return jnp.where(jnp.any(fits), jnp.argmax(fits) + 1, 0)
