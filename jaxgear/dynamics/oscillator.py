@@ -97,6 +97,10 @@ class Oscillator(Checked):
         error, error_rate, _ = self._excited(phase, mesh_frequency)
         return self._along(y[0]) - error, self._along(y[1]) - error_rate
 
+    def approach_rate(self, phase: Scalar, v: Coordinates, mesh_frequency: Scalar) -> Scalar:
+        """Velocity of the approach [um/s]."""
+        return self._along(v) - self._excited(phase, mesh_frequency)[1]
+
     def _along(self, x: Coordinates) -> Scalar:
         return self.direction[0] * x[0] if len(x) == 1 else self.direction @ x
 
