@@ -1,24 +1,36 @@
 """How a mesh is run through its speeds: what vibrates, at which speeds, and the quantities that are made of it."""
 
+from dataclasses import replace
 from typing import Any, Literal
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..contact import Mesh
+from ..contact import Mesh, MeshCycle
+from ..geometry import GearPair
 from ..metrics import Quantity
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, concrete, count, number
-from .force_map import mesh_force
+from .force import AbstractMeshForce
+from .from_contact import mesh_force
 from .oscillator import Oscillator
 from .response import SpeedResponse
 from .speed_sweep import speed_sweep
-from .systems import inertia_of, torsional
+from .steady import SteadyNumbers, differentiable
+from .systems import inertia_of, on_bearings, torsional
 
 Scalar = Float[Array, ""]
+Bearing = Float[Array, " directions"]
+Model = Literal["map", "varying stiffness", "loaded error", "tangent"]
 
 # Of the critical damping, where nothing is said: gears with splash lubrication have 0.03 to 0.1.
 DAMPING_RATIO = 0.05
+_BEARING = {"shape": ("directions",), "optional": True, "default": None}
+_DIRECTIONS = 2  # along and across
+# Steps of a mesh cycle while its natural frequency is not known, since it is traced: 64 of its periods for one at four
+# times the mesh frequency.
+_STEPS = 256
 
 
 class Dynamics(Checked):
@@ -31,6 +43,11 @@ class Dynamics(Checked):
         pinion_inertia: polar moment of inertia of the pinion and what turns with it; that of the body without it.
         wheel_inertia: likewise.
         compliance: of what lies between the teeth and the inertias, in series with the mesh.
+        pinion_bearing: stiffness of the support of the pinion along and across the line of action; rigid without it. The
+            supports of both gears are given, or of none.
+        wheel_bearing: likewise.
+        pinion_bearing_damping: viscous damping of the support of the pinion along and across; none without it.
+        wheel_bearing_damping: likewise.
         model: of the mesh force.
         kick: dynamic factor with which a second run from the highest speed down begins, to find orbits that hang
             together with no other; 1 for no such run.
@@ -43,6 +60,107 @@ class Dynamics(Checked):
     pinion_inertia: Scalar | None = number("kg m2", low=0.0, open_low=True, optional=True, default=None)
     wheel_inertia: Scalar | None = number("kg m2", low=0.0, open_low=True, optional=True, default=None)
     compliance: Scalar = number("um/N", low=0.0, default=0.0)
-    model: Literal["map", "stiffness", "error", "tangent"] = "map"
+    pinion_bearing: Bearing | None = number("N/um", low=0.0, open_low=True, **_BEARING)
+    wheel_bearing: Bearing | None = number("N/um", low=0.0, open_low=True, **_BEARING)
+    pinion_bearing_damping: Bearing | None = number("N s/um", low=0.0, **_BEARING)
+    wheel_bearing_damping: Bearing | None = number("N s/um", low=0.0, **_BEARING)
+    model: Model = "map"
     kick: Scalar = number("", low=1.0, default=3.0)
     steps: int | None = count(low=32, high=65_536, optional=True, default=None)
+
+    def check_together(self) -> None:
+        if self.damping_ratio is not None and self.damping is not None:
+            raise ValueError("Dynamics: damping_ratio and damping are both given, must be one of them")
+        supports = self.pinion_bearing, self.wheel_bearing
+        if (supports[0] is None) != (supports[1] is None):
+            raise ValueError("Dynamics: pinion_bearing and wheel_bearing must both be given, or none")
+        for name in ("pinion_bearing", "wheel_bearing"):
+            damping = getattr(self, f"{name}_damping")
+            if damping is not None and supports[0] is None:
+                raise ValueError(f"Dynamics: {name}_damping has no effect without pinion_bearing and wheel_bearing")
+            for given, of in ((getattr(self, name), name), (damping, f"{name}_damping")):
+                if given is not None and len(given) != _DIRECTIONS:
+                    raise ValueError(f"Dynamics: {of} has {len(given)} numbers, must be two: along and across")
+        known = concrete(self.mesh_frequencies)
+        if known is not None and (known[1:] <= known[:-1]).any():
+            raise ValueError("Dynamics: mesh_frequencies must increase")
+
+    def oscillator(
+        self,
+        mesh: Mesh,
+        torque: Any,
+        *,
+        pinion: AbstractModification | None = None,
+        wheel: AbstractModification | None = None,
+    ) -> Oscillator:
+        """What vibrates: the approach of the flanks, and on bearings the centres of both gears.
+
+        Args:
+            mesh: prepared mesh.
+            torque: on the pinion [N m].
+            pinion: modification of the pinion flank; None for the nominal involute.
+            wheel: modification of the wheel flank; None for the nominal involute.
+
+        Raises:
+            TypeError, ValueError: as `mesh_force`, `torsional` and `on_bearings`.
+        """
+        options = {"model": self.model, "compliance": self.compliance}
+        return self.masses(mesh_force(mesh, torque=torque, pinion=pinion, wheel=wheel, **options), mesh.pair, torque)
+
+    def masses(self, force: AbstractMeshForce, pair: GearPair, torque: Any) -> Oscillator:
+        """The oscillator of any mesh force between the gears of a pair under a torque on the pinion [N m]."""
+        given = (pair.pinion, self.pinion_inertia), (pair.wheel, self.wheel_inertia)
+        inertias = tuple(inertia_of(gear) if inertia is None else inertia for gear, inertia in given)
+        ratio = DAMPING_RATIO if self.damping_ratio is None and self.damping is None else self.damping_ratio
+        options: dict[str, Any] = {"damping": self.damping} if ratio is None else {"damping_ratio": ratio}
+        options |= {"pair": pair, "torque": torque, "inertias": inertias}
+        if self.pinion_bearing is None or self.wheel_bearing is None:
+            return torsional(force, **options)
+        nothing = jnp.zeros_like(self.pinion_bearing)
+        damping = [nothing if of is None else of for of in (self.pinion_bearing_damping, self.wheel_bearing_damping)]
+        return on_bearings(
+            force,
+            bearing_stiffness=jax.vmap(jnp.diag)(jnp.stack([self.pinion_bearing, self.wheel_bearing])),
+            bearing_damping=jax.vmap(jnp.diag)(jnp.stack(damping)),
+            **options,
+        )
+
+    def runs(self, oscillator: Oscillator) -> dict[str, SpeedResponse]:
+        """The steady states over the speeds: rising, falling, and falling after a kick at the highest speed."""
+        options: dict[str, Any] = {"steps": self.steps}
+        runs: dict[str, dict[str, Any]] = {"up": {"direction": "up"}, "down": {"direction": "down"}}
+        kick = concrete(self.kick)
+        if kick is None or kick > 1:
+            runs["down, kicked"] = {"direction": "down", "kick": self.kick}
+        return {
+            name: speed_sweep(oscillator, self.mesh_frequencies, **options, **more) for name, more in runs.items()
+        }
+
+    def quantity(self, name: str) -> Quantity:
+        """A dynamic quantity for objectives, constraints, sweeps and Pareto fronts, with these settings.
+
+        Args:
+            name: "dynamic_factor", "approach_rms", "no_contact" or "coast_contact" at the speed of the operation, the
+                worse of the motions from rest and from a kick; with "worst_" before it, the worst of all runs and
+                speeds. The first two are differentiable where the steady state is an orbit of up to four mesh cycles;
+                elsewhere their derivative is zero.
+
+        Raises:
+            ValueError: for another name.
+        """
+        return with_settings(name, self)
+
+    def numbers(self, oscillator: Oscillator) -> SteadyNumbers:
+        """The numbers of all runs with their derivatives, leading axis (runs,).
+
+        The steps of the integrator are `steps`, or 256: nothing else is known of what is being traced.
+        """
+        steps = _STEPS if self.steps is None else self.steps
+        nodes = oscillator.mesh_force.nodes(steps)
+        found = replace(self, steps=steps).runs(jax.lax.stop_gradient(oscillator)).values()
+        each = [differentiable(oscillator, run, nodes) for run in found]
+        return jax.tree.map(lambda *parts: jnp.stack(parts), *each)
+
+    def oscillator_of(self, cycle: MeshCycle, mesh: Mesh) -> Oscillator:
+        """What vibrates, of a design that a cycle on the mesh is of, its manufacturing deviations included."""
+        raise NotImplementedError
