@@ -8,3 +8,8 @@ from .oscillator import Oscillator as Oscillator
 from .response import SpeedResponse as SpeedResponse
 from .speed_sweep import speed_sweep as speed_sweep
 from .speed_sweep import steps_for as steps_for
+from .systems import equivalent_mass as equivalent_mass
+from .systems import inertia_of as inertia_of
+from .systems import on_bearings as on_bearings
+from .systems import torsional as torsional
+from .systems import two_gears as two_gears

@@ -147,20 +147,9 @@ class _Limits(NamedTuple):
 
 
 def _prepared(
-    oscillator,
-    frequencies,
-    owner,
-    *,
-    direction,
-    kick,
-    carry,
-    steps,
-    tolerance,
-    most_cycles,
-    most_periods,
-    points,
-    orders,
-) -> tuple[_Sizes, _Limits]:
+    owner, oscillator, frequencies, *, direction="up", kick=None, carry=True, steps=None, tolerance=None,
+    most_cycles=500, most_periods=4, points=32, orders=ORDERS,
+) -> tuple[_Sizes, _Limits]:  # fmt: skip
     if direction not in ("up", "down"):
         raise ValueError(f'{owner}: direction = {direction!r} must be "up" or "down"')
     if not isinstance(carry, bool):

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import bracketed_root, program
+from .force import AbstractMeshForce
 from .oscillator import Coordinates, Oscillator
 
 Scalar = Float[Array, ""]
@@ -42,7 +43,7 @@ def at_rest(oscillator: Oscillator, phase: Scalar) -> Rest:
     along = oscillator.direction / root_mass
     load = oscillator.load / root_mass
     wanted = along @ load / (along @ along)
-    approach = _approach_under(oscillator, place, wanted)
+    approach = _approach_under(oscillator.mesh_force, place, wanted)
     error = oscillator.along(phase, (jnp.zeros_like(load), jnp.zeros_like(load)), jnp.zeros_like(phase))[0]
     x = along * (approach - error) / (along @ along)
     if oscillator.stiffness is not None:
@@ -60,14 +61,26 @@ def at_rest(oscillator: Oscillator, phase: Scalar) -> Rest:
     return Rest(x / root_mass, force, slope)
 
 
-def _approach_under(oscillator: Oscillator, place, wanted: Scalar) -> Scalar:
+def mean_stiffness_of(mesh_force: AbstractMeshForce, static_force: Scalar) -> Scalar:
+    """Slope of the mesh force under a static force [N], averaged over the mesh cycle [N/um]."""
+
+    def slope(phase):
+        place = mesh_force.at(phase)
+        approach = _approach_under(mesh_force, place, static_force)
+        return jax.jvp(lambda q: mesh_force.force(place, q), (approach,), (jnp.ones_like(approach),))[1]
+
+    begin = mesh_force.nodes(_POSITIONS).astype(static_force.dtype)
+    return jnp.sum(jnp.diff(begin) * jax.vmap(slope)((begin[:-1] + begin[1:]) / 2))
+
+
+def _approach_under(mesh_force: AbstractMeshForce, place, wanted: Scalar) -> Scalar:
     """Approach [um] at which the mesh force has a value [N]."""
-    force = oscillator.mesh_force.force
+    force = mesh_force.force
     tried = jnp.asarray(_BRACKETS, wanted.dtype)
     above = jax.vmap(lambda q: force(place, q))(tried) >= wanted
     below = jax.vmap(lambda q: force(place, q))(-tried) <= wanted
     high, low = tried[jnp.argmax(above)], -tried[jnp.argmax(below)]
-    return bracketed_root(_excess, low, high, (oscillator.mesh_force, place, wanted))
+    return bracketed_root(_excess, low, high, (mesh_force, place, wanted))
 
 
 def _excess(approach, given):

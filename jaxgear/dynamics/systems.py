@@ -1,0 +1,238 @@
+"""Oscillators of a gear pair: torsional, two gears, two gears on flexible bearings."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry import Gear, GearPair
+from ..numerics import check, real
+from .force import AbstractMeshForce
+from .oscillator import NEWTON, Excitation, Oscillator
+from .static import mean_stiffness_of
+
+Scalar = Float[Array, ""]
+
+_MM = 1e-3  # in m
+_BEARING = "(pinion, wheel) x (along, across) x (along, across)"
+
+
+def inertia_of(gear: Gear) -> Scalar:
+    """Moment of inertia of a gear body about its axis [kg m2]: a ring from the bore to the reference pitch circle.
+
+    Over its own face width and with the density of its material; a solid disc where the gear has no `bore_diameter`.
+    Oscillators take another inertia as an argument.
+    """
+    outer, inner = _radii(gear)
+    return jnp.pi / 2 * gear.material.density * gear.face_width * _MM * (outer**4 - inner**4)
+
+
+def _mass_of(gear: Gear) -> Scalar:
+    """Mass of the same body [kg]."""
+    outer, inner = _radii(gear)
+    return jnp.pi * gear.material.density * gear.face_width * _MM * (outer**2 - inner**2)
+
+
+def _radii(gear: Gear) -> tuple[Scalar, Scalar]:
+    """Of the body [m]."""
+    inner = jnp.zeros_like(gear.module) if gear.bore_diameter is None else gear.bore_radius
+    return gear.pitch_radius * _MM, inner * _MM
+
+
+def equivalent_mass(pair: GearPair, inertias=None) -> Scalar:
+    """Mass on the line of action of two gears that turn against each other [kg].
+
+    1 / m = r_b1^2 / I_1 + r_b2^2 / I_2
+
+    Args:
+        pair: pinion and wheel.
+        inertias: of pinion and wheel [kg m2], with what turns with them; None for `inertia_of` the gears.
+
+    Raises:
+        ValueError: in one line for inertias that are not two positive numbers.
+    """
+    return 1 / jnp.sum(1 / _masses("equivalent_mass", pair, inertias))
+
+
+def torsional(
+    mesh_force: AbstractMeshForce,
+    *,
+    pair: GearPair,
+    torque,
+    damping_ratio=None,
+    damping=None,
+    inertias=None,
+    mean_stiffness=None,
+    excitation: Excitation | None = None,
+) -> Oscillator:
+    """The relative rotation of two gears on the line of action, one coordinate: the approach q [um].
+
+    m q'' + c q' + F(phase, q) = T_1 / r_b1
+
+    Args:
+        mesh_force: of the mesh.
+        pair: pinion and wheel.
+        torque: on the pinion [N m].
+        damping_ratio: of the vibration with the mean stiffness, c = 2 ratio sqrt(k m).
+        damping: c [N s/um], in place of the ratio. Either acts with and without contact.
+        inertias: of pinion and wheel [kg m2]; None for `inertia_of` the gears.
+        mean_stiffness: k of the damping ratio [N/um]; None for the mean over the cycle of the slope of the mesh force
+            under the static load.
+        excitation: None for none. Its displacement is taken off the approach.
+
+    Raises:
+        ValueError: in one line for both or neither of damping and damping_ratio, or a number outside its range.
+    """
+    mass, force = equivalent_mass(pair, inertias), _force("torsional", pair, torque)
+    c = _damping("torsional", mesh_force, mass, force, damping_ratio, damping, mean_stiffness)
+    one = jnp.ones((1,), mass.dtype)
+    return Oscillator(
+        mesh_force=mesh_force, mass=mass * one, direction=one, load=force * one, mesh_damping=c, excitation=excitation
+    )
+
+
+def two_gears(
+    mesh_force: AbstractMeshForce,
+    *,
+    pair: GearPair,
+    torque,
+    damping_ratio=None,
+    damping=None,
+    inertias=None,
+    mean_stiffness=None,
+    excitation: Excitation | None = None,
+) -> Oscillator:
+    """Pinion and wheel as two coordinates, r_b1 theta_1 and r_b2 theta_2 [um], which nothing holds.
+
+    I_1 / r_b1^2 x_1'' + F + c q' = T_1 / r_b1,   I_2 / r_b2^2 x_2'' - F - c q' = -T_1 / r_b1,   q = x_1 - x_2
+
+    The torque of the wheel balances that of the pinion; arguments and errors of `torsional`. A component of a larger
+    model: what is joined to the gears adds to `load`, `stiffness` and `damping`, or to what the vector field returns.
+    """
+    masses, force = _masses("two_gears", pair, inertias), _force("two_gears", pair, torque)
+    c = _damping("two_gears", mesh_force, 1 / jnp.sum(1 / masses), force, damping_ratio, damping, mean_stiffness)
+    direction = jnp.asarray([1.0, -1.0], masses.dtype)
+    return Oscillator(
+        mesh_force=mesh_force,
+        mass=masses,
+        direction=direction,
+        load=force * direction,
+        mesh_damping=c,
+        excitation=excitation,
+    )
+
+
+def on_bearings(
+    mesh_force: AbstractMeshForce,
+    *,
+    pair: GearPair,
+    torque,
+    bearing_stiffness,
+    bearing_damping=None,
+    masses=None,
+    damping_ratio=None,
+    damping=None,
+    inertias=None,
+    mean_stiffness=None,
+    excitation: Excitation | None = None,
+) -> Oscillator:
+    """Two gears whose centres move on flexible bearings: five coordinates [um].
+
+    In order: the relative rotation u = r_b1 theta_1 - r_b2 theta_2; the centre of the pinion along the line of action,
+    in the direction in which it pushes the wheel, and across; the centre of the wheel likewise. The approach is
+    q = u + along_1 - along_2; the bearings carry the mesh force, so that at rest the pinion gives way by -F / k_1 and
+    the wheel by F / k_2.
+
+    Args:
+        mesh_force, pair, torque, damping_ratio, damping, inertias, mean_stiffness, excitation: as for `torsional`.
+        bearing_stiffness: of the supports of pinion and wheel in (along, across) [N/um], symmetric, shape (2, 2, 2).
+        bearing_damping: likewise [N s/um]; None for none.
+        masses: of the bodies that move on the bearings [kg], pinion and wheel; None for those of the bodies of
+            `inertia_of`.
+
+    Raises:
+        ValueError: in one line as for `torsional`, and for a bearing that is not symmetric or not stiff.
+    """
+    owner = "on_bearings"
+    mass, force = equivalent_mass(pair, inertias), _force(owner, pair, torque)
+    c = _damping(owner, mesh_force, mass, force, damping_ratio, damping, mean_stiffness)
+    bodies = _pair_of_numbers(
+        owner, "masses", "kg", (_mass_of(pair.pinion), _mass_of(pair.wheel)) if masses is None else masses
+    )
+    held = _on_ground(owner, "bearing_stiffness", "N/um", bearing_stiffness, stiff=True)
+    damped = None
+    if bearing_damping is not None:
+        damped = _on_ground(owner, "bearing_damping", "N s/um", bearing_damping, stiff=False)
+    dtype = mass.dtype
+    return Oscillator(
+        mesh_force=mesh_force,
+        mass=jnp.concatenate([mass[None], jnp.repeat(bodies, 2)]),
+        direction=jnp.asarray([1.0, 1.0, 0.0, -1.0, 0.0], dtype),
+        load=force * jnp.asarray([1.0, 0.0, 0.0, 0.0, 0.0], dtype),
+        mesh_damping=c,
+        stiffness=held,
+        damping=damped,
+        excitation=excitation,
+    )
+
+
+def _masses(owner: str, pair: GearPair, inertias) -> Float[Array, "2"]:
+    """Of pinion and wheel on the line of action [kg]."""
+    given = (inertia_of(pair.pinion), inertia_of(pair.wheel)) if inertias is None else inertias
+    radii = jnp.stack([pair.pinion.base_radius, pair.wheel.base_radius]) * _MM
+    return _pair_of_numbers(owner, "inertias", "kg m2", given) / radii**2
+
+
+def _pair_of_numbers(owner: str, name: str, unit: str, given) -> Float[Array, "2"]:
+    if isinstance(given, tuple | list) and any(isinstance(part, jax.Array) for part in given):
+        given = jnp.stack([real(part) for part in given])
+    numbers = real(given)
+    if numbers.shape != (2,):
+        raise ValueError(f"{owner}: {name} has shape {numbers.shape}, must be two numbers, of pinion and wheel")
+    check(owner, name, numbers, unit, low=0.0, open_low=True)
+    return numbers
+
+
+def _force(owner: str, pair: GearPair, torque) -> Scalar:
+    """Static force on the line of action [N]."""
+    torque = real(torque)
+    if torque.ndim:
+        raise ValueError(f"{owner}: torque has shape {torque.shape}, must be a single number; make many with jax.vmap")
+    check(owner, "torque", torque, "N m", low=0.0, open_low=True)
+    return torque / (pair.pinion.base_radius * _MM)
+
+
+def _damping(owner: str, mesh_force, mass, force, ratio, damping, stiffness) -> Scalar:
+    """Viscous damping of the approach [N s/um]."""
+    if (ratio is None) == (damping is None):
+        raise ValueError(f"{owner}: give either damping_ratio or damping [N s/um]")
+    if ratio is None:
+        if stiffness is not None:
+            raise ValueError(f"{owner}: mean_stiffness belongs to damping_ratio, damping is given")
+        damping = real(damping)
+        check(owner, "damping", damping, "N s/um", low=0.0)
+        return damping
+    ratio = real(ratio)
+    check(owner, "damping_ratio", ratio, "", low=0.0, high=1.0)
+    stiffness = mean_stiffness_of(mesh_force, force) if stiffness is None else real(stiffness)
+    check(owner, "mean_stiffness", stiffness, "N/um", low=0.0, open_low=True)
+    # stiffness and damping are per um, the mass is that of metres
+    return 2 * ratio * jnp.sqrt(stiffness * mass / NEWTON)
+
+
+def _on_ground(owner: str, name: str, unit: str, given: Any, *, stiff: bool) -> Float[Array, "5 5"]:
+    """Matrices of two bearings at the coordinates of `on_bearings`."""
+    given = real(given)
+    if given.shape != (2, 2, 2):
+        raise ValueError(f"{owner}: {name} has shape {given.shape}, must be {_BEARING}")
+    check(owner, name, given, unit)
+    if not isinstance(given, jax.core.Tracer):
+        if bool((jnp.abs(given - given.swapaxes(1, 2)) > 1e-9 * jnp.max(jnp.abs(given))).any()):
+            raise ValueError(f"{owner}: {name} must be symmetric")
+        least = float(jnp.min(jnp.linalg.eigvalsh(given)))
+        if least < 0 or (stiff and least == 0):
+            limit = "greater than 0" if stiff else "at least 0"
+            raise ValueError(f"{owner}: {name} has an eigenvalue of {least:g} {unit}, must be {limit} {unit}")
+    held = jnp.zeros((5, 5), given.dtype)
+    return held.at[1:3, 1:3].set(given[0]).at[3:5, 3:5].set(given[1])
