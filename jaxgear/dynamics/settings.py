@@ -1,5 +1,6 @@
 """How a mesh is run through its speeds: what vibrates, at which speeds, and the quantities that are made of it."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -23,6 +24,8 @@ from .systems import inertia_of, on_bearings, torsional
 Scalar = Float[Array, ""]
 Bearing = Float[Array, " directions"]
 Model = Literal["map", "varying stiffness", "loaded error", "tangent"]
+
+UP, DOWN, KICKED = "up", "down", "down, kicked"
 
 # Of the critical damping, where nothing is said: gears with splash lubrication have 0.03 to 0.1.
 DAMPING_RATIO = 0.05
@@ -125,16 +128,31 @@ class Dynamics(Checked):
             **options,
         )
 
-    def runs(self, oscillator: Oscillator) -> dict[str, SpeedResponse]:
-        """The steady states over the speeds: rising, falling, and falling after a kick at the highest speed."""
-        options: dict[str, Any] = {"steps": self.steps}
-        runs: dict[str, dict[str, Any]] = {"up": {"direction": "up"}, "down": {"direction": "down"}}
+    @property
+    def run_names(self) -> tuple[str, ...]:
+        """What the speeds are gone through for: rising, falling, and falling after a kick at the highest speed."""
         kick = concrete(self.kick)
-        if kick is None or kick > 1:
-            runs["down, kicked"] = {"direction": "down", "kick": self.kick}
-        return {
-            name: speed_sweep(oscillator, self.mesh_frequencies, **options, **more) for name, more in runs.items()
-        }
+        return UP, DOWN, *((KICKED,) if kick is None or kick > 1 else ())
+
+    def run(self, oscillator: Oscillator, name: str, *, steps: Sequence[int] | int | None = None) -> SpeedResponse:
+        """The steady states of one of the runs.
+
+        Args:
+            oscillator: what vibrates.
+            name: one of `run_names`.
+            steps: of the integrator per mesh cycle, in place of `steps`; one number or one for each speed.
+        """
+        return speed_sweep(
+            oscillator,
+            self.mesh_frequencies,
+            direction="up" if name == UP else "down",
+            kick=self.kick if name == KICKED else None,
+            steps=self.steps if steps is None else steps,
+        )
+
+    def runs(self, oscillator: Oscillator) -> dict[str, SpeedResponse]:
+        """The steady states of all runs."""
+        return {name: self.run(oscillator, name) for name in self.run_names}
 
     def quantity(self, name: str) -> Quantity:
         """A dynamic quantity for objectives, constraints, sweeps and Pareto fronts, with these settings.

@@ -12,9 +12,9 @@ from .response import SpeedResponse
 
 Numbers = Float[Array, " speeds"]
 
-# Mesh cycles of the orbits that are differentiated: an orbit of three or four cycles is one of twelve too.
-_PERIODS = (1, 2, 12)
-_CHOICE = (len(_PERIODS), 0, 1, 2, 2)  # by the period that was found; 0 for none
+# Mesh cycles of the orbits that are differentiated: an orbit of two, three or four cycles is one of twelve too.
+_PERIODS = (1, 12)
+_CHOICE = (len(_PERIODS), 0, 1, 1, 1)  # by the period that was found; 0 for none
 # How far the orbit may be from the motion that was recorded, relative to its dynamic factor and rms.
 _SAME = 1e-2
 

@@ -1,0 +1,68 @@
+"""A motion of an oscillator over time: what phase portraits and time histories show."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..numerics import Checked, kernel, result, whole
+from .integrate import cycles, steps_of
+from .oscillator import Oscillator
+from .poincare import STEPS, checked, nodes_of
+
+Samples = Float[Array, " samples"]
+
+
+class Motion(Checked):
+    """Result of `motion`, at the begin of every step of the integrator.
+
+    Attributes:
+        phase: mesh position [base pitches], shape (samples,).
+        approach: of the flanks [um], shape (samples,).
+        approach_rate: [um/s], shape (samples,).
+        force: elastic force of the mesh [N], shape (samples,): zero where nothing touches, negative on the coast
+            flanks.
+    """
+
+    phase: Samples = result()
+    approach: Samples = result("um")
+    approach_rate: Samples = result("um/s")
+    force: Samples = result("N")
+
+
+def motion(
+    oscillator: Oscillator, mesh_frequency: Any, start: Any, *, periods: int = 1, steps: Any = STEPS
+) -> Motion:
+    """The motion from a state over some mesh cycles.
+
+    Args:
+        oscillator: that moves.
+        mesh_frequency: [Hz], a single number.
+        start: displacements [um] and velocities [um/s] at mesh position 0, each of shape (coordinates,).
+        periods: number of mesh cycles.
+        steps: number of equal steps of a mesh cycle, or its nodes from 0 to 1 [base pitches].
+
+    Raises:
+        TypeError: for something else than an `Oscillator`.
+        ValueError: for a mesh frequency that is not positive, a start of another shape or steps out of order.
+    """
+    frequency, start = checked("motion", oscillator, mesh_frequency, start)
+    nodes = nodes_of("motion", steps).astype(frequency.dtype)
+    return _moved(oscillator, frequency, start, nodes, whole("motion", "periods", periods))
+
+
+@kernel
+def _moved(oscillator: Oscillator, frequency, start, nodes, periods: int) -> Motion:
+    steps = steps_of(oscillator, nodes)
+    _, states = cycles(oscillator, start, steps, frequency, periods)
+
+    def of_step(step, phase, x, v):
+        q, rate = oscillator.along(phase, (x, v), frequency)
+        return phase, q, rate, oscillator.mesh_force.force(step.first, q)
+
+    def of_cycle(number, x, v):
+        return jax.vmap(of_step)(steps, steps.phase + number, x, v)
+
+    found = jax.vmap(of_cycle)(jnp.arange(periods, dtype=frequency.dtype), *states)
+    return Motion(*(part.ravel() for part in found))
