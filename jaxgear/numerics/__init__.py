@@ -22,6 +22,10 @@ from .frozen import Frozen as Frozen
 from .leading import on_both as on_both
 from .leading import over_batch as over_batch
 from .logarithm import log as log
+from .newton import implicit_root as implicit_root
+from .newton import newton as newton
+from .newton import solve as solve
+from .newton import with_jacobian as with_jacobian
 from .programs import kernel as kernel
 from .programs import program as program
 from .progress import Callback as Callback

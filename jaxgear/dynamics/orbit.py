@@ -1,0 +1,223 @@
+"""Periodic orbits by Newton shooting on the Poincare map, with their Floquet multipliers and exact derivatives."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Complex, Float
+
+from ..numerics import Checked, count, implicit_root, kernel, result, whole, with_jacobian
+from .history import history, largest, mean, rms, share, smallest
+from .integrate import cycles, steps_of
+from .oscillator import Coordinates, Oscillator, State
+from .poincare import STEPS, after, checked, moved, nodes_of, scaled, unscaled
+
+Scalar = Float[Array, ""]
+Samples = Float[Array, " samples"]
+
+# A multiplier counts as outside of the unit circle from this many roots of the rounding error on: coordinates that turn
+# freely together have two multipliers of one, which rounding separates by that much.
+_NEUTRAL = 100.0
+_SAME = 0.05  # largest distance of an orbit from the settled state that it refines, as part of its size
+
+
+class Orbit(Checked):
+    """A periodic orbit: the state repeats after some mesh cycles. Leading axes of a batch come from `jax.vmap`.
+
+    Attributes:
+        displacement, velocity: of the coordinates at mesh position 0 [um], [um/s], shape (coordinates,).
+        mesh_frequency: [Hz].
+        periods: number of mesh cycles after which the state repeats.
+        phase: where the samples lie [base pitches], from 0 to `periods`, shape (samples,).
+        approach: of the flanks [um], shape (samples,).
+        approach_rate: its velocity [um/s], shape (samples,).
+        force: elastic force of the mesh [N], shape (samples,).
+        dynamic_factor: largest force over the static one; where springs to ground carry some of the load, over the
+            mean of the force.
+        approach_rms: root mean square of the approach about its mean [um].
+        approach_mean, approach_min, approach_max: [um].
+        no_contact, coast_contact: share of the time without force, and with force on the coast flanks; they have no
+            derivative.
+        monodromy: derivative of the state after the orbit by the state before, of displacements and of velocities
+            divided by 2 pi times the mesh frequency, shape (2 coordinates, 2 coordinates).
+        residual: largest change of those unknowns over the orbit [um].
+        converged: whether the residual is down to what rounding and the size of the multipliers leave.
+    """
+
+    displacement: Coordinates = result("um")
+    velocity: Coordinates = result("um/s")
+    mesh_frequency: Scalar = result("Hz")
+    phase: Samples = result()
+    approach: Samples = result("um")
+    approach_rate: Samples = result("um/s")
+    force: Samples = result("N")
+    dynamic_factor: Scalar = result()
+    approach_rms: Scalar = result("um")
+    approach_mean: Scalar = result("um")
+    approach_min: Scalar = result("um")
+    approach_max: Scalar = result("um")
+    no_contact: Scalar = result()
+    coast_contact: Scalar = result()
+    monodromy: Float[Array, "unknowns unknowns"] = result()
+    residual: Scalar = result("um")
+    converged: Bool[Array, ""] = result()
+    periods: int = count()
+
+    @property
+    def start(self) -> State:
+        """State at mesh position 0: displacements [um] and velocities [um/s]."""
+        return self.displacement, self.velocity
+
+    @property
+    def multipliers(self) -> Complex[Array, "... unknowns"]:
+        """Floquet multipliers: what becomes of small deviations over one orbit."""
+        return jnp.linalg.eigvals(self.monodromy)
+
+    @property
+    def stable(self) -> Bool[Array, "..."]:
+        """Whether no small deviation grows: no multiplier lies outside of the unit circle."""
+        margin = _NEUTRAL * np.sqrt(jnp.finfo(self.monodromy.dtype).eps)
+        sizes = jnp.abs(jnp.linalg.eigvals(jax.lax.stop_gradient(self.monodromy)))
+        return jnp.all(sizes <= 1 + margin, axis=-1)
+
+
+def find_orbit(
+    oscillator: Oscillator, mesh_frequency: Any, start: Any, *, periods: int = 1, steps: Any = STEPS
+) -> Orbit:
+    """The periodic orbit next to a state, stable or not.
+
+    Newton's method on the change of the state over `periods` mesh cycles, by Runge-Kutta steps of order four. Every
+    number of the orbit is differentiable with respect to every number of the oscillator and to the mesh frequency, by
+    the implicit function theorem, in forward and reverse mode: those of an isolated orbit, so not at a fold.
+
+    Args:
+        oscillator: that moves.
+        mesh_frequency: [Hz], a single number.
+        start: displacements [um] and velocities [um/s] at mesh position 0, each of shape (coordinates,), not far from
+            the orbit; no derivative passes through them.
+        periods: mesh cycles after which the orbit repeats.
+        steps: number of equal steps of a mesh cycle, or its nodes from 0 to 1 [base pitches]. Where the force jumps
+            there has to be a node.
+
+    Raises:
+        TypeError: for something else than an `Oscillator`.
+        ValueError: for a mesh frequency that is not positive, a start of another shape or steps out of order.
+    """
+    frequency, start = checked("find_orbit", oscillator, mesh_frequency, start)
+    nodes = nodes_of("find_orbit", steps).astype(frequency.dtype)
+    return _found(oscillator, frequency, start, nodes, whole("find_orbit", "periods", periods))
+
+
+def settle(oscillator: Oscillator, mesh_frequency: Any, start: Any, *, cycles: int = 100, steps: Any = STEPS) -> State:
+    """The state after some mesh cycles, at mesh position 0; it has no derivatives.
+
+    With a damping ratio zeta deviations decay by exp(-2 pi zeta f_n / f) per cycle.
+
+    Args:
+        oscillator, mesh_frequency, start, steps: as for `find_orbit`.
+        cycles: how many.
+
+    Raises:
+        TypeError, ValueError: as `find_orbit`.
+    """
+    frequency, start = checked("settle", oscillator, mesh_frequency, start)
+    nodes = nodes_of("settle", steps).astype(frequency.dtype)
+    return _settled(oscillator, frequency, start, nodes, whole("settle", "cycles", cycles, 0))
+
+
+def steady_orbit(
+    oscillator: Oscillator,
+    mesh_frequency: Any,
+    start: Any,
+    *,
+    settle: int = 100,
+    periods: int = 1,
+    steps: Any = STEPS,
+) -> Orbit:
+    """The orbit on which the motion from a start settles: a stable one, with exact derivatives.
+
+    After some cycles, which no derivative passes through, Newton's method takes the state to the orbit. It has not
+    converged where the motion does not settle on an orbit of so many mesh cycles: where that is unstable or far away.
+
+    Args:
+        oscillator, mesh_frequency, start, periods, steps: as for `find_orbit`; the start may be anything.
+        settle: number of mesh cycles before Newton's method, for instance 5 / (2 pi zeta f_n / f) with a damping
+            ratio zeta.
+
+    Raises:
+        TypeError, ValueError: as `find_orbit`.
+    """
+    frequency, start = checked("steady_orbit", oscillator, mesh_frequency, start)
+    nodes = nodes_of("steady_orbit", steps).astype(frequency.dtype)
+    settle, periods = whole("steady_orbit", "settle", settle, 0), whole("steady_orbit", "periods", periods)
+    return _steady(oscillator, frequency, start, nodes, settle, periods)
+
+
+@kernel
+def _settled(oscillator, frequency, start, nodes, count: int) -> State:
+    oscillator, frequency, start = jax.lax.stop_gradient((oscillator, frequency, start))
+    return after(oscillator, start, steps_of(oscillator, nodes), frequency, count)
+
+
+@kernel
+def _found(oscillator, frequency, start, nodes, periods: int) -> Orbit:
+    steps = steps_of(oscillator, nodes)
+    first = scaled(start, jax.lax.stop_gradient(frequency))
+    z = implicit_root(lambda z: moved(oscillator, z, steps, frequency, periods), first)
+    return orbit_at(oscillator, z, steps, frequency, periods)
+
+
+@kernel
+def _steady(oscillator, frequency, start, nodes, settle: int, periods: int) -> Orbit:
+    begin = _settled(oscillator, frequency, start, nodes, settle)
+    orbit = _found(oscillator, frequency, begin, nodes, periods)
+    there, here = (jax.lax.stop_gradient(scaled(y, frequency)) for y in (orbit.start, begin))
+    near = jnp.linalg.norm(there - here) <= _SAME * jnp.linalg.norm(there)
+    return dataclasses.replace(orbit, converged=orbit.converged & orbit.stable & near)
+
+
+def orbit_at(oscillator: Oscillator, z, steps, frequency: Scalar, periods: int) -> Orbit:
+    """What the orbit through some unknowns does."""
+
+    def flown(z):
+        end, states = cycles(oscillator, unscaled(z, frequency), steps, frequency, periods)
+        return scaled(end, frequency), (end, states)
+
+    last, monodromy, (end, states) = with_jacobian(flown, z, has_aux=True)
+    of = history(oscillator, states, end, steps, frequency)
+    residual = jnp.max(jnp.abs(last - z))
+    x, v = unscaled(z, frequency)
+    return Orbit(
+        displacement=x,
+        velocity=v,
+        mesh_frequency=frequency,
+        phase=of.phase,
+        approach=of.approach[0],
+        approach_rate=of.velocity,
+        force=of.force[0],
+        dynamic_factor=largest(of.force) / _static_force(oscillator, mean(of, of.force)),
+        approach_rms=rms(of, of.approach),
+        approach_mean=mean(of, of.approach),
+        approach_min=smallest(of.approach),
+        approach_max=largest(of.approach),
+        no_contact=share(of, of.force == 0),
+        coast_contact=share(of, of.force < 0),
+        monodromy=monodromy,
+        residual=residual,
+        converged=residual <= _tolerance(z, monodromy),
+        periods=periods,
+    )
+
+
+def _static_force(oscillator: Oscillator, otherwise: Scalar) -> Scalar:
+    """Static force of the mesh [N]; another one where springs carry some of the load."""
+    along = oscillator.direction
+    return otherwise if oscillator.stiffness is not None else jnp.sum(along * oscillator.load) / jnp.sum(along**2)
+
+
+def _tolerance(z, monodromy) -> Scalar:
+    """Largest residual of a root of Newton's method [um]."""
+    size = jnp.linalg.norm(z) * (1 + jnp.linalg.norm(monodromy))
+    return jax.lax.stop_gradient(jnp.sqrt(jnp.finfo(z.dtype).eps) * 0.1 * size)

@@ -1,0 +1,85 @@
+"""The map of a state over some mesh cycles, in scaled unknowns: what shooting and continuation find fixed points of."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..numerics import check, real, whole
+from .integrate import Steps, one_step
+from .oscillator import Oscillator, State
+
+Scalar = Float[Array, ""]
+Unknowns = Float[Array, " unknowns"]  # displacements and velocities / (2 pi mesh frequency), all [um]
+
+STEPS = 200  # of a mesh cycle: Runge-Kutta steps of order four keep K_v to 0.1 %
+
+
+def scaled(y: State, mesh_frequency: Scalar) -> Unknowns:
+    """A state as unknowns of like size."""
+    return jnp.concatenate([y[0], y[1] / (2 * jnp.pi * mesh_frequency)])
+
+
+def unscaled(z: Unknowns, mesh_frequency: Scalar) -> State:
+    """The state of unknowns."""
+    x, v = jnp.split(z, 2)
+    return x, v * (2 * jnp.pi * mesh_frequency)
+
+
+def after(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar, count: int) -> State:
+    """State after some cycles, of which nothing is recorded."""
+
+    def step(y, step):
+        return one_step(oscillator, y, step, mesh_frequency), None
+
+    return jax.lax.scan(lambda y, _: (jax.lax.scan(step, y, steps)[0], None), y, length=count)[0]
+
+
+def moved(oscillator: Oscillator, z: Unknowns, steps: Steps, mesh_frequency: Scalar, count: int) -> Unknowns:
+    """By how much the unknowns change over some cycles: zero on a periodic orbit."""
+    y = after(oscillator, unscaled(z, mesh_frequency), steps, mesh_frequency, count)
+    return scaled(y, mesh_frequency) - z
+
+
+def checked(owner: str, oscillator: Any, mesh_frequency: Any, start: Any) -> tuple[Scalar, State]:
+    """Mesh frequency and start as arrays of the oscillator's type.
+
+    Raises:
+        TypeError: for something else than an `Oscillator`.
+        ValueError: for a mesh frequency that is not positive, or a start of another shape.
+    """
+    if not isinstance(oscillator, Oscillator):
+        raise TypeError(f"{owner}: oscillator is of type {type(oscillator).__name__}, must be an Oscillator")
+    frequency = real(mesh_frequency)
+    if frequency.shape != ():
+        raise ValueError(
+            f"{owner}: mesh_frequency has shape {frequency.shape}, must be a single number; make many with jax.vmap"
+        )
+    check(owner, "mesh_frequency", frequency, "Hz", low=0.0, open_low=True)
+    shape = oscillator.mass.shape
+    if not isinstance(start, tuple | list) or len(start) != 2:
+        raise ValueError(f"{owner}: start must be displacements and velocities (x, v)")
+    for name, part in zip(("displacements", "velocities"), start):
+        if jnp.shape(part) != shape:
+            raise ValueError(f"{owner}: {name} of start have shape {jnp.shape(part)}, must be {shape}")
+    dtype = jnp.result_type(oscillator.mass, frequency)
+    x, v = (real(part).astype(dtype) for part in start)
+    return frequency.astype(dtype), (x, v)
+
+
+def nodes_of(owner: str, steps: Any) -> Float[Array, " nodes"]:
+    """Nodes of a mesh cycle, from their number or as they are given.
+
+    Raises:
+        ValueError: for fewer than two steps, or nodes that do not increase from 0 to 1.
+    """
+    if jnp.ndim(steps) == 0:
+        return jnp.linspace(0.0, 1.0, whole(owner, "steps", steps, 2) + 1)
+    nodes = real(steps)
+    known = None if isinstance(nodes, jax.core.Tracer) else nodes
+    if nodes.ndim != 1 or len(nodes) < 3:
+        raise ValueError(f"{owner}: steps have shape {nodes.shape}, must be a number or at least 3 nodes")
+    if known is not None and (known[0] != 0 or known[-1] != 1 or (jnp.diff(known) <= 0).any()):
+        raise ValueError(f"{owner}: nodes of steps must increase from 0 to 1 base pitch")
+    return nodes
