@@ -67,8 +67,3 @@ def one_cycle(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Sc
 def cycles(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar, count: int) -> tuple[State, State]:
     """State after some cycles, and the states at the begin of every step, leading axes (count, steps)."""
     return jax.lax.scan(lambda y, _: one_cycle(oscillator, y, steps, mesh_frequency), y, length=count)
-
-
-def advanced(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar) -> State:
-    """State after a cycle."""
-    return jax.lax.scan(lambda y, step: (one_step(oscillator, y, step, mesh_frequency), None), y, steps)[0]

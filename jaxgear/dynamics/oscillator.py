@@ -92,11 +92,6 @@ class Oscillator(Checked):
         """Approach of the flanks [um]."""
         return self._along(x) - self._excited(phase, jnp.zeros_like(phase))[0]
 
-    def along(self, phase: Scalar, y: State, mesh_frequency: Scalar) -> tuple[Scalar, Scalar]:
-        """Approach of the flanks [um] and its rate [um/s]."""
-        error, error_rate, _ = self._excited(phase, mesh_frequency)
-        return self._along(y[0]) - error, self._along(y[1]) - error_rate
-
     def approach_rate(self, phase: Scalar, v: Coordinates, mesh_frequency: Scalar) -> Scalar:
         """Velocity of the approach [um/s]."""
         return self._along(v) - self._excited(phase, mesh_frequency)[1]

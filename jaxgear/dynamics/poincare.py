@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import check, real, whole
-from .integrate import Steps, one_step, steps_of
+from .integrate import Steps, one_step
 from .oscillator import Oscillator, State
 
 Scalar = Float[Array, ""]

@@ -1,6 +1,6 @@
 """What a recorded orbit of an oscillator says: dynamic factor, vibration, spectra, shares of contact."""
 
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import equinox as eqx
 import jax
@@ -8,13 +8,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from ..numerics import Checked, result
+from .history import history, largest, mean, share, smallest
 from .integrate import Steps, one_cycle
 from .oscillator import Oscillator, State
 
 Scalar = Float[Array, ""]
 
-# Simpson's rule over begin, middle and end of a step
-_SIMPSON = (1 / 6, 4 / 6, 1 / 6)
+PLACES = (0.0, 0.5, 1.0)  # of the samples of a history in a step
 # an order repeats after so many cycles if times their number it is whole but for rounding
 _ROUNDING = 1e-6
 
@@ -70,7 +70,7 @@ class Sums(NamedTuple):
         lowest, highest: of the approach [um].
         mean, square: integrals of the approach from where it began, and of its square [um, um^2].
         apart, coast: time without contact and with coast flanks [cycles].
-        force, velocity: complex Fourier integrals, shape (orders,).
+        force, approach: complex Fourier integrals, shape (orders,).
     """
 
     peak: Scalar
@@ -81,7 +81,7 @@ class Sums(NamedTuple):
     apart: Scalar
     coast: Scalar
     force: Array
-    velocity: Array
+    approach: Array
 
 
 def no_sums(orders: Float[Array, " orders"]) -> Sums:
@@ -115,38 +115,25 @@ def with_cycle(
         origin: approach from which mean and square are taken [um].
     """
     end, begins = one_cycle(oscillator, y, steps, mesh_frequency)
-    begins = jax.tree.map(lambda part, last: jnp.concatenate([part, last[None]]), begins, end)
-    phases = jnp.append(steps.phase, jnp.ones_like(steps.phase[:1]))
-    q, v = jax.vmap(lambda phase, x, v: oscillator.along(phase, (x, v), mesh_frequency))(phases, *begins)
-    h = steps.length / mesh_frequency
-    # the cubic through approach and rate at both ends of a step
-    middle = (q[:-1] + q[1:]) / 2 + h * (v[:-1] - v[1:]) / 8
-    rate = jnp.where(h > 0, 1.5 * jnp.diff(q) / jnp.where(h > 0, h, 1.0), v[:-1]) - (v[:-1] + v[1:]) / 4
-    force = jax.vmap(oscillator.mesh_force.force)
-    forces = (force(steps.first, q[:-1]), force(steps.middle, middle), force(steps.last, q[1:]))
-    approaches, rates = (q[:-1], middle, q[1:]), (v[:-1], rate, v[1:])
+    of = history(oscillator, jax.tree.map(lambda part: part[None], begins), end, steps, mesh_frequency)
+    off = of.approach - origin
+    places = jnp.asarray(PLACES, of.phase.dtype)
+    turn = 2 * jnp.pi * orders * (of.phase + places[:, None] * of.length + cycle)[..., None]
 
-    def integral(parts):
-        return sum(weight * jnp.sum(steps.length * part) for weight, part in zip(_SIMPSON, parts))
+    def spectrum(values):
+        return jax.lax.complex(*(jax.vmap(lambda turned: mean(of, values * turned), -1)(wave) for wave in waves))
 
-    def spectrum(parts):
-        shares = [weight * steps.length * part for weight, part in zip(_SIMPSON, parts)]
-        turned = [share @ wave for share, wave in zip(shares, waves)]
-        return sum(turned[1:], turned[0])
-
-    at = [steps.phase + share * steps.length + cycle for share in (0.0, 0.5, 1.0)]
-    waves = [jnp.exp(jax.lax.complex(jnp.zeros(()), -2 * jnp.pi) * phase[:, None] * orders[None]) for phase in at]
-    off = [part - origin for part in approaches]
+    waves = jnp.cos(turn), -jnp.sin(turn)
     return end, Sums(
-        jnp.maximum(sums.peak, jnp.max(_crest(*forces))),
-        jnp.minimum(sums.lowest, -jnp.max(_crest(*(-part for part in approaches)))),
-        jnp.maximum(sums.highest, jnp.max(_crest(*approaches))),
-        sums.mean + integral(off),
-        sums.square + integral([part**2 for part in off]),
-        sums.apart + integral([(part == 0).astype(q.dtype) for part in forces]),
-        sums.coast + integral([(part < 0).astype(q.dtype) for part in forces]),
-        sums.force + spectrum(forces),
-        sums.velocity + spectrum(rates),
+        jnp.maximum(sums.peak, largest(of.force)),
+        jnp.minimum(sums.lowest, smallest(of.approach)),
+        jnp.maximum(sums.highest, largest(of.approach)),
+        sums.mean + mean(of, off),
+        sums.square + mean(of, off**2),
+        sums.apart + share(of, of.force == 0),
+        sums.coast + share(of, of.force < 0),
+        sums.force + spectrum(of.force),
+        sums.approach + spectrum(of.approach),
     )
 
 
@@ -165,12 +152,19 @@ class Numbers(NamedTuple):
 
 
 def numbers_of(
-    sums: Sums, *, cycles: Scalar, orders: Float[Array, " orders"], origin: Scalar, static_force: Scalar
+    sums: Sums,
+    mesh_frequency: Scalar,
+    *,
+    cycles: Scalar,
+    orders: Float[Array, " orders"],
+    origin: Scalar,
+    static_force: Scalar,
 ) -> Numbers:
     """Numbers of an orbit from the sums over its cycles.
 
     Args:
         sums: over so many cycles.
+        mesh_frequency: [Hz].
         cycles: their number.
         orders: multiples of the mesh frequency.
         origin: as in `with_cycle` [um].
@@ -190,16 +184,7 @@ def numbers_of(
         sums.lowest,
         sums.highest,
         amplitudes(sums.force),
-        amplitudes(sums.velocity),
+        amplitudes(sums.approach) * 2 * jnp.pi * orders * mesh_frequency,
         sums.apart / cycles,
         sums.coast / cycles,
     )
-
-
-def _crest(begin: Any, middle: Any, end: Any):
-    """Highest value within each step of the parabola through its begin, middle and end."""
-    bend = 2 * (begin + end) - 4 * middle
-    slope = 4 * middle - 3 * begin - end
-    inside = (bend < 0) & (slope > 0) & (slope < -2 * bend)
-    top = begin - slope**2 / jnp.where(inside, 4 * bend, 1.0)
-    return jnp.where(inside, top, jnp.maximum(begin, end))

@@ -10,8 +10,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ..numerics import check, concrete, kernel, real, whole
-from .integrate import Steps, advanced, steps_of
+from .integrate import Steps, steps_of
 from .oscillator import Oscillator, State
+from .poincare import after
 from .response import Numbers, SpeedResponse, no_sums, numbers_of, with_cycle
 from .static import Rest, at_rest, natural_frequencies
 
@@ -259,7 +260,7 @@ def _steady(oscillator, y, rows: Steps, frequency, limits: _Limits, sizes: _Size
     y, period = _settled(oscillator, y, rows, frequency, limits, sizes.most_periods)
     orders = jnp.asarray(sizes.orders, frequency.dtype)
     zero = jnp.zeros((), frequency.dtype)
-    origin = oscillator.along(zero, y, frequency)[0]
+    origin = oscillator.approach(zero, y[0])
     cycles = jnp.where(period > 0, period, sizes.points)
 
     def on(carry):
@@ -267,7 +268,7 @@ def _steady(oscillator, y, rows: Steps, frequency, limits: _Limits, sizes: _Size
 
     def recorded(carry):
         cycle, y, sums, approaches, velocities = carry
-        q, v = oscillator.along(zero, y, frequency)
+        q, v = oscillator.approach(zero, y[0]), oscillator.approach_rate(zero, y[1], frequency)
         # an orbit's points repeat, so that there are as many for every speed
         here = jnp.arange(sizes.points) % cycles == cycle
         approaches, velocities = jnp.where(here, q, approaches), jnp.where(here, v, velocities)
@@ -278,7 +279,7 @@ def _steady(oscillator, y, rows: Steps, frequency, limits: _Limits, sizes: _Size
     begin = jnp.zeros_like(cycles), y, no_sums(orders), nothing, nothing
     _, y, sums, approaches, velocities = jax.lax.while_loop(on, recorded, begin)
     numbers = numbers_of(
-        sums, cycles=cycles.astype(frequency.dtype), orders=orders, origin=origin, static_force=rest.force
+        sums, frequency, cycles=cycles.astype(frequency.dtype), orders=orders, origin=origin, static_force=rest.force
     )
     return _Found(numbers, period, approaches, velocities, y)
 
@@ -289,7 +290,7 @@ def _settled(oscillator, y, rows: Steps, frequency, limits: _Limits, most_period
 
     def watched(y: State) -> Array:
         """What repeats, all in um: of coordinates that nothing holds only the approach does."""
-        q, v = oscillator.along(zero, y, frequency)
+        q, v = oscillator.approach(zero, y[0]), oscillator.approach_rate(zero, y[1], frequency)
         turn = 1 / (2 * jnp.pi * frequency)
         if oscillator.stiffness is None:
             return jnp.stack([q, turn * v])
@@ -301,7 +302,7 @@ def _settled(oscillator, y, rows: Steps, frequency, limits: _Limits, most_period
 
     def cycled(carry):
         cycle, _, y, before = carry
-        y = advanced(oscillator, y, rows, frequency)
+        y = after(oscillator, y, rows, frequency, 1)
         now = watched(y)
         size = jnp.maximum(jnp.max(jnp.abs(now)), jnp.nanmax(jnp.abs(before)))
         away = jnp.max(jnp.abs(before - now), axis=1) / size

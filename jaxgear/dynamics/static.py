@@ -44,19 +44,19 @@ def at_rest(oscillator: Oscillator, phase: Scalar) -> Rest:
     load = oscillator.load / root_mass
     wanted = along @ load / (along @ along)
     approach = _approach_under(oscillator.mesh_force, place, wanted)
-    error = oscillator.along(phase, (jnp.zeros_like(load), jnp.zeros_like(load)), jnp.zeros_like(phase))[0]
-    x = along * (approach - error) / (along @ along)
+    error = -oscillator.approach(phase, jnp.zeros_like(load))
+    x = along * (approach + error) / (along @ along)
     if oscillator.stiffness is not None:
         ground = oscillator.stiffness / (root_mass[:, None] * root_mass[None])
 
         def residual(x):
-            return ground @ x + along * oscillator.mesh_force.force(place, along @ x + error) - load
+            return ground @ x + along * oscillator.mesh_force.force(place, along @ x - error) - load
 
         def corrected(_, x):
             return x - jnp.linalg.lstsq(jax.jacfwd(residual)(x), residual(x))[0]
 
         x = jax.lax.fori_loop(0, _NEWTON_STEPS, corrected, x)
-    approach = along @ x + error
+    approach = along @ x - error
     force, slope = jax.jvp(lambda q: oscillator.mesh_force.force(place, q), (approach,), (jnp.ones_like(approach),))
     return Rest(x / root_mass, force, slope)
 
