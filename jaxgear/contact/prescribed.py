@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
@@ -11,6 +12,10 @@ from .mesh import Mesh
 from .operation import operation_of
 from .slide import RemovedMaterial
 from .solve import check_mesh, outermost, removed_material
+
+# Newton steps from the approach of all springs in series to that of the teeth: the force of contacts that stiffen bends
+# one way, so that the steps come from one side and double their digits; measured, four leave 1e-9 of the force.
+_SERIES_STEPS = 4
 
 Scalar = Float[Array, ""]
 Curve = Float[Array, " positions"]
@@ -97,3 +102,37 @@ def _solve_at(mesh: Mesh, error: Curve, removed: RemovedMaterial) -> PrescribedC
         residual=solution.residual,
         converged=solution.solved & mesh.margins.valid & (error < outermost(mesh, removed)),
     )
+
+
+def solve_series(
+    mesh: Mesh, approach: Curve, removed: RemovedMaterial, compliance: Scalar
+) -> tuple[Curve, Curve, Curve, Bool[Array, " positions"]]:
+    """Contact at a prescribed approach of the teeth and what they share in series, whose deflection is part of it.
+
+    Args:
+        mesh: prepared mesh.
+        approach: of teeth, wind-up of the bodies (`mesh.hub`) and series compliance together [um], shape (positions,).
+        removed: material removed from the flanks.
+        compliance: further one in series, of shafts for instance [um/N].
+
+    Returns:
+        the force [N]; its slope over the approach [N/um]; the transmission error of the teeth alone, for `solve_at`
+        [um]; and where this has converged; all of shape (positions,).
+    """
+    shared = mesh.hub / mesh.pair.face_width + compliance
+
+    def step(error, _):
+        found = _solve_at(mesh, error, removed)
+        missed = approach - error - shared * found.force
+        slope = found.tangent_stiffness / (1 + shared * found.tangent_stiffness)
+        change = missed / (1 + shared * found.tangent_stiffness)
+        return error + change, (found.force + slope * missed, slope, error, found.converged & _is_met(missed, approach))
+
+    steps = jax.lax.scan(step, approach, length=_SERIES_STEPS)[1]
+    force, slope, error, converged = jax.tree.map(lambda part: part[-1], steps)
+    return force, slope, error, converged
+
+
+def _is_met(missed: Curve, approach: Curve) -> Bool[Array, " positions"]:
+    # what is missed has been corrected to first order
+    return jnp.abs(missed) <= 1e-3 * (1 + jnp.abs(approach))

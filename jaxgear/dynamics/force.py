@@ -7,7 +7,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, number
+from ..numerics import Checked, bracketed_root, number
+
+# Doublings of 1 um until a bracket holds the approach of a force; there is no root where they do not suffice.
+_DOUBLINGS = 40
+# Share of a force by which flanks count as touching, where the deflection under the force is measured from.
+_TOUCHING = 1e-6
 
 Scalar = Float[Array, ""]
 
@@ -46,6 +51,52 @@ class AbstractMeshForce(Checked):
         """Slope of the force over the approach [N/um]."""
         place = self.at(phase)
         return jax.jvp(lambda q: self.force(place, q), (approach,), (jnp.ones_like(approach),))[1]
+
+    def static_approach(self, phase: Scalar, force: Scalar) -> Scalar:
+        """Approach [um] that takes a force [N]: the loaded transmission error under it.
+
+        A positive force has one on the drive flanks, a negative one on the coast flanks. Where there is none, as for a
+        negative force without coast flanks, the number that is returned is far out; for a force of zero it is
+        somewhere in the clearance.
+        """
+        return _approach_at(self, self.at(phase), force)
+
+    def mean_stiffness(self, force: Scalar, *, positions: int = 64) -> Scalar:
+        """Mean stiffness under a static force: the force over the mean deflection of a cycle [N/um].
+
+        The deflection is the static approach under the force less that at which the flanks touch. That is the stiffness
+        of a linear spring with the same mean deflection: natural frequency and damping of the literature refer to
+        it, it does not depend on how a contact stiffens from zero on, and it needs no derivative.
+
+        Args:
+            force: static force [N], not zero.
+            positions: mesh positions of the mean, evenly spaced from 0 on.
+        """
+
+        def deflection(phase):
+            place = self.at(phase)
+            return _approach_at(self, place, force) - _approach_at(self, place, _TOUCHING * force)
+
+        phases = jnp.arange(positions, dtype=jnp.result_type(force)) / positions
+        return force / jnp.mean(jax.vmap(deflection)(phases))
+
+
+def _missing(approach: Scalar, args) -> Scalar:
+    mesh_force, place, force = args
+    return mesh_force.force(place, approach) - force
+
+
+def _approach_at(mesh_force: AbstractMeshForce, place: Any, force: Scalar) -> Scalar:
+    args = mesh_force, place, force
+    fixed = jax.lax.stop_gradient(args)
+
+    def is_short(state):
+        width, doublings = state
+        return (doublings < _DOUBLINGS) & ((_missing(width, fixed) < 0) | (_missing(-width, fixed) > 0))
+
+    start = jnp.ones_like(force), 0
+    width, _ = jax.lax.while_loop(is_short, lambda state: (2 * state[0], state[1] + 1), start)
+    return bracketed_root(_missing, -width, width, args)
 
 
 class DeadZone(AbstractMeshForce):

@@ -58,7 +58,7 @@ def _moved(oscillator: Oscillator, frequency, start, nodes, periods: int) -> Mot
     _, states = cycles(oscillator, start, steps, frequency, periods)
 
     def of_step(step, phase, x, v):
-        q, rate = oscillator.along(phase, (x, v), frequency)
+        q, rate = oscillator.approach(phase, x), oscillator.approach_rate(phase, v, frequency)
         return phase, q, rate, oscillator.mesh_force.force(step.first, q)
 
     def of_cycle(number, x, v):

@@ -8,6 +8,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
@@ -77,7 +78,10 @@ class _WithSettings:
                 raise ValueError(f"{self.name}: needs a speed, solve with Operation(torque, speed)")
             frequency = mesh_frequency(cycle.kinematics.pair.pinion.teeth, operation.speed)
             settings = dataclasses.replace(settings, mesh_frequencies=frequency[None])
-        return getattr(settings.numbers(settings.oscillator_of(cycle, mesh)), kind.field)
+        oscillator = settings.oscillator_of(cycle, mesh)
+        found = getattr(settings.numbers(oscillator), kind.field)
+        # a map of contacts that were not found is no force
+        return jnp.where(oscillator.mesh_force.converged, found, jnp.nan)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -104,11 +108,8 @@ def _quantity(name: str, of: Callable[[MeshCycle], Any]) -> Quantity:
 
 
 def _plain(settings: Checked) -> tuple[tuple[str, Any], ...]:
-    return tuple((field.name, _hashable(field.name, getattr(settings, field.name))) for field in _fields(settings))
-
-
-def _fields(settings: Checked) -> tuple[dataclasses.Field, ...]:
-    return dataclasses.fields(settings)
+    names = [field.name for field in dataclasses.fields(settings)]
+    return tuple((name, _hashable(name, getattr(settings, name))) for name in names)
 
 
 def _hashable(name: str, value: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +14,7 @@ from ..metrics import Quantity
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, concrete, count, number
 from .force import AbstractMeshForce
-from .from_contact import mesh_force
+from .from_contact import Model, mesh_force, mesh_force_of
 from .oscillator import Oscillator
 from .response import SpeedResponse
 from .speed_sweep import speed_sweep
@@ -23,7 +23,6 @@ from .systems import inertia_of, on_bearings, torsional
 
 Scalar = Float[Array, ""]
 Bearing = Float[Array, " directions"]
-Model = Literal["map", "varying stiffness", "loaded error", "tangent"]
 
 UP, DOWN, KICKED = "up", "down", "down, kicked"
 
@@ -181,4 +180,5 @@ class Dynamics(Checked):
 
     def oscillator_of(self, cycle: MeshCycle, mesh: Mesh) -> Oscillator:
         """What vibrates, of a design that a cycle on the mesh is of, its manufacturing deviations included."""
-        raise NotImplementedError
+        options = {"model": self.model, "compliance": self.compliance}
+        return self.masses(mesh_force_of(cycle, mesh, **options), mesh.pair, cycle.torque)

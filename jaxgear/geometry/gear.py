@@ -35,6 +35,10 @@ class Gear(Checked):
             which cannot pass its torque on along the axis, so without a held circle its wind-up has no limit.
         tip_edge_radius: radius of the edge between flank and tip cylinder [mm], used for the pressure of corner contact
             only.
+        tooth_thickness_allowance: E_sns (ISO 21771), by which the tooth is thicker than the rack makes it, as an arc on
+            the reference cylinder [um]: negative for backlash, half of it on either flank. Both flanks are turned
+            towards the tooth centreline with their fillets, as by a tool with wider teeth at the same depth: the root
+            circle stays, and the thinner tooth is softer. Tables of finite elements hold the tooth without it.
         material: elastic constants.
 
     Raises:
@@ -54,6 +58,7 @@ class Gear(Checked):
     tip_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     bore_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     tip_edge_radius: Scalar = number("mm", low=0.0, open_low=True, default=0.1, kw_only=True)
+    tooth_thickness_allowance: Scalar = number("um", high=0.0, default=0.0, kw_only=True)
     material: Material = eqx.field(default_factory=Material, kw_only=True)
 
     def check_together(self) -> None:
@@ -103,6 +108,11 @@ class Gear(Checked):
     def bore_radius(self) -> Real:
         """[mm]"""
         return 0.5 * self.root_circle_radius if self.bore_diameter is None else 0.5 * self.bore_diameter
+
+    @property
+    def thickness_angle(self) -> Real:
+        """What the tooth thickness allowance adds to half the angle of the tooth [rad]."""
+        return 1e-3 * self.tooth_thickness_allowance / (2 * self.pitch_radius)
 
     @property
     def tip_roll_length(self) -> Real:

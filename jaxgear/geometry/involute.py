@@ -32,6 +32,9 @@ class Toothed(Protocol):
     @property
     def base_radius(self) -> Scalar: ...
 
+    @property
+    def thickness_angle(self) -> Scalar: ...
+
 
 def involute(tangent: Real) -> Real:
     """inv(alpha) [rad] from tan(alpha)."""
@@ -42,7 +45,7 @@ def half_tooth_angle(gear: Toothed, rho: Real) -> Real:
     """Angle between the tooth centreline and the involute at a roll length [mm], seen from the gear centre [rad]."""
     alpha = jnp.deg2rad(gear.pressure_angle)
     at_base = (jnp.pi / 2 + 2 * gear.profile_shift * jnp.tan(alpha)) / gear.teeth + involute(jnp.tan(alpha))
-    return at_base - involute(rho / gear.base_radius)
+    return at_base + gear.thickness_angle - involute(rho / gear.base_radius)
 
 
 def load_angle(gear: Toothed, rho: Real) -> Real:

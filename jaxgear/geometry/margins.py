@@ -13,7 +13,7 @@ from ..numerics import Checked, result, safe_sqrt
 from .gear import Gear, shape_faults
 from .involute import diameter, involute
 from .outline import Outline, outline
-from .path import PathOfContact, backlash_free_involute, working_pressure_angle
+from .path import PathOfContact, backlash_free_involute, pressure_angle_of
 
 Scalar = Float[Array, ""]
 
@@ -50,7 +50,8 @@ class Margins(Checked):
         pinion_tip_clearance, wheel_tip_clearance: from the gear's tip to the mate's root circle on the line of
             centres [mm].
         contact_ratio_margin: transverse contact ratio minus 1.
-        backlash: play between the unloaded flanks on the line of action [um]; 0 without a given centre distance.
+        backlash: play between the unloaded flanks on the line of action [um], by centre distance and tooth thickness
+            allowances; without a given centre distance that of the allowances alone.
         base_circle_clearance: centre distance minus both base radii [mm].
         base_pitch_difference: between pinion and wheel, relative. No margin: it must vanish.
         accuracy: by how much clearances of the form circles and backlash may lie below zero.
@@ -106,6 +107,7 @@ def margins_between(pinion: Outline, wheel: Outline, path: PathOfContact, center
     distance = both * secant if center_distance is None else center_distance
     # p_b - s_1 - s_2 with the thicknesses at the base circles: 2 (r_b1 + r_b2) (inv(alpha_w) - inv(alpha_w,free))
     play = 2e3 * both * (involute(tangent) - backlash_free_involute(first, second))
+    play = (jnp.zeros_like(play) if center_distance is None else play) - thickening(first, second)
     return Margins(
         pinion_tip_land=first.tip_land,
         wheel_tip_land=second.tip_land,
@@ -118,7 +120,7 @@ def margins_between(pinion: Outline, wheel: Outline, path: PathOfContact, center
         pinion_tip_clearance=distance - first.tip_radius - second.root_circle_radius,
         wheel_tip_clearance=distance - second.tip_radius - first.root_circle_radius,
         contact_ratio_margin=path.contact_ratio - 1,
-        backlash=jnp.zeros_like(play) if center_distance is None else play,
+        backlash=play,
         base_circle_clearance=distance - both,
         base_pitch_difference=jnp.abs(first.base_pitch - second.base_pitch) / first.base_pitch,
         accuracy=Accuracy(
@@ -128,6 +130,11 @@ def margins_between(pinion: Outline, wheel: Outline, path: PathOfContact, center
             backlash=2e3 * _DISTANCE_ACCURACY * both * tangent,
         ),
     )
+
+
+def thickening(pinion: Gear, wheel: Gear) -> Scalar:
+    """Play on the line of action that the tooth thickness allowances take [um]: the arcs on both base circles."""
+    return 2e3 * (pinion.base_radius * pinion.thickness_angle + wheel.base_radius * wheel.thickness_angle)
 
 
 def _form_accuracy(outline: Outline) -> Scalar:
@@ -175,8 +182,9 @@ def faults_between(
 
 
 def _backlash_fault(pinion: Gear, wheel: Gear, center_distance) -> str:
-    angle = working_pressure_angle(pinion, wheel, None)
-    free = float((pinion.base_radius + wheel.base_radius) / jnp.cos(angle)) * (1 - _DISTANCE_ACCURACY)
+    both = pinion.base_radius + wheel.base_radius
+    angle = pressure_angle_of(backlash_free_involute(pinion, wheel) + 0.5e-3 * thickening(pinion, wheel) / both)
+    free = float(both / jnp.cos(angle)) * (1 - _DISTANCE_ACCURACY)
     unit = "mm (backlash-free)"
     return f"GearPair: center_distance = {float(center_distance):g} {unit} must be at least {free:g} {unit}"
 

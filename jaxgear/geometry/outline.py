@@ -128,7 +128,8 @@ def rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
     alpha, m = jnp.deg2rad(gear.pressure_angle), gear.module
     tip = gear.root_radius * m
     from_rack_centre = jnp.pi * m / 4 - gear.dedendum * m * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * tip / jnp.cos(alpha)
-    return jnp.pi * m / 2 - from_rack_centre, (gear.dedendum - gear.profile_shift) * m - tip, tip
+    from_centreline = jnp.pi * m / 2 - from_rack_centre + gear.pitch_radius * gear.thickness_angle
+    return from_centreline, (gear.dedendum - gear.profile_shift) * m - tip, tip
 
 
 def trochoid(gear: Gear, g: Real) -> tuple[Real, Real]:

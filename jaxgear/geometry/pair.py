@@ -21,7 +21,7 @@ class GearPair(Checked):
         pinion: driving gear.
         wheel: driven gear.
         center_distance: operating centre distance [mm]; None for the backlash-free one of the nominal tooth
-            thicknesses.
+            thicknesses, to which tooth thickness allowances add their play.
 
     Raises:
         ValueError: for gears that do not share module or pressure angle, an impossible centre distance, a contact ratio
@@ -56,7 +56,9 @@ class GearPair(Checked):
 
     @property
     def backlash(self) -> Scalar:
-        """Play between the unloaded flanks on the line of action [um], of nominal tooth thicknesses."""
+        """Play between the unloaded, unmodified flanks on the line of action [um]: that of the centre distance, and
+        cos(pressure angle) times what the tooth thickness allowances take off both teeth.
+        """
         return margins(self).backlash
 
     @property

@@ -77,7 +77,11 @@ def working_pressure_angle(pinion: Gear, wheel: Gear, center_distance: Real | No
         ratio = (pinion.base_radius + wheel.base_radius) / center_distance
         # the clip keeps a traced, impossible centre distance finite; a concrete one has been refused
         return jnp.arccos(jnp.minimum(ratio, 1.0 - 1e-6))
-    target = backlash_free_involute(pinion, wheel)
+    return pressure_angle_of(backlash_free_involute(pinion, wheel))
+
+
+def pressure_angle_of(target: Real) -> Real:
+    """Pressure angle [rad] whose involute function is given [rad]."""
     low, high = jnp.full_like(target, 1e-3), jnp.full_like(target, jnp.tan(_WIDEST_ANGLE))
     return jnp.arctan(bracketed_root(_missing_involute, low, high, target))
 

@@ -23,6 +23,8 @@ from .variables import increasing, read_variables
 
 # Tooth pairs are carried along up to this many times the deflection of a single pair after ISO 6336-1.
 _DEFLECTIONS = 2.0
+# A mesh force has to be known up to these, which vibration reaches.
+_DYNAMIC_DEFLECTIONS = 5.5
 # Where gears are left open, at least as many as `prepare` takes for traced gears: contact ratios up to 3.
 _OPEN_PAIRS = 4
 # Slices where a modification varies along the face: the mean of a parabola over the middles of n slices is 1 / n^2 too
@@ -133,12 +135,13 @@ class DesignFile:
         if self._resolution.pairs is not None:
             return self._resolution
         torque = max(self.torque, self.torque_range[1]) if torque is None else torque
-        deflection = _DEFLECTIONS * float(_single_deflection(self._middle, np.asarray(torque)))
+        times = _DEFLECTIONS if self.dynamics is None else _DYNAMIC_DEFLECTIONS
+        deflection = times * float(_single_deflection(self._middle, np.asarray(torque)))
         try:
             pairs = fewest_pairs(self._middle, deflection=deflection)
         except ValueError:
             given = f"{torque:g} N m deflects a pair of teeth of module {float(self._middle.pinion.module):g} mm by"
-            problem = f"{given} {deflection / _DEFLECTIONS:.3g} um: give the torque in N m, elastic moduli in MPa"
+            problem = f"{given} {deflection / times:.3g} um: give the torque in N m, elastic moduli in MPa"
             raise DesignFileError("load.torque", problem, self.path) from None
         if self._pair.free():  # other variants can have a larger contact ratio
             pairs = max(pairs, _OPEN_PAIRS)

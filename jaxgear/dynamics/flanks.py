@@ -1,0 +1,107 @@
+"""Drive and coast flanks of a mesh: one gear pair seen twice, and the clearance between both."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..contact import Mesh, RemovedMaterial, removed_material, solve_removed
+from ..contact.mesh import prepare_from
+from ..geometry import tooth_thickness
+from ..microgeometry import AbstractModification
+from ..numerics import program
+
+Scalar = Float[Array, ""]
+Curve = Float[Array, " positions"]
+Both = tuple[AbstractModification | None, AbstractModification | None]
+
+
+class Flanks(NamedTuple):
+    """One side of the teeth as the mesh force meets it.
+
+    Attributes:
+        mesh: prepared at the mesh positions of these flanks.
+        removed: material removed.
+        order: which of its positions belongs to each position of the drive flanks, shape (positions,).
+        clearance: what is added to the approach of these flanks where the other ones just touch unmodified [um].
+    """
+
+    mesh: Mesh
+    removed: RemovedMaterial
+    order: Any
+    clearance: Scalar
+
+
+class Static(NamedTuple):
+    """Static contact of one side under a torque, shape (positions,) each, in the order of the drive flanks.
+
+    Attributes:
+        unloaded: approach at which the flanks touch [um].
+        loaded: approach under the torque, series compliance included [um].
+        stiffness: slope of the force there [N/um].
+        converged: where the contact has been found.
+    """
+
+    unloaded: Curve
+    loaded: Curve
+    stiffness: Curve
+    converged: Any
+
+
+def drive_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
+    """The flanks that a mesh has been prepared for."""
+    pinion, wheel = modification
+    removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
+    return Flanks(mesh, removed, jnp.arange(mesh.resolution.positions), jnp.zeros_like(torque))
+
+
+def coast_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
+    """The flanks behind, solved at their own mesh positions.
+
+    Seen in a mirror the coast flanks are drive flanks of the same gears that turn the other way, and their force is
+
+        F(phase, q) = -F_coast(phase_c - phase, -q - j),    phase_c = 1/2 + (s_1 - s_2) / (2 p)
+
+    with the backlash j on the line of action, the tooth thicknesses s_1 of the pinion and s_2 of the wheel on the
+    working pitch circles, and the pitch p = s_1 + s_2 + j / cos(alpha_w) there.
+
+    Of an approach q both gears have half: the pinion is q/2 ahead of its mean position, the wheel q/2 behind, as
+    everywhere in jaxgear. On the pitch circle the leading flank of the pinion's reference tooth is then
+    phase p + q / (2 cos(alpha_w)) ahead of the pitch point and the coast flank s_1 behind that. The coast flanks touch
+    where q = -j: they do so in the pitch point at phase p = s_1 + j / (2 cos(alpha_w)), modulo p, which is phase_c.
+    The coast contact moves against the mirrored direction while the gears turn on, hence the sign of the phase; its
+    approach is measured from q = -j, and half of it again moves either gear. (R. G. Parker and co-workers name the
+    phase between both sides: Y. Guo, R. G. Parker, Mech. Mach. Theory 78 (2014) 263-273.)
+    """
+    pair, sizes = mesh.pair, mesh.resolution
+    first, shift, play = _coast_phase(mesh)
+    turned = prepare_from(first, pair, mesh.compliance, sizes)
+    pinion, wheel = modification
+    removed = removed_material(turned, torque, pinion=pinion, wheel=wheel)
+    order = (shift - jnp.arange(sizes.positions)) % sizes.positions
+    return Flanks(turned, removed, order, play)
+
+
+@program
+def _coast_phase(mesh: Mesh):
+    """First mesh position of the coast flanks, which of them belongs to the first of the drive flanks, backlash."""
+    pair, count = mesh.pair, mesh.resolution.positions
+    secant = 1 / jnp.cos(pair.working_pressure_angle)
+    thickness = [tooth_thickness(gear, 2 * gear.base_radius * secant) for gear in (pair.pinion, pair.wheel)]
+    middle = 0.5 + (thickness[0] - thickness[1]) / (2 * pair.base_pitch * secant)
+    places = (middle - mesh.kinematics.first_phase) * count
+    shift = jnp.floor(places)
+    return (places - shift) / count, shift.astype(int), mesh.margins.backlash
+
+
+def static(flanks: Flanks, torque: Scalar, compliance: Scalar) -> Static:
+    """Static contact of one side."""
+    cycle = solve_removed(flanks.mesh, torque, flanks.removed)
+    force = cycle.force
+    found = Static(
+        cycle.unloaded_transmission_error,
+        cycle.transmission_error + compliance * force,
+        1 / (1 / cycle.tangent_stiffness + compliance),
+        cycle.converged,
+    )
+    return Static(*(part[flanks.order] for part in found))

@@ -1,0 +1,125 @@
+"""The force of a mesh from contact analyses, on a grid of mesh positions and approaches."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from ..contact.prescribed import solve_series
+from ..numerics import kernel, result
+from .flanks import Flanks
+from .force import AbstractMeshForce
+
+Scalar = Float[Array, ""]
+Start = Float[Array, "sides"]
+Table = Float[Array, "sides positions levels"]
+
+# slopes at the ends of an interval up to which a cubic rises (F. N. Fritsch, R. E. Carlson, SIAM J. Numer. Anal. 17
+# (1980) 238-246), in mean slopes
+_STEEPEST = 3.0
+
+
+class Rows(NamedTuple):
+    """What the force at one mesh position depends on; first the drive, then the coast flanks.
+
+    Attributes:
+        start: approach at which the drive flanks touch, and the negative of that at which the coast flanks do [um].
+        force: at the levels of approach beyond `start` [N], shape (sides x levels,).
+        rise: its slope times the distance of two levels [N], same shape.
+    """
+
+    start: Start
+    force: Float[Array, " nodes"]
+    rise: Float[Array, " nodes"]
+
+
+class ForceMap(AbstractMeshForce):
+    """Force of a mesh by cubic pieces over the approach, linear between mesh positions; made by `mesh_force`.
+
+    The force is exactly zero in the clearance, rises everywhere else with a continuous slope, and goes on linearly
+    beyond the table.
+
+    Attributes:
+        first_phase: mesh position with which the grid begins [base pitches].
+        start: approach at which the drive flanks touch, and the negative of that at which the coast flanks do [um],
+            shape (2, positions).
+        spacing: of the levels of approach [um].
+        node_force: force of drive and coast flanks [N], shape (2, positions, levels), from `start` on.
+        node_stiffness: its slope over the approach [N/um], same shape.
+        converged: whether all contacts of the grid have been found.
+    """
+
+    first_phase: Scalar = result("base pitches")
+    start: Float[Array, "sides positions"] = result("um")
+    spacing: Scalar = result("um")
+    node_force: Table = result("N")
+    node_stiffness: Table = result("N/um")
+    converged: Bool[Array, ""] = result()
+
+    def at(self, phase: Scalar) -> Rows:
+        lower, upper, share = between(phase, self.first_phase, self.start.shape[-1])
+
+        def mixed(table):
+            return ((1 - share) * table[:, lower] + share * table[:, upper]).reshape(-1)
+
+        return Rows(mixed(self.start), mixed(self.node_force), mixed(self.node_stiffness * self.spacing))
+
+    def force(self, place: Rows, approach: Scalar) -> Scalar:
+        levels = len(place.force) // 2
+        drive, closed = closing(place.start, approach)
+        level = closed / self.spacing
+        below = jnp.clip(level, 0.0, levels - 2).astype(jnp.int32)
+        node = below + jnp.where(drive, 0, levels).astype(jnp.int32)
+        share = level - below
+        inside = jnp.clip(share, 0.0, 1.0)
+        low, high, rise, end = place.force[node], place.force[node + 1], place.rise[node], place.rise[node + 1]
+        jump = high - low
+        cubic = rise + inside * (3 * jump - 2 * rise - end + inside * (rise + end - 2 * jump))
+        found = low + inside * cubic + end * jnp.maximum(share - 1, 0.0)
+        return jnp.where(drive, found, -found)
+
+
+def between(phase: Scalar, first: Scalar, count: int):
+    """The places of a periodic grid on both sides of a mesh position, and what share of the way it is to the second."""
+    place = (phase - first) * count
+    lower = jnp.floor(place)
+    index = lower.astype(jnp.int32) % count
+    return index, (index + 1) % count, place - lower
+
+
+def closing(start: Start, approach: Scalar) -> tuple[Bool[Array, ""], Scalar]:
+    """Whether the drive flanks are nearer than the coast flanks, and how far the nearer ones are past touching [um]."""
+    drive = approach >= 0.5 * (start[0] - start[1])
+    return drive, jnp.where(drive, approach - start[0], -approach - start[1])
+
+
+@kernel
+def tabulate(flanks: Flanks, unloaded, compliance: Scalar, spacing: Scalar, levels: int):
+    """Force [N] and slope [N/um] of one side at levels of the approach, shape (positions, levels) each, and whether
+    all of it has converged.
+
+    Args:
+        flanks: of one side.
+        unloaded: approach at which the flanks touch [um], in the order of the flanks' own mesh.
+        compliance: in series [um/N].
+        spacing: of the levels [um].
+        levels: their number.
+    """
+    above = spacing * jnp.arange(1, levels, dtype=spacing.dtype)
+
+    def at(level):
+        return solve_series(flanks.mesh, unloaded + level, flanks.removed, compliance)
+
+    force, slope, _, converged = jax.vmap(at)(above)
+    force, slope = (jnp.moveaxis(part, 0, 1) for part in (force, slope))
+    force = jnp.concatenate([jnp.zeros_like(force[:, :1]), force], axis=1)
+    # contacts are soft where they begin, within less than a level: the slope there is that of a parabola
+    first = 2 * force[:, 1:2] / spacing - slope[:, :1]
+    slope = jnp.concatenate([first, slope], axis=1)
+    mean = jnp.diff(force, axis=1) / spacing
+    around = jnp.minimum(
+        jnp.concatenate([mean[:, :1], mean], axis=1), jnp.concatenate([mean, slope[:, -1:]], axis=1)
+    )
+    slope = jnp.clip(slope, 0.0, _STEEPEST * around)
+    return force[flanks.order], slope[flanks.order], jnp.all(converged)

@@ -1,0 +1,172 @@
+"""Mesh forces of a prepared mesh: the map of its contact, and simpler models of it."""
+
+from dataclasses import replace
+from typing import Any, Literal, get_args
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..contact import Mesh, MeshCycle, RemovedMaterial, prepare
+from ..contact.operation import operation_of
+from ..contact.solve import check_mesh
+from ..microgeometry import AbstractModification
+from ..numerics import check, concrete, real, whole
+from .flanks import Both, Flanks, Static, coast_flanks, drive_flanks, static
+from .force import AbstractMeshForce
+from .force_map import ForceMap, tabulate
+from .force_models import LoadedError, Tangent, VaryingStiffness
+
+Scalar = Float[Array, ""]
+Model = Literal["map", "varying stiffness", "loaded error", "tangent"]
+
+# Flanks that press on both sides without a load by more than this jam [um]; rounding of single precision is less.
+_JAMMED = 1e-2
+_MOST_PAIRS = 12
+_LEVELS, _REACH = 64, 5.0  # of a map, see `mesh_force`
+
+
+def mesh_force(
+    mesh: Mesh,
+    *,
+    torque: Any,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+    coast: Both | None = None,
+    model: Model = "map",
+    levels: int = _LEVELS,
+    reach: Any = _REACH,
+    compliance: Any = 0.0,
+) -> Any:
+    """Force of a mesh as a function of mesh position and approach, for oscillators.
+
+    The approach is that of the teeth, of the wind-up of the gear bodies (`mesh.hub`) and of `compliance` in series.
+
+    Args:
+        mesh: prepared mesh; its positions are those of the force, which is linear between them.
+        torque: on the pinion [N m], positive. For the map it sets the width of the contacts over which modifications
+            are averaged, and with `reach` how far the table goes; the simpler models are made for it.
+        pinion: modification of the drive flanks of the pinion; None for the nominal involute.
+        wheel: likewise of the wheel.
+        coast: modifications of the coast flanks of (pinion, wheel), None of either for the nominal involute; None for
+            those of the drive flanks.
+        model: "map" for `ForceMap`, the contact at every approach; "varying stiffness" for `VaryingStiffness`, "loaded
+            error" for `LoadedError`, "tangent" for `Tangent`: all give the static transmission error of the torque.
+        levels: number of approaches of the map on either side of the clearance.
+        reach: largest deflection of the map, relative to the largest static one; the map is linear beyond.
+        compliance: of shafts, bearings and bodies in series with the mesh [um/N].
+
+    Returns:
+        the mesh force, differentiable with respect to every number. Where the number of pairs was left open, is too
+        small for the deflections of the map, and nothing is traced, it is made of more of them.
+
+    Raises:
+        TypeError: for something else than a prepared mesh or modifications.
+        ValueError: for a number outside its range, flanks that jam, or a modification that varies along the face on a
+            mesh of one slice.
+    """
+    check_mesh("mesh_force", mesh)
+    torque = operation_of("mesh_force", torque, mesh.slice_width.dtype).torque
+    check("mesh_force", "torque", torque, "N m", low=0.0, open_low=True)
+    series = _number("compliance", compliance, "um/N", mesh, low=0.0)
+    farthest = _number("reach", reach, "", mesh, low=1.0)
+    if model not in get_args(Model):
+        wanted = ", ".join(f'"{name}"' for name in get_args(Model))
+        raise ValueError(f"mesh_force: model = {model!r} must be one of {wanted}")
+    whole("mesh_force", "levels", levels, 4, 4096)
+    both = (pinion, wheel), _coast_of(coast, (pinion, wheel))
+    made = _made(mesh, torque, both, model, levels, farthest, series)
+    while _is_too_narrow(mesh, made):
+        sizes = replace(mesh.resolution, pairs=mesh.resolution.chosen_pairs + 1)
+        mesh = replace(prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes), automatic=True)
+        made = _made(mesh, torque, both, model, levels, farthest, series)
+    return made
+
+
+def _number(name: str, value: Any, unit: str, mesh: Mesh, **limits) -> Scalar:
+    value = real(value)
+    if value.ndim:
+        raise ValueError(f"mesh_force: {name} has shape {value.shape}, must be a single number; make many with jax.vmap")
+    check("mesh_force", name, value, unit, **limits)
+    return value.astype(mesh.slice_width.dtype)
+
+
+def _coast_of(coast: Any, drive: Both) -> Both:
+    if coast is None:
+        return drive
+    if not isinstance(coast, tuple) or len(coast) != 2:
+        raise TypeError(f"mesh_force: coast is {coast!r}, must be a tuple (pinion, wheel) of modifications, or None")
+    return coast
+
+
+def _is_too_narrow(mesh: Mesh, made) -> bool:
+    converged = concrete(made.converged)
+    return converged is not None and not converged and mesh.automatic and mesh.resolution.chosen_pairs < _MOST_PAIRS
+
+
+def mesh_force_of(cycle: MeshCycle, mesh: Mesh, *, model: Model = "map", compliance: Any = 0.0) -> Any:
+    """`mesh_force` of a solved design, traceable, with what has been removed from its drive flanks.
+
+    So it has the manufacturing deviations of the cycle. The coast flanks are those of its modifications, nominal
+    involutes where it carries none.
+
+    Args:
+        cycle: of one design.
+        mesh: on which it was solved.
+        model, compliance: as in `mesh_force`.
+    """
+    gap = cycle.gap - mesh.corner_gap[:, None]
+    count, torque = mesh.resolution.positions, cycle.torque
+    drive = Flanks(mesh, RemovedMaterial(gap, cycle.shift, cycle.bend), jnp.arange(count), jnp.zeros_like(torque))
+    sides = drive, coast_flanks(mesh, torque, (cycle.pinion, cycle.wheel))
+    reach, series = (_number("mesh_force_of", value, "", mesh) for value in (_REACH, compliance))
+    return _of_sides(mesh, torque, sides, model, _LEVELS, reach, series)
+
+
+def _made(mesh, torque, both, model, levels, reach, compliance) -> AbstractMeshForce:
+    sides = drive_flanks(mesh, torque, both[0]), coast_flanks(mesh, torque, both[1])
+    return _of_sides(mesh, torque, sides, model, levels, reach, compliance)
+
+
+def _of_sides(mesh, torque, sides: tuple[Flanks, Flanks], model, levels, reach, compliance) -> AbstractMeshForce:
+    found = [static(side, torque, compliance) for side in sides]
+    force, first = 1e3 * torque / mesh.pair.pinion.base_radius, mesh.kinematics.first_phase
+    converged = jnp.all(found[0].converged) & jnp.all(found[1].converged)
+    if model == "tangent":
+        return Tangent(first, force, found[0].loaded, found[0].stiffness, jnp.all(found[0].converged))
+    start = jnp.stack([each.unloaded + side.clearance for each, side in zip(found, sides)])
+    converged &= ~_jammed(start)
+    deflection = jnp.stack([each.loaded - each.unloaded for each in found])
+    if model == "varying stiffness":
+        return VaryingStiffness(first, start, force / deflection, converged)
+    if model == "loaded error":
+        mean = jnp.mean(deflection, axis=1)
+        return LoadedError(first, start + deflection - mean[:, None], force / mean, converged)
+    spacing = jax.lax.stop_gradient(reach * jnp.max(deflection) / (levels - 1))
+    tables = [tabulate(side, _in_own_order(side, each), compliance, spacing, levels) for side, each in zip(sides, found)]
+    drive, coast = tables
+    return ForceMap(
+        first_phase=first,
+        start=start,
+        spacing=spacing,
+        node_force=jnp.stack([drive[0], coast[0]]),
+        node_stiffness=jnp.stack([drive[1], coast[1]]),
+        converged=converged & drive[2] & coast[2],
+    )
+
+
+def _in_own_order(side: Flanks, found: Static):
+    # the order of drive flanks is the identity, that of coast flanks its own inverse
+    return found.unloaded[side.order]
+
+
+def _jammed(start):
+    """Whether flanks press on both sides without a load; of concrete numbers an error."""
+    least = jnp.min(start[0] + start[1])
+    known = concrete(least)
+    if known is not None and known < -_JAMMED:
+        raise ValueError(
+            f"mesh_force: the clearance between drive and coast flanks = {float(known):.4g} um must be at least 0 um: "
+            "the modifications add material, and the pair has too little backlash"
+        )
+    return least < -_JAMMED
