@@ -86,7 +86,9 @@ def mesh_force(
 def _number(name: str, value: Any, unit: str, mesh: Mesh, **limits) -> Scalar:
     value = real(value)
     if value.ndim:
-        raise ValueError(f"mesh_force: {name} has shape {value.shape}, must be a single number; make many with jax.vmap")
+        raise ValueError(
+            f"mesh_force: {name} has shape {value.shape}, must be a single number; make many with jax.vmap"
+        )
     check("mesh_force", name, value, unit, **limits)
     return value.astype(mesh.slice_width.dtype)
 
@@ -143,7 +145,9 @@ def _of_sides(mesh, torque, sides: tuple[Flanks, Flanks], model, levels, reach, 
         mean = jnp.mean(deflection, axis=1)
         return LoadedError(first, start + deflection - mean[:, None], force / mean, converged)
     spacing = jax.lax.stop_gradient(reach * jnp.max(deflection) / (levels - 1))
-    tables = [tabulate(side, _in_own_order(side, each), compliance, spacing, levels) for side, each in zip(sides, found)]
+    tables = [
+        tabulate(side, _in_own_order(side, each), compliance, spacing, levels) for side, each in zip(sides, found)
+    ]
     drive, coast = tables
     return ForceMap(
         first_phase=first,

@@ -31,9 +31,7 @@ class Motion(Checked):
     force: Samples = result("N")
 
 
-def motion(
-    oscillator: Oscillator, mesh_frequency: Any, start: Any, *, periods: int = 1, steps: Any = STEPS
-) -> Motion:
+def motion(oscillator: Oscillator, mesh_frequency: Any, start: Any, *, periods: int = 1, steps: Any = STEPS) -> Motion:
     """The motion from a state over some mesh cycles.
 
     Args:

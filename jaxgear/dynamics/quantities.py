@@ -92,8 +92,8 @@ class _WithoutSettings:
 
     def __call__(self, cycle: MeshCycle) -> Numbers:
         raise ValueError(
-            f'{self.name}: needs settings, give jaxgear.dynamics.Dynamics(...).quantity("{self.name}"), or a design file '
-            "with the table [dynamics]"
+            f'{self.name}: needs settings, give jaxgear.dynamics.Dynamics(...).quantity("{self.name}"), or a design '
+            "file with the table [dynamics]"
         )
 
 
@@ -122,4 +122,3 @@ def _hashable(name: str, value: Any) -> Any:
 
 
 quantities.add(*(_quantity(name, _WithoutSettings(name)) for name in DYNAMIC_QUANTITIES))
-

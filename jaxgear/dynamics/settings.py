@@ -45,8 +45,8 @@ class Dynamics(Checked):
         pinion_inertia: polar moment of inertia of the pinion and what turns with it; that of the body without it.
         wheel_inertia: likewise.
         compliance: of what lies between the teeth and the inertias, in series with the mesh.
-        pinion_bearing: stiffness of the support of the pinion along and across the line of action; rigid without it. The
-            supports of both gears are given, or of none.
+        pinion_bearing: stiffness of the support of the pinion along and across the line of action; rigid without it.
+            The supports of both gears are given, or of none.
         wheel_bearing: likewise.
         pinion_bearing_damping: viscous damping of the support of the pinion along and across; none without it.
         wheel_bearing_damping: likewise.

@@ -71,7 +71,7 @@ def differentiable(oscillator: Oscillator, response: SpeedResponse, nodes: Float
 def _of_orbit(oscillator, frequency, start, periods: int, nodes, recorded: SteadyNumbers) -> SteadyNumbers:
     orbit = find_orbit(oscillator, frequency, start, periods=periods, steps=nodes)
     factor, rms = orbit.dynamic_factor, orbit.approach_rms
-    scale = recorded.approach_rms + jnp.finfo(rms.dtype).eps**0.5 * jnp.abs(orbit.approach_mean)
+    scale = recorded.approach_rms + jnp.finfo(rms.dtype).eps ** 0.5 * jnp.abs(orbit.approach_mean)
     same = jnp.abs(factor - recorded.dynamic_factor) <= _SAME * recorded.dynamic_factor
     same &= (jnp.abs(rms - recorded.approach_rms) <= _SAME * scale) & orbit.converged
     exact = recorded._replace(dynamic_factor=factor, approach_rms=rms, exact=same)

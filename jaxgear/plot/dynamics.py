@@ -55,9 +55,7 @@ def speed_response(
 _MOVES = {"up": "rising", "down": "falling"}
 
 
-def waterfall(
-    response: SpeedResponse, of: Literal["force", "velocity"] = "force", ax: Axes | None = None
-) -> Axes:
+def waterfall(response: SpeedResponse, of: Literal["force", "velocity"] = "force", ax: Axes | None = None) -> Axes:
     """Campbell diagram: amplitudes of the spectrum along the multiples of the mesh frequency, over the mesh frequency.
 
     Args:
@@ -141,15 +139,16 @@ def phase_portrait(approach, velocity, force, ax: Axes | None = None, *, once: A
                 ax.add_collection(LineCollection(segments[there], colors=_STATES[name], linewidths=1.4, label=name))
         if once is not None:
             ax.plot(
-                np.asarray(once[0]), 1e-3 * np.asarray(once[1]), "o", color="#D55E00", markersize=4, label="once a cycle"
+                np.asarray(once[0]),
+                1e-3 * np.asarray(once[1]),
+                "o",
+                color="#D55E00",
+                markersize=4,
+                label="once a cycle",
             )
         ax.autoscale_view()
         ax.set(xlabel=_APPROACH_LABEL, ylabel="velocity of approach [mm/s]")
         legend_above(ax)
         if title:
-            ax.annotate(
-                title, (0.02, 0.98), xycoords="axes fraction", ha="left", va="top", color=GREY
-            )
+            ax.annotate(title, (0.02, 0.98), xycoords="axes fraction", ha="left", va="top", color=GREY)
     return ax
-
-
