@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..contact import Mesh, prepare
+from ..contact import Mesh
+from ..contact.mesh import prepare_from
 from ..contact.operation import operation_of
 from ..contact.solve import check_mesh
 from ..microgeometry import AbstractModification
@@ -33,6 +34,7 @@ def mesh_force(
     wheel: AbstractModification | None = None,
     coast: Both | None = None,
     model: Model = "map",
+    positions: int = 256,
     levels: int = 64,
     reach: Any = 5.0,
     compliance: Any = 0.0,
@@ -42,7 +44,7 @@ def mesh_force(
     The approach is that of the teeth, of the wind-up of the gear bodies (`mesh.hub`) and of `compliance` in series.
 
     Args:
-        mesh: prepared mesh; its positions are those of the force, which is linear between them.
+        mesh: prepared mesh, of any number of positions.
         torque: on the pinion [N m], positive. For the map it sets the width of the contacts over which modifications
             are averaged, and with `reach` how far the table goes; the simpler models are made for it.
         pinion: modification of the drive flanks of the pinion; None for the nominal involute.
@@ -51,6 +53,9 @@ def mesh_force(
             those of the drive flanks.
         model: "map" for `ForceMap`, the contact at every approach; "varying stiffness" for `VaryingStiffness`, "loaded
             error" for `LoadedError`, "tangent" for `Tangent`: all give the static transmission error of the torque.
+        positions: mesh positions of the force, which is linear between them: pairs come into contact at an approach that
+            changes by several um from one of 64 positions to the next. An integrator whose steps meet these
+            positions alone needs no more than it has steps.
         levels: number of approaches of the map on either side of the clearance.
         reach: largest deflection of the map, relative to the largest static one; the map is linear beyond.
         compliance: of shafts, bearings and bodies in series with the mesh [um/N].
@@ -73,13 +78,23 @@ def mesh_force(
         wanted = ", ".join(f'"{name}"' for name in get_args(Model))
         raise ValueError(f"mesh_force: model = {model!r} must be one of {wanted}")
     whole("mesh_force", "levels", levels, 4, 4096)
+    whole("mesh_force", "positions", positions, 4, 65536)
+    mesh = _with(mesh, positions=positions)
     both = (pinion, wheel), _coast_of(coast, (pinion, wheel))
     made = _made(mesh, torque, both, model, levels, farthest, series)
     while _is_too_narrow(mesh, made):
-        sizes = replace(mesh.resolution, pairs=mesh.resolution.chosen_pairs + 1)
-        mesh = replace(prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes), automatic=True)
+        mesh = _with(mesh, pairs=mesh.resolution.chosen_pairs + 1)
         made = _made(mesh, torque, both, model, levels, farthest, series)
     return made
+
+
+def _with(mesh: Mesh, **sizes: int) -> Mesh:
+    """The mesh in other array sizes."""
+    wanted = replace(mesh.resolution, **sizes)
+    if wanted == mesh.resolution:
+        return mesh
+    made = prepare_from(mesh.kinematics.first_phase, mesh.pair, mesh.compliance, wanted)
+    return replace(made, automatic=mesh.automatic)
 
 
 def _number(name: str, value: Any, unit: str, mesh: Mesh, **limits) -> Scalar:
