@@ -1,6 +1,6 @@
 """Contact of the mesh at a prescribed transmission error: what dynamics and wear ask for."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -13,9 +13,11 @@ from .operation import operation_of
 from .slide import RemovedMaterial
 from .solve import check_mesh, outermost, removed_material
 
-# Newton steps from the approach of all springs in series to that of the teeth: the force of contacts that stiffen bends
+# Newton steps of a mesh of several slices from the approach of all springs in series to that of the teeth: the force of contacts that stiffen bends
 # one way, so that the steps come from one side and double their digits; measured, four leave 1e-9 of the force.
 _SERIES_STEPS = 4
+# what may be missed of the approach [um, and relative to it] before the last correction, which is of second order
+_MET = 1e-3
 
 Scalar = Float[Array, ""]
 Curve = Float[Array, " positions"]
@@ -88,14 +90,24 @@ def solve_at(
 
 
 @program
-def _solve_at(mesh: Mesh, error: Curve, removed: RemovedMaterial) -> PrescribedContact:
-    gap, law = mesh.corner_gap[:, None] + removed.amount, mesh.law.moved(removed.shift)
-    problem = ContactProblem(mesh.structure, law, gap, mesh.lever, mesh.slice_width, approach=error)
+def _solve_at(
+    mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Scalar | None = None
+) -> PrescribedContact:
+    """Contact at a prescribed approach of the teeth; of a mesh of one slice with a shared compliance [um/N] in series.
+
+    Its deflection is then part of the approach and of the tangent stiffness, not of the transmission error.
+    """
+    gap, law, structure = mesh.corner_gap[:, None] + removed.amount, mesh.law.moved(removed.shift), mesh.structure
+    if shared is not None:
+        structure = structure + shared * mesh.slice_width[0] * mesh.lever[:, None] * mesh.lever[None]
+    problem = ContactProblem(structure, law, gap, mesh.lever, mesh.slice_width, approach=approach)
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
     pair_force = mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1)
+    force = jnp.sum(pair_force, axis=0)
+    error = approach if shared is None else approach - shared * force
     return PrescribedContact(
         transmission_error=error,
-        force=jnp.sum(pair_force, axis=0),
+        force=force,
         pair_force=pair_force,
         line_load=solution.line_load,
         tangent_stiffness=tangent_stiffness(problem, solution),
@@ -104,9 +116,23 @@ def _solve_at(mesh: Mesh, error: Curve, removed: RemovedMaterial) -> PrescribedC
     )
 
 
-def solve_series(
-    mesh: Mesh, approach: Curve, removed: RemovedMaterial, compliance: Scalar
-) -> tuple[Curve, Curve, Curve, Bool[Array, " positions"]]:
+class SeriesContact(NamedTuple):
+    """Contact at a prescribed approach of teeth and what they share in series, shape (positions,) each.
+
+    Attributes:
+        force: [N].
+        stiffness: its slope over the approach [N/um].
+        transmission_error: of the teeth alone, as `solve_at` takes it [um].
+        converged: where the contact has been found.
+    """
+
+    force: Curve
+    stiffness: Curve
+    transmission_error: Curve
+    converged: Bool[Array, " positions"]
+
+
+def solve_series(mesh: Mesh, approach: Curve, removed: RemovedMaterial, compliance: Scalar) -> SeriesContact:
     """Contact at a prescribed approach of the teeth and what they share in series, whose deflection is part of it.
 
     Args:
@@ -114,25 +140,19 @@ def solve_series(
         approach: of teeth, wind-up of the bodies (`mesh.hub`) and series compliance together [um], shape (positions,).
         removed: material removed from the flanks.
         compliance: further one in series, of shafts for instance [um/N].
-
-    Returns:
-        the force [N]; its slope over the approach [N/um]; the transmission error of the teeth alone, for `solve_at`
-        [um]; and where this has converged; all of shape (positions,).
     """
     shared = mesh.hub / mesh.pair.face_width + compliance
+    if mesh.resolution.slices == 1:  # a compliance that couples all pairs: one solution is enough
+        found = _solve_at(mesh, approach, removed, shared)
+        return SeriesContact(found.force, found.tangent_stiffness, found.transmission_error, found.converged)
 
     def step(error, _):
         found = _solve_at(mesh, error, removed)
+        softened = 1 + shared * found.tangent_stiffness
         missed = approach - error - shared * found.force
-        slope = found.tangent_stiffness / (1 + shared * found.tangent_stiffness)
-        change = missed / (1 + shared * found.tangent_stiffness)
-        return error + change, (found.force + slope * missed, slope, error, found.converged & _is_met(missed, approach))
+        stiffness = found.tangent_stiffness / softened
+        met = jnp.abs(missed) <= _MET * (1 + jnp.abs(approach))
+        met &= found.converged
+        return error + missed / softened, SeriesContact(found.force + stiffness * missed, stiffness, error, met)
 
-    steps = jax.lax.scan(step, approach, length=_SERIES_STEPS)[1]
-    force, slope, error, converged = jax.tree.map(lambda part: part[-1], steps)
-    return force, slope, error, converged
-
-
-def _is_met(missed: Curve, approach: Curve) -> Bool[Array, " positions"]:
-    # what is missed has been corrected to first order
-    return jnp.abs(missed) <= 1e-3 * (1 + jnp.abs(approach))
+    return jax.tree.map(lambda part: part[-1], jax.lax.scan(step, approach, length=_SERIES_STEPS)[1])

@@ -111,8 +111,8 @@ def tabulate(flanks: Flanks, unloaded, compliance: Scalar, spacing: Scalar, leve
     def at(level):
         return solve_series(flanks.mesh, unloaded + level, flanks.removed, compliance)
 
-    force, slope, _, converged = jax.vmap(at)(above)
-    force, slope = (jnp.moveaxis(part, 0, 1) for part in (force, slope))
+    found = jax.vmap(at)(above)
+    force, slope = found.force.T, found.stiffness.T
     force = jnp.concatenate([jnp.zeros_like(force[:, :1]), force], axis=1)
     # contacts are soft where they begin, within less than a level: the slope there is that of a parabola
     first = 2 * force[:, 1:2] / spacing - slope[:, :1]
@@ -122,4 +122,4 @@ def tabulate(flanks: Flanks, unloaded, compliance: Scalar, spacing: Scalar, leve
         jnp.concatenate([mean[:, :1], mean], axis=1), jnp.concatenate([mean, slope[:, -1:]], axis=1)
     )
     slope = jnp.clip(slope, 0.0, _STEEPEST * around)
-    return force[flanks.order], slope[flanks.order], jnp.all(converged)
+    return force[flanks.order], slope[flanks.order], jnp.all(found.converged)

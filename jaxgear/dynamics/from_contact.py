@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..contact import Mesh, MeshCycle, RemovedMaterial, prepare
+from ..contact import Mesh
+from ..contact.mesh import prepare_from
 from ..contact.operation import operation_of
 from ..contact.solve import check_mesh
 from ..microgeometry import AbstractModification
@@ -23,7 +24,6 @@ Model = Literal["map", "varying stiffness", "loaded error", "tangent"]
 # Flanks that press on both sides without a load by more than this jam [um]; rounding of single precision is less.
 _JAMMED = 1e-2
 _MOST_PAIRS = 12
-_LEVELS, _REACH = 64, 5.0  # of a map, see `mesh_force`
 
 
 def mesh_force(
@@ -34,16 +34,18 @@ def mesh_force(
     wheel: AbstractModification | None = None,
     coast: Both | None = None,
     model: Model = "map",
-    levels: int = _LEVELS,
-    reach: Any = _REACH,
+    positions: int = 256,
+    levels: int = 64,
+    reach: Any = 5.0,
     compliance: Any = 0.0,
+    deviation: Any = None,
 ) -> Any:
     """Force of a mesh as a function of mesh position and approach, for oscillators.
 
     The approach is that of the teeth, of the wind-up of the gear bodies (`mesh.hub`) and of `compliance` in series.
 
     Args:
-        mesh: prepared mesh; its positions are those of the force, which is linear between them.
+        mesh: prepared mesh, of any number of positions.
         torque: on the pinion [N m], positive. For the map it sets the width of the contacts over which modifications
             are averaged, and with `reach` how far the table goes; the simpler models are made for it.
         pinion: modification of the drive flanks of the pinion; None for the nominal involute.
@@ -52,9 +54,14 @@ def mesh_force(
             those of the drive flanks.
         model: "map" for `ForceMap`, the contact at every approach; "varying stiffness" for `VaryingStiffness`, "loaded
             error" for `LoadedError`, "tangent" for `Tangent`: all give the static transmission error of the torque.
+        positions: mesh positions of the force, which is linear between them: pairs come into contact at an approach that
+            changes by several um from one of 64 positions to the next. An integrator whose steps meet these
+            positions alone needs no more than it has steps.
         levels: number of approaches of the map on either side of the clearance.
         reach: largest deflection of the map, relative to the largest static one; the map is linear beyond.
         compliance: of shafts, bearings and bodies in series with the mesh [um/N].
+        deviation: material that manufacturing deviations remove besides from the drive flanks [um], shape (pairs,
+            slices, positions) of the mesh; linear between its positions. None for perfect gears.
 
     Returns:
         the mesh force, differentiable with respect to every number. Where the number of pairs was left open, is too
@@ -74,21 +81,46 @@ def mesh_force(
         wanted = ", ".join(f'"{name}"' for name in get_args(Model))
         raise ValueError(f"mesh_force: model = {model!r} must be one of {wanted}")
     whole("mesh_force", "levels", levels, 4, 4096)
+    whole("mesh_force", "positions", positions, 4, 65536)
+    given, mesh = mesh, _with(mesh, positions=positions)
     both = (pinion, wheel), _coast_of(coast, (pinion, wheel))
-    made = _made(mesh, torque, both, model, levels, farthest, series)
+    off = _interpolated(deviation, given, mesh)
+    made = _made(mesh, torque, both, off, model, levels, farthest, series)
     while _is_too_narrow(mesh, made):
-        sizes = replace(mesh.resolution, pairs=mesh.resolution.chosen_pairs + 1)
-        mesh = replace(prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes), automatic=True)
-        made = _made(mesh, torque, both, model, levels, farthest, series)
+        mesh = _with(mesh, pairs=mesh.resolution.chosen_pairs + 1)
+        made = _made(mesh, torque, both, _interpolated(deviation, given, mesh), model, levels, farthest, series)
     return made
+
+
+def _with(mesh: Mesh, **sizes: int) -> Mesh:
+    """The mesh in other array sizes."""
+    wanted = replace(mesh.resolution, **sizes)
+    if wanted == mesh.resolution:
+        return mesh
+    made = prepare_from(mesh.kinematics.first_phase, mesh.pair, mesh.compliance, wanted)
+    return replace(made, automatic=mesh.automatic)
+
+
+def _interpolated(deviation: Any, of: Mesh, mesh: Mesh):
+    """Material that deviations remove on another mesh of the same gears; a number where there are none."""
+    if deviation is None:
+        return 0.0
+    wanted = of.resolution.chosen_pairs, of.resolution.slices, of.resolution.positions
+    if jnp.shape(deviation) != wanted:
+        raise ValueError(
+            f"mesh_force: deviation has shape {jnp.shape(deviation)}, must be {wanted} (pairs, slices, positions)"
+        )
+    # one pair follows the other on the path of contact, the last one first
+    there, here = (each.path[::-1].ravel() for each in (of, mesh))
+    rows = jnp.moveaxis(jnp.asarray(deviation)[::-1], 1, 0).reshape(of.resolution.slices, -1)
+    found = jax.vmap(lambda row: jnp.interp(here, there, row))(rows)
+    return jnp.moveaxis(found.reshape(len(rows), *mesh.path.shape), 0, 1)[::-1]
 
 
 def _number(name: str, value: Any, unit: str, mesh: Mesh, **limits) -> Scalar:
     value = real(value)
     if value.ndim:
-        raise ValueError(
-            f"mesh_force: {name} has shape {value.shape}, must be a single number; make many with jax.vmap"
-        )
+        raise ValueError(f"mesh_force: {name} has shape {value.shape}, must be a single number; make many with jax.vmap")
     check("mesh_force", name, value, unit, **limits)
     return value.astype(mesh.slice_width.dtype)
 
@@ -106,31 +138,9 @@ def _is_too_narrow(mesh: Mesh, made) -> bool:
     return converged is not None and not converged and mesh.automatic and mesh.resolution.chosen_pairs < _MOST_PAIRS
 
 
-def mesh_force_of(cycle: MeshCycle, mesh: Mesh, *, model: Model = "map", compliance: Any = 0.0) -> Any:
-    """`mesh_force` of a solved design, traceable, with what has been removed from its drive flanks.
-
-    So it has the manufacturing deviations of the cycle. The coast flanks are those of its modifications, nominal
-    involutes where it carries none.
-
-    Args:
-        cycle: of one design.
-        mesh: on which it was solved.
-        model, compliance: as in `mesh_force`.
-    """
-    gap = cycle.gap - mesh.corner_gap[:, None]
-    count, torque = mesh.resolution.positions, cycle.torque
-    drive = Flanks(mesh, RemovedMaterial(gap, cycle.shift, cycle.bend), jnp.arange(count), jnp.zeros_like(torque))
-    sides = drive, coast_flanks(mesh, torque, (cycle.pinion, cycle.wheel))
-    reach, series = (_number("mesh_force_of", value, "", mesh) for value in (_REACH, compliance))
-    return _of_sides(mesh, torque, sides, model, _LEVELS, reach, series)
-
-
-def _made(mesh, torque, both, model, levels, reach, compliance) -> AbstractMeshForce:
-    sides = drive_flanks(mesh, torque, both[0]), coast_flanks(mesh, torque, both[1])
-    return _of_sides(mesh, torque, sides, model, levels, reach, compliance)
-
-
-def _of_sides(mesh, torque, sides: tuple[Flanks, Flanks], model, levels, reach, compliance) -> AbstractMeshForce:
+def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> AbstractMeshForce:
+    drive = drive_flanks(mesh, torque, both[0])
+    sides = drive._replace(removed=drive.removed + deviation), coast_flanks(mesh, torque, both[1])
     found = [static(side, torque, compliance) for side in sides]
     force, first = 1e3 * torque / mesh.pair.pinion.base_radius, mesh.kinematics.first_phase
     converged = jnp.all(found[0].converged) & jnp.all(found[1].converged)
@@ -145,9 +155,7 @@ def _of_sides(mesh, torque, sides: tuple[Flanks, Flanks], model, levels, reach, 
         mean = jnp.mean(deflection, axis=1)
         return LoadedError(first, start + deflection - mean[:, None], force / mean, converged)
     spacing = jax.lax.stop_gradient(reach * jnp.max(deflection) / (levels - 1))
-    tables = [
-        tabulate(side, _in_own_order(side, each), compliance, spacing, levels) for side, each in zip(sides, found)
-    ]
+    tables = [tabulate(side, _in_own_order(side, each), compliance, spacing, levels) for side, each in zip(sides, found)]
     drive, coast = tables
     return ForceMap(
         first_phase=first,

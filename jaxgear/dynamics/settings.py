@@ -8,13 +8,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..contact import Mesh, MeshCycle
+from ..contact import Mesh, MeshCycle, removed_material
 from ..geometry import GearPair
 from ..metrics import Quantity
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, concrete, count, number
 from .force import AbstractMeshForce
-from .from_contact import Model, mesh_force, mesh_force_of
+from .from_contact import Model, mesh_force
 from .oscillator import Oscillator
 from .response import SpeedResponse
 from .speed_sweep import speed_sweep
@@ -51,6 +51,7 @@ class Dynamics(Checked):
         pinion_bearing_damping: viscous damping of the support of the pinion along and across; none without it.
         wheel_bearing_damping: likewise.
         model: of the mesh force.
+        positions: mesh positions of the force, which is linear between them.
         kick: dynamic factor with which a second run from the highest speed down begins, to find orbits that hang
             together with no other; 1 for no such run.
         steps: of the integrator per mesh cycle; chosen by the natural frequency without it.
@@ -67,6 +68,7 @@ class Dynamics(Checked):
     pinion_bearing_damping: Bearing | None = number("N s/um", low=0.0, **_BEARING)
     wheel_bearing_damping: Bearing | None = number("N s/um", low=0.0, **_BEARING)
     model: Model = "map"
+    positions: int = count(low=16, high=4096, default=128)
     kick: Scalar = number("", low=1.0, default=3.0)
     steps: int | None = count(low=32, high=65_536, optional=True, default=None)
 
@@ -106,8 +108,11 @@ class Dynamics(Checked):
         Raises:
             TypeError, ValueError: as `mesh_force`, `torsional` and `on_bearings`.
         """
-        options = {"model": self.model, "compliance": self.compliance}
-        return self.masses(mesh_force(mesh, torque=torque, pinion=pinion, wheel=wheel, **options), mesh.pair, torque)
+        return self._oscillator(mesh, torque, pinion=pinion, wheel=wheel)
+
+    def _oscillator(self, mesh: Mesh, torque: Any, **flanks: Any) -> Oscillator:
+        options: dict[str, Any] = {"model": self.model, "compliance": self.compliance, "positions": self.positions}
+        return self.masses(mesh_force(mesh, torque=torque, **options, **flanks), mesh.pair, torque)
 
     def masses(self, force: AbstractMeshForce, pair: GearPair, torque: Any) -> Oscillator:
         """The oscillator of any mesh force between the gears of a pair under a torque on the pinion [N m]."""
@@ -180,5 +185,8 @@ class Dynamics(Checked):
 
     def oscillator_of(self, cycle: MeshCycle, mesh: Mesh) -> Oscillator:
         """What vibrates, of a design that a cycle on the mesh is of, its manufacturing deviations included."""
-        options = {"model": self.model, "compliance": self.compliance}
-        return self.masses(mesh_force_of(cycle, mesh, **options), mesh.pair, cycle.torque)
+        flanks = {"pinion": cycle.pinion, "wheel": cycle.wheel}
+        deviation = cycle.gap - mesh.corner_gap[:, None] - removed_material(mesh, cycle.torque, **flanks).amount
+        if cycle.pinion is not None and cycle.wheel is not None:
+            deviation = jax.lax.stop_gradient(deviation)  # of the design it does not depend but by rounding
+        return self._oscillator(mesh, cycle.torque, **flanks, deviation=deviation)
