@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from .oscillator import Oscillator, State
 
@@ -67,3 +67,40 @@ def one_cycle(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Sc
 def cycles(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar, count: int) -> tuple[State, State]:
     """State after some cycles, and the states at the begin of every step, leading axes (count, steps)."""
     return jax.lax.scan(lambda y, _: one_cycle(oscillator, y, steps, mesh_frequency), y, length=count)
+
+
+class Cycle(NamedTuple):
+    """Mesh positions of a cycle so close that steps of two, four, eight ... of their distances are taken from them.
+
+    Attributes:
+        after: places of the mesh force at the positions, where it jumps just after them, leading axis (positions,).
+        before: just before the positions, the first of them the second position; None where nothing jumps.
+        nodes: the positions and the end of the cycle [base pitches], shape (positions + 1,).
+    """
+
+    after: Any
+    before: Any
+    nodes: Float[Array, " nodes"]
+
+
+def cycle_of(oscillator: Oscillator, steps: int) -> Cycle:
+    """Mesh positions for so many steps per cycle, and for every half of that down to two steps."""
+    nodes = oscillator.mesh_force.nodes(2 * steps).astype(oscillator.mass.dtype)
+    fine = steps_of(oscillator, nodes)
+    return Cycle(fine.first, fine.last if oscillator.mesh_force.jumps else None, nodes)
+
+
+def step_of(cycle: Cycle, index: Int[Array, ""], stride: Int[Array, ""]) -> Steps:
+    """One step over an even number of positions; neither it nor its number need be known to the compiler."""
+    begin, end = index * stride, (index + 1) * stride
+
+    def at(places, place):
+        return jax.tree.map(lambda part: jax.lax.dynamic_index_in_dim(part, place, keepdims=False), places)
+
+    phase = at(cycle.nodes, begin)
+    middle = at(cycle.after, begin + stride // 2)
+    if cycle.before is None:
+        last = at(cycle.after, end % (len(cycle.nodes) - 1))
+    else:
+        last = at(cycle.before, end - 1)
+    return Steps(at(cycle.after, begin), middle, last, phase, at(cycle.nodes, end) - phase)

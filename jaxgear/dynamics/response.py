@@ -9,12 +9,12 @@ from jaxtyping import Array, Bool, Float, Int
 
 from ..numerics import Checked, result
 from .history import history, largest, mean, share, smallest
-from .integrate import Steps, one_cycle
+from .integrate import Steps, one_step
 from .oscillator import Oscillator, State
 
 Scalar = Float[Array, ""]
 
-PLACES = (0.0, 0.5, 1.0)  # of the samples of a history in a step
+_PLACES = (0.0, 0.5, 1.0)  # of the samples of a history in a step
 # an order repeats after so many cycles if times their number it is whole but for rounding
 _ROUNDING = 1e-6
 
@@ -63,7 +63,7 @@ class SpeedResponse(Checked):
 
 
 class Sums(NamedTuple):
-    """Of an orbit's cycles so far: extremes, and integrals over the mesh position.
+    """Of the steps of an orbit so far: extremes, and integrals over the mesh position.
 
     Attributes:
         peak: largest elastic mesh force [N].
@@ -85,53 +85,57 @@ class Sums(NamedTuple):
 
 
 def no_sums(orders: Float[Array, " orders"]) -> Sums:
-    """Before the first cycle."""
+    """Before the first step."""
     zero = jnp.zeros((), orders.dtype)
     spectrum = jax.lax.complex(jnp.zeros_like(orders), jnp.zeros_like(orders))
     return Sums(zero - jnp.inf, zero + jnp.inf, zero - jnp.inf, zero, zero, zero, zero, spectrum, spectrum)
 
 
-def with_cycle(
+def with_step(
     sums: Sums,
     oscillator: Oscillator,
     y: State,
-    steps: Steps,
+    step: Steps,
     mesh_frequency: Scalar,
     *,
     orders: Float[Array, " orders"],
     cycle: Int[Array, ""],
     origin: Scalar,
 ) -> tuple[State, Sums]:
-    """The state after one more cycle, and the sums with it.
+    """The state after one more step, and the sums with it.
 
     Args:
-        sums: of the cycles before.
+        sums: of the steps before.
         oscillator: what vibrates.
-        y: state at mesh position 0.
-        steps: of the cycle.
+        y: state at the begin of the step.
+        step: one.
         mesh_frequency: [Hz].
         orders: multiples of the mesh frequency.
         cycle: how many came before.
         origin: approach from which mean and square are taken [um].
     """
-    end, begins = one_cycle(oscillator, y, steps, mesh_frequency)
-    of = history(oscillator, jax.tree.map(lambda part: part[None], begins), end, steps, mesh_frequency)
+    end = one_step(oscillator, y, step, mesh_frequency)
+    begin = jax.tree.map(lambda part: part[None, None], y)
+    of = history(oscillator, begin, end, jax.tree.map(lambda part: part[None], step), mesh_frequency)
     off = of.approach - origin
-    places = jnp.asarray(PLACES, of.phase.dtype)
-    turn = 2 * jnp.pi * orders * (of.phase + places[:, None] * of.length + cycle)[..., None]
+    places = jnp.asarray(_PLACES, of.phase.dtype)[:, None]
+    turn = 2 * jnp.pi * orders[:, None, None] * (of.phase + places * of.length + cycle)
+    waves = jnp.cos(turn), -jnp.sin(turn)
+
+    def integral(values):
+        return step.length * mean(of, values)
 
     def spectrum(values):
-        return jax.lax.complex(*(jax.vmap(lambda turned: mean(of, values * turned), -1)(wave) for wave in waves))
+        return jax.lax.complex(*(jax.vmap(lambda turned: integral(values * turned))(wave) for wave in waves))
 
-    waves = jnp.cos(turn), -jnp.sin(turn)
     return end, Sums(
         jnp.maximum(sums.peak, largest(of.force)),
         jnp.minimum(sums.lowest, smallest(of.approach)),
         jnp.maximum(sums.highest, largest(of.approach)),
-        sums.mean + mean(of, off),
-        sums.square + mean(of, off**2),
-        sums.apart + share(of, of.force == 0),
-        sums.coast + share(of, of.force < 0),
+        sums.mean + integral(off),
+        sums.square + integral(off**2),
+        sums.apart + step.length * share(of, of.force == 0),
+        sums.coast + step.length * share(of, of.force < 0),
         sums.force + spectrum(of.force),
         sums.approach + spectrum(of.approach),
     )

@@ -1,6 +1,6 @@
 """Steady vibration over mesh frequency, with the state carried from speed to speed as on a test rig."""
 
-import itertools
+import dataclasses
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
@@ -10,10 +10,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ..numerics import check, concrete, kernel, real, whole
-from .integrate import Steps, steps_of
+from .integrate import Cycle, cycle_of, one_step, step_of
 from .oscillator import Oscillator, State
-from .poincare import after
-from .response import Numbers, SpeedResponse, no_sums, numbers_of, with_cycle
+from .response import Numbers, SpeedResponse, no_sums, numbers_of, with_step
 from .static import Rest, at_rest, natural_frequencies
 
 Scalar = Float[Array, ""]
@@ -29,10 +28,9 @@ _APART = 30.0
 
 
 class _Sizes(NamedTuple):
-    """What is static in a sweep: (speeds, steps per cycle) of the groups in turn, and sizes."""
+    """What is static in a sweep."""
 
-    groups: tuple[tuple[int, int], ...]
-    direction: Literal["up", "down"]
+    most_steps: int
     fresh: bool
     most_periods: int
     points: int
@@ -93,7 +91,8 @@ def speed_sweep(
         "speed_sweep", oscillator, frequencies, direction=direction, kick=kick, carry=carry, steps=steps,
         tolerance=tolerance, most_cycles=most_cycles, most_periods=most_periods, points=points, orders=orders,
     )  # fmt: skip
-    return _swept(oscillator, frequencies, _start_of(oscillator, start), limits, sizes)
+    found = _swept(oscillator, frequencies, _start_of(oscillator, start), limits, sizes)
+    return dataclasses.replace(found, direction=direction)
 
 
 def checked_frequencies(owner: str, given) -> Speeds:
@@ -142,6 +141,8 @@ def _check_single(oscillator: Oscillator) -> None:
 class _Limits(NamedTuple):
     """Numbers of a sweep that may change without a new program."""
 
+    steps: Int[Array, " speeds"]
+    down: Bool[Array, ""]
     tolerance: Scalar
     most_cycles: Int[Array, ""]
     kick: Scalar
@@ -168,18 +169,21 @@ def _prepared(
     if points < most_periods:
         raise ValueError(f"{owner}: points = {points} must be at least most_periods = {most_periods}")
     counts = _counts(owner, oscillator, frequencies, steps)
-    if direction == "down":
-        counts = counts[::-1]
-    groups = tuple((len(tuple(same)), count) for count, same in itertools.groupby(counts))
-    sizes = _Sizes(groups, direction, not carry, most_periods, points, orders)
-    return sizes, _Limits(tolerance.astype(dtype), jnp.asarray(most_cycles), kick.astype(dtype))
+    sizes = _Sizes(max(counts), not carry, most_periods, points, orders)
+    return sizes, _Limits(
+        jnp.asarray(counts),
+        jnp.asarray(direction == "down"),
+        tolerance.astype(dtype),
+        jnp.asarray(most_cycles),
+        kick.astype(dtype),
+    )
 
 
 def _counts(owner, oscillator, frequencies, steps) -> tuple[int, ...]:
     if steps is None:
         return steps_for(oscillator, frequencies)
     if isinstance(steps, int | np.integer):
-        return (whole(owner, "steps", steps, low=8),) * len(frequencies)
+        steps = (steps,) * len(frequencies)
     counts = tuple(whole(owner, "steps", count, low=8) for count in steps)
     if len(counts) != len(frequencies):
         raise ValueError(
@@ -206,22 +210,19 @@ def _swept(
 ) -> SpeedResponse:
     rest = at_rest(oscillator, jnp.zeros((), frequencies.dtype))
     first = _kicked(oscillator, rest, start, limits.kick)
-    down = sizes.direction == "down"
-    in_turn = frequencies[::-1] if down else frequencies
-    y, begin, parts = first, 0, []
-    for count, steps in sizes.groups:
-        rows = steps_of(oscillator, oscillator.mesh_force.nodes(steps).astype(frequencies.dtype))
+    cycle = cycle_of(oscillator, sizes.most_steps)
 
-        def at_speed(y, frequency, rows=rows):
-            found = _steady(oscillator, first if sizes.fresh else y, rows, frequency, limits, sizes, rest)
-            return found.state, found
+    def at_speed(y, speed):
+        frequency, steps = speed
+        begin = first if sizes.fresh else y
+        found = _steady(oscillator, begin, _Speed(frequency, cycle, steps, sizes.most_steps), limits, sizes, rest)
+        return found.state, found
 
-        y, found = jax.lax.scan(at_speed, y, in_turn[begin : begin + count])
-        begin += count
-        parts.append(found)
-    found = jax.tree.map(lambda *part: jnp.concatenate(part), *parts)
-    if down:
-        found = jax.tree.map(lambda part: part[::-1], found)
+    def turned(parts):
+        return jax.tree.map(lambda part: jnp.where(limits.down, part[::-1], part), parts)
+
+    _, found = jax.lax.scan(at_speed, first, turned((frequencies, limits.steps)))
+    found = turned(found)
     return SpeedResponse(
         mesh_frequency=frequencies,
         **found.numbers._asdict(),
@@ -231,7 +232,7 @@ def _swept(
         settled=found.period > 0,
         state=found.state,
         orders=sizes.orders,
-        direction=sizes.direction,
+        direction="up",
     )
 
 
@@ -255,9 +256,25 @@ class _Found(NamedTuple):
     state: State
 
 
-def _steady(oscillator, y, rows: Steps, frequency, limits: _Limits, sizes: _Sizes, rest: Rest) -> _Found:
+class _Speed(NamedTuple):
+    """A mesh frequency [Hz], and the steps of its cycles."""
+
+    frequency: Scalar
+    cycle: Cycle
+    steps: Int[Array, ""]
+    most_steps: int
+
+    def over_cycle(self, function, carry):
+        """Folds function(carry, step) over the steps of a cycle."""
+        # a position lies in the middle of the shortest step
+        stride = 2 * (self.most_steps // self.steps)
+        return jax.lax.fori_loop(0, self.steps, lambda i, carry: function(carry, step_of(self.cycle, i, stride)), carry)
+
+
+def _steady(oscillator, y, speed: _Speed, limits: _Limits, sizes: _Sizes, rest: Rest) -> _Found:
     """Steady state at one speed, and its record."""
-    y, period = _settled(oscillator, y, rows, frequency, limits, sizes.most_periods)
+    frequency = speed.frequency
+    y, period = _settled(oscillator, y, speed, limits, sizes.most_periods)
     orders = jnp.asarray(sizes.orders, frequency.dtype)
     zero = jnp.zeros((), frequency.dtype)
     origin = oscillator.approach(zero, y[0])
@@ -272,20 +289,25 @@ def _steady(oscillator, y, rows: Steps, frequency, limits: _Limits, sizes: _Size
         # an orbit's points repeat, so that there are as many for every speed
         here = jnp.arange(sizes.points) % cycles == cycle
         approaches, velocities = jnp.where(here, q, approaches), jnp.where(here, v, velocities)
-        y, sums = with_cycle(sums, oscillator, y, rows, frequency, orders=orders, cycle=cycle, origin=origin)
+
+        def more(carry, step):
+            y, sums = carry
+            return with_step(sums, oscillator, y, step, frequency, orders=orders, cycle=cycle, origin=origin)
+
+        y, sums = speed.over_cycle(more, (y, sums))
         return cycle + 1, y, sums, approaches, velocities
 
     nothing = jnp.zeros(sizes.points, frequency.dtype)
     begin = jnp.zeros_like(cycles), y, no_sums(orders), nothing, nothing
     _, y, sums, approaches, velocities = jax.lax.while_loop(on, recorded, begin)
-    numbers = numbers_of(
-        sums, frequency, cycles=cycles.astype(frequency.dtype), orders=orders, origin=origin, static_force=rest.force
-    )
+    count = cycles.astype(frequency.dtype)
+    numbers = numbers_of(sums, frequency, cycles=count, orders=orders, origin=origin, static_force=rest.force)
     return _Found(numbers, period, approaches, velocities, y)
 
 
-def _settled(oscillator, y, rows: Steps, frequency, limits: _Limits, most_periods: int):
+def _settled(oscillator, y, speed: _Speed, limits: _Limits, most_periods: int):
     """State after as many cycles as it takes, and the cycles of its orbit, 0 where none was found."""
+    frequency = speed.frequency
     zero = jnp.zeros((), frequency.dtype)
 
     def watched(y: State) -> Array:
@@ -302,7 +324,7 @@ def _settled(oscillator, y, rows: Steps, frequency, limits: _Limits, most_period
 
     def cycled(carry):
         cycle, _, y, before = carry
-        y = after(oscillator, y, rows, frequency, 1)
+        y = speed.over_cycle(lambda y, step: one_step(oscillator, y, step, frequency), y)
         now = watched(y)
         size = jnp.maximum(jnp.max(jnp.abs(now)), jnp.nanmax(jnp.abs(before)))
         away = jnp.max(jnp.abs(before - now), axis=1) / size
