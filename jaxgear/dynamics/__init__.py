@@ -1,5 +1,10 @@
 """Gears at speed: mesh force, oscillators, steady states over speed, orbits and their bifurcations."""
 
+from .bifurcation import Bifurcation as Bifurcation
+from .bifurcation import Fold as Fold
+from .bifurcation import fold_of as fold_of
+from .continuation import Branch as Branch
+from .continuation import follow_orbits as follow_orbits
 from .force import AbstractMeshForce as AbstractMeshForce
 from .force import DeadZone as DeadZone
 from .force import RectangularStiffness as RectangularStiffness
@@ -10,6 +15,11 @@ from .force_models import VaryingStiffness as VaryingStiffness
 from .from_contact import mesh_force as mesh_force
 from .motion import Motion as Motion
 from .motion import motion as motion
+from .orbit import Orbit as Orbit
+from .orbit import find_orbit as find_orbit
+from .orbit import settle as settle
+from .orbit import steady_orbit as steady_orbit
+from .orbit import steady_orbits as steady_orbits
 from .oscillator import Excitation as Excitation
 from .oscillator import Oscillator as Oscillator
 from .quantities import DYNAMIC_QUANTITIES as DYNAMIC_QUANTITIES

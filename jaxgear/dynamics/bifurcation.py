@@ -16,9 +16,12 @@ Scalar = Float[Array, ""]
 Kind = Literal["fold", "flip", "Neimark-Sacker"]
 
 _REAL = 1e-6  # a multiplier with a smaller imaginary part is real
-_SECANTS = 24  # a fold is found in about eight
-_FLAT = 1e-7  # slope of the parameter along a branch at a fold, both scaled
-_FIRST = 1e-3  # first step along a branch for its curvature
+_LEVEL = 1e-8  # a branch whose tangent has a smaller part along the parameter stands still in it: rounding
+_TRIALS = 40  # a fold is found in about eight
+_FLAT = 1e-8  # slope of the parameter along a branch at a fold, both scaled
+_NARROW = 1e-7  # distance along a branch, scaled, to which a fold is enclosed
+_FIRST = 1e-3  # first step along a branch
+_FURTHER, _FARTHEST = 1.5, 0.1  # factor on a secant that has not enclosed the fold, and the longest step
 
 
 class Bifurcation(Checked):
@@ -45,7 +48,7 @@ class Fold(Checked):
     Attributes:
         parameter: at which the branch turns; differentiable.
         displacement, velocity: start of the orbit there [um], [um/s], without derivatives, shape (coordinates,).
-        slope: of the parameter over the branch, both scaled, zero at a fold.
+        slope: of the parameter over the branch, both scaled: zero at a fold, but not where the branch has a corner.
         converged: whether a fold was found.
     """
 
@@ -77,8 +80,9 @@ def tests_of(point: Corrected, orbit: Orbit) -> Tests:
     """Test functions at a point of a branch."""
     multipliers = np.linalg.eigvals(np.asarray(orbit.monodromy))
     pairs = np.abs(multipliers[np.abs(multipliers.imag) > _REAL])
+    level = float(point.tangent[-1])
     return Tests(
-        fold=float(point.tangent[-1]),
+        fold=level if abs(level) > _LEVEL else float("nan"),
         flip=float(np.prod(1 + multipliers).real),
         neimark_sacker=float(pairs.max() - 1) if len(pairs) else float("nan"),
     )
@@ -132,8 +136,9 @@ def fold_of(oscillator: Any, near: Bifurcation, *, steps: Any = STEPS) -> Fold:
 def _fold(family: Family, z, parameter, direction, nodes, periods: int) -> Fold:
     z, parameter, direction, nodes = held((z, parameter, direction, nodes))
     scales = Scales(jnp.linalg.norm(z), parameter)
-    point, slope = _turning(held(family), scales.place(z, parameter), jnp.append(direction, 0.0), scales, nodes, periods)
-    place = held(point.place)
+    begin, normal = scales.place(z, parameter), jnp.append(direction, jnp.zeros_like(parameter))
+    search = held(_turning(held(family), begin, normal, scales, nodes, periods))
+    place = search.point.place
 
     def across(place, family):
         return change(family, place, scales, nodes, periods)
@@ -148,30 +153,63 @@ def _fold(family: Family, z, parameter, direction, nodes, periods: int) -> Fold:
         parameter=value - scales.parameter * (moved - held(moved)),
         displacement=x,
         velocity=v * 2 * jnp.pi * frequency,
-        slope=slope,
-        converged=point.converged & (jnp.abs(slope) < _FLAT),
+        slope=search.slopes[1],
+        converged=search.point.converged & search.found,
     )
 
 
-def _turning(family, place, normal, scales, nodes, periods) -> tuple[Corrected, Scalar]:
-    """Where the slope of the parameter over the distance along a normal is zero, by secants."""
+class _Search(NamedTuple):
+    """Two places on the branch, the distance to try next, and how far the search is."""
+
+    point: Corrected
+    distances: Scalar
+    slopes: Scalar
+    trial: Scalar
+    bracketed: Bool[Array, ""]
+    trials: Array
+
+    @property
+    def found(self) -> Bool[Array, ""]:
+        """Whether a slope of zero has been met or enclosed; at the corner of a branch it can only be enclosed."""
+        apart = jnp.abs(self.distances[1] - self.distances[0])
+        return (self.trials > 1) & ((jnp.abs(self.slopes[1]) < _FLAT) | (self.bracketed & (apart < _NARROW)))
+
+
+def _turning(family, place, normal, scales, nodes, periods) -> _Search:
+    """Where the slope of the parameter over the distance along a normal is zero: false position (Illinois).
+
+    Until the slope has changed its sign, secants that go somewhat too far.
+    """
 
     def at(distance):
         point = corrected(family, place + distance * normal, normal, scales, nodes, periods)
         return point, point.tangent[-1] / jnp.sum(point.tangent * normal)
 
-    def go_on(state):
-        _, (point, slope), _, count = state
-        return (jnp.abs(slope) >= _FLAT) & point.converged & (count < _SECANTS)
+    def go_on(search):
+        return ~search.found & search.point.converged & (search.trials < _TRIALS)
 
-    def secant(state):
-        (distance, (_, slope)), last_slope, before = (state[0], state[1]), state[2][1], state[2][0]
-        flat = slope == last_slope
-        ahead = distance - slope * (distance - before) / jnp.where(flat, 1.0, slope - last_slope)
-        return ahead, at(ahead), (distance, slope), state[3] + 1
+    def advance(search):
+        point, slope = at(search.trial)
+        other, last = search.distances
+        old, newest = search.slopes
+        # the new place and that across the zero from it; one that stays for a second time counts half
+        stays = search.bracketed & (slope * newest > 0)
+        distances = jnp.stack([jnp.where(stays, other, last), search.trial])
+        slopes = jnp.stack([jnp.where(stays, 0.5 * old, newest), slope])
+        bracketed = (slopes[0] * slopes[1] < 0) & (search.trials > 0)
+        return _Search(
+            point, distances, slopes, _next(distances, slopes, bracketed, search.trials), bracketed, search.trials + 1
+        )
 
     zero = jnp.zeros((), place.dtype)
-    begin, first = at(zero), jnp.asarray(_FIRST, place.dtype)
-    state = first, at(first), (zero, begin[1]), 0
-    _, (point, slope), _, _ = jax.lax.while_loop(go_on, secant, state)
-    return point, slope
+    nothing = Corrected(place, normal, zero, jnp.array(True))
+    begin = _Search(nothing, jnp.stack([zero, zero]), jnp.stack([zero, zero]), zero, jnp.array(False), jnp.array(0))
+    return jax.lax.while_loop(go_on, advance, begin)
+
+
+def _next(distances, slopes, bracketed, trials) -> Scalar:
+    """The distance to try after two slopes."""
+    rise = slopes[1] - slopes[0]
+    secant = -slopes[1] * (distances[1] - distances[0]) / jnp.where(rise == 0, 1.0, rise)
+    ahead = jnp.where(bracketed, secant, jnp.clip(_FURTHER * secant, -_FARTHEST, _FARTHEST))
+    return jnp.where(trials == 0, _FIRST, distances[1] + ahead)

@@ -26,7 +26,6 @@ _SHORTEST = 1e-3  # of the first step; shorter ones turn with the corner of a br
 _LONGEST = 4.0
 _LOCATED = 1e-9  # part of a step to which a bifurcation is located
 _HALVINGS = 60
-_ALIKE = 1e-2  # two halves of an orbit that differ by less, as part of its size, are one orbit of half the period
 
 
 class Branch(Checked):
@@ -157,9 +156,10 @@ class _Follower:
                 self.take_last(point)
                 ended = "range"
                 break
-            if self.note(point, orbit, step):
+            if _joins(self.orbit, orbit):
                 ended = "joined"
                 break
+            self.note(point, orbit, step)
             closed = len(self.kept) > 3 and self.passes_begin(point, step)
             self.take(point, orbit)
             if callback is not None:
@@ -176,7 +176,10 @@ class _Follower:
         return float(self.scales.unknowns(point.place)[1])
 
     def take(self, point: Corrected, orbit: Orbit) -> None:
-        self.point, self.orbit, self.tests = point, orbit, tests_of(point, orbit)
+        tests = tests_of(point, orbit)
+        # where the parameter stands still, the direction that it had
+        self.tests = tests._replace(fold=self.tests.fold) if np.isnan(tests.fold) else tests
+        self.point, self.orbit = point, orbit
         self.kept.append(orbit)
         self.parameters.append(self.scales.unknowns(point.place)[1])
 
@@ -196,18 +199,13 @@ class _Follower:
         apart = float(jnp.linalg.norm(point.place - self.begin.place))
         return apart < step and float(jnp.sum(point.tangent * self.begin.tangent)) > 0
 
-    def note(self, point: Corrected, orbit: Orbit, step: float) -> bool:
-        """Locates the bifurcations up to the next point; whether the branch ends at one."""
+    def note(self, point: Corrected, orbit: Orbit, step: float) -> None:
+        """Locates the bifurcations up to the next point."""
         tests = tests_of(point, orbit)
         found = [self.located(kind, tests, step) for kind in self.tests.crossed(tests)]
         for _, bifurcation in sorted(found, key=lambda item: item[0]):
-            if bifurcation.kind == "fold" and _repeats(bifurcation.orbit):
-                self.kept.append(bifurcation.orbit)
-                self.parameters.append(bifurcation.parameter)
-                return True
             self.bifurcations.append(bifurcation)
             self.before.append(len(self.kept))
-        return False
 
     def located(self, kind: Kind, beyond: Tests, step: float) -> tuple[float, Bifurcation]:
         """A bifurcation before the next point, by false position with halved ends (Illinois), and its distance."""
@@ -217,7 +215,7 @@ class _Follower:
             middle = (a * right - b * left) / (right - left)
             point, orbit = self.along(middle)
             value = tests_of(point, orbit).of(kind)
-            if value == 0 or not np.isfinite(value) or b - a < _LOCATED * step:
+            if not abs(value) > _LOCATED or b - a < _LOCATED * step:
                 break
             if value * right > 0:
                 b, right, left = middle, value, left * (0.5 if side == 1 else 1.0)
@@ -225,8 +223,6 @@ class _Follower:
             else:
                 a, left, right = middle, value, right * (0.5 if side == -1 else 1.0)
                 side = -1
-            if min(abs(middle - a), abs(b - middle)) == 0 and abs(value) < _LOCATED:
-                break
         return middle, bifurcation_at(kind, self.scales.unknowns(point.place)[1], point, orbit)
 
     def branch(self, ended: Ended) -> Branch:
@@ -248,9 +244,13 @@ def _point(family, guess, normal, scales: Scales, nodes, periods: int) -> tuple[
     return point, orbit_at(oscillator, z, steps_of(oscillator, nodes), frequency, periods)
 
 
-def _repeats(orbit: Orbit) -> bool:
-    """Whether an orbit of an even number of cycles is one of half as many."""
-    if orbit.periods % 2:
-        return False
-    first, second = np.split(np.asarray(orbit.approach), 2)
-    return bool(np.abs(first - second).max() < _ALIKE * np.abs(first).max())
+def _joins(here: Orbit, there: Orbit) -> bool:
+    """Whether orbits of half the period lie between two neighbouring orbits: their halves have changed places."""
+    return here.periods % 2 == 0 and float(np.dot(_odd(here), _odd(there))) < 0
+
+
+def _odd(orbit: Orbit) -> np.ndarray:
+    """By how much the state differs from that half an orbit later."""
+    scale = 2 * np.pi * float(orbit.mesh_frequency)
+    halves = (np.split(np.asarray(part), 2) for part in (orbit.approach, orbit.approach_rate / scale))
+    return np.array([first[0] - second[0] for first, second in halves])
