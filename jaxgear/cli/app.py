@@ -99,6 +99,25 @@ def optimize(
 
 
 @app.command()
+def dynamics(
+    file: File,
+    output: Annotated[Path | None, _output("dynamics")] = None,
+    quick: Quick = False,
+    no_figures: NoFigures = False,
+    no_cache: NoCache = False,
+) -> int:
+    """Run the pair through the speeds of the table [dynamics], up and down, under several torques.
+
+    Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the design file or
+    the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.
+    """
+    with interrupt.importing():
+        from . import dynamics
+    fine = dynamics.run_dynamics(file, output, quick=quick, figures=not no_figures, cache=not no_cache)
+    return OK if fine else NOT_CONVERGED
+
+
+@app.command()
 def sweep(
     file: File,
     output: Annotated[Path | None, _output("sweep")] = None,

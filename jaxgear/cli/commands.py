@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from ..geometry import GearPair
-from ..io import DesignFileError, optimize_request
-from ..microgeometry import NoModification
+from ..io import DesignFile, DesignFileError, optimize_request
+from ..microgeometry import AbstractModification, NoModification
 from ..numerics import program
 from ..sizing import iso_relief
 from .devices import compile_quickly
@@ -28,7 +28,7 @@ def analyze(file: Path, output: Path | None, *, figures: bool, cache: bool) -> b
             problem = f"analyze needs numbers, these are free: {free}; use jaxgear optimize"
             raise DesignFileError("variables", problem, file)
         with run(design, output or default_folder(file, "analyze"), stages) as current:
-            _import_ahead(*_FIGURES * figures)
+            import_ahead(*_FIGURES * figures)
             current.prepare()
             current.evaluate("unmodified", NoModification(), NoModification())
             pinion, wheel = design.design({})
@@ -46,19 +46,23 @@ def optimize(file: Path, output: Path | None, *, method: str | None, quick: bool
         request = optimize_request(design, method=method, quick=quick)
         target = output or default_folder(file, "optimize", request.method, quick=quick)
         with run(design, target, stages) as current:
-            _import_ahead(*_SEARCH, *_FIGURES * figures)
+            import_ahead(*_SEARCH, *_FIGURES * figures)
             current.prepare(quick=quick, finer=request.finer, verify=request.verify)
-            load = np.asarray(design.torque), np.asarray(design.optimize.application_factor)
-            relief = _iso_relief(design.pair(), *load)
+            relief = rule_based(design)
             involute = NoModification()
             current.search(request, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
             current.write(figures=figures)
     return current.show()
 
 
-def _import_ahead(*modules: str) -> None:
+def import_ahead(*modules: str) -> None:
     """Imports what is needed later in another thread: this one will wait for the compiler."""
     threading.Thread(target=lambda: [importlib.import_module(module) for module in modules]).start()
+
+
+def rule_based(design: DesignFile) -> AbstractModification:
+    """The relief of ISO 6336-1 for both tips."""
+    return _iso_relief(design.pair(), np.asarray(design.torque), np.asarray(design.optimize.application_factor))
 
 
 @program

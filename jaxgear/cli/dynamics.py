@@ -1,9 +1,9 @@
 """The command `jaxgear dynamics`: from a design file to the vibration of its designs over the speed."""
 
-import dataclasses
 import os
 from collections.abc import Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import jax
 import numpy as np
 
 from ..contact import Mesh
-from ..dynamics import Oscillator, steps_for
+from ..dynamics import Dynamics, Oscillator, steps_for
 from ..io import (
     DesignFile,
     DynamicsRequest,
@@ -24,8 +24,8 @@ from ..io import (
 from ..io.schema import METHODS_WITHOUT_VARIABLES
 from ..microgeometry import AbstractModification, NoModification
 from ..optimize import Front
-from . import dynamics_report, interrupt, report
-from .commands import import_ahead, iso_relief_of
+from . import dynamics_figures, dynamics_report, interrupt, report
+from .commands import import_ahead, rule_based
 from .devices import compile_quickly
 from .dynamics_report import Study
 from .kept import Kept
@@ -53,7 +53,7 @@ def run_dynamics(file: Path, output: Path | None, *, quick: bool, figures: bool,
             write_summary(folder / "summary.json", {**dynamics_report.summary(study), "quick": quick})
             dynamics_report.write_responses(folder / "responses.csv", study)
             if figures:
-                dynamics_report.write_figures(folder, study)
+                dynamics_figures.write_figures(folder, study)
             putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
             putting_in_place.callback(kept.remove)
     report.console().print(dynamics_report.table(study))
@@ -82,7 +82,7 @@ def _designs(
     size = design.resolution(max(design.torque, *request.torques))
     mesh = jax.block_until_ready(design.mesh(coarse(size) if quick else size))
     involute = NoModification()
-    relief = iso_relief_of(design)
+    relief = rule_based(design)
     designs: dict[str, Modifications] = {"unmodified": (involute, involute), "rule-based": (relief, relief)}
     if not design.bounds:
         given = design.design({})
@@ -117,7 +117,7 @@ def _study(
         oscillators[name] = {
             torque: settings.oscillator(mesh, torque, pinion=pinion, wheel=wheel) for torque in request.torques
         }
-    steps = settings.steps or _steps(settings.mesh_frequencies, oscillators)
+    steps = _steps(settings, oscillators)
     stages.begin("running through the speeds")
     responses: dict[str, dict[float, dict[str, Any]]] = {}
     total, done = _count(designs, request), 0
@@ -127,17 +127,15 @@ def _study(
             runs = responses[name][torque] = {}
             for run in settings.run_names:
                 stages.count(done, total, f"{name}, {torque:g} N m, {run}")
-                made_of = oscillator, dataclasses.astuple(_plain(settings)), run, steps
-                runs[run] = kept(made_of, lambda: settings.run(oscillator, run, steps=steps))
+                made_of = oscillator, settings.mesh_frequencies, settings.kick
+                runs[run] = kept((made_of, run, steps), partial(settings.run, oscillator, run, steps=steps))
                 done += 1
     return Study(design, request, mesh, designs, oscillators, responses, steps)
 
 
-def _plain(settings):
-    return settings
-
-
-def _steps(mesh_frequencies, oscillators: Mapping[str, Mapping[float, Oscillator]]) -> tuple[int, ...]:
+def _steps(settings: Dynamics, oscillators: Mapping[str, Mapping[float, Oscillator]]) -> tuple[int, ...]:
     """As many as the stiffest oscillator needs at every speed: one compiled program serves all."""
-    each = [steps_for(one, mesh_frequencies) for several in oscillators.values() for one in several.values()]
+    if settings.steps is not None:
+        return (settings.steps,) * len(settings.mesh_frequencies)
+    each = [steps_for(one, settings.mesh_frequencies) for several in oscillators.values() for one in several.values()]
     return tuple(int(count) for count in np.max(each, axis=0))

@@ -17,7 +17,7 @@ from ..io import writing
 from . import interrupt
 from .version import version
 
-_PLAIN = "state"  # a field of two arrays
+_PAIR = "state"  # a field of two arrays
 
 
 class Kept:
@@ -66,10 +66,11 @@ def _digest(tree: Any) -> str:
 
 def _write(path: Path, response: SpeedResponse) -> None:
     fields = {field.name: getattr(response, field.name) for field in dataclasses.fields(response)}
-    displacement, velocity = fields.pop(_PLAIN)
+    displacement, velocity = fields.pop(_PAIR)
+    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in fields.items()}
     temporary = path.with_suffix(".part")
     with temporary.open("wb") as file:
-        np.savez(file, displacement=displacement, velocity=velocity, **{n: np.asarray(v) for n, v in fields.items()})
+        np.savez(file, displacement=np.asarray(displacement), velocity=np.asarray(velocity), **arrays)
     temporary.replace(path)
 
 
@@ -77,7 +78,7 @@ def _read(path: Path) -> SpeedResponse | None:
     try:
         with np.load(path) as file:
             data = dict(file)
-        data[_PLAIN] = data.pop("displacement"), data.pop("velocity")
+        data[_PAIR] = data.pop("displacement"), data.pop("velocity")
         data["orders"], data["direction"] = tuple(data["orders"].tolist()), str(data["direction"])
         return SpeedResponse(**data)
     except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):  # not there, or torn

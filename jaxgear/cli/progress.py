@@ -46,6 +46,11 @@ class Stages(_Bar):
         interrupt.check()
         self.update(self._task, completed=step, total=total, note=f"best {best:.4g}")
 
+    def count(self, done: int, total: int, note: str) -> None:
+        """How much of the stage is done, and what is next."""
+        interrupt.check()
+        self.update(self._task, completed=done, total=total, note=note)
+
 
 class Meter(_Bar):
     """Progress of a sweep, whose callback it is.

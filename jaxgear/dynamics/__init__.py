@@ -25,6 +25,9 @@ from .oscillator import Oscillator as Oscillator
 from .quantities import DYNAMIC_QUANTITIES as DYNAMIC_QUANTITIES
 from .quantities import mesh_frequency as mesh_frequency
 from .response import SpeedResponse as SpeedResponse
+from .settings import DOWN as DOWN
+from .settings import KICKED as KICKED
+from .settings import UP as UP
 from .settings import Dynamics as Dynamics
 from .speed_sweep import speed_sweep as speed_sweep
 from .speed_sweep import steps_for as steps_for

@@ -16,6 +16,7 @@ from ..numerics import Checked, concrete, count, number
 from .force import AbstractMeshForce
 from .from_contact import Model, mesh_force
 from .oscillator import Oscillator
+from .quantities import with_settings
 from .response import SpeedResponse
 from .speed_sweep import speed_sweep
 from .steady import SteadyNumbers, differentiable
@@ -28,8 +29,8 @@ UP, DOWN, KICKED = "up", "down", "down, kicked"
 
 # Of the critical damping, where nothing is said: gears with splash lubrication have 0.03 to 0.1.
 DAMPING_RATIO = 0.05
-_BEARING = {"shape": ("directions",), "optional": True, "default": None}
-_DIRECTIONS = 2  # along and across
+_AXES = ("directions",)  # along and across
+_DIRECTIONS = 2
 # Steps of a mesh cycle while its natural frequency is not known, since it is traced: 64 of its periods for one at four
 # times the mesh frequency.
 _STEPS = 256
@@ -63,10 +64,10 @@ class Dynamics(Checked):
     pinion_inertia: Scalar | None = number("kg m2", low=0.0, open_low=True, optional=True, default=None)
     wheel_inertia: Scalar | None = number("kg m2", low=0.0, open_low=True, optional=True, default=None)
     compliance: Scalar = number("um/N", low=0.0, default=0.0)
-    pinion_bearing: Bearing | None = number("N/um", low=0.0, open_low=True, **_BEARING)
-    wheel_bearing: Bearing | None = number("N/um", low=0.0, open_low=True, **_BEARING)
-    pinion_bearing_damping: Bearing | None = number("N s/um", low=0.0, **_BEARING)
-    wheel_bearing_damping: Bearing | None = number("N s/um", low=0.0, **_BEARING)
+    pinion_bearing: Bearing | None = number("N/um", low=0.0, open_low=True, shape=_AXES, optional=True, default=None)
+    wheel_bearing: Bearing | None = number("N/um", low=0.0, open_low=True, shape=_AXES, optional=True, default=None)
+    pinion_bearing_damping: Bearing | None = number("N s/um", low=0.0, shape=_AXES, optional=True, default=None)
+    wheel_bearing_damping: Bearing | None = number("N s/um", low=0.0, shape=_AXES, optional=True, default=None)
     model: Model = "map"
     positions: int = count(low=16, high=4096, default=128)
     kick: Scalar = number("", low=1.0, default=3.0)
@@ -150,7 +151,7 @@ class Dynamics(Checked):
             oscillator,
             self.mesh_frequencies,
             direction="up" if name == UP else "down",
-            kick=self.kick if name == KICKED else None,
+            kick=self.kick if name == KICKED else None,  # type: ignore[arg-type]
             steps=self.steps if steps is None else steps,
         )
 

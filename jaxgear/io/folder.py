@@ -27,6 +27,13 @@ RESULT_FILES = frozenset(
         "k_chart.png",
         "lead_chart.png",
         "pressure_map.png",
+        "responses.csv",
+        "dynamic_factor.png",
+        "approach_rms.png",
+        "waterfall.png",
+        "bifurcation.png",
+        "phase_portrait.png",
+        "branches.png",
     }
 )
 

@@ -205,7 +205,7 @@ def _measure(section: schema.OptimizeSection) -> AbstractMeasure:
 def _constraint(design: DesignFile, number: int, table: schema.Tables) -> Constraint:
     key = f"optimize.constraint[{number}]"
     section = decode(key, table, schema.ConstraintSection)
-    of = section.variables if section.of is None else section.of
+    of: Any = section.variables if section.of is None else section.of
     if of is None or (section.of is not None and section.variables is not None):
         raise DesignFileError(key, "needs either of = a quantity or variables = a table of coefficients")
     if isinstance(of, str):

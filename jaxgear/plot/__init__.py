@@ -5,6 +5,10 @@ None shows a window or changes matplotlib's settings; `save` writes the file.
 """
 
 from .convergence import convergence as convergence
+from .dynamics import bifurcation as bifurcation
+from .dynamics import phase_portrait as phase_portrait
+from .dynamics import speed_response as speed_response
+from .dynamics import waterfall as waterfall
 from .fan import fan as fan
 from .fan import ppte_distribution as ppte_distribution
 from .fan import ppte_histogram as ppte_histogram

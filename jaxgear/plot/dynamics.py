@@ -25,6 +25,8 @@ def speed_response(
     responses: Mapping[str, Sequence[SpeedResponse]],
     of: Literal["dynamic_factor", "approach_rms"] = "dynamic_factor",
     ax: Axes | None = None,
+    *,
+    title: str = "",
 ) -> Axes:
     """A number of the steady states of several designs over the mesh frequency, speed rising and falling.
 
@@ -32,6 +34,7 @@ def speed_response(
         responses: of every design, by its name: those of several runs, each with its direction.
         of: which number: the dynamic factor or the rms of the approach about its mean.
         ax: Axes to draw into; None for a new figure.
+        title: in the Axes.
     """
     seen: dict[str, None] = {}
     with report_axes(ax) as ax:
@@ -49,19 +52,23 @@ def speed_response(
         ax.set_ylim(bottom=1.0 if of == "dynamic_factor" else 0.0)
         ax.set(xlabel=FREQUENCY_LABEL, ylabel=_RESPONSES[of])
         legend_above(ax)
+        _say(ax, title)
     return ax
 
 
 _MOVES = {"up": "rising", "down": "falling"}
 
 
-def waterfall(response: SpeedResponse, of: Literal["force", "velocity"] = "force", ax: Axes | None = None) -> Axes:
+def waterfall(
+    response: SpeedResponse, of: Literal["force", "velocity"] = "force", ax: Axes | None = None, *, title: str = ""
+) -> Axes:
     """Campbell diagram: amplitudes of the spectrum along the multiples of the mesh frequency, over the mesh frequency.
 
     Args:
         response: of one run.
         of: spectrum of the mesh force or of the velocity of approach.
         ax: Axes to draw into; None for a new figure.
+        title: in the Axes.
     """
     unit, scale = ("N", 1.0) if of == "force" else ("mm/s", 1e-3)
     frequency, orders = np.asarray(response.mesh_frequency), np.asarray(response.orders)
@@ -87,6 +94,7 @@ def waterfall(response: SpeedResponse, of: Literal["force", "velocity"] = "force
         bar.set_label(f"amplitude of the {'mesh force' if of == 'force' else 'velocity of approach'} [{unit}]")
         bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
         ax.set(xlabel=FREQUENCY_LABEL, ylabel="frequency [Hz]")
+        _say(ax, title)
     return ax
 
 
@@ -97,7 +105,7 @@ def _name_orders(ax: Axes, orders, highest: float) -> None:
             ax.annotate(f"{order:g}", (highest, order * highest), annotation_clip=False, **place)
 
 
-def bifurcation(responses: Sequence[SpeedResponse], ax: Axes | None = None) -> Axes:
+def bifurcation(responses: Sequence[SpeedResponse], ax: Axes | None = None, *, title: str = "") -> Axes:
     """Bifurcation diagram: the approach once per mesh cycle over the mesh frequency.
 
     An orbit of one mesh cycle shows as one point, one of two as two, an aperiodic one as a cloud.
@@ -105,6 +113,7 @@ def bifurcation(responses: Sequence[SpeedResponse], ax: Axes | None = None) -> A
     Args:
         responses: of one or several runs, each with its direction.
         ax: Axes to draw into; None for a new figure.
+        title: in the Axes.
     """
     with report_axes(ax) as ax:
         for index, response in enumerate(responses):
@@ -115,6 +124,7 @@ def bifurcation(responses: Sequence[SpeedResponse], ax: Axes | None = None) -> A
             ax.plot(frequency.ravel(), points.ravel(), linestyle="", markersize=2.2, mew=0, label=label, **style)
         ax.set(xlabel=FREQUENCY_LABEL, ylabel="approach at mesh position 0 [µm]")
         legend_above(ax)
+        _say(ax, title)
     return ax
 
 
@@ -127,7 +137,7 @@ def phase_portrait(approach, velocity, force, ax: Axes | None = None, *, once: A
         force: of the mesh [N], shape (steps,): positive on the drive flanks, negative on the coast flanks.
         once: (approach, velocity) once per mesh cycle, each of shape (points,); None for no marks.
         ax: Axes to draw into; None for a new figure.
-        title: over the Axes.
+        title: in the Axes.
     """
     x, y, f = np.asarray(approach), 1e-3 * np.asarray(velocity), np.asarray(force)
     closed = np.stack([np.append(x, x[0]), np.append(y, y[0])], axis=1)
@@ -149,6 +159,11 @@ def phase_portrait(approach, velocity, force, ax: Axes | None = None, *, once: A
         ax.autoscale_view()
         ax.set(xlabel=_APPROACH_LABEL, ylabel="velocity of approach [mm/s]")
         legend_above(ax)
-        if title:
-            ax.annotate(title, (0.02, 0.98), xycoords="axes fraction", ha="left", va="top", color=GREY)
+        _say(ax, title)
     return ax
+
+
+def _say(ax: Axes, title: str) -> None:
+    """A title in the upper left corner, since a legend stands above."""
+    if title:
+        ax.annotate(title, (0.02, 0.98), xycoords="axes fraction", ha="left", va="top", color=GREY)

@@ -1,0 +1,69 @@
+"""Pictures of a study of the vibration over the speed."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..dynamics import UP, Oscillator, SpeedResponse, motion
+from . import report
+from .dynamics_report import Study, peak
+
+_PANEL, _HEIGHT = 92.0, 84.0  # [mm]
+
+
+def write_figures(folder: Path, study: Study) -> None:
+    """Writes all figures: responses of all designs, and the first and the last design more closely."""
+    import matplotlib
+
+    matplotlib.use("Agg")  # the command line never shows a window
+    from .. import plot
+
+    torques = study.request.torques
+    size: dict[str, Any] = {"columns": len(torques), "width": _PANEL * len(torques), "height": _HEIGHT}
+    axes: dict[str, Any] = {}
+    for field in ("dynamic_factor", "approach_rms"):
+        with plot.figure.report_axes(None, **size) as panels:
+            for number, (panel, torque) in enumerate(zip(np.ravel(panels), torques)):
+                runs = {name: list(of[torque].values()) for name, of in study.responses.items()}
+                plot.speed_response(runs, field, panel, title=f"{torque:g} N m")
+                panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
+        axes[field] = panels
+    shown = list(dict.fromkeys((next(iter(study.designs)), list(study.designs)[-1])))
+    size = {"columns": len(shown), "width": _PANEL * len(shown), "height": _HEIGHT}
+    for kind in ("waterfall", "bifurcation", "phase_portrait"):
+        with plot.figure.report_axes(None, **size) as panels:
+            for number, (panel, name) in enumerate(zip(np.ravel(panels), shown)):
+                _draw(kind, panel, study, name)
+                panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
+        axes[kind] = panels
+    report.save_figures(folder, axes)
+
+
+def _draw(kind: str, panel, study: Study, name: str) -> None:
+    from .. import plot
+
+    runs = study.responses[name][study.torque]
+    last = list(runs.values())[-1]
+    title = f"{name}, {study.torque:g} N m"
+    if kind == "waterfall":
+        plot.waterfall(last, "force", panel, title=title)
+    elif kind == "bifurcation":
+        plot.bifurcation([runs[UP], last], panel, title=title)
+    else:
+        worst = max(runs.values(), key=lambda response: peak(response, "dynamic_factor")[0])
+        _portrait(panel, study, study.oscillators[name][study.torque], worst, name)
+
+
+def _portrait(panel, study: Study, oscillator: Oscillator, response: SpeedResponse, name: str) -> None:
+    """The motion at the worst speed."""
+    from .. import plot
+
+    place = int(np.nanargmax(np.asarray(response.dynamic_factor)))
+    count = int(response.period[place]) or response.poincare_approach.shape[-1]
+    frequency = float(response.mesh_frequency[place])
+    start = tuple(part[place] for part in response.state)
+    moved = motion(oscillator, frequency, start, periods=count, steps=study.steps[place])
+    once = response.poincare_approach[place, :count], response.poincare_velocity[place, :count]
+    title = f"{name}, {study.torque:g} N m, {frequency:.0f} Hz"
+    plot.phase_portrait(moved.approach, moved.approach_rate, moved.force, panel, once=once, title=title)

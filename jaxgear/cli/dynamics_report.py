@@ -1,0 +1,181 @@
+"""What `jaxgear dynamics` says, writes and draws."""
+
+import csv
+import dataclasses
+import platform
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from ..contact import Mesh
+from ..dynamics import Oscillator, SpeedResponse
+from ..io import DesignFile, DynamicsRequest, describe
+from ..microgeometry import AbstractModification
+from .version import version
+
+_COLUMNS = {
+    "dynamic_factor": "dynamic_factor",
+    "approach_rms": "approach_rms_um",
+    "approach_mean": "approach_mean_um",
+    "approach_min": "approach_min_um",
+    "approach_max": "approach_max_um",
+    "no_contact": "no_contact_share",
+    "coast_contact": "coast_contact_share",
+    "period": "period_mesh_cycles",
+    "settled": "settled",
+}
+
+
+@dataclass(frozen=True)
+class Study:
+    """What has been found of all designs.
+
+    Attributes:
+        design: the design file.
+        request: what it asks for.
+        mesh: on which the designs are compared.
+        designs: their modifications (pinion, wheel) by name.
+        oscillators: of every design, by torque [N m].
+        responses: of every design, by torque [N m] and name of the run.
+        steps: of the integrator per mesh cycle, at every speed.
+    """
+
+    design: DesignFile
+    request: DynamicsRequest
+    mesh: Mesh
+    designs: Mapping[str, tuple[AbstractModification, AbstractModification]]
+    oscillators: Mapping[str, Mapping[float, Oscillator]]
+    responses: Mapping[str, Mapping[float, Mapping[str, SpeedResponse]]]
+    steps: tuple[int, ...]
+
+    def rows(self) -> Iterator[tuple[str, float, str, SpeedResponse]]:
+        """Design, torque, run and response of all runs."""
+        for name, of_torques in self.responses.items():
+            for torque, runs in of_torques.items():
+                for run, response in runs.items():
+                    yield name, torque, run, response
+
+    @property
+    def torque(self) -> float:
+        """The torque next to the design torque [N m]."""
+        return min(self.request.torques, key=lambda torque: abs(torque - self.design.torque))
+
+
+def peak(response: SpeedResponse, field: str) -> tuple[float, float]:
+    """Largest value of a field and its mesh frequency [Hz]; NaN where nothing is finite."""
+    values = np.asarray(getattr(response, field))
+    if not np.isfinite(values).any():
+        return float("nan"), float("nan")
+    place = int(np.nanargmax(values))
+    return float(values[place]), float(response.mesh_frequency[place])
+
+
+def table(study: Study) -> Table:
+    """The peaks of every run."""
+    result = Table(title=f"{study.design.title}: largest values over the speed", title_justify="left", box=SIMPLE_HEAD)
+    result.add_column("design", no_wrap=True)
+    result.add_column("torque [N m]", justify="right")
+    result.add_column("speed", no_wrap=True)
+    for heading in ("K_v", "at [Hz]", "rms [um]", "at [Hz]", "no contact [%]"):
+        result.add_column(heading, justify="right", no_wrap=True)
+    before = None
+    for name, torque, run, response in study.rows():
+        if before not in (None, name):
+            result.add_section()
+        (factor, at_factor), (rms, at_rms) = peak(response, "dynamic_factor"), peak(response, "approach_rms")
+        apart = 100 * peak(response, "no_contact")[0]
+        numbers = f"{factor:.3f}", f"{at_factor:.0f}", f"{rms:.2f}", f"{at_rms:.0f}", f"{apart:.1f}"
+        result.add_row(name, f"{torque:g}", run, *numbers)
+        before = name
+    return result
+
+
+def verdict(study: Study) -> Iterator[str]:
+    """The worst of every design over all runs and torques."""
+    worst = {
+        name: max(peak(response, "dynamic_factor")[0] for runs in of_torques.values() for response in runs.values())
+        for name, of_torques in study.responses.items()
+    }
+    first = next(iter(worst.values()))
+    others = [f"{name} {value:.3f} ({100 * (value / first - 1):+.0f} %)" for name, value in list(worst.items())[1:]]
+    yield f"worst dynamic factor over all torques and speeds: unmodified {first:.3f}, {', '.join(others)}"
+    aperiodic = sum(int(np.sum(np.asarray(response.period) == 0)) for *_, response in study.rows())
+    total = sum(len(response.mesh_frequency) for *_, response in study.rows())
+    if aperiodic:
+        yield f"no periodic motion was found at {aperiodic} of {total} speeds: their numbers are of a recorded time"
+
+
+def failures(study: Study) -> Iterator[str]:
+    """A line for every design whose contact was not found at some approach."""
+    for name, of_torques in study.oscillators.items():
+        bad = [f"{torque:g}" for torque, of in of_torques.items() if not bool(_converged(of))]
+        if bad:
+            yield (
+                f"MESH FORCE NOT CONVERGED: {name} at {', '.join(bad)} N m; its numbers are not to be trusted. "
+                "Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
+            )
+
+
+def _converged(oscillator: Oscillator):
+    return getattr(oscillator.mesh_force, "converged", True)
+
+
+def summary(study: Study) -> dict[str, Any]:
+    """Contents of `summary.json`."""
+    settings = study.request.settings
+    given = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
+    frequencies = np.asarray(given.pop("mesh_frequencies"))
+    designs: dict[str, Any] = {}
+    for name, (pinion, wheel) in study.designs.items():
+        runs = [
+            {"torque_Nm": torque, "speed": run, **_peaks(response)}
+            for other, torque, run, response in study.rows()
+            if other == name
+        ]
+        flanks = {"pinion_modification": describe(pinion), "wheel_modification": describe(wheel)}
+        designs[name] = {"runs": runs, **flanks}
+    return {
+        "title": study.design.title,
+        "design_file": study.design.path.name,
+        "torques_Nm": study.request.torques,
+        "mesh_frequencies_Hz": [float(frequencies[0]), float(frequencies[-1])],
+        "speeds": len(frequencies),
+        "settings": {name: value for name, value in given.items() if value is not None},
+        "equivalent_mass_kg": np.asarray(study.oscillators["unmodified"][study.torque].mass),
+        "steps": [min(study.steps), max(study.steps)],
+        "designs": designs,
+        "versions": {
+            "jaxgear": version(),
+            "jax": jax.__version__,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+        },
+    }
+
+
+def _peaks(response: SpeedResponse) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for field, column in (("dynamic_factor", "dynamic_factor"), ("approach_rms", "approach_rms_um")):
+        found[f"max_{column}"], found[f"at_{field}_Hz"] = peak(response, field)
+    found["max_no_contact_share"] = peak(response, "no_contact")[0]
+    found["max_coast_contact_share"] = peak(response, "coast_contact")[0]
+    found["speeds_without_period"] = int(np.sum(np.asarray(response.period) == 0))
+    return found
+
+
+def write_responses(path: Path, study: Study) -> None:
+    """Every speed of every run as CSV."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["design", "torque_Nm", "speed", "mesh_frequency_Hz", *_COLUMNS.values()])
+        for name, torque, run, response in study.rows():
+            columns = [np.asarray(getattr(response, field)) for field in _COLUMNS]
+            for frequency, *values in zip(np.asarray(response.mesh_frequency), *columns):
+                numbers = [int(value) if value.dtype.kind in "ib" else f"{value:.7g}" for value in values]
+                writer.writerow([name, f"{torque:g}", run, f"{frequency:.7g}", *numbers])
