@@ -22,6 +22,7 @@ ALLOWANCE = -40.0
 SIZES = jg.Resolution(positions=16, pairs=3)
 RELIEFS = {"pinion": jg.TipRelief(6.9, 3.4), "wheel": jg.TipRelief(5.0, 3.0)}
 NO_RELIEFS = {"pinion": jg.TipRelief(0.0, 3.4), "wheel": jg.TipRelief(0.0, 3.0)}
+THICKER = jg.TabulatedProfile([0.0, 99.0], [-50.0, -50.0])
 MODIFICATIONS = {"relieved": RELIEFS, "nominal": NO_RELIEFS}
 
 
@@ -39,7 +40,7 @@ def static_force(mesh):
 def case(request, mesh):
     """Modifications and the map of default size."""
     given = MODIFICATIONS[request.param]
-    made = mesh_force(mesh, torque=TORQUE, **given)
+    made = mesh_force(mesh, torque=TORQUE, **given, reach=3.5)
     assert bool(made.converged)
     return given, made
 
@@ -76,11 +77,11 @@ def test_between_its_grid_the_map_is_within_half_a_percent_of_the_contact_analys
     random = np.random.default_rng(7)
     for first in random.uniform(0, 1 / 16, 4):
         aside = prepare_from(first, mesh.pair, mesh.compliance, SIZES)
-        approach = jnp.asarray(random.uniform(-5.0, 30.0, 80))
+        approach = jnp.asarray(random.uniform(-5.0, 24.0, 80))
         wanted = direct(aside, removed_material(aside, TORQUE, **given), approach)
         phase, approach = (part.ravel() for part in jnp.meshgrid(aside.phase, approach))
         found, wanted = forces(force, phase, approach), wanted.ravel()
-        assert float(wanted.max()) > 4 * static_force and float(wanted.min()) == 0
+        assert float(wanted.max()) > 2.5 * static_force and float(wanted.min()) == 0
         assert float(jnp.max(jnp.abs(found - wanted) / jnp.maximum(wanted, static_force))) < 5e-3
 
 
@@ -116,16 +117,15 @@ def test_the_coast_flanks_touch_where_both_gears_turned_back_put_them(mesh):
     pair, path = mesh.pair, mesh.path_of_contact
     angle, play = pair.working_pressure_angle, 1e-3 * pair.backlash
     first, shift, _ = _coast_phase(mesh)
+
+    def centreline(gear, sign, rho):
+        """Angle of the tooth that touches there beyond the line of centres, in the sense of the pinion's path."""
+        return sign * (jnp.arctan(rho / gear.base_radius) - angle - half_tooth_angle(gear, rho))
+
     for gear, length, sign in ((pair.pinion, path.pinion_roll_length, 1), (pair.wheel, path.wheel_roll_length, -1)):
-
-        def centreline(place):
-            """Angle of the tooth that touches there beyond the line of centres, in the sense of the pinion's path."""
-            rho = length(place)
-            return sign * (jnp.arctan(rho / gear.base_radius) - angle - half_tooth_angle(gear, rho))
-
         for phase in (0.0, 0.3):
-            there = centreline(phase * pair.base_pitch)
-            mirrored = -centreline((first + shift / 16 - phase) * pair.base_pitch)
+            there = centreline(gear, sign, length(phase * pair.base_pitch))
+            mirrored = -centreline(gear, sign, length((first + shift / 16 - phase) * pair.base_pitch))
             # the pinion is turned back by half the play, the wheel on
             turned = there - sign * 0.5 * play / gear.base_radius
             pitches = (turned - mirrored) * gear.teeth / (2 * jnp.pi)
@@ -140,8 +140,9 @@ def test_equal_gears_are_their_own_mirror_image_half_a_pitch_on():
 
 
 def test_other_coast_flanks_change_nothing_on_the_drive_side(mesh):
-    plain, nominal = mesh_force(mesh, torque=TORQUE, **RELIEFS), tuple(NO_RELIEFS.values())
-    other = mesh_force(mesh, torque=TORQUE, **RELIEFS, coast=nominal)
+    nominal, sizes = tuple(NO_RELIEFS.values()), {"positions": 16, "levels": 16}
+    plain = mesh_force(mesh, torque=TORQUE, **RELIEFS, **sizes)
+    other = mesh_force(mesh, torque=TORQUE, **RELIEFS, **sizes, coast=nominal)
     np.testing.assert_array_equal(plain.node_force[0], other.node_force[0])
     approach = -mesh.pair.backlash - 10.0
     assert np.any(
@@ -158,8 +159,7 @@ def test_gradients_equal_central_differences(mesh, approach):
         return jax.vmap(lambda phase: made(phase, jnp.asarray(approach)))(jnp.asarray([0.11, 0.42, 0.83]))
 
     step = 1e-4
-    at = eqx.filter_jit(at)
-    found = eqx.filter_jit(jax.jacfwd(at))(jnp.asarray(6.9))
+    _, found = jax.jvp(at, (jnp.asarray(6.9),), (jnp.asarray(1.0),))
     wanted = (at(jnp.asarray(6.9 + step)) - at(jnp.asarray(6.9 - step))) / (2 * step)
     assert float(jnp.max(jnp.abs(wanted))) > 1.0
     np.testing.assert_allclose(found, wanted, rtol=1e-5, atol=1e-5)
@@ -215,7 +215,10 @@ def test_mean_stiffness_of_a_spring_behind_a_clearance_is_the_spring(static_forc
         ({"compliance": -1.0}, "mesh_force: compliance = -1 um/N must be at least 0 um/N"),
         ({"reach": 0.5}, "mesh_force: reach = 0.5 must be at least 1"),
         ({"model": "exact"}, "mesh_force: model = 'exact' must be one of \"map\""),
-        ({"pinion": jg.ProfileSlope(-80.0)}, "mesh_force: the clearance between drive and coast flanks = "),
+        (
+            {"pinion": jg.TabulatedProfile([0.0, 99.0], [-50.0, -50.0])},
+            "mesh_force: the clearance between drive and coast flanks = ",
+        ),
     ],
 )
 def test_wrong_input_is_named(mesh, given, message):

@@ -34,7 +34,7 @@ def mesh_force(
     wheel: AbstractModification | None = None,
     coast: Both | None = None,
     model: Model = "map",
-    positions: int = 256,
+    positions: int = 320,
     levels: int = 128,
     reach: Any = 5.0,
     compliance: Any = 0.0,
