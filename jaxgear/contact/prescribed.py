@@ -13,8 +13,9 @@ from .operation import operation_of
 from .slide import RemovedMaterial
 from .solve import check_mesh, outermost, removed_material
 
-# Newton steps of a mesh of several slices from the approach of all springs in series to that of the teeth: the force of contacts that stiffen bends
-# one way, so that the steps come from one side and double their digits; measured, four leave 1e-9 of the force.
+# Newton steps of a mesh of several slices from the approach of all springs in series to that of the teeth: the force of
+# contacts that stiffen bends one way, so that the steps come from one side and double their digits; measured, four
+# leave 1e-9 of the force.
 _SERIES_STEPS = 4
 # what may be missed of the approach [um, and relative to it] before the last correction, which is of second order
 _MET = 1e-3
@@ -90,9 +91,7 @@ def solve_at(
 
 
 @program
-def _solve_at(
-    mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Scalar | None = None
-) -> PrescribedContact:
+def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Scalar | None = None) -> PrescribedContact:
     """Contact at a prescribed approach of the teeth; of a mesh of one slice with a shared compliance [um/N] in series.
 
     Its deflection is then part of the approach and of the tangent stiffness, not of the transmission error.

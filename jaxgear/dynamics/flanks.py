@@ -1,5 +1,6 @@
 """Drive and coast flanks of a mesh: one gear pair seen twice, and the clearance between both."""
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -50,6 +51,7 @@ class Static(NamedTuple):
 
 def drive_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
     """The flanks that a mesh has been prepared for."""
+    mesh = replace(mesh, automatic=False)  # as that of the coast flanks, which then need no programs of their own
     pinion, wheel = modification
     removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
     return Flanks(mesh, removed, jnp.arange(mesh.resolution.positions), jnp.zeros_like(torque))

@@ -78,7 +78,7 @@ class AbstractMeshForce(Checked):
             return _approach_at(self, place, force) - _approach_at(self, place, _TOUCHING * force)
 
         phases = jnp.arange(positions, dtype=jnp.result_type(force)) / positions
-        return force / jnp.mean(jax.vmap(deflection)(phases))
+        return (1 - _TOUCHING) * force / jnp.mean(jax.vmap(deflection)(phases))
 
 
 def _missing(approach: Scalar, args) -> Scalar:

@@ -69,8 +69,8 @@ class ForceMap(AbstractMeshForce):
         levels = len(place.force) // 2
         drive, closed = closing(place.start, approach)
         level = closed / self.spacing
-        below = jnp.clip(level, 0.0, levels - 2).astype(jnp.int32)
-        node = below + jnp.where(drive, 0, levels).astype(jnp.int32)
+        below = jnp.floor(jnp.clip(level, 0.0, levels - 2.0))
+        node = below.astype(jnp.int32) + jnp.where(drive, 0, levels).astype(jnp.int32)
         share = level - below
         inside = jnp.clip(share, 0.0, 1.0)
         low, high, rise, end = place.force[node], place.force[node + 1], place.rise[node], place.rise[node + 1]
@@ -118,8 +118,6 @@ def tabulate(flanks: Flanks, unloaded, compliance: Scalar, spacing: Scalar, leve
     first = 2 * force[:, 1:2] / spacing - slope[:, :1]
     slope = jnp.concatenate([first, slope], axis=1)
     mean = jnp.diff(force, axis=1) / spacing
-    around = jnp.minimum(
-        jnp.concatenate([mean[:, :1], mean], axis=1), jnp.concatenate([mean, slope[:, -1:]], axis=1)
-    )
+    around = jnp.minimum(jnp.concatenate([mean[:, :1], mean], axis=1), jnp.concatenate([mean, slope[:, -1:]], axis=1))
     slope = jnp.clip(slope, 0.0, _STEEPEST * around)
     return force[flanks.order], slope[flanks.order], jnp.all(found.converged)

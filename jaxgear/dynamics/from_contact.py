@@ -34,8 +34,8 @@ def mesh_force(
     wheel: AbstractModification | None = None,
     coast: Both | None = None,
     model: Model = "map",
-    positions: int = 256,
-    levels: int = 64,
+    positions: int = 320,
+    levels: int = 128,
     reach: Any = 5.0,
     compliance: Any = 0.0,
     deviation: Any = None,
@@ -54,9 +54,9 @@ def mesh_force(
             those of the drive flanks.
         model: "map" for `ForceMap`, the contact at every approach; "varying stiffness" for `VaryingStiffness`, "loaded
             error" for `LoadedError`, "tangent" for `Tangent`: all give the static transmission error of the torque.
-        positions: mesh positions of the force, which is linear between them: pairs come into contact at an approach that
-            changes by several um from one of 64 positions to the next. An integrator whose steps meet these
-            positions alone needs no more than it has steps.
+        positions: mesh positions of the force, which is linear between them: the approach at which a pair comes into
+            contact changes by several um from one of 64 positions to the next. An integrator whose steps meet
+            these positions alone needs no more than it has steps.
         levels: number of approaches of the map on either side of the clearance.
         reach: largest deflection of the map, relative to the largest static one; the map is linear beyond.
         compliance: of shafts, bearings and bodies in series with the mesh [um/N].
@@ -120,7 +120,9 @@ def _interpolated(deviation: Any, of: Mesh, mesh: Mesh):
 def _number(name: str, value: Any, unit: str, mesh: Mesh, **limits) -> Scalar:
     value = real(value)
     if value.ndim:
-        raise ValueError(f"mesh_force: {name} has shape {value.shape}, must be a single number; make many with jax.vmap")
+        raise ValueError(
+            f"mesh_force: {name} has shape {value.shape}, must be a single number; make many with jax.vmap"
+        )
     check("mesh_force", name, value, unit, **limits)
     return value.astype(mesh.slice_width.dtype)
 
@@ -155,7 +157,9 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
         mean = jnp.mean(deflection, axis=1)
         return LoadedError(first, start + deflection - mean[:, None], force / mean, converged)
     spacing = jax.lax.stop_gradient(reach * jnp.max(deflection) / (levels - 1))
-    tables = [tabulate(side, _in_own_order(side, each), compliance, spacing, levels) for side, each in zip(sides, found)]
+    tables = [
+        tabulate(side, _in_own_order(side, each), compliance, spacing, levels) for side, each in zip(sides, found)
+    ]
     drive, coast = tables
     return ForceMap(
         first_phase=first,

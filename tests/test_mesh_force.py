@@ -1,0 +1,231 @@
+"""The force of a mesh over mesh position and approach: its map, the coast flanks and the simpler models."""
+
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import gear_pair
+
+import jaxgear as jg
+from jaxgear.contact import removed_material, solve_removed
+from jaxgear.contact.mesh import prepare_from
+from jaxgear.contact.prescribed import solve_series
+from jaxgear.dynamics import DeadZone, mesh_force
+from jaxgear.dynamics.flanks import _coast_phase
+from jaxgear.geometry.involute import half_tooth_angle
+
+TORQUE = 50.0
+ALLOWANCE = -40.0
+SIZES = jg.Resolution(positions=16, pairs=3)
+RELIEFS = {"pinion": jg.TipRelief(6.9, 3.4), "wheel": jg.TipRelief(5.0, 3.0)}
+NO_RELIEFS = {"pinion": jg.TipRelief(0.0, 3.4), "wheel": jg.TipRelief(0.0, 3.0)}
+THICKER = jg.TabulatedProfile([0.0, 99.0], [-50.0, -50.0])
+MODIFICATIONS = {"relieved": RELIEFS, "nominal": NO_RELIEFS}
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return jg.prepare(gear_pair(shift=(0.3, -0.1), tooth_thickness_allowance=ALLOWANCE), resolution=SIZES)
+
+
+@pytest.fixture(scope="module")
+def static_force(mesh):
+    return 1e3 * TORQUE / mesh.pair.pinion.base_radius
+
+
+@pytest.fixture(scope="module", params=list(MODIFICATIONS))
+def case(request, mesh):
+    """Modifications and the map of default size."""
+    given = MODIFICATIONS[request.param]
+    made = mesh_force(mesh, torque=TORQUE, **given, reach=3.5)
+    assert bool(made.converged)
+    return given, made
+
+
+@eqx.filter_jit
+def forces(force, phase, approach):
+    return jax.vmap(force)(phase, approach)
+
+
+@eqx.filter_jit
+def approaches(force, phase, load):
+    return jax.vmap(lambda at: force.static_approach(at, load))(phase)
+
+
+@eqx.filter_jit
+def direct(mesh, removed, approach, compliance=0.0):
+    """Force at every approach, shape (approaches, positions)."""
+    at = partial(solve_series, mesh, removed=removed, compliance=jnp.asarray(compliance))
+    return jax.vmap(lambda q: at(jnp.full(mesh.resolution.positions, q)).force)(approach)
+
+
+def test_a_load_has_the_transmission_error_of_the_contact_analysis(case, mesh, static_force):
+    given, force = case
+    removed = removed_material(mesh, TORQUE, **given)
+    for share in (0.2, 1.0, 3.0):
+        cycle = solve_removed(mesh, share * TORQUE, removed)
+        found = approaches(force, mesh.phase, share * static_force)
+        np.testing.assert_allclose(found, cycle.transmission_error, rtol=1e-3, atol=6e-3)
+
+
+def test_between_its_grid_the_map_is_within_half_a_percent_of_the_contact_analysis(case, mesh, static_force):
+    """Of the static force, or of the force itself where that is larger; also far beyond the static deflection."""
+    given, force = case
+    random = np.random.default_rng(7)
+    for first in random.uniform(0, 1 / 16, 4):
+        aside = prepare_from(first, mesh.pair, mesh.compliance, SIZES)
+        approach = jnp.asarray(random.uniform(-5.0, 24.0, 80))
+        wanted = direct(aside, removed_material(aside, TORQUE, **given), approach)
+        phase, approach = (part.ravel() for part in jnp.meshgrid(aside.phase, approach))
+        found, wanted = forces(force, phase, approach), wanted.ravel()
+        assert float(wanted.max()) > 2.5 * static_force and float(wanted.min()) == 0
+        assert float(jnp.max(jnp.abs(found - wanted) / jnp.maximum(wanted, static_force))) < 5e-3
+
+
+def test_the_force_rises_outside_the_clearance_and_is_exactly_zero_in_it(case, mesh):
+    force = case[1]
+    backlash = float(mesh.pair.backlash)
+    approach = jnp.linspace(-backlash - 60.0, 60.0, 2001)
+    for phase in np.random.default_rng(1).uniform(-1, 2, 5):
+        touch, back = force.at(jnp.asarray(phase)).start
+        found = forces(force, jnp.full_like(approach, phase), approach)
+        inside = (approach <= touch) & (approach >= -back)
+        assert not np.any(found[inside]) and np.all(found[approach > touch] > 0) and np.all(found[approach < -back] < 0)
+        rising = jnp.diff(found)
+        assert np.all(rising[~(inside[1:] & inside[:-1])] > 0)
+        np.testing.assert_allclose(jnp.diff(found, 2)[-20:], 0.0, atol=1e-9)  # linear beyond the table
+
+
+def test_both_flanks_are_the_same_gears_in_a_mirror(case, mesh):
+    """About the mesh position where the pinion's tooth stands on the line of centres with equal play on both sides."""
+    force, backlash = case[1], mesh.pair.backlash
+    first, shift, _ = _coast_phase(mesh)
+    middle = 0.5 * (first + shift / 16)
+    random = np.random.default_rng(3)
+    aside, approach = jnp.asarray(random.uniform(0, 1, 40)), jnp.asarray(random.uniform(0, 25.0, 40))
+    drive = forces(force, middle + aside, approach)
+    coast = forces(force, middle - aside, -backlash - approach)
+    # each side is solved at its own positions, the map is linear between both
+    np.testing.assert_allclose(coast, -drive, rtol=5e-3, atol=10.0)
+
+
+def test_the_coast_flanks_touch_where_both_gears_turned_back_put_them(mesh):
+    """From the flanks' own angles: a tooth that touches at s on one side touches at s' on the other."""
+    pair, path = mesh.pair, mesh.path_of_contact
+    angle, play = pair.working_pressure_angle, 1e-3 * pair.backlash
+    first, shift, _ = _coast_phase(mesh)
+
+    def centreline(gear, sign, rho):
+        """Angle of the tooth that touches there beyond the line of centres, in the sense of the pinion's path."""
+        return sign * (jnp.arctan(rho / gear.base_radius) - angle - half_tooth_angle(gear, rho))
+
+    for gear, length, sign in ((pair.pinion, path.pinion_roll_length, 1), (pair.wheel, path.wheel_roll_length, -1)):
+        for phase in (0.0, 0.3):
+            there = centreline(gear, sign, length(phase * pair.base_pitch))
+            mirrored = -centreline(gear, sign, length((first + shift / 16 - phase) * pair.base_pitch))
+            # the pinion is turned back by half the play, the wheel on
+            turned = there - sign * 0.5 * play / gear.base_radius
+            pitches = (turned - mirrored) * gear.teeth / (2 * jnp.pi)
+            assert float(jnp.abs(pitches - jnp.round(pitches))) < 1e-9
+
+
+def test_equal_gears_are_their_own_mirror_image_half_a_pitch_on():
+    pair = gear_pair((30, 30), bores=(None, None), tooth_thickness_allowance=ALLOWANCE)
+    first, shift, play = _coast_phase(jg.prepare(pair, resolution=SIZES))
+    assert float(first + shift / 16) == pytest.approx(0.5, abs=1e-12)
+    assert float(play) == pytest.approx(float(pair.backlash))
+
+
+def test_other_coast_flanks_change_nothing_on_the_drive_side(mesh):
+    nominal, sizes = tuple(NO_RELIEFS.values()), {"positions": 16, "levels": 16}
+    plain = mesh_force(mesh, torque=TORQUE, **RELIEFS, **sizes)
+    other = mesh_force(mesh, torque=TORQUE, **RELIEFS, **sizes, coast=nominal)
+    np.testing.assert_array_equal(plain.node_force[0], other.node_force[0])
+    approach = -mesh.pair.backlash - 10.0
+    assert np.any(
+        forces(plain, mesh.phase, jnp.full(16, approach)) != forces(other, mesh.phase, jnp.full(16, approach))
+    )
+
+
+@pytest.mark.parametrize("approach", [8.0, -50.0])
+def test_gradients_equal_central_differences(mesh, approach):
+    def at(amount):
+        made = mesh_force(
+            mesh, torque=TORQUE, pinion=jg.TipRelief(amount, 3.4), positions=16, levels=16, compliance=1e-3
+        )
+        return jax.vmap(lambda phase: made(phase, jnp.asarray(approach)))(jnp.asarray([0.11, 0.42, 0.83]))
+
+    step = 1e-4
+    _, found = jax.jvp(at, (jnp.asarray(6.9),), (jnp.asarray(1.0),))
+    wanted = (at(jnp.asarray(6.9 + step)) - at(jnp.asarray(6.9 - step))) / (2 * step)
+    assert float(jnp.max(jnp.abs(wanted))) > 1.0
+    np.testing.assert_allclose(found, wanted, rtol=1e-5, atol=1e-5)
+
+
+def test_what_is_in_series_adds_its_deflection(mesh):
+    compliance, removed = 2e-3, removed_material(mesh, TORQUE, **RELIEFS)
+    approach = jnp.linspace(1.0, 20.0, 7)
+    with_it = direct(mesh, removed, approach, compliance)
+    for row, q in zip(with_it, approach):
+        teeth = q - (compliance + mesh.hub / mesh.pair.face_width) * row
+        found = jg.solve_at(mesh, teeth, torque=TORQUE, **RELIEFS)
+        np.testing.assert_allclose(found.force, row, rtol=1e-8, atol=1e-8)
+
+
+def test_slices_share_what_is_in_series(mesh):
+    """A load that is uniform over the face takes the force of one slice."""
+    sliced = jg.prepare(mesh.pair, resolution=jg.Resolution(positions=16, pairs=3, slices=2))
+    both = [
+        direct(each, removed_material(each, TORQUE, **RELIEFS), jnp.asarray([3.0, 15.0]), 2e-3)
+        for each in (mesh, sliced)
+    ]
+    np.testing.assert_allclose(*both, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("model", ["varying stiffness", "loaded error", "tangent"])
+def test_simpler_models_have_the_static_transmission_error_of_their_torque(mesh, static_force, model):
+    removed = removed_material(mesh, TORQUE, **RELIEFS)
+    cycle = solve_removed(mesh, TORQUE, removed)
+    force = mesh_force(mesh, torque=TORQUE, **RELIEFS, model=model, positions=16)
+    np.testing.assert_allclose(approaches(force, mesh.phase, static_force), cycle.transmission_error, rtol=1e-9)
+    coast = np.asarray(forces(force, mesh.phase, jnp.full(16, -0.5 * mesh.pair.backlash)))
+    assert model == "tangent" or not coast.any()
+    if model == "tangent":
+        slope = jax.vmap(force.stiffness)(mesh.phase, cycle.transmission_error)
+        np.testing.assert_allclose(slope, cycle.tangent_stiffness, rtol=1e-9)
+    else:
+        deflection = jnp.mean(cycle.transmission_error - cycle.unloaded_transmission_error)
+        assert float(force.mean_stiffness(static_force, positions=16)) == pytest.approx(
+            float(static_force / deflection), rel=1e-5
+        )
+
+
+def test_mean_stiffness_of_a_spring_behind_a_clearance_is_the_spring(static_force):
+    assert float(DeadZone(300.0, 20.0).mean_stiffness(static_force)) == pytest.approx(300.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"torque": 0.0}, "mesh_force: torque = 0 N m must be greater than 0 N m"),
+        ({"levels": 2}, "mesh_force: levels = 2 must be a whole number of at least 4"),
+        ({"compliance": -1.0}, "mesh_force: compliance = -1 um/N must be at least 0 um/N"),
+        ({"reach": 0.5}, "mesh_force: reach = 0.5 must be at least 1"),
+        ({"model": "exact"}, "mesh_force: model = 'exact' must be one of \"map\""),
+        (
+            {"pinion": jg.TabulatedProfile([0.0, 99.0], [-50.0, -50.0])},
+            "mesh_force: the clearance between drive and coast flanks = ",
+        ),
+    ],
+)
+def test_wrong_input_is_named(mesh, given, message):
+    with pytest.raises(ValueError, match=message):
+        mesh_force(mesh, **({"torque": TORQUE, "positions": 16} | given))
+
+
+def test_coast_flanks_are_a_pair_of_modifications(mesh):
+    with pytest.raises(TypeError, match=r"coast is TipRelief\(.*must be a tuple \(pinion, wheel\)"):
+        mesh_force(mesh, torque=TORQUE, coast=jg.TipRelief(1.0, 2.0))
