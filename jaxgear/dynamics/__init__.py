@@ -1,11 +1,14 @@
 """Gears at speed: mesh force, oscillators, steady states over speed, orbits and their bifurcations."""
 
+from .batch import speed_sweeps as speed_sweeps
 from .force import AbstractMeshForce as AbstractMeshForce
 from .force import DeadZone as DeadZone
 from .force import RectangularStiffness as RectangularStiffness
 from .oscillator import Excitation as Excitation
 from .oscillator import Oscillator as Oscillator
 from .response import SpeedResponse as SpeedResponse
+from .run_up import RunUp as RunUp
+from .run_up import run_up as run_up
 from .speed_sweep import speed_sweep as speed_sweep
 from .speed_sweep import steps_for as steps_for
 from .systems import equivalent_mass as equivalent_mass
