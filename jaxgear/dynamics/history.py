@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import maximum
-from .integrate import Steps
+from .integrate import Recorded, Steps
 from .oscillator import Oscillator, State
 
 Scalar = Float[Array, ""]
@@ -35,7 +35,7 @@ class History(NamedTuple):
     force: Thirds
 
 
-def history(oscillator: Oscillator, states: State, end: State, steps: Steps, mesh_frequency: Scalar) -> History:
+def history(oscillator: Oscillator, states: Recorded, end: State, steps: Steps, mesh_frequency: Scalar) -> History:
     """The history of recorded cycles.
 
     Args:

@@ -3,12 +3,13 @@
 import dataclasses
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
-from ..numerics import Checked, count, implicit_root, kernel, result, whole, with_jacobian
+from ..numerics import Checked, check, count, implicit_root, kernel, real, result, whole, with_jacobian
 from .history import history, largest, mean, rms, share, smallest
 from .integrate import cycles, steps_of
 from .oscillator import Coordinates, Oscillator, State
@@ -153,6 +154,45 @@ def steady_orbit(
     nodes = nodes_of("steady_orbit", steps).astype(frequency.dtype)
     settle, periods = whole("steady_orbit", "settle", settle, 0), whole("steady_orbit", "periods", periods)
     return _steady(oscillator, frequency, start, nodes, settle, periods)
+
+
+def steady_orbits(
+    oscillator: Oscillator,
+    mesh_frequencies: Any,
+    start: Any,
+    *,
+    settle: int = 0,
+    periods: int = 1,
+    steps: Any = STEPS,
+) -> Orbit:
+    """`steady_orbit` at many speeds, each from a state of its own: what objectives over a speed band are made of.
+
+    The starts are the settled states of a sweep over the speed, so that every orbit lies on the branch that the sweep
+    was on. A smooth worst case is `reductions.Max().soft(orbits.dynamic_factor, width)`.
+
+    Args:
+        oscillator, settle, periods, steps: as for `steady_orbit`.
+        mesh_frequencies: [Hz], shape (speeds,).
+        start: displacements [um] and velocities [um/s] at mesh position 0, each of shape (speeds, coordinates).
+
+    Returns:
+        orbits, every array with the leading axis (speeds,).
+
+    Raises:
+        TypeError, ValueError: as `find_orbit`.
+    """
+    frequencies, (x, v) = real(mesh_frequencies), (real(part) for part in start)
+    if frequencies.ndim != 1 or x.shape[:1] != frequencies.shape:
+        raise ValueError(
+            f"steady_orbits: mesh_frequencies have shape {frequencies.shape} and the start {x.shape}, "
+            "must be (speeds,) and (speeds, coordinates)"
+        )
+    check("steady_orbits", "mesh_frequencies", frequencies, "Hz", low=0.0, open_low=True)
+
+    def at(frequency, x, v):
+        return steady_orbit(oscillator, frequency, (x, v), settle=settle, periods=periods, steps=steps)
+
+    return eqx.filter_vmap(at)(frequencies, x, v)
 
 
 @kernel

@@ -4,6 +4,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..numerics import check, real, whole
@@ -60,11 +61,12 @@ def checked(owner: str, oscillator: Any, mesh_frequency: Any, start: Any) -> tup
     shape = oscillator.mass.shape
     if not isinstance(start, tuple | list) or len(start) != 2:
         raise ValueError(f"{owner}: start must be displacements and velocities (x, v)")
-    for name, part in zip(("displacements", "velocities"), start):
-        if jnp.shape(part) != shape:
-            raise ValueError(f"{owner}: {name} of start have shape {jnp.shape(part)}, must be {shape}")
+    parts = [real(part) for part in start]
+    for name, part in zip(("displacements", "velocities"), parts):
+        if part.shape != shape:
+            raise ValueError(f"{owner}: {name} of start have shape {part.shape}, must be {shape}")
     dtype = jnp.result_type(oscillator.mass, frequency)
-    x, v = (real(part).astype(dtype) for part in start)
+    x, v = (part.astype(dtype) for part in parts)
     return frequency.astype(dtype), (x, v)
 
 
@@ -74,7 +76,7 @@ def nodes_of(owner: str, steps: Any) -> Float[Array, " nodes"]:
     Raises:
         ValueError: for fewer than two steps, or nodes that do not increase from 0 to 1.
     """
-    if jnp.ndim(steps) == 0:
+    if isinstance(steps, int | np.integer):
         return jnp.linspace(0.0, 1.0, whole(owner, "steps", steps, 2) + 1)
     nodes = real(steps)
     known = None if isinstance(nodes, jax.core.Tracer) else nodes

@@ -1,0 +1,256 @@
+"""Branches of periodic orbits over a parameter, followed through folds by their arclength."""
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Complex, Float
+
+from ..numerics import Checked, check, kernel, real, result, whole
+from .bifurcation import Bifurcation, Kind, Tests, bifurcation_at, tests_of
+from .corrector import Corrected, Scales, corrected, family_of, first_direction
+from .integrate import steps_of
+from .orbit import Orbit, orbit_at
+from .poincare import STEPS, nodes_of, scaled
+
+Scalar = Float[Array, ""]
+Ended = Literal["range", "points", "closed", "joined", "lost"]
+
+# Control of the steps along a branch: a corrector of few evaluations makes them longer, one of many shorter.
+_FEW, _MANY = 4, 7
+_LONGER, _SHORTER = 1.4, 0.6
+_TURN = 0.95  # least cosine of the angle between neighbouring tangents
+_SHORTEST = 1e-3  # of the first step; shorter ones turn with the corner of a branch, however sharp
+_LONGEST = 4.0
+_LOCATED = 1e-9  # part of a step to which a bifurcation is located
+_HALVINGS = 60
+
+
+class Branch(Checked):
+    """Periodic orbits along a branch, stable and unstable, in the order in which it was followed.
+
+    Attributes:
+        parameter: of the family, for an oscillator the mesh frequency [Hz], shape (points,).
+        orbits: every array with the leading axis (points,).
+        bifurcations: in order; `before` tells where they lie.
+        before: index of the first point behind every bifurcation.
+        ended: "range" where the parameter reached an end of its range, "points" after the largest number of them,
+            "closed" where the branch came back to its begin, "joined" where it ended on the branch of orbits of half
+            the period, "lost" where Newton's method did not go on.
+    """
+
+    parameter: Float[Array, " points"] = result()
+    orbits: Orbit
+    bifurcations: tuple[Bifurcation, ...]
+    before: tuple[int, ...]
+    ended: Ended
+
+    @property
+    def mesh_frequency(self) -> Float[Array, " points"]:
+        """[Hz]."""
+        return self.orbits.mesh_frequency
+
+    @property
+    def multipliers(self) -> Complex[Array, "points unknowns"]:
+        """Floquet multipliers of every orbit."""
+        return self.orbits.multipliers
+
+    @property
+    def stable(self) -> Bool[Array, " points"]:
+        """Whether every orbit is stable."""
+        return self.orbits.stable
+
+
+def follow_orbits(
+    oscillator: Any,
+    start: Orbit | Bifurcation,
+    *,
+    within: tuple[Any, Any],
+    direction: Literal["up", "down"] = "up",
+    parameter: Any = None,
+    step: float = 0.02,
+    points: int = 500,
+    steps: Any = STEPS,
+    callback: Callable[[int, Orbit], None] | None = None,
+) -> Branch:
+    """Follows a branch of periodic orbits through its folds until the parameter leaves a range.
+
+    Pseudo-arclength continuation: a step along the tangent, then Newton's method across it. Steps grow and shrink with
+    the work of Newton's method. Between points at which a multiplier has crossed the unit circle the bifurcation is
+    located. The loop runs on the host; its points share one compiled function.
+
+    Args:
+        oscillator: that moves, over its mesh frequency; or a function of a parameter that gives an oscillator and a
+            mesh frequency [Hz].
+        start: an orbit of the branch; or a flip of another branch, from which orbits of twice the period branch off.
+        within: smallest and largest parameter.
+        direction: of the parameter at the start; a branch from a flip goes where it must.
+        parameter: of the start, where a function is given.
+        step: first step along the branch, as part of the parameter and of the size of the orbit.
+        points: largest number of points.
+        steps: of a mesh cycle, as for `find_orbit`.
+        callback: called with the number of every point and its orbit.
+
+    Raises:
+        TypeError: for something else than an oscillator, a function or a start.
+        ValueError: for a start that is no flip or lies outside of the range, or a number out of its range.
+    """
+    if direction not in ("up", "down"):
+        raise ValueError(f'follow_orbits: direction = {direction!r} must be "up" or "down"')
+    check("follow_orbits", "step", real(step), "", low=0.0, open_low=True, high=1.0)
+    whole("follow_orbits", "points", points, 2)
+    follower = _Follower(family_of(oscillator), start, within, direction, parameter, nodes_of("follow_orbits", steps))
+    return follower.followed(float(step), points, callback)
+
+
+class _Follower:
+    """The state of a host loop along one branch."""
+
+    def __init__(self, family, start, within, direction, parameter, nodes):
+        flip = isinstance(start, Bifurcation)
+        if flip and start.kind != "flip":
+            raise ValueError(f'follow_orbits: start is a bifurcation of kind "{start.kind}", must be a flip')
+        orbit = start.orbit if isinstance(start, Bifurcation) else start
+        if not isinstance(orbit, Orbit):
+            raise TypeError(f"follow_orbits: start is of type {type(start).__name__}, must be an Orbit or a flip")
+        given = start.parameter if flip else orbit.mesh_frequency if parameter is None else parameter
+        self.family, self.periods = family, orbit.periods * (2 if flip else 1)
+        dtype = orbit.displacement.dtype
+        self.nodes, at = nodes.astype(dtype), real(given).astype(dtype)
+        self.low, self.high = (float(end) for end in within)
+        check("follow_orbits", "parameter of the start", at, "", low=self.low, high=self.high)
+        z = scaled(orbit.start, orbit.mesh_frequency)
+        self.scales = Scales(jnp.linalg.norm(z), jnp.maximum(jnp.abs(at), 1e-30))
+        ahead = first_direction(len(z) + 1, dtype, 1.0 if direction == "up" else -1.0)
+        self.point, self.orbit = self.at(self.scales.place(z, at), ahead)
+        if not bool(self.point.converged):
+            raise ValueError("follow_orbits: there is no orbit of the branch near the start")
+        if flip:
+            self.point = self.point._replace(tangent=jnp.append(start.direction, 0.0).astype(dtype))
+        self.begin, self.tests = self.point, tests_of(self.point, self.orbit)
+        self.kept, self.bifurcations, self.before = [self.orbit], [], []
+        self.parameters = [at]
+
+    def at(self, guess, normal) -> tuple[Corrected, Orbit]:
+        return _point(self.family, guess, normal, self.scales, self.nodes, self.periods)
+
+    def along(self, distance) -> tuple[Corrected, Orbit]:
+        """The point a distance ahead along the tangent."""
+        return self.at(self.point.place + distance * self.point.tangent, self.point.tangent)
+
+    def followed(self, step: float, points: int, callback) -> Branch:
+        shortest, longest = _SHORTEST * step, _LONGEST * step
+        ended: Ended = "points"
+        while len(self.kept) < points:
+            point, orbit = self.along(step)
+            turn = float(jnp.sum(point.tangent * self.point.tangent))
+            if not bool(point.converged) or (turn < _TURN and step > shortest):
+                if step <= shortest:
+                    ended = "lost"
+                    break
+                step = max(0.5 * step, shortest)
+                continue
+            if not self.low <= self.parameter(point) <= self.high:
+                self.take_last(point)
+                ended = "range"
+                break
+            if len(self.kept) > 1 and _joins(self.orbit, orbit):  # the first may be the flip itself
+                ended = "joined"
+                break
+            self.note(point, orbit, step)
+            closed = len(self.kept) > 3 and self.passes_begin(point, step)
+            self.take(point, orbit)
+            if callback is not None:
+                callback(len(self.kept), orbit)
+            if closed:
+                ended = "closed"
+                break
+            evaluations = int(point.evaluations)
+            factor = _LONGER if evaluations <= _FEW else _SHORTER if evaluations >= _MANY else 1.0
+            step = min(max(factor * step, shortest), longest)
+        return self.branch(ended)
+
+    def parameter(self, point: Corrected) -> float:
+        return float(self.scales.unknowns(point.place)[1])
+
+    def take(self, point: Corrected, orbit: Orbit) -> None:
+        tests = tests_of(point, orbit)
+        # where the parameter stands still, the direction that it had
+        self.tests = tests._replace(fold=self.tests.fold) if np.isnan(tests.fold) else tests
+        self.point, self.orbit = point, orbit
+        self.kept.append(orbit)
+        self.parameters.append(self.scales.unknowns(point.place)[1])
+
+    def take_last(self, beyond: Corrected) -> None:
+        """The point at the end of the range."""
+        end = self.low if self.parameter(beyond) < self.low else self.high
+        here, there = float(self.point.place[-1]), float(beyond.place[-1])
+        target = end / float(self.scales.parameter)
+        guess = self.point.place + (target - here) / (there - here) * (beyond.place - self.point.place)
+        guess = guess.at[-1].set(target)
+        sign = 1.0 if there > here else -1.0
+        point, orbit = self.at(guess, first_direction(len(guess), guess.dtype, sign))
+        if bool(point.converged):
+            self.take(point, orbit)
+
+    def passes_begin(self, point: Corrected, step: float) -> bool:
+        apart = float(jnp.linalg.norm(point.place - self.begin.place))
+        return apart < step and float(jnp.sum(point.tangent * self.begin.tangent)) > 0
+
+    def note(self, point: Corrected, orbit: Orbit, step: float) -> None:
+        """Locates the bifurcations up to the next point."""
+        tests = tests_of(point, orbit)
+        found = [self.located(kind, tests, step) for kind in self.tests.crossed(tests)]
+        for _, bifurcation in sorted(found, key=lambda item: item[0]):
+            self.bifurcations.append(bifurcation)
+            self.before.append(len(self.kept))
+
+    def located(self, kind: Kind, beyond: Tests, step: float) -> tuple[float, Bifurcation]:
+        """A bifurcation before the next point, by false position with halved ends (Illinois), and its distance."""
+        a, b, left, right = 0.0, step, self.tests.of(kind), beyond.of(kind)
+        side = 0
+        for _ in range(_HALVINGS):
+            middle = (a * right - b * left) / (right - left)
+            point, orbit = self.along(middle)
+            value = tests_of(point, orbit).of(kind)
+            if not abs(value) > _LOCATED or b - a < _LOCATED * step:
+                break
+            if value * right > 0:
+                b, right, left = middle, value, left * (0.5 if side == 1 else 1.0)
+                side = 1
+            else:
+                a, left, right = middle, value, right * (0.5 if side == -1 else 1.0)
+                side = -1
+        return middle, bifurcation_at(kind, self.scales.unknowns(point.place)[1], point, orbit)
+
+    def branch(self, ended: Ended) -> Branch:
+        orbits = jax.tree.map(lambda *parts: jnp.asarray(np.stack(parts)), *self.kept)
+        return Branch(
+            parameter=jnp.asarray(np.stack(self.parameters)),
+            orbits=orbits,
+            bifurcations=tuple(self.bifurcations),
+            before=tuple(self.before),
+            ended=ended,
+        )
+
+
+@kernel
+def _point(family, guess, normal, scales: Scales, nodes, periods: int) -> tuple[Corrected, Orbit]:
+    point = corrected(family, guess, normal, scales, nodes, periods)
+    z, parameter = scales.unknowns(point.place)
+    oscillator, frequency = family(parameter)
+    return point, orbit_at(oscillator, z, steps_of(oscillator, nodes), frequency, periods)
+
+
+def _joins(here: Orbit, there: Orbit) -> bool:
+    """Whether orbits of half the period lie between two neighbouring orbits: their halves have changed places."""
+    return here.periods % 2 == 0 and float(np.dot(_odd(here), _odd(there))) < 0
+
+
+def _odd(orbit: Orbit) -> np.ndarray:
+    """By how much the state differs from that half an orbit later."""
+    scale = 2 * np.pi * float(orbit.mesh_frequency)
+    halves = (np.split(np.asarray(part), 2) for part in (orbit.approach, orbit.approach_rate / scale))
+    return np.array([first[0] - second[0] for first, second in halves])
