@@ -64,11 +64,12 @@ def speed_sweep(
         direction: "up" begins at the first, "down" at the last.
         start: coordinates and velocities at mesh position 0 at which the sweep begins, each of shape (coordinates,);
             None for the static equilibrium.
-        kick: dynamic factor, greater than 1, to which an impulse on the approach starts the oscillator, about; with 3
-            or so orbits are found that hang together with no other, such as those of two mesh cycles above twice the
-            natural frequency. None for no impulse.
+        kick: dynamic factor, greater than 1, to which an impulse on the approach starts the oscillator, about. It finds
+            orbits that hang together with no other, such as those of two mesh cycles below twice the natural frequency;
+            which of them depends on its size: 3 to 5 are worth a try. None for no impulse.
         carry: whether each speed begins with the state of the one before; otherwise each begins as the first one does.
-        steps: of the integrator per mesh cycle, one number or one for each speed; None for as many as the natural
+        steps: of the integrator per mesh cycle, even, one number or one for each speed, each a divisor of the largest;
+            None for as many as the natural
             frequencies need, which have to be known then: where the oscillator is being traced, `steps_for` of a
             concrete one gives them.
         tolerance: by how much the state may still differ, relative to its size; None for the root of the machine
@@ -190,6 +191,9 @@ def _counts(owner, oscillator, frequencies, steps) -> tuple[int, ...]:
         raise ValueError(
             f"{owner}: steps has {len(counts)} numbers, must have one for each of {len(frequencies)} speeds"
         )
+    for count in counts:
+        if count % 2 or max(counts) % count:
+            raise ValueError(f"{owner}: steps = {count} must be even and divide the largest, {max(counts)}")
     return counts
 
 
