@@ -1,13 +1,16 @@
 """Periodic orbits against exact ones, closed forms and central differences."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from oscillators import dead_zone, frequency, rectangular
+from scipy.interpolate import CubicHermiteSpline
 
-from jaxgear.dynamics import find_orbit
+from jaxgear.dynamics import Oscillator, find_orbit, settle, steady_orbit, steady_orbits
 from jaxgear.dynamics.orbit import _found
+from jaxgear.numerics.reductions import Max
 
 STEPS = 4000
 FEW = 400
@@ -119,13 +122,17 @@ def test_peaks_do_not_depend_on_the_steps():
 
 def refined(numbers):
     """Nodes of a cycle with tiny steps around the places where contact begins and ends: no kink in the others."""
-    orbit = at(numbers[0], NEAR, zeta=numbers[1], ratio=numbers[2], steps=1000)
-    ends = np.append(orbit.phase, 1.0)
-    values = np.append(orbit.approach, orbit.approach[0])
-    rates = np.append(orbit.approach_rate, orbit.approach_rate[0]) / float(orbit.mesh_frequency)
-    zeros = CubicHermiteSpline(ends, values, rates).roots(extrapolate=False)
-    assert len(zeros) == 2
-    return jnp.asarray(np.unique(np.concatenate([ends, zeros - 1e-5, zeros + 1e-5])))
+    even = np.linspace(0.0, 1.0, 1001)
+    nodes = np.sort(np.append(even, [0.1001, 0.1002, 0.1003, 0.1004]))
+    for width in (1e-5, 1e-7):
+        orbit = at(numbers[0], NEAR, zeta=numbers[1], ratio=numbers[2], steps=jnp.asarray(nodes))
+        ends = np.append(orbit.phase, 1.0)
+        values = np.append(orbit.approach, orbit.approach[0])
+        rates = np.append(orbit.approach_rate, orbit.approach_rate[0]) / float(orbit.mesh_frequency)
+        zeros = CubicHermiteSpline(ends, values, rates).roots(extrapolate=False)
+        assert len(zeros) == 2
+        nodes = np.sort(np.concatenate([even, zeros - width, zeros + width]))
+    return jnp.asarray(nodes)
 
 
 @jax.jit
@@ -161,3 +168,84 @@ def test_no_derivative_passes_through_the_start():
 
     slope = jax.grad(lambda x: of_start(x).dynamic_factor)(jnp.array([2.0]))
     assert slope == 0
+
+
+def two_gears(mass=2.0):
+    """The first benchmark as two gears that turn freely: the same approach, and a rotation of both together."""
+    one = rectangular()
+    masses = [mass, 1 / (1 - 1 / mass)]  # whose equivalent mass is one
+    return Oscillator(
+        one.mesh_force, mass=masses, direction=[1.0, -1.0], load=[1.0, -1.0], mesh_damping=0.1, newton=1.0
+    )
+
+
+def test_gears_that_turn_freely_have_the_orbit_of_their_equivalent_mass():
+    """Momentum is conserved: two more multipliers of one, and nothing that Newton's method could solve for."""
+    both = find_orbit(two_gears(), frequency(0.9), ([1.3, -0.7], [1.0, -0.6]), steps=FEW)
+    one = at(0.9, NEAR, steps=FEW)
+    assert bool(both.converged) and bool(both.stable)
+    for name in ("dynamic_factor", "approach_rms", "approach_mean", "approach_min", "no_contact"):
+        np.testing.assert_allclose(getattr(both, name), getattr(one, name), rtol=1e-9)
+    np.testing.assert_allclose(moduli(both), [1.0, 1.0, *moduli(one)], rtol=0, atol=1e-5)
+
+    def factor(oscillator, start):
+        return find_orbit(oscillator, frequency(0.9), start, steps=FEW).dynamic_factor
+
+    load = jax.grad(lambda f: factor(_loaded(two_gears(), jnp.stack([f, -f])), ([1.3, -0.7], [1.0, -0.6])))(1.0)
+    # the force is piecewise linear: everything is proportional to the load
+    assert abs(load) < 1e-9
+
+
+def _loaded(oscillator, load):
+    return eqx.tree_at(lambda o: o.load, oscillator, load)
+
+
+def test_a_motion_settles_on_the_orbit_that_is_refined():
+    state = settle(rectangular(), frequency(1.0), ([0.0], [0.0]), cycles=60, steps=FEW)
+    orbit = steady_orbit(rectangular(), frequency(1.0), ([0.0], [0.0]), settle=60, steps=FEW)
+    np.testing.assert_allclose(state, orbit.start, rtol=0, atol=1e-6)
+    assert bool(orbit.converged) and abs(orbit.dynamic_factor - 3.094483) < 1e-3
+    # the settled state repeats after two cycles: an orbit of one cycle is near only by chance, and unstable
+    doubled = [steady_orbit(rectangular(), frequency(1.9), ([0.0], [0.0]), periods=n, steps=FEW) for n in (1, 2)]
+    assert [bool(orbit.converged) for orbit in doubled] == [False, True]
+    assert abs(doubled[1].dynamic_factor - 3.658612) < 1e-3
+
+
+def test_the_worst_of_a_band_has_the_gradient_of_its_orbits():
+    omegas = jnp.linspace(1.0, 1.3, 4)
+    starts = [settle(rectangular(), frequency(omega), NEAR, cycles=60, steps=FEW) for omega in omegas]
+    states = tuple(jnp.stack(parts) for parts in zip(*starts))
+
+    @jax.jit
+    def worst(zeta):
+        orbits = steady_orbits(rectangular(zeta), frequency(omegas), states, settle=0, steps=FEW)
+        return Max().soft(orbits.dynamic_factor, 0.3), orbits.converged
+
+    slope = jax.jit(jax.grad(lambda zeta: worst(zeta)[0]))(0.05)
+    assert worst(0.05)[1].all()
+    difference = (worst(0.0505)[0] - worst(0.0495)[0]) / 1e-3
+    np.testing.assert_allclose(slope, difference, rtol=3e-2)  # kinks inside of steps
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"mesh_frequency": 0.0}, "find_orbit: mesh_frequency = 0 Hz must be greater than 0 Hz"),
+        ({"mesh_frequency": [1.0, 2.0]}, "find_orbit: mesh_frequency has shape"),
+        ({"start": ([1.0, 2.0], [0.0])}, "find_orbit: displacements of start have shape"),
+        ({"start": 1.0}, "find_orbit: start must be displacements and velocities"),
+        ({"periods": 0}, "find_orbit: periods = 0 must be a whole number of at least 1"),
+        ({"steps": 1}, "find_orbit: steps = 1 must be a whole number of at least 2"),
+        ({"steps": jnp.array([0.0, 0.5, 0.9])}, "find_orbit: nodes of steps must increase from 0 to 1"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(given, message):
+    arguments = {"mesh_frequency": 0.1, "start": NEAR, **given}
+    with pytest.raises(ValueError, match=message) as refused:
+        find_orbit(rectangular(), arguments.pop("mesh_frequency"), arguments.pop("start"), **arguments)
+    assert "\n" not in str(refused.value)
+
+
+def test_something_else_than_an_oscillator_is_refused():
+    with pytest.raises(TypeError, match="find_orbit: oscillator is of type int"):
+        find_orbit(3, 0.1, NEAR)

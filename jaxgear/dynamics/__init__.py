@@ -1,5 +1,6 @@
 """Gears at speed: mesh force, oscillators, steady states over speed, orbits and their bifurcations."""
 
+from .batch import speed_sweeps as speed_sweeps
 from .bifurcation import Bifurcation as Bifurcation
 from .bifurcation import Fold as Fold
 from .bifurcation import fold_of as fold_of
@@ -25,6 +26,8 @@ from .oscillator import Oscillator as Oscillator
 from .quantities import DYNAMIC_QUANTITIES as DYNAMIC_QUANTITIES
 from .quantities import mesh_frequency as mesh_frequency
 from .response import SpeedResponse as SpeedResponse
+from .run_up import RunUp as RunUp
+from .run_up import run_up as run_up
 from .settings import DOWN as DOWN
 from .settings import KICKED as KICKED
 from .settings import UP as UP

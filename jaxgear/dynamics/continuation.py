@@ -156,7 +156,7 @@ class _Follower:
                 self.take_last(point)
                 ended = "range"
                 break
-            if _joins(self.orbit, orbit):
+            if len(self.kept) > 1 and _joins(self.orbit, orbit):  # the first may be the flip itself
                 ended = "joined"
                 break
             self.note(point, orbit, step)

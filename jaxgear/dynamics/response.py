@@ -119,7 +119,8 @@ def with_step(
     of = history(oscillator, begin, end, jax.tree.map(lambda part: part[None], step), mesh_frequency)
     off = of.approach - origin
     places = jnp.asarray(_PLACES, of.phase.dtype)[:, None]
-    turn = 2 * jnp.pi * orders[:, None, None] * (of.phase + places * of.length + cycle)
+    phase = of.phase[None] + places * of.length[None] + cycle.astype(of.phase.dtype)
+    turn = 2 * jnp.pi * orders[:, None, None] * phase[None]
     waves = jnp.cos(turn), -jnp.sin(turn)
 
     def integral(values):

@@ -64,11 +64,12 @@ def speed_sweep(
         direction: "up" begins at the first, "down" at the last.
         start: coordinates and velocities at mesh position 0 at which the sweep begins, each of shape (coordinates,);
             None for the static equilibrium.
-        kick: dynamic factor, greater than 1, to which an impulse on the approach starts the oscillator, about; with 3
-            or so orbits are found that hang together with no other, such as those of two mesh cycles above twice the
-            natural frequency. None for no impulse.
+        kick: dynamic factor, greater than 1, to which an impulse on the approach starts the oscillator, about. It finds
+            orbits that hang together with no other, such as those of two mesh cycles below twice the natural frequency;
+            which of them depends on its size: 3 to 5 are worth a try. None for no impulse.
         carry: whether each speed begins with the state of the one before; otherwise each begins as the first one does.
-        steps: of the integrator per mesh cycle, one number or one for each speed; None for as many as the natural
+        steps: of the integrator per mesh cycle, even, one number or one for each speed, each a divisor of the largest;
+            None for as many as the natural
             frequencies need, which have to be known then: where the oscillator is being traced, `steps_for` of a
             concrete one gives them.
         tolerance: by how much the state may still differ, relative to its size; None for the root of the machine
@@ -87,11 +88,11 @@ def speed_sweep(
     """
     frequencies = checked_frequencies("speed_sweep", mesh_frequencies)
     _check_single(oscillator)
-    sizes, limits = _prepared(
+    sizes, limits = prepared(
         "speed_sweep", oscillator, frequencies, direction=direction, kick=kick, carry=carry, steps=steps,
         tolerance=tolerance, most_cycles=most_cycles, most_periods=most_periods, points=points, orders=orders,
     )  # fmt: skip
-    found = _swept(oscillator, frequencies, _start_of(oscillator, start), limits, sizes)
+    found = swept(oscillator, frequencies, start_of("speed_sweep", oscillator, start), limits, sizes)
     return dataclasses.replace(found, direction=direction)
 
 
@@ -148,10 +149,11 @@ class _Limits(NamedTuple):
     kick: Scalar
 
 
-def _prepared(
+def prepared(
     owner, oscillator, frequencies, *, direction="up", kick=None, carry=True, steps=None, tolerance=None,
     most_cycles=500, most_periods=4, points=32, orders=ORDERS,
 ) -> tuple[_Sizes, _Limits]:  # fmt: skip
+    """Options of a sweep, checked: what is static and what is not."""
     if direction not in ("up", "down"):
         raise ValueError(f'{owner}: direction = {direction!r} must be "up" or "down"')
     if not isinstance(carry, bool):
@@ -189,25 +191,30 @@ def _counts(owner, oscillator, frequencies, steps) -> tuple[int, ...]:
         raise ValueError(
             f"{owner}: steps has {len(counts)} numbers, must have one for each of {len(frequencies)} speeds"
         )
+    for count in counts:
+        if count % 2 or max(counts) % count:
+            raise ValueError(f"{owner}: steps = {count} must be even and divide the largest, {max(counts)}")
     return counts
 
 
-def _start_of(oscillator: Oscillator, start: State | None) -> State | None:
+def start_of(owner: str, oscillator: Oscillator, start: State | None) -> State | None:
+    """A given start, checked."""
     if start is None:
         return None
     shape = oscillator.mass.shape
     if not isinstance(start, tuple) or len(start) != 2 or any(jnp.shape(part) != shape for part in start):
-        raise ValueError(f"speed_sweep: start must be coordinates and velocities, each of shape {shape}")
+        raise ValueError(f"{owner}: start must be coordinates and velocities, each of shape {shape}")
     x, v = (real(part) for part in start)
-    check("speed_sweep", "start", x, "um")
-    check("speed_sweep", "start", v, "um/s")
+    check(owner, "start", x, "um")
+    check(owner, "start", v, "um/s")
     return x, v
 
 
 @kernel
-def _swept(
+def swept(
     oscillator: Oscillator, frequencies: Speeds, start: State | None, limits: _Limits, sizes: _Sizes
 ) -> SpeedResponse:
+    """The response as of an upward sweep; whoever asked for it knows the direction."""
     rest = at_rest(oscillator, jnp.zeros((), frequencies.dtype))
     first = _kicked(oscillator, rest, start, limits.kick)
     cycle = cycle_of(oscillator, sizes.most_steps)
@@ -327,7 +334,7 @@ def _settled(oscillator, y, speed: _Speed, limits: _Limits, most_periods: int):
         y = speed.over_cycle(lambda y, step: one_step(oscillator, y, step, frequency), y)
         now = watched(y)
         size = jnp.maximum(jnp.max(jnp.abs(now)), jnp.nanmax(jnp.abs(before)))
-        away = jnp.max(jnp.abs(before - now), axis=1) / size
+        away = jnp.max(jnp.abs(before - now[None]), axis=1) / size
         return cycle + 1, _period(away, limits.tolerance), y, jnp.concatenate([now[None], before[:-1]])
 
     first = watched(y)

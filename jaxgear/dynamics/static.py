@@ -103,10 +103,8 @@ class Natural(NamedTuple):
 @program
 def natural_frequencies(oscillator: Oscillator) -> Natural:
     """Natural frequencies with the mesh stiffness under the static load, averaged over the cycle."""
-    phases = (jnp.arange(_POSITIONS) + 0.5) / _POSITIONS
-    stiffness = jnp.mean(
-        jax.vmap(lambda phase: at_rest(oscillator, phase).stiffness)(phases.astype(oscillator.mass.dtype))
-    )
+    rest = at_rest(oscillator, jnp.zeros((), oscillator.mass.dtype))
+    stiffness = mean_stiffness_of(oscillator.mesh_force, rest.force)
     along = oscillator.direction / jnp.sqrt(oscillator.mass)
     total = stiffness * along[:, None] * along[None]
     if oscillator.stiffness is not None:
