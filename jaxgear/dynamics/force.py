@@ -26,6 +26,10 @@ class AbstractMeshForce(Checked):
     # whether the force jumps at some mesh positions: the ends of an integrator's steps then lie on the step's side
     jumps: ClassVar[bool] = False
 
+    def nodes(self, steps: int) -> Float[Array, " nodes"]:
+        """Mesh positions between which an integrator steps, from 0 to 1 [base pitches], shape (steps + 1,)."""
+        return jnp.linspace(0.0, 1.0, steps + 1)
+
     @abstractmethod
     def at(self, phase: Scalar) -> Any:
         """A tree of arrays: what the force at a mesh position [base pitches, any number] depends on."""
@@ -76,6 +80,12 @@ class RectangularStiffness(AbstractMeshForce):
     double: Scalar = number("N/um", low=0.0, open_low=True)
     single: Scalar = number("N/um", low=0.0, open_low=True)
     share: Scalar = number("", low=0.0, high=1.0)
+
+    def nodes(self, steps: int) -> Float[Array, " nodes"]:
+        """Half of the steps with two pairs and half with one, so that the jump lies between two steps."""
+        half = steps // 2
+        double = self.share * jnp.linspace(0.0, 1.0, half + 1)
+        return jnp.append(double[:-1], self.share + (1 - self.share) * jnp.linspace(0.0, 1.0, steps - half + 1))
 
     def at(self, phase: Scalar) -> Scalar:
         return jnp.where(phase - jnp.floor(phase) < self.share, self.double, self.single)
