@@ -108,7 +108,7 @@ def test_orbits_in_a_dead_zone(row):
 
 def test_contact_is_lost_for_the_share_of_time_that_the_approach_is_negative():
     orbit = at(0.9, NEAR)
-    below = np.mean(np.asarray(orbit.approach) < 0)
+    below = np.diff(np.append(orbit.phase, 1.0)) @ (np.asarray(orbit.approach) < 0)
     assert abs(orbit.no_contact - below) < 1e-3 and orbit.coast_contact == 0
     assert at(1.2, ([1.3], [0.9])).no_contact == 0
 
@@ -160,6 +160,18 @@ def test_gradients_of_an_orbit():
         ahead, behind = POINT + by, POINT - by
         difference = (quantities(ahead, refined(ahead)) - quantities(behind, refined(behind))) / 2e-3
         np.testing.assert_allclose(forward[:, i], difference, rtol=1e-4)
+
+
+def test_the_share_of_two_pairs_moves_the_orbit():
+    """The jump of the stiffness moves with its node."""
+
+    @jax.jit
+    def rms(share):
+        moving = eqx.tree_at(lambda o: o.mesh_force.share, rectangular(), share)
+        return find_orbit(moving, frequency(1.2), ([1.3], [0.9]), steps=FEW).approach_rms
+
+    slope = jax.grad(rms)(0.37)
+    np.testing.assert_allclose(slope, (rms(0.371) - rms(0.369)) / 2e-3, rtol=1e-4)
 
 
 def test_no_derivative_passes_through_the_start():

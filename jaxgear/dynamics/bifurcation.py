@@ -46,7 +46,7 @@ class Fold(Checked):
     """Result of `fold_of`.
 
     Attributes:
-        parameter: at which the branch turns; differentiable.
+        parameter: at which the branch turns; for an oscillator the mesh frequency [Hz]; differentiable.
         displacement, velocity: start of the orbit there [um], [um/s], without derivatives, shape (coordinates,).
         slope: of the parameter over the branch, both scaled: zero at a fold, but not where the branch has a corner.
         converged: whether a fold was found.
@@ -115,7 +115,8 @@ def fold_of(oscillator: Any, near: Bifurcation, *, steps: Any = STEPS) -> Fold:
     those of higher order are not.
 
     Args:
-        oscillator: that moves, or a function of a parameter that gives an oscillator and a mesh frequency [Hz].
+        oscillator: that moves, or a function of a parameter that gives an oscillator and a mesh frequency [Hz]; for
+            derivatives a function that is an `equinox.Module` and holds what they are taken by.
         near: a fold of the same or a similar oscillator, from `Branch.bifurcations`.
         steps: of a mesh cycle, as for `find_orbit`.
 
@@ -127,17 +128,17 @@ def fold_of(oscillator: Any, near: Bifurcation, *, steps: Any = STEPS) -> Fold:
         raise ValueError(f'fold_of: near is a bifurcation of kind "{near.kind}", must be a fold')
     dtype = near.orbit.displacement.dtype
     parameter = real(near.parameter).astype(dtype)
-    nodes = nodes_of("fold_of", steps).astype(dtype)
+    nodes = nodes_of("fold_of", steps)
     z = scaled(near.orbit.start, near.orbit.mesh_frequency)
     return _fold(family_of(oscillator), z, parameter, near.direction, nodes, near.orbit.periods)
 
 
 @kernel
 def _fold(family: Family, z, parameter, direction, nodes, periods: int) -> Fold:
-    z, parameter, direction, nodes = held((z, parameter, direction, nodes))
+    z, parameter, direction = held((z, parameter, direction))
     scales = Scales(jnp.linalg.norm(z), parameter)
     begin, normal = scales.place(z, parameter), jnp.append(direction, jnp.zeros_like(parameter))
-    search = held(_turning(held(family), begin, normal, scales, nodes, periods))
+    search = held(_turning(held(family), begin, normal, scales, held(nodes), periods))
     place = search.point.place
 
     def across(place, family):

@@ -11,9 +11,8 @@ from jaxtyping import Array, Bool, Complex, Float
 from ..numerics import Checked, check, kernel, real, result, whole
 from .bifurcation import Bifurcation, Kind, Tests, bifurcation_at, tests_of
 from .corrector import Corrected, Scales, corrected, family_of, first_direction
-from .integrate import steps_of
 from .orbit import Orbit, orbit_at
-from .poincare import STEPS, nodes_of, scaled
+from .poincare import STEPS, nodes_of, scaled, steps_at
 
 Scalar = Float[Array, ""]
 Ended = Literal["range", "points", "closed", "joined", "lost"]
@@ -118,7 +117,7 @@ class _Follower:
         given = start.parameter if flip else orbit.mesh_frequency if parameter is None else parameter
         self.family, self.periods = family, orbit.periods * (2 if flip else 1)
         dtype = orbit.displacement.dtype
-        self.nodes, at = nodes.astype(dtype), real(given).astype(dtype)
+        self.nodes, at = nodes, real(given).astype(dtype)
         self.low, self.high = (float(end) for end in within)
         check("follow_orbits", "parameter of the start", at, "", low=self.low, high=self.high)
         z = scaled(orbit.start, orbit.mesh_frequency)
@@ -241,7 +240,7 @@ def _point(family, guess, normal, scales: Scales, nodes, periods: int) -> tuple[
     point = corrected(family, guess, normal, scales, nodes, periods)
     z, parameter = scales.unknowns(point.place)
     oscillator, frequency = family(parameter)
-    return point, orbit_at(oscillator, z, steps_of(oscillator, nodes), frequency, periods)
+    return point, orbit_at(oscillator, z, steps_at(oscillator, nodes), frequency, periods)
 
 
 def _joins(here: Orbit, there: Orbit) -> bool:

@@ -9,9 +9,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..numerics import newton, solve
-from .integrate import steps_of
 from .oscillator import Oscillator
-from .poincare import moved
+from .poincare import moved, steps_at
 
 Scalar = Float[Array, ""]
 Place = Float[Array, " places"]  # the unknowns of an orbit and the parameter, each divided by its scale
@@ -83,7 +82,7 @@ def change(family: Family, place: Place, scales: Scales, nodes, periods: int) ->
     """By how much the unknowns change over an orbit, divided by their scale."""
     z, parameter = scales.unknowns(place)
     oscillator, frequency = family(parameter)
-    return moved(oscillator, z, steps_of(oscillator, nodes), frequency, periods) / scales.size
+    return moved(oscillator, z, steps_at(oscillator, nodes), frequency, periods) / scales.size
 
 
 def corrected(family: Family, guess: Place, normal: Place, scales: Scales, nodes, periods: int) -> Corrected:
@@ -106,4 +105,5 @@ def first_direction(size: int, dtype, sign: float) -> Place:
 
 def held(tree: Any) -> Any:
     """A tree whose arrays pass no derivative."""
-    return jax.lax.stop_gradient(tree)
+    arrays, rest = eqx.partition(tree, eqx.is_array)
+    return eqx.combine(jax.lax.stop_gradient(arrays), rest)

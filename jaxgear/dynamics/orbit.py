@@ -11,9 +11,9 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from ..numerics import Checked, check, count, implicit_root, kernel, real, result, whole, with_jacobian
 from .history import history, largest, mean, rms, share, smallest
-from .integrate import cycles, steps_of
+from .integrate import cycles
 from .oscillator import Coordinates, Oscillator, State
-from .poincare import STEPS, after, checked, moved, nodes_of, scaled, unscaled
+from .poincare import STEPS, after, checked, moved, nodes_of, scaled, steps_at, unscaled
 
 Scalar = Float[Array, ""]
 Samples = Float[Array, " samples"]
@@ -99,15 +99,16 @@ def find_orbit(
         start: displacements [um] and velocities [um/s] at mesh position 0, each of shape (coordinates,), not far from
             the orbit; no derivative passes through them.
         periods: mesh cycles after which the orbit repeats.
-        steps: number of equal steps of a mesh cycle, or its nodes from 0 to 1 [base pitches]. Where the force jumps
-            there has to be a node.
+        steps: number of steps of a mesh cycle, laid out by the mesh force; or their ends from 0 to 1 [base pitches],
+            with one wherever the force jumps. A kink of the force inside of a step, as where stiff flanks part, costs
+            the derivatives all but one order of the step.
 
     Raises:
         TypeError: for something else than an `Oscillator`.
         ValueError: for a mesh frequency that is not positive, a start of another shape or steps out of order.
     """
     frequency, start = checked("find_orbit", oscillator, mesh_frequency, start)
-    nodes = nodes_of("find_orbit", steps).astype(frequency.dtype)
+    nodes = nodes_of("find_orbit", steps)
     return _found(oscillator, frequency, start, nodes, whole("find_orbit", "periods", periods))
 
 
@@ -124,7 +125,7 @@ def settle(oscillator: Oscillator, mesh_frequency: Any, start: Any, *, cycles: i
         TypeError, ValueError: as `find_orbit`.
     """
     frequency, start = checked("settle", oscillator, mesh_frequency, start)
-    nodes = nodes_of("settle", steps).astype(frequency.dtype)
+    nodes = nodes_of("settle", steps)
     return _settled(oscillator, frequency, start, nodes, whole("settle", "cycles", cycles, 0))
 
 
@@ -151,7 +152,7 @@ def steady_orbit(
         TypeError, ValueError: as `find_orbit`.
     """
     frequency, start = checked("steady_orbit", oscillator, mesh_frequency, start)
-    nodes = nodes_of("steady_orbit", steps).astype(frequency.dtype)
+    nodes = nodes_of("steady_orbit", steps)
     settle, periods = whole("steady_orbit", "settle", settle, 0), whole("steady_orbit", "periods", periods)
     return _steady(oscillator, frequency, start, nodes, settle, periods)
 
@@ -198,12 +199,12 @@ def steady_orbits(
 @kernel
 def _settled(oscillator, frequency, start, nodes, count: int) -> State:
     oscillator, frequency, start = jax.lax.stop_gradient((oscillator, frequency, start))
-    return after(oscillator, start, steps_of(oscillator, nodes), frequency, count)
+    return after(oscillator, start, steps_at(oscillator, nodes), frequency, count)
 
 
 @kernel
 def _found(oscillator, frequency, start, nodes, periods: int) -> Orbit:
-    steps = steps_of(oscillator, nodes)
+    steps = steps_at(oscillator, nodes)
     first = scaled(start, jax.lax.stop_gradient(frequency))
     z = implicit_root(lambda z: moved(oscillator, z, steps, frequency, periods), first)
     return orbit_at(oscillator, z, steps, frequency, periods)

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import check, real, whole
-from .integrate import Steps, one_step
+from ..numerics import check, concrete, real, whole
+from .integrate import Steps, one_step, steps_of
 from .oscillator import Oscillator, State
 
 Scalar = Float[Array, ""]
@@ -70,18 +70,25 @@ def checked(owner: str, oscillator: Any, mesh_frequency: Any, start: Any) -> tup
     return frequency.astype(dtype), (x, v)
 
 
-def nodes_of(owner: str, steps: Any) -> Float[Array, " nodes"]:
-    """Nodes of a mesh cycle, from their number or as they are given.
+def nodes_of(owner: str, steps: Any) -> int | Float[Array, " nodes"]:
+    """What `steps_at` takes, checked.
 
     Raises:
         ValueError: for fewer than two steps, or nodes that do not increase from 0 to 1.
     """
     if isinstance(steps, int | np.integer):
-        return jnp.linspace(0.0, 1.0, whole(owner, "steps", steps, 2) + 1)
+        return whole(owner, "steps", steps, 2)
     nodes = real(steps)
-    known = None if isinstance(nodes, jax.core.Tracer) else nodes
     if nodes.ndim != 1 or len(nodes) < 3:
-        raise ValueError(f"{owner}: steps have shape {nodes.shape}, must be a number or at least 3 nodes")
-    if known is not None and (known[0] != 0 or known[-1] != 1 or (jnp.diff(known) <= 0).any()):
+        raise ValueError(f"{owner}: steps have shape {nodes.shape}, must be a whole number or at least 3 nodes")
+    known = concrete(nodes)
+    if known is not None and (known[0] != 0 or known[-1] != 1 or (np.diff(known) <= 0).any()):
         raise ValueError(f"{owner}: nodes of steps must increase from 0 to 1 base pitch")
     return nodes
+
+
+def steps_at(oscillator: Oscillator, nodes: int | Float[Array, " nodes"]) -> Steps:
+    """Steps between nodes of a mesh cycle, or so many as the mesh force lays them out."""
+    if isinstance(nodes, int):
+        nodes = oscillator.mesh_force.nodes(nodes)
+    return steps_of(oscillator, nodes.astype(oscillator.mass.dtype))
