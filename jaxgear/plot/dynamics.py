@@ -16,6 +16,7 @@ _APPROACH_LABEL = "approach of the flanks [µm]"
 _RESPONSES = {"dynamic_factor": "dynamic factor $K_v$ [-]", "approach_rms": "rms of the approach [µm]"}
 _DIRECTIONS = {"up": "-", "down": (0, (4, 1.5))}
 _MARKS = 12  # on a curve
+_PAD, _LINE = 6.0, 13.0  # [pt] of a title over the Axes, and of a line of a legend between both
 _DECADES = 3.0  # of amplitudes that a spectrum shows
 # drive flanks, clearance, coast flanks: in lightness too
 _STATES = {"drive flanks": "#0072B2", "apart": "#E69F00", "coast flanks": "#000000"}
@@ -34,7 +35,7 @@ def speed_response(
         responses: of every design, by its name: those of several runs, each with its direction.
         of: which number: the dynamic factor or the rms of the approach about its mean.
         ax: Axes to draw into; None for a new figure.
-        title: in the Axes.
+        title: over the Axes and the legend.
     """
     seen: dict[str, None] = {}
     with report_axes(ax) as ax:
@@ -51,8 +52,7 @@ def speed_response(
             ax.plot([], [], color=GREY, linestyle=_DIRECTIONS[direction], label=f"speed {_MOVES[direction]}")
         ax.set_ylim(bottom=1.0 if of == "dynamic_factor" else 0.0)
         ax.set(xlabel=FREQUENCY_LABEL, ylabel=_RESPONSES[of])
-        legend_above(ax)
-        _say(ax, title)
+        _entitle(ax, title, legend_above(ax))
     return ax
 
 
@@ -68,7 +68,7 @@ def waterfall(
         response: of one run.
         of: spectrum of the mesh force or of the velocity of approach.
         ax: Axes to draw into; None for a new figure.
-        title: in the Axes.
+        title: over the Axes and the legend.
     """
     unit, scale = ("N", 1.0) if of == "force" else ("mm/s", 1e-3)
     frequency, orders = np.asarray(response.mesh_frequency), np.asarray(response.orders)
@@ -94,7 +94,7 @@ def waterfall(
         bar.set_label(f"amplitude of the {'mesh force' if of == 'force' else 'velocity of approach'} [{unit}]")
         bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
         ax.set(xlabel=FREQUENCY_LABEL, ylabel="frequency [Hz]")
-        _say(ax, title)
+        _entitle(ax, title, 0)
     return ax
 
 
@@ -113,7 +113,7 @@ def bifurcation(responses: Sequence[SpeedResponse], ax: Axes | None = None, *, t
     Args:
         responses: of one or several runs, each with its direction.
         ax: Axes to draw into; None for a new figure.
-        title: in the Axes.
+        title: over the Axes and the legend.
     """
     with report_axes(ax) as ax:
         for index, response in enumerate(responses):
@@ -121,10 +121,9 @@ def bifurcation(responses: Sequence[SpeedResponse], ax: Axes | None = None, *, t
             frequency = np.broadcast_to(np.asarray(response.mesh_frequency)[:, None], points.shape)
             style = {"color": line_style(1 + index)["color"], "marker": "^v"[index % 2]}
             label = f"speed {_MOVES[response.direction]}"
-            ax.plot(frequency.ravel(), points.ravel(), linestyle="", markersize=2.2, mew=0, label=label, **style)
+            ax.plot(frequency.ravel(), points.ravel(), linestyle="", markersize=3.0, mew=0, label=label, **style)
         ax.set(xlabel=FREQUENCY_LABEL, ylabel="approach at mesh position 0 [µm]")
-        legend_above(ax)
-        _say(ax, title)
+        _entitle(ax, title, legend_above(ax))
     return ax
 
 
@@ -137,7 +136,7 @@ def phase_portrait(approach, velocity, force, ax: Axes | None = None, *, once: A
         force: of the mesh [N], shape (steps,): positive on the drive flanks, negative on the coast flanks.
         once: (approach, velocity) once per mesh cycle, each of shape (points,); None for no marks.
         ax: Axes to draw into; None for a new figure.
-        title: in the Axes.
+        title: over the Axes and the legend.
     """
     x, y, f = np.asarray(approach), 1e-3 * np.asarray(velocity), np.asarray(force)
     closed = np.stack([np.append(x, x[0]), np.append(y, y[0])], axis=1)
@@ -158,12 +157,11 @@ def phase_portrait(approach, velocity, force, ax: Axes | None = None, *, once: A
             )
         ax.autoscale_view()
         ax.set(xlabel=_APPROACH_LABEL, ylabel="velocity of approach [mm/s]")
-        legend_above(ax)
-        _say(ax, title)
+        _entitle(ax, title, legend_above(ax))
     return ax
 
 
-def _say(ax: Axes, title: str) -> None:
-    """A title in the upper left corner, since a legend stands above."""
+def _entitle(ax: Axes, title: str, lines: int) -> None:
+    """A title over a legend of so many lines."""
     if title:
-        ax.annotate(title, (0.02, 0.98), xycoords="axes fraction", ha="left", va="top", color=GREY)
+        ax.set_title(title, loc="left", pad=_PAD + _LINE * lines, fontsize=ax.xaxis.label.get_fontsize())
