@@ -13,12 +13,14 @@ import pytest
 from scipy.stats.mstats import hdquantiles
 
 import jaxgear as jg
+from jaxgear.dynamics import DYNAMIC_QUANTITIES
 from jaxgear.metrics import quantities
 from jaxgear.sweeps.selection import front, smallest
 from jaxgear.sweeps.store import Store, load_manifest
 
 BOUNDS = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.5)}
-NAMES = tuple(name for name in quantities if name != "max_flash_temperature")  # which needs a speed
+# without those that need a speed or settings
+NAMES = tuple(name for name in quantities if name not in ("max_flash_temperature", *DYNAMIC_QUANTITIES))
 FEW = ("ppte", "max_flank_pressure", "effective_contact_ratio")
 PLAN = jg.Sobol(BOUNDS, 40, seed=5)
 

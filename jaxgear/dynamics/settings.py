@@ -44,13 +44,13 @@ class Dynamics(Checked):
         damping_ratio: of the approach, to the critical damping at the mean stiffness; 0.05 without it or `damping`.
         damping: viscous damping of the approach, in place of the ratio.
         pinion_inertia: polar moment of inertia of the pinion and what turns with it; that of the body without it.
-        wheel_inertia: likewise.
+        wheel_inertia: the same of the wheel.
         compliance: of what lies between the teeth and the inertias, in series with the mesh.
         pinion_bearing: stiffness of the support of the pinion along and across the line of action; rigid without it.
             The supports of both gears are given, or of none.
-        wheel_bearing: likewise.
+        wheel_bearing: the same of the wheel.
         pinion_bearing_damping: viscous damping of the support of the pinion along and across; none without it.
-        wheel_bearing_damping: likewise.
+        wheel_bearing_damping: the same of the wheel.
         model: of the mesh force.
         positions: mesh positions of the force, which is linear between them.
         kick: dynamic factor with which a second run from the highest speed down begins, to find orbits that hang

@@ -14,7 +14,7 @@ class DynamicsSection(section_of(Dynamics, ("mesh_frequencies",), open=False)): 
         mesh_frequencies: lowest and highest frequency of the mesh; either these or `speeds`.
         speeds: lowest and highest speed of the pinion.
         number: of speeds, at equal steps.
-        torque_factors: torques of `jaxgear dynamics`, in design torques.
+        torque_factors: torques of `jaxgear dynamics`, in design torques; 0.5, 1 and 2 without it.
     """
 
     mesh_frequencies: Annotated[list[float] | None, list_of(positive("Hz"), length=2)] = None

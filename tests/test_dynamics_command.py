@@ -1,0 +1,167 @@
+"""The command `jaxgear dynamics` and the table [dynamics]: what it writes and says, and one line for what is wrong."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from test_cli import call
+
+from jaxgear.cli import interrupt
+from jaxgear.cli.kept import Kept
+from jaxgear.dynamics import Oscillator, RectangularStiffness, speed_sweep
+from jaxgear.io import DesignFileError, dynamics_request, load_design, sweep_request
+from jaxgear.io.folder import RESULT_FILES
+
+GEAR = """
+teeth = 50
+module = 3.0
+face_width = 20.0
+tip_diameter = 154.5709
+bore_diameter = 40.0
+tooth_thickness_allowance = -60.0
+"""
+PAIR = f"""
+[pinion]{GEAR}
+[wheel]{GEAR}
+[load]
+torque = 200.0
+[resolution]
+positions = 16
+"""
+TABLE = """
+[dynamics]
+mesh_frequencies = [1500.0, 3500.0]
+number = 8
+pinion_inertia = 7.8e-3
+wheel_inertia = 7.8e-3
+model = "varying stiffness"
+positions = 32
+steps = 64
+torque_factors = [1.0]
+"""
+FIGURES = "dynamic_factor", "approach_rms", "waterfall", "bifurcation", "phase_portrait"
+
+
+@pytest.fixture(autouse=True)
+def no_cache(monkeypatch):
+    """The tests keep their own compilation cache."""
+    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
+
+
+@pytest.fixture
+def file(tmp_path):
+    def written(text):
+        path = tmp_path / "pair.toml"
+        path.write_text(text)
+        return path
+
+    return written
+
+
+def test_the_command_writes_what_it_says(file, tmp_path):
+    path, folder = file(PAIR + TABLE), tmp_path / "out"
+    code, out, err = call("dynamics", str(path), "--output", str(folder))
+    assert code == 0, err
+    assert {entry.name for entry in folder.iterdir()} == {
+        "summary.json",
+        "responses.csv",
+        *(f"{name}.png" for name in FIGURES),
+    }
+    assert {entry.name for entry in folder.iterdir()} <= RESULT_FILES
+    assert not list(tmp_path.glob(".out*"))  # what was kept is no longer needed
+    with (folder / "responses.csv").open() as lines:
+        rows = list(csv.DictReader(lines))
+    assert len(rows) == 2 * 3 * 8  # unmodified and rule-based, three runs, eight speeds
+    summary = json.loads((folder / "summary.json").read_text())
+    for design, data in summary["designs"].items():
+        for run in data["runs"]:
+            of_run = [row for row in rows if (row["design"], row["speed"]) == (design, run["speed"])]
+            factors = np.array([float(row["dynamic_factor"]) for row in of_run])
+            assert run["max_dynamic_factor"] == pytest.approx(factors.max(), rel=1e-6)
+            assert run["at_dynamic_factor_Hz"] == pytest.approx(float(of_run[factors.argmax()]["mesh_frequency_Hz"]))
+            assert (factors > 0.99).all()  # the mean of the force over an orbit is the static one
+    worst = {name: max(run["max_dynamic_factor"] for run in data["runs"]) for name, data in summary["designs"].items()}
+    assert 1 < worst["rule-based"] < worst["unmodified"]
+    assert f"unmodified {worst['unmodified']:.3f}, rule-based {worst['rule-based']:.3f}" in out
+    assert "rule-based" in out and "down, kicked" in out
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("", "dynamics: missing, nothing says at which speeds the pair runs"),
+        ("[dynamics]\n", "dynamics: needs either mesh_frequencies or speeds"),
+        (TABLE + "speeds = [1.0, 2.0]\n", "dynamics: needs either mesh_frequencies or speeds"),
+        (TABLE.replace("3500.0", "1000.0"), "dynamics.mesh_frequencies[1]: 1000 Hz must be greater than 1500 Hz"),
+        (TABLE.replace("3500.0", '"fast"'), "dynamics.mesh_frequencies[1]: must be a number, not a string"),
+        (TABLE.replace("[1.0]", "[1.0, 1.0]"), "dynamics.torque_factors: must all be different"),
+        (TABLE + "dampings = 1.0\n", 'dynamics.dampings: unknown key, did you mean "damping"?'),
+        (TABLE + "damping_ratio = -0.1\n", "dynamics.damping_ratio: -0.1 must be at least 0"),
+        (TABLE + "pinion_bearing = [100.0, 100.0]\n", "pinion_bearing and wheel_bearing must both be given, or none"),
+        (TABLE + "damping_ratio = 0.1\ndamping = 1e-3\n", "damping_ratio and damping are both given"),
+    ],
+)
+def test_what_is_wrong_with_the_table_is_one_line(file, tmp_path, text, message):
+    code, out, err = call("dynamics", str(file(PAIR + text)), "--output", str(tmp_path / "out"))
+    lines = err.strip().splitlines()
+    assert code == 2 and out == ""
+    assert message in lines[-1] and lines[-1].startswith("jaxgear: error: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_speeds_of_the_pinion_are_mesh_frequencies(file):
+    text = PAIR + TABLE.replace("mesh_frequencies = [1500.0, 3500.0]", "speeds = [1800.0, 4200.0]")
+    request = dynamics_request(load_design(file(text)))
+    frequencies = np.asarray(request.settings.mesh_frequencies)
+    assert frequencies == pytest.approx(np.linspace(1500.0, 3500.0, 8))  # 50 teeth, 60 s
+    assert request.torques == (200.0,)
+
+
+SWEEP = """
+[sweep]
+samples = 4
+results = ["ppte", "{name}"]
+[variables]
+height = {{ low = 0.0, high = 8.0, unit = "um" }}
+[[pinion.modification]]
+type = "tip_relief"
+amount = "height"
+length = 3.0
+"""
+
+
+def test_a_design_file_binds_names_to_its_settings(file):
+    """The settings of the table, and a refusal in one line without them."""
+    text = PAIR + SWEEP.format(name="worst_dynamic_factor")
+    results = sweep_request(load_design(file(text + TABLE))).results
+    request = dynamics_request(load_design(file(text + TABLE)))
+    assert results == ("ppte", request.settings.quantity("worst_dynamic_factor"))
+    with pytest.raises(DesignFileError, match=r'sweep.results\[1\]: "worst_dynamic_factor" needs the table \[dynam'):
+        sweep_request(load_design(file(text)))
+    with pytest.raises(DesignFileError, match='"approach_rms" needs load.speed'):
+        sweep_request(load_design(file(PAIR + SWEEP.format(name="approach_rms") + TABLE)))
+
+
+def test_kept_responses_are_not_made_again(tmp_path):
+    """After Ctrl-C the command goes on: by what they are made of, and by nothing else."""
+    oscillator = Oscillator(RectangularStiffness(1.4, 0.8, 0.4), [1.0], [1.0], [1.0], mesh_damping=0.1, newton=1.0)
+    made = []
+
+    def sweep():
+        made.append(1)
+        return speed_sweep(oscillator, [0.1, 0.2], steps=32, points=4)
+
+    first = Kept(tmp_path / ".runs", 2)((oscillator, "up"), sweep)
+    assert "1 of 2 runs are kept" in interrupt.state.written
+    again = Kept(tmp_path / ".runs", 2)((oscillator, "up"), sweep)
+    assert len(made) == 1
+    for one, other in zip((first.dynamic_factor, *first.state), (again.dynamic_factor, *again.state)):
+        assert np.array_equal(one, other)
+    assert (again.direction, again.orders) == (first.direction, first.orders)
+    kept = Kept(tmp_path / ".runs", 2)
+    kept((oscillator, "down"), sweep)
+    assert len(made) == 2
+    next((tmp_path / ".runs").iterdir()).write_bytes(b"torn")
+    kept.remove()
+    assert not (tmp_path / ".runs").exists()
