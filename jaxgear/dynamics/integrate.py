@@ -14,6 +14,10 @@ Scalar = Float[Array, ""]
 _ASIDE = 1e-6
 
 
+# displacements and velocities at the begin of every step
+Recorded = tuple[Float[Array, "*steps coordinates"], Float[Array, "*steps coordinates"]]
+
+
 class Steps(NamedTuple):
     """One mesh cycle in steps; every field has the leading axis (steps,).
 
@@ -59,11 +63,13 @@ def one_step(oscillator: Oscillator, y: State, step: Steps, mesh_frequency: Scal
     return jax.tree.map(lambda part, a, b, c, d: part + h / 6 * (a + 2 * (b + c) + d), y, first, second, third, fourth)
 
 
-def one_cycle(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar) -> tuple[State, State]:
+def one_cycle(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar) -> tuple[State, Recorded]:
     """State after a cycle, and the states at the begin of every step, leading axis (steps,)."""
     return jax.lax.scan(lambda y, step: (one_step(oscillator, y, step, mesh_frequency), y), y, steps)
 
 
-def cycles(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar, count: int) -> tuple[State, State]:
+def cycles(
+    oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar, count: int
+) -> tuple[State, Recorded]:
     """State after some cycles, and the states at the begin of every step, leading axes (count, steps)."""
     return jax.lax.scan(lambda y, _: one_cycle(oscillator, y, steps, mesh_frequency), y, length=count)

@@ -50,7 +50,7 @@ class IsoDynamicFactor(Checked):
 
     @property
     def range(self) -> str:
-        """Range of the speed: "subcritical", "main resonance", "intermediate" or "supercritical"; of concrete numbers."""
+        """Of the speed: "subcritical", "main resonance", "intermediate" or "supercritical"; for concrete numbers."""
         ratio = float(self.resonance_ratio)
         if ratio <= float(self.main_resonance_begins):
             return "subcritical"
@@ -102,8 +102,16 @@ def iso_dynamic_factor(
     check(owner, "run_in", run_in, "", low=0.0, high=1.0)
     none = real(0.0)
     deviations = (none, none) if quality_class is None else _deviations(pair, quality_class)
-    given = map(real, (torque, speed, tip_relief, application_factor, run_in))
-    return _factor(pair, *given, *deviations, optional_real(reduced_mass))
+    return _factor(
+        pair,
+        real(torque),
+        real(speed),
+        real(tip_relief),
+        real(application_factor),
+        real(run_in),
+        *deviations,
+        optional_real(reduced_mass),
+    )
 
 
 def resonance_speed(teeth, mesh_stiffness, reduced_mass) -> Scalar:

@@ -54,14 +54,14 @@ class PolynomialClearance(AbstractMeshForce):
         if order not in ORDERS:
             raise ValueError(f"PolynomialClearance.fit: order = {order!r} must be 3, 5 or 7")
         check("PolynomialClearance.fit", "range", range, "", low=1.0, open_low=True)
-        return cls(_fitted(order, real(range)), range)
+        return cls(_fitted(order, real(range)), real(range))
 
     @classmethod
     def published(cls, order: int = 7) -> "PolynomialClearance":
         """With the coefficients `PUBLISHED` for |x| <= 3."""
         if order not in PUBLISHED:
             raise ValueError(f"PolynomialClearance.published: order = {order!r} must be 3, 5 or 7")
-        return cls(PUBLISHED[order], 3.0)
+        return cls(real(PUBLISHED[order]), real(3.0))
 
     def at(self, phase: Scalar) -> tuple:
         return ()
@@ -118,16 +118,16 @@ def warn_of_false_well(clearance: PolynomialClearance, load) -> bool:
     Returns:
         whether it warned; False for traced numbers.
     """
-    known = concrete(clearance.coefficients), concrete(real(load)), concrete(clearance.range)
-    if any(part is None for part in known) or not np.asarray(known[0])[0] < 0:
+    first, carried, most = concrete(clearance.coefficients), concrete(real(load)), concrete(clearance.range)
+    if first is None or carried is None or most is None or not first[0] < 0:
         return False
     x = clearance.loaded(load)
     slope = concrete(clearance.slope(x))
     if slope is None or slope >= _SOFT:
         return False
     warnings.warn(
-        f"PolynomialClearance: coefficients a_1 = {float(known[0][0]):.4g} makes a false double well with zeros at x = "
-        f"+-{float(clearance.false_zero):.4g}, and load = {float(known[1]):.4g} lies in it: its stiffness there is "
+        f"PolynomialClearance: coefficients a_1 = {float(first[0]):.4g} makes a false double well with zeros at x = "
+        f"+-{float(clearance.false_zero):.4g}, and load = {float(carried):.4g} lies in it: its stiffness there is "
         f"{float(slope):.3g} instead of 1",
         stacklevel=3,
     )
@@ -137,14 +137,14 @@ def warn_of_false_well(clearance: PolynomialClearance, load) -> bool:
 def _fitted(order: int, most: Scalar) -> Float[Array, " terms"]:
     """Coefficients of least squares: Legendre's odd polynomials of x / range are orthogonal over the range."""
     node, weight = np.polynomial.legendre.leggauss(_NODES)
-    node, weight = real(0.5 * (node + 1)).astype(most.dtype), real(0.5 * weight).astype(most.dtype)
+    at, share = real(0.5 * (node + 1)).astype(most.dtype), real(0.5 * weight).astype(most.dtype)
     # the dead zone on its slope only, 1 <= x <= range, in u = x / range
-    u = 1 / most + (1 - 1 / most) * node
-    value = (u * most - 1) * weight * (1 - 1 / most)
+    u = 1 / most + (1 - 1 / most) * at
+    value = (u * most - 1) * share * (1 - 1 / most)
     total = jnp.zeros((order + 1) // 2, most.dtype)
     for degree in range(1, order + 1, 2):
         power = np.polynomial.legendre.leg2poly([0.0] * degree + [1.0])[1::2]
         legendre = sum(float(part) * u ** (2 * i + 1) for i, part in enumerate(power))
-        share = (2 * degree + 1) * jnp.sum(value * legendre)
-        total = total + share * jnp.pad(real(power).astype(most.dtype), (0, len(total) - len(power)))
+        projected = (2 * degree + 1) * jnp.sum(value * legendre)
+        total = total + projected * jnp.pad(real(power).astype(most.dtype), (0, len(total) - len(power)))
     return total / most ** real(np.arange(1, order + 1, 2)).astype(most.dtype)

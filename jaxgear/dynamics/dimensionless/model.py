@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...numerics import Checked, check, number, real
-from ..force import AbstractMeshForce
+from ..force import AbstractMeshForce, DeadZone
 from ..oscillator import Excitation, Oscillator
 from .clearance import PolynomialClearance, warn_of_false_well
 from .relief import CycleRelief
@@ -20,11 +20,19 @@ Orders = Float[Array, " orders"]
 ReliefForm = Literal["exact", "first order", "first order as printed"]
 
 
+def loaded_approach(clearance: AbstractMeshForce, load: Scalar) -> Scalar:
+    """x > 0 with f(x) = load > 0."""
+    if isinstance(clearance, PolynomialClearance):
+        return clearance.loaded(load)
+    assert isinstance(clearance, DeadZone)  # which the force has checked
+    return clearance.half_clearance + load / clearance.stiffness_constant
+
+
 class DimensionlessForce(AbstractMeshForce):
     """[1 + sum_j B_j cos(2 pi j phase + phi_j)] f(x - C(phase)); every number dimensionless.
 
     Attributes:
-        clearance: f, `DeadZone` or `PolynomialClearance`.
+        clearance: f, `DeadZone()` or a `PolynomialClearance`.
         stiffness_harmonics: B_j over the mean stiffness, j = 1, 2, ..., shape (orders,).
         stiffness_angles: phi_j [rad], shape (orders,).
         relief: C; None for none.
@@ -42,11 +50,37 @@ class DimensionlessForce(AbstractMeshForce):
     relief_form: ReliefForm = eqx.field(default="exact", static=True)
 
     def check_together(self) -> None:
+        if not isinstance(self.clearance, DeadZone | PolynomialClearance):
+            raise TypeError(
+                f"DimensionlessForce: clearance is {type(self.clearance).__name__}, must be DeadZone or "
+                "PolynomialClearance"
+            )
         if self.relief_form != "exact" and not isinstance(self.clearance, PolynomialClearance):
             raise ValueError(
                 f'DimensionlessForce: relief_form = "{self.relief_form}" needs a PolynomialClearance: the slope of '
                 f"{type(self.clearance).__name__} jumps"
             )
+
+    def nodes(self, steps: int) -> Float[Array, " nodes"]:
+        """Mesh positions between which an integrator steps, from 0 to 1 [base pitches], shape (steps + 1,).
+
+        Evenly spaced, but for the two nearest to where the relief jumps, which are moved there.
+        """
+        even = real(np.linspace(0.0, 1.0, steps + 1))
+        if self.relief is None:
+            return even
+        ends = self.relief.ends
+        first, second = jnp.clip(jnp.round(ends * steps), 1, steps - 1)
+        beside = jnp.where((ends[1] > ends[0]) & (first < steps - 1) | (first == 1), first + 1, first - 1)
+        second = jnp.where(second == first, beside, second)
+        place = jnp.arange(steps + 1)
+        moved = jnp.where(place == first, ends[0], jnp.where(place == second, ends[1], even))
+        return jnp.sort(moved)
+
+    def static_approach(self, phase: Scalar, force: Scalar) -> Scalar:
+        """x where the exact form takes a positive force at a mesh position: C + f^-1(force / stiffness)."""
+        _, stiffness, taken = self.at(phase)
+        return taken + loaded_approach(self.clearance, force / stiffness)
 
     def at(self, phase: Scalar) -> Any:
         order = jnp.arange(1, len(self.stiffness_harmonics) + 1, dtype=self.stiffness_harmonics.dtype)

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from ...numerics import Checked, program, real, result, safe_sqrt
-from .model import DimensionlessModel
+from .model import DimensionlessModel, loaded_approach
 
 Scalar = Float[Array, ""]
 Lines = Complex[Array, " orders"]
@@ -109,7 +109,7 @@ def loaded_mean(model: DimensionlessModel) -> LoadedMean:
         return x - (jnp.mean(over_cycle(x)) - model.load) / jnp.mean(first(x))
 
     shift = 0.0 if model.relief is None else jnp.mean(jax.vmap(model.relief)(phase))
-    start = _loaded(model) + shift
+    start = loaded_approach(model.clearance, model.load) + shift
     x = jax.lax.fori_loop(0, _NEWTON, newton, start)
     orders = real(np.arange(1, _HIGHEST + 1)).astype(phase.dtype)
     turn = turned(-2 * jnp.pi * orders[:, None] * phase[None])
@@ -133,12 +133,6 @@ def loaded_mean(model: DimensionlessModel) -> LoadedMean:
         parametric=harmonics(slope),
         parametric_quadratic=harmonics(bend),
     )
-
-
-def _loaded(model: DimensionlessModel) -> Scalar:
-    """Loaded mean without modification."""
-    given = getattr(model.clearance, "loaded", None)
-    return model.load + 1 if given is None else given(model.load)
 
 
 def frequency_shift(state: LoadedMean, frequency: Scalar, resonant: int = 0, parametric: int = 0) -> Scalar:

@@ -1,5 +1,6 @@
 """Dynamic profile modification: the relief whose vibration at one operating condition is least."""
 
+import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
@@ -9,9 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ...microgeometry import Linear, Polynomial, Power
-from ...numerics import Checked, check, kernel, real, result, spread, whole
-from .clearance import PolynomialClearance
+from ...microgeometry import Linear, Polynomial, Power, Quadratic
+from ...numerics import Checked, check, concrete, kernel, real, result, spread, whole
 from .model import DimensionlessModel, with_relief
 from .relief import CycleRelief
 from .settle import _settle, at_rest
@@ -20,6 +20,7 @@ Scalar = Float[Array, ""]
 Free = Literal["amount", "length", "curve"]
 
 _SETTLING, _PERIODS, _STEPS = 60, 2, 64  # cycles, cycles, steps per cycle of every evaluation
+_LAST_SETTLING = 400  # cycles, of the amplitudes that are reported
 _POSITIONS = 128  # of the static curve
 _KICK = 0.5  # velocity over F_m of the second start, which finds a detached branch
 _STATIC_ITERATIONS = 300
@@ -52,9 +53,9 @@ def operating_conditions(frequency=1.0) -> tuple[OperatingCondition, ...]:
     """
     omega = float(frequency)
     # a polynomial of degree 5 with b_0 = 0: no step where the relief starts
-    shape = Polynomial(np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
+    shape = Polynomial(real([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
     return (
-        OperatingCondition("primary", omega, ("amount", "curve"), Power(1.2), "lower the peak"),
+        OperatingCondition("primary", omega, ("amount", "curve"), Power(real(1.2)), "lower the peak"),
         OperatingCondition("super-harmonic 1/2", omega / 2, ("curve",), shape, "detune the coupling that excites it"),
         OperatingCondition("super-harmonic 1/3", omega / 3, ("curve",), shape, "detune the coupling that excites it"),
         OperatingCondition("high speed", 3 * omega, ("amount", "length"), Linear(), "least impact velocity"),
@@ -88,7 +89,7 @@ def dynamic_profile_modification(
     relief: CycleRelief,
     *,
     free: Sequence[Free] = ("amount", "curve"),
-    bounds: Mapping[str, tuple[float, float]] | None = None,
+    bounds: Mapping[str, tuple[Any, Any]] | None = None,
     iterations: int = 60,
 ) -> DynamicModification:
     """The coefficients of a relief that minimize the largest amplitude of a model at one frequency.
@@ -108,7 +109,8 @@ def dynamic_profile_modification(
         relief: to start from, and what is not free.
         free: "amount" (C_max), "length" (lambda), "curve" (its coefficients, all of them).
         bounds: of each; None or left out for `amount` 0 to 4 F_m [half clearances], `length` from a fifth of contact
-            ratio - 1 to half of the contact ratio, `curve` 0.5 to 4 for an exponent and -4 to 4 for coefficients.
+            ratio - 1 to half of the contact ratio, `curve` 0.5 to 4 for an exponent and -4 to 4 for coefficients, of a
+            polynomial all but b_0, which stays. A bound of a curve may be a list, one number per coefficient.
         iterations: steps of Adam.
     """
     check("dynamic_profile_modification", "frequency", frequency, "", low=0.0, open_low=True)
@@ -119,16 +121,18 @@ def dynamic_profile_modification(
     model = with_relief(model, None)
     low, high = _bounds(model, relief, names, bounds or {})
     at = real(frequency)
-    unit = jnp.clip((_vector(relief, names) - low) / (high - low), 0.0, 1.0)
+    width = jnp.where(high > low, high - low, 1.0)
+    unit = jnp.clip((_vector(relief, names) - low) / width, 0.0, 1.0)
     static = _static_search(model, relief, names, low, high, unit)
     further = jnp.clip(2 * static, 0.0, 1.0)
     best, _ = _dynamic_search(model, relief, names, low, high, at, jnp.stack([unit, static, further]), iterations)
     found = [_made(relief, names, low + (high - low) * part) for part in (static, best)]
     none = eqx.tree_at(lambda r: r.amount, relief, jnp.zeros_like(relief.amount))
     every = (none, *found)
-    amplitude, settled = zip(*(_amplitude(model, part, at) for part in every))
+    amplitude, settled = zip(*(_amplitude(model, part, at, _LAST_SETTLING) for part in every))
     at_rest_too = jnp.stack([_static_amplitude(model, part) for part in every])
-    return DynamicModification(at, *found, jnp.stack(amplitude), at_rest_too, jnp.stack(settled))
+    static_found, dynamic_found = found
+    return DynamicModification(at, static_found, dynamic_found, jnp.stack(amplitude), at_rest_too, jnp.stack(settled))
 
 
 def modification_table(rows: Sequence[tuple[OperatingCondition, DynamicModification]]) -> str:
@@ -159,7 +163,7 @@ def _made(relief: CycleRelief, free: Sequence[str], vector: Float[Array, " numbe
         for leaf in leaves:
             part, vector = vector[: leaf.size], vector[leaf.size :]
             new.append(part.reshape(leaf.shape))
-        relief = eqx.tree_at(lambda r, name=name: getattr(r, name), relief, jax.tree.unflatten(tree, new))
+        relief = eqx.tree_at(operator.attrgetter(name), relief, jax.tree.unflatten(tree, new))
     return relief
 
 
@@ -172,14 +176,19 @@ def _bounds(model: DimensionlessModel, relief: CycleRelief, free: Sequence[str],
         "length": (0.2 * (ratio - 1), 0.5 * ratio),
         "curve": (0.5, 4.0) if isinstance(relief.curve, Power) else (-4.0, 4.0),
     }
+    if isinstance(relief.curve, Polynomial | Quadratic):  # b_0 would be a step where the relief starts
+        fixed = jnp.concatenate([jnp.ravel(leaf) for leaf in jax.tree.leaves(relief.curve)])
+        inner = jnp.arange(len(fixed)) > 0
+        usual["curve"] = (jnp.where(inner, -4.0, fixed), jnp.where(inner, 4.0, fixed))
     low, high = [], []
     for name in free:
         count = sum(leaf.size for leaf in jax.tree.leaves(getattr(relief, name)))
         least, most = given.get(name, usual[name])
-        if not isinstance(least, jax.core.Tracer) and not isinstance(most, jax.core.Tracer) and not least < most:
-            raise ValueError(f"dynamic_profile_modification: bounds of {name} = ({least}, {most}) must rise")
-        low.append(jnp.full(count, real(least)))
-        high.append(jnp.full(count, real(most)))
+        known = concrete(real(least)), concrete(real(most))
+        if known[0] is not None and known[1] is not None and (known[0] > known[1]).any():
+            raise ValueError(f"dynamic_profile_modification: bounds of {name} = ({least}, {most}) must not fall")
+        low.append(jnp.broadcast_to(real(least), count))
+        high.append(jnp.broadcast_to(real(most), count))
     return jnp.concatenate(low), jnp.concatenate(high)
 
 
@@ -187,20 +196,19 @@ def _static_amplitude(model: DimensionlessModel, relief: CycleRelief) -> Scalar:
     """Half of the range of x where the mesh force equals F_m at every position: x = C + f^-1(F_m / stiffness)."""
     force = with_relief(model, relief).mesh_force
     phase = real(np.arange(_POSITIONS) / _POSITIONS)
-    _, stiffness, taken = jax.vmap(force.at)(phase)
-    load = model.load / stiffness
-    clearance = model.clearance
-    deflected = jax.vmap(clearance.loaded)(load) if isinstance(clearance, PolynomialClearance) else 1 + load
-    return 0.5 * spread(deflected + taken, axis=-1)
+    static = jax.vmap(force.static_approach, in_axes=(0, None))(phase, model.load)
+    return 0.5 * spread(static, axis=-1)
 
 
-def _amplitude(model: DimensionlessModel, relief: CycleRelief, frequency: Scalar) -> tuple[Scalar, Bool[Array, ""]]:
+def _amplitude(
+    model: DimensionlessModel, relief: CycleRelief, frequency: Scalar, settling: int = _SETTLING
+) -> tuple[Scalar, Bool[Array, ""]]:
     """The larger amplitude of two starts, at rest and kicked; and whether it has settled."""
     moved = with_relief(model, relief)
     rest = at_rest(moved)
     kicked = rest + jnp.stack([jnp.zeros_like(model.load), _KICK * model.load])
     starts = jnp.stack([rest, kicked])
-    found = jax.vmap(lambda start: _settle(moved, frequency, start, _SETTLING, _PERIODS, _STEPS))(starts)
+    found = jax.vmap(lambda start: _settle(moved, frequency, start, settling, _PERIODS, _STEPS))(starts)
     # a kick that leaves the range of a polynomial says nothing about the design
     second = jnp.where(jnp.isfinite(found.amplitude[1]), found.amplitude[1], -1.0)
     which = jnp.where(second > found.amplitude[0], 1, 0)

@@ -8,7 +8,7 @@ from jaxtyping import Array, Bool, Complex, Float
 from ...numerics import Checked, check, kernel, real, result, safe_divide, whole
 from ..integrate import Steps, cycles, one_cycle, steps_of
 from ..oscillator import Oscillator, State
-from .model import DimensionlessForce, DimensionlessModel
+from .model import DimensionlessModel, loaded_approach
 
 Scalar = Float[Array, ""]
 
@@ -77,31 +77,15 @@ def settled_vibration(
 
 def at_rest(model: DimensionlessModel) -> Float[Array, " two"]:
     """The loaded mean without vibration: (x_m, 0)."""
-    loaded = getattr(model.clearance, "loaded", None)
-    mean = model.load + 1 if loaded is None else loaded(model.load)
+    mean = loaded_approach(model.clearance, model.load)
     shift = jnp.zeros_like(mean) if model.relief is None else jnp.mean(jax.vmap(model.relief)(_phases(64)))
     return jnp.stack([mean + shift, jnp.zeros_like(mean)])
-
-
-def grid_of(force: DimensionlessForce, steps: int) -> Float[Array, " nodes"]:
-    """Nodes over a mesh cycle, two of which are moved to where the relief jumps."""
-    even = _phases(steps + 1) * (steps + 1) / steps
-    if force.relief is None:
-        return even
-    ends = force.relief.ends
-    # of the inner nodes the nearest, or the one beside it for the second end
-    first = jnp.clip(jnp.round(ends[0] * steps), 1, steps - 1)
-    second = jnp.clip(jnp.round(ends[1] * steps), 1, steps - 1)
-    second = jnp.where(second == first, jnp.where(ends[1] > ends[0], first + 1, first - 1), second)
-    place = jnp.arange(steps + 1, dtype=even.dtype)
-    moved = jnp.where(place == first, ends[0], jnp.where(place == second, ends[1], even))
-    return jnp.sort(jnp.clip(moved, 0.0, 1.0))
 
 
 @kernel
 def _settle(model: DimensionlessModel, frequency: Scalar, begin, settling: int, periods: int, steps: int) -> Settled:
     oscillator, mesh_frequency = model.oscillator(), frequency / (2 * jnp.pi)
-    prepared = steps_of(oscillator, grid_of(model.mesh_force, steps))
+    prepared = steps_of(oscillator, model.mesh_force.nodes(steps).astype(begin.dtype))
     fixed = jax.lax.stop_gradient((oscillator, mesh_frequency, prepared, begin))
     y = _run(*fixed[:3], fixed[3], settling)
     y = jax.lax.stop_gradient(y)
