@@ -73,7 +73,7 @@ class DimensionlessForce(AbstractMeshForce):
         first, second = jnp.clip(jnp.round(ends * steps), 1, steps - 1)
         beside = jnp.where((ends[1] > ends[0]) & (first < steps - 1) | (first == 1), first + 1, first - 1)
         second = jnp.where(second == first, beside, second)
-        place = jnp.arange(steps + 1)
+        place = jnp.arange(steps + 1, dtype=even.dtype)
         moved = jnp.where(place == first, ends[0], jnp.where(place == second, ends[1], even))
         return jnp.sort(moved)
 
