@@ -1,5 +1,6 @@
 """Resonances in closed form beside the integrated motion: errors fall with the excitation."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -79,8 +80,8 @@ def test_stiffness_harmonics_force_directly_and_in_the_slope():
     found = loaded_mean(model(0.03, stiffness=(0.1, 0.05, 0.02), displacement=0.03, displacement_order=2.0))
     stiff = np.array([0.1, 0.05, 0.02]) * np.exp(1j * np.array([0.3, 0.5, 0.2]))
     assert np.allclose(found.force[:3], -0.5 * stiff) and np.allclose(found.force[3:], 0)
-    assert np.allclose(found.parametric[:3], stiff * found.frequency**2)
-    assert np.allclose(found.parametric_quadratic[:3], stiff * found.quadratic)
+    assert np.allclose(found.parametric[:3], stiff * float(found.frequency) ** 2)
+    assert np.allclose(found.parametric_quadratic[:3], stiff * float(found.quadratic))
     # a displacement's force grows with the square of its frequency
     assert np.isclose(found.forcing(jnp.array(0.4))[1], -0.5 * stiff[1] + 0.03 * 0.8**2)
 
@@ -90,10 +91,10 @@ def test_relief_takes_its_part_of_the_forcing():
     relief = CycleRelief(1e-4, 0.37, 1.37, begin=-0.185)
     plain = model(0.03)
     without, found = loaded_mean(plain), loaded_mean(with_relief(plain, relief))
-    phase = np.arange(256) / 256
-    taken = np.array([relief(jnp.array(p)) for p in phase[:: 256 // 64]])
+    phase = np.arange(1024) / 1024
+    taken = np.asarray(jax.vmap(relief)(jnp.array(phase)))
     assert np.isclose(found.mean - without.mean, taken.mean(), rtol=1e-3)
-    first = 2 * np.mean(taken * np.exp(-2j * np.pi * phase[:: 256 // 64]))
+    first = 2 * np.mean(taken * np.exp(-2j * np.pi * phase))
     assert np.isclose(found.force[0], -(without.frequency**2) * first, rtol=0.02)
 
 
@@ -128,8 +129,7 @@ def super_harmonic(order, size, detuning):
     return float(closed), float(abs(settled.harmonic(order)))
 
 
-@pytest.mark.parametrize("order, most", [(2, 0.02), (3, 0.025)])
-@pytest.mark.parametrize("detuning", [-0.02, 0.03])
+@pytest.mark.parametrize("order, most, detuning", [(2, 0.02, -0.02), (2, 0.02, 0.03), (3, 0.025, 0.03)])
 def test_super_harmonic_resonance_is_asymptotic(order, most, detuning):
     errors = []
     for size in (0.5, 0.25):
@@ -140,7 +140,7 @@ def test_super_harmonic_resonance_is_asymptotic(order, most, detuning):
 
 def test_super_harmonic_forcing_has_every_part():
     """Without the quadratic term, the stiffness harmonic or the direct part the amplitude would be far off."""
-    given = model(0.02, stiffness=(0.05, 0.0125, 0.0), torque=0.03, torque_angle=0.4)
+    given = model(0.02, stiffness=(0.05, 0.0125, 0.0), torque=0.2, torque_angle=0.4)
     state = loaded_mean(given)
     half = state.frequency / 2
     line = complex(state.response(half)[0])
@@ -239,9 +239,9 @@ def test_combinations_of_mesh_harmonics_are_the_super_harmonics():
     third = state.frequency / 3
     line = state.response(third)
     made = combination_forcing(state, given, third, 0, 1)
-    assert np.isclose(made, -4 * state.quadratic * complex(line[0]) * complex(line[1]))
+    assert np.isclose(made, -4 * float(state.quadratic) * complex(line[0]) * complex(line[1]))
     # what is left at order 3 is from order 1 alone, of third order in it
-    alone = effective_forcing(state, third, 3) - made
+    alone = complex(effective_forcing(state, third, 3)) - complex(made)
     a2, a3, one = float(state.quadratic), float(state.cubic), complex(line[0])
     inverse = complex(state.receptance_inverse(2 * third))
     assert np.isclose(alone, -2 * a3 * one**3 - 4 * a2 * one * (-a2 * one**2 / inverse))

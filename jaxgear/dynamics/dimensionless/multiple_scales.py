@@ -22,7 +22,7 @@ from .model import DimensionlessModel, loaded_approach
 Scalar = Float[Array, ""]
 Lines = Complex[Array, " orders"]
 
-_POSITIONS = 256  # of the mesh cycle, where the harmonics of the expansion are found
+_POSITIONS = 1024  # of the mesh cycle, where the harmonics of the expansion are found
 _NEWTON = 30
 _HIGHEST = 6  # order of the mesh frequency that is kept
 
@@ -141,7 +141,8 @@ def frequency_shift(state: LoadedMean, frequency: Scalar, resonant: int = 0, par
     Args:
         state: the expansion.
         frequency: Omega.
-        resonant: order that resonates itself, n Omega ~ omega_0; its response is the slow amplitude. 0 for none.
+        resonant: order that resonates itself, n Omega ~ omega_0; its response is the slow amplitude. 0 for none. The
+            order 2 n then excites parametrically, and is no part of the shift.
         parametric: order whose difference frequency does, n Omega ~ 2 omega_0. 0 for none.
     """
     omega, forced = state.frequency, state.orders * frequency
@@ -151,8 +152,9 @@ def frequency_shift(state: LoadedMean, frequency: Scalar, resonant: int = 0, par
     total = 6 * state.cubic * jnp.abs(line) ** 2 + 2 * jnp.real(state.parametric_quadratic * line.conj())
     # sum and difference of the vibration's frequency and the line's; one that resonates is no small correction
     total = total + jnp.abs(coupling) ** 2 / (forced * (2 * omega + forced))
-    apart = jnp.where(state.orders == parametric, 1.0, forced * (2 * omega - forced))
-    total = total - jnp.where(state.orders == parametric, 0.0, jnp.abs(coupling) ** 2 / apart)
+    close = (state.orders == parametric) | (state.orders == 2 * resonant) & (resonant > 0)
+    apart = jnp.where(close, 1.0, forced * (2 * omega - forced))
+    total = total - jnp.where(close, 0.0, jnp.abs(coupling) ** 2 / apart)
     return (jnp.sum(total) + 2 * state.quadratic * constant / omega**2) / (2 * omega)
 
 

@@ -48,6 +48,10 @@ class Backbone(Checked):
 def primary_resonance(state: LoadedMean, frequency) -> Resonance:
     """Omega ~ omega_0: A^2 [(Omega - omega_0 - kappa A^2)^2 + zeta^2] = (P_1 / (2 omega_0))^2.
 
+    The stiffness harmonic of twice the resonant order, here Q_2, excites the same vibration parametrically, which this
+    curve leaves out: it holds where `damping_threshold` of that order is well below zeta, and the integrated motion
+    (`settled_vibration`) is the reference elsewhere. Likewise for `super_harmonic_resonance`.
+
     Args:
         state: the expansion about the loaded mean.
         frequency: Omega, shape (frequencies,).
