@@ -95,8 +95,8 @@ def dynamic_profile_modification(
     """The coefficients of a relief that minimize the largest amplitude of a model at one frequency.
 
     The amplitude is that of the study, half of the range of x in the settled vibration; its gradient is exact (implicit
-    function theorem of the periodic orbit) and is followed by Adam with projection onto the bounds, from three designs:
-    the given one, the static optimum and twice its distance from no relief. The static optimum minimizes the range of x
+    function theorem of the periodic orbit) and is followed by Adam with projection onto the bounds, from four designs:
+    the given one, the static optimum, twice its numbers, and none as far as what is free allows. The static optimum minimizes the range of x
     at vanishing speed within the same parameters.
 
     Without torque fluctuation and displacement a relief that keeps the static x constant keeps x constant at every
@@ -125,7 +125,10 @@ def dynamic_profile_modification(
     unit = jnp.clip((_vector(relief, names) - low) / width, 0.0, 1.0)
     static = _static_search(model, relief, names, low, high, unit)
     further = jnp.clip(2 * static, 0.0, 1.0)
-    best, _ = _dynamic_search(model, relief, names, low, high, at, jnp.stack([unit, static, further]), iterations)
+    none_free = jnp.clip(-low / width, 0.0, 1.0)  # no relief, where the free numbers reach it
+    best, _ = _dynamic_search(
+        model, relief, names, low, high, at, jnp.stack([unit, static, further, none_free]), iterations
+    )
     found = [_made(relief, names, low + (high - low) * part) for part in (static, best)]
     none = eqx.tree_at(lambda r: r.amount, relief, jnp.zeros_like(relief.amount))
     every = (none, *found)
