@@ -31,6 +31,8 @@ from .hertz import Kovalskii as Kovalskii
 from .hertz import NonlinearPower as NonlinearPower
 from .hertz import Palmgren as Palmgren
 from .hertz import Weber as Weber
+from .iso_6336 import IsoStiffness as IsoStiffness
+from .iso_6336 import iso_stiffness as iso_stiffness
 from .laws import AbstractLaw as AbstractLaw
 from .plane import Plane as Plane
 from .plane import PlaneState as PlaneState

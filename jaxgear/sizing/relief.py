@@ -8,58 +8,14 @@ References:
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..compliance import iso_stiffness
 from ..contact import MeshCycle
 from ..geometry import GearPair, path_of_contact
 from ..metrics import secant_stiffness
 from ..microgeometry import AbstractCurve, TipRelief
-from ..numerics import Checked, check, minimum, program, real, result, safe_divide
+from ..numerics import check, minimum, real, safe_divide
 
 Scalar = Float[Array, ""]
-
-# ISO 6336-1 clause 9: minimum flexibility q' of a pair [mm um/N] in 1/z1, 1/z2, x1 and x2
-_Q = (0.04723, 0.15551, 0.25791, -0.00635, -0.11654, -0.00193, -0.24188, 0.00529, 0.00182)
-_MODEL_FACTOR = 0.8  # C_M, measured to theoretical single stiffness
-_LIGHT_LOAD = 100.0  # line load [N/mm] below which c' falls with its fourth root
-
-
-class IsoStiffness(Checked):
-    """Tooth stiffness of ISO 6336-1 Method B, solid disc bodies.
-
-    Attributes:
-        theoretical: c'_th.
-        single: c', largest stiffness of one pair.
-        mesh: c_gamma_alpha, mean of the total mesh stiffness.
-    """
-
-    theoretical: Scalar = result("N/(mm um)")
-    single: Scalar = result("N/(mm um)")
-    mesh: Scalar = result("N/(mm um)")
-
-
-def iso_stiffness(pair: GearPair, line_load=_LIGHT_LOAD) -> IsoStiffness:
-    """Stiffness of ISO 6336-1 Method B.
-
-    Args:
-        pair: gear pair; the standard covers x1 >= x2 and -0.5 <= x1 + x2 <= 2.
-        line_load: F_t K_A / b [N/mm]; below 100 N/mm the stiffness is reduced.
-    """
-    check("iso_stiffness", "line_load", line_load, "N/mm", low=0.0)
-    return _iso_stiffness(pair, real(line_load))
-
-
-@program
-def _iso_stiffness(pair: GearPair, line_load: Scalar) -> IsoStiffness:
-    pinion, wheel = pair.pinion, pair.wheel
-    z1, z2, x1, x2 = pinion.teeth, wheel.teeth, pinion.profile_shift, wheel.profile_shift
-    c1, c2, c3, c4, c5, c6, c7, c8, c9 = _Q
-    q = c1 + c2 / z1 + c3 / z2 + c4 * x1 + c5 * x1 / z1 + c6 * x2 + c7 * x2 / z2 + c8 * x1**2 + c9 * x2**2
-    dedendum = 0.5 * (pinion.dedendum + wheel.dedendum)
-    rack = (1 + 0.5 * (1.2 - dedendum)) * (1 - 0.02 * (20.0 - pinion.pressure_angle))
-    first, second = pinion.material.elastic_modulus, wheel.material.elastic_modulus
-    steel = 2 * first * second / (first + second) / 206_000.0
-    light = jnp.minimum(line_load / _LIGHT_LOAD, 1.0) ** 0.25
-    single = _MODEL_FACTOR * rack * steel * light / q
-    return IsoStiffness(1 / q, single, single * (0.75 * path_of_contact(pair).contact_ratio + 0.25))
 
 
 def long_relief_length(pair: GearPair) -> Scalar:

@@ -1,0 +1,39 @@
+"""The dimensionless model of a gear pair: polynomial clearance, multiple scales, dynamic profile modification.
+
+from_mesh (a pair's numbers) -> DimensionlessModel -> Oscillator, for every tool of `jaxgear.dynamics`
+                                                  -> LoadedMean -> resonances in closed form
+                                                  -> settled_vibration -> dynamic_profile_modification
+"""
+
+from .clearance import PUBLISHED as PUBLISHED
+from .clearance import PolynomialClearance as PolynomialClearance
+from .identification import Identified as Identified
+from .identification import from_mesh as from_mesh
+from .model import DimensionlessForce as DimensionlessForce
+from .model import DimensionlessModel as DimensionlessModel
+from .model import dimensionless_model as dimensionless_model
+from .model import rectangular_harmonics as rectangular_harmonics
+from .model import with_relief as with_relief
+from .multiple_scales import LoadedMean as LoadedMean
+from .multiple_scales import effective_forcing as effective_forcing
+from .multiple_scales import frequency_shift as frequency_shift
+from .multiple_scales import loaded_mean as loaded_mean
+from .optimum import DynamicModification as DynamicModification
+from .optimum import OperatingCondition as OperatingCondition
+from .optimum import dynamic_profile_modification as dynamic_profile_modification
+from .optimum import modification_table as modification_table
+from .optimum import operating_conditions as operating_conditions
+from .relief import CycleRelief as CycleRelief
+from .relief import largest_relief as largest_relief
+from .resonances import Backbone as Backbone
+from .resonances import Resonance as Resonance
+from .resonances import combination_forcing as combination_forcing
+from .resonances import damping_threshold as damping_threshold
+from .resonances import forced_amplitude as forced_amplitude
+from .resonances import parametric_instability as parametric_instability
+from .resonances import primary_resonance as primary_resonance
+from .resonances import response_curve as response_curve
+from .resonances import sub_harmonic_resonance as sub_harmonic_resonance
+from .resonances import super_harmonic_resonance as super_harmonic_resonance
+from .settle import Settled as Settled
+from .settle import settled_vibration as settled_vibration
