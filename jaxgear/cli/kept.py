@@ -79,8 +79,9 @@ def _read(path: Path) -> SpeedResponse | None:
     try:
         with np.load(path) as file:
             data: dict[str, Any] = dict(file)
-        orders, direction = tuple(data.pop("orders").tolist()), str(data.pop("direction"))
-        arrays = {name: jnp.asarray(value) for name, value in data.items()}
+        orders = tuple(data.pop("orders").tolist())
+        direction: Any = str(data.pop("direction"))
+        arrays: dict[str, Any] = {name: jnp.asarray(value) for name, value in data.items()}
         arrays[_PAIR] = arrays.pop("displacement"), arrays.pop("velocity")
         return SpeedResponse(**arrays, orders=orders, direction=direction)
     except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):  # not there, or torn
