@@ -177,7 +177,7 @@ def flanks_of(owner: str, mesh: Mesh, pinion: Any, wheel: Any) -> tuple[Abstract
     return pinion or NoModification(), wheel or NoModification()
 
 
-def _cycle(mesh: Mesh, operation: Operation, contact: dict[str, Array], pinion=None, wheel=None) -> MeshCycle:
+def _cycle(mesh: Mesh, operation: Operation, contact: dict[str, Any], pinion=None, wheel=None) -> MeshCycle:
     """What the compiled programs leave out: it passes through them unchanged, and would be copied."""
     return MeshCycle(
         kinematics=mesh.kinematics, margins=mesh.margins, operation=operation, pinion=pinion, wheel=wheel, **contact
