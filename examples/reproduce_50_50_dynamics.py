@@ -155,7 +155,9 @@ def _lower(torque: float, found: dict, names) -> dict:
     base, less = f"{torque:g} unmodified", {}
     for name in names:
         for what in ("K_v", "K_v 3", "q_rms"):
-            less[f"{torque:g} {name} less {what}"] = 100 * (1 - found[f"{torque:g} {name} {what}"] / found[f"{base} {what}"])
+            less[f"{torque:g} {name} less {what}"] = 100 * (
+                1 - found[f"{torque:g} {name} {what}"] / found[f"{base} {what}"]
+            )
     return less
 
 
@@ -165,7 +167,9 @@ def show(found) -> None:
     for key, text, published, unit, why in LINES:
         if key not in found:
             continue
-        difference = f"{found[key] - published:+8.1f} points" if unit == "%" else f"{100 * (found[key] / published - 1):+8.1f} %"
+        difference = (
+            f"{found[key] - published:+8.1f} points" if unit == "%" else f"{100 * (found[key] / published - 1):+8.1f} %"
+        )
         print((f"{text} [{unit}]" if unit else text).ljust(60) + f"{published:10.4g}{found[key]:10.4g}{difference}")
         if why:
             print(textwrap.fill(why, 100, initial_indent="    ", subsequent_indent="    "))
