@@ -36,9 +36,10 @@ DETACHED = (
     "highest speed."
 )
 RELIEVED = (
-    "The study's reliefs leave 0.70 um of PPTE by its finite elements; what jaxgear's leave is another curve, and at "
-    "point 3 orbits of two cycles live on the contact loss that is left."
+    "What jaxgear's relief leaves of the excitation no longer takes the flanks apart at 200 N m, so that no orbit with "
+    "contact loss hangs on; the study's leaves 0.70 um of PPTE and an orbit of two cycles at point 3."
 )
+OFF_DESIGN = "The same reliefs, which jaxgear finds to work better at this torque too."
 # key of the result, text, published value, unit, where the difference comes from
 LINES = [
     ("200 unmodified f1", "200 N m, point 1", 1100.0, "Hz", ""),
@@ -61,12 +62,12 @@ LINES = [
         "um",
         "The study has it at point 1, where it reports a jump that neither jaxgear nor a model of separate pairs shows.",
     ),
-    ("100 type 1 less K_v", "100 N m, largest K_v of type 1 lower by", 28.0, "%", RELIEVED),
-    ("100 type 2 less K_v", "100 N m, largest K_v of type 2 lower by", 34.0, "%", RELIEVED),
-    ("100 type 1 less K_v 3", "100 N m, K_v of type 1 at point 3 lower by", 53.0, "%", RELIEVED),
-    ("100 type 2 less K_v 3", "100 N m, K_v of type 2 at point 3 lower by", 60.0, "%", RELIEVED),
-    ("100 type 1 less q_rms", "100 N m, largest q_rms of type 1 lower by", 22.0, "%", RELIEVED),
-    ("100 type 2 less q_rms", "100 N m, largest q_rms of type 2 lower by", 33.0, "%", RELIEVED),
+    ("100 type 1 less K_v", "100 N m, largest K_v of type 1 lower by", 28.0, "%", OFF_DESIGN),
+    ("100 type 2 less K_v", "100 N m, largest K_v of type 2 lower by", 34.0, "%", OFF_DESIGN),
+    ("100 type 1 less K_v 3", "100 N m, K_v of type 1 at point 3 lower by", 53.0, "%", OFF_DESIGN),
+    ("100 type 2 less K_v 3", "100 N m, K_v of type 2 at point 3 lower by", 60.0, "%", OFF_DESIGN),
+    ("100 type 1 less q_rms", "100 N m, largest q_rms of type 1 lower by", 22.0, "%", OFF_DESIGN),
+    ("100 type 2 less q_rms", "100 N m, largest q_rms of type 2 lower by", 33.0, "%", OFF_DESIGN),
     ("400 unmodified f1", "400 N m, point 1", 1200.0, "Hz", ""),
     ("400 unmodified f2", "400 N m, point 2", 2400.0, "Hz", SMOOTH),
     ("400 unmodified f3", "400 N m, point 3", 4500.0, "Hz", DETACHED),
@@ -78,7 +79,7 @@ LINES = [
         "The study's third peak changes its shape at this torque; jaxgear's does not.",
     ),
     ("400 unmodified q_rms", "400 N m, largest q_rms, unmodified", 32.5, "um", "The study has it at point 2."),
-    ("400 type 1 less q_rms", "400 N m, largest q_rms of type 1 lower by", 14.0, "%", RELIEVED),
+    ("400 type 1 less q_rms", "400 N m, largest q_rms of type 1 lower by", 14.0, "%", OFF_DESIGN),
 ]
 
 
@@ -162,8 +163,9 @@ def _lower(torque: float, found: dict, names) -> dict:
 
 
 def show(found) -> None:
-    """Prints every published number, jaxgear's and the difference, and where the difference comes from."""
+    """Prints every published number, jaxgear's and the difference; where the difference comes from, once each."""
     print(f"{'':60}{'published':>10}{'jaxgear':>10}")
+    said = set()
     for key, text, published, unit, why in LINES:
         if key not in found:
             continue
@@ -171,7 +173,8 @@ def show(found) -> None:
             f"{found[key] - published:+8.1f} points" if unit == "%" else f"{100 * (found[key] / published - 1):+8.1f} %"
         )
         print((f"{text} [{unit}]" if unit else text).ljust(60) + f"{published:10.4g}{found[key]:10.4g}{difference}")
-        if why:
+        if why and why not in said:
+            said.add(why)
             print(textwrap.fill(why, 100, initial_indent="    ", subsequent_indent="    "))
 
 
