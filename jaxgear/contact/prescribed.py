@@ -10,7 +10,7 @@ from ..numerics import Checked, ContactProblem, check, program, real, result, so
 from .mesh import Mesh
 from .operation import operation_of
 from .slide import RemovedMaterial
-from .solve import check_mesh, outermost, removed_material
+from .solve import check_mesh, flanks_of, loaded_material, outermost, unlabelled
 
 Scalar = Float[Array, ""]
 Curve = Float[Array, " positions"]
@@ -78,8 +78,14 @@ def solve_at(
         )
     check("solve_at", "transmission_error", error, "um")
     torque = operation_of("solve_at", torque, mesh.slice_width.dtype).torque
-    removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-    return _solve_at(mesh, jnp.broadcast_to(error.astype(removed.amount.dtype), (positions,)), removed)
+    flanks, prepared = flanks_of("solve_at", mesh, pinion, wheel), unlabelled(mesh)
+    error = jnp.broadcast_to(error.astype(torque.dtype), (positions,))
+
+    def first_contact(removed):
+        contact = _solve_at(prepared, error, removed)
+        return contact.line_load, contact.residual
+
+    return _solve_at(prepared, error, loaded_material(mesh, torque, *flanks, first_contact))
 
 
 @program
