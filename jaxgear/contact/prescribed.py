@@ -7,10 +7,11 @@ from jaxtyping import Array, Bool, Float
 
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, ContactProblem, check, program, real, result, solve_contact, tangent_stiffness
+from .loaded_width import loaded_material, unlabelled
 from .mesh import Mesh
 from .operation import operation_of
 from .slide import RemovedMaterial
-from .solve import check_mesh, flanks_of, loaded_material, outermost, unlabelled
+from .solve import check_mesh, flanks_of, outermost
 
 Scalar = Float[Array, ""]
 Curve = Float[Array, " positions"]
@@ -25,7 +26,8 @@ class PrescribedContact(Checked):
         force: total force on the line of action [N], shape (positions,).
         pair_force: what every pair contributes [N], shape (pairs, positions).
         line_load: [N/mm], shape (pairs, slices, positions); exactly zero where nothing touches, as are the forces.
-        tangent_stiffness: d force / d transmission error [N/um]; it counts only where there is contact.
+        tangent_stiffness: d force / d transmission error [N/um] on the material that is met; it counts only where there
+            is contact.
         residual: largest relative violation of the contact conditions, shape (positions,).
         converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
             touch, and the gears can run, shape (positions,).
@@ -59,7 +61,8 @@ def solve_at(
         mesh: prepared mesh.
         transmission_error: without the wind-up of the bodies [um], scalar or shape (positions,).
         torque: on the pinion [N m], at which the width of the contact is taken over which modifications are averaged:
-            that of the mean load.
+            that of the mean load. With a compliance that averages over the loaded width it is that of a first solution,
+            and the loads which that finds at the prescribed error make the widths of the second one.
         pinion: modification of the pinion flank; None for the nominal involute.
         wheel: modification of the wheel flank; None for the nominal involute.
 

@@ -125,4 +125,3 @@ def verify(optimum: Optimum, *, cache: str | Path | bool | None = True) -> Verif
 
 def _ppte(cycle: MeshCycle) -> float:
     return float(np.ptp(np.asarray(cycle.transmission_error))) if solved(cycle) else float("inf")
-
