@@ -1,4 +1,4 @@
-"""Modifications averaged over the width that the load of every contact makes it, as the finite-element structure asks."""
+"""Modifications averaged over the width that every contact gets from its own load, with finite-element structure."""
 
 import jax
 import jax.numpy as jnp
@@ -60,7 +60,7 @@ def test_contacts_are_as_wide_as_their_loads(mesh, cycle):
     assert alone.any() and open_.any() and between.any()
     np.testing.assert_allclose(found[alone], wide[alone], rtol=1e-7, atol=1e-9)
     np.testing.assert_allclose(found[open_], narrow[open_], rtol=1e-9, atol=1e-12)
-    assert np.abs(found - wide)[between].max() > 0.05
+    assert np.abs(found - wide)[between].max() > 0.02
 
 
 def test_other_models_take_one_solution_over_the_width_of_the_full_load(mesh):
@@ -135,7 +135,7 @@ def test_every_slice_has_its_own_width(mesh):
     assert bool(crowned.converged.all()) and not np.any(crowned.line_load[:, 0]) and np.any(crowned.line_load[:, 1])
     found, narrow = (removed_material(sliced, torque, **flanks).amount for torque in (TORQUE, 0.0))
     np.testing.assert_allclose(found[:, 0], narrow[:, 0], rtol=1e-9, atol=1e-12)
-    assert np.abs(found[:, 1] - narrow[:, 1]).max() > 0.05
+    assert np.abs(found[:, 1] - narrow[:, 1]).max() > 0.02
 
 
 def test_a_prescribed_error_makes_its_own_widths(mesh, cycle):
