@@ -1,8 +1,8 @@
 """Over which width modifications are averaged: of one pair that carries all, or of the load of every contact.
 
 Finite elements have no width of their own: what their contacts meet of a relief follows from the load that each of them
-carries. Where the structure is as accurate as that, it shows: on steep reliefs the wider mean makes PPTE
-up to 9 % too small, and the loaded width leaves 2.5 % at worst.
+carries. Where the structure is as accurate as that, it shows: on steep reliefs the wider mean makes PPTE up
+to 9 % too small, and the loaded width leaves 2.5 % at worst.
 """
 
 from collections.abc import Callable
