@@ -3,8 +3,8 @@
 The study gives dynamic factor K_v and rms of the relative displacement q over mesh frequencies up to 5 kHz, rising and
 falling, at 100, 200 and 400 N m, of the unmodified gears and of two reliefs that level the transmission error. It
 prints neither its gears nor inertias nor damping. Here they are the test pair of 50 teeth and module 3 with 0.135 mm
-of backlash on the line of action, solid discs, and the damping ratio at which the largest K_v at 200 N m is the study's.
-Run it: `python examples/reproduce_50_50_dynamics.py`.
+of backlash on the line of action, solid discs, and the damping ratio at which the largest K_v at 200 N m is that of the
+study. Run it: `python examples/reproduce_50_50_dynamics.py`.
 """
 
 import jax
