@@ -67,7 +67,7 @@ class ForceMap(AbstractMeshForce):
             return ((1 - share) * table[:, lower] + share * table[:, upper]).reshape(-1)
 
         apart = distances(self.reach, self.node_force.shape[-1])
-        return Rows(mixed(self.start), mixed(self.node_force), mixed(self.node_stiffness * apart))
+        return Rows(mixed(self.start), mixed(self.node_force), mixed(self.node_stiffness * apart[None, None]))
 
     def force(self, place: Rows, approach: Scalar) -> Scalar:
         levels = len(place.force) // 2
@@ -144,5 +144,5 @@ def tabulate(flanks: Flanks, unloaded, compliance: Scalar, reach: Scalar, levels
     step = jnp.diff(force, axis=1)
     least = jnp.minimum(jnp.concatenate([step[:, :1], step], axis=1), jnp.concatenate([step, step[:, -1:]], axis=1))
     # the last slope is the one beyond the table as well
-    slope = jnp.clip(slope, 0.0, _STEEPEST * least / apart)
+    slope = jnp.clip(slope, 0.0, _STEEPEST * least / apart[None])
     return force[flanks.order], slope[flanks.order], jnp.all(found.converged)

@@ -59,7 +59,8 @@ def mesh_force(
             to the contact analysis (half a percent needs 512). An integrator whose steps meet these positions alone
             needs no more than it has steps.
         levels: number of approaches of the map on either side of the clearance, closer together where it ends.
-        reach: largest deflection of the map, relative to the largest static one; the map is linear beyond.
+        reach: largest deflection of the map, relative to the largest static one of the drive flanks; the map is
+            linear beyond.
         compliance: of shafts, bearings and bodies in series with the mesh [um/N].
         deviation: material that manufacturing deviations remove besides from the drive flanks [um], shape (pairs,
             slices, positions) of the mesh; linear between its positions. None for perfect gears.
@@ -157,7 +158,7 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
     if model == "loaded error":
         mean = jnp.mean(deflection, axis=1)
         return LoadedError(first, start + deflection - mean[:, None], force / mean, converged)
-    farthest = jax.lax.stop_gradient(reach * jnp.max(deflection))
+    farthest = jax.lax.stop_gradient(reach * jnp.max(deflection[0]))
     tables = [
         tabulate(side, _in_own_order(side, each), compliance, farthest, levels) for side, each in zip(sides, found)
     ]
