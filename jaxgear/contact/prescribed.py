@@ -15,8 +15,7 @@ from .slide import RemovedMaterial
 from .solve import check_mesh, flanks_of, outermost
 
 # Newton steps of a mesh of several slices from the approach of all springs in series to that of the teeth: the force of
-# contacts that stiffen bends one way, so that the steps come from one side and double their digits; measured, four
-# leave 1e-9 of the force.
+# contacts that stiffen bends one way, so that the steps come from one side and double their digits.
 _SERIES_STEPS = 4
 # what may be missed of the approach [um, and relative to it] before the last correction, which is of second order
 _MET = 1e-3
