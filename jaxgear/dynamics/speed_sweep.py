@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 from ..numerics import check, concrete, kernel, real, whole
 from .integrate import cycle_of
 from .oscillator import Oscillator, State
-from .response import Numbers, SpeedResponse, no_sums, numbers_of, with_step
+from .response import Numbers, SpeedResponse, no_sums, numbers_of, with_cycle, with_step
 from .settling import Speed, settled
 from .static import Rest, at_rest, natural_frequencies
 
@@ -283,9 +283,12 @@ def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, rest: R
 
         def more(carry, step):
             y, sums = carry
-            return with_step(sums, oscillator, y, step, frequency, orders=orders, cycle=cycle, origin=origin)
+            return with_step(sums, oscillator, y, step, frequency, orders=orders, origin=origin)
 
-        y, sums = speed.over_cycle(more, (y, sums))
+        nothing = no_sums(orders)
+        begin = sums._replace(force=nothing.force, approach=nothing.approach)
+        y, of_cycle = speed.over_cycle(more, (y, begin))
+        sums = with_cycle(sums, of_cycle, cycle, orders)
         return cycle + 1, y, sums, approaches, velocities
 
     nothing = jnp.zeros(sizes.points, frequency.dtype)
