@@ -99,7 +99,6 @@ def with_step(
     mesh_frequency: Scalar,
     *,
     orders: Float[Array, " orders"],
-    cycle: Int[Array, ""],
     origin: Scalar,
 ) -> tuple[State, Sums]:
     """The state after one more step, and the sums with it.
@@ -111,7 +110,6 @@ def with_step(
         step: one.
         mesh_frequency: [Hz].
         orders: multiples of the mesh frequency.
-        cycle: how many came before.
         origin: approach from which mean and square are taken [um].
     """
     end = one_step(oscillator, y, step, mesh_frequency)
@@ -119,7 +117,8 @@ def with_step(
     of = history(oscillator, begin, end, jax.tree.map(lambda part: part[None], step), mesh_frequency)
     off = of.approach - origin
     places = jnp.asarray(_PLACES, of.phase.dtype)[:, None]
-    phase = of.phase[None] + places * of.length[None] + cycle.astype(of.phase.dtype)
+    # of the cycle alone: the same for all oscillators that advance side by side
+    phase = of.phase[None] + places * of.length[None]
     turn = 2 * jnp.pi * orders[:, None, None] * phase[None]
     waves = jnp.cos(turn), -jnp.sin(turn)
 
@@ -140,6 +139,21 @@ def with_step(
         sums.force + spectrum(of.force),
         sums.approach + spectrum(of.approach),
     )
+
+
+def with_cycle(before: Sums, of_cycle: Sums, cycle: Int[Array, ""], orders: Float[Array, " orders"]) -> Sums:
+    """The sums with one more cycle, the spectra turned by the cycles that came before.
+
+    Args:
+        before: of all cycles before.
+        of_cycle: of the cycle with the sums before, but for the spectra, which are of the cycle alone.
+        cycle: how many came before.
+        orders: multiples of the mesh frequency.
+    """
+    angle = 2 * jnp.pi * orders * cycle.astype(orders.dtype)
+    turn = jax.lax.complex(jnp.cos(angle), -jnp.sin(angle))
+    force, approach = before.force + turn * of_cycle.force, before.approach + turn * of_cycle.approach
+    return of_cycle._replace(force=force, approach=approach)
 
 
 class Numbers(NamedTuple):
@@ -172,7 +186,7 @@ def numbers_of(
         mesh_frequency: [Hz].
         cycles: their number.
         orders: multiples of the mesh frequency.
-        origin: as in `with_cycle` [um].
+        origin: as in `with_step` [um].
         static_force: [N].
     """
     mean = sums.mean / cycles

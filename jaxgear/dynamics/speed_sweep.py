@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,9 +10,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ..numerics import check, concrete, kernel, real, whole
-from .integrate import Cycle, cycle_of, one_step, step_of
+from .integrate import cycle_of
 from .oscillator import Oscillator, State
-from .response import Numbers, SpeedResponse, no_sums, numbers_of, with_step
+from .response import Numbers, SpeedResponse, no_sums, numbers_of, with_cycle, with_step
+from .settling import Speed, settled
 from .static import Rest, at_rest, natural_frequencies
 
 Scalar = Float[Array, ""]
@@ -22,9 +23,7 @@ ORDERS = tuple(half / 2 for half in range(1, 13))
 
 # Steps over a period of the approach's natural frequency and of the highest one, which no more than has to be stable,
 # and over a cycle: results are then within 0.1 % of those of twice as many.
-_STEPS_PER_PERIOD, _STEPS_PER_HIGHEST_PERIOD, _FEWEST_STEPS = 64, 8, 128
-# An orbit of several cycles counts as one only if its cycles differ by so many tolerances.
-_APART = 30.0
+_STEPS_PER_PERIOD, _STEPS_PER_HIGHEST_PERIOD, _FEWEST_STEPS = 40, 8, 64
 
 
 class _Sizes(NamedTuple):
@@ -222,7 +221,7 @@ def swept(
     def at_speed(y, speed):
         frequency, steps = speed
         begin = first if sizes.fresh else y
-        found = _steady(oscillator, begin, _Speed(frequency, cycle, steps, sizes.most_steps), limits, sizes, rest)
+        found = _steady(oscillator, begin, Speed(frequency, cycle, steps, sizes.most_steps), limits, sizes, rest)
         return found.state, found
 
     def turned(parts):
@@ -263,25 +262,10 @@ class _Found(NamedTuple):
     state: State
 
 
-class _Speed(NamedTuple):
-    """A mesh frequency [Hz], and the steps of its cycles."""
-
-    frequency: Scalar
-    cycle: Cycle
-    steps: Int[Array, ""]
-    most_steps: int
-
-    def over_cycle(self, function, carry):
-        """Folds function(carry, step) over the steps of a cycle."""
-        # a position lies in the middle of the shortest step
-        stride = 2 * (self.most_steps // self.steps)
-        return jax.lax.fori_loop(0, self.steps, lambda i, carry: function(carry, step_of(self.cycle, i, stride)), carry)
-
-
-def _steady(oscillator, y, speed: _Speed, limits: _Limits, sizes: _Sizes, rest: Rest) -> _Found:
+def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, rest: Rest) -> _Found:
     """Steady state at one speed, and its record."""
     frequency = speed.frequency
-    y, period = _settled(oscillator, y, speed, limits, sizes.most_periods)
+    y, period = settled(oscillator, y, speed, limits.tolerance, limits.most_cycles, sizes.most_periods)
     orders = jnp.asarray(sizes.orders, frequency.dtype)
     zero = jnp.zeros((), frequency.dtype)
     origin = oscillator.approach(zero, y[0])
@@ -299,9 +283,12 @@ def _steady(oscillator, y, speed: _Speed, limits: _Limits, sizes: _Sizes, rest: 
 
         def more(carry, step):
             y, sums = carry
-            return with_step(sums, oscillator, y, step, frequency, orders=orders, cycle=cycle, origin=origin)
+            return with_step(sums, oscillator, y, step, frequency, orders=orders, origin=origin)
 
-        y, sums = speed.over_cycle(more, (y, sums))
+        nothing = no_sums(orders)
+        begin = sums._replace(force=nothing.force, approach=nothing.approach)
+        y, of_cycle = speed.over_cycle(more, (y, begin))
+        sums = with_cycle(sums, of_cycle, cycle, orders)
         return cycle + 1, y, sums, approaches, velocities
 
     nothing = jnp.zeros(sizes.points, frequency.dtype)
@@ -310,47 +297,3 @@ def _steady(oscillator, y, speed: _Speed, limits: _Limits, sizes: _Sizes, rest: 
     count = cycles.astype(frequency.dtype)
     numbers = numbers_of(sums, frequency, cycles=count, orders=orders, origin=origin, static_force=rest.force)
     return _Found(numbers, period, approaches, velocities, y)
-
-
-def _settled(oscillator, y, speed: _Speed, limits: _Limits, most_periods: int):
-    """State after as many cycles as it takes, and the cycles of its orbit, 0 where none was found."""
-    frequency = speed.frequency
-    zero = jnp.zeros((), frequency.dtype)
-
-    def watched(y: State) -> Array:
-        """What repeats, all in um: of coordinates that nothing holds only the approach does."""
-        q, v = oscillator.approach(zero, y[0]), oscillator.approach_rate(zero, y[1], frequency)
-        turn = 1 / (2 * jnp.pi * frequency)
-        if oscillator.stiffness is None:
-            return jnp.stack([q, turn * v])
-        return jnp.concatenate([jnp.stack([q, turn * v]), y[0], turn * y[1]])
-
-    def on(carry):
-        cycle, period, *_ = carry
-        return (period == 0) & (cycle < limits.most_cycles)
-
-    def cycled(carry):
-        cycle, _, y, before = carry
-        y = speed.over_cycle(lambda y, step: one_step(oscillator, y, step, frequency), y)
-        now = watched(y)
-        size = jnp.maximum(jnp.max(jnp.abs(now)), jnp.nanmax(jnp.abs(before)))
-        away = jnp.max(jnp.abs(before - now[None]), axis=1) / size
-        return cycle + 1, _period(away, limits.tolerance), y, jnp.concatenate([now[None], before[:-1]])
-
-    first = watched(y)
-    before = jnp.full((most_periods, len(first)), jnp.nan, frequency.dtype).at[0].set(first)
-    begin: Any = jnp.zeros_like(limits.most_cycles), jnp.zeros_like(limits.most_cycles), y, before
-    _, period, y, _ = jax.lax.while_loop(on, cycled, begin)
-    return y, period
-
-
-def _period(away: Float[Array, " periods"], tolerance: Scalar) -> Int[Array, ""]:
-    """The fewest cycles after which the state repeats, 0 for none.
-
-    Fewer cycles must be clearly apart: an orbit that is still being approached along a spiral is met from afar now and
-    then.
-    """
-    closest: Bool[Array, " periods"] = away < tolerance
-    nearer = jnp.concatenate([jnp.full((1,), jnp.inf, away.dtype), jax.lax.cummin(away)[:-1]])
-    fits = closest & (nearer > _APART * tolerance)
-    return jnp.where(jnp.any(fits), jnp.argmax(fits) + 1, 0)
