@@ -246,3 +246,17 @@ def test_wrong_input_is_named(mesh, given, message):
 def test_coast_flanks_are_a_pair_of_modifications(mesh):
     with pytest.raises(TypeError, match=r"coast is TipRelief\(.*must be a tuple \(pinion, wheel\)"):
         mesh_force(mesh, torque=TORQUE, coast=jg.TipRelief(1.0, 2.0))
+
+
+def test_thinner_teeth_leave_their_arc_on_the_line_of_action_as_backlash():
+    """The 50/50 pair with teeth of 4.64 mm: 2 x 72.4 um x cos(20 deg)."""
+    pair = gear_pair((50, 50), bores=(None, None), tooth_thickness_allowance=-72.4)
+    assert float(pair.backlash) == pytest.approx(136.07, abs=0.005)
+    assert float(gear_pair((50, 50), bores=(None, None), tooth_thickness_allowance=0.0).backlash) == pytest.approx(
+        float(gear_pair((50, 50), bores=(None, None)).backlash), abs=0.0
+    )
+
+
+def test_thicker_teeth_are_refused():
+    with pytest.raises(ValueError, match="Gear: tooth_thickness_allowance = 1 um must be at most 0 um"):
+        gear_pair(tooth_thickness_allowance=1.0)

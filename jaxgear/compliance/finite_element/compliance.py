@@ -124,7 +124,8 @@ def finite_element_compliance(
     """Teeth and gear bodies by finite elements: two-dimensional, whole ring, bore held rigidly, once per gear.
 
     Takes one to three seconds per gear and plane, then comes from the disk. A table holds for every module, modulus,
-    face width, centre distance, torque and modification of the gear.
+    face width, centre distance, torque and modification of the gear. The meshed tooth is without its tooth thickness
+    allowance, which therefore does not soften it here as it does in the other compliances.
 
     Args:
         pair: gear pair of concrete numbers.
