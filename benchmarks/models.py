@@ -107,9 +107,11 @@ def _mesh(model: Model, pair: str, plane: str) -> jg.Mesh:
 
 
 def _solved(mesh: jg.Mesh, case: Case) -> jg.MeshCycle:
-    """`solve` reads the prepared compliance only, so one label for all models leaves one compilation per
-    contact law.
+    """`solve` reads the prepared arrays, and of the compliance how wide it takes the contacts to be: one label for all
+    models that agree in this leaves one compilation per contact law.
     """
-    labelled = eqx.tree_at(lambda m: m.compliance, mesh, strong(jg.default_compliance()))
+    labelled = mesh
+    if not mesh.compliance.averages_over_loaded_width:
+        labelled = eqx.tree_at(lambda m: m.compliance, mesh, strong(jg.default_compliance()))
     pinion, wheel = modifications(case)
     return _solve(labelled, jnp.asarray(np.float64(case.torque)), pinion=pinion, wheel=wheel)

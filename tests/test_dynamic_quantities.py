@@ -22,8 +22,10 @@ SETTINGS = Dynamics(
     wheel_inertia=7.8e-3,
     model="varying stiffness",
     positions=32,
+    kick=1.0,
     steps=64,
 )
+HEIGHT = 2.4  # um
 
 
 @pytest.fixture(scope="module")
@@ -39,40 +41,61 @@ def design(parameters):
     return relief, relief
 
 
-@pytest.fixture(scope="module")
-def problem(mesh):
-    """Both quantities that have derivatives, of a relief of free height."""
-    objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_approach_rms")]
-    return make_problem(design, {"height": (0.0, 8.0)}, mesh=mesh, torque=TORQUE, objective=objectives)
+def numbers(mesh, height):
+    """Dynamic factor and rms of all runs and speeds."""
+    relief = jg.TipRelief(height, 3.2)
+    found = SETTINGS.numbers(SETTINGS.oscillator(mesh, TORQUE, pinion=relief, wheel=relief))
+    return jnp.stack([found.dynamic_factor, found.approach_rms]), found.exact
 
 
 @pytest.fixture(scope="module")
-def linearization(problem):
-    return eqx.filter_jit(lambda problem, x: problem.linearize(x))(problem, jnp.asarray([0.3]))
+def sloped(mesh):
+    """Numbers, their derivatives by the height of the relief, and which are those of an orbit."""
+
+    @eqx.filter_jit
+    def of(mesh, height):
+        one = jnp.ones_like(height)
+        return jax.jvp(lambda height: numbers(mesh, height), (height,), (one,))
+
+    def plain(height):
+        (values, exact), (slopes, _) = of(mesh, jnp.asarray(height))
+        return np.asarray(values), np.asarray(slopes), np.asarray(exact)
+
+    return plain
 
 
-def test_an_objective_is_the_number_of_the_sweep(problem, mesh, linearization):
-    """The whole chain, cycle, mesh, force and oscillator, against the steps done by hand."""
-    relief = jg.TipRelief(2.4, 3.2)
-    oscillator = SETTINGS.oscillator(mesh, TORQUE, pinion=relief, wheel=relief)
-    runs = SETTINGS.runs(oscillator)
-    assert list(runs) == ["up", "down", "down, kicked"]
-    for pieces, field in zip(linearization.objectives, ("dynamic_factor", "approach_rms")):
-        swept = np.concatenate([np.asarray(getattr(run, field)) for run in runs.values()])
-        assert np.asarray(pieces.upper[0]) == pytest.approx(swept, rel=2e-3)
-    assert bool(linearization.fine)
-    assert float(linearization.objectives[0].value[0]) > 1.1
-
-
-def test_slopes_are_those_of_central_differences(problem, linearization):
+def test_slopes_are_those_of_central_differences(sloped):
     step = 1e-3
-    score = eqx.filter_jit(lambda problem, x: problem.score(x).value)
-    above, below = (score(problem, jnp.asarray([0.3 + side])) for side in (step, -step))
-    slopes = np.asarray(above - below) / (2 * step)
-    for pieces, slope in zip(linearization.objectives, slopes):
-        worst = int(np.argmax(pieces.upper[0]))
-        assert float(pieces.slope[0, worst, 0]) == pytest.approx(slope, rel=1e-4)
-        assert abs(slope) > 1e-2
+    (_, slopes, exact), (above, *_), (below, *_) = (sloped(HEIGHT + side) for side in (0.0, step, -step))
+    assert exact.all()
+    assert slopes == pytest.approx((above - below) / (2 * step), rel=1e-4, abs=1e-6)
+    assert np.abs(slopes).max() > 1e-2
+
+
+def test_an_objective_is_the_number_of_the_sweep(mesh, sloped):
+    """The whole chain, cycle, mesh, force and oscillator, against the steps done by hand."""
+    objective = SETTINGS.quantity("worst_dynamic_factor")
+    problem = make_problem(design, {"height": (0.0, 8.0)}, mesh=mesh, torque=TORQUE, objective=objective)
+    (value,) = eqx.filter_jit(lambda problem, x: problem.score(x).value)(problem, jnp.asarray([HEIGHT / 8]))
+    relief = jg.TipRelief(HEIGHT, 3.2)
+    runs = SETTINGS.runs(SETTINGS.oscillator(mesh, TORQUE, pinion=relief, wheel=relief))
+    assert list(runs) == ["up", "down"]
+    swept = np.stack([np.asarray(run.dynamic_factor) for run in runs.values()])
+    assert float(value) == pytest.approx(sloped(HEIGHT)[0][0].max(), rel=1e-9)
+    assert sloped(HEIGHT)[0][0] == pytest.approx(swept, rel=2e-3)
+    assert float(value) > 1.1
+
+
+@pytest.mark.slow
+def test_a_linearization_has_the_slopes_of_every_speed(mesh, sloped):
+    objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_approach_rms")]
+    problem = make_problem(design, {"height": (0.0, 8.0)}, mesh=mesh, torque=TORQUE, objective=objectives)
+    found = eqx.filter_jit(lambda problem, x: problem.linearize(x))(problem, jnp.asarray([HEIGHT / 8]))
+    assert bool(found.fine)
+    values, slopes, _ = sloped(HEIGHT)
+    for pieces, value, slope in zip(found.objectives, values, slopes):
+        assert np.asarray(pieces.upper[0]) == pytest.approx(value.ravel(), rel=1e-8)
+        assert np.asarray(pieces.slope[0, :, 0]) == pytest.approx(8 * slope.ravel(), rel=1e-6, abs=1e-8)
 
 
 def test_equal_settings_make_equal_quantities():
@@ -123,4 +146,5 @@ def test_bad_settings_are_one_line(given, message):
 
 
 def test_no_kick_saves_a_run():
-    assert dataclasses.replace(SETTINGS, kick=1.0).run_names == ("up", "down")
+    assert SETTINGS.run_names == ("up", "down")
+    assert dataclasses.replace(SETTINGS, kick=3.0).run_names == ("up", "down", "down, kicked")

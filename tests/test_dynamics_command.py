@@ -61,7 +61,8 @@ def file(tmp_path):
 
 def test_the_command_writes_what_it_says(file, tmp_path):
     path, folder = file(PAIR + TABLE), tmp_path / "out"
-    code, out, err = call("dynamics", str(path), "--output", str(folder))
+    done = call("dynamics", str(path), "--output", str(folder))
+    code, out, err = done.code, done.out, done.err
     assert code == 0, err
     assert {entry.name for entry in folder.iterdir()} == {
         "summary.json",
@@ -103,7 +104,8 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     ],
 )
 def test_what_is_wrong_with_the_table_is_one_line(file, tmp_path, text, message):
-    code, out, err = call("dynamics", str(file(PAIR + text)), "--output", str(tmp_path / "out"))
+    done = call("dynamics", str(file(PAIR + text)), "--output", str(tmp_path / "out"))
+    code, out, err = done.code, done.out, done.err
     lines = err.strip().splitlines()
     assert code == 2 and out == ""
     assert message in lines[-1] and lines[-1].startswith("jaxgear: error: ")

@@ -68,7 +68,7 @@ def test_a_load_has_the_transmission_error_of_the_contact_analysis(case, mesh, s
     for share in (0.2, 1.0, 3.0):
         cycle = solve_removed(mesh, share * TORQUE, removed)
         found = approaches(force, mesh.phase, share * static_force)
-        np.testing.assert_allclose(found, cycle.transmission_error, rtol=1e-3, atol=6e-3)
+        np.testing.assert_allclose(found, cycle.transmission_error, rtol=1e-3, atol=1e-3)
 
 
 def test_between_its_grid_the_map_is_within_half_a_percent_of_the_contact_analysis(case, mesh, static_force):
@@ -137,6 +137,21 @@ def test_equal_gears_are_their_own_mirror_image_half_a_pitch_on():
     first, shift, play = _coast_phase(jg.prepare(pair, resolution=SIZES))
     assert float(first + shift / 16) == pytest.approx(0.5, abs=1e-12)
     assert float(play) == pytest.approx(float(pair.backlash))
+    made = mesh_force(jg.prepare(pair, resolution=SIZES), torque=TORQUE, **RELIEFS, positions=16, levels=16)
+    other = mesh_force(
+        jg.prepare(pair, resolution=SIZES),
+        torque=TORQUE,
+        pinion=RELIEFS["wheel"],
+        wheel=RELIEFS["pinion"],
+        positions=16,
+        levels=16,
+    )
+    # half a pitch is half of the grid: both sides are solved at the same places
+    mirrored = (8 - np.arange(16)) % 16
+    np.testing.assert_allclose(made.start[1], made.start[0][mirrored] + play, atol=1e-9)
+    np.testing.assert_allclose(made.node_force[1], made.node_force[0][mirrored], rtol=1e-6, atol=1e-6)
+    # driven by the other gear the reliefs change places, and approach and recess with them
+    np.testing.assert_allclose(other.node_force[0], made.node_force[0][-np.arange(16)], rtol=1e-6, atol=1e-6)
 
 
 def test_other_coast_flanks_change_nothing_on_the_drive_side(mesh):
@@ -150,7 +165,8 @@ def test_other_coast_flanks_change_nothing_on_the_drive_side(mesh):
     )
 
 
-@pytest.mark.parametrize("approach", [8.0, -50.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("approach", [8.0, -84.0])  # on the drive flanks and, 75 um of backlash behind, the coast ones
 def test_gradients_equal_central_differences(mesh, approach):
     def at(amount):
         made = mesh_force(
@@ -175,6 +191,7 @@ def test_what_is_in_series_adds_its_deflection(mesh):
         np.testing.assert_allclose(found.force, row, rtol=1e-8, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_slices_share_what_is_in_series(mesh):
     """A load that is uniform over the face takes the force of one slice."""
     sliced = jg.prepare(mesh.pair, resolution=jg.Resolution(positions=16, pairs=3, slices=2))

@@ -104,6 +104,19 @@ def test_50_50_pressure_is_even_with_one_pair_in_contact():
     assert study["unmodified_single_pressure"] == pytest.approx(np.sqrt(141.9 * 103_500 / (np.pi * 12.83)), rel=0.01)
 
 
+def test_50_50_at_speed():
+    """The three peaks on the way down, the third of an orbit of two mesh cycles, and what the relief does to them."""
+    study = found("reproduce_50_50_dynamics")
+    for point, frequency in ((1, 1050.0), (2, 2200.0), (3, 4450.0)):
+        assert study[f"200 unmodified f{point}"] == pytest.approx(frequency, rel=0.1)
+    assert 4.0 < study["200 unmodified K_v"] < 4.7
+    assert 20.0 < study["200 unmodified q_rms"] < 27.0
+    assert study["200 unmodified down over up"] > 1.5
+    assert study["200 unmodified settled"] and study["200 type 1 settled"]
+    assert study["200 type 1 median K_v"] == pytest.approx(1.0, abs=0.1)
+    assert study["200 type 1 K_v"] < 0.5 * study["200 unmodified K_v"]
+
+
 def test_iso_table():
     rows = found("iso_6336_stiffness")
     module = importlib.import_module("examples.iso_6336_stiffness")  # after it has run: it would warn

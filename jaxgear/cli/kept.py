@@ -10,6 +10,7 @@ from typing import Any
 from zipfile import BadZipFile
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from ..dynamics import SpeedResponse
@@ -77,9 +78,11 @@ def _write(path: Path, response: SpeedResponse) -> None:
 def _read(path: Path) -> SpeedResponse | None:
     try:
         with np.load(path) as file:
-            data = dict(file)
-        data[_PAIR] = data.pop("displacement"), data.pop("velocity")
-        data["orders"], data["direction"] = tuple(data["orders"].tolist()), str(data["direction"])
-        return SpeedResponse(**data)
+            data: dict[str, Any] = dict(file)
+        orders = tuple(data.pop("orders").tolist())
+        direction: Any = str(data.pop("direction"))
+        arrays: dict[str, Any] = {name: jnp.asarray(value) for name, value in data.items()}
+        arrays[_PAIR] = arrays.pop("displacement"), arrays.pop("velocity")
+        return SpeedResponse(**arrays, orders=orders, direction=direction)
     except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):  # not there, or torn
         return None

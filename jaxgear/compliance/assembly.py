@@ -1,6 +1,7 @@
 """Composition of tooth, body and contact models into the compliance of a mesh."""
 
 from abc import abstractmethod
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -23,9 +24,13 @@ class AbstractCompliance(eqx.Module):
     Attributes:
         plane: "auto", "stress" or "strain". The contact and its pressure are in plane stress for "stress" only; what
             the structure makes of it is its own affair (`plane_stress_share` tells where a gear lies between both).
+        averages_over_loaded_width: whether it is accurate enough for modifications to be averaged over the width that
+            every contact's own load makes it, which takes a second contact solution; else over that of one pair that
+            carries the full load.
     """
 
     plane: eqx.AbstractVar[PlaneState]
+    averages_over_loaded_width: ClassVar[bool] = False
 
     @abstractmethod
     def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "pairs pairs positions"]:

@@ -43,6 +43,8 @@ class PlaceSide(NamedTuple):
 class Place(NamedTuple):
     """Where the contacts are and how far they may slide [mm], positive towards the pinion tip; (pairs, 1, positions).
 
+    The half width may differ from slice to slice.
+
     Attributes:
         radius: relative radius of curvature.
         half_width: of the contact.
@@ -58,7 +60,8 @@ class Place(NamedTuple):
     sides: tuple[PlaceSide, PlaceSide]
 
 
-def place_of(mesh: Mesh, torque: Scalar) -> Place:
+def place_of(mesh: Mesh, torque: Scalar, line_load: Real | None = None) -> Place:
+    """Where the contacts of a mesh are; as wide as their line loads make them [N/mm], where these are given."""
     first, second = mesh.sides
     radius = reduced_radius(first.contact_roll_length, second.contact_roll_length)[:, None]
     outside, path, contact = mesh.outside, mesh.path, mesh.path_of_contact
@@ -74,7 +77,7 @@ def place_of(mesh: Mesh, torque: Scalar) -> Place:
     ]
     sides = _side(mesh, first, 1.0), _side(mesh, second, -1.0)
     narrowest = _NARROWEST * radius
-    half_width = jnp.maximum(_half_width(mesh, torque), narrowest)
+    half_width = jnp.maximum(_half_width(mesh, torque, line_load), narrowest)
     return Place(radius, half_width, beyond[:, None], -inside[1][:, None], inside[0][:, None], sides)
 
 
@@ -190,7 +193,9 @@ def secant_slope(sided_terms, place: Place, moved: Real) -> Real:
     return reduce(add, each) / place.half_width
 
 
-def _half_width(mesh: Mesh, torque: Scalar) -> Float[Array, "pairs 1 positions"]:
-    """Half width of the contact over which modifications are averaged [mm]: that of one pair under the full load."""
+def _half_width(mesh: Mesh, torque: Scalar, line_load: Real | None) -> Float[Array, "pairs #slices positions"]:
+    """Half width of the contact over which modifications are averaged [mm]: by default of one pair that carries all."""
+    if line_load is not None:
+        return safe_sqrt(mesh.width_factor[:, None] * line_load)
     force = 1e3 * torque / mesh.pair.pinion.base_radius
     return safe_sqrt(mesh.width_factor * force / mesh.pair.face_width)[:, None]

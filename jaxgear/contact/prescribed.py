@@ -8,14 +8,14 @@ from jaxtyping import Array, Bool, Float
 
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, ContactProblem, check, program, real, result, solve_contact, tangent_stiffness
+from .loaded_width import loaded_material, unlabelled
 from .mesh import Mesh
 from .operation import operation_of
 from .slide import RemovedMaterial
-from .solve import check_mesh, outermost, removed_material
+from .solve import check_mesh, flanks_of, outermost
 
 # Newton steps of a mesh of several slices from the approach of all springs in series to that of the teeth: the force of
-# contacts that stiffen bends one way, so that the steps come from one side and double their digits; measured, four
-# leave 1e-9 of the force.
+# contacts that stiffen bends one way, so that the steps come from one side and double their digits.
 _SERIES_STEPS = 4
 # what may be missed of the approach [um, and relative to it] before the last correction, which is of second order
 _MET = 1e-3
@@ -33,7 +33,8 @@ class PrescribedContact(Checked):
         force: total force on the line of action [N], shape (positions,).
         pair_force: what every pair contributes [N], shape (pairs, positions).
         line_load: [N/mm], shape (pairs, slices, positions); exactly zero where nothing touches, as are the forces.
-        tangent_stiffness: d force / d transmission error [N/um]; it counts only where there is contact.
+        tangent_stiffness: d force / d transmission error [N/um] on the material that is met; it counts only where there
+            is contact.
         residual: largest relative violation of the contact conditions, shape (positions,).
         converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
             touch, and the gears can run, shape (positions,).
@@ -67,7 +68,8 @@ def solve_at(
         mesh: prepared mesh.
         transmission_error: without the wind-up of the bodies [um], scalar or shape (positions,).
         torque: on the pinion [N m], at which the width of the contact is taken over which modifications are averaged:
-            that of the mean load.
+            that of the mean load. With a compliance that averages over the loaded width it is that of a first solution,
+            and the loads which that finds at the prescribed error make the widths of the second one.
         pinion: modification of the pinion flank; None for the nominal involute.
         wheel: modification of the wheel flank; None for the nominal involute.
 
@@ -86,8 +88,14 @@ def solve_at(
         )
     check("solve_at", "transmission_error", error, "um")
     torque = operation_of("solve_at", torque, mesh.slice_width.dtype).torque
-    removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-    return _solve_at(mesh, jnp.broadcast_to(error.astype(removed.amount.dtype), (positions,)), removed)
+    flanks, prepared = flanks_of("solve_at", mesh, pinion, wheel), unlabelled(mesh)
+    error = jnp.broadcast_to(error.astype(torque.dtype), (positions,))
+
+    def first_contact(removed):
+        contact = _solve_at(prepared, error, removed)
+        return contact.line_load, contact.residual
+
+    return _solve_at(prepared, error, loaded_material(mesh, torque, *flanks, first_contact))
 
 
 @program

@@ -84,10 +84,17 @@ def nominal_material(
 
 @program
 def slid_material(
-    mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: AbstractModification
+    mesh: Mesh,
+    torque: Scalar,
+    pinion: AbstractModification,
+    wheel: AbstractModification,
+    line_load: Load | None = None,
 ) -> RemovedMaterial:
-    """What the contacts meet of the modifications; its arguments in the precision of the mesh."""
-    place, sizes, dtype = place_of(mesh, torque), mesh.resolution, torque.dtype
+    """What the contacts meet of the modifications; its arguments in the precision of the mesh.
+
+    The contacts are as wide as their line loads make them [N/mm]; by default as one pair that carries the full load.
+    """
+    place, sizes, dtype = place_of(mesh, torque, line_load), mesh.resolution, torque.dtype
     given = [(sided, varies_along_profile(sided, place)) for sided in terms_of(mesh, dtype, pinion, wheel)]
     along = [sided for sided, slopes in given if slopes]  # what the contact slides down
     amount = jnp.zeros((sizes.chosen_pairs, sizes.slices, sizes.positions), dtype)

@@ -73,7 +73,7 @@ def coast_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
     where q = -j: they do so in the pitch point at phase p = s_1 + j / (2 cos(alpha_w)), modulo p, which is phase_c.
     The coast contact moves against the mirrored direction while the gears turn on, hence the sign of the phase; its
     approach is measured from q = -j, and half of it again moves either gear. (R. G. Parker and co-workers name the
-    phase between both sides: Y. Guo, R. G. Parker, Mech. Mach. Theory 78 (2014) 263-273.)
+    phase between both sides: Y. Guo, R. G. Parker, Mech. Mach. Theory 78, 2014.)
     """
     pair, sizes = mesh.pair, mesh.resolution
     first, shift, play = _coast_phase(mesh)

@@ -100,7 +100,7 @@ def _approach_at(mesh_force: AbstractMeshForce, place: Any, force: Scalar) -> Sc
 
 
 class DeadZone(AbstractMeshForce):
-    """Constant stiffness on either side of a clearance (Kahraman, Singh, J. Sound Vib. 142 (1990) 49-75).
+    """Constant stiffness on either side of a clearance (Kahraman, Singh, J. Sound Vib. 142, 1990).
 
     Attributes:
         stiffness_constant: [N/um].

@@ -15,9 +15,12 @@ Scalar = Float[Array, ""]
 Start = Float[Array, "sides"]
 Table = Float[Array, "sides positions levels"]
 
-# slopes at the ends of an interval up to which a cubic rises (F. N. Fritsch, R. E. Carlson, SIAM J. Numer. Anal. 17
-# (1980) 238-246), in mean slopes
+# slopes at the ends of an interval up to which a cubic rises (F. N. Fritsch, R. E. Carlson, SIAM J. Numer. Anal. 17,
+# 1980), in mean slopes
 _STEEPEST = 3.0
+# distance of the first two levels in that of evenly spaced ones: contacts are soft where they begin, and pairs come in
+# at small loads, where the force is compared with that of the whole load
+_FIRST_STEP = 0.3
 
 
 class Rows(NamedTuple):
@@ -26,7 +29,7 @@ class Rows(NamedTuple):
     Attributes:
         start: approach at which the drive flanks touch, and the negative of that at which the coast flanks do [um].
         force: at the levels of approach beyond `start` [N], shape (sides x levels,).
-        rise: its slope times the distance of two levels [N], same shape.
+        rise: its slope over the number of the level [N], same shape.
     """
 
     start: Start
@@ -44,7 +47,7 @@ class ForceMap(AbstractMeshForce):
         first_phase: mesh position with which the grid begins [base pitches].
         start: approach at which the drive flanks touch, and the negative of that at which the coast flanks do [um],
             shape (2, positions).
-        spacing: of the levels of approach [um].
+        reach: approach of the last level beyond `start` [um]; the levels lie closer where the flanks begin to touch.
         node_force: force of drive and coast flanks [N], shape (2, positions, levels), from `start` on.
         node_stiffness: its slope over the approach [N/um], same shape.
         converged: whether all contacts of the grid have been found.
@@ -52,7 +55,7 @@ class ForceMap(AbstractMeshForce):
 
     first_phase: Scalar = result("base pitches")
     start: Float[Array, "sides positions"] = result("um")
-    spacing: Scalar = result("um")
+    reach: Scalar = result("um")
     node_force: Table = result("N")
     node_stiffness: Table = result("N/um")
     converged: Bool[Array, ""] = result()
@@ -63,12 +66,13 @@ class ForceMap(AbstractMeshForce):
         def mixed(table):
             return ((1 - share) * table[:, lower] + share * table[:, upper]).reshape(-1)
 
-        return Rows(mixed(self.start), mixed(self.node_force), mixed(self.node_stiffness * self.spacing))
+        apart = distances(self.reach, self.node_force.shape[-1])
+        return Rows(mixed(self.start), mixed(self.node_force), mixed(self.node_stiffness * apart[None, None]))
 
     def force(self, place: Rows, approach: Scalar) -> Scalar:
         levels = len(place.force) // 2
         drive, closed = closing(place.start, approach)
-        level = closed / self.spacing
+        level = level_of(closed, self.reach, levels)
         below = jnp.floor(jnp.clip(level, 0.0, levels - 2.0))
         node = below.astype(jnp.int32) + jnp.where(drive, 0, levels).astype(jnp.int32)
         share = level - below
@@ -78,6 +82,26 @@ class ForceMap(AbstractMeshForce):
         cubic = rise + inside * (3 * jump - 2 * rise - end + inside * (rise + end - 2 * jump))
         found = low + inside * cubic + end * jnp.maximum(share - 1, 0.0)
         return jnp.where(drive, found, -found)
+
+
+def level_of(closed: Scalar, reach: Scalar, levels: int) -> Scalar:
+    """Number of the level at an approach beyond touching [um], a fraction between two: the inverse of `approaches`."""
+    share, bend = closed / reach, (1 - _FIRST_STEP) / _FIRST_STEP**2
+    inside = 2 * share / (_FIRST_STEP * (1 + jnp.sqrt(1 + 4 * bend * jnp.clip(share, 0.0, 1.0))))
+    beyond = (share - 1) / (2 - _FIRST_STEP)
+    return (levels - 1) * jnp.where(share < 1, inside, 1 + beyond)
+
+
+def approaches(reach: Scalar, levels: int) -> Float[Array, " levels"]:
+    """Approach of the levels beyond touching [um]: parabolic in their number, from 0 to the reach."""
+    share = jnp.linspace(0.0, 1.0, levels, dtype=reach.dtype)
+    return reach * share * (_FIRST_STEP + (1 - _FIRST_STEP) * share)
+
+
+def distances(reach: Scalar, levels: int) -> Float[Array, " levels"]:
+    """Slope of `approaches` over the number of the level [um]."""
+    share = jnp.linspace(0.0, 1.0, levels, dtype=reach.dtype)
+    return reach * (_FIRST_STEP + 2 * (1 - _FIRST_STEP) * share) / (levels - 1)
 
 
 def between(phase: Scalar, first: Scalar, count: int):
@@ -95,7 +119,7 @@ def closing(start: Start, approach: Scalar) -> tuple[Bool[Array, ""], Scalar]:
 
 
 @kernel
-def tabulate(flanks: Flanks, unloaded, compliance: Scalar, spacing: Scalar, levels: int):
+def tabulate(flanks: Flanks, unloaded, compliance: Scalar, reach: Scalar, levels: int):
     """Force [N] and slope [N/um] of one side at levels of the approach, shape (positions, levels) each, and whether
     all of it has converged.
 
@@ -103,10 +127,10 @@ def tabulate(flanks: Flanks, unloaded, compliance: Scalar, spacing: Scalar, leve
         flanks: of one side.
         unloaded: approach at which the flanks touch [um], in the order of the flanks' own mesh.
         compliance: in series [um/N].
-        spacing: of the levels [um].
+        reach: of the last level [um].
         levels: their number.
     """
-    above = spacing * jnp.arange(1, levels, dtype=spacing.dtype)
+    above, apart = approaches(reach, levels)[1:], distances(reach, levels)
 
     def at(level):
         return solve_series(flanks.mesh, unloaded + level, flanks.removed, compliance)
@@ -115,9 +139,10 @@ def tabulate(flanks: Flanks, unloaded, compliance: Scalar, spacing: Scalar, leve
     force, slope = found.force.T, found.stiffness.T
     force = jnp.concatenate([jnp.zeros_like(force[:, :1]), force], axis=1)
     # contacts are soft where they begin, within less than a level: the slope there is that of a parabola
-    first = 2 * force[:, 1:2] / spacing - slope[:, :1]
+    first = 2 * force[:, 1:2] / above[0] - slope[:, :1]
     slope = jnp.concatenate([first, slope], axis=1)
-    mean = jnp.diff(force, axis=1) / spacing
-    around = jnp.minimum(jnp.concatenate([mean[:, :1], mean], axis=1), jnp.concatenate([mean, slope[:, -1:]], axis=1))
-    slope = jnp.clip(slope, 0.0, _STEEPEST * around)
+    step = jnp.diff(force, axis=1)
+    least = jnp.minimum(jnp.concatenate([step[:, :1], step], axis=1), jnp.concatenate([step, step[:, -1:]], axis=1))
+    # the last slope is the one beyond the table as well
+    slope = jnp.clip(slope, 0.0, _STEEPEST * least / apart[None])
     return force[flanks.order], slope[flanks.order], jnp.all(found.converged)

@@ -59,7 +59,7 @@ class VaryingStiffness(AbstractMeshForce):
 
 class LoadedError(AbstractMeshForce):
     """Mean stiffness, excited by the loaded transmission error: k (q - q_0(phase) + F_0 / k), without parametric
-    excitation (A. Kahraman, R. Singh, J. Sound Vib. 146 (1991) 135-156).
+    excitation, as A. Kahraman and R. Singh have it.
 
     Attributes:
         first_phase: mesh position with which the curves begin [base pitches].

@@ -34,8 +34,8 @@ def mesh_force(
     wheel: AbstractModification | None = None,
     coast: Both | None = None,
     model: Model = "map",
-    positions: int = 320,
-    levels: int = 128,
+    positions: int = 640,
+    levels: int = 48,
     reach: Any = 5.0,
     compliance: Any = 0.0,
     deviation: Any = None,
@@ -55,10 +55,12 @@ def mesh_force(
         model: "map" for `ForceMap`, the contact at every approach; "varying stiffness" for `VaryingStiffness`, "loaded
             error" for `LoadedError`, "tangent" for `Tangent`: all give the static transmission error of the torque.
         positions: mesh positions of the force, which is linear between them: the approach at which a pair comes into
-            contact changes by several um from one of 64 positions to the next. An integrator whose steps meet
-            these positions alone needs no more than it has steps.
-        levels: number of approaches of the map on either side of the clearance.
-        reach: largest deflection of the map, relative to the largest static one; the map is linear beyond.
+            contact changes by several um from one of 64 positions to the next, so that they limit how near the map is
+            to the contact analysis (half a percent needs 512). An integrator whose steps meet these positions alone
+            needs no more than it has steps.
+        levels: number of approaches of the map on either side of the clearance, closer together where it ends.
+        reach: largest deflection of the map, relative to the largest static one of the drive flanks; the map is
+            linear beyond.
         compliance: of shafts, bearings and bodies in series with the mesh [um/N].
         deviation: material that manufacturing deviations remove besides from the drive flanks [um], shape (pairs,
             slices, positions) of the mesh; linear between its positions. None for perfect gears.
@@ -156,15 +158,15 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
     if model == "loaded error":
         mean = jnp.mean(deflection, axis=1)
         return LoadedError(first, start + deflection - mean[:, None], force / mean, converged)
-    spacing = jax.lax.stop_gradient(reach * jnp.max(deflection) / (levels - 1))
+    farthest = jax.lax.stop_gradient(reach * jnp.max(deflection[0]))
     tables = [
-        tabulate(side, _in_own_order(side, each), compliance, spacing, levels) for side, each in zip(sides, found)
+        tabulate(side, _in_own_order(side, each), compliance, farthest, levels) for side, each in zip(sides, found)
     ]
     drive, coast = tables
     return ForceMap(
         first_phase=first,
         start=start,
-        spacing=spacing,
+        reach=farthest,
         node_force=jnp.stack([drive[0], coast[0]]),
         node_stiffness=jnp.stack([drive[1], coast[1]]),
         converged=converged & drive[2] & coast[2],

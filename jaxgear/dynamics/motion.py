@@ -7,9 +7,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import Checked, kernel, result, whole
-from .integrate import cycles, steps_of
+from .integrate import cycles
 from .oscillator import Oscillator
-from .poincare import STEPS, checked, nodes_of
+from .poincare import STEPS, checked, nodes_of, steps_at
 
 Samples = Float[Array, " samples"]
 
@@ -46,13 +46,13 @@ def motion(oscillator: Oscillator, mesh_frequency: Any, start: Any, *, periods: 
         ValueError: for a mesh frequency that is not positive, a start of another shape or steps out of order.
     """
     frequency, start = checked("motion", oscillator, mesh_frequency, start)
-    nodes = nodes_of("motion", steps).astype(frequency.dtype)
+    nodes = nodes_of("motion", steps)
     return _moved(oscillator, frequency, start, nodes, whole("motion", "periods", periods))
 
 
 @kernel
 def _moved(oscillator: Oscillator, frequency, start, nodes, periods: int) -> Motion:
-    steps = steps_of(oscillator, nodes)
+    steps = steps_at(oscillator, nodes)
     _, states = cycles(oscillator, start, steps, frequency, periods)
 
     def of_step(step, phase, x, v):

@@ -179,10 +179,8 @@ class Dynamics(Checked):
         The steps of the integrator are `steps`, or 256: nothing else is known of what is being traced.
         """
         steps = _STEPS if self.steps is None else self.steps
-        nodes = oscillator.mesh_force.nodes(steps)
-        found = replace(self, steps=steps).runs(jax.lax.stop_gradient(oscillator)).values()
-        each = [differentiable(oscillator, run, nodes) for run in found]
-        return jax.tree.map(lambda *parts: jnp.stack(parts), *each)
+        runs = replace(self, steps=steps).runs(jax.lax.stop_gradient(oscillator))
+        return differentiable(oscillator, tuple(runs.values()), steps)
 
     def oscillator_of(self, cycle: MeshCycle, mesh: Mesh) -> Oscillator:
         """What vibrates, of a design that a cycle on the mesh is of, its manufacturing deviations included."""

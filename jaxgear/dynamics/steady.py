@@ -1,5 +1,6 @@
 """Numbers of steady vibration that can be differentiated, whatever the number of cycles after which it repeats."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -10,7 +11,7 @@ from .orbit import find_orbit
 from .oscillator import Oscillator
 from .response import SpeedResponse
 
-Numbers = Float[Array, " speeds"]
+Numbers = Float[Array, "responses speeds"]
 
 # Mesh cycles of the orbits that are differentiated: an orbit of two, three or four cycles is one of twelve too.
 _PERIODS = (1, 12)
@@ -30,46 +31,50 @@ class SteadyNumbers(NamedTuple):
     approach_rms: Numbers
     no_contact: Numbers
     coast_contact: Numbers
-    exact: Bool[Array, " speeds"]
+    exact: Bool[Array, "responses speeds"]
 
 
-def differentiable(oscillator: Oscillator, response: SpeedResponse, nodes: Float[Array, " nodes"]) -> SteadyNumbers:
-    """Numbers of a response with their derivatives by every number of the oscillator and by the mesh frequencies.
+def differentiable(oscillator: Oscillator, responses: Sequence[SpeedResponse], steps: int) -> SteadyNumbers:
+    """Numbers of responses with their derivatives by every number of the oscillator, leading axis (responses,).
 
     The orbits that the motion has settled on are found again by Newton's method, whose derivatives are exact. Where it
     has settled on none, the numbers are those that were recorded, without derivatives.
 
     Args:
         oscillator: that the response is of.
-        response: with orbits of up to four mesh cycles.
-        nodes: of the steps of a mesh cycle [base pitches].
+        responses: to as many speeds each, with orbits of up to four mesh cycles.
+        steps: of a mesh cycle.
     """
-    recorded = jax.lax.stop_gradient(
-        SteadyNumbers(
-            response.dynamic_factor,
-            response.approach_rms,
-            response.no_contact,
-            response.coast_contact,
-            jnp.zeros_like(response.settled),
+    each = [
+        (
+            of.mesh_frequency,
+            *jax.lax.stop_gradient((of.state, of.period)),
+            jax.lax.stop_gradient(
+                SteadyNumbers(
+                    of.dynamic_factor, of.approach_rms, of.no_contact, of.coast_contact, jnp.zeros_like(of.settled)
+                )
+            ),
         )
-    )
-    starts = jax.lax.stop_gradient((response.state, response.period))
+        for of in responses
+    ]
+    together = jax.tree.map(lambda *parts: jnp.concatenate(parts), *each)
 
     def of_speed(given):
         frequency, start, period, found = given
 
         def orbit(periods):
-            return lambda: _of_orbit(oscillator, frequency, start, periods, nodes, found)
+            return lambda: _of_orbit(oscillator, frequency, start, periods, steps, found)
 
         cases = [*(orbit(periods) for periods in _PERIODS), lambda: found]
         return jax.lax.switch(jnp.asarray(_CHOICE)[period], cases)
 
     # one after the other: only the orbits that are there are worked out
-    return jax.lax.map(of_speed, (response.mesh_frequency, *starts, recorded))
+    found = jax.lax.map(of_speed, together)
+    return jax.tree.map(lambda part: part.reshape(len(responses), -1), found)
 
 
-def _of_orbit(oscillator, frequency, start, periods: int, nodes, recorded: SteadyNumbers) -> SteadyNumbers:
-    orbit = find_orbit(oscillator, frequency, start, periods=periods, steps=nodes)
+def _of_orbit(oscillator, frequency, start, periods: int, steps: int, recorded: SteadyNumbers) -> SteadyNumbers:
+    orbit = find_orbit(oscillator, frequency, start, periods=periods, steps=steps)
     factor, rms = orbit.dynamic_factor, orbit.approach_rms
     scale = recorded.approach_rms + jnp.finfo(rms.dtype).eps ** 0.5 * jnp.abs(orbit.approach_mean)
     same = jnp.abs(factor - recorded.dynamic_factor) <= _SAME * recorded.dynamic_factor

@@ -33,7 +33,6 @@ RESULT_FILES = frozenset(
         "waterfall.png",
         "bifurcation.png",
         "phase_portrait.png",
-        "branches.png",
     }
 )
 

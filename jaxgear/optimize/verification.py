@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import equinox as eqx
-import jax
 import numpy as np
 
 from ..compliance import TabulatedCompliance, finite_element_compliance
@@ -73,11 +72,8 @@ def verification(mesh: Mesh, compliance: TabulatedCompliance, problem: Problem |
         problem: whose objectives are compared besides the PPTE.
     """
     other = prepare(mesh.pair, compliance=compliance, resolution=mesh.resolution)
-    # The solver reads prepared arrays alone. With the compliance of the claim beside them the mesh is of the same kind,
-    # and the compiled programs that have found the claim serve it as well.
-    alike = replace(other, compliance=mesh.compliance, automatic=mesh.automatic)
-    chosen = alike if _shapes(alike) == _shapes(mesh) else other
-    return Verification(chosen, None if problem is None else problem.on(chosen))
+    other = replace(other, automatic=mesh.automatic)
+    return Verification(other, None if problem is None else problem.on(other))
 
 
 def structure_for(mesh: Mesh, *, cache: str | Path | bool | None = True) -> TabulatedCompliance:
@@ -129,7 +125,3 @@ def verify(optimum: Optimum, *, cache: str | Path | bool | None = True) -> Verif
 
 def _ppte(cycle: MeshCycle) -> float:
     return float(np.ptp(np.asarray(cycle.transmission_error))) if solved(cycle) else float("inf")
-
-
-def _shapes(mesh: Mesh):
-    return jax.tree.structure(mesh), [(leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(mesh)]

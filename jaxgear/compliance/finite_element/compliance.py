@@ -1,6 +1,7 @@
 """The compliance of a mesh from one table per gear and plane."""
 
 from pathlib import Path
+from typing import ClassVar
 
 import equinox as eqx
 import jax
@@ -56,6 +57,7 @@ class TabulatedCompliance(AbstractCompliance, Checked):
     pinion: tuple[GearTable, ...]
     wheel: tuple[GearTable, ...]
     plane: PlaneState = eqx.field(static=True)
+    averages_over_loaded_width: ClassVar[bool] = True
 
     def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Matrix:
         return self._of_gear(self.pinion, pinion, False) + self._of_gear(self.wheel, wheel, True)
