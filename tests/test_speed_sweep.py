@@ -108,6 +108,28 @@ def test_results_do_not_depend_on_the_number_of_steps():
             np.testing.assert_allclose(coarse, fine, rtol=1e-3)
 
 
+def test_the_orbit_is_foreseen_before_the_motion_has_settled():
+    """Deviations fade by exp(-2 pi zeta / Omega) per cycle: from one to the tolerance takes 18 Omega / (2 pi zeta)."""
+    zeta, cycles, unique = 0.01, 60, (OMEGA >= 0.45) & (OMEGA <= 1.0)
+    assert (18 * OMEGA / (2 * np.pi * zeta) > 2 * cycles)[unique].all()
+    options = {"carry": False, "steps": STEPS}
+    few = speed_sweep(rectangular(zeta), SPEEDS, most_cycles=cycles, **options)
+    assert few.settled[unique].all()
+    many = speed_sweep(rectangular(zeta), SPEEDS, most_cycles=5000, tolerance=1e-11, **options)
+    for name in ("dynamic_factor", "approach_rms", "period"):
+        np.testing.assert_allclose(getattr(few, name)[unique], getattr(many, name)[unique], rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_more_damping_has_its_exact_orbits_too():
+    """To the printed digits, which need finer steps: the stiffness jumps where contact is lost within a step."""
+    found = speed_sweep(rectangular(0.08), SPEEDS, direction="down", steps=8 * STEPS)
+    for omega, rms, factor in ((0.8, 1.793530, 4.267209), (0.9, 1.373012, 3.656888), (1.0, 1.044662, 3.125866)):
+        i = list(OMEGA).index(omega)
+        assert float(found.approach_rms[i]) == pytest.approx(rms, abs=1e-6)
+        assert float(found.dynamic_factor[i]) == pytest.approx(factor, abs=1e-6)
+
+
 def test_slow_speeds_take_more_steps():
     steps = steps_for(rectangular(), SPEEDS[0] * np.array([0.25, 0.5, 1.0, 20.0]))
     assert list(steps) == sorted(steps, reverse=True) and steps[0] >= 4 * steps[2] // 2 > steps[3]

@@ -14,7 +14,7 @@ from .response import SpeedResponse
 from .speed_sweep import checked_frequencies, prepared, swept
 
 # Oscillators side by side: on a CPU the rows of their mesh forces stay in the cache, an accelerator needs many.
-_SIDE_BY_SIDE, _SIDE_BY_SIDE_ELSEWHERE = 64, 4096
+_SIDE_BY_SIDE, _SIDE_BY_SIDE_ELSEWHERE = 32, 4096
 
 
 def speed_sweeps(oscillators: Oscillator, mesh_frequencies, *, batch: int | None = None, **options: Any):

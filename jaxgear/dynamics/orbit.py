@@ -253,9 +253,11 @@ def orbit_at(oscillator: Oscillator, z, steps, frequency: Scalar, periods: int) 
 
 
 def _static_force(oscillator: Oscillator, otherwise: Scalar) -> Scalar:
-    """Static force of the mesh [N]; another one where springs carry some of the load."""
-    along = oscillator.direction
-    return otherwise if oscillator.stiffness is not None else jnp.sum(along * oscillator.load) / jnp.sum(along**2)
+    """Static force of the mesh [N], as `at_rest`; another one where springs carry some of the load."""
+    if oscillator.stiffness is not None:
+        return otherwise
+    along = oscillator.direction / oscillator.mass
+    return jnp.sum(along * oscillator.load) / jnp.sum(along * oscillator.direction)
 
 
 def _tolerance(z, monodromy) -> Scalar:
