@@ -32,7 +32,7 @@ positions = 16
 TABLE = """
 [dynamics]
 mesh_frequencies = [1500.0, 3500.0]
-number = 8
+number = 9
 pinion_inertia = 7.8e-3
 wheel_inertia = 7.8e-3
 model = "varying stiffness"
@@ -40,7 +40,7 @@ positions = 32
 steps = 64
 torque_factors = [1.0]
 """
-FIGURES = "dynamic_factor", "approach_rms", "waterfall", "bifurcation", "phase_portrait"
+FIGURES = "dynamic_factor", "approach_rms", "waterfall", "bifurcation", "phase_portrait", "branches"
 
 
 @pytest.fixture(autouse=True)
@@ -86,6 +86,23 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     assert 1 < worst["rule-based"] < worst["unmodified"]
     assert f"unmodified {worst['unmodified']:.3f}, rule-based {worst['rule-based']:.3f}" in out
     assert "rule-based" in out and "down, kicked" in out
+    check_branches(summary, rows)
+
+
+def check_branches(summary, rows):
+    """Jumps of the runs are folds of the branch that they lie on."""
+    branch, *_ = summary["branches_of_unmodified"]
+    assert branch["period_mesh_cycles"] == 1 and branch["ended"] == "range"
+    folds = [one["mesh_frequency_Hz"] for one in branch["bifurcations"] if one["kind"] == "fold"]
+    assert folds and len(folds) % 2 == 0
+    up, down = (
+        np.array([float(row["dynamic_factor"]) for row in rows if (row["design"], row["speed"]) == ("unmodified", run)])
+        for run in ("up", "down")
+    )
+    speeds = np.linspace(1500.0, 3500.0, 9)
+    apart = np.abs(up - down) > 0.01 * up  # two steady states: only between the folds
+    assert apart.any()
+    assert ((speeds[apart] > min(folds)) & (speeds[apart] < max(folds))).all()
 
 
 @pytest.mark.parametrize(
@@ -116,7 +133,7 @@ def test_speeds_of_the_pinion_are_mesh_frequencies(file):
     text = PAIR + TABLE.replace("mesh_frequencies = [1500.0, 3500.0]", "speeds = [1800.0, 4200.0]")
     request = dynamics_request(load_design(file(text)))
     frequencies = np.asarray(request.settings.mesh_frequencies)
-    assert frequencies == pytest.approx(np.linspace(1500.0, 3500.0, 8))  # 50 teeth, 60 s
+    assert frequencies == pytest.approx(np.linspace(1500.0, 3500.0, 9))  # 50 teeth, 60 s
     assert request.torques == (200.0,)
 
 

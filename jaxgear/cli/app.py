@@ -106,7 +106,7 @@ def dynamics(
     no_figures: NoFigures = False,
     no_cache: NoCache = False,
 ) -> int:
-    """Run the pair through the speeds of the table [dynamics], up and down, under several torques.
+    """Run the pair through the speeds of the table `dynamics`, up and down, under several torques.
 
     Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the design file or
     the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.

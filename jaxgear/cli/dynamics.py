@@ -27,7 +27,8 @@ from ..optimize import Front
 from . import dynamics_figures, dynamics_report, interrupt, report
 from .commands import import_ahead, rule_based
 from .devices import compile_quickly
-from .dynamics_report import Study
+from .dynamics_branches import branches_of
+from .dynamics_report import Study, next_to_design
 from .kept import Kept
 from .progress import Stages
 from .run import coarse, default_folder, opened
@@ -130,7 +131,10 @@ def _study(
                 made_of = oscillator, settings.mesh_frequencies, settings.kick
                 runs[run] = kept((made_of, run, steps), partial(settings.run, oscillator, run, steps=steps))
                 done += 1
-    return Study(design, request, mesh, designs, oscillators, responses, steps)
+    stages.begin("following the orbits of the unmodified design")
+    torque = next_to_design(design, request)
+    branches = branches_of(oscillators["unmodified"][torque], responses["unmodified"][torque], steps)
+    return Study(design, request, mesh, designs, oscillators, responses, steps, tuple(branches))
 
 
 def _steps(settings: Dynamics, oscillators: Mapping[str, Mapping[float, Oscillator]]) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ from ..dynamics import UP, Oscillator, SpeedResponse, motion
 from . import report
 from .dynamics_report import Study, peak
 
-_PANEL, _HEIGHT = 92.0, 84.0  # [mm]
+_PANEL, _HEIGHT, _WIDE = 92.0, 84.0, 130.0  # [mm]
 
 
 def write_figures(folder: Path, study: Study) -> None:
@@ -37,6 +37,10 @@ def write_figures(folder: Path, study: Study) -> None:
                 _draw(kind, panel, study, name)
                 panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
         axes[kind] = panels
+    if study.branches:
+        runs, title = list(study.responses["unmodified"][study.torque].values()), f"unmodified, {study.torque:g} N m"
+        with plot.figure.report_axes(None, width=_WIDE, height=_HEIGHT) as axis:
+            axes["branches"] = plot.branches(study.branches, ax=axis, responses=runs, title=title)
     report.save_figures(folder, axes)
 
 

@@ -14,7 +14,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..contact import Mesh
-from ..dynamics import Oscillator, SpeedResponse
+from ..dynamics import Branch, Oscillator, SpeedResponse
 from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
 from .version import version
@@ -44,6 +44,7 @@ class Study:
         oscillators: of every design, by torque [N m].
         responses: of every design, by torque [N m] and name of the run.
         steps: of the integrator per mesh cycle, at every speed.
+        branches: of periodic orbits of the unmodified design, at `torque`.
     """
 
     design: DesignFile
@@ -53,6 +54,7 @@ class Study:
     oscillators: Mapping[str, Mapping[float, Oscillator]]
     responses: Mapping[str, Mapping[float, Mapping[str, SpeedResponse]]]
     steps: tuple[int, ...]
+    branches: tuple[Branch, ...]
 
     def rows(self) -> Iterator[tuple[str, float, str, SpeedResponse]]:
         """Design, torque, run and response of all runs."""
@@ -64,7 +66,12 @@ class Study:
     @property
     def torque(self) -> float:
         """The torque next to the design torque [N m]."""
-        return min(self.request.torques, key=lambda torque: abs(torque - self.design.torque))
+        return next_to_design(self.design, self.request)
+
+
+def next_to_design(design: DesignFile, request: DynamicsRequest) -> float:
+    """The torque of a study next to the design torque [N m]."""
+    return min(request.torques, key=lambda torque: abs(torque - design.torque))
 
 
 def peak(response: SpeedResponse, field: str) -> tuple[float, float]:
@@ -150,6 +157,7 @@ def summary(study: Study) -> dict[str, Any]:
         "equivalent_mass_kg": np.asarray(study.oscillators["unmodified"][study.torque].mass),
         "steps": [min(study.steps), max(study.steps)],
         "designs": designs,
+        "branches_of_unmodified": [_branch(branch) for branch in study.branches],
         "versions": {
             "jaxgear": version(),
             "jax": jax.__version__,
@@ -157,6 +165,14 @@ def summary(study: Study) -> dict[str, Any]:
             "python": platform.python_version(),
         },
     }
+
+
+def _branch(branch: Branch) -> dict[str, Any]:
+    bifurcations = [
+        {"kind": one.kind, "mesh_frequency_Hz": float(one.parameter), "dynamic_factor": float(one.orbit.dynamic_factor)}
+        for one in branch.bifurcations
+    ]
+    return {"period_mesh_cycles": branch.orbits.periods, "ended": branch.ended, "bifurcations": bifurcations}
 
 
 def _peaks(response: SpeedResponse) -> dict[str, float]:

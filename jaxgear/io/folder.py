@@ -31,6 +31,7 @@ RESULT_FILES = frozenset(
         "dynamic_factor.png",
         "approach_rms.png",
         "waterfall.png",
+        "branches.png",
         "bifurcation.png",
         "phase_portrait.png",
     }

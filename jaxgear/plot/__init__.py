@@ -6,6 +6,7 @@ None shows a window or changes matplotlib's settings; `save` writes the file.
 
 from .convergence import convergence as convergence
 from .dynamics import bifurcation as bifurcation
+from .dynamics import branches as branches
 from .dynamics import phase_portrait as phase_portrait
 from .dynamics import speed_response as speed_response
 from .dynamics import waterfall as waterfall

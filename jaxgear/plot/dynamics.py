@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 
-from ..dynamics import SpeedResponse
+from ..dynamics import Branch, SpeedResponse
 from .figure import GREY, legend_above, line_style, marker_style, report_axes
 
 FREQUENCY_LABEL = "mesh frequency [Hz]"
@@ -20,6 +20,7 @@ _PAD, _LINE = 6.0, 13.0  # [pt] of a title over the Axes, and of a line of a leg
 _DECADES = 3.0  # of amplitudes that a spectrum shows
 # drive flanks, clearance, coast flanks: in lightness too
 _STATES = {"drive flanks": "#0072B2", "apart": "#E69F00", "coast flanks": "#000000"}
+_BIFURCATIONS = {"fold": ("o", "#D55E00"), "flip": ("D", "#009E73"), "Neimark-Sacker": ("s", "#CC79A7")}
 
 
 def speed_response(
@@ -125,6 +126,66 @@ def bifurcation(responses: Sequence[SpeedResponse], ax: Axes | None = None, *, t
         ax.set(xlabel=FREQUENCY_LABEL, ylabel="approach at mesh position 0 [µm]")
         _entitle(ax, title, legend_above(ax))
     return ax
+
+
+def branches(
+    found: Sequence[Branch],
+    of: Literal["dynamic_factor", "approach_rms"] = "dynamic_factor",
+    ax: Axes | None = None,
+    *,
+    responses: Sequence[SpeedResponse] = (),
+    title: str = "",
+) -> Axes:
+    """Response curve of branches of orbits over the mesh frequency: stable and unstable parts, and bifurcations.
+
+    Args:
+        found: of one oscillator.
+        of: which number: the dynamic factor or the rms of the approach about its mean.
+        ax: Axes to draw into; None for a new figure.
+        responses: runs through the speeds, whose steady states are marked.
+        title: over the Axes and the legend.
+    """
+    names: dict[str, None] = {}
+
+    def once(name: str) -> dict[str, str]:
+        first = name not in names
+        names[name] = None
+        return {"label": name} if first else {}
+
+    with report_axes(ax) as ax:
+        for response in responses:
+            values = np.asarray(getattr(response, of))
+            dots = {"linestyle": "", "marker": "o", "markersize": 2.5, "mew": 0, "color": GREY, "alpha": 0.6}
+            ax.plot(np.asarray(response.mesh_frequency), values, **dots, **once("steady states of the runs"))
+        for branch in found:
+            at, values, stable = _curve(branch, of)
+            parts = {
+                "stable": (stable[1:] & stable[:-1], "-"),
+                "unstable": (~(stable[1:] & stable[:-1]), (0, (3, 1.5))),
+            }
+            for name, (there, dashes) in parts.items():
+                if there.any():
+                    ends = np.append(there, False) | np.insert(there, 0, False)
+                    apart = np.where(ends, values, np.nan)
+                    ax.plot(at, apart, color=_STATES["drive flanks"], linestyle=dashes, linewidth=1.4, **once(name))
+            for one in branch.bifurcations:
+                marker, color = _BIFURCATIONS[one.kind]
+                place = float(one.parameter), float(getattr(one.orbit, of))
+                ax.plot(*place, marker, color=color, markersize=5, zorder=3, **once(one.kind))
+        ax.set_ylim(bottom=1.0 if of == "dynamic_factor" else 0.0)
+        ax.set(xlabel=FREQUENCY_LABEL, ylabel=_RESPONSES[of])
+        _entitle(ax, title, legend_above(ax))
+    return ax
+
+
+def _curve(branch: Branch, of: str):
+    """Mesh frequencies, values and stability along a branch, with its bifurcations, which belong to both sides."""
+    places = np.asarray(branch.before, int)
+    between = [float(one.parameter) for one in branch.bifurcations]
+    reached = [float(getattr(one.orbit, of)) for one in branch.bifurcations]
+    at = np.insert(np.asarray(branch.mesh_frequency, float), places, between)
+    values = np.insert(np.asarray(getattr(branch.orbits, of), float), places, reached)
+    return at, values, np.insert(np.asarray(branch.stable), places, np.ones(len(places), bool))
 
 
 def phase_portrait(approach, velocity, force, ax: Axes | None = None, *, once: Any = None, title: str = "") -> Axes:
