@@ -73,7 +73,8 @@ class Drivetrain(eqx.Module):
 def drivetrain(mesh, amount, length) -> Drivetrain:
     """With gears of one tip relief."""
     relief = jg.TipRelief(amount, length)
-    force = dynamics.mesh_force(mesh, torque=TORQUE, pinion=relief, wheel=relief, model="varying stiffness", positions=64)
+    flanks = {"pinion": relief, "wheel": relief}
+    force = dynamics.mesh_force(mesh, torque=TORQUE, **flanks, model="varying stiffness", positions=64)
     wheel = GEAR_INERTIA[1] + LOAD_INERTIA
     gears = dynamics.two_gears(
         force, pair=mesh.pair, torque=TORQUE, inertias=(GEAR_INERTIA[0], wheel), damping_ratio=DAMPING_RATIO

@@ -2,9 +2,9 @@
 
 The study gives dynamic factor K_v and rms of the relative displacement q over mesh frequencies up to 5 kHz, rising and
 falling, at 100, 200 and 400 N m, of the unmodified gears and of two reliefs that level the transmission error. It
-prints neither its gears nor inertias nor damping. Here they are: the test pair of 50 teeth and module 3 with 0.136 mm of
-backlash on the line of action, solid discs, and the damping ratio at which the largest K_v at 200 N m is the study's.
-Run it: `python examples/reproduce_50_50_dynamics.py`.
+prints neither its gears nor inertias nor damping. Here they are: the test pair of 50 teeth and module 3 with 0.136 mm
+of backlash on the line of action, solid discs, and the damping ratio at which the largest K_v at 200 N m is that of the
+study. Run it: `python examples/reproduce_50_50_dynamics.py`.
 """
 
 import jax
@@ -59,7 +59,7 @@ LINES = [
         "100 N m, largest q_rms, unmodified",
         13.5,
         "um",
-        "The study has it at point 1, where it reports a jump that neither jaxgear nor a model of separate pairs shows.",
+        "The study has it at point 1, where it reports a jump that neither jaxgear nor a model of separate pairs has.",
     ),
     ("100 type 1 less K_v", "100 N m, largest K_v of type 1 lower by", 28.0, "%", RELIEVED),
     ("100 type 2 less K_v", "100 N m, largest K_v of type 2 lower by", 34.0, "%", RELIEVED),
