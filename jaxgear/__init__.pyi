@@ -3,6 +3,7 @@
 from . import compliance as compliance
 from . import conditions as conditions
 from . import contact as contact
+from . import dynamics as dynamics
 from . import geometry as geometry
 from . import io as io
 from . import metrics as metrics

@@ -189,6 +189,8 @@ def test_rule_based_design_is_the_iso_relief_on_both_tips(folder, optimized):
 def test_all_result_files_are_there(folder, analyzed, optimized):
     of_others = {"front.csv", "front.png", "iterations_relief.png", "iterations_transmission_error.png"}
     of_others |= {"lead_chart.png", "pressure_map.png"}  # one slice shows nothing over the face
+    of_others |= {"responses.csv", "dynamic_factor.png", "approach_rms.png", "waterfall.png", "bifurcation.png"}
+    of_others |= {"phase_portrait.png", "branches.png"}  # of `jaxgear dynamics`
     assert {path.name for path in (folder / "optimized").iterdir()} == RESULT_FILES - of_others
     assert {path.name for path in (folder / "analyzed").iterdir()} == {"summary.json", "flanks.csv"}
     for path in (folder / "optimized").glob("*.png"):

@@ -28,6 +28,7 @@ from jaxgear.io import (
     write_summary,
 )
 from jaxgear.io.layout import family, section_of
+from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, Flank, ParabolicLinear
 from jaxgear.numerics import number
 
@@ -709,9 +710,10 @@ def test_a_resolution_that_misses_part_of_the_path_is_refused(load):
 def test_examples_load_and_are_what_their_name_says(path):
     file = load_design(path)
     teeth = [int(gear.teeth) for gear in (file.pair().pinion, file.pair().wheel)]
-    kind = "sweep" if file.sweep is not None else "robust" if file.optimize.manufactured else "spur"
+    kinds = {"sweep": file.sweep, "dynamics": file.dynamics, "robust": file.optimize.manufactured or None}
+    kind = next((name for name, section in kinds.items() if section is not None), "spur")
     assert path.stem == f"{kind}_{teeth[0]}_{teeth[1]}"
-    assert file.bounds and file.title
+    assert (file.bounds or file.optimize.method in METHODS_WITHOUT_VARIABLES) and file.title
     file.design({name: 0.5 * (low + high) for name, (low, high) in file.bounds.items()})
 
 

@@ -73,7 +73,7 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     assert not list(tmp_path.glob(".out*"))  # what was kept is no longer needed
     with (folder / "responses.csv").open() as lines:
         rows = list(csv.DictReader(lines))
-    assert len(rows) == 2 * 3 * 8  # unmodified and rule-based, three runs, eight speeds
+    assert len(rows) == 2 * 3 * 9  # unmodified and rule-based, three runs, nine speeds
     summary = json.loads((folder / "summary.json").read_text())
     for design, data in summary["designs"].items():
         for run in data["runs"]:

@@ -18,6 +18,7 @@ EXAMPLES = (
     "which_curve",
     "is_it_robust_over_torque",
     "what_does_robust_design_buy",
+    "drivetrain",
 )
 
 
@@ -36,7 +37,7 @@ def answers(name):
     return pytest.fixture(scope="module")(lambda: example(name).numbers(results(name)))
 
 
-relief, coupling, curve, robust, manufactured = map(answers, EXAMPLES)
+relief, coupling, curve, robust, manufactured, driven = map(answers, EXAMPLES)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -161,3 +162,9 @@ def test_two_loaded_pairs_average_their_deviations(manufactured):
         for name in ("nominal", "robust")
     }
     assert deepest["nominal"] > 3 * deepest["robust"]
+
+
+def test_the_drivetrain_runs_up_and_its_derivative_is_that_of_a_central_difference(driven):
+    assert driven["last_speed_rpm"] > 2100.0
+    assert driven["force_rms_relief_N"] < 0.8 * driven["force_rms_unmodified_N"]
+    assert driven["slope_N_per_um"] == pytest.approx(driven["difference_N_per_um"], rel=1e-3)

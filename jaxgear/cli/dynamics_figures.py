@@ -38,9 +38,10 @@ def write_figures(folder: Path, study: Study) -> None:
                 panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
         axes[kind] = panels
     if study.branches:
-        runs, title = list(study.responses["unmodified"][study.torque].values()), f"unmodified, {study.torque:g} N m"
+        swept = list(study.responses["unmodified"][study.torque].values())
+        title = f"unmodified, {study.torque:g} N m"
         with plot.figure.report_axes(None, width=_WIDE, height=_HEIGHT) as axis:
-            axes["branches"] = plot.branches(study.branches, ax=axis, responses=runs, title=title)
+            axes["branches"] = plot.branches(study.branches, ax=axis, responses=swept, title=title)
     report.save_figures(folder, axes)
 
 
