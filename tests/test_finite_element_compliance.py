@@ -130,6 +130,31 @@ def test_the_module_has_no_derivative_beside_a_bore_in_millimetres(folder):
         jax.grad(lambda module: softness(compliance, module=module, bore=20.0))(3.0)
 
 
+def test_a_thinner_tooth_is_softer_and_has_a_table_of_its_own(tabulated, folder):
+    """By about as much as beam and ring say, which bend the same outline."""
+
+    def gears(allowance):
+        return jg.GearPair(
+            *(jg.Gear(teeth, 3.0, face_width=18.0, tooth_thickness_allowance=allowance) for teeth in (19, 48))
+        )
+
+    def scaled(pair, module):
+        return eqx.tree_at(lambda p: (p.pinion.module, p.wheel.module), pair, (module, module))
+
+    def mean(allowance, compliance):
+        return float(jnp.mean(jnp.diagonal(prepared(gears(allowance), compliance).structure)))
+
+    with pytest.raises(ValueError, match="pinion tooth_thickness_allowance over module = -0.03 differs from 0 of its"):
+        prepared(gears(-90.0), tabulated)
+    softer = mean(-90.0, jg.finite_element_compliance(gears(-90.0), "auto", cache=folder)) / mean(0.0, tabulated) - 1
+    closed_form = jg.default_compliance("auto")
+    assert softer == pytest.approx(mean(-90.0, closed_form) / mean(0.0, closed_form) - 1, rel=0.25)
+    assert softer > 0.005
+    compliance = jg.finite_element_compliance(gears(-90.0), "auto", cache=folder)
+    slope = jax.grad(lambda module: jnp.sum(prepared(scaled(gears(-90.0), module), compliance).structure))
+    assert np.isnan(slope(3.0))  # the allowance does not grow with the module
+
+
 def test_other_gears_than_those_of_the_table(tabulated):
     with pytest.raises(ValueError, match="^finite_element_compliance: pinion teeth = 20 differs from 19 of its table"):
         prepared(pair((20, 48)), tabulated)

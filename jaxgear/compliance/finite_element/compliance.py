@@ -46,8 +46,8 @@ class TabulatedCompliance(AbstractCompliance, Checked):
 
     A gear of another size, modulus or face width is scaled. A gear of another shape is not that of the table: `prepare`
     refuses it, and where its numbers are traced the result is NaN and does not converge. Derivatives by numbers that
-    shape a gear (teeth, profile shift, rack, tip, bore, Poisson's ratio) raise a `ValueError`; by the module too where
-    bore or tip diameter are given, as it moves their ratio.
+    shape a gear (teeth, profile shift, rack, tip, bore, tooth thickness allowance, Poisson's ratio) raise a `ValueError`;
+    by the module too where bore or tip diameter are given, as it moves their ratio, and with an allowance they are NaN.
 
     Attributes:
         pinion, wheel: tables of each gear, in the order of `structure_planes`, or one for all planes.
@@ -124,8 +124,7 @@ def finite_element_compliance(
     """Teeth and gear bodies by finite elements: two-dimensional, whole ring, bore held rigidly, once per gear.
 
     Takes one to three seconds per gear and plane, then comes from the disk. A table holds for every module, modulus,
-    face width, centre distance, torque and modification of the gear. The meshed tooth is without its tooth thickness
-    allowance, which therefore does not soften it here as it does in the other compliances.
+    face width, centre distance, torque and modification of the gear.
 
     Args:
         pair: gear pair of concrete numbers.

@@ -21,6 +21,7 @@ class Shape(NamedTuple):
         profile_shift, dedendum, root_radius: as in `Gear`.
         tip_ratio, bore_ratio: radii of tip and bore over the module.
         poisson: Poisson's ratio of the plane problem.
+        allowance: of the tooth thickness over the module.
     """
 
     teeth: float
@@ -31,6 +32,7 @@ class Shape(NamedTuple):
     tip_ratio: float
     bore_ratio: float
     poisson: float
+    allowance: float = 0.0
 
     def rounded(self) -> "Shape":
         """Seven significant digits: what single precision holds."""
@@ -55,11 +57,11 @@ class Tooth:
         self.base = self.pitch * np.cos(alpha)
         self.root = self.pitch + shape.profile_shift - shape.dedendum
         self.tip, self.bore = shape.tip_ratio, shape.bore_ratio
-        turn = (np.pi / 2 + 2 * shape.profile_shift * np.tan(alpha)) / shape.teeth
+        turn = (np.pi / 2 + 2 * shape.profile_shift * np.tan(alpha) + shape.allowance) / shape.teeth
         self._base_half_angle = turn + np.tan(alpha) - alpha
         arc = shape.root_radius
         land = np.pi / 4 - shape.dedendum * np.tan(alpha) - (1 - np.sin(alpha)) * arc / np.cos(alpha)
-        self._offset, self._depth = np.pi / 2 - land, shape.dedendum - shape.profile_shift - arc
+        self._offset, self._depth = np.pi / 2 - land + shape.allowance / 2, shape.dedendum - shape.profile_shift - arc
         self.tip_roll_length = float(np.sqrt(max(self.tip**2 - self.base**2, 0.0)))
         self.junction, self.form_roll_length = self._junction()
         end = self.trochoid(np.pi / 2)

@@ -20,12 +20,13 @@ Points = Float[Array, " points"]
 # A gear is that of its table up to here, relative: single precision, and a table's own rounding.
 _ALIKE = 3e-6
 # numbers of a gear on which its table depends in a way that the table does not know
-_HELD = ("teeth", "pressure_angle", "profile_shift", "dedendum", "root_radius")
+_HELD = ("teeth", "pressure_angle", "profile_shift", "dedendum", "root_radius", "tooth_thickness_allowance")
 
 _WORDS = {
     "tip_ratio": "tip_diameter over 2 module",
     "bore_ratio": "bore_diameter over 2 module",
     "poisson": "Poisson's ratio of the plane problem",
+    "allowance": "tooth_thickness_allowance over module",
 }
 
 
@@ -113,6 +114,7 @@ def shape_of(gear: Gear, plane: Plane) -> Float[Array, " numbers"]:
             gear.tip_radius / gear.module,
             gear.bore_radius / gear.module,
             plane_poisson(gear.material, plane),
+            1e-3 * gear.tooth_thickness_allowance / gear.module,
         ]
     )
 
@@ -133,7 +135,8 @@ class Scale(eqx.Module):
         gear = _without_unknown_derivatives(gear)
         given = jax.lax.stop_gradient(shape_of(gear, plane))
         apart = jnp.abs(given - table.shape) / jnp.maximum(jnp.abs(table.shape), 1.0)
-        factor = table.modulus / plane_modulus(gear.material, plane)
+        # a module that moves the tooth thickness against it has no derivative: NaN, as only the number tells
+        factor = table.modulus / plane_modulus(gear.material, plane) + _unknown_slope(shape_of(gear, plane)[-1])
         return cls(table.module / gear.module, jnp.where(jnp.any(apart > _ALIKE), jnp.nan, factor))
 
 
@@ -160,6 +163,18 @@ def _without_unknown_derivatives(gear: Gear) -> Gear:
     return eqx.tree_at(
         lambda g: [getattr(g, name) for name in names], gear, [*held.values(), material], is_leaf=lambda x: x is None
     )
+
+
+@jax.custom_jvp
+def _unknown_slope(x: Scalar) -> Scalar:
+    """Zero, with a derivative of NaN by a number that is not zero."""
+    return jnp.zeros_like(x)
+
+
+@_unknown_slope.defjvp
+def _unknown_slope_jvp(primals, tangents):
+    (x,), (x_dot,) = primals, tangents
+    return _unknown_slope(x), jnp.where(x == 0, 0.0, jnp.nan) * x_dot
 
 
 def _held(name: str, value):
