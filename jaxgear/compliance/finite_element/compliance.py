@@ -46,8 +46,9 @@ class TabulatedCompliance(AbstractCompliance, Checked):
 
     A gear of another size, modulus or face width is scaled. A gear of another shape is not that of the table: `prepare`
     refuses it, and where its numbers are traced the result is NaN and does not converge. Derivatives by numbers that
-    shape a gear (teeth, profile shift, rack, tip, bore, tooth thickness allowance, Poisson's ratio) raise a `ValueError`;
-    by the module too where bore or tip diameter are given, as it moves their ratio, and with an allowance they are NaN.
+    shape a gear (teeth, profile shift, rack, tip, bore, tooth thickness allowance, Poisson's ratio) raise a
+    `ValueError`; by the module too where bore or tip diameter are given, as it moves their ratio. With an allowance
+    those by the module are NaN.
 
     Attributes:
         pinion, wheel: tables of each gear, in the order of `structure_planes`, or one for all planes.
