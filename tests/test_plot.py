@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import equinox as eqx
 import jax
@@ -261,3 +262,13 @@ changed = [key for key in before if dict.__getitem__(matplotlib.rcParams, key) i
 assert not changed, changed
 """
     subprocess.run([sys.executable, "-c", program], check=True, timeout=300)
+
+
+def test_shared_axes_of_speed_responses_show_all_curves():
+    frequency = np.linspace(500.0, 5000.0, 10)
+    figure, both = plt.subplots(1, 2, sharey=True)
+    for ax, height in zip(both, (3.0, 30.0)):
+        response = SimpleNamespace(direction="up", mesh_frequency=frequency, approach_rms=height * np.ones(10))
+        plot.speed_response({"unmodified": [response]}, "approach_rms", ax)
+    assert both[0].get_ylim() == both[1].get_ylim() and both[0].get_ylim()[0] == 0.0 and both[0].get_ylim()[1] > 30.0
+    plt.close(figure)

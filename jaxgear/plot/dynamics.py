@@ -51,13 +51,20 @@ def speed_response(
                 ax.plot(frequency, np.asarray(getattr(response, of)), **{**style, **dashes, **label})
         for direction in seen if len(seen) > 1 else ():
             ax.plot([], [], color=GREY, linestyle=_DIRECTIONS[direction], label=f"speed {_MOVES[direction]}")
-        ax.set_ylim(bottom=1.0 if of == "dynamic_factor" else 0.0)
+        _begin_at(ax, 1.0 if of == "dynamic_factor" else 0.0)
         ax.set(xlabel=FREQUENCY_LABEL, ylabel=_RESPONSES[of])
         _entitle(ax, title, legend_above(ax))
     return ax
 
 
 _MOVES = {"up": "rising", "down": "falling"}
+
+
+def _begin_at(ax: Axes, bottom: float) -> None:
+    """Lower end of the ordinate; the upper one leaves room for the curves of all Axes that share it."""
+    shared = ax.get_shared_y_axes().get_siblings(ax)
+    highest = [np.max(line.get_ydata()) for each in shared for line in each.lines if len(line.get_ydata())]
+    ax.set_ylim(bottom, bottom + 1.05 * (max(highest, default=bottom + 1.0) - bottom))
 
 
 def waterfall(
@@ -172,7 +179,7 @@ def branches(
                 marker, color = _BIFURCATIONS[one.kind]
                 place = float(one.parameter), float(getattr(one.orbit, of))
                 ax.plot(*place, marker, color=color, markersize=5, zorder=3, **once(one.kind))
-        ax.set_ylim(bottom=1.0 if of == "dynamic_factor" else 0.0)
+        _begin_at(ax, 1.0 if of == "dynamic_factor" else 0.0)
         ax.set(xlabel=FREQUENCY_LABEL, ylabel=_RESPONSES[of])
         _entitle(ax, title, legend_above(ax))
     return ax
