@@ -81,7 +81,8 @@ class AbstractMeshForce(Checked):
         return (1 - _TOUCHING) * force / jnp.mean(jax.vmap(deflection)(phases))
 
 
-def _missing(approach: Scalar, args) -> Scalar:
+def missing(approach: Scalar, args) -> Scalar:
+    """Force [N] at an approach [um] less the wanted one; args are (mesh force, place, wanted force)."""
     mesh_force, place, force = args
     return mesh_force.force(place, approach) - force
 
@@ -92,11 +93,11 @@ def _approach_at(mesh_force: AbstractMeshForce, place: Any, force: Scalar) -> Sc
 
     def is_short(state):
         width, doublings = state
-        return (doublings < _DOUBLINGS) & ((_missing(width, fixed) < 0) | (_missing(-width, fixed) > 0))
+        return (doublings < _DOUBLINGS) & ((missing(width, fixed) < 0) | (missing(-width, fixed) > 0))
 
     start = jnp.ones_like(force), 0
     width, _ = jax.lax.while_loop(is_short, lambda state: (2 * state[0], state[1] + 1), start)
-    return bracketed_root(_missing, -width, width, args)
+    return bracketed_root(missing, -width, width, args)
 
 
 class DeadZone(AbstractMeshForce):

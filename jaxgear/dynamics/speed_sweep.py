@@ -69,9 +69,8 @@ def speed_sweep(
             which of them depends on its size: 3 to 5 are worth a try. None for no impulse.
         carry: whether each speed begins with the state of the one before; otherwise each begins as the first one does.
         steps: of the integrator per mesh cycle, even, one number or one for each speed, each a divisor of the largest;
-            None for as many as the natural
-            frequencies need, which have to be known then: where the oscillator is being traced, `steps_for` of a
-            concrete one gives them.
+            None for as many as the natural frequencies need, which have to be known then: where the oscillator is being
+            traced, `steps_for` of a concrete one gives them.
         tolerance: by how much the state may still differ, relative to its size; None for the root of the machine
             precision.
         most_cycles: after which a speed is left unsettled.

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import bracketed_root, program
-from .force import AbstractMeshForce
+from .force import AbstractMeshForce, missing
 from .oscillator import Coordinates, Oscillator
 
 Scalar = Float[Array, ""]
@@ -65,9 +65,7 @@ def mean_stiffness_of(mesh_force: AbstractMeshForce, static_force: Scalar) -> Sc
     """Slope of the mesh force under a static force [N], averaged over the mesh cycle [N/um]."""
 
     def slope(phase):
-        place = mesh_force.at(phase)
-        approach = _approach_under(mesh_force, place, static_force)
-        return jax.jvp(lambda q: mesh_force.force(place, q), (approach,), (jnp.ones_like(approach),))[1]
+        return mesh_force.stiffness(phase, _approach_under(mesh_force, mesh_force.at(phase), static_force))
 
     begin = mesh_force.nodes(_POSITIONS).astype(static_force.dtype)
     return jnp.sum(jnp.diff(begin) * jax.vmap(slope)((begin[:-1] + begin[1:]) / 2))
@@ -80,12 +78,7 @@ def _approach_under(mesh_force: AbstractMeshForce, place, wanted: Scalar) -> Sca
     above = jax.vmap(lambda q: force(place, q))(tried) >= wanted
     below = jax.vmap(lambda q: force(place, q))(-tried) <= wanted
     high, low = tried[jnp.argmax(above)], -tried[jnp.argmax(below)]
-    return bracketed_root(_excess, low, high, (mesh_force, place, wanted))
-
-
-def _excess(approach, given):
-    mesh_force, place, wanted = given
-    return mesh_force.force(place, approach) - wanted
+    return bracketed_root(missing, low, high, (mesh_force, place, wanted))
 
 
 class Natural(NamedTuple):
