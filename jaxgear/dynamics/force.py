@@ -1,16 +1,20 @@
 """The interface of a mesh force, and those of closed form."""
 
 from abc import abstractmethod
+from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, bracketed_root, number
+from ..numerics import Checked, bracketed_root, number, real
 
 # Doublings of 1 um until a bracket holds the approach of a force; there is no root where they do not suffice.
 _DOUBLINGS = 40
+# mesh positions over which a stiffness is averaged
+_POSITIONS = 32
 # Share of a force by which flanks count as touching, where the deflection under the force is measured from.
 _TOUCHING = 1e-6
 
@@ -55,49 +59,68 @@ class AbstractMeshForce(Checked):
     def static_approach(self, phase: Scalar, force: Scalar) -> Scalar:
         """Approach [um] that takes a force [N]: the loaded transmission error under it.
 
-        A positive force has one on the drive flanks, a negative one on the coast flanks. Where there is none, as for a
-        negative force without coast flanks, the number that is returned is far out; for a force of zero it is
-        somewhere in the clearance.
+        A positive force has one on the drive flanks, a negative one on the coast flanks; for a force of zero it is
+        somewhere in the clearance. NaN where there is none, as for a negative force without coast flanks.
         """
-        return _approach_at(self, self.at(phase), force)
+        return approach_under(self, self.at(phase), force)
 
-    def mean_stiffness(self, force: Scalar, *, positions: int = 64) -> Scalar:
-        """Mean stiffness under a static force: the force over the mean deflection of a cycle [N/um].
+    def mean_tangent_stiffness(self, force: Scalar) -> Scalar:
+        """Slope of the force under a static force [N], averaged over the mesh cycle [N/um].
 
-        The deflection is the static approach under the force less that at which the flanks touch. That is the stiffness
-        of a linear spring with the same mean deflection: natural frequency and damping of the literature refer to
-        it, it does not depend on how a contact stiffens from zero on, and it needs no derivative.
-
-        Args:
-            force: static force [N], not zero.
-            positions: mesh positions of the mean, evenly spaced from 0 on.
+        The stiffness that a small vibration about the static approach meets: natural frequencies and damping ratios
+        refer to it.
         """
+        force = real(force)
+        return self.over_cycle(lambda phase: self.stiffness(phase, self.static_approach(phase, force)), force.dtype)
+
+    def mean_secant_stiffness(self, force: Scalar) -> Scalar:
+        """A static force [N], not zero, over the mean deflection of the mesh cycle under it [N/um].
+
+        The deflection is the static approach under the force less that at which the flanks touch: the stiffness of a
+        linear spring with the same mean deflection, below the tangent one since contacts stiffen from zero on. Studies
+        that know a static transmission error and no slope state it.
+        """
+        force = real(force)
 
         def deflection(phase):
-            place = self.at(phase)
-            return _approach_at(self, place, force) - _approach_at(self, place, _TOUCHING * force)
+            return self.static_approach(phase, force) - self.static_approach(phase, _TOUCHING * force)
 
-        phases = jnp.arange(positions, dtype=jnp.result_type(force)) / positions
-        return (1 - _TOUCHING) * force / jnp.mean(jax.vmap(deflection)(phases))
+        return (1 - _TOUCHING) * force / self.over_cycle(deflection, force.dtype)
+
+    def over_cycle(self, of: Callable[[Scalar], Scalar], dtype: Any) -> Scalar:
+        """Mean of a function of the mesh position over a cycle, each position for the step about it."""
+        begin = self.nodes(_POSITIONS).astype(dtype)
+        return jnp.sum(jnp.diff(begin) * jax.vmap(of)((begin[:-1] + begin[1:]) / 2))
+
+
+@partial(jax.jit, inline=True)
+def approach_under(mesh_force: AbstractMeshForce, place: Any, force: Scalar) -> Scalar:
+    """Approach [um] at which a mesh force has a value [N]; NaN where it has it nowhere.
+
+    A mesh force that is NaN from some approach on counts as larger than any value there.
+    """
+    args = mesh_force, place, force
+    fixed = jax.lax.stop_gradient(args)
+
+    def is_short(width):
+        return (missing(width, fixed) < 0) | (missing(-width, fixed) > 0)
+
+    def is_searched(state):
+        width, doublings = state
+        return (doublings < _DOUBLINGS) & is_short(width)
+
+    start = jnp.ones_like(force), 0
+    width, _ = jax.lax.while_loop(is_searched, lambda state: (2 * state[0], state[1] + 1), start)
+    found = bracketed_root(missing, -width, width, args)
+    known = ~is_short(width) & jnp.isfinite(missing(jax.lax.stop_gradient(found), fixed))
+    return jnp.where(known, found, jnp.nan)
 
 
 def missing(approach: Scalar, args) -> Scalar:
     """Force [N] at an approach [um] less the wanted one; args are (mesh force, place, wanted force)."""
     mesh_force, place, force = args
-    return mesh_force.force(place, approach) - force
-
-
-def _approach_at(mesh_force: AbstractMeshForce, place: Any, force: Scalar) -> Scalar:
-    args = mesh_force, place, force
-    fixed = jax.lax.stop_gradient(args)
-
-    def is_short(state):
-        width, doublings = state
-        return (doublings < _DOUBLINGS) & ((missing(width, fixed) < 0) | (missing(-width, fixed) > 0))
-
-    start = jnp.ones_like(force), 0
-    width, _ = jax.lax.while_loop(is_short, lambda state: (2 * state[0], state[1] + 1), start)
-    return bracketed_root(missing, -width, width, args)
+    found = mesh_force.force(place, approach)
+    return jnp.where(jnp.isnan(found), jnp.where(approach < 0, -jnp.inf, jnp.inf), found - force)
 
 
 class DeadZone(AbstractMeshForce):

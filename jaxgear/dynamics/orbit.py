@@ -14,6 +14,7 @@ from .history import history, largest, mean, rms, share, smallest
 from .integrate import cycles
 from .oscillator import Coordinates, Oscillator, State
 from .poincare import STEPS, after, checked, moved, nodes_of, scaled, steps_at, unscaled
+from .static import static_force
 
 Scalar = Float[Array, ""]
 Samples = Float[Array, " samples"]
@@ -238,7 +239,7 @@ def orbit_at(oscillator: Oscillator, z, steps, frequency: Scalar, periods: int) 
         approach=of.approach[0],
         approach_rate=of.velocity,
         force=of.force[0],
-        dynamic_factor=largest(of.force) / _static_force(oscillator, mean(of, of.force)),
+        dynamic_factor=largest(of.force) / static_force(oscillator),
         approach_rms=rms(of, of.approach),
         approach_mean=mean(of, of.approach),
         approach_min=smallest(of.approach),
@@ -250,14 +251,6 @@ def orbit_at(oscillator: Oscillator, z, steps, frequency: Scalar, periods: int) 
         converged=residual <= _tolerance(z, monodromy),
         periods=periods,
     )
-
-
-def _static_force(oscillator: Oscillator, otherwise: Scalar) -> Scalar:
-    """Static force of the mesh [N], as `at_rest`; another one where springs carry some of the load."""
-    if oscillator.stiffness is not None:
-        return otherwise
-    along = oscillator.direction / oscillator.mass
-    return jnp.sum(along * oscillator.load) / jnp.sum(along * oscillator.direction)
 
 
 def _tolerance(z, monodromy) -> Scalar:

@@ -12,7 +12,7 @@ from .history import history, largest, smallest
 from .integrate import cycle_of, one_step, step_of
 from .oscillator import Oscillator, State
 from .speed_sweep import start_of, steps_for
-from .static import at_rest
+from .static import at_rest, static_force
 
 Scalar = Float[Array, ""]
 Samples = Float[Array, " samples"]
@@ -149,7 +149,7 @@ def _run(
     return RunUp(
         time=found.time,
         mesh_frequency=frequency_at(position.astype(ends.dtype)),
-        dynamic_factor=found.peak / rest.force,
+        dynamic_factor=found.peak / static_force(oscillator),
         approach_min=found.lowest,
         approach_max=found.highest,
         state=found.y,

@@ -14,7 +14,7 @@ from .integrate import cycle_of
 from .oscillator import Oscillator, State
 from .response import Numbers, SpeedResponse, no_sums, numbers_of, with_cycle, with_step
 from .settling import Speed, settled
-from .static import Rest, at_rest, natural_frequencies
+from .static import Rest, at_rest, natural_frequencies, static_force
 
 Scalar = Float[Array, ""]
 Speeds = Float[Array, " speeds"]
@@ -214,14 +214,14 @@ def swept(
     oscillator: Oscillator, frequencies: Speeds, start: State | None, limits: _Limits, sizes: _Sizes
 ) -> SpeedResponse:
     """The response as of an upward sweep; whoever asked for it knows the direction."""
-    rest = at_rest(oscillator, jnp.zeros((), frequencies.dtype))
+    rest, static = at_rest(oscillator, jnp.zeros((), frequencies.dtype)), static_force(oscillator)
     first = _kicked(oscillator, rest, start, limits.kick)
     cycle = cycle_of(oscillator, sizes.most_steps)
 
     def at_speed(y, speed):
         frequency, steps = speed
         begin = first if sizes.fresh else y
-        found = _steady(oscillator, begin, Speed(frequency, cycle, steps, sizes.most_steps), limits, sizes, rest)
+        found = _steady(oscillator, begin, Speed(frequency, cycle, steps, sizes.most_steps), limits, sizes, static)
         return found.state, found
 
     def turned(parts):
@@ -262,7 +262,7 @@ class _Found(NamedTuple):
     state: State
 
 
-def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, rest: Rest) -> _Found:
+def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, static: Scalar) -> _Found:
     """Steady state at one speed, and its record."""
     frequency = speed.frequency
     y, period = settled(oscillator, y, speed, limits.tolerance, limits.most_cycles, sizes.most_periods)
@@ -295,5 +295,5 @@ def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, rest: R
     begin = jnp.zeros_like(cycles), y, no_sums(orders), nothing, nothing
     _, y, sums, approaches, velocities = jax.lax.while_loop(on, recorded, begin)
     count = cycles.astype(frequency.dtype)
-    numbers = numbers_of(sums, frequency, cycles=count, orders=orders, origin=origin, static_force=rest.force)
+    numbers = numbers_of(sums, frequency, cycles=count, orders=orders, origin=origin, static_force=static)
     return _Found(numbers, period, approaches, velocities, y)

@@ -1,22 +1,19 @@
 """An oscillator at rest under its static load, and the frequencies at which it vibrates about that."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import bracketed_root, program
-from .force import AbstractMeshForce, missing
+from ..numerics import number, program, safe_divide
+from .force import AbstractMeshForce, approach_under
 from .oscillator import Coordinates, Oscillator
 
 Scalar = Float[Array, ""]
 
-# Approaches [um] of either sign among which the one under the static load is bracketed.
-_BRACKETS = tuple(2.0**power for power in range(-20, 31))
-_NEWTON_STEPS = 12
-# mesh positions over which the stiffness is averaged
-_POSITIONS = 32
+# Share of the approach that no spring holds, by mass, above which it is free: rounding of single precision is less.
+_FREE = 1e-5
 
 
 class Rest(NamedTuple):
@@ -36,49 +33,60 @@ class Rest(NamedTuple):
 def at_rest(oscillator: Oscillator, phase: Scalar) -> Rest:
     """Equilibrium under the mean load at a mesh position [base pitches].
 
-    Loads that do not balance accelerate the whole; the rest is then that of the approach.
+    Loads that do not balance accelerate the whole; the rest is then that of the approach. Where springs hold every
+    motion that changes the approach, they and the mesh share the load, else the mesh carries what the load demands.
     """
-    place = oscillator.mesh_force.at(phase)
-    root_mass = jnp.sqrt(oscillator.mass)
-    along = oscillator.direction / root_mass
-    load = oscillator.load / root_mass
-    wanted = along @ load / (along @ along)
-    approach = _approach_under(oscillator.mesh_force, place, wanted)
+    mesh_force, root_mass = oscillator.mesh_force, jnp.sqrt(oscillator.mass)
+    along, load = oscillator.direction / root_mass, oscillator.load / root_mass
     error = -oscillator.approach(phase, jnp.zeros_like(load))
-    x = along * (approach + error) / (along @ along)
-    if oscillator.stiffness is not None:
+    if oscillator.stiffness is None:
+        free, held = along, jnp.zeros_like(load)
+        approach = mesh_force.static_approach(phase, along @ load / (along @ along))
+        force, slope = _with_slope(mesh_force, phase, approach)
+    else:
         ground = oscillator.stiffness / (root_mass[:, None] * root_mass[None])
-
-        def residual(x):
-            return ground @ x + along * oscillator.mesh_force.force(place, along @ x - error) - load
-
-        def corrected(_, x):
-            return x - jnp.linalg.lstsq(jax.jacfwd(residual)(x), residual(x))[0]
-
-        x = jax.lax.fori_loop(0, _NEWTON_STEPS, corrected, x)
-    approach = along @ x - error
-    force, slope = jax.jvp(lambda q: oscillator.mesh_force.force(place, q), (approach,), (jnp.ones_like(approach),))
-    return Rest(x / root_mass, force, slope)
-
-
-def mean_stiffness_of(mesh_force: AbstractMeshForce, static_force: Scalar) -> Scalar:
-    """Slope of the mesh force under a static force [N], averaged over the mesh cycle [N/um]."""
-
-    def slope(phase):
-        return mesh_force.stiffness(phase, _approach_under(mesh_force, mesh_force.at(phase), static_force))
-
-    begin = mesh_force.nodes(_POSITIONS).astype(static_force.dtype)
-    return jnp.sum(jnp.diff(begin) * jax.vmap(slope)((begin[:-1] + begin[1:]) / 2))
+        yields = jnp.linalg.pinv((ground + ground.T) / 2, hermitian=True)
+        free = along - ground @ (yields @ along)
+        is_free = free @ along > _FREE * (along @ along)
+        free = jnp.where(is_free, free, 0.0)
+        # the springs as one beside the mesh, without load at the approach that they alone would take
+        spring = jnp.where(is_free, 0.0, safe_divide(1.0, along @ yields @ along))
+        alone = along @ yields @ load - error
+        wanted = jnp.where(is_free, safe_divide(free @ load, free @ along), spring * alone)
+        approach = approach_under(_BesideSpring(mesh_force, spring), mesh_force.at(phase), wanted)
+        force, slope = _with_slope(mesh_force, phase, approach)
+        held = yields @ (load - along * force)
+    moved = free * safe_divide(approach + error - along @ held, free @ along)
+    return Rest((held + moved) / root_mass, force, slope)
 
 
-def _approach_under(mesh_force: AbstractMeshForce, place, wanted: Scalar) -> Scalar:
-    """Approach [um] at which the mesh force has a value [N]."""
-    force = mesh_force.force
-    tried = jnp.asarray(_BRACKETS, wanted.dtype)
-    above = jax.vmap(lambda q: force(place, q))(tried) >= wanted
-    below = jax.vmap(lambda q: force(place, q))(-tried) <= wanted
-    high, low = tried[jnp.argmax(above)], -tried[jnp.argmax(below)]
-    return bracketed_root(missing, low, high, (mesh_force, place, wanted))
+def static_force(oscillator: Oscillator) -> Scalar:
+    """Mesh force [N] under the mean load, averaged over the mesh cycle at rest: that of dynamic factors.
+
+    Every periodic motion has the same mean of the whole mesh force where no spring shares the load with the mesh.
+    """
+    if oscillator.stiffness is None:
+        along = oscillator.direction / oscillator.mass
+        return along @ oscillator.load / (along @ oscillator.direction)
+    return oscillator.mesh_force.over_cycle(lambda phase: at_rest(oscillator, phase).force, oscillator.load.dtype)
+
+
+class _BesideSpring(AbstractMeshForce):
+    """A mesh and a spring [N/um] that the same approach deflects."""
+
+    mesh: AbstractMeshForce
+    spring: Scalar = number("N/um")
+
+    def at(self, phase: Scalar) -> Any:
+        return self.mesh.at(phase)
+
+    def force(self, place: Any, approach: Scalar) -> Scalar:
+        return self.mesh.force(place, approach) + self.spring * approach
+
+
+def _with_slope(mesh_force: AbstractMeshForce, phase: Scalar, approach: Scalar) -> tuple[Scalar, Scalar]:
+    place = mesh_force.at(phase)
+    return jax.jvp(lambda q: mesh_force.force(place, q), (approach,), (jnp.ones_like(approach),))
 
 
 class Natural(NamedTuple):
@@ -96,8 +104,7 @@ class Natural(NamedTuple):
 @program
 def natural_frequencies(oscillator: Oscillator) -> Natural:
     """Natural frequencies with the mesh stiffness under the static load, averaged over the cycle."""
-    rest = at_rest(oscillator, jnp.zeros((), oscillator.mass.dtype))
-    stiffness = mean_stiffness_of(oscillator.mesh_force, rest.force)
+    stiffness = oscillator.mesh_force.mean_tangent_stiffness(static_force(oscillator))
     along = oscillator.direction / jnp.sqrt(oscillator.mass)
     total = stiffness * along[:, None] * along[None]
     if oscillator.stiffness is not None:

@@ -4,13 +4,13 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Gear, GearPair
-from ..numerics import check, real
+from ..numerics import check, concrete, real
 from .force import AbstractMeshForce
 from .oscillator import NEWTON, Excitation, Oscillator
-from .static import mean_stiffness_of
 
 Scalar = Float[Array, ""]
 
@@ -77,8 +77,8 @@ def torsional(
         damping_ratio: of the vibration with the mean stiffness, c = 2 ratio sqrt(k m).
         damping: c [N s/um], in place of the ratio. Either acts with and without contact.
         inertias: of pinion and wheel [kg m2]; None for `inertia_of` the gears.
-        mean_stiffness: k of the damping ratio [N/um]; None for the mean over the cycle of the slope of the mesh force
-            under the static load.
+        mean_stiffness: k of the damping ratio [N/um]; None for the `mean_tangent_stiffness` of the mesh force under the
+            static load.
         excitation: None for none. Its displacement is taken off the approach.
 
     Raises:
@@ -215,7 +215,7 @@ def _damping(owner: str, mesh_force, mass, force, ratio, damping, stiffness) -> 
         return damping
     ratio = real(ratio)
     check(owner, "damping_ratio", ratio, "", low=0.0, high=1.0)
-    stiffness = mean_stiffness_of(mesh_force, force) if stiffness is None else real(stiffness)
+    stiffness = mesh_force.mean_tangent_stiffness(force) if stiffness is None else real(stiffness)
     check(owner, "mean_stiffness", stiffness, "N/um", low=0.0, open_low=True)
     # stiffness and damping are per um, the mass is that of metres
     return 2 * ratio * jnp.sqrt(stiffness * mass / NEWTON)
@@ -227,10 +227,11 @@ def _on_ground(owner: str, name: str, unit: str, given: Any, *, stiff: bool) -> 
     if given.shape != (2, 2, 2):
         raise ValueError(f"{owner}: {name} has shape {given.shape}, must be {_BEARING}")
     check(owner, name, given, unit)
-    if not isinstance(given, jax.core.Tracer):
-        if bool((jnp.abs(given - given.swapaxes(1, 2)) > 1e-9 * jnp.max(jnp.abs(given))).any()):
+    known = concrete(given)
+    if known is not None:
+        if (np.abs(known - known.swapaxes(1, 2)) > 1e-9 * np.max(np.abs(known))).any():
             raise ValueError(f"{owner}: {name} must be symmetric")
-        least = float(jnp.min(jnp.linalg.eigvalsh(given)))
+        least = float(np.min(np.linalg.eigvalsh(known)))
         if least < 0 or (stiff and least == 0):
             limit = "greater than 0" if stiff else "at least 0"
             raise ValueError(f"{owner}: {name} has an eigenvalue of {least:g} {unit}, must be {limit} {unit}")

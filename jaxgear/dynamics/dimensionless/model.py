@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...numerics import Checked, check, number, real
-from ..force import AbstractMeshForce, DeadZone
+from ..force import AbstractMeshForce, DeadZone, approach_under
 from ..oscillator import Excitation, Oscillator
 from .clearance import PolynomialClearance, warn_of_false_well
 from .relief import CycleRelief
@@ -78,9 +78,13 @@ class DimensionlessForce(AbstractMeshForce):
         return jnp.sort(moved)
 
     def static_approach(self, phase: Scalar, force: Scalar) -> Scalar:
-        """x where the exact form takes a positive force at a mesh position: C + f^-1(force / stiffness)."""
-        _, stiffness, taken = self.at(phase)
-        return taken + loaded_approach(self.clearance, force / stiffness)
+        """x that takes a force; of the exact form C + f^-1(force / stiffness), outside of a false double well."""
+        place = self.at(phase)
+        if self.relief_form != "exact":
+            return approach_under(self, place, force)
+        _, stiffness, taken = place
+        size = loaded_approach(self.clearance, jnp.abs(force) / stiffness)
+        return taken + jnp.where(force < 0, -size, size)
 
     def at(self, phase: Scalar) -> Any:
         order = jnp.arange(1, len(self.stiffness_harmonics) + 1, dtype=self.stiffness_harmonics.dtype)
