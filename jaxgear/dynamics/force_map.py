@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..contact.prescribed import solve_series
-from ..numerics import kernel, result
+from ..numerics import program, result
 from .flanks import Flanks
 from .force import AbstractMeshForce
 
@@ -118,10 +118,12 @@ def closing(start: Start, approach: Scalar) -> tuple[Bool[Array, ""], Scalar]:
     return drive, jnp.where(drive, approach - start[0], -approach - start[1])
 
 
-@kernel
+@program
 def tabulate(flanks: Flanks, unloaded, compliance: Scalar, reach: Scalar, levels: int):
     """Force [N] and slope [N/um] of one side at levels of the approach, shape (positions, levels) each, and whether
     all of it has converged.
+
+    Called as it is, it runs for a hundredth of the time that it compiles, and a gear pair needs it twice.
 
     Args:
         flanks: of one side.
