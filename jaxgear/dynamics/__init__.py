@@ -34,6 +34,7 @@ from .settings import UP as UP
 from .settings import Dynamics as Dynamics
 from .speed_sweep import speed_sweep as speed_sweep
 from .speed_sweep import steps_for as steps_for
+from .static import natural_frequencies as natural_frequencies
 from .steady import SteadyNumbers as SteadyNumbers
 from .systems import equivalent_mass as equivalent_mass
 from .systems import inertia_of as inertia_of
