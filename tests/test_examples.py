@@ -19,6 +19,7 @@ EXAMPLES = (
     "is_it_robust_over_torque",
     "what_does_robust_design_buy",
     "drivetrain",
+    "inside_a_simulation",
 )
 
 
@@ -37,7 +38,7 @@ def answers(name):
     return pytest.fixture(scope="module")(lambda: example(name).numbers(results(name)))
 
 
-relief, coupling, curve, robust, manufactured, driven = map(answers, EXAMPLES)
+relief, coupling, curve, robust, manufactured, driven, simulated = map(answers, EXAMPLES)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -168,3 +169,9 @@ def test_the_drivetrain_runs_up_and_its_derivative_is_that_of_a_central_differen
     assert driven["last_speed_rpm"] > 2100.0
     assert driven["force_rms_relief_N"] < 0.8 * driven["force_rms_unmodified_N"]
     assert driven["slope_N_per_um"] == pytest.approx(driven["difference_N_per_um"], rel=1e-3)
+
+
+def test_relief_calms_a_simulated_vibration_and_its_slope_is_that_of_differences(simulated):
+    assert simulated["worst_rms_relief_um"] < 0.2 * simulated["worst_rms_unmodified_um"]
+    assert simulated["slope_um_per_um"] == pytest.approx(simulated["difference_um_per_um"], rel=1e-6)
+    assert simulated["slope_um_per_um"] < -0.5

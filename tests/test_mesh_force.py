@@ -13,7 +13,7 @@ import jaxgear as jg
 from jaxgear.contact import removed_material, solve_removed
 from jaxgear.contact.mesh import prepare_from
 from jaxgear.contact.prescribed import solve_series
-from jaxgear.dynamics import DeadZone, mesh_force
+from jaxgear.dynamics import mesh_force
 from jaxgear.dynamics.flanks import _coast_phase
 from jaxgear.geometry.involute import half_tooth_angle
 
@@ -108,8 +108,22 @@ def test_both_flanks_are_the_same_gears_in_a_mirror(case, mesh):
     aside, approach = jnp.asarray(random.uniform(0, 1, 40)), jnp.asarray(random.uniform(0, 25.0, 40))
     drive = forces(force, middle + aside, approach)
     coast = forces(force, middle - aside, -backlash - approach)
-    # each side is solved at its own positions, the map is linear between both
+    # each side is solved at positions of its own, between which the map is linear: at nodes it is exact, see below
     np.testing.assert_allclose(coast, -drive, rtol=5e-3, atol=10.0)
+
+
+def test_about_its_middle_a_grid_has_both_flanks_at_the_same_places(mesh):
+    """Other gears than equal ones: where the grid begins at the middle of the mirror, nothing is interpolated."""
+    first, shift, play = _coast_phase(mesh)
+    middle = 0.5 * (first + shift / 16)
+    steps = jnp.floor(16 * middle)
+    centred = prepare_from(middle - steps / 16, mesh.pair, mesh.compliance, SIZES)
+    made = mesh_force(centred, torque=TORQUE, **RELIEFS, positions=16, levels=16)
+    mirrored = (2 * int(steps) - np.arange(16)) % 16
+    assert not np.allclose(made.node_force[0], made.node_force[0][mirrored], rtol=0.05)
+    np.testing.assert_allclose(made.start[1], made.start[0][mirrored] + play, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(made.node_force[1], made.node_force[0][mirrored], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(made.node_stiffness[1], made.node_stiffness[0][mirrored], rtol=1e-9, atol=1e-9)
 
 
 def test_the_coast_flanks_touch_where_both_gears_turned_back_put_them(mesh):
@@ -149,9 +163,9 @@ def test_equal_gears_are_their_own_mirror_image_half_a_pitch_on():
     # half a pitch is half of the grid: both sides are solved at the same places
     mirrored = (8 - np.arange(16)) % 16
     np.testing.assert_allclose(made.start[1], made.start[0][mirrored] + play, atol=1e-9)
-    np.testing.assert_allclose(made.node_force[1], made.node_force[0][mirrored], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(made.node_force[1], made.node_force[0][mirrored], rtol=1e-9, atol=1e-9)
     # driven by the other gear the reliefs change places, and approach and recess with them
-    np.testing.assert_allclose(other.node_force[0], made.node_force[0][-np.arange(16)], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(other.node_force[0], made.node_force[0][-np.arange(16)], rtol=1e-9, atol=1e-9)
 
 
 def test_other_coast_flanks_change_nothing_on_the_drive_side(mesh):
