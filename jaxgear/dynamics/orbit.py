@@ -79,9 +79,12 @@ class Orbit(Checked):
     @property
     def stable(self) -> Bool[Array, "..."]:
         """Whether no small deviation grows: no multiplier lies outside of the unit circle."""
-        margin = _NEUTRAL * np.sqrt(jnp.finfo(self.monodromy.dtype).eps)
-        sizes = jnp.abs(jnp.linalg.eigvals(jax.lax.stop_gradient(self.monodromy)))
-        return jnp.all(sizes <= 1 + margin, axis=-1)
+        return ~jnp.any(outside(jnp.abs(jnp.linalg.eigvals(jax.lax.stop_gradient(self.monodromy)))), axis=-1)
+
+
+def outside(moduli):
+    """Which multipliers lie outside of the unit circle."""
+    return ~(moduli <= 1 + _NEUTRAL * np.sqrt(jnp.finfo(moduli.dtype).eps))
 
 
 def find_orbit(
