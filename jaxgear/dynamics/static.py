@@ -43,7 +43,7 @@ def at_rest(oscillator: Oscillator, phase: Scalar) -> Rest:
     along = oscillator.direction / root_mass
     load = oscillator.load / root_mass
     wanted = along @ load / (along @ along)
-    approach = _approach_under(oscillator.mesh_force, place, wanted)
+    approach = approach_under(oscillator.mesh_force, place, wanted)
     error = -oscillator.approach(phase, jnp.zeros_like(load))
     x = along * (approach + error) / (along @ along)
     if oscillator.stiffness is not None:
@@ -65,13 +65,13 @@ def mean_stiffness_of(mesh_force: AbstractMeshForce, static_force: Scalar) -> Sc
     """Slope of the mesh force under a static force [N], averaged over the mesh cycle [N/um]."""
 
     def slope(phase):
-        return mesh_force.stiffness(phase, _approach_under(mesh_force, mesh_force.at(phase), static_force))
+        return mesh_force.stiffness(phase, approach_under(mesh_force, mesh_force.at(phase), static_force))
 
     begin = mesh_force.nodes(_POSITIONS).astype(static_force.dtype)
     return jnp.sum(jnp.diff(begin) * jax.vmap(slope)((begin[:-1] + begin[1:]) / 2))
 
 
-def _approach_under(mesh_force: AbstractMeshForce, place, wanted: Scalar) -> Scalar:
+def approach_under(mesh_force: AbstractMeshForce, place, wanted: Scalar) -> Scalar:
     """Approach [um] at which the mesh force has a value [N]."""
     force = mesh_force.force
     tried = jnp.asarray(_BRACKETS, wanted.dtype)
