@@ -75,8 +75,8 @@ def bifurcation_of(oscillator: Any, near: Bifurcation, *, steps: Any = STEPS) ->
     nodes = nodes_of("bifurcation_of", steps)
     z = scaled(near.orbit.start, near.orbit.mesh_frequency)
     normal = jnp.append(near.direction, 0.0) if near.kind == "fold" else first_direction(len(z) + 1, dtype, 1.0)
-    multiplier = critical(near.kind, np.linalg.eigvals(np.asarray(near.orbit.monodromy)))
-    multiplier = jnp.asarray(multiplier, np.result_type(dtype, np.complex64) if np.iscomplexobj(multiplier) else dtype)
+    known = critical(near.kind, np.linalg.eigvals(np.asarray(near.orbit.monodromy)))
+    multiplier = jnp.asarray(known, np.result_type(dtype, np.complex64) if isinstance(known, complex) else dtype)
     given = z, parameter, normal.astype(dtype), multiplier
     return _moved(family_of(oscillator), given, nodes, near.kind, near.orbit.periods)
 
