@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from oscillators import SHARE, dead_zone, frequency, rectangular
 
-from jaxgear.dynamics import find_orbit, fold_of, follow_orbits
+from jaxgear.dynamics import bifurcation_of, find_orbit, follow_orbits
 
 STEPS = 1000
 TWO_PI = 2 * np.pi
@@ -122,7 +122,7 @@ def test_a_family_over_any_parameter():
     within = frequency(0.6), frequency(1.0)
     branch = follow_orbits(dead_zone, start, parameter=speed, within=within, direction="down", step=0.02, steps=STEPS)
     assert branch.ended == "range" and [found.kind for found in branch.bifurcations] == ["fold", "fold"]
-    again = fold_of(dead_zone, branch.bifurcations[0], steps=STEPS)
+    again = bifurcation_of(dead_zone, branch.bifurcations[0], steps=STEPS)
     np.testing.assert_allclose(again.parameter, branch.bifurcations[0].parameter, rtol=1e-5)
     (orbit,) = near(branch, 0.80, False)
     orbit = find_orbit(*dead_zone(jnp.asarray(frequency(0.80))), orbit.start, steps=STEPS)
@@ -133,21 +133,25 @@ def test_a_family_over_any_parameter():
     assert abs(orbit.approach_mean - 1.085105) < 0.01 and abs(amplitude - 0.156748) < 0.02
 
 
-def test_the_gradient_of_a_fold(resonance):
-    """Speed at which the low branch ends, by damping and stiffness ratio, against the folds of changed oscillators.
+def finer(orbit, changes):
+    """Nodes of a cycle with short steps where contact begins and ends.
 
-    Short steps lie where contact begins and ends: a kink inside of a step costs the derivative its accuracy.
+    A kink inside of a step costs the derivative its accuracy.
     """
-    fold = resonance.bifurcations[1]
-    phase, approach = np.asarray(fold.orbit.phase), np.asarray(fold.orbit.approach)
+    phase, approach = np.asarray(orbit.phase), np.asarray(orbit.approach)
     (turns,) = np.nonzero(approach * np.roll(approach, -1) < 0)
-    assert len(turns) == 2
+    assert len(turns) == changes
     short = [np.linspace(phase[i] - 0.003, phase[i] + 0.004, 501) for i in turns]
-    nodes = jnp.asarray(np.unique(np.concatenate([phase, [1.0], *short])))
+    return jnp.asarray(np.unique(np.concatenate([phase, [1.0], *short])))
+
+
+def check_gradient(bifurcation, changes):
+    """Its speed by damping and stiffness ratio, against those of changed oscillators."""
+    nodes = finer(bifurcation.orbit, changes)
 
     @jax.jit
     def speed(numbers):
-        found = fold_of(rectangular(*numbers), fold, steps=nodes)
+        found = bifurcation_of(rectangular(*numbers), bifurcation, steps=nodes)
         return TWO_PI * found.parameter, found.converged
 
     point = jnp.array([0.05, 1.75])
@@ -158,9 +162,19 @@ def test_the_gradient_of_a_fold(resonance):
         np.testing.assert_allclose(gradient[i], difference, rtol=1e-3)
 
 
+def test_the_gradient_of_a_fold(resonance):
+    """Where the low branch ends, of an orbit that loses contact."""
+    check_gradient(resonance.bifurcations[1], changes=2)
+
+
+def test_the_gradient_of_a_flip(parametric):
+    """Where the period doubles, of an orbit that keeps contact."""
+    check_gradient(parametric.bifurcations[0], changes=0)
+
+
 def test_what_is_no_fold_or_flip_is_refused(resonance, parametric):
-    with pytest.raises(ValueError, match='fold_of: near is a bifurcation of kind "flip", must be a fold'):
-        fold_of(rectangular(), parametric.bifurcations[0])
+    with pytest.raises(TypeError, match="bifurcation_of: near is of type Orbit, must be a Bifurcation"):
+        bifurcation_of(rectangular(), parametric.bifurcations[0].orbit)
     with pytest.raises(ValueError, match='start is a bifurcation of kind "fold", must be a flip'):
         followed(resonance.bifurcations[0], within=(0.05, 0.2))
     with pytest.raises(ValueError, match="direction = 'left' must be"):

@@ -10,6 +10,7 @@ import pytest
 
 from jaxgear.dynamics import (
     DeadZone,
+    Dynamics,
     Excitation,
     Oscillator,
     RectangularStiffness,
@@ -42,6 +43,7 @@ DOWN = {
     1.70: (-1.636469, -0.189108, 0.363866, 1.636903, 3.042975, -1.654128, 4.168459, 2),
 }
 OMEGA = np.array([row[0] for row in UP])
+USUAL = float(Dynamics([1.0]).kick)
 SPEEDS = OMEGA / (2 * np.pi)
 
 
@@ -90,7 +92,7 @@ def test_the_way_down_stays_on_the_upper_branch_until_its_fold():
 
 
 def test_a_kick_finds_the_orbit_of_two_cycles():
-    at_rest, kicked = (swept("up", kick, carry=False) for kick in (None, 4.5))
+    at_rest, kicked = (swept("up", kick, carry=False) for kick in (None, USUAL))
     i = list(OMEGA).index(1.7)
     assert (int(at_rest.period[i]), int(kicked.period[i])) == (1, 2)
     assert float(kicked.dynamic_factor[i]) == pytest.approx(4.168459, abs=1e-5)

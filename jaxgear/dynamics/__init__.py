@@ -2,8 +2,8 @@
 
 from .batch import speed_sweeps as speed_sweeps
 from .bifurcation import Bifurcation as Bifurcation
-from .bifurcation import Fold as Fold
-from .bifurcation import fold_of as fold_of
+from .bifurcation_point import BifurcationPoint as BifurcationPoint
+from .bifurcation_point import bifurcation_of as bifurcation_of
 from .continuation import Branch as Branch
 from .continuation import follow_orbits as follow_orbits
 from .force import AbstractMeshForce as AbstractMeshForce

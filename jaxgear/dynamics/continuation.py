@@ -128,7 +128,7 @@ class _Follower:
             raise ValueError("follow_orbits: there is no orbit of the branch near the start")
         if flip:
             self.point = self.point._replace(tangent=jnp.append(start.direction, 0.0).astype(dtype))
-        self.begin, self.tests = self.point, tests_of(self.point, self.orbit)
+        self.begin, self.tests = self.point, tests_of(self.point)
         self.kept, self.bifurcations, self.before = [self.orbit], [], []
         self.parameters = [at]
 
@@ -175,9 +175,9 @@ class _Follower:
         return float(self.scales.unknowns(point.place)[1])
 
     def take(self, point: Corrected, orbit: Orbit) -> None:
-        tests = tests_of(point, orbit)
+        tests = tests_of(point)
         # where the parameter stands still, the direction that it had
-        self.tests = tests._replace(fold=self.tests.fold) if np.isnan(tests.fold) else tests
+        self.tests = tests._replace(level=self.tests.level) if np.isnan(tests.level) else tests
         self.point, self.orbit = point, orbit
         self.kept.append(orbit)
         self.parameters.append(self.scales.unknowns(point.place)[1])
@@ -200,20 +200,23 @@ class _Follower:
 
     def note(self, point: Corrected, orbit: Orbit, step: float) -> None:
         """Locates the bifurcations up to the next point."""
-        tests = tests_of(point, orbit)
-        found = [self.located(kind, tests, step) for kind in self.tests.crossed(tests)]
+        tests = tests_of(point)
+        found = [self.located(kind, test, tests, step) for kind, test in self.tests.crossed(tests).items()]
         for _, bifurcation in sorted(found, key=lambda item: item[0]):
-            self.bifurcations.append(bifurcation)
-            self.before.append(len(self.kept))
+            if bifurcation is not None:
+                self.bifurcations.append(bifurcation)
+                self.before.append(len(self.kept))
 
-    def located(self, kind: Kind, beyond: Tests, step: float) -> tuple[float, Bifurcation]:
+    def located(
+        self, kind: Kind, test: Callable[[Tests], float], beyond: Tests, step: float
+    ) -> tuple[float, Bifurcation | None]:
         """A bifurcation before the next point, by false position with halved ends (Illinois), and its distance."""
-        a, b, left, right = 0.0, step, self.tests.of(kind), beyond.of(kind)
+        a, b, left, right = 0.0, step, test(self.tests), test(beyond)
         side = 0
         for _ in range(_HALVINGS):
             middle = (a * right - b * left) / (right - left)
             point, orbit = self.along(middle)
-            value = tests_of(point, orbit).of(kind)
+            value = test(tests_of(point))
             if not abs(value) > _LOCATED or b - a < _LOCATED * step:
                 break
             if value * right > 0:

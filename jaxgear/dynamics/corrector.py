@@ -54,12 +54,14 @@ class Corrected(NamedTuple):
     Attributes:
         place: where it is.
         tangent: of the branch, of length one; the last number is that of the parameter.
+        monodromy: derivative of the state after the orbit by the state before, in the unknowns of the place.
         evaluations: of the Poincare map.
         converged: whether there is an orbit.
     """
 
     place: Place
     tangent: Place
+    monodromy: Float[Array, "unknowns unknowns"]
     evaluations: Scalar
     converged: Bool[Array, ""]
 
@@ -95,7 +97,8 @@ def corrected(family: Family, guess: Place, normal: Place, scales: Scales, nodes
     found = newton(equations, guess, most=_MOST)
     ahead = jnp.zeros_like(guess).at[-1].set(1.0)
     tangent = solve(found.jacobian, ahead)
-    return Corrected(found.root, tangent / jnp.linalg.norm(tangent), found.steps, found.converged)
+    monodromy = found.jacobian[:-1, :-1] + jnp.eye(len(guess) - 1, dtype=guess.dtype)
+    return Corrected(found.root, tangent / jnp.linalg.norm(tangent), monodromy, found.steps, found.converged)
 
 
 def first_direction(size: int, dtype, sign: float) -> Place:

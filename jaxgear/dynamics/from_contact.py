@@ -158,7 +158,7 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
     if model == "loaded error":
         mean = jnp.mean(deflection, axis=1)
         return LoadedError(first, start + deflection - mean[:, None], force / mean, converged)
-    farthest = jax.lax.stop_gradient(reach * jnp.max(deflection[0]))
+    farthest = reach * jnp.max(deflection[0])
     tables = [
         tabulate(side, _in_own_order(side, each), compliance, farthest, levels) for side, each in zip(sides, found)
     ]

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from ..numerics import Checked, kernel, result, whole
 from .integrate import cycles
 from .oscillator import Oscillator
-from .poincare import STEPS, checked, nodes_of, steps_at
+from .poincare import STEPS, checked, steps_at
 
 Samples = Float[Array, " samples"]
 
@@ -45,8 +45,7 @@ def motion(oscillator: Oscillator, mesh_frequency: Any, start: Any, *, periods: 
         TypeError: for something else than an `Oscillator`.
         ValueError: for a mesh frequency that is not positive, a start of another shape or steps out of order.
     """
-    frequency, start = checked("motion", oscillator, mesh_frequency, start)
-    nodes = nodes_of("motion", steps)
+    frequency, start, nodes = checked("motion", oscillator, mesh_frequency, start, steps)
     return _moved(oscillator, frequency, start, nodes, whole("motion", "periods", periods))
 
 

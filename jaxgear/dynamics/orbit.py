@@ -13,7 +13,7 @@ from ..numerics import Checked, check, count, implicit_root, kernel, real, resul
 from .history import history, largest, mean, rms, share, smallest
 from .integrate import cycles
 from .oscillator import Coordinates, Oscillator, State
-from .poincare import STEPS, after, checked, moved, nodes_of, scaled, steps_at, unscaled
+from .poincare import STEPS, after, checked, moved, scaled, steps_at, unscaled
 from .static import static_force
 
 Scalar = Float[Array, ""]
@@ -22,6 +22,7 @@ Samples = Float[Array, " samples"]
 # A multiplier counts as outside of the unit circle from this many roots of the rounding error on: coordinates that turn
 # freely together have two multipliers of one, which rounding separates by that much.
 _NEUTRAL = 100.0
+_REFINEMENTS = 8  # evaluations of Newton's method from a settled state, which is near: three or four are enough
 _SAME = 0.05  # largest distance of an orbit from the settled state that it refines, as part of its size
 
 
@@ -80,9 +81,12 @@ class Orbit(Checked):
     @property
     def stable(self) -> Bool[Array, "..."]:
         """Whether no small deviation grows: no multiplier lies outside of the unit circle."""
-        margin = _NEUTRAL * np.sqrt(jnp.finfo(self.monodromy.dtype).eps)
-        sizes = jnp.abs(jnp.linalg.eigvals(jax.lax.stop_gradient(self.monodromy)))
-        return jnp.all(sizes <= 1 + margin, axis=-1)
+        return ~jnp.any(outside(jnp.abs(jnp.linalg.eigvals(jax.lax.stop_gradient(self.monodromy)))), axis=-1)
+
+
+def outside(moduli):
+    """Which multipliers lie outside of the unit circle."""
+    return ~(moduli <= 1 + _NEUTRAL * np.sqrt(jnp.finfo(moduli.dtype).eps))
 
 
 def find_orbit(
@@ -108,8 +112,7 @@ def find_orbit(
         TypeError: for something else than an `Oscillator`.
         ValueError: for a mesh frequency that is not positive, a start of another shape or steps out of order.
     """
-    frequency, start = checked("find_orbit", oscillator, mesh_frequency, start)
-    nodes = nodes_of("find_orbit", steps)
+    frequency, start, nodes = checked("find_orbit", oscillator, mesh_frequency, start, steps)
     return _found(oscillator, frequency, start, nodes, whole("find_orbit", "periods", periods))
 
 
@@ -125,8 +128,7 @@ def settle(oscillator: Oscillator, mesh_frequency: Any, start: Any, *, cycles: i
     Raises:
         TypeError, ValueError: as `find_orbit`.
     """
-    frequency, start = checked("settle", oscillator, mesh_frequency, start)
-    nodes = nodes_of("settle", steps)
+    frequency, start, nodes = checked("settle", oscillator, mesh_frequency, start, steps)
     return _settled(oscillator, frequency, start, nodes, whole("settle", "cycles", cycles, 0))
 
 
@@ -143,6 +145,7 @@ def steady_orbit(
 
     After some cycles, which no derivative passes through, Newton's method takes the state to the orbit. It has not
     converged where the motion does not settle on an orbit of so many mesh cycles: where that is unstable or far away.
+    What is returned is then those cycles themselves.
 
     Args:
         oscillator, mesh_frequency, start, periods, steps: as for `find_orbit`; the start may be anything.
@@ -152,10 +155,9 @@ def steady_orbit(
     Raises:
         TypeError, ValueError: as `find_orbit`.
     """
-    frequency, start = checked("steady_orbit", oscillator, mesh_frequency, start)
-    nodes = nodes_of("steady_orbit", steps)
+    frequency, start, nodes = checked("steady_orbit", oscillator, mesh_frequency, start, steps)
     settle, periods = whole("steady_orbit", "settle", settle, 0), whole("steady_orbit", "periods", periods)
-    return _steady(oscillator, frequency, start, nodes, settle, periods)
+    return settled_orbit(oscillator, frequency, start, nodes, settle, periods)
 
 
 def steady_orbits(
@@ -212,12 +214,19 @@ def _found(oscillator, frequency, start, nodes, periods: int) -> Orbit:
 
 
 @kernel
-def _steady(oscillator, frequency, start, nodes, settle: int, periods: int) -> Orbit:
-    begin = _settled(oscillator, frequency, start, nodes, settle)
-    orbit = _found(oscillator, frequency, begin, nodes, periods)
-    there, here = (jax.lax.stop_gradient(scaled(y, frequency)) for y in (orbit.start, begin))
-    near = jnp.linalg.norm(there - here) <= _SAME * jnp.linalg.norm(there)
-    return dataclasses.replace(orbit, converged=orbit.converged & orbit.stable & near)
+def settled_orbit(oscillator: Oscillator, frequency: Scalar, start: State, nodes, settle: int, periods: int) -> Orbit:
+    """`steady_orbit` without checks.
+
+    Where the motion does not settle on an orbit of so many cycles it is those cycles themselves: they have not
+    converged, and their derivatives are those from a fixed state.
+    """
+    steps = steps_at(oscillator, nodes)
+    begin = scaled(_settled(oscillator, frequency, start, nodes, settle), jax.lax.stop_gradient(frequency))
+    z = implicit_root(lambda z: moved(oscillator, z, steps, frequency, periods), begin, most=_REFINEMENTS)
+    # not where a state is not a number either
+    same = jax.lax.stop_gradient(jnp.linalg.norm(z - begin) <= _SAME * jnp.linalg.norm(z))
+    orbit = orbit_at(oscillator, jnp.where(same, z, begin), steps, frequency, periods)
+    return dataclasses.replace(orbit, converged=orbit.converged & orbit.stable & same)
 
 
 def orbit_at(oscillator: Oscillator, z, steps, frequency: Scalar, periods: int) -> Orbit:

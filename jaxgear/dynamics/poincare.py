@@ -43,12 +43,15 @@ def moved(oscillator: Oscillator, z: Unknowns, steps: Steps, mesh_frequency: Sca
     return scaled(y, mesh_frequency) - z
 
 
-def checked(owner: str, oscillator: Any, mesh_frequency: Any, start: Any) -> tuple[Scalar, State]:
-    """Mesh frequency and start as arrays of the oscillator's type.
+Nodes = int | Float[Array, " nodes"]
+
+
+def checked(owner: str, oscillator: Any, mesh_frequency: Any, start: Any, steps: Any) -> tuple[Scalar, State, Nodes]:
+    """Mesh frequency and start as arrays of the oscillator's type, and what `steps_at` takes.
 
     Raises:
         TypeError: for something else than an `Oscillator`.
-        ValueError: for a mesh frequency that is not positive, or a start of another shape.
+        ValueError: for a mesh frequency that is not positive, a start of another shape or steps out of order.
     """
     if not isinstance(oscillator, Oscillator):
         raise TypeError(f"{owner}: oscillator is of type {type(oscillator).__name__}, must be an Oscillator")
@@ -67,10 +70,10 @@ def checked(owner: str, oscillator: Any, mesh_frequency: Any, start: Any) -> tup
             raise ValueError(f"{owner}: {name} of start have shape {part.shape}, must be {shape}")
     dtype = jnp.result_type(oscillator.mass, frequency)
     x, v = (part.astype(dtype) for part in parts)
-    return frequency.astype(dtype), (x, v)
+    return frequency.astype(dtype), (x, v), nodes_of(owner, steps)
 
 
-def nodes_of(owner: str, steps: Any) -> int | Float[Array, " nodes"]:
+def nodes_of(owner: str, steps: Any) -> Nodes:
     """What `steps_at` takes, checked.
 
     Raises:
@@ -87,7 +90,7 @@ def nodes_of(owner: str, steps: Any) -> int | Float[Array, " nodes"]:
     return nodes
 
 
-def steps_at(oscillator: Oscillator, nodes: int | Float[Array, " nodes"]) -> Steps:
+def steps_at(oscillator: Oscillator, nodes: Nodes) -> Steps:
     """Steps between nodes of a mesh cycle, or so many as the mesh force lays them out."""
     if isinstance(nodes, int):
         nodes = oscillator.mesh_force.nodes(nodes)

@@ -6,8 +6,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ...numerics import Checked, check, kernel, real, result, safe_divide, whole
-from ..integrate import Steps, cycles, one_cycle, steps_of
-from ..oscillator import Oscillator, State
+from ..orbit import settled_orbit
 from .model import DimensionlessModel, loaded_approach
 
 Scalar = Float[Array, ""]
@@ -26,7 +25,7 @@ class Settled(Checked):
         weight: share of the recorded time that a sample stands for, shape (samples,).
         amplitude: half of the range of x, S1's alpha_max.
         residual: change of the state over the recorded cycles, relative to the size of the vibration.
-        settled: False where that is too large, or the vibration left the range of a polynomial.
+        settled: False where that is too large, the orbit is unstable, or the vibration left the range of a polynomial.
         start: state at mesh position 0, of the oscillator's coordinate.
     """
 
@@ -84,61 +83,20 @@ def at_rest(model: DimensionlessModel) -> Float[Array, " two"]:
 
 @kernel
 def _settle(model: DimensionlessModel, frequency: Scalar, begin, settling: int, periods: int, steps: int) -> Settled:
-    oscillator, mesh_frequency = model.oscillator(), frequency / (2 * jnp.pi)
-    prepared = steps_of(oscillator, model.mesh_force.nodes(steps).astype(begin.dtype))
-    fixed = jax.lax.stop_gradient((oscillator, mesh_frequency, prepared, begin))
-    y = _run(*fixed[:3], fixed[3], settling)
-    y = jax.lax.stop_gradient(y)
-
-    def over(y):
-        return _run(oscillator, mesh_frequency, prepared, y, periods)
-
-    jacobian = jax.lax.stop_gradient(jax.jacfwd(lambda y: _run(*fixed[:3], y, periods))(y))
-    missed = over(y) - y
-    inverse, determinant = _inverse(jacobian - jnp.eye(2, dtype=y.dtype))
-    step = inverse @ missed
-    # a Newton step lands on the orbit, and its derivative is the orbit's; far from it the step means nothing
-    near = jnp.all(jnp.abs(jax.lax.stop_gradient(missed)) < 1e-2) & (jnp.abs(determinant) > 1e-9)
-    start = jnp.where(near, y - jnp.where(near, step, 0.0), y)
-    return _recorded(oscillator, mesh_frequency, prepared, start, periods)
-
-
-def _recorded(oscillator: Oscillator, mesh_frequency: Scalar, prepared: Steps, start, periods: int) -> Settled:
-    y, (x, v) = cycles(oscillator, _state(start), prepared, mesh_frequency, periods)
-    turns = jnp.arange(periods, dtype=start.dtype)
-    phase = (prepared.phase[None] + turns[:, None]).ravel()
-    length = prepared.length
-    weight = jnp.tile(0.5 * (length + jnp.roll(length, 1)) / periods, periods)
-    approach = jax.vmap(oscillator.approach)(phase, x.reshape(-1, 1))
-    force = jax.vmap(oscillator.mesh_force)(phase, approach)
-    amplitude = 0.5 * (jnp.max(approach) - jnp.min(approach))
-    miss = jnp.max(jnp.abs(_flat(y) - start))
-    residual = safe_divide(miss, jnp.max(jnp.abs(approach)))
-    settled = jnp.isfinite(approach).all() & (residual < _SETTLED)
-    return Settled(phase, approach, force, weight, amplitude, residual, settled, start)
-
-
-def _run(oscillator: Oscillator, mesh_frequency: Scalar, prepared: Steps, start, count: int):
-    """State after some cycles, shape (2,)."""
-    y, _ = jax.lax.scan(
-        lambda y, _: (one_cycle(oscillator, y, prepared, mesh_frequency)[0], None), _state(start), length=count
+    start = begin[:1], begin[1:]
+    orbit = settled_orbit(model.oscillator(), frequency / (2 * jnp.pi), start, steps, settling, periods)
+    length = jnp.diff(orbit.phase, append=jnp.full(1, periods, orbit.phase.dtype))
+    residual = safe_divide(orbit.residual, jnp.max(jnp.abs(orbit.approach)))
+    return Settled(
+        phase=orbit.phase,
+        approach=orbit.approach,
+        force=orbit.force,
+        weight=0.5 * (length + jnp.roll(length, 1)) / periods,
+        amplitude=0.5 * (orbit.approach_max - orbit.approach_min),
+        residual=residual,
+        settled=jnp.isfinite(orbit.approach).all() & orbit.stable & (residual < _SETTLED),
+        start=jnp.concatenate(orbit.start),
     )
-    return _flat(y)
-
-
-def _state(flat: Float[Array, " two"]) -> State:
-    return flat[:1], flat[1:]
-
-
-def _flat(y: State) -> Float[Array, " two"]:
-    return jnp.concatenate(y)
-
-
-def _inverse(matrix):
-    (a, b), (c, d) = matrix
-    determinant = a * d - b * c
-    safe = jnp.where(determinant == 0, 1.0, determinant)
-    return jnp.stack([jnp.stack([d, -b]), jnp.stack([-c, a])]) / safe, determinant
 
 
 def _phases(count: int) -> Float[Array, " positions"]:

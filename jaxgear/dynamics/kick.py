@@ -1,0 +1,71 @@
+"""Starts far from rest, which find orbits that hang together with no other."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .oscillator import Oscillator, State
+from .static import Rest
+
+Scalar = Float[Array, ""]
+
+_POSITIONS = 16  # of the first harmonic of the static approach
+_QUARTER = 0.25  # of a mesh cycle
+_FLAT = 1e-6  # a static approach with a smaller harmonic, as part of its deflection, has no softest position
+
+
+class Kick(NamedTuple):
+    """How flanks are thrown apart.
+
+    Attributes:
+        apart: largest approach less that at rest [um], negative.
+        acceleration: of the approach where the flanks are apart [um/s^2].
+        phase: mesh position of the largest distance, from -1/2 to 1/2 [base pitches].
+        on: whether they are thrown at all.
+    """
+
+    apart: Scalar
+    acceleration: Scalar
+    phase: Scalar
+    on: Array
+
+
+def kick_of(oscillator: Oscillator, rest: Rest, factor: Scalar) -> Kick:
+    """The distance from which flanks meet again with a dynamic factor, and where on the cycle they are to have it.
+
+    With the static deflection d of the mesh stiffness, flanks that a constant force closes over a gap g are pressed to
+    the deflection d + (d^2 + 2 g d)^(1/2): a dynamic factor K needs g = ((K - 1)^2 - 1) d / 2. Up to K = 2 contact is
+    kept, and the approach is released from (K - 1) d behind that at rest.
+
+    Orbits of two mesh cycles are farthest apart a quarter of a cycle behind the softest mesh position, when the mesh
+    begins to stiffen. With a rectangular or a harmonic stiffness a gap there leads to them over a band of sizes about
+    K = 3, whatever variation and damping; an impulse on flanks in contact does for scattered sizes only.
+    """
+    along = oscillator.direction / oscillator.mass
+    deflection = jnp.abs(rest.force) / rest.stiffness
+    swing = factor - 1
+    apart = jnp.where(swing > 1, 0.5 * (1 + swing**2), swing) * deflection
+    phases = jnp.arange(_POSITIONS, dtype=deflection.dtype) / _POSITIONS
+    static = jax.vmap(lambda at: oscillator.mesh_force.static_approach(at, rest.force))(phases)
+    cosine, sine = (jnp.mean(static * of(2 * jnp.pi * phases)) for of in (jnp.cos, jnp.sin))
+    varies = jnp.hypot(cosine, sine) > _FLAT * deflection
+    softest = jnp.where(varies, jnp.arctan2(sine, cosine) / (2 * jnp.pi), -_QUARTER)
+    phase = softest + _QUARTER
+    acceleration = oscillator.newton * jnp.sum(oscillator.direction * along) * jnp.abs(rest.force)
+    return Kick(-apart, acceleration, phase - jnp.round(phase), factor > 1)
+
+
+def kicked(oscillator: Oscillator, start: State, kick: Kick, mesh_frequency: Scalar) -> State:
+    """A start with its approach thrown so that it would stand still, the farthest away, at the mesh position of a kick.
+
+    At mesh position 0 the flanks are on their way there, or on their way back, under the static force alone.
+    """
+    x, v = start
+    time = kick.phase / mesh_frequency
+    fallen = jnp.minimum(0.5 * kick.acceleration * time**2, -kick.apart)  # no farther than to the approach at rest
+    along = oscillator.direction / oscillator.mass
+    share = along / jnp.sum(oscillator.direction * along)
+    speed = -jnp.sign(time) * jnp.sqrt(2 * kick.acceleration * fallen)
+    return x + share * jnp.where(kick.on, kick.apart + fallen, 0.0), v + share * jnp.where(kick.on, speed, 0.0)
