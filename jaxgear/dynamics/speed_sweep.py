@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 from ..numerics import check, concrete, kernel, real, whole
 from .integrate import cycle_of
 from .oscillator import Oscillator, State
-from .response import Numbers, SpeedResponse, no_sums, numbers_of, with_cycle, with_step
+from .response import Numbers, SpeedResponse, no_sums, numbers_of, waves_of, with_cycle, with_step
 from .settling import Speed, settled
 from .static import Rest, at_rest, natural_frequencies
 
@@ -217,11 +217,12 @@ def swept(
     rest = at_rest(oscillator, jnp.zeros((), frequencies.dtype))
     first = _kicked(oscillator, rest, start, limits.kick)
     cycle = cycle_of(oscillator, sizes.most_steps)
+    waves = waves_of(jnp.asarray(sizes.orders, frequencies.dtype), cycle.nodes)
 
     def at_speed(y, speed):
         frequency, steps = speed
         begin = first if sizes.fresh else y
-        found = _steady(oscillator, begin, Speed(frequency, cycle, steps, sizes.most_steps), limits, sizes, rest)
+        found = _steady(oscillator, begin, Speed(frequency, cycle, steps, sizes.most_steps), limits, sizes, rest, waves)
         return found.state, found
 
     def turned(parts):
@@ -262,7 +263,7 @@ class _Found(NamedTuple):
     state: State
 
 
-def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, rest: Rest) -> _Found:
+def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, rest: Rest, waves) -> _Found:
     """Steady state at one speed, and its record."""
     frequency = speed.frequency
     y, period = settled(oscillator, y, speed, limits.tolerance, limits.most_cycles, sizes.most_periods)
@@ -281,9 +282,9 @@ def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, rest: R
         here = jnp.arange(sizes.points) % cycles == cycle
         approaches, velocities = jnp.where(here, q, approaches), jnp.where(here, v, velocities)
 
-        def more(carry, step):
+        def more(carry, step, nodes):
             y, sums = carry
-            return with_step(sums, oscillator, y, step, frequency, orders=orders, origin=origin)
+            return with_step(sums, oscillator, y, step, frequency, waves=waves[nodes], origin=origin)
 
         nothing = no_sums(orders)
         begin = sums._replace(force=nothing.force, approach=nothing.approach)
