@@ -92,7 +92,7 @@ def no_sums(orders: Float[Array, " orders"]) -> Sums:
 
 def waves_of(orders: Float[Array, " orders"], phase: Float[Array, " nodes"]) -> Float[Array, "nodes waves"]:
     """Cosines and negative sines of the orders at mesh positions [base pitches]; of the cycle alone."""
-    turn = 2 * jnp.pi * phase[:, None] * orders
+    turn = 2 * jnp.pi * phase[:, None] * orders[None]
     return jnp.concatenate([jnp.cos(turn), -jnp.sin(turn)], axis=1)
 
 
@@ -127,7 +127,7 @@ def with_step(
 
     # a product of matrices, so that no compiler works the force out once more for every order
     weights = step.length * jnp.asarray(SIMPSON, off.dtype)
-    spectra = (weights * jnp.stack([of.force[:, 0], of.approach[:, 0]])) @ waves
+    spectra = (weights[None] * jnp.stack([of.force[:, 0], of.approach[:, 0]])) @ waves
     force, approach = jax.lax.complex(*jnp.split(spectra, 2, axis=1))
 
     return end, Sums(
