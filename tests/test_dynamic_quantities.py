@@ -131,6 +131,24 @@ def test_a_linearization_has_the_slopes_of_every_speed(mesh, sloped):
         assert np.asarray(pieces.slope[0, :, 0]) == pytest.approx(8 * slope.ravel(), rel=1e-6, abs=1e-8)
 
 
+def test_quantities_of_the_same_settings_share_a_sweep(mesh, monkeypatch):
+    """As objectives and limits of one problem; those at the speed of the operation have their own."""
+    traced = []
+    made = Dynamics.numbers
+    monkeypatch.setattr(Dynamics, "numbers", lambda *args: traced.append(args) or made(*args))
+    objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_no_contact")]
+    limit = jg.Constraint(SETTINGS.quantity("worst_approach_rms"), high=5.0)
+    options = {"mesh": mesh, "torque": TORQUE, "objective": objectives, "constraints": [limit]}
+    problem = make_problem(design, {"height": (0.0, 8.0)}, **options)
+    for times in (1, 2):  # a second trace has nothing of the first one
+        eqx.filter_eval_shape(problem.score, jnp.asarray([0.3]))
+        assert len(traced) == times
+    cycle = jg.solve(mesh, jg.Operation(TORQUE, speed=3000.0)).on(mesh)
+    names = "dynamic_factor", "approach_rms", "worst_approach_rms"
+    jax.eval_shape(lambda: [SETTINGS.quantity(name)(cycle) for name in names])
+    assert len(traced) == 4
+
+
 def test_equal_settings_make_equal_quantities():
     again = dataclasses.replace(SETTINGS, damping_ratio=0.05)
     one, same = SETTINGS.quantity("worst_dynamic_factor"), again.quantity("worst_dynamic_factor")
