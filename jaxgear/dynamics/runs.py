@@ -136,7 +136,8 @@ def _of_designs(rows, shared, make, keep, ways: _Ways, sizes, devices):
 
 def _or_nothing(converged: Bool[Array, ""], part: Array) -> Array:
     """Numbers of a mesh force that was found."""
-    return jnp.where(converged, part, jnp.nan if jnp.issubdtype(part.dtype, jnp.floating) else 0).astype(part.dtype)
+    nothing = jnp.nan if jnp.issubdtype(part.dtype, jnp.floating) else 0
+    return jnp.where(converged, part, jnp.full((), nothing, part.dtype))
 
 
 def _ways(runs: Mapping[str, Run]) -> _Ways:
