@@ -14,7 +14,7 @@ from ..numerics import kernel
 from .batch import side_by_side
 from .oscillator import Oscillator
 from .response import SpeedResponse
-from .speed_sweep import checked_frequencies, prepared, steps_for, swept
+from .speed_sweep import check_single, checked_frequencies, prepared, steps_for, swept
 
 Responses = dict[str, SpeedResponse]
 Direction = Literal["up", "down"]
@@ -44,6 +44,7 @@ def speed_runs(oscillator: Oscillator, mesh_frequencies, runs: Mapping[str, Run]
         ValueError: as `speed_sweep`.
     """
     frequencies = checked_frequencies("speed_runs", mesh_frequencies)
+    check_single("speed_runs", oscillator)
     if options.get("steps") is None:
         options["steps"] = steps_for(oscillator, frequencies)
     sizes, limits = _prepared("speed_runs", frequencies, runs, options)
@@ -122,8 +123,13 @@ def _of_designs(rows, shared, make, keep, ways: _Ways, sizes, devices):
     together = _MADE_TOGETHER if devices.devices.flat[0].platform == "cpu" else _MADE_TOGETHER_ELSEWHERE
 
     def of_design(shared, oscillator):
-        found = _of_one(oscillator, shared, sizes)
+        frequencies, limits = shared
         converged = getattr(oscillator.mesh_force, "converged", jnp.asarray(True))
+        # the others of a batch do not wait for a motion that is none
+        limits = limits._replace(
+            most_cycles=jnp.where(converged, limits.most_cycles, jnp.zeros_like(limits.most_cycles))
+        )
+        found = _of_one(oscillator, (frequencies, limits), sizes)
         found = jax.tree.map(partial(_or_nothing, converged), found)
         return keep(_named(found, ways)) if keep else found
 

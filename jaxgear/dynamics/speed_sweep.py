@@ -86,7 +86,7 @@ def speed_sweep(
             holds many, or an option outside its range.
     """
     frequencies = checked_frequencies("speed_sweep", mesh_frequencies)
-    _check_single(oscillator)
+    check_single("speed_sweep", oscillator)
     sizes, limits = prepared(
         "speed_sweep", oscillator, frequencies, direction=direction, kick=kick, carry=carry, steps=steps,
         tolerance=tolerance, most_cycles=most_cycles, most_periods=most_periods, points=points, orders=orders,
@@ -130,11 +130,12 @@ def steps_for(oscillator: Oscillator, mesh_frequencies) -> tuple[int, ...]:
     return tuple(int(_FEWEST_STEPS * 2**power) for power in doublings)
 
 
-def _check_single(oscillator: Oscillator) -> None:
-    if oscillator.mass.ndim != 1:
+def check_single(owner: str, oscillator: Oscillator) -> None:
+    """Raises a one-line `ValueError` for many."""
+    many = oscillator.mass.shape[:-1]
+    if many:
         raise ValueError(
-            f"speed_sweep: oscillator holds oscillators of shape {oscillator.mass.shape[:-1]}, must be one; make many "
-            "with jax.vmap or speed_sweeps"
+            f"{owner}: oscillator holds oscillators of shape {many}, must be one; make many with speed_sweeps"
         )
 
 
