@@ -132,11 +132,9 @@ def steps_for(oscillator: Oscillator, mesh_frequencies) -> tuple[int, ...]:
 
 def check_single(owner: str, oscillator: Oscillator) -> None:
     """Raises a one-line `ValueError` for many."""
-    many = oscillator.mass.shape[:-1]
-    if many:
-        raise ValueError(
-            f"{owner}: oscillator holds oscillators of shape {many}, must be one; make many with speed_sweeps"
-        )
+    if oscillator.mass.ndim != 1:
+        many = f"oscillators of shape {oscillator.mass.shape[:-1]}"
+        raise ValueError(f"{owner}: oscillator holds {many}, must be one; make many with speed_sweeps")
 
 
 class _Limits(NamedTuple):
