@@ -10,6 +10,7 @@ import pytest
 
 import jaxgear as jg
 from jaxgear.dynamics import DYNAMIC_QUANTITIES, Dynamics
+from jaxgear.dynamics.runs import Run, design_runs
 from jaxgear.optimize.problem import make_problem
 
 TORQUE = 200.0
@@ -86,6 +87,38 @@ def test_an_objective_is_the_number_of_the_sweep(mesh, sloped):
     assert float(value) > 1.1
 
 
+def test_many_designs_are_each_as_alone(mesh):
+    """Batches of two, the last one filled up; the contacts of one design count as not found."""
+    heights, found = jnp.asarray([0.0, HEIGHT, 5.0]), jnp.asarray([True, True, False])
+
+    def make(design):
+        height, found = design
+        relief = jg.TipRelief(height, 3.2)
+        oscillator = SETTINGS.oscillator(mesh, TORQUE, pinion=relief, wheel=relief)
+        return eqx.tree_at(lambda of: of.mesh_force.converged, oscillator, oscillator.mesh_force.converged & found)
+
+    def keep(runs):
+        return runs, jnp.max(runs["down"].dynamic_factor)
+
+    runs, worst = SETTINGS.runs_of(make, (heights, found), keep=keep, batch=2)
+    assert list(runs) == ["up", "down"] and runs["down"].direction == "down"
+    assert worst[:2] == pytest.approx(np.asarray(runs["down"].dynamic_factor)[:2].max(axis=1)) and np.isnan(worst[2])
+    assert np.isnan(runs["up"].approach_rms[2]).all() and not runs["up"].settled[2].any()
+    for i in range(2):
+        relief = jg.TipRelief(heights[i], 3.2)
+        alone = SETTINGS.runs(SETTINGS.oscillator(mesh, TORQUE, pinion=relief, wheel=relief))
+        one = jax.tree.map(lambda part: part[i], runs)  # noqa: B023 - at once
+        assert jax.tree.all(jax.tree.map(lambda a, b: jnp.allclose(a, b, rtol=1e-9, atol=1e-6), one, alone))
+
+
+def test_designs_have_one_leading_axis():
+    for designs in (1.0, (jnp.ones(2), jnp.ones(3)), jnp.ones(0)):
+        with pytest.raises(ValueError, match="^design_runs: designs must be arrays with one leading axis"):
+            SETTINGS.runs_of(lambda design: design, designs)
+    with pytest.raises(ValueError, match="^design_runs: steps must be given"):
+        design_runs(lambda design: design, jnp.ones(2), [1000.0], {"up": Run()})
+
+
 @pytest.mark.slow
 def test_a_linearization_has_the_slopes_of_every_speed(mesh, sloped):
     objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_approach_rms")]
@@ -96,6 +129,24 @@ def test_a_linearization_has_the_slopes_of_every_speed(mesh, sloped):
     for pieces, value, slope in zip(found.objectives, values, slopes):
         assert np.asarray(pieces.upper[0]) == pytest.approx(value.ravel(), rel=1e-8)
         assert np.asarray(pieces.slope[0, :, 0]) == pytest.approx(8 * slope.ravel(), rel=1e-6, abs=1e-8)
+
+
+def test_quantities_of_the_same_settings_share_a_sweep(mesh, monkeypatch):
+    """As objectives and limits of one problem; those at the speed of the operation have their own."""
+    traced = []
+    made = Dynamics.numbers
+    monkeypatch.setattr(Dynamics, "numbers", lambda *args: traced.append(args) or made(*args))
+    objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_no_contact")]
+    limit = jg.Constraint(SETTINGS.quantity("worst_approach_rms"), high=5.0)
+    options = {"mesh": mesh, "torque": TORQUE, "objective": objectives, "constraints": [limit]}
+    problem = make_problem(design, {"height": (0.0, 8.0)}, **options)
+    for times in (1, 2):  # a second trace has nothing of the first one
+        eqx.filter_eval_shape(problem.score, jnp.asarray([0.3]))
+        assert len(traced) == times
+    cycle = jg.solve(mesh, jg.Operation(TORQUE, speed=3000.0)).on(mesh)
+    names = "dynamic_factor", "approach_rms", "worst_approach_rms"
+    jax.eval_shape(lambda: [SETTINGS.quantity(name)(cycle) for name in names])
+    assert len(traced) == 4
 
 
 def test_equal_settings_make_equal_quantities():

@@ -19,6 +19,7 @@ from jaxgear.dynamics import (
     speed_sweeps,
     steps_for,
 )
+from jaxgear.dynamics.runs import Run, speed_runs
 
 SINGLE = 0.7827788650  # stiffness ratio 1.75, mean 1 over a share of 0.37
 STEPS = 512  # of every sweep here, so that there is one program; exact values are printed to six digits
@@ -99,6 +100,15 @@ def test_a_kick_finds_the_orbit_of_two_cycles():
     # its cycles alternate: half the mesh frequency is in the force, and in the other orbit it is not
     assert kicked.orders[0] == 0.5
     assert float(kicked.force_harmonics[i, 0]) > 1.0 and float(at_rest.force_harmonics[i, 0]) == 0.0
+
+
+def test_runs_in_one_program_are_those_of_one_each():
+    runs = {"up": Run("up"), "down": Run("down"), "kicked": Run("down", 4.5)}
+    found = speed_runs(rectangular(), SPEEDS, runs, steps=STEPS)
+    for name, alone in (("up", swept("up")), ("down", swept("down")), ("kicked", swept("down", 4.5))):
+        assert found[name].direction == alone.direction
+        assert jax.tree.all(jax.tree.map(lambda a, b: jnp.allclose(a, b, rtol=1e-9), found[name], alone))
+    assert found["up"].dynamic_factor[3] < found["down"].dynamic_factor[3]
 
 
 def test_results_do_not_depend_on_the_number_of_steps():

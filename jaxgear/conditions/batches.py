@@ -46,14 +46,14 @@ def divided(rows, devices: DeviceMesh):
     return jax.device_put(rows, NamedSharding(devices, PartitionSpec(_AXIS)))
 
 
-def over_devices(function, rows, shared, *, batch: int, devices: DeviceMesh):
+def over_devices(function, rows, shared, *, batch: int | None, devices: DeviceMesh):
     """function(shared, row) of every row, rows leading: each device takes its share, `batch` rows side by side.
 
     Args:
         function: traceable.
         rows: array or tree of arrays with as many leading entries, a multiple of batch and number of devices.
         shared: arrays that every device holds.
-        batch: rows side by side on a device.
+        batch: rows side by side on a device; None for one after the other, each of which may be a batch itself.
         devices: as `local_devices` gives them.
     """
     split, same = PartitionSpec(_AXIS), PartitionSpec()

@@ -17,6 +17,12 @@ from .speed_sweep import checked_frequencies, prepared, swept
 _SIDE_BY_SIDE, _SIDE_BY_SIDE_ELSEWHERE = 32, 4096
 
 
+def side_by_side(owner: str, batch: int | None) -> int:
+    """Oscillators that advance side by side on a device; None for as many as suit it."""
+    elsewhere = jax.local_devices()[0].platform != "cpu"
+    return whole(owner, "batch", (_SIDE_BY_SIDE_ELSEWHERE if elsewhere else _SIDE_BY_SIDE) if batch is None else batch)
+
+
 def speed_sweeps(oscillators: Oscillator, mesh_frequencies, *, batch: int | None = None, **options: Any):
     """`speed_sweep` of many oscillators: designs, torques, or both.
 
@@ -42,8 +48,7 @@ def speed_sweeps(oscillators: Oscillator, mesh_frequencies, *, batch: int | None
             f"{owner}: oscillators have masses of shape {oscillators.mass.shape}, must be (oscillators, coordinates); "
             "make them with jax.vmap"
         )
-    elsewhere = jax.local_devices()[0].platform != "cpu"
-    batch = whole(owner, "batch", (_SIDE_BY_SIDE_ELSEWHERE if elsewhere else _SIDE_BY_SIDE) if batch is None else batch)
+    batch = side_by_side(owner, batch)
     sizes, limits = prepared(owner, oscillators, frequencies, **options)
     devices, count = local_devices(), len(oscillators.mass)
     share = -(-count // devices.size)

@@ -14,7 +14,7 @@ Scalar = Float[Array, ""]
 Samples = Float[Array, " samples"]
 Thirds = Float[Array, "3 samples"]  # at the begin, in the middle and at the end of every step
 
-_SIMPSON = (1 / 6, 4 / 6, 1 / 6)
+SIMPSON = (1 / 6, 4 / 6, 1 / 6)  # weights of the three places of a step
 
 
 class History(NamedTuple):
@@ -67,7 +67,7 @@ def history(oscillator: Oscillator, states: Recorded, end: State, steps: Steps, 
 
 def mean(of: History, values: Thirds) -> Scalar:
     """Mean over time, by Simpson's rule in every step."""
-    weights = jnp.asarray(_SIMPSON, values.dtype)
+    weights = jnp.asarray(SIMPSON, values.dtype)
     return jnp.sum((weights @ values) * of.length) / jnp.sum(of.length)
 
 

@@ -96,17 +96,21 @@ def cycle_of(oscillator: Oscillator, steps: int) -> Cycle:
     return Cycle(fine.first, fine.last if oscillator.mesh_force.jumps else None, nodes)
 
 
+def nodes_of(index: Int[Array, ""], stride: Int[Array, ""]) -> Int[Array, "3"]:
+    """Positions of a cycle at the begin, in the middle and at the end of a step over an even number of them."""
+    return index * stride + jnp.stack([jnp.zeros_like(stride), stride // 2, stride])
+
+
 def step_of(cycle: Cycle, index: Int[Array, ""], stride: Int[Array, ""]) -> Steps:
     """One step over an even number of positions; neither it nor its number need be known to the compiler."""
-    begin, end = index * stride, (index + 1) * stride
+    begin, middle, end = nodes_of(index, stride)
 
     def at(places, place):
         return jax.tree.map(lambda part: jax.lax.dynamic_index_in_dim(part, place, keepdims=False), places)
 
     phase = at(cycle.nodes, begin)
-    middle = at(cycle.after, begin + stride // 2)
     if cycle.before is None:
         last = at(cycle.after, end % (len(cycle.nodes) - 1))
     else:
         last = at(cycle.before, end - 1)
-    return Steps(at(cycle.after, begin), middle, last, phase, at(cycle.nodes, end) - phase)
+    return Steps(at(cycle.after, begin), at(cycle.after, middle), last, phase, at(cycle.nodes, end) - phase)

@@ -9,12 +9,13 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..contact import MeshCycle
 from ..metrics import Quantity, quantities
-from ..numerics import Checked, concrete
+from ..numerics import Checked, concrete, once
 from ..numerics.reductions import Max
+from .steady import SteadyNumbers
 
 Numbers = Float[Array, "runs speeds"]
 
@@ -71,7 +72,14 @@ class _WithSettings:
     fields: tuple[tuple[str, Any], ...]
 
     def __call__(self, cycle: MeshCycle) -> Numbers:
-        settings, kind = self.make(**dict(self.fields)), DYNAMIC_QUANTITIES[self.name]
+        kind = DYNAMIC_QUANTITIES[self.name]
+        # all quantities of the same settings come from one sweep
+        found, converged = once(cycle, (self.make, self.fields, kind.at_speed), lambda: self._numbers(cycle, kind))
+        # a map of contacts that were not found is no force
+        return jnp.where(converged, getattr(found, kind.field), jnp.nan)
+
+    def _numbers(self, cycle: MeshCycle, kind: Kind) -> tuple[SteadyNumbers, Bool[Array, ""]]:
+        settings = self.make(**dict(self.fields))
         mesh, operation = cycle.mesh_for(self.name), cycle.operation
         if kind.at_speed:
             if operation.speed is None:
@@ -79,9 +87,7 @@ class _WithSettings:
             frequency = mesh_frequency(cycle.kinematics.pair.pinion.teeth, operation.speed)
             settings = dataclasses.replace(settings, mesh_frequencies=frequency[None])
         oscillator = settings.oscillator_of(cycle, mesh)
-        found = getattr(settings.numbers(oscillator), kind.field)
-        # a map of contacts that were not found is no force
-        return jnp.where(oscillator.mesh_force.converged, found, jnp.nan)
+        return settings.numbers(oscillator), oscillator.mesh_force.converged
 
 
 @dataclasses.dataclass(frozen=True)

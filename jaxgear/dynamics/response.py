@@ -8,13 +8,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from ..numerics import Checked, result
-from .history import history, largest, mean, share, smallest
+from .history import SIMPSON, history, largest, mean, share, smallest
 from .integrate import Steps, one_step
 from .oscillator import Oscillator, State
 
 Scalar = Float[Array, ""]
 
-_PLACES = (0.0, 0.5, 1.0)  # of the samples of a history in a step
 # an order repeats after so many cycles if times their number it is whole but for rounding
 _ROUNDING = 1e-6
 
@@ -91,6 +90,12 @@ def no_sums(orders: Float[Array, " orders"]) -> Sums:
     return Sums(zero - jnp.inf, zero + jnp.inf, zero - jnp.inf, zero, zero, zero, zero, spectrum, spectrum)
 
 
+def waves_of(orders: Float[Array, " orders"], phase: Float[Array, " nodes"]) -> Float[Array, "nodes waves"]:
+    """Cosines and negative sines of the orders at mesh positions [base pitches]; of the cycle alone."""
+    turn = 2 * jnp.pi * phase[:, None] * orders[None]
+    return jnp.concatenate([jnp.cos(turn), -jnp.sin(turn)], axis=1)
+
+
 def with_step(
     sums: Sums,
     oscillator: Oscillator,
@@ -98,7 +103,7 @@ def with_step(
     step: Steps,
     mesh_frequency: Scalar,
     *,
-    orders: Float[Array, " orders"],
+    waves: Float[Array, "3 waves"],
     origin: Scalar,
 ) -> tuple[State, Sums]:
     """The state after one more step, and the sums with it.
@@ -109,24 +114,21 @@ def with_step(
         y: state at the begin of the step.
         step: one.
         mesh_frequency: [Hz].
-        orders: multiples of the mesh frequency.
+        waves: as `waves_of` gives them at the begin, in the middle and at the end of the step.
         origin: approach from which mean and square are taken [um].
     """
     end = one_step(oscillator, y, step, mesh_frequency)
     begin = jax.tree.map(lambda part: part[None, None], y)
     of = history(oscillator, begin, end, jax.tree.map(lambda part: part[None], step), mesh_frequency)
     off = of.approach - origin
-    places = jnp.asarray(_PLACES, of.phase.dtype)[:, None]
-    # of the cycle alone: the same for all oscillators that advance side by side
-    phase = of.phase[None] + places * of.length[None]
-    turn = 2 * jnp.pi * orders[:, None, None] * phase[None]
-    waves = jnp.cos(turn), -jnp.sin(turn)
 
     def integral(values):
         return step.length * mean(of, values)
 
-    def spectrum(values):
-        return jax.lax.complex(*(jax.vmap(lambda turned: integral(values * turned))(wave) for wave in waves))
+    # a product of matrices, so that no compiler works the force out once more for every order
+    weights = step.length * jnp.asarray(SIMPSON, off.dtype)
+    spectra = (weights[None] * jnp.stack([of.force[:, 0], of.approach[:, 0]])) @ waves
+    force, approach = jax.lax.complex(*jnp.split(spectra, 2, axis=1))
 
     return end, Sums(
         jnp.maximum(sums.peak, largest(of.force)),
@@ -136,8 +138,8 @@ def with_step(
         sums.square + integral(off**2),
         sums.apart + step.length * share(of, of.force == 0),
         sums.coast + step.length * share(of, of.force < 0),
-        sums.force + spectrum(of.force),
-        sums.approach + spectrum(of.approach),
+        sums.force + force,
+        sums.approach + approach,
     )
 
 

@@ -1,6 +1,6 @@
 """How a mesh is run through its speeds: what vibrates, at which speeds, and the quantities that are made of it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from .from_contact import Model, mesh_force
 from .oscillator import Oscillator
 from .quantities import with_settings
 from .response import SpeedResponse
+from .runs import Run, design_runs, speed_runs
 from .speed_sweep import speed_sweep
 from .steady import SteadyNumbers, differentiable
 from .systems import inertia_of, on_bearings, torsional
@@ -147,17 +148,61 @@ class Dynamics(Checked):
             name: one of `run_names`.
             steps: of the integrator per mesh cycle, in place of `steps`; one number or one for each speed.
         """
-        return speed_sweep(
-            oscillator,
-            self.mesh_frequencies,
-            direction="up" if name == UP else "down",
-            kick=self.kick if name == KICKED else None,  # type: ignore[arg-type]
-            steps=self.steps if steps is None else steps,
-        )
+        steps = self.steps if steps is None else steps
+        return speed_sweep(oscillator, self.mesh_frequencies, steps=steps, **self._runs[name]._asdict())
+
+    @property
+    def _runs(self) -> dict[str, Run]:
+        return {
+            name: Run("up" if name == UP else "down", self.kick if name == KICKED else None) for name in self.run_names
+        }
 
     def runs(self, oscillator: Oscillator) -> dict[str, SpeedResponse]:
         """The steady states of all runs."""
-        return {name: self.run(oscillator, name) for name in self.run_names}
+        return speed_runs(oscillator, self.mesh_frequencies, self._runs, steps=self.steps)
+
+    def runs_of(
+        self,
+        make: Callable[[Any], Oscillator],
+        designs: Any,
+        *,
+        steps: Sequence[int] | int | None = None,
+        keep: Callable[[dict[str, SpeedResponse]], Any] | None = None,
+        batch: int | None = None,
+    ) -> Any:
+        """The steady states of all runs of many designs, at many torques as well, in one program.
+
+        Mesh forces are made batch by batch, so that what is in memory besides what is kept does not grow with the
+        number of designs:
+
+            def make(design):
+                relief = TipRelief(design["amount"], design["length"])
+                return settings.oscillator(mesh, design["torque"], pinion=relief, wheel=relief)
+
+            worst = settings.runs_of(make, designs, keep=lambda runs: jnp.max(runs["up"].dynamic_factor))
+
+        Args:
+            make: oscillator of one design; traced. The program is compiled once for one function.
+            designs: array or tree of arrays with a leading axis.
+            steps: of the integrator per mesh cycle, one number or one for each speed, as `steps_for` of the stiffest
+                design gives them; None for `steps`, or 256.
+            keep: what is kept of the runs of one design, a tree of arrays; traced. None for all of them.
+            batch: designs that advance side by side on a device; None for as many as suit the device.
+
+        Returns:
+            what is kept, with the axis of the designs in front. Of a design whose contacts were not found numbers are
+            nan, and no speed is settled.
+
+        Raises:
+            ValueError: for designs without a common leading axis, and steps out of their range.
+        """
+        steps = self._traced_steps if steps is None else steps
+        options: dict[str, Any] = {"steps": steps, "keep": keep, "batch": batch}
+        return design_runs(make, designs, self.mesh_frequencies, self._runs, **options)
+
+    @property
+    def _traced_steps(self) -> int:
+        return _STEPS if self.steps is None else self.steps
 
     def quantity(self, name: str) -> Quantity:
         """A dynamic quantity for objectives, constraints, sweeps and Pareto fronts, with these settings.
@@ -178,7 +223,7 @@ class Dynamics(Checked):
 
         The steps of the integrator are `steps`, or 256: nothing else is known of what is being traced.
         """
-        steps = _STEPS if self.steps is None else self.steps
+        steps = self._traced_steps
         runs = replace(self, steps=steps).runs(jax.lax.stop_gradient(oscillator))
         return differentiable(oscillator, tuple(runs.values()), steps)
 

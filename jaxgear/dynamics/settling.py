@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from .integrate import Cycle, one_step, step_of
+from .integrate import Cycle, nodes_of, one_step, step_of
 from .oscillator import Oscillator, State
 
 Scalar = Float[Array, ""]
@@ -31,10 +31,14 @@ class Speed(NamedTuple):
     most_steps: int
 
     def over_cycle(self, function, carry):
-        """Folds function(carry, step) over the steps of a cycle."""
+        """Folds function(carry, step, indices of the nodes of its begin, middle and end) over the steps of a cycle."""
         # a position lies in the middle of the shortest step
         stride = 2 * (self.most_steps // self.steps)
-        return jax.lax.fori_loop(0, self.steps, lambda i, carry: function(carry, step_of(self.cycle, i, stride)), carry)
+
+        def more(index, carry):
+            return function(carry, step_of(self.cycle, index, stride), nodes_of(index, stride))
+
+        return jax.lax.fori_loop(0, self.steps, more, carry)
 
 
 class _Settling(NamedTuple):
@@ -71,7 +75,7 @@ def settled(
 
     def cycled(now: _Settling) -> _Settling:
         y = _state(now.past[0], scale)
-        y = speed.over_cycle(lambda y, step: one_step(oscillator, y, step, speed.frequency), y)
+        y = speed.over_cycle(lambda y, step, _: one_step(oscillator, y, step, speed.frequency), y)
         past = jnp.concatenate([_scaled(y, scale)[None], now.past[:-1]])
         seen = _seen(oscillator, past)
         size = jnp.nanmax(jnp.abs(seen))

@@ -13,7 +13,7 @@ from ..numerics import check, concrete, kernel, real, whole
 from .integrate import cycle_of
 from .kick import kick_of, kicked
 from .oscillator import Oscillator, State
-from .response import Numbers, SpeedResponse, no_sums, numbers_of, with_cycle, with_step
+from .response import Numbers, SpeedResponse, no_sums, numbers_of, waves_of, with_cycle, with_step
 from .settling import Speed, settled
 from .static import at_rest, natural_frequencies, static_force
 
@@ -87,7 +87,7 @@ def speed_sweep(
             holds many, or an option outside its range.
     """
     frequencies = checked_frequencies("speed_sweep", mesh_frequencies)
-    _check_single(oscillator)
+    check_single("speed_sweep", oscillator)
     sizes, limits = prepared(
         "speed_sweep", oscillator, frequencies, direction=direction, kick=kick, carry=carry, steps=steps,
         tolerance=tolerance, most_cycles=most_cycles, most_periods=most_periods, points=points, orders=orders,
@@ -131,12 +131,11 @@ def steps_for(oscillator: Oscillator, mesh_frequencies) -> tuple[int, ...]:
     return tuple(int(_FEWEST_STEPS * 2**power) for power in doublings)
 
 
-def _check_single(oscillator: Oscillator) -> None:
+def check_single(owner: str, oscillator: Oscillator) -> None:
+    """Raises a one-line `ValueError` for many."""
     if oscillator.mass.ndim != 1:
-        raise ValueError(
-            f"speed_sweep: oscillator holds oscillators of shape {oscillator.mass.shape[:-1]}, must be one; make many "
-            "with jax.vmap or speed_sweeps"
-        )
+        many = f"oscillators of shape {oscillator.mass.shape[:-1]}"
+        raise ValueError(f"{owner}: oscillator holds {many}, must be one; make many with speed_sweeps")
 
 
 class _Limits(NamedTuple):
@@ -219,11 +218,13 @@ def swept(
     begin = (rest.coordinates, jnp.zeros_like(rest.coordinates)) if start is None else start
     kick = kick_of(oscillator, rest, limits.kick)
     cycle = cycle_of(oscillator, sizes.most_steps)
+    waves = waves_of(jnp.asarray(sizes.orders, frequencies.dtype), cycle.nodes)
 
     def at_speed(y, speed):
         frequency, steps = speed
         first = kicked(oscillator, begin, kick, frequency) if sizes.fresh else y
-        found = _steady(oscillator, first, Speed(frequency, cycle, steps, sizes.most_steps), limits, sizes, static)
+        at = Speed(frequency, cycle, steps, sizes.most_steps)
+        found = _steady(oscillator, first, at, limits, sizes, static, waves)
         return found.state, found
 
     def turned(parts):
@@ -253,7 +254,7 @@ class _Found(NamedTuple):
     state: State
 
 
-def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, static: Scalar) -> _Found:
+def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, static: Scalar, waves) -> _Found:
     """Steady state at one speed, and its record."""
     frequency = speed.frequency
     y, period = settled(oscillator, y, speed, limits.tolerance, limits.most_cycles, sizes.most_periods)
@@ -272,9 +273,9 @@ def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, static:
         here = jnp.arange(sizes.points) % cycles == cycle
         approaches, velocities = jnp.where(here, q, approaches), jnp.where(here, v, velocities)
 
-        def more(carry, step):
+        def more(carry, step, nodes):
             y, sums = carry
-            return with_step(sums, oscillator, y, step, frequency, orders=orders, origin=origin)
+            return with_step(sums, oscillator, y, step, frequency, waves=waves[nodes], origin=origin)
 
         nothing = no_sums(orders)
         begin = sums._replace(force=nothing.force, approach=nothing.approach)

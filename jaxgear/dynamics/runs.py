@@ -1,0 +1,159 @@
+"""Several runs through the same speeds in one program, of one oscillator or of many designs."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any, Literal, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool
+
+from ..conditions.batches import divided, local_devices, over_devices, padded
+from ..numerics import kernel
+from .batch import side_by_side
+from .oscillator import Oscillator
+from .response import SpeedResponse
+from .speed_sweep import check_single, checked_frequencies, prepared, steps_for, swept
+
+Responses = dict[str, SpeedResponse]
+Direction = Literal["up", "down"]
+_Ways = tuple[tuple[str, Direction], ...]  # names and directions of runs
+
+# Designs whose mesh forces are made at the same time: those of a CPU fit its cache.
+_MADE_TOGETHER, _MADE_TOGETHER_ELSEWHERE = 4, 64
+
+
+class Run(NamedTuple):
+    """One way through the speeds; options of `speed_sweep`."""
+
+    direction: Direction = "up"
+    kick: Any = None
+
+
+def speed_runs(oscillator: Oscillator, mesh_frequencies, runs: Mapping[str, Run], **options: Any) -> Responses:
+    """`speed_sweep` of one oscillator for each of some runs, one after the other in one program.
+
+    Args:
+        oscillator: one.
+        mesh_frequencies: [Hz], increasing, shape (speeds,).
+        runs: by name.
+        options: the others of `speed_sweep` but for `start`.
+
+    Raises:
+        ValueError: as `speed_sweep`.
+    """
+    frequencies = checked_frequencies("speed_runs", mesh_frequencies)
+    check_single("speed_runs", oscillator)
+    if options.get("steps") is None:
+        options["steps"] = steps_for(oscillator, frequencies)
+    sizes, limits = _prepared("speed_runs", frequencies, runs, options)
+    return _named(_of_one(oscillator, (frequencies, limits), sizes), _ways(runs))
+
+
+def design_runs(
+    make: Callable[[Any], Oscillator],
+    designs: Any,
+    mesh_frequencies,
+    runs: Mapping[str, Run],
+    *,
+    keep: Callable[[Responses], Any] | None = None,
+    batch: int | None = None,
+    **options: Any,
+) -> Any:
+    """`speed_runs` of many designs, whose oscillators are made batch by batch.
+
+    What is in memory besides what is kept does not grow with the number of designs.
+
+    Args:
+        make: oscillator of one design; traced. The program is compiled once for one function.
+        designs: array or tree of arrays with a leading axis.
+        mesh_frequencies: [Hz], increasing, shape (speeds,), the same for all.
+        runs: by name.
+        keep: what is kept of the responses of one design, a tree of arrays; traced. None for all of them.
+        batch: designs that advance side by side on a device; None for as many as suit the device.
+        options: the others of `speed_sweep` but for `start`; `steps` have to be given, as `steps_for` of the stiffest
+            design gives them.
+
+    Returns:
+        what is kept, with the axis of the designs in front. Of a design whose contacts were not found floating-point
+        numbers are nan, and no speed is settled.
+
+    Raises:
+        ValueError: as `speed_sweep`, without `steps`, and for designs without a common leading axis.
+    """
+    owner = "design_runs"
+    frequencies = checked_frequencies(owner, mesh_frequencies)
+    if options.get("steps") is None:
+        raise ValueError(f"{owner}: steps must be given, as steps_for of the stiffest design gives them")
+    lengths = {jnp.shape(part)[:1] for part in jax.tree.leaves(designs)}
+    if len(lengths) != 1 or not all(lengths) or lengths == {(0,)}:
+        raise ValueError(f"{owner}: designs must be arrays with one leading axis, the same and not 0 for all")
+    sizes, limits = _prepared(owner, frequencies, runs, options)
+    devices, (count,) = local_devices(), lengths.pop()
+    batch = min(side_by_side(owner, batch), -(-count // devices.size))
+
+    def in_batches(part):
+        rows = padded(part, batch * devices.size)
+        return rows.reshape(-1, batch, *rows.shape[1:])
+
+    rows = divided(jax.tree.map(in_batches, designs), devices)
+    found = _of_designs(rows, (frequencies, limits), make, keep, _ways(runs), sizes, devices)
+    found = jax.tree.map(lambda part: part.reshape(-1, *part.shape[2:])[:count], found)
+    return found if keep else _named(found, _ways(runs), axis=1)
+
+
+def _prepared(owner: str, frequencies, runs: Mapping[str, Run], options: dict):
+    """What is static in all runs, and numbers of each, with a leading axis (runs,)."""
+    each = [prepared(owner, None, frequencies, **run._asdict(), **options) for run in runs.values()]
+    return each[0][0], jax.tree.map(lambda *parts: jnp.stack(parts), *(limits for _, limits in each))
+
+
+@kernel
+def _of_one(oscillator: Oscillator, shared, sizes) -> SpeedResponse:
+    """Responses with the axis of the runs in front."""
+    frequencies, limits = shared
+    # one after the other: side by side every one would wait for the others, each at another speed
+    return jax.lax.map(lambda of_run: swept(oscillator, frequencies, None, of_run, sizes), limits)
+
+
+@kernel
+def _of_designs(rows, shared, make, keep, ways: _Ways, sizes, devices):
+    """What is kept of designs in batches, with the axes of the batches and their designs in front."""
+    together = _MADE_TOGETHER if devices.devices.flat[0].platform == "cpu" else _MADE_TOGETHER_ELSEWHERE
+
+    def of_design(shared, oscillator):
+        frequencies, limits = shared
+        converged = getattr(oscillator.mesh_force, "converged", jnp.asarray(True))
+        # the others of a batch do not wait for a motion that is none
+        limits = limits._replace(
+            most_cycles=jnp.where(converged, limits.most_cycles, jnp.zeros_like(limits.most_cycles))
+        )
+        found = _of_one(oscillator, (frequencies, limits), sizes)
+        found = jax.tree.map(partial(_or_nothing, converged), found)
+        return keep(_named(found, ways)) if keep else found
+
+    def of_batch(shared, batch):
+        oscillators = jax.lax.map(make, batch, batch_size=together)
+        return jax.vmap(partial(of_design, shared))(oscillators)
+
+    return over_devices(of_batch, rows, shared, batch=None, devices=devices)
+
+
+def _or_nothing(converged: Bool[Array, ""], part: Array) -> Array:
+    """Numbers of a mesh force that was found."""
+    nothing = jnp.nan if jnp.issubdtype(part.dtype, jnp.floating) else 0
+    return jnp.where(converged, part, jnp.full((), nothing, part.dtype))
+
+
+def _ways(runs: Mapping[str, Run]) -> _Ways:
+    return tuple((name, run.direction) for name, run in runs.items())
+
+
+def _named(found: SpeedResponse, ways: _Ways, axis: int = 0) -> Responses:
+    """Responses by the names of their runs, which have an axis of their own."""
+
+    def of(index: int) -> SpeedResponse:
+        return jax.tree.map(lambda part: jax.lax.index_in_dim(part, index, axis, keepdims=False), found)
+
+    return {name: replace(of(index), direction=direction) for index, (name, direction) in enumerate(ways)}
