@@ -188,8 +188,8 @@ def convergence_section(console: Console, *, quick: bool) -> list[str]:
     found = independence(moving, SPEEDS[:: 4 if quick else 1])
     console.print(
         f"Force map of a gear pair, {found.speeds} steady states up and down, {found.steps[0]} to {found.steps[1]} "
-        f"steps per cycle against {_FINER} times as many: K_v within {found.factor:.4f} %, rms within {found.rms:.4f} %;"
-        f" {found.apart} beside a jump are on different orbits",
+        f"steps per cycle against {_FINER} times as many: K_v within {found.factor:.4f} %, rms within {found.rms:.4f} "
+        f"%; {found.apart} beside a jump are on different orbits",
         highlight=False,
     )
     if not found.holds:

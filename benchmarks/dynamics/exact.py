@@ -155,8 +155,8 @@ def _nearest(known: Known, found: Sequence[dict[str, float]]) -> dict[str, float
 
 
 def rectangular_branches(steps: int, *, quick: bool) -> Iterator[Orbit]:
-    """Through both folds of the primary resonance and of the second super-harmonic one, and through the flip into orbits
-    of two cycles, with both damping ratios; quick: up the high branch of the primary resonance alone.
+    """Through both folds of the primary and the super-harmonic resonance, and through the flip into orbits of two
+    cycles, with both damping ratios; quick: up the high branch of the primary resonance alone.
     """
     oscillator = rectangular()
     begin = find_orbit(oscillator, frequency(1.2), ([1.3], [0.9]), steps=steps)

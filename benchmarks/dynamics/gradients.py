@@ -82,7 +82,7 @@ def exact_slopes() -> Iterator[Slope]:
 
 
 def _of_pair(positions: int):
-    """K_v and rms [um] of a pair by amount and length of its reliefs, torque and damping ratio, from a settled start."""
+    """A pair, the numbers that it is made of, and K_v and rms [um] by those and a settled state."""
 
     def made(point):
         amount, length, torque, damping = point
