@@ -121,11 +121,14 @@ def test_load_that_is_multiplied_multiplies_the_approach():
     assert jax.tree.all(jax.tree.map(lambda a, b: jnp.allclose(a, b, rtol=1e-9), batched, many))
 
 
-def test_dead_zone_orbits_are_the_exact_ones():
-    """To the printed digits, eight of the state."""
+@pytest.mark.parametrize(
+    ("steps", "within"), [(4 * STEPS, 5e-8), pytest.param(4 * SHARPER, 1e-8, marks=pytest.mark.slow)]
+)
+def test_dead_zone_orbits_are_the_exact_ones(steps, within):
+    """To the printed digits; eight of the state need more steps."""
     omega = np.array(sorted({known.omega for known in DEAD_ZONE}))
     for direction in ("up", "down"):
-        found = speed_sweep(dead_zone_on_a_moving_base(), omega / (2 * np.pi), direction=direction, steps=4 * SHARPER)
+        found = speed_sweep(dead_zone_on_a_moving_base(), omega / (2 * np.pi), direction=direction, steps=steps)
         assert found.settled.all()
         for i, at in enumerate(omega):
             known = the_one(DEAD_ZONE, at, direction)
@@ -133,8 +136,8 @@ def test_dead_zone_orbits_are_the_exact_ones():
                 continue  # the weak orbit there is not printed
             numbers = [known.mean, known.rms, known.most, known.least]
             np.testing.assert_allclose(row(found, i)[:4], numbers, rtol=0, atol=1e-6)
-            np.testing.assert_allclose(found.poincare_approach[i, 0], known.x0, atol=1e-8)
-            np.testing.assert_allclose(found.poincare_velocity[i, 0], known.v0, atol=1e-8)
+            np.testing.assert_allclose(found.poincare_approach[i, 0], known.x0, rtol=0, atol=within)
+            np.testing.assert_allclose(found.poincare_velocity[i, 0], known.v0, rtol=0, atol=within)
 
 
 def test_slow_speed_is_the_static_limit():

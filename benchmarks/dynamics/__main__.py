@@ -21,6 +21,7 @@ from .gradients import gradient_section
 from .throughput import DESIGNS, FULL_DESIGNS, throughput_section
 
 _WIDTH = 180
+_MAP = "map"  # the section that is about contact analyses and nothing else
 
 
 def sections(options: argparse.Namespace) -> dict[str, Callable[[Console], list[str]]]:
@@ -29,7 +30,7 @@ def sections(options: argparse.Namespace) -> dict[str, Callable[[Console], list[
     return {
         "exact": lambda console: exact_section(console, quick=quick),
         "convergence": lambda console: convergence_section(console, quick=quick),
-        "map": lambda console: map_section(console, quick=quick),
+        _MAP: map_section,
         "gradients": lambda console: gradient_section(console, quick=quick),
         "cost": lambda console: cost_section(console, quick=quick),
         "throughput": lambda console: throughput_section(console, quick=quick, designs=options.designs),
@@ -42,13 +43,15 @@ NAMES = tuple(sections(argparse.Namespace(quick=True, designs=DESIGNS)))
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.dynamics", description=__doc__.splitlines()[0])
     parser.add_argument("sections", nargs="*", metavar="section", help=f"one of {', '.join(NAMES)}; all if none")
-    parser.add_argument("--quick", action="store_true", help="less of everything, in a minute")
+    parser.add_argument("--quick", action="store_true", help="what takes no contact analysis, in a minute")
     parser.add_argument("--full", action="store_true", help=f"{FULL_DESIGNS} designs in the section on throughput")
     parser.add_argument("--designs", type=int, help=f"so many, {DESIGNS} if not given")
     options = parser.parse_args(arguments)
     for name in options.sections:
         if name not in NAMES:
             parser.error(f"no section {name!r}: choose from {', '.join(NAMES)}")
+    if options.quick and _MAP in options.sections:
+        parser.error(f"section {_MAP!r} is not quick")
     if options.full and (options.quick or options.designs is not None):
         parser.error("--full goes with neither --quick nor --designs")
     if options.designs is None:
@@ -61,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     console = Console(width=_WIDTH)
     console.print(", ".join(f"{key} {value}" for key, value in machine(cores).items()), markup=False, highlight=False)
     missed = []
-    for name in options.sections or NAMES:
+    for name in options.sections or [name for name in NAMES if name != _MAP or not options.quick]:
         missed += sections(options)[name](console)
     for line in missed:
         console.print(f"MISSED: {line}", markup=False, highlight=False)

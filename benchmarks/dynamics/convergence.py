@@ -14,8 +14,7 @@ from jaxgear.numerics import number
 
 from .exact_flow import exact_orbit
 from .known import RATIO, SHARE, ZETA, frequency, rectangular, stiffness
-from .pair import POSITIONS, QUICK_POSITIONS, SPEEDS
-from .pair import oscillator as oscillator_of
+from .pair import QUICK_SPEEDS, SPEEDS, one_of
 
 STEPS = 32, 64, 128, 256, 512, 1024
 MOST_STEPS = 4096  # of the reference where nothing is known in closed form
@@ -184,10 +183,9 @@ def convergence_section(console: Console, *, quick: bool) -> list[str]:
         )
     console.print(table)
     missed = [f"{row.name}: order {row.order:.2f} in place of {_SMOOTH:g}" for row in rows if not row.converges]
-    moving = oscillator_of(positions=QUICK_POSITIONS if quick else POSITIONS)
-    found = independence(moving, SPEEDS[:: 4 if quick else 1])
+    found = independence(one_of(quick=quick), QUICK_SPEEDS if quick else SPEEDS)
     console.print(
-        f"Force map of a gear pair, {found.speeds} steady states up and down, {found.steps[0]} to {found.steps[1]} "
+        f"Force map of a pair, {found.speeds} steady states up and down, {found.steps[0]} to {found.steps[1]} "
         f"steps per cycle against {_FINER} times as many: K_v within {found.factor:.4f} %, rms within {found.rms:.4f} "
         f"%; {found.apart} beside a jump are on different orbits",
         highlight=False,

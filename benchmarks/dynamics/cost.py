@@ -14,7 +14,7 @@ from ..baselines.c_kernel import find_compiler
 from ..baselines.c_sweep import CSweep
 from ..baselines.scipy_sweep import ScipySweep
 from ..baselines.vibration import vibration_of
-from .pair import POSITIONS, QUICK_POSITIONS, SPEEDS, oscillator
+from .pair import QUICK_SPEEDS, SPEEDS, one_of
 from .timing import Times, best_of
 
 # Relative tolerances of SciPy's methods, of a few tried those at which K_v comes out about as well as with jaxgear.
@@ -24,7 +24,7 @@ _MOST_CYCLES = 500
 _FINER = 8  # times the steps of the reference
 _JUMP = 0.05  # relative difference of K_v that means another orbit
 _INNER_STEPS, _INNER_CYCLES, _INNER_SPEED = 128, 100, 2500.0
-_SIDE_BY_SIDE = 32
+_SIDE_BY_SIDE, _QUICK_DESIGNS = 32, 4
 _WORST = 0.5  # of K_v [%], to which all have to agree so that their times can be compared
 _DIRECTIONS = "up", "down"
 
@@ -60,8 +60,8 @@ class Entry:
 
 def contenders(*, quick: bool) -> Iterator[Entry]:
     """Steady states of one pair up and down; SciPy at a few of the speeds, each from the state at the one before."""
-    speeds = SPEEDS[:: 6 if quick else 1]
-    moving = oscillator(positions=QUICK_POSITIONS if quick else POSITIONS)
+    speeds = QUICK_SPEEDS if quick else SPEEDS
+    moving = one_of(quick=quick)
     chosen = steps_for(moving, speeds)
     fine = [
         speed_sweep(moving, speeds, direction=way, steps=[_FINER * count for count in chosen]) for way in _DIRECTIONS
@@ -73,7 +73,7 @@ def contenders(*, quick: bool) -> Iterator[Entry]:
 
     both = f"up and down, {len(speeds)} speeds"
     yield Entry("jaxgear, one design", both, swept, reference.size, np.array(swept()), reference)
-    count = 4 if quick else _SIDE_BY_SIDE
+    count = _QUICK_DESIGNS if quick else _SIDE_BY_SIDE
     many = jax.tree.map(lambda part: np.repeat(np.asarray(part)[None], count, axis=0), moving)
 
     def swept_many():
@@ -118,7 +118,7 @@ def _c_entry(kernel: CSweep, moving: Oscillator, speeds, chosen, both: str, refe
 
 def inner_loops(*, quick: bool) -> dict[str, tuple[int, Callable[[], object]]]:
     """Runge-Kutta steps alone: number of them in a call, and the call."""
-    moving = oscillator(positions=QUICK_POSITIONS if quick else POSITIONS)
+    moving = one_of(quick=quick)
     start = moving.mesh_force.static_approach(0.0, moving.load[0])[None], np.zeros(1)
     steps = _INNER_STEPS * _INNER_CYCLES
 

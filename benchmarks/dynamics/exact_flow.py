@@ -12,6 +12,7 @@ from .known import SHARE, stiffness
 
 _SCAN = 64  # places of a piece between which a loss of contact, which ends the piece, is looked for
 _ENDS = 1e-12  # of the time within a piece that lies past its begin, where x = 0 already
+_CLOSED = 1e-11  # largest change of the state over an orbit
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
@@ -45,8 +46,8 @@ def exact_orbit(omega, near, *, zeta, ratio, periods=1) -> ExactOrbit:
     def back(y):
         return _flown(y, cycle, pair, zeta, periods)[-1][-1] - y
 
-    start, _, found, message = fsolve(back, np.asarray(near, float), xtol=1e-14, full_output=True)
-    if found != 1 and np.abs(back(start)).max() > 1e-11:
+    start, *_, message = fsolve(back, np.asarray(near, float), xtol=1e-14, full_output=True)
+    if not np.abs(back(start)).max() <= _CLOSED:
         raise RuntimeError(f"exact_orbit: {message}")
     return _summary(start, _flown(start, cycle, pair, zeta, periods), cycle * periods, cycle, zeta)
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
 
 import equinox as eqx
 import jax
@@ -46,20 +45,17 @@ class MapError:
     megabytes: float
 
 
-def map_against_direct(
-    *, phases: int = 160, approaches: int = 240, cases: int | None = None, **sizes: int
-) -> list[MapError]:
+def map_against_direct(*, phases: int = 160, approaches: int = 240, **sizes: int) -> list[MapError]:
     """Force map against the contact analysis at random places, on the drive flanks up to three static forces.
 
     Args:
         phases: mesh positions compared, a multiple of 16.
         approaches: compared at each of them.
-        cases: how many of the pairs and reliefs; None for all.
         sizes: `positions` and `levels` of `mesh_force`, where not its defaults.
     """
     random = np.random.default_rng(_SEED)
     firsts = random.uniform(0, 1 / _POSITIONS, phases // _POSITIONS)
-    return [_map_error(*case, firsts, random.uniform(0, 1, approaches), sizes) for case in islice(_cases(), cases)]
+    return [_map_error(*case, firsts, random.uniform(0, 1, approaches), sizes) for case in _cases()]
 
 
 def print_map_errors(console: Console, rows: Sequence[MapError]) -> None:
@@ -134,10 +130,8 @@ def _forces(force, phase, approach):
     return jax.vmap(lambda q: jax.vmap(lambda at: force(at, q))(phase))(approach)
 
 
-def map_section(console: Console, *, quick: bool) -> list[str]:
-    """Quick: one relief of one pair, at few places."""
-    few = {"phases": _POSITIONS, "approaches": 20}
-    rows = map_against_direct(cases=1, **few) if quick else map_against_direct()
+def map_section(console: Console) -> list[str]:
+    rows = map_against_direct()
     print_map_errors(console, rows)
     return [
         f"the force map of {row.pair}, {row.relief} relief, is off by {row.percent:.2f} %, at most {MOST_PERCENT:g} %"

@@ -1,6 +1,6 @@
 """Derivatives of K_v and of the rms of the approach: against central differences, and what they cost."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import equinox as eqx
@@ -14,7 +14,7 @@ from jaxgear.dynamics import find_orbit, settle
 
 from .exact_flow import exact_orbit
 from .known import RATIO, SHARE, ZETA, frequency, rectangular
-from .pair import DAMPING_RATIO, LENGTH, POSITIONS, QUICK_POSITIONS, TORQUE, oscillator
+from .pair import DAMPING_RATIO, LENGTH, TORQUE, imagined, oscillator
 from .timing import best_of
 
 _OMEGA = 0.9
@@ -27,7 +27,7 @@ _EVEN_STEPS = 1000
 _SPEED = 3500.0  # mesh frequency of the pair [Hz]
 _AMOUNT = 3.0  # of its reliefs [um]
 _PARAMETERS = {"amount [um]": _AMOUNT, "length [mm]": LENGTH, "torque [N m]": TORQUE, "damping ratio": DAMPING_RATIO}
-_PAIR_WITHIN = 1e-4  # of a pair, relative to the largest of what is compared by the same step
+_PAIR_WITHIN = 1e-4
 _RELATIVE = 2e-4  # step of the central differences
 _STEPS, _SETTLE = 256, 150
 
@@ -81,79 +81,87 @@ def exact_slopes() -> Iterator[Slope]:
             yield Slope(of, by, float(found[j, i]), float(difference[j]))
 
 
-def _of_pair(positions: int):
-    """A pair, the numbers that it is made of, and K_v and rms [um] by those and a settled state."""
-
-    def made(point):
-        amount, length, torque, damping = point
-        return oscillator(amount, length, torque=torque, damping_ratio=damping, positions=positions)
-
-    def quantities(point, start):
-        orbit = find_orbit(made(point), _SPEED, start, steps=_STEPS)
-        return jnp.stack([orbit.dynamic_factor, orbit.approach_rms])
-
-    point = jnp.asarray(list(_PARAMETERS.values()))
-    return eqx.filter_jit(made)(point), point, quantities
+def _made(point):
+    amount, length, torque, damping = point
+    return oscillator(amount, length, torque=torque, damping_ratio=damping)
 
 
-def pair_slopes(*, quick: bool) -> Iterator[Slope]:
+def _quantities(moving, start):
+    orbit = find_orbit(moving, _SPEED, start, steps=_STEPS)
+    return jnp.stack([orbit.dynamic_factor, orbit.approach_rms])
+
+
+def _settled(moving):
+    return settle(moving, _SPEED, ([10.0], [0.0]), cycles=_SETTLE, steps=_STEPS)
+
+
+def pair_slopes() -> Iterator[Slope]:
     """Of a gear pair through its contact analyses, against central differences of the whole."""
-    moving, point, quantities = _of_pair(QUICK_POSITIONS if quick else POSITIONS)
-    start = settle(moving, _SPEED, ([10.0], [0.0]), cycles=_SETTLE, steps=_STEPS)
+    point = jnp.asarray(list(_PARAMETERS.values()))
+    start = _settled(jax.jit(_made)(point))
+
+    def quantities(point):
+        return _quantities(_made(point), start)
+
     value = jax.jit(quantities)
-    slopes = np.asarray(jax.jit(jax.jacfwd(quantities))(point, start))
+    slopes = np.asarray(jax.jit(jax.jacfwd(quantities))(point))
     for i, by in enumerate(_PARAMETERS):
         away = np.zeros(len(point))
         away[i] = _RELATIVE * float(point[i])
-        difference = (np.asarray(value(point + away, start)) - np.asarray(value(point - away, start))) / (2 * away[i])
+        difference = (np.asarray(value(point + away)) - np.asarray(value(point - away))) / (2 * away[i])
         for j, of in enumerate(("K_v", "rms [um]")):
             yield Slope(of, by, float(slopes[j, i]), float(difference[j]))
 
 
-def costs(*, quick: bool) -> dict[str, float]:
-    """Processor time of value and gradient over that of the value: of an orbit by all numbers of its oscillator, and of
-    a design through its contact analyses.
-    """
-    moving, point, quantities = _of_pair(QUICK_POSITIONS if quick else POSITIONS)
-    start = settle(moving, _SPEED, ([10.0], [0.0]), cycles=_SETTLE, steps=_STEPS)
+def orbit_cost(moving, *, quick: bool) -> float:
+    """Processor time of value and gradient of K_v over that of the value: by all numbers of an oscillator."""
+    start = _settled(moving)
+    value = eqx.filter_jit(lambda moving: _quantities(moving, start)[0])
+    both = eqx.filter_jit(eqx.filter_value_and_grad(lambda moving: _quantities(moving, start)[0]))
+    return _ratio(lambda: value(moving), lambda: both(moving), quick=quick)
 
-    def factor(moving):
-        return find_orbit(moving, _SPEED, start, steps=_STEPS).dynamic_factor
 
-    def of_design(point):
-        return quantities(point, start)[0]
+def design_cost() -> float:
+    """The same by the numbers of a design, its force map included."""
+    point = jnp.asarray(list(_PARAMETERS.values()))
+    start = _settled(jax.jit(_made)(point))
 
-    orbit, with_orbit = eqx.filter_jit(factor), eqx.filter_jit(eqx.filter_value_and_grad(factor))
-    design, with_design = jax.jit(of_design), jax.jit(jax.value_and_grad(of_design))
-    calls = {
-        "orbit": lambda: orbit(moving),
-        "orbit with gradient": lambda: with_orbit(moving),
-        "design": lambda: design(point),
-        "design with gradient": lambda: with_design(point),
-    }
-    times = best_of(calls, 2 if quick else 5)
-    return {name: times[f"{name} with gradient"].processor / times[name].processor for name in ("orbit", "design")}
+    def factor(point):
+        return _quantities(_made(point), start)[0]
+
+    value, both = jax.jit(factor), jax.jit(jax.value_and_grad(factor))
+    return _ratio(lambda: value(point), lambda: both(point), quick=False)
+
+
+def _ratio(value, both, *, quick: bool) -> float:
+    times = best_of({"value": value, "both": both}, 2 if quick else 5)
+    return times["both"].processor / times["value"].processor
 
 
 def gradient_section(console: Console, *, quick: bool) -> list[str]:
-    missed = []
-    for title, rows, within in (
-        (f"Rectangular stiffness at Omega {_OMEGA}, against the closed form", list(exact_slopes()), _EXACT_WITHIN),
-        (f"Gear pair at {_SPEED:g} Hz, against central differences", list(pair_slopes(quick=quick)), _PAIR_WITHIN),
-    ):
-        table = Table("derivative of", "by", title=title)
-        for heading in ("jaxgear", "difference", "relative error"):
-            table.add_column(heading, justify="right")
-        for row in rows:
-            numbers = f"{row.derivative:.6g}", f"{row.difference:.6g}", f"{row.error:.1e}"
-            table.add_row(row.of.replace("[", r"\["), row.by.replace("[", r"\["), *numbers)
-            if not row.error <= within:
-                missed.append(f"derivative of {row.of} by {row.by} is off by {row.error:.1e}, at most {within:g}")
-        console.print(table)
-    found = costs(quick=quick)
-    console.print(
-        f"Value and gradient over value, processor time: {found['orbit']:.1f} for an orbit by all numbers of its map, "
-        f"{found['design']:.1f} for a design by {len(_PARAMETERS)} of its numbers, map included",
-        highlight=False,
+    """Quick: without contact analyses."""
+    missed = _compared(
+        console, f"Rectangular stiffness at Omega {_OMEGA:g}, against the closed form", exact_slopes(), _EXACT_WITHIN
     )
+    if not quick:
+        title = f"Gear pair at {_SPEED:g} Hz, through its contact analyses, against central differences"
+        missed += _compared(console, title, pair_slopes(), _PAIR_WITHIN)
+    moving = imagined() if quick else oscillator(_AMOUNT)
+    costs = [f"{orbit_cost(moving, quick=quick):.1f} for an orbit by all numbers of its force map"]
+    if not quick:
+        costs.append(f"{design_cost():.1f} for a design by {len(_PARAMETERS)} numbers, its force map included")
+    console.print(f"Value and gradient over value, processor time: {'; '.join(costs)}", highlight=False)
+    return missed
+
+
+def _compared(console: Console, title: str, rows: Iterable[Slope], within: float) -> list[str]:
+    missed, table = [], Table("derivative of", "by", title=title)
+    for heading in ("jaxgear", "difference", "relative error"):
+        table.add_column(heading, justify="right")
+    for row in rows:
+        numbers = f"{row.derivative:.6g}", f"{row.difference:.6g}", f"{row.error:.1e}"
+        table.add_row(row.of.replace("[", r"\["), row.by.replace("[", r"\["), *numbers)
+        if not row.error <= within:
+            missed.append(f"derivative of {row.of} by {row.by} is off by {row.error:.1e}, at most {within:g}")
+    console.print(table)
     return missed
