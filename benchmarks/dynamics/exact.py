@@ -3,14 +3,14 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from jaxgear.dynamics import Orbit, SpeedResponse, find_orbit, follow_orbits, speed_sweep
+from jaxgear.dynamics import Orbit, SpeedResponse, find_orbit, speed_sweep
 
+from .branches import dead_zone_branches, rectangular_branches
 from .known import (
     DEAD_ZONE,
     MORE_DAMPED,
@@ -29,7 +29,6 @@ STEPS, SHARPER_STEPS = 4096, 16384
 MOST = 1.0  # largest difference in units of the last printed digit; the printed numbers are rounded or cut off
 _AWAY = (0.01, -0.01)  # of the state from which shooting starts, in the wide clearance a fifth of it
 _SAME = 0.01  # largest distance of an orbit from the printed numbers that it is compared with
-_RANGE = 0.3, 2.4  # of the speeds in which branches are followed
 _KICK = 4.5  # dynamic factor that leads to orbits of two cycles
 _UNSTABLE, _ONLY_MODULI, _NOT_MET = "a sweep leaves it", "a sweep has no multipliers", "not met"
 
@@ -152,74 +151,6 @@ def _nearest(known: Known, found: Sequence[dict[str, float]]) -> dict[str, float
     comparable = [values for values in found if any(name in values for name in wanted)]
     best = min(comparable, key=distance, default={})
     return best if best and distance(best) < _SAME else {}
-
-
-def rectangular_branches(steps: int, *, quick: bool) -> Iterator[Orbit]:
-    """Through both folds of the primary and the super-harmonic resonance, and through the flip into orbits of two
-    cycles, with both damping ratios; quick: up the high branch of the primary resonance alone.
-    """
-    oscillator = rectangular()
-    begin = find_orbit(oscillator, frequency(1.2), ([1.3], [0.9]), steps=steps)
-    yield begin
-    yield from _chain(oscillator, begin, (1.0, 0.9, 0.8, 0.7), steps)
-    if quick:
-        return
-    high = list(_chain(oscillator, begin, (0.7, 0.5), steps))[-1]
-    yield high
-    yield from _chain(oscillator, high, (0.7, 0.8), steps)
-    yield from _chain(oscillator, high, (0.35, 0.45), steps)
-    yield from _chain(oscillator, begin, (1.7, 1.9, 2.0), steps)
-    kept = list(_chain(oscillator, begin, (1.7,), steps))[-1]
-    yield from _doubled(oscillator, kept, 1.9, (1.9, 1.7), steps)
-    damped = rectangular(MORE_ZETA)
-    begin = find_orbit(damped, frequency(1.0), ([1.65], [1.45]), steps=steps)
-    yield begin
-    yield from _chain(damped, begin, (0.9, 0.8), steps)
-    begin = find_orbit(damped, frequency(1.9), ([1.03], [0.29]), steps=steps)
-    yield begin
-    yield from _chain(damped, begin, (2.0,), steps)
-    yield from _doubled(damped, begin, 2.0, (1.9, 1.7), steps)
-
-
-def dead_zone_branches(steps: int) -> Iterator[Orbit]:
-    """From high speed down over the softening resonance, through both folds and up again."""
-    oscillator, speed = dead_zone(jnp.asarray(frequency(1.5)))
-    begin = find_orbit(oscillator, speed, ([1.01], [0.016]), steps=steps)
-    yield begin
-    yield from _chain(dead_zone, begin, (1.2, 1.0, 0.9, 0.85, 0.8, 0.75, 0.7, 0.8), steps)
-
-
-def _chain(family, begin: Orbit, omegas: Sequence[float], steps: int) -> Iterator[Orbit]:
-    """Orbits at some speeds, each on the branch from the one before."""
-    here = begin
-    for omega in omegas:
-        speed = here.mesh_frequency
-        down = frequency(omega) < speed
-        ends = (omega, _RANGE[1]) if down else (_RANGE[0], omega)
-        branch = follow_orbits(
-            family,
-            here,
-            within=(frequency(ends[0]), frequency(ends[1])),
-            direction="down" if down else "up",
-            parameter=None if family is not dead_zone else speed,
-            step=0.05,
-            steps=steps,
-        )
-        here = jax.tree.map(lambda part: part[-1], branch.orbits)
-        yield here
-
-
-def _doubled(oscillator, begin: Orbit, until: float, omegas: Sequence[float], steps: int) -> Iterator[Orbit]:
-    """Orbits of two cycles at some speeds, on the branch from the flip between the first orbit and a speed above."""
-    lowest = frequency(_RANGE[0])
-    above = follow_orbits(oscillator, begin, within=(lowest, frequency(until)), step=0.05, steps=steps)
-    flip = next(found for found in above.bifurcations if found.kind == "flip")
-    # unstable first: down to a fold, and up again as the orbit on which a motion settles
-    highest = frequency(omegas[0]) if omegas[0] > 2 * np.pi * float(flip.parameter) else frequency(_RANGE[1])
-    branch = follow_orbits(oscillator, flip, within=(lowest, highest), step=0.1, steps=steps)
-    first = jax.tree.map(lambda part: part[-1], branch.orbits)
-    yield first
-    yield from _chain(oscillator, first, omegas[1:], steps)
 
 
 def exact_section(console: Console, *, quick: bool) -> list[str]:

@@ -37,7 +37,8 @@ def imagined(torque=TORQUE, positions=POSITIONS) -> Oscillator:
     force = stiffness * deflection * (1 + _STIFFENING * deflection)
     slope = stiffness * (1 + 2 * _STIFFENING * deflection)
     touching = np.stack([np.sin(turn), _CLEARANCE + np.sin(turn)])
-    made = ForceMap(0.0, touching, _REACH, np.stack([force, force]), np.stack([slope, slope]), np.asarray(True))
+    tables = 0.0, touching, _REACH, np.stack([force, force]), np.stack([slope, slope]), True
+    made = ForceMap(*(jnp.asarray(part) for part in tables))
     return torsional(made, pair=mesh().pair, torque=torque, inertias=(_INERTIA, _INERTIA), damping_ratio=DAMPING_RATIO)
 
 
