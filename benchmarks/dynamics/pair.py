@@ -28,6 +28,19 @@ _STIFFNESS, _VARIATION, _STIFFENING, _CLEARANCE = 230.0, 45.0, 0.004, 130.0
 _REACH, _LEVELS = 60.0, 48
 
 
+@cache
+def gears() -> jg.GearPair:
+    gear = jg.Gear(
+        50, 3.0, face_width=_WIDTH, tip_diameter=_TIP, bore_diameter=_BORE, tooth_thickness_allowance=_ALLOWANCE
+    )
+    return jg.GearPair(gear, gear)
+
+
+@cache
+def mesh() -> jg.Mesh:
+    return jg.prepare(gears(), resolution=jg.Resolution(positions=16, pairs=4))
+
+
 def imagined(torque=TORQUE, positions=POSITIONS) -> Oscillator:
     """A smooth stiffness that varies by as much as that of the pair, and grows with the load."""
     share = np.linspace(0.0, 1.0, _LEVELS)
@@ -39,20 +52,12 @@ def imagined(torque=TORQUE, positions=POSITIONS) -> Oscillator:
     touching = np.stack([np.sin(turn), _CLEARANCE + np.sin(turn)])
     tables = 0.0, touching, _REACH, np.stack([force, force]), np.stack([slope, slope]), True
     made = ForceMap(*(jnp.asarray(part) for part in tables))
-    return torsional(made, pair=mesh().pair, torque=torque, inertias=(_INERTIA, _INERTIA), damping_ratio=DAMPING_RATIO)
+    return torsional(made, pair=gears(), torque=torque, inertias=(_INERTIA, _INERTIA), damping_ratio=DAMPING_RATIO)
 
 
 def one_of(*, quick: bool, torque=TORQUE) -> Oscillator:
     """The unmodified pair, or the imagined one."""
     return imagined(torque) if quick else oscillator(torque=torque)
-
-
-@cache
-def mesh() -> jg.Mesh:
-    gear = jg.Gear(
-        50, 3.0, face_width=_WIDTH, tip_diameter=_TIP, bore_diameter=_BORE, tooth_thickness_allowance=_ALLOWANCE
-    )
-    return jg.prepare(jg.GearPair(gear, gear), resolution=jg.Resolution(positions=16, pairs=4))
 
 
 def oscillator(amount=0.0, length=LENGTH, *, torque=TORQUE, damping_ratio=DAMPING_RATIO, positions=POSITIONS):
