@@ -14,7 +14,7 @@ from jaxgear.dynamics import find_orbit, settle
 
 from .exact_flow import exact_orbit
 from .known import RATIO, SHARE, ZETA, frequency, rectangular
-from .pair import DAMPING_RATIO, LENGTH, TORQUE, imagined, oscillator
+from .pair import DAMPING_RATIO, LENGTH, TORQUE, imagined, mesh, oscillator
 from .timing import best_of
 
 _OMEGA = 0.9
@@ -81,9 +81,10 @@ def exact_slopes() -> Iterator[Slope]:
             yield Slope(of, by, float(found[j, i]), float(difference[j]))
 
 
-def _made(point):
+@jax.jit
+def _made(of, point):
     amount, length, torque, damping = point
-    return oscillator(amount, length, torque=torque, damping_ratio=damping)
+    return oscillator(of, amount, length, torque=torque, damping_ratio=damping)
 
 
 def _quantities(moving, start):
@@ -97,11 +98,11 @@ def _settled(moving):
 
 def pair_slopes() -> Iterator[Slope]:
     """Of a gear pair through its contact analyses, against central differences of the whole."""
-    point = jnp.asarray(list(_PARAMETERS.values()))
-    start = _settled(jax.jit(_made)(point))
+    of, point = mesh(), jnp.asarray(list(_PARAMETERS.values()))
+    start = _settled(_made(of, point))
 
     def quantities(point):
-        return _quantities(_made(point), start)
+        return _quantities(_made(of, point), start)
 
     value = jax.jit(quantities)
     slopes = np.asarray(jax.jit(jax.jacfwd(quantities))(point))
@@ -123,11 +124,11 @@ def orbit_cost(moving, *, quick: bool) -> float:
 
 def design_cost() -> float:
     """The same by the numbers of a design, its force map included."""
-    point = jnp.asarray(list(_PARAMETERS.values()))
-    start = _settled(jax.jit(_made)(point))
+    of, point = mesh(), jnp.asarray(list(_PARAMETERS.values()))
+    start = _settled(_made(of, point))
 
     def factor(point):
-        return _quantities(_made(point), start)[0]
+        return _quantities(_made(of, point), start)[0]
 
     value, both = jax.jit(factor), jax.jit(jax.value_and_grad(factor))
     return _ratio(lambda: value(point), lambda: both(point), quick=False)
@@ -146,7 +147,7 @@ def gradient_section(console: Console, *, quick: bool) -> list[str]:
     if not quick:
         title = f"Gear pair at {_SPEED:g} Hz, through its contact analyses, against central differences"
         missed += _compared(console, title, pair_slopes(), _PAIR_WITHIN)
-    moving = imagined() if quick else oscillator(_AMOUNT)
+    moving = imagined() if quick else oscillator(mesh(), _AMOUNT)
     costs = [f"{orbit_cost(moving, quick=quick):.1f} for an orbit by all numbers of its force map"]
     if not quick:
         costs.append(f"{design_cost():.1f} for a design by {len(_PARAMETERS)} numbers, its force map included")

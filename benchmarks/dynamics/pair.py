@@ -5,7 +5,6 @@ And one that needs no contact analysis and so no compilation of it, for what has
 
 from functools import cache
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -57,10 +56,10 @@ def imagined(torque=TORQUE, positions=POSITIONS) -> Oscillator:
 
 def one_of(*, quick: bool, torque=TORQUE) -> Oscillator:
     """The unmodified pair, or the imagined one."""
-    return imagined(torque) if quick else oscillator(torque=torque)
+    return imagined(torque) if quick else oscillator(mesh(), torque=torque)
 
 
-def oscillator(amount=0.0, length=LENGTH, *, torque=TORQUE, damping_ratio=DAMPING_RATIO, positions=POSITIONS):
+def oscillator(of: jg.Mesh, amount=0.0, length=LENGTH, *, torque=TORQUE, damping_ratio=DAMPING_RATIO) -> Oscillator:
     """With a linear tip relief on both gears [um], [mm], on its force map."""
     relief = jg.TipRelief(amount, length)
     settings = Dynamics(
@@ -68,19 +67,19 @@ def oscillator(amount=0.0, length=LENGTH, *, torque=TORQUE, damping_ratio=DAMPIN
         damping_ratio=damping_ratio,
         pinion_inertia=_INERTIA,
         wheel_inertia=_INERTIA,
-        positions=positions,
+        positions=POSITIONS,
     )
-    return settings.oscillator(mesh(), torque, pinion=relief, wheel=relief)
+    return settings.oscillator(of, torque, pinion=relief, wheel=relief)
 
 
-@eqx.filter_jit
-def relieved(amounts, lengths, positions: int = POSITIONS) -> Oscillator:
+def relieved(amounts, lengths) -> Oscillator:
     """Pairs with tip reliefs [um], [mm], one for each of two arrays: one axis in front of every array."""
-    return jax.lax.map(
-        lambda row: oscillator(*row, positions=positions),
-        (jnp.asarray(amounts), jnp.asarray(lengths)),
-        batch_size=_SIDE_BY_SIDE,
-    )
+    return _relieved(mesh(), jnp.asarray(amounts), jnp.asarray(lengths))
+
+
+@jax.jit
+def _relieved(of, amounts, lengths):
+    return jax.lax.map(lambda row: oscillator(of, *row), (amounts, lengths), batch_size=_SIDE_BY_SIDE)
 
 
 def random_reliefs(count: int) -> tuple[np.ndarray, np.ndarray]:
