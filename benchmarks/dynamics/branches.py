@@ -13,16 +13,14 @@ _RANGE = 0.3, 2.4  # of the speeds
 _STEP = 0.05  # along a branch
 
 
-def rectangular_branches(steps: int, *, quick: bool) -> Iterator[Orbit]:
+def rectangular_branches(steps: int) -> Iterator[Orbit]:
     """Through both folds of the primary and the super-harmonic resonance, and through the flip into orbits of two
-    cycles, with both damping ratios; quick: up the high branch of the primary resonance alone.
+    cycles, with both damping ratios.
     """
     oscillator = rectangular()
     begin = find_orbit(oscillator, frequency(1.2), ([1.3], [0.9]), steps=steps)
     yield begin
     yield from _chain(oscillator, begin, (1.0, 0.9, 0.8, 0.7), steps)
-    if quick:
-        return
     high = list(_chain(oscillator, begin, (0.7, 0.5), steps))[-1]
     yield high
     yield from _chain(oscillator, high, (0.7, 0.8), steps)
