@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from oscillators import dead_zone, frequency, rectangular
+from oscillators import DEAD_ZONE, MORE_DAMPED, RECTANGULAR, dead_zone, frequency, rectangular
 from scipy.interpolate import CubicHermiteSpline
 
 from jaxgear.dynamics import Oscillator, find_orbit, settle, steady_orbit, steady_orbits
@@ -14,50 +14,6 @@ from jaxgear.numerics.reductions import Max
 
 STEPS = 4000
 FEW = 400
-
-# Rectangular stiffness of ratio 1.75, zeta 0.05, exact by segments: Omega, periods, x0, v0, mean, rms, max, min, K_v,
-# moduli of the multipliers, stable
-RECTANGULAR = [
-    (0.35, 1, 1.648687, 0.276777, 1.038569, 0.543260, 1.962546, -0.105576, 2.298924, (0.4075, 0.4075), True),
-    (0.45, 1, 1.397338, 0.036080, 1.079562, 0.387123, 1.457924, 0.145926, 1.915133, (0.4975, 0.4975), True),
-    (0.50, 1, 1.390083, 0.574387, 1.080967, 0.622171, 2.157169, 0.015619, 2.119300, (0.6147, 0.4630), True),
-    (0.70, 1, 0.936449, -0.274675, 1.108917, 0.471900, 1.821345, 0.452400, 1.425710, (0.6384, 0.6384), True),
-    (0.70, 1, 3.332644, 1.645712, -0.731543, 2.588885, 3.678720, -3.835178, 5.039343, (0.6384, 0.6384), True),
-    (0.80, 1, 1.028996, -0.572884, 1.150150, 0.644710, 2.068119, 0.215482, 1.618880, (0.6752, 0.6752), True),
-    (0.80, 1, 2.590742, 1.722510, -0.069470, 1.907104, 3.084581, -2.392970, 4.225453, (0.6752, 0.6752), True),
-    (0.90, 1, 2.031854, 1.638302, 0.332164, 1.427648, 2.616350, -1.444173, 3.584040, (0.7053, 0.7053), True),
-    (1.00, 1, 1.664274, 1.458325, 0.585805, 1.080237, 2.258973, -0.791533, 3.094483, (0.7304, 0.7304), True),
-    (1.20, 1, 1.311115, 0.922941, 0.866159, 0.553646, 1.691276, 0.128918, 2.316816, (0.7697, 0.7697), True),
-    (1.70, 1, 1.045985, 0.352461, 0.967610, 0.129608, 1.161816, 0.799680, 1.591529, (0.8313, 0.8313), True),
-    (1.70, 2, -1.636469, -0.189108, 0.363866, 1.636903, 3.042975, -1.654128, 4.168459, (0.6910, 0.6910), True),
-    (1.90, 1, 1.031065, 0.290763, 0.976502, 0.093761, 1.117137, 0.855626, 1.530325, (1.0797, 0.6654), False),
-    (1.90, 2, -0.778739, -0.198446, 0.736544, 1.212573, 2.670787, -0.798173, 3.658612, (0.7184, 0.7184), True),
-    (2.00, 1, 1.026317, 0.268197, 0.979545, 0.081540, 1.101895, 0.874627, 1.509445, (1.1230, 0.6504), False),
-]
-
-# the same with zeta 0.08: Omega, periods, start, rms, K_v (None where none is printed), moduli or None
-MORE_DAMPED = [
-    (0.80, 1, (2.5, 1.7), 1.793530, 4.267209, None),
-    (0.90, 1, (2.0, 1.6), 1.373012, 3.656888, None),
-    (1.00, 1, (1.65, 1.45), 1.044662, 3.125866, None),
-    (1.70, 2, (-1.45, -0.19), 1.528408, 4.017806, None),
-    (1.90, 1, (1.03, 0.29), None, None, (0.9823, 0.5997)),
-    (1.90, 2, (-0.7, -0.2), 1.131640, 3.521593, None),
-    (2.00, 1, (1.03, 0.27), None, None, (1.0223, None)),
-]
-
-# dead zone of half width 1, load 0.1 + 0.05 Omega^2 cos, zeta 0.05: Omega, x0, v0, mean, rms, max, min
-DEAD_ZONE = [
-    (0.70, 1.14715094, 0.00453019, 1.1, 0.033653, 1.147593, 1.052407),
-    (0.75, 0.83384301, 0.16407875, 0.998125, 0.224724, 1.353042, 0.716349),
-    (0.80, 1.18470588, 0.01505882, 1.1, 0.061357, 1.186772, 1.013228),
-    (0.80, 0.82523679, 0.12460593, 1.019012, 0.202258, 1.333009, 0.761570),
-    (0.85, 0.84127443, 0.09870540, 1.037179, 0.181301, 1.314362, 0.803296),
-    (0.90, 0.86319781, 0.08016883, 1.051981, 0.162860, 1.297581, 0.839249),
-    (1.00, 0.90596537, 0.05577444, 1.073115, 0.133083, 1.269255, 0.895288),
-    (1.20, 0.96623122, 0.03143497, 1.093828, 0.094212, 1.228617, 0.963318),
-    (1.50, 1.01127760, 0.01597003, 1.1, 0.063186, 1.189359, 1.010641),
-]
 
 NEAR = ([2.0], [1.6])  # the orbit of the first benchmark at Omega 0.9
 
@@ -70,40 +26,39 @@ def moduli(orbit):
     return sorted(np.abs(orbit.multipliers), reverse=True)
 
 
-@pytest.mark.parametrize("row", RECTANGULAR, ids=lambda row: f"{row[0]} T{row[1]} {row[8]:.2f}")
-def test_orbits_of_a_rectangular_stiffness(row):
-    omega, periods, x, v, mean, rms, most, least, factor, sizes, stable = row
-    orbit = at(omega, ([x + 0.01], [v - 0.01]), periods=periods)
+@pytest.mark.parametrize("known", RECTANGULAR, ids=lambda known: f"{known.name} {known.factor:.2f}")
+def test_orbits_of_a_rectangular_stiffness(known):
+    orbit = at(known.omega, ([known.x0 + 0.01], [known.v0 - 0.01]), periods=known.periods)
     found = [orbit.displacement[0], orbit.velocity[0], orbit.approach_mean, orbit.approach_rms]
     found += [orbit.approach_max, orbit.approach_min, orbit.dynamic_factor]
-    np.testing.assert_allclose(found, [x, v, mean, rms, most, least, factor], rtol=0, atol=2e-6)
-    np.testing.assert_allclose(moduli(orbit), sizes, rtol=0, atol=3e-4)
-    assert bool(orbit.converged) and bool(orbit.stable) == stable
+    exact = [known.x0, known.v0, known.mean, known.rms, known.most, known.least, known.factor]
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(moduli(orbit), known.moduli, rtol=0, atol=1e-4)
+    assert bool(orbit.converged) and bool(orbit.stable) == known.stable
     # Liouville: the damping shrinks every volume of the state space, in contact and out of it
-    expected = np.exp(-4 * np.pi * periods * 0.05 / omega)
+    expected = np.exp(-4 * np.pi * known.periods * 0.05 / known.omega)
     np.testing.assert_allclose(np.linalg.det(orbit.monodromy), expected, rtol=1e-9)
 
 
-@pytest.mark.parametrize("row", MORE_DAMPED, ids=lambda row: f"{row[0]} T{row[1]}")
-def test_orbits_with_more_damping(row):
-    omega, periods, (x, v), rms, factor, sizes = row
-    orbit = at(omega, ([x], [v]), zeta=0.08, periods=periods)
-    assert bool(orbit.converged)
-    if rms is not None:
-        np.testing.assert_allclose([orbit.approach_rms, orbit.dynamic_factor], [rms, factor], rtol=0, atol=2e-6)
-    for size, expected in zip(moduli(orbit), sizes or (None, None)):
-        assert expected is None or abs(size - expected) < 1e-4
+@pytest.mark.parametrize("known", MORE_DAMPED, ids=lambda known: known.name)
+def test_orbits_with_more_damping(known):
+    x, v = known.near
+    orbit = at(known.omega, ([x], [v]), zeta=known.zeta, periods=known.periods)
+    assert bool(orbit.converged) and bool(orbit.stable) == known.stable
+    if known.rms is not None:
+        found = [orbit.approach_rms, orbit.dynamic_factor]
+        np.testing.assert_allclose(found, [known.rms, known.factor], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(moduli(orbit)[: len(known.moduli)], known.moduli, rtol=0, atol=1e-4)
 
 
-@pytest.mark.parametrize("row", DEAD_ZONE, ids=lambda row: f"{row[0]} {row[4]}")
-def test_orbits_in_a_dead_zone(row):
-    omega, x, v, *rest = row
-    moving, speed = dead_zone(jnp.asarray(frequency(omega)))
-    orbit = find_orbit(moving, speed, ([x + 0.002], [v]), steps=2 * STEPS)
+@pytest.mark.parametrize("known", DEAD_ZONE, ids=lambda known: f"{known.name} {known.rms}")
+def test_orbits_in_a_dead_zone(known):
+    moving, speed = dead_zone(jnp.asarray(frequency(known.omega)))
+    orbit = find_orbit(moving, speed, ([known.x0 + 0.002], [known.v0]), steps=2 * STEPS)
     assert bool(orbit.converged) and bool(orbit.stable)
-    np.testing.assert_allclose([orbit.displacement[0], orbit.velocity[0]], [x, v], rtol=0, atol=1e-8)
+    np.testing.assert_allclose([orbit.displacement[0], orbit.velocity[0]], [known.x0, known.v0], rtol=0, atol=1e-8)
     found = [orbit.approach_mean, orbit.approach_rms, orbit.approach_max, orbit.approach_min]
-    np.testing.assert_allclose(found, rest, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(found, [known.mean, known.rms, known.most, known.least], rtol=0, atol=1e-6)
 
 
 def test_contact_is_lost_for_the_share_of_time_that_the_approach_is_negative():

@@ -60,7 +60,7 @@ class CKernel:
         self._positions = problem.corner_gap.shape[-1]
         self._crowning = np.ascontiguousarray(problem.crowning)
         self._table = _table(two_candidates(problem))
-        self._library = _compile()
+        self._library = compiled(_SOURCE)
         if self._library.block_rows() != self._table.shape[1]:
             raise RuntimeError("kernel.c and c_kernel.py disagree about the table")
         self._threads = threads
@@ -81,16 +81,16 @@ class CKernel:
         ppte = np.empty(len(variants))
 
         def part(begin, end):
-            slope = None if gradient is None else _pointer(gradient[begin:end])
+            slope = None if gradient is None else pointer(gradient[begin:end])
             # ctypes releases Python's lock during the call
             self._library.evaluate(
-                _pointer(self._table),
+                pointer(self._table),
                 self._positions,
                 len(self._crowning),
-                _pointer(self._crowning),
-                _pointer(variants[begin:end]),
+                pointer(self._crowning),
+                pointer(variants[begin:end]),
                 ctypes.c_long(end - begin),
-                _pointer(ppte[begin:end]),
+                pointer(ppte[begin:end]),
                 slope,
             )
 
@@ -99,22 +99,28 @@ class CKernel:
         return ppte
 
 
-def _pointer(array: np.ndarray):
+def pointer(array: np.ndarray):
+    """The numbers of a contiguous array of doubles for C."""
     return array.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
 
-def _compile() -> ctypes.CDLL:
+def compiled(source: Path) -> ctypes.CDLL:
+    """The functions of a C file, compiled for this machine.
+
+    Raises:
+        RuntimeError: without a C compiler, or where it does not understand the file.
+    """
     compiler = find_compiler()
     if compiler is None:
         raise RuntimeError("no C compiler found")
     with tempfile.TemporaryDirectory() as folder:
         unit, library = Path(folder, "kernel.o"), Path(folder, "kernel.so")
         for flags in _FLAGS:
-            command = [compiler, *flags, "-std=gnu11", "-fPIC", "-c", str(_SOURCE), "-o", str(unit)]
+            command = [compiler, *flags, "-std=gnu11", "-fPIC", "-c", str(source), "-o", str(unit)]
             if subprocess.run(command, capture_output=True).returncode == 0:
                 break
         else:
-            raise RuntimeError(f"{compiler} does not compile {_SOURCE.name}")
+            raise RuntimeError(f"{compiler} does not compile {source.name}")
         # linked without fast mathematics, which would switch denormal numbers off in the whole process
         subprocess.run([compiler, "-shared", str(unit), "-o", str(library), "-lm"], check=True, capture_output=True)
         return ctypes.CDLL(str(library))

@@ -1,0 +1,1 @@
+"""How accurate the dynamics are and what they cost: `python -m benchmarks.dynamics`."""
