@@ -1,0 +1,185 @@
+"""Elastic lines, bearings and torsion of shafts against closed forms, equilibrium and reciprocity."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxgear as jg
+from jaxgear.shafts import (
+    Bearing,
+    Coupling,
+    Gearbox,
+    GearMesh,
+    MatrixBearing,
+    MountedGear,
+    Section,
+    Shaft,
+    ShaftLoad,
+    bearing_reactions,
+    elastic_line,
+    integral_diameter,
+    support,
+)
+from jaxgear.shafts.beam import shear_coefficient
+
+E, NU = 206_000.0, 0.3
+G = E / (2 * (1 + NU))
+STIFF = 1e14  # N/um and N m/rad: what it gives is below every tolerance here
+
+
+def inertia(diameter, bore=0.0):
+    return np.pi / 64 * (diameter**4 - bore**4)
+
+
+def shear_area(diameter, bore=0.0):
+    return float(shear_coefficient(jnp.asarray(bore / diameter), jnp.asarray(NU))) * np.pi / 4 * (diameter**2 - bore**2)
+
+
+def alone(sections, bearings, loads=(), couplings=()):
+    return Gearbox([Shaft("s", sections, bearings, couplings=couplings, loads=loads)], [])
+
+
+def displacement(gearbox, at):
+    return np.asarray(elastic_line(gearbox, "s", jnp.asarray(at)).displacement)
+
+
+def test_cantilever_with_force_and_moment_has_its_closed_form():
+    length, force, moment = 200.0, 500.0, 30.0
+    wall = Bearing("A", 0.0, STIFF, STIFF, 1e4 * STIFF)
+    load = ShaftLoad(length, (force, 0.0, 1e3), (0.0, moment))
+    found = displacement(alone([Section(length, 40, 20)], [wall], [load]), [length])[0]
+    bending, m = E * inertia(40, 20), 1e3 * moment
+    x = force * (length**3 / (3 * bending) + length / (G * shear_area(40, 20))) + m * length**2 / (2 * bending)
+    ry = force * length**2 / (2 * bending) + m * length / bending
+    z = 1e3 * length / (E * np.pi / 4 * (40**2 - 20**2))
+    np.testing.assert_allclose(found[[0, 4]], 1e3 * np.array([x, ry]), rtol=1e-8)
+    np.testing.assert_allclose(found[2], 1e3 * z, rtol=1e-6)
+    np.testing.assert_array_equal(found[[1, 3]], 0.0)
+
+
+def test_both_planes_bend_alike():
+    wall = Bearing("A", 0.0, STIFF, 0.0, 1e4 * STIFF)
+    one = alone([Section(150, 30)], [wall], [ShaftLoad(150, (100.0, 0, 0), (0.0, 5.0))])
+    other = alone([Section(150, 30)], [wall], [ShaftLoad(150, (0.0, 100.0, 0), (-5.0, 0.0))])
+    x, y = displacement(one, [90.0])[0], displacement(other, [90.0])[0]
+    np.testing.assert_allclose(y[[1, 3]], [x[0], -x[4]], rtol=1e-12)
+
+
+def test_beam_on_two_supports_has_its_closed_form():
+    length, a, force = 300.0, 120.0, 1000.0
+    b = length - a
+    ends = [Bearing("A", 0.0, STIFF), Bearing("B", length, STIFF)]
+    box = alone([Section(length, 35)], ends, [ShaftLoad(a, (0.0, force, 0.0))])
+    bending = 3 * E * inertia(35) * length
+    under = force * a**2 * b**2 / bending + force * a * b / (length * G * shear_area(35))
+    np.testing.assert_allclose(displacement(box, [a])[0, 1], 1e3 * under, rtol=1e-8)
+    reactions = bearing_reactions(box)
+    np.testing.assert_allclose(reactions.force[:, 1], [force * b / length, force * a / length], rtol=1e-10)
+
+
+def test_stepped_cantilever_adds_the_pieces_up():
+    """Tip deflection of two sections: that of the root piece under force and moment, its slope, that of the tip."""
+    l1, l2, d1, d2, force = 80.0, 120.0, 50.0, 30.0, 300.0
+    wall = Bearing("A", 0.0, STIFF, 0.0, 1e4 * STIFF)
+    box = alone([Section(l1, d1), Section(l2, d2)], [wall], [ShaftLoad(l1 + l2, (force, 0, 0))])
+    b1, b2, m = E * inertia(d1), E * inertia(d2), force * l2
+    step = force * l1**3 / (3 * b1) + m * l1**2 / (2 * b1) + force * l1 / (G * shear_area(d1))
+    slope = force * l1**2 / (2 * b1) + m * l1 / b1
+    tip = step + slope * l2 + force * l2**3 / (3 * b2) + force * l2 / (G * shear_area(d2))
+    np.testing.assert_allclose(displacement(box, [l1, l1 + l2])[:, 0], 1e3 * np.array([step, tip]), rtol=1e-8)
+
+
+def test_torsion_of_a_stepped_shaft_between_two_couplings():
+    ends = [Bearing("A", 0.0, STIFF), Bearing("B", 200.0, STIFF)]
+    box = alone([Section(80, 50), Section(120, 30, 10)], ends, couplings=[Coupling(20.0, 40.0), Coupling(170.0)])
+    twist = elastic_line(box, "s", jnp.asarray([0.0, 20.0, 80.0, 170.0, 200.0])).twist
+    first, second = 60 / (2 * inertia(50)), 90 / (2 * inertia(30, 10))
+    # what leaves on the right turns back what is right of the coupling that drives
+    expected = -40e6 / G * np.array([0.0, 0.0, first, first + second, first + second])
+    np.testing.assert_allclose(twist, expected, rtol=1e-8, atol=1e-12)
+
+
+def test_shear_coefficient_is_cowpers():
+    np.testing.assert_allclose(shear_coefficient(jnp.asarray(0.0), jnp.asarray(0.3)), 6 * 1.3 / (7 + 6 * 0.3))
+    np.testing.assert_allclose(
+        shear_coefficient(jnp.asarray(1.0), jnp.asarray(0.3)), 2 * 1.3 / (4 + 3 * 0.3)
+    )  # thin tube
+
+
+PINION = jg.Gear(teeth=19, module=3.0, face_width=18.0, bore_diameter=24.0)
+WHEEL = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=40.0)
+TILTED = np.diag([300.0, 400.0, 0.0, 2e4, 3e4]) + 0.0
+TILTED[0, 4] = TILTED[4, 0] = 500.0
+TILTED[1, 3] = TILTED[3, 1] = -400.0
+
+
+def two_stages(radial=500.0, diameter=36.0, housing=None):
+    """A reducer whose second mesh sits at 100 degrees from the first one."""
+    into = Shaft(
+        "in",
+        [Section(70, 30), Section(80, 25)],
+        [Bearing("A", 10, radial, 50.0), Bearing("B", 140, 300.0)],
+        [MountedGear("p1", PINION, 50, integral_diameter(PINION))],
+        [Coupling(0.0, 60.0)],
+    )
+    middle = Shaft(
+        "middle",
+        [Section(150, diameter)],
+        [Bearing("C", 10, 600.0), MatrixBearing("D", 140, TILTED)],
+        [MountedGear("w1", WHEEL, 50), MountedGear("p2", PINION, 100, integral_diameter(PINION))],
+    )
+    out = Shaft(
+        "out",
+        [Section(200, 45)],
+        [Bearing("E", 10, 900.0), Bearing("F", 140, 700.0)],
+        [MountedGear("w2", WHEEL, 100)],
+        [Coupling(200.0)],
+        [ShaftLoad(180.0, (0.0, -400.0, 0.0))],
+    )
+    return Gearbox([into, middle, out], [GearMesh("p1", "w1", 0.0), GearMesh("p2", "w2", 100.0)], housing)
+
+
+@pytest.fixture(scope="module")
+def reducer():
+    return two_stages()
+
+
+Y = jnp.linspace(-8.0, 8.0, 5)
+
+
+def test_torque_grows_with_the_ratio(reducer):
+    np.testing.assert_allclose(reducer.pinion_torques(), [60.0, 60.0 * 48 / 19], rtol=1e-12)
+    assert reducer.path.turning == (1, -1, 1)
+
+
+def test_bearing_forces_balance_mesh_forces_and_loads(reducer):
+    reactions = bearing_reactions(reducer)
+    force, at = np.asarray(reactions.force), {"A": 10, "B": 140, "C": 10, "D": 140, "E": 10, "F": 140}
+    base = np.array([float(PINION.base_radius), float(WHEEL.base_radius)])
+    first, second = 60e3 / base[0], 60e3 * 48 / 19 / base[0]
+    alpha = np.deg2rad(20.0)
+    turned = np.deg2rad(100.0)
+    normal = [np.array([np.sin(alpha), np.cos(alpha)])]
+    # the middle shaft turns clockwise: forwards is (sin, -cos) of the angle
+    forwards = np.array([np.sin(turned), -np.cos(turned)])
+    normal.append(np.cos(alpha) * forwards + np.sin(alpha) * np.array([np.cos(turned), np.sin(turned)]))
+    loads = {
+        "in": [(50, -first * normal[0])],
+        "middle": [(50, first * normal[0]), (100, -second * normal[1])],
+        "out": [(100, second * normal[1]), (180, np.array([0.0, -400.0]))],
+    }
+    for index, (name, carried) in enumerate(loads.items()):
+        own = slice(2 * index, 2 * index + 2)
+        places = np.array([at[bearing] for bearing in reactions.names[own]])
+        np.testing.assert_allclose(force[own, :2].sum(0), sum(f for _, f in carried), rtol=1e-9, err_msg=name)
+        # moments about x and y: y z and x z
+        moments = np.array([sum(z * f[0] for z, f in carried), sum(z * f[1] for z, f in carried)])
+        held = places @ force[own, :2] + np.array([force[own, 4].sum(), -force[own, 3].sum()])
+        np.testing.assert_allclose(held, moments, rtol=1e-9, err_msg=name)
+
+
+def test_influence_is_symmetric_and_definite(reducer):
+    for mesh in (0, 1):
+        matrix = np.asarray(support(reducer, mesh).influence(Y))
+        np.testing.assert_allclose(matrix, matrix.T, rtol=1e-12)
+        assert np.linalg.eigvalsh(matrix)[0] > 0
