@@ -3,9 +3,17 @@
 from .bearing import AbstractBearing as AbstractBearing
 from .bearing import Bearing as Bearing
 from .bearing import MatrixBearing as MatrixBearing
+from .face_load import FaceLoad as FaceLoad
+from .face_load import annex_e as annex_e
+from .face_load import face_load_factor as face_load_factor
+from .face_load import mesh_stiffness as mesh_stiffness
+from .face_load import root_face_load_factor as root_face_load_factor
+from .face_load import tooth_height as tooth_height
 from .gearbox import Gearbox as Gearbox
 from .gearbox import GearMesh as GearMesh
 from .housing import Housing as Housing
+from .method_c import iso_shaft_deformation as iso_shaft_deformation
+from .method_c import method_c as method_c
 from .misalignment import Misalignment as Misalignment
 from .misalignment import axis_tolerance as axis_tolerance
 from .reactions import BearingReactions as BearingReactions

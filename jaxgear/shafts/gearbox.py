@@ -136,7 +136,7 @@ class Gearbox(Checked):
             return 0
         if len(free) != 1:
             raise ValueError(
-                f"Gearbox: {len(free)} couplings have no torque of their own, must be 1, where that of the others leaves"
+                f"Gearbox: {len(free)} couplings have no torque of their own, must be 1, the way out of the others"
             )
         return free[0]
 

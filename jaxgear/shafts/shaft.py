@@ -148,17 +148,17 @@ class Shaft(Checked):
     def beam(self) -> Beam:
         """The pieces between all steps of the diameters, gear bodies included."""
         ends = jnp.cumsum(jnp.stack([section.length for section in self.sections]))
-        bodies = [gear for gear in self.gears if gear.body_diameter is not None]
-        faces = [end for gear in bodies for end in (gear.start, gear.end)]
+        bodies = [(gear, gear.body_diameter) for gear in self.gears if gear.body_diameter is not None]
+        faces = [end for gear, _ in bodies for end in (gear.start, gear.end)]
         steps = jnp.stack([*ends, *faces]) if faces else ends
         edges = jnp.concatenate([jnp.zeros_like(ends[:1]), jnp.sort(jnp.clip(steps, 0.0, ends[-1]))])
         middle = 0.5 * (edges[:-1] + edges[1:])
         which = jnp.sum(middle[:, None] > ends[None, :-1], axis=-1)
         diameter = jnp.stack([section.diameter for section in self.sections])[which]
         bore = jnp.stack([section.bore for section in self.sections])[which]
-        for gear in bodies:
+        for gear, body in bodies:
             inside = (middle > gear.start) & (middle < gear.end)
-            diameter = jnp.where(inside, jnp.maximum(diameter, gear.body_diameter), diameter)
+            diameter = jnp.where(inside, jnp.maximum(diameter, body), diameter)
         return beam(edges, diameter, bore, self.material)
 
     def _named(self) -> tuple[str, ...]:
@@ -193,7 +193,8 @@ class _Facts(NamedTuple):
 
 @program
 def _facts(shaft: Shaft) -> _Facts:
-    points = [item.position for item in shaft.bearings], [item.position for item in (*shaft.couplings, *shaft.loads)]
+    others: tuple[Coupling | ShaftLoad, ...] = (*shaft.couplings, *shaft.loads)
+    points = [item.position for item in shaft.bearings], [item.position for item in others]
     length = shaft.length
     scale = jnp.stack([1.0, 1.0, 1.0, 1 / length, 1 / length])
     places = rigid(jnp.stack(points[0]))
