@@ -3,6 +3,8 @@
 from .bearing import AbstractBearing as AbstractBearing
 from .bearing import Bearing as Bearing
 from .bearing import MatrixBearing as MatrixBearing
+from .condensation import condense as condense
+from .condensation import spread_forces as spread_forces
 from .face_load import FaceLoad as FaceLoad
 from .face_load import annex_e as annex_e
 from .face_load import face_load_factor as face_load_factor
@@ -12,6 +14,8 @@ from .face_load import tooth_height as tooth_height
 from .gearbox import Gearbox as Gearbox
 from .gearbox import GearMesh as GearMesh
 from .housing import Housing as Housing
+from .housing_file import read_housing as read_housing
+from .housing_file import write_housing as write_housing
 from .method_c import iso_shaft_deformation as iso_shaft_deformation
 from .method_c import method_c as method_c
 from .misalignment import Misalignment as Misalignment
