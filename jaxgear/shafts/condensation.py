@@ -19,6 +19,7 @@ from collections.abc import Mapping
 import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
+from threadpoolctl import threadpool_limits
 
 from .beam import DIRECTIONS
 from .housing import Housing
@@ -90,7 +91,11 @@ def condense(stiffness, seats: Mapping[str, np.ndarray]) -> Housing:
         raise ValueError("condense: seats must not be empty")
     loads = np.concatenate(list(seats.values()), axis=1)
     try:
-        moved = scipy.sparse.linalg.splu(matrix).solve(loads)
+        with threadpool_limits(limits=1):  # many small blocks: threads only get in each other's way
+            factors = scipy.sparse.linalg.splu(
+                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            )
+            moved = factors.solve(loads)
     except RuntimeError:  # exactly singular
         raise ValueError("condense: stiffness is singular: is the housing fixed to its foundation?") from None
     compliance = loads.T @ moved  # mm and rad per N and N mm
