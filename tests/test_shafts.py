@@ -224,7 +224,7 @@ def test_influence_is_that_of_a_simple_beam_and_a_bar_in_torsion():
     np.testing.assert_allclose(found, 1e3 * (bending + shear + twist), rtol=3e-3)
     np.testing.assert_allclose(gap, 0.0, atol=1e-12)
     mirrored, _ = face(single(exit_at=120.0))
-    np.testing.assert_allclose(mirrored - face(single())[0], mirrored[::-1, ::-1] - mirrored, atol=1e-9)
+    np.testing.assert_allclose(mirrored[::-1, ::-1], found, rtol=1e-3)
 
 
 def test_influence_knows_no_direction_of_the_mesh_on_round_bearings():

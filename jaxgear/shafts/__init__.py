@@ -16,8 +16,12 @@ from .gearbox import GearMesh as GearMesh
 from .housing import Housing as Housing
 from .housing_file import read_housing as read_housing
 from .housing_file import write_housing as write_housing
-from .method_c import iso_shaft_deformation as iso_shaft_deformation
-from .method_c import method_c as method_c
+from .iso_method_c import iso_shaft_deformation as iso_shaft_deformation
+from .iso_method_c import method_c as method_c
+from .mesh_support import AbstractSupport as AbstractSupport
+from .mesh_support import RigidSupport as RigidSupport
+from .mesh_support import ShaftSupport as ShaftSupport
+from .mesh_support import support as support
 from .misalignment import Misalignment as Misalignment
 from .misalignment import axis_tolerance as axis_tolerance
 from .reactions import BearingReactions as BearingReactions
@@ -31,7 +35,3 @@ from .shaft import Section as Section
 from .shaft import Shaft as Shaft
 from .shaft import ShaftLoad as ShaftLoad
 from .shaft import integral_diameter as integral_diameter
-from .support import AbstractSupport as AbstractSupport
-from .support import RigidSupport as RigidSupport
-from .support import ShaftSupport as ShaftSupport
-from .support import support as support

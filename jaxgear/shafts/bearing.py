@@ -28,6 +28,11 @@ class AbstractBearing(Checked):
     def matrix(self) -> Matrix:
         """Stiffness in x, y, z, rx, ry [N/um, N/mrad, N mm/mrad], symmetric and positive semidefinite."""
 
+    @property
+    @abstractmethod
+    def play(self) -> Scalar | None:
+        """Radial clearance [um]; None for a bearing without any."""
+
 
 class Bearing(AbstractBearing):
     """Bearing with the same stiffness in all radial directions.
@@ -38,6 +43,8 @@ class Bearing(AbstractBearing):
         radial: [N/um].
         axial: [N/um]; 0 for a floating bearing.
         tilting: against rotation about x and y [N m/rad]; 0 for a bearing that aligns itself.
+        clearance: by which the shaft can move to every side before the bearing resists, half the diametral clearance
+            [um]; None for none. See `operating_point` for what is made of it.
     """
 
     name: str = eqx.field(static=True)
@@ -45,12 +52,18 @@ class Bearing(AbstractBearing):
     radial: Scalar = number("N/um", low=0.0)
     axial: Scalar = number("N/um", low=0.0, default=0.0)
     tilting: Scalar = number("N m/rad", low=0.0, default=0.0)
+    clearance: Scalar | None = number("um", low=0.0, optional=True, default=None)
 
     @property
     def matrix(self) -> Matrix:
         """Diagonal stiffness."""
         # 1 N m/rad is 1 N mm/mrad
         return jnp.diag(jnp.stack([self.radial, self.radial, self.axial, self.tilting, self.tilting]))
+
+    @property
+    def play(self) -> Scalar | None:
+        """`clearance`."""
+        return self.clearance
 
 
 class MatrixBearing(AbstractBearing):
@@ -86,3 +99,8 @@ class MatrixBearing(AbstractBearing):
     def matrix(self) -> Matrix:
         """The symmetric part, of which `stiffness` is made within rounding."""
         return symmetric(self.stiffness)
+
+    @property
+    def play(self) -> None:
+        """None: the matrix is a tangent that knows of it."""
+        return None

@@ -4,7 +4,7 @@ Unknown are the forces of all bearings on their shafts f and how every shaft mov
 of the shafts held at their left ends, R what their points move with q, K the bearings and C the housing:
 
     u_b = F_bb f + F_bp p + R_b q        bearings under their forces and the loads p
-    f = -K (u_b + C f)                   the seats move by -C f
+    f = f_0 - K (u_b + C f)              the seats move by -C f
     R_b^T f + R_p^T p = 0                every shaft is in equilibrium
     u_p = F_pb f + F_pp p + R_p q
 
@@ -43,6 +43,8 @@ class System(NamedTuple):
         bearings: K.
         housing: C.
         loose: 1 for movements that no bearing resists, which stay zero.
+        play: force of the bearings at no relative displacement, by which the tangent K of bearings with clearance misses
+            the origin [N, N mm]; zero of linear bearings.
     """
 
     flexibility: Float[Array, "n n"]
@@ -50,6 +52,7 @@ class System(NamedTuple):
     bearings: Float[Array, "b b"]
     housing: Float[Array, "b b"]
     loose: Float[Array, " movements"]
+    play: Float[Array, " b"]
 
 
 class Equilibrium(NamedTuple):
@@ -98,11 +101,19 @@ def system(gearbox: Gearbox, patterns: list[Patterns]) -> System:
         stiffness = stiffness.at[index, :, index].set(matrix)
     stiffness = stiffness.reshape(_WAYS * count, -1)
     housing = jnp.zeros_like(stiffness) if gearbox.housing is None else gearbox.housing.at(gearbox.bearing_names)
-    return System(total, jnp.concatenate(moving, axis=1), stiffness, housing, jnp.concatenate(loose))
+    return System(
+        total, jnp.concatenate(moving, axis=1), stiffness, housing, jnp.concatenate(loose), jnp.zeros(len(stiffness))
+    )
 
 
-def solve(of: System, loads: Float[Array, "patterns loads"]) -> Equilibrium:
-    """Forces and displacements under several loads, each a sum of the patterns."""
+def solve(of: System, loads: Float[Array, "patterns loads"], *, actual: bool = False) -> Equilibrium:
+    """Forces and displacements under several loads, each a sum of the patterns.
+
+    Args:
+        of: the equations.
+        loads: share of every pattern in every load.
+        actual: whether the play of the bearings counts, as in a state; not in what a further load changes.
+    """
     count = len(of.bearings)
     inner, across = of.flexibility[:count, :count], of.flexibility[:count, count:] @ loads
     here, there = of.moving[:count], of.moving[count:]
@@ -113,7 +124,8 @@ def solve(of: System, loads: Float[Array, "patterns loads"]) -> Equilibrium:
         / size[:, None]
     )
     lower = jnp.concatenate([here.T, jnp.diag(of.loose)], axis=1)
-    right = jnp.concatenate([-(of.bearings @ across) / size[:, None], -there.T @ loads])
+    given = of.play[:, None] * float(actual) - of.bearings @ across
+    right = jnp.concatenate([given / size[:, None], -there.T @ loads])
     found = jnp.linalg.solve(jnp.concatenate([upper, lower]), right)
     force, moved = found[:count], found[count:]
     return Equilibrium(

@@ -13,7 +13,7 @@ from ..compliance.iso_6336 import iso_stiffness
 from ..geometry import Gear, GearPair, path_of_contact
 from ..microgeometry import AbstractModification, Flank, NoModification
 from ..numerics import Checked, check, maximum, press, program, real, result, whole
-from .support import AbstractSupport, ShaftSupport, even_coordinates
+from .mesh_support import AbstractSupport, ShaftSupport, even_coordinates
 
 Scalar = Float[Array, ""]
 Slices = Float[Array, " slices"]

@@ -9,9 +9,10 @@ from jaxtyping import Array, Float
 
 from ..numerics import Checked, check, program, real, result
 from .beam import DIRECTIONS, twist
-from .equilibrium import Patterns, solve, system
+from .equilibrium import Patterns, solve
 from .gearbox import Gearbox
-from .support import load_pattern, side_by_side, torques_on
+from .loads import load_pattern, side_by_side, torques_on
+from .operating_point import system_under_load
 
 _WAYS = len(DIRECTIONS)
 
@@ -92,7 +93,7 @@ def elastic_line(gearbox: Gearbox, shaft: str, position) -> ElasticLine:
 
 @program
 def _reactions(gearbox: Gearbox) -> BearingReactions:
-    found = solve(system(gearbox, load_pattern(gearbox)), jnp.ones((1, 1)))
+    found = solve(system_under_load(gearbox, load_pattern(gearbox)), jnp.ones((1, 1)), actual=True)
     shape = -1, _WAYS
     force, shaft, seat = (item[:, 0].reshape(shape) for item in (-found.force, found.bearing, found.seat))
     return BearingReactions(gearbox.bearing_names, force, shaft, seat)
@@ -104,7 +105,9 @@ def _line(gearbox: Gearbox, shaft: int, position: Float[Array, " points"]) -> El
     probes = [Patterns(jnp.zeros(0), jnp.zeros((0, _WAYS, _WAYS * count)))] * len(gearbox.shafts)
     probes[shaft] = Patterns(position, jnp.eye(_WAYS * count).reshape(count, _WAYS, -1))
     load = jnp.zeros((_WAYS * count + 1, 1)).at[-1].set(1.0)
-    found = solve(system(gearbox, side_by_side(probes, load_pattern(gearbox))), load).pattern[:-1, 0]
+    found = solve(system_under_load(gearbox, side_by_side(probes, load_pattern(gearbox))), load, actual=True).pattern[
+        :-1, 0
+    ]
     at, torque = torques_on(gearbox, shaft)
     # of two torques that turn a shaft against each other, the one on the left holds
     turned = twist(gearbox.shafts[shaft].beam, jnp.minimum(position[:, None], at[None, :])) @ torque
