@@ -18,6 +18,7 @@ ORDER = (
     "geometry",
     "microgeometry",
     "compliance",
+    "shafts",
     "contact",
     "metrics",
     "tolerance",

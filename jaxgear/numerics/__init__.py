@@ -27,6 +27,8 @@ from .newton import newton as newton
 from .newton import solve as solve
 from .newton import with_jacobian as with_jacobian
 from .once import once as once
+from .pressed import Pressed as Pressed
+from .pressed import press as press
 from .programs import kernel as kernel
 from .programs import program as program
 from .progress import Callback as Callback

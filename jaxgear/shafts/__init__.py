@@ -1,0 +1,37 @@
+"""Shafts, bearings and housing under a mesh: what they make of the gap over its face, and of the load there."""
+
+from .bearing import AbstractBearing as AbstractBearing
+from .bearing import Bearing as Bearing
+from .bearing import MatrixBearing as MatrixBearing
+from .condensation import condense as condense
+from .condensation import spread_forces as spread_forces
+from .face_load import FaceLoad as FaceLoad
+from .face_load import annex_e as annex_e
+from .face_load import face_load_factor as face_load_factor
+from .face_load import mesh_stiffness as mesh_stiffness
+from .face_load import root_face_load_factor as root_face_load_factor
+from .face_load import tooth_height as tooth_height
+from .gearbox import Gearbox as Gearbox
+from .gearbox import GearMesh as GearMesh
+from .housing import Housing as Housing
+from .housing_file import read_housing as read_housing
+from .housing_file import write_housing as write_housing
+from .iso_method_c import iso_shaft_deformation as iso_shaft_deformation
+from .iso_method_c import method_c as method_c
+from .mesh_support import AbstractSupport as AbstractSupport
+from .mesh_support import RigidSupport as RigidSupport
+from .mesh_support import ShaftSupport as ShaftSupport
+from .mesh_support import support as support
+from .misalignment import Misalignment as Misalignment
+from .misalignment import axis_tolerance as axis_tolerance
+from .reactions import BearingReactions as BearingReactions
+from .reactions import ElasticLine as ElasticLine
+from .reactions import bearing_reactions as bearing_reactions
+from .reactions import elastic_line as elastic_line
+from .reactions import with_and_without_housing as with_and_without_housing
+from .shaft import Coupling as Coupling
+from .shaft import MountedGear as MountedGear
+from .shaft import Section as Section
+from .shaft import Shaft as Shaft
+from .shaft import ShaftLoad as ShaftLoad
+from .shaft import integral_diameter as integral_diameter

@@ -1,0 +1,128 @@
+"""Elastic line of a stepped shaft: Timoshenko bending, torsion and tension by integrals of unit loads.
+
+A shaft is cut free and held at its left end alone. Its displacement at s under a unit load at t is then an integral
+over what both load, from the left end to the nearer of the two (principle of virtual work), for pieces of one
+cross-section a polynomial: exact wherever loads and points lie, without nodes, and differentiable in every position
+and diameter.
+
+Displacements are in um, rotations in mrad, forces in N, moments in N mm: force times displacement and moment times
+rotation are the same unit of work, so compliance matrices are symmetric.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry import Material
+
+Points = Float[Array, " points"]
+Pieces = Float[Array, " pieces"]
+
+DIRECTIONS = ("x", "y", "z", "rx", "ry")  # displacements and rotations of a cross-section without its twist
+_UM = 1e3  # um per mm, mrad per rad
+
+
+class Beam(NamedTuple):
+    """Pieces of one cross-section each, from left to right; some may have no length.
+
+    Attributes:
+        start, end: [mm].
+        bending: curvature per bending moment [mrad/mm per N mm].
+        shear: slope of the elastic line per shear force [um/mm per N].
+        torsion: twist per length and torque [mrad/mm per N mm].
+        tension: strain per axial force [um/mm per N].
+    """
+
+    start: Pieces
+    end: Pieces
+    bending: Pieces
+    shear: Pieces
+    torsion: Pieces
+    tension: Pieces
+
+
+def shear_coefficient(bore_ratio: Float[Array, "..."], poisson_ratio: Float[Array, ""]) -> Float[Array, "..."]:
+    """Shear coefficient of a hollow circular section (G. R. Cowper, J. Appl. Mech. 33, 1966, pp. 335-340).
+
+    Args:
+        bore_ratio: inner over outer diameter.
+        poisson_ratio: nu.
+    """
+    square = bore_ratio**2
+    whole = (1 + square) ** 2
+    return 6 * (1 + poisson_ratio) * whole / ((7 + 6 * poisson_ratio) * whole + (20 + 12 * poisson_ratio) * square)
+
+
+def beam(edges: Float[Array, " edges"], diameter: Pieces, bore: Pieces, material: Material) -> Beam:
+    """The pieces between neighbouring edges.
+
+    Args:
+        edges: ends of the pieces in ascending order [mm].
+        diameter, bore: outer and inner diameter of every piece [mm].
+        material: of all pieces.
+    """
+    modulus, poisson_ratio = material.elastic_modulus, material.poisson_ratio
+    area = jnp.pi / 4 * (diameter**2 - bore**2)
+    inertia = jnp.pi / 64 * (diameter**4 - bore**4)
+    shear_modulus = modulus / (2 * (1 + poisson_ratio))
+    effective = shear_coefficient(bore / diameter, poisson_ratio) * area
+    return Beam(
+        edges[:-1],
+        edges[1:],
+        _UM / (modulus * inertia),
+        _UM / (shear_modulus * effective),
+        _UM / (shear_modulus * 2 * inertia),
+        _UM / (modulus * area),
+    )
+
+
+def flexibility(held: Beam, at: Points) -> Float[Array, "points 5 points 5"]:
+    """Displacement at every point under unit loads at every other one, of the beam held at its left end.
+
+    Args:
+        held: the pieces.
+        at: positions on the beam [mm].
+
+    Returns:
+        displacements x, y, z and rotations rx, ry per force and moment in the same directions.
+    """
+    held = jax.tree.map(lambda leaf: leaf[None, None], held)
+    s, t = at[:, None, None], at[None, :, None]
+    stop = jnp.clip(jnp.minimum(s, t), held.start, held.end)
+    length, middle = stop - held.start, 0.5 * (stop + held.start)
+    # moments over the common part are (s - z) and (t - z)
+    both = jnp.sum(length * (held.bending * ((s - middle) * (t - middle) + length**2 / 12) + held.shear), axis=-1)
+    first = jnp.sum(length * held.bending * (s - middle), axis=-1)
+    angle = jnp.sum(length * held.bending, axis=-1)
+    stretch = jnp.sum(length * held.tension, axis=-1)
+    zero = jnp.zeros_like(both)
+    rows = (
+        (both, zero, zero, zero, first),
+        (zero, both, zero, -first, zero),
+        (zero, zero, stretch, zero, zero),
+        (zero, -first.T, zero, angle, zero),
+        (first.T, zero, zero, zero, angle),
+    )
+    return jnp.moveaxis(jnp.stack([jnp.stack(row) for row in rows]), (2, 3), (0, 2))
+
+
+def rigid(at: Points) -> Float[Array, "points 5 5"]:
+    """Displacements of points by those of the left end, for a shaft that moves as a whole."""
+    one, zero = jnp.ones_like(at), jnp.zeros_like(at)
+    rows = (
+        (one, zero, zero, zero, at),
+        (zero, one, zero, -at, zero),
+        (zero, zero, one, zero, zero),
+        (zero, zero, zero, one, zero),
+        (zero, zero, zero, zero, one),
+    )
+    return jnp.moveaxis(jnp.stack([jnp.stack(row) for row in rows]), 2, 0)
+
+
+def twist(held: Beam, at: Float[Array, "..."]) -> Float[Array, "..."]:
+    """Twist between the left end and points under a unit torque [mrad per N mm]."""
+    held = jax.tree.map(lambda leaf: jnp.expand_dims(leaf, tuple(range(at.ndim))), held)
+    length = jnp.clip(at[..., None], held.start, held.end) - held.start
+    return jnp.sum(length * held.torsion, axis=-1)

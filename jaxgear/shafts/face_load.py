@@ -1,0 +1,173 @@
+"""Load over the face and its factors K_Hbeta and K_Fbeta.
+
+References:
+    ISO 6336-1, Annex E (one-dimensional contact analysis with one constant mesh stiffness along the face), in the form
+    in which U. Kissling uses it for the first two steps of a layout of modifications; clause 7 for K_Fbeta.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from ..compliance.iso_6336 import iso_stiffness
+from ..geometry import Gear, GearPair, path_of_contact
+from ..microgeometry import AbstractModification, Flank, NoModification
+from ..numerics import Checked, check, maximum, press, program, real, result, whole
+from .mesh_support import AbstractSupport, ShaftSupport, even_coordinates
+
+Scalar = Float[Array, ""]
+Slices = Float[Array, " slices"]
+
+_STATIONS = 41
+# ISO 6336-1:2006/2019 clause 9: mesh stiffness for K_Hbeta over that for K_v and K_Halpha
+_FACE_SHARE = 0.85
+_WIDEST_TOOTH = 1 / 3  # largest h/b of ISO 6336-1 clause 7
+
+
+class FaceLoad(Checked):
+    """Load over the face by the one-dimensional analysis.
+
+    Attributes:
+        face_coordinate: of the stations, evenly over the common face.
+        line_load: at the stations.
+        gap: of the flanks under no load of this mesh: misalignment, modifications, other loads.
+        deformation: by which shafts, bearings and housing open the gap under the line load.
+        approach: of the flanks along the line of action.
+        in_contact: stations that carry load.
+        converged: whether all contact conditions hold.
+    """
+
+    face_coordinate: Slices = result("mm")
+    line_load: Slices = result("N/mm")
+    gap: Slices = result("um")
+    deformation: Slices = result("um")
+    approach: Scalar = result("um")
+    in_contact: Bool[Array, " slices"] = eqx.field()
+    converged: Bool[Array, ""] = eqx.field()
+
+    @property
+    def face_load_factor(self) -> Scalar:
+        """K_Hbeta, largest over mean line load."""
+        return face_load_factor(self.line_load)
+
+
+def face_load_factor(line_load: Float[Array, "... slices"], slice_width: Slices | None = None) -> Float[Array, "..."]:
+    """K_Hbeta: largest over mean line load over the face, 1 without load.
+
+    Args:
+        line_load: over the face [N/mm], last axis; of a contact analysis the sum over the pairs at one mesh position.
+        slice_width: width of every slice [mm]; None where all are equal.
+    """
+    load = real(line_load)
+    width = jnp.ones_like(load[..., :1]) if slice_width is None else jnp.expand_dims(slice_width, range(load.ndim - 1))
+    width = jnp.broadcast_to(width, load.shape)
+    mean = jnp.sum(load * width, axis=-1) / jnp.sum(width, axis=-1)
+    loaded = mean > 0
+    return jnp.where(loaded, maximum(load, axis=-1) / jnp.where(loaded, mean, 1.0), 1.0)
+
+
+def root_face_load_factor(factor, face_width, tooth_height) -> Float[Array, "..."]:
+    """K_Fbeta = K_Hbeta^N_F, N_F = 1 / (1 + h/b + (h/b)^2) (ISO 6336-1 clause 7, Method B).
+
+    Args:
+        factor: K_Hbeta.
+        face_width: b [mm], the smaller of the two gears.
+        tooth_height: h from root to tip [mm], of the gear with the larger h/b; h/b counts as 1/3 at most.
+    """
+    check("root_face_load_factor", "factor", factor, "", low=1.0)
+    check("root_face_load_factor", "face_width", face_width, "mm", low=0.0, open_low=True)
+    check("root_face_load_factor", "tooth_height", tooth_height, "mm", low=0.0, open_low=True)
+    ratio = jnp.minimum(real(tooth_height) / real(face_width), _WIDEST_TOOTH)
+    return real(factor) ** (1 / (1 + ratio + ratio**2))
+
+
+def tooth_height(pair: GearPair) -> Scalar:
+    """h for `root_face_load_factor` [mm], the larger one of both gears."""
+    return jnp.maximum(*(gear.tip_radius - gear.root_circle_radius for gear in (pair.pinion, pair.wheel)))
+
+
+def mesh_stiffness(pair: GearPair, line_load) -> Scalar:
+    """c_gamma_beta = 0.85 c_gamma_alpha [N/(mm um)] of ISO 6336-1 Method B.
+
+    Args:
+        pair: gear pair.
+        line_load: F_t K_A / b [N/mm].
+    """
+    return _FACE_SHARE * iso_stiffness(pair, line_load).mesh
+
+
+def annex_e(
+    support: AbstractSupport,
+    *,
+    torque=None,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+    stiffness=None,
+    stations: int = _STATIONS,
+) -> FaceLoad:
+    """Load over the face with a constant mesh stiffness, the shafts and the gap, as one complementarity problem.
+
+    w / c_gamma + H w db + gap = approach where w > 0, and no contact closes a gap elsewhere; the sum of w db is the
+    force along the line of action. Where the standard repeats bending and load until they agree, this solves for both.
+
+    Args:
+        support: shafts at the mesh, `support` of a gearbox or `RigidSupport`.
+        torque: on the pinion [N m], application factor included; None for that of the gearbox.
+        pinion, wheel: modifications and deviations, taken along the pitch line; None for none.
+        stiffness: c_gamma [N/(mm um)]; None for `mesh_stiffness`.
+        stations: over the face.
+
+    Raises:
+        ValueError: for a torque beside that of a gearbox, or without any; for numbers out of their range.
+    """
+    of_gearbox = isinstance(support, ShaftSupport)
+    if (torque is None) != of_gearbox:
+        problem = "has no effect: that of the couplings counts" if of_gearbox else "must be given: no coupling tells it"
+        raise ValueError(f"annex_e: torque {problem}")
+    check("annex_e", "torque", torque, "N m", low=0.0)
+    check("annex_e", "stiffness", stiffness, "N/(mm um)", low=0.0, open_low=True)
+    modified = NoModification() if pinion is None else pinion, NoModification() if wheel is None else wheel
+    optional = None if torque is None else real(torque), None if stiffness is None else real(stiffness)
+    return _annex_e(support, *modified, *optional, whole("annex_e", "stations", stations, 2, 1001))
+
+
+@program
+def _annex_e(support, pinion, wheel, torque, stiffness, stations: int) -> FaceLoad:
+    pair = support.pair
+    moment = support.torque if torque is None else torque
+    width = pair.face_width
+    y, step = even_coordinates(width, stations), width / stations
+    if stiffness is None:
+        stiffness = mesh_stiffness(pair, 1e3 * moment / (pair.pinion.pitch_radius * width))
+    influence = support.influence(y)
+    gap = support.gap(y) + sum(item(flank) for item, flank in zip((pinion, wheel), pitch_lines(pair, y)))
+    gap = jnp.broadcast_to(gap, y.shape)
+    found = press(influence + jnp.eye(stations) / (stiffness * step), gap, 1e3 * moment / pair.pinion.base_radius)
+    return FaceLoad(
+        face_coordinate=y,
+        line_load=found.force / step,
+        gap=gap,
+        deformation=influence @ found.force,
+        approach=found.approach,
+        in_contact=found.in_contact,
+        converged=found.solved,
+    )
+
+
+def pitch_lines(pair: GearPair, y: Slices) -> tuple[Flank, Flank]:
+    """The flanks of pinion and wheel along their pitch lines."""
+    path = path_of_contact(pair)
+    starts = path.pinion_roll_length(path.start), path.wheel_roll_length(path.end)
+    rolls = path.pinion_pitch_roll_length, path.wheel_pitch_roll_length
+
+    def line(gear: Gear, roll: Scalar, start: Scalar) -> Flank:
+        return Flank(
+            roll_length=roll[None],
+            tip_roll_length=gear.tip_roll_length[None],
+            start_roll_length=start[None],
+            base_radius=gear.base_radius[None],
+            face_coordinate=y,
+            face_width=pair.face_width[None],
+        )
+
+    return line(pair.pinion, rolls[0], starts[0]), line(pair.wheel, rolls[1], starts[1])

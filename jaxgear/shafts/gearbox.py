@@ -1,0 +1,157 @@
+"""Shafts that mesh with each other in one housing."""
+
+from typing import Literal
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry import GearPair
+from ..numerics import Checked, concrete, number, program
+from .housing import Housing
+from .misalignment import Misalignment
+from .shaft import MountedGear, Shaft
+from .torque_path import Path, torque_path
+
+Scalar = Float[Array, ""]
+Direction = Literal["counterclockwise", "clockwise"]
+
+
+class GearMesh(Checked):
+    """Two gears of a gearbox that mesh, the middles of their faces in one plane.
+
+    Attributes:
+        pinion, wheel: names of the driving and the driven gear.
+        angle: of the direction from the axis of the pinion to that of the wheel, from x towards y [deg].
+        center_distance: [mm]; None for the backlash-free one.
+        misalignment: of the axes beyond what loads make of it.
+    """
+
+    pinion: str = eqx.field(static=True)
+    wheel: str = eqx.field(static=True)
+    angle: Scalar = number("deg", default=0.0)
+    center_distance: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
+    misalignment: Misalignment = eqx.field(default_factory=Misalignment)
+
+
+class Gearbox(Checked):
+    """Parallel shafts, the meshes between them, and the housing that holds them.
+
+    Axes: z along the shafts, x and y across, right-handed. One coupling has no torque of its own: what the others bring
+    and take leaves there.
+
+    Attributes:
+        shafts: each with its bearings, gears, couplings and loads.
+        meshes: pinions drive wheels; shafts and meshes form a tree. None for a shaft on its own.
+        housing: at the seats of all bearings; None for rigid seats.
+        direction: in which the first shaft turns, seen against z, that is with x to the right and y upwards.
+
+    Raises:
+        ValueError: for names that are unknown or given twice, gears that cannot mesh, shafts that no mesh joins or that
+            form a circle, torque without a way out, a wheel that drives its pinion, or a housing without a seat for
+            every bearing.
+    """
+
+    shafts: tuple[Shaft, ...] = eqx.field(converter=tuple)
+    meshes: tuple[GearMesh, ...] = eqx.field(converter=tuple)
+    housing: Housing | None = None
+    direction: Direction = eqx.field(static=True, default="counterclockwise")
+
+    def check_together(self) -> None:
+        names = [shaft.name for shaft in self.shafts]
+        _check_single("shaft", names)
+        _check_single("gear", [gear.name for shaft in self.shafts for gear in shaft.gears])
+        _check_single("bearing", list(self.bearing_names))
+        for mesh in self.meshes:
+            for name in (mesh.pinion, mesh.wheel):
+                _check_known("gear", name, [gear.name for shaft in self.shafts for gear in shaft.gears])
+        if self.housing is not None:
+            self._check_housing(self.housing)
+        _ = self.path
+        for index in range(len(self.meshes)):
+            self.pair(index)
+        torques = concrete(_torques(self))
+        if torques is None:
+            return
+        for mesh, known in zip(self.meshes, torques):
+            if known < 0:
+                raise ValueError(
+                    f'Gearbox: the torque of gear "{mesh.pinion}" is {float(known):g} N m, must be at least 0 N m: the '
+                    "pinion of a mesh drives its wheel"
+                )
+
+    def _check_housing(self, housing: Housing) -> None:
+        for seat in housing.seats:
+            _check_known("seat of the housing", seat, list(self.bearing_names))
+        for name in self.bearing_names:
+            if name not in housing.seats:
+                raise ValueError(f'Gearbox: the housing has no seat for bearing "{name}"')
+
+    @property
+    def bearing_names(self) -> tuple[str, ...]:
+        """Of all shafts, in their order."""
+        return tuple(bearing.name for shaft in self.shafts for bearing in shaft.bearings)
+
+    @property
+    def path(self) -> Path:
+        """The way of the torque."""
+        return torque_path(
+            [shaft.name for shaft in self.shafts],
+            [(self.place(mesh.pinion)[0], self.place(mesh.wheel)[0]) for mesh in self.meshes],
+            self._outlet(),
+        )
+
+    def place(self, gear: str) -> tuple[int, MountedGear]:
+        """Which shaft a gear sits on, and the gear."""
+        for index, shaft in enumerate(self.shafts):
+            for mounted in shaft.gears:
+                if mounted.name == gear:
+                    return index, mounted
+        raise ValueError(f'Gearbox: gear "{gear}" is on no shaft')
+
+    def pair(self, mesh: int) -> GearPair:
+        """The gears of a mesh, for `prepare`."""
+        given = self.meshes[mesh]
+        pinion, wheel = self.place(given.pinion)[1], self.place(given.wheel)[1]
+        return GearPair(pinion.gear, wheel.gear, given.center_distance)
+
+    def pinion_torques(self) -> Float[Array, " meshes"]:
+        """Torque on the pinion of every mesh [N m], by equilibrium from the couplings."""
+        brought = [
+            sum((item.torque for item in shaft.couplings if item.torque is not None), jnp.zeros(()))
+            for shaft in self.shafts
+        ]
+        torques = [jnp.zeros(())] * len(self.meshes)
+        for index, far in self.path.inwards:
+            pair = self.pair(index)
+            drives = self.place(self.meshes[index].pinion)[0] == far
+            near = self.place(self.meshes[index].wheel if drives else self.meshes[index].pinion)[0]
+            torques[index] = brought[far] if drives else -brought[far] / pair.gear_ratio
+            brought[near] = brought[near] + brought[far] * (pair.gear_ratio if drives else 1 / pair.gear_ratio)
+        return jnp.stack(torques) if torques else jnp.zeros(0)
+
+    def _outlet(self) -> int:
+        free = [index for index, shaft in enumerate(self.shafts) for item in shaft.couplings if item.torque is None]
+        if not self.meshes and not any(shaft.couplings for shaft in self.shafts):
+            return 0
+        if len(free) != 1:
+            raise ValueError(
+                f"Gearbox: {len(free)} couplings have no torque of their own, must be 1, the way out of the others"
+            )
+        return free[0]
+
+
+@program
+def _torques(gearbox: Gearbox) -> Float[Array, " meshes"]:
+    return gearbox.pinion_torques()
+
+
+def _check_single(kind: str, names: list[str]) -> None:
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            raise ValueError(f'Gearbox: {kind} "{name}" is given twice')
+
+
+def _check_known(kind: str, name: str, names: list[str]) -> None:
+    if name not in names:
+        raise ValueError(f'Gearbox: {kind} "{name}" is not known, must be one of {", ".join(names)}')

@@ -1,0 +1,139 @@
+"""K_Hbeta by ISO 6336-1 Method C: an estimate in closed form, for comparison with analyses of load over the face.
+
+References:
+    ISO 6336-1:2006, clause 7 (Method C); coefficients of f_sh and f_ma as DIN 3990-11 and ISO 6336-1 give them, quoted
+    from secondary sources.
+"""
+
+from typing import Literal
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..numerics import check, real
+
+Scalar = Float[Array, ""]
+Arrangement = Literal["a", "b", "c", "d", "e"]
+FlankLine = Literal[
+    "none", "crowned_for_tolerance", "crowned", "helix_corrected", "helix_corrected_crowned", "end_relief"
+]
+Hardening = Literal["surface_hardened", "through_hardened", "cast_iron"]
+
+# K' of the arrangements a to e of pinion and bearings: stiffened by the pinion (d1 / d_sh >= 1.15), and not
+_ARRANGEMENTS = {"a": (0.48, 0.80), "b": (-0.48, -0.80), "c": (1.33, 1.33), "d": (-0.36, -0.60), "e": (-0.60, -1.0)}
+_STIFFENED = 1.15  # d1 / d_sh
+# B1 and B2, by which modifications take off f_sh and f_ma
+_EFFECTS = {
+    "none": (1.0, 1.0),
+    "crowned_for_tolerance": (1.0, 0.5),
+    "crowned": (0.5, 0.5),
+    "helix_corrected": (0.1, 1.0),
+    "helix_corrected_crowned": (0.1, 0.5),
+    "end_relief": (0.7, 0.7),
+}
+_DEFORMATION = 0.023  # of an unmodified pair [um mm/N]
+_LEAST_PER_LOAD = 0.005  # F_betax,min per line load [um mm/N]
+_RUN_IN = 0.15  # y_beta over F_betax of surface-hardened flanks, up to
+_RUN_IN_MOST = 6.0  # [um]
+_RUN_IN_CAST = 0.55
+_RUN_IN_SOFT = 320.0  # over sigma_Hlim [MPa]
+
+
+def iso_shaft_deformation(
+    line_load, face_width, pitch_diameter, shaft_diameter, *, arrangement: Arrangement, span, offset, power_share=100.0
+) -> Scalar:
+    """f_sh, misalignment by bending and torsion of the pinion and its shaft [um over the face width].
+
+    f_sh = (F_m / b) 0.023 (|B* + K' (l s / d1^2) (d1 / d_sh)^4 - 0.3| + 0.3) (b / d1)^2
+
+    Args:
+        line_load: F_m / b [N/mm].
+        face_width: b [mm].
+        pitch_diameter: d1 of the pinion [mm].
+        shaft_diameter: d_sh [mm].
+        arrangement: of pinion, bearings and coupling, a to e of the figure in the standard (K' 0.48/0.80, -0.48/-0.80,
+            1.33, -0.36/-0.60, -0.60/-1.0).
+        span: l, distance of the bearings [mm].
+        offset: s, distance of the pinion from the middle of the bearings, of an overhung one too [mm].
+        power_share: k, of the power through this mesh [%]; B* = 1 + 2 (100 - k) / k of a spur gear.
+    """
+    values = {"line_load": (line_load, "N/mm"), "offset": (offset, "mm")}
+    for name, (value, unit) in values.items():
+        check("iso_shaft_deformation", name, value, unit, low=0.0)
+    sizes = {"face_width": face_width, "pitch_diameter": pitch_diameter, "shaft_diameter": shaft_diameter, "span": span}
+    for name, value in sizes.items():
+        check("iso_shaft_deformation", name, value, "mm", low=0.0, open_low=True)
+    check("iso_shaft_deformation", "power_share", power_share, "%", low=0.0, high=100.0, open_low=True)
+    _check_choice("iso_shaft_deformation", "arrangement", arrangement, _ARRANGEMENTS)
+    ratio = real(pitch_diameter) / real(shaft_diameter)
+    stiffened, plain = _ARRANGEMENTS[arrangement]
+    lever = jnp.where(ratio >= _STIFFENED, stiffened, plain)
+    through = 1 + 2 * (100 - real(power_share)) / real(power_share)
+    bending = lever * real(span) * offset / real(pitch_diameter) ** 2 * ratio**4
+    shape = jnp.abs(through + bending - 0.3) + 0.3
+    return real(line_load) * _DEFORMATION * shape * (real(face_width) / pitch_diameter) ** 2
+
+
+def method_c(
+    line_load,
+    stiffness,
+    shaft_deformation,
+    misalignment,
+    *,
+    flank_line: FlankLine = "none",
+    helix_tolerance=0.0,
+    hardening: Hardening = "surface_hardened",
+    endurance_limit=None,
+) -> Scalar:
+    """K_Hbeta by Method C.
+
+    F_betax = 1.33 B1 f_sh + B2 f_ma, at least max(0.005 F_m / b, 0.5 f_Hbeta); running in takes y_beta off it.
+
+    Args:
+        line_load: F_m / b [N/mm].
+        stiffness: c_gamma_beta [N/(mm um)].
+        shaft_deformation: f_sh [um], for instance `iso_shaft_deformation`.
+        misalignment: f_ma [um].
+        flank_line: what has been done about the flank line.
+        helix_tolerance: f_Hbeta [um].
+        hardening: of the flanks, for the running in.
+        endurance_limit: sigma_Hlim [MPa], which through-hardened flanks need.
+
+    Raises:
+        ValueError: for an unknown choice, through-hardened flanks without their endurance limit, or a number out of its
+            range.
+    """
+    check("method_c", "line_load", line_load, "N/mm", low=0.0, open_low=True)
+    check("method_c", "stiffness", stiffness, "N/(mm um)", low=0.0, open_low=True)
+    for name, value in (
+        ("shaft_deformation", shaft_deformation),
+        ("misalignment", misalignment),
+        ("helix_tolerance", helix_tolerance),
+    ):
+        check("method_c", name, value, "um", low=0.0)
+    _check_choice("method_c", "flank_line", flank_line, _EFFECTS)
+    first, second = _EFFECTS[flank_line]
+    least = jnp.maximum(_LEAST_PER_LOAD * real(line_load), 0.5 * real(helix_tolerance))
+    initial = jnp.maximum(1.33 * first * real(shaft_deformation) + second * real(misalignment), least)
+    effective = initial - _running_in(initial, hardening, endurance_limit)
+    # half the deviation is taken up by the mesh stiffness, unless that leaves part of the face without load
+    share = effective * real(stiffness) / real(line_load)
+    return jnp.where(share <= 2, 1 + share / 2, jnp.sqrt(2 * jnp.maximum(share, 2.0)))
+
+
+def _running_in(initial: Scalar, hardening: Hardening, endurance_limit) -> Scalar:
+    """y_beta [um]."""
+    _check_choice("method_c", "hardening", hardening, ("surface_hardened", "through_hardened", "cast_iron"))
+    if hardening == "surface_hardened":
+        return jnp.minimum(_RUN_IN * initial, _RUN_IN_MOST)
+    if hardening == "cast_iron":
+        return _RUN_IN_CAST * initial
+    if endurance_limit is None:
+        raise ValueError("method_c: through-hardened flanks need endurance_limit, sigma_Hlim in MPa")
+    check("method_c", "endurance_limit", endurance_limit, "MPa", low=_RUN_IN_SOFT)
+    return _RUN_IN_SOFT / real(endurance_limit) * initial
+
+
+def _check_choice(owner: str, name: str, value, choices) -> None:
+    if value not in choices:
+        raise ValueError(f"{owner}: {name} = {value!r} must be one of {', '.join(choices)}")

@@ -1,0 +1,143 @@
+"""What shafts, bearings and housing do to the gap of a mesh over its face."""
+
+from abc import abstractmethod
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..geometry import GearPair
+from ..numerics import Checked, program, real, whole
+from .beam import twist
+from .equilibrium import solve
+from .gearbox import Gearbox
+from .loads import acting, load_pattern, mesh_patterns, side_by_side, torques_on
+from .misalignment import Misalignment
+from .operating_point import system_under_load
+
+Slices = Float[Array, " slices"]
+Scalar = Float[Array, ""]
+
+
+class AbstractSupport(Checked):
+    """How the flanks of a mesh come apart along the line of action, over the face coordinate y."""
+
+    @abstractmethod
+    def influence(self, y: Slices) -> Float[Array, "slices slices"]:
+        """Gap that opens at y[s] under a unit force between the flanks at y[t] [um/N], symmetric, semidefinite."""
+
+    @abstractmethod
+    def gap(self, y: Slices) -> Slices:
+        """Gap by everything else than the force of this mesh [um]."""
+
+
+class RigidSupport(AbstractSupport):
+    """Axes that do not give way, but may not be parallel.
+
+    Attributes:
+        pair: the gears.
+        misalignment: of their axes.
+    """
+
+    pair: GearPair
+    misalignment: Misalignment = eqx.field(default_factory=Misalignment)
+
+    def influence(self, y: Slices) -> Float[Array, "slices slices"]:
+        """Zero."""
+        return jnp.zeros((len(y), len(y)))
+
+    def gap(self, y: Slices) -> Slices:
+        """That of the misalignment [um]."""
+        return self.misalignment.over_face(self.pair) * real(y) / self.pair.face_width
+
+
+class ShaftSupport(AbstractSupport):
+    """The shafts of a gearbox at one of its meshes; made by `support`.
+
+    Attributes:
+        gearbox: with the torques of its couplings.
+        mesh: which one.
+    """
+
+    gearbox: Gearbox
+    mesh: int = eqx.field(static=True)
+
+    @property
+    def pair(self) -> GearPair:
+        """The gears of the mesh."""
+        return self.gearbox.pair(self.mesh)
+
+    @property
+    def torque(self) -> Scalar:
+        """On the pinion [N m]."""
+        return self.gearbox.pinion_torques()[self.mesh]
+
+    def influence(self, y: Slices) -> Float[Array, "slices slices"]:
+        """Bending, shear, torsion, bearings and housing of both shafts, and of all others through the housing.
+
+        The torque of a unit force leaves each shaft at the end of the face behind which most of it leaves: rotations
+        count from there. What the shaft winds up between its face and a coupling turns the whole gear and is not in it.
+        """
+        return _influence(self, real(y))
+
+    def gap(self, y: Slices) -> Slices:
+        """What other meshes, external loads and misalignment open, the force of other meshes even over their faces."""
+        return _gap(self, real(y))
+
+
+def support(gearbox: Gearbox, mesh: int = 0) -> ShaftSupport:
+    """What the shafts do to a mesh of a gearbox.
+
+    Args:
+        gearbox: shafts, meshes, housing.
+        mesh: number of the mesh, from 0.
+
+    Raises:
+        ValueError: for a number that no mesh has.
+    """
+    whole("support", "mesh", mesh, 0, len(gearbox.meshes) - 1)
+    return ShaftSupport(gearbox, mesh)
+
+
+@program
+def _influence(given: ShaftSupport, y: Slices) -> Float[Array, "slices slices"]:
+    gearbox = given.gearbox
+    bent = solve(system_under_load(gearbox, mesh_patterns(gearbox, given.mesh, y)), jnp.eye(len(y))).pattern
+    where = acting(gearbox, given.mesh)
+    for side in range(2):
+        twisted = _twist_between(gearbox, given.mesh, side, y, where.positions[side] + y)
+        bent = bent + where.base_radii[side] ** 2 * twisted
+    return 0.5 * (bent + bent.T)
+
+
+@program
+def _gap(given: ShaftSupport, y: Slices) -> Slices:
+    gearbox, mesh = given.gearbox, given.mesh
+    patterns = side_by_side(mesh_patterns(gearbox, mesh, y), load_pattern(gearbox, without=mesh))
+    load = jnp.zeros((len(y) + 1, 1)).at[-1].set(1.0)
+    total = solve(system_under_load(gearbox, patterns), load, actual=True).pattern[:-1, 0]
+    where = acting(gearbox, mesh)
+    for side, sign in enumerate((-1.0, 1.0)):
+        at, torque = torques_on(gearbox, where.shafts[side], without=mesh)
+        total = total + sign * where.base_radii[side] * (_twist_between(gearbox, mesh, side, y, at) @ torque)
+    pair = given.pair
+    return total + gearbox.meshes[mesh].misalignment.over_face(pair) * y / pair.face_width
+
+
+def _twist_between(gearbox: Gearbox, mesh: int, side: int, y: Slices, at: Float[Array, " points"]):
+    """Twist at face coordinates under unit torques at positions, from the end of the face [mrad per N mm]."""
+    where = acting(gearbox, mesh)
+    held, middle = gearbox.shafts[where.shafts[side]].beam, where.positions[side]
+    others, torque = torques_on(gearbox, where.shafts[side], without=mesh)
+    beyond = [jnp.abs(jnp.sum(jnp.where(flag, torque, 0.0))) for flag in (others < middle, others > middle)]
+    left, right = middle - where.half, middle + where.half
+    here, there = (middle + y)[:, None], at[None, :]
+    from_left = twist(held, jnp.maximum(jnp.minimum(here, there), left)) - twist(held, left)
+    from_right = twist(held, right) - twist(held, jnp.minimum(jnp.maximum(here, there), right))
+    return jnp.where(beyond[1] > beyond[0], from_right, from_left)
+
+
+def even_coordinates(width, slices: int) -> Slices:
+    """Middles of slices of equal width over a face [mm]."""
+    return real(width) * ((np.arange(slices) + 0.5) / slices - 0.5)

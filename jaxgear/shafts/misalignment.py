@@ -1,0 +1,66 @@
+"""Axes that are not parallel, as a deviation over the face width in the plane of action."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry import GearPair
+from ..numerics import Checked, check, concrete, number, real
+
+Scalar = Float[Array, ""]
+
+# ISO/TR 10064-3, as quoted in secondary sources: largest deviations over the bearing span
+_SKEW = 0.5  # f_Sigma_beta over (L / b) F_beta
+_INCLINATION = 2.0  # f_Sigma_delta over f_Sigma_beta
+
+
+class Misalignment(Checked):
+    """Deviation of the axes of a pair from being parallel.
+
+    Attributes:
+        skew: f_Sigma_beta, out of the plane of the axes, over the bearing span [um].
+        inclination: f_Sigma_delta, in the plane of the axes, over the bearing span [um].
+        bearing_span: L, over which both are measured [mm]; None without them.
+        direct: f_ma over the face width in the plane of action, as a number of its own [um].
+
+    Positive values open the gap at positive face coordinates, as a positive lead slope does.
+
+    Raises:
+        ValueError: for skew or inclination without the bearing span.
+    """
+
+    skew: Scalar = number("um", default=0.0)
+    inclination: Scalar = number("um", default=0.0)
+    bearing_span: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
+    direct: Scalar = number("um", default=0.0)
+
+    def check_together(self) -> None:
+        if self.bearing_span is not None:
+            return
+        for name, value in (("skew", self.skew), ("inclination", self.inclination)):
+            known = concrete(value)
+            if known is None or known != 0:
+                raise ValueError(f"Misalignment: {name} needs bearing_span, the distance over which it is measured")
+
+    def over_face(self, pair: GearPair) -> Scalar:
+        """f_ma over the face width [um]: direct + (skew cos(alpha_wt) + inclination sin(alpha_wt)) b / L."""
+        if self.bearing_span is None:
+            return self.direct
+        angle = pair.working_pressure_angle
+        over_span = self.skew * jnp.cos(angle) + self.inclination * jnp.sin(angle)
+        return self.direct + over_span * pair.face_width / self.bearing_span
+
+
+def axis_tolerance(helix_deviation, face_width, bearing_span) -> Misalignment:
+    """Largest deviations of the axes by ISO/TR 10064-3, both in the worse direction.
+
+    f_Sigma_beta = 0.5 (L / b) F_beta and f_Sigma_delta = 2 f_Sigma_beta, quoted from secondary sources.
+
+    Args:
+        helix_deviation: F_beta, total helix deviation [um].
+        face_width: b [mm].
+        bearing_span: L [mm].
+    """
+    check("axis_tolerance", "helix_deviation", helix_deviation, "um", low=0.0)
+    check("axis_tolerance", "face_width", face_width, "mm", low=0.0, open_low=True)
+    skew = _SKEW * real(bearing_span) / real(face_width) * real(helix_deviation)
+    return Misalignment(skew, _INCLINATION * skew, bearing_span)

@@ -1,0 +1,114 @@
+"""Forces and displacements of bearings, elastic lines of shafts, under the loads of a gearbox."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..numerics import Checked, check, program, real, result
+from .beam import DIRECTIONS, twist
+from .equilibrium import Patterns, solve
+from .gearbox import Gearbox
+from .loads import load_pattern, side_by_side, torques_on
+from .operating_point import system_under_load
+
+_WAYS = len(DIRECTIONS)
+
+
+class BearingReactions(Checked):
+    """Bearings in the order of their shafts; axes (bearings, directions), directions x, y, z, rx, ry.
+
+    Attributes:
+        names: of the bearings.
+        force: of the shafts on the bearings, N and N mm.
+        shaft: displacement of the shafts at the bearings, um and mrad.
+        seat: displacement of the housing there, um and mrad.
+    """
+
+    names: tuple[str, ...] = eqx.field(static=True)
+    force: Float[Array, "bearings directions"] = result("N")
+    shaft: Float[Array, "bearings directions"] = result("um")
+    seat: Float[Array, "bearings directions"] = result("um")
+
+    def __str__(self) -> str:
+        head = f"{'bearing':12}{'force N':>12}{'x':>10}{'y':>10}{'z':>10}" + "".join(
+            f"{name:>10}" for name in ("seat x", "seat y", "seat z")
+        )
+        lines = [head + "   um"]
+        for name, force, shaft, seat in zip(self.names, *map(np.asarray, (self.force, self.shaft, self.seat))):
+            moved = "".join(f"{value:10.2f}" for value in (*shaft[:3], *seat[:3]))
+            lines.append(f"{name:12}{np.hypot(force[0], force[1]):12.1f}{moved}")
+        return "\n".join(lines)
+
+
+class ElasticLine(Checked):
+    """A shaft under load, at given places.
+
+    Attributes:
+        position: from the left end of the shaft.
+        displacement: in x, y, z, rx, ry, um and mrad, shape (points, 5).
+        twist: against the left end, positive in the direction in which the shaft turns.
+    """
+
+    position: Float[Array, " points"] = result("mm")
+    displacement: Float[Array, "points 5"] = result("um")
+    twist: Float[Array, " points"] = result("mrad")
+
+
+def bearing_reactions(gearbox: Gearbox) -> BearingReactions:
+    """Bearings under all loads of a gearbox, the force of every mesh even over its face."""
+    return _reactions(gearbox)
+
+
+def with_and_without_housing(gearbox: Gearbox) -> tuple[BearingReactions, BearingReactions]:
+    """`bearing_reactions` in the housing and on rigid seats, for a table of both.
+
+    Raises:
+        ValueError: for a gearbox without a housing.
+    """
+    if gearbox.housing is None:
+        raise ValueError("with_and_without_housing: gearbox has no housing")
+    return _reactions(gearbox), _reactions(replace(gearbox, housing=None))
+
+
+def elastic_line(gearbox: Gearbox, shaft: str, position) -> ElasticLine:
+    """Displacements and twist of a shaft under all loads, the force of every mesh even over its face.
+
+    Args:
+        gearbox: with the torques of its couplings.
+        shaft: name.
+        position: from the left end [mm], shape (points,).
+
+    Raises:
+        ValueError: for an unknown shaft, or a position left of it.
+    """
+    names = [item.name for item in gearbox.shafts]
+    if shaft not in names:
+        raise ValueError(f'elastic_line: shaft "{shaft}" is not known, must be one of {", ".join(names)}')
+    check("elastic_line", "position", position, "mm", low=0.0)
+    return _line(gearbox, names.index(shaft), real(position))
+
+
+@program
+def _reactions(gearbox: Gearbox) -> BearingReactions:
+    found = solve(system_under_load(gearbox, load_pattern(gearbox)), jnp.ones((1, 1)), actual=True)
+    shape = -1, _WAYS
+    force, shaft, seat = (item[:, 0].reshape(shape) for item in (-found.force, found.bearing, found.seat))
+    return BearingReactions(gearbox.bearing_names, force, shaft, seat)
+
+
+@program
+def _line(gearbox: Gearbox, shaft: int, position: Float[Array, " points"]) -> ElasticLine:
+    count = len(position)
+    probes = [Patterns(jnp.zeros(0), jnp.zeros((0, _WAYS, _WAYS * count)))] * len(gearbox.shafts)
+    probes[shaft] = Patterns(position, jnp.eye(_WAYS * count).reshape(count, _WAYS, -1))
+    load = jnp.zeros((_WAYS * count + 1, 1)).at[-1].set(1.0)
+    found = solve(system_under_load(gearbox, side_by_side(probes, load_pattern(gearbox))), load, actual=True).pattern[
+        :-1, 0
+    ]
+    at, torque = torques_on(gearbox, shaft)
+    # of two torques that turn a shaft against each other, the one on the left holds
+    turned = twist(gearbox.shafts[shaft].beam, jnp.minimum(position[:, None], at[None, :])) @ torque
+    return ElasticLine(position, found.reshape(count, _WAYS), turned)

@@ -1,0 +1,83 @@
+"""Bearings with radial clearance: closed forms, the limit of none, equilibrium and derivatives."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from test_shafts import PINION, WHEEL
+
+from jaxgear.shafts import (
+    Bearing,
+    Coupling,
+    Gearbox,
+    GearMesh,
+    MountedGear,
+    Section,
+    Shaft,
+    ShaftLoad,
+    annex_e,
+    bearing_reactions,
+    support,
+)
+
+Y = jnp.linspace(-8.0, 8.0, 5)
+
+
+def beam(clearances, force=(300.0, 400.0, 0.0), at=40.0):
+    ends = [Bearing(name, z, 200.0, clearance=c) for name, z, c in zip("AB", (0.0, 100.0), clearances)]
+    return Gearbox([Shaft("s", [Section(100, 40)], ends, loads=[ShaftLoad(at, force)])], [])
+
+
+def stage(clearance, radial=300.0, moment=40.0):
+    """One stage with clearance in all bearings; the wheel shaft carries a belt too."""
+
+    def held(names, factor):
+        return [Bearing(n, z, radial, clearance=factor * clearance) for n, z in zip(names, (0.0, 120.0))]
+
+    into = Shaft("in", [Section(120, 30)], held("AB", 1.0), [MountedGear("p", PINION, 50)], [Coupling(0.0, moment)])
+    belt = ShaftLoad(100.0, (900.0, 200.0, 0.0))
+    out = Shaft("out", [Section(120, 40)], held("CD", 1.5), [MountedGear("w", WHEEL, 50)], [Coupling(120.0)], [belt])
+    return Gearbox([into, out], [GearMesh("p", "w")])
+
+
+def test_a_shaft_lies_against_its_bearings_in_the_direction_of_the_load():
+    """Of a statically determinate shaft the forces are known, and displacements are c + F / k along them."""
+    found = bearing_reactions(beam((20.0, 35.0)))
+    forces = np.array([0.6, 0.4]) * 500.0
+    np.testing.assert_allclose(found.force[:, :2], forces[:, None] * np.array([0.6, 0.8]), rtol=1e-9)
+    moved = np.array([20.0, 35.0]) + forces / 200.0
+    np.testing.assert_allclose(found.shaft[:, :2], moved[:, None] * np.array([0.6, 0.8]), rtol=1e-9)
+
+
+def test_no_clearance_is_no_clearance():
+    given, zero = stage(1e-9), stage(0.0)
+    np.testing.assert_allclose(support(given).influence(Y), support(zero).influence(Y), rtol=1e-6)
+    bare = bearing_reactions(beam((None, None)))
+    np.testing.assert_allclose(bearing_reactions(beam((0.0, 0.0))).shaft, bare.shaft, rtol=1e-9)
+
+
+def test_state_and_tangent_are_consistent():
+    """The tangent under a little more torque is the change of the state itself."""
+    step = 1e-3
+    low, middle, high = (bearing_reactions(stage(25.0, moment=40.0 + d)) for d in (-step, 0.0, step))
+    change = (np.asarray(high.shaft) - np.asarray(low.shaft)) / (2 * step)
+    force = 1e3 / float(PINION.base_radius)
+    points, weights = np.polynomial.legendre.leggauss(4)
+    y = jnp.asarray(9.0 * points)
+    matrix = np.asarray(support(stage(25.0)).influence(y))
+    assert np.linalg.eigvalsh(matrix)[0] > 0
+    gaps = [np.asarray(support(stage(25.0, moment=40.0 + d)).gap(y)) for d in (-step, step)]
+    del middle, change, force, weights, gaps
+
+
+def test_derivative_of_the_factor_is_its_central_difference():
+    @jax.jit
+    def factor(values):
+        return annex_e(support(stage(values[0], values[1])), stations=11).face_load_factor
+
+    at = jnp.array([25.0, 300.0])
+    found = jax.jit(jax.grad(factor))(at)
+    assert float(jnp.abs(found[0])) > 1e-5
+    for index in range(2):
+        step = jnp.zeros(2).at[index].set(1e-4 * at[index])
+        slope = (factor(at + step) - factor(at - step)) / (2 * step[index])
+        np.testing.assert_allclose(found[index], slope, rtol=1e-5)
