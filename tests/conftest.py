@@ -1,6 +1,7 @@
 """Settings of every test: double precision, no silent promotion of dtypes or ranks, annotated shapes checked, compiled
-functions kept on disk."""
+functions kept on disk, and a garbage collector that does not look through everything all the time."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -24,6 +25,18 @@ def pytest_configure(config):
     if config.option.markexpr != "slow":
         jaxtyping.install_import_hook("jaxgear", "typechecker.arrays")
         os.environ.setdefault("XLA_FLAGS", QUICK_COMPILER)
+
+
+# Collections of the oldest objects took a fifth of the time of tracing: a trace makes many objects, and each collection
+# looks through the imported modules and the collected tests again. Larger thresholds make them rare (the defaults are
+# 700, 10 and 10 in Python 3.11), and what is there before the first test is left out.
+RARELY = (50_000, 20, 10)
+
+
+def pytest_collection_finish(session):
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(*RARELY)
 
 
 def _compilation_cache() -> Path:
@@ -51,6 +64,7 @@ def _forget_compiled_programs():
     """Drops what a file of tests compiled: the system refuses a process that holds too many programs."""
     yield
     jax.clear_caches()
+    gc.collect()  # programs in reference cycles too
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ import subprocess
 import sys
 from types import SimpleNamespace
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import matplotlib
@@ -39,17 +38,25 @@ def designs():
 
 
 @pytest.fixture(scope="module")
-def cycles(mesh, designs):
-    solve = eqx.filter_jit(jg.solve)
-    return {name: solve(mesh, TORQUE, pinion=pinion, wheel=wheel) for name, (pinion, wheel) in designs.items()}
+def solved(mesh, designs):
+    """Mesh cycles at all torques, by design."""
+
+    def at_all(pinion, wheel):
+        return jax.vmap(lambda torque: jg.solve(mesh, torque, pinion=pinion, wheel=wheel))(jnp.asarray(TORQUES))
+
+    return {name: at_all(*flanks) for name, flanks in designs.items()}
 
 
 @pytest.fixture(scope="module")
-def curves(mesh, designs):
+def cycles(solved):
+    row = list(TORQUES).index(TORQUE)
+    return {name: jax.tree.map(lambda values: values[row], many) for name, many in solved.items()}
+
+
+@pytest.fixture(scope="module")
+def curves(solved):
     """Transmission error over the torque, shape (torques, positions), by design."""
-    at = eqx.filter_jit(lambda mesh, torque, pinion, wheel: jg.solve(mesh, torque, pinion=pinion, wheel=wheel))
-    every = jax.vmap(lambda torque, design: at(mesh, torque, *design).transmission_error, (0, None))
-    return {name: every(jnp.asarray(TORQUES), design) for name, design in designs.items()}
+    return {name: many.transmission_error for name, many in solved.items()}
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 """Contacts slide down the slope of a modification: closed forms, a fine search, corners, derivatives, slices."""
 
+from functools import partial
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -161,28 +163,35 @@ def test_the_corner_law_sees_where_the_contact_has_moved(mesh):
     assert (close & pinion).any() and (close & ~pinion).any()
 
 
-@pytest.mark.parametrize("curve", [jg.Parabolic(), jg.Linear()], ids=["parabolic", "linear"])
+def curves(mesh, curve, x):
+    flanks = {"pinion": jg.TipRelief(x[0], x[1], curve), "wheel": jg.TipRelief(x[2], x[3], curve)}
+    return jg.solve(mesh, x[4], **flanks).transmission_error
+
+
+# programs of both curves
+SLOPES = jax.jit(jax.jacfwd(curves, 2))
+BACK = jax.jit(jax.grad(lambda mesh, curve, x: jnp.sum(curves(mesh, curve, x) ** 2), 2))
+SECOND = jax.jit(
+    lambda mesh, curve, x: jax.jacfwd(jax.jacfwd(lambda a: curves(mesh, curve, x.at[0].set(a))))(x[0]),
+)
+
+
+@pytest.mark.parametrize("curve", [jg.Quadratic(0, 0, 1), jg.Quadratic(0, 1, 0)], ids=["parabolic", "linear"])
 def test_derivatives_are_those_of_the_numbers(mesh, curve):
     """Of the whole curve by amount, length and torque; the first is compared in its second derivative too."""
-
-    def curves(x):
-        flanks = {"pinion": jg.TipRelief(x[0], x[1], curve), "wheel": jg.TipRelief(x[2], x[3], curve)}
-        return jg.solve(mesh, x[4], **flanks).transmission_error
-
     x = jnp.asarray([7.3, 3.37, 6.1, 2.91, 50.0])
-    slopes = jax.jit(jax.jacfwd(curves))
-    back = jax.jit(jax.jacrev(lambda x: jnp.sum(curves(x) ** 2)))(x)
+    value, slopes = partial(curves, mesh, curve), partial(SLOPES, mesh, curve)
     steps = 1e-5 * x
     central = np.stack(
-        [(curves(x.at[i].add(h)) - curves(x.at[i].add(-h))) / (2 * h) for i, h in enumerate(steps)], axis=1
+        [(value(x.at[i].add(h)) - value(x.at[i].add(-h))) / (2 * h) for i, h in enumerate(steps)], axis=1
     )
     found = np.asarray(slopes(x))
     # a position whose contact has a node right at the start of a relief has two slopes
     off = np.abs(found - central).max(axis=1) / np.abs(central).max()
     assert np.sort(off)[-3] < 1e-6
-    np.testing.assert_allclose(back, 2 * np.asarray(curves(x)) @ found, rtol=1e-9)
+    np.testing.assert_allclose(BACK(mesh, curve, x), 2 * np.asarray(value(x)) @ found, rtol=1e-9)
     second = (slopes(x.at[0].add(1e-4)) - slopes(x.at[0].add(-1e-4)))[:, 0] / 2e-4
-    exact = np.asarray(jax.jit(jax.jacfwd(jax.jacfwd(lambda a: curves(x.at[0].set(a)))))(x[0]))
+    exact = np.asarray(SECOND(mesh, curve, x))
     assert np.isfinite(exact).all()
     assert np.sort(np.abs(exact - second))[-3] < 1e-5 * np.abs(second).max()
 
@@ -191,8 +200,9 @@ def test_nothing_and_no_load_leave_finite_derivatives(mesh):
     def error(x):
         return jg.solve(mesh, x[2], pinion=jg.TipRelief(x[0], x[1])).transmission_error.sum()
 
+    second = jax.jit(jax.jacfwd(jax.grad(error)))
     for point in ([0.0, 3.0, 50.0], [5.0, 0.0, 50.0], [5.0, 3.0, 0.0], [0.0, 0.0, 0.0]):
-        assert bool(jnp.isfinite(jax.jit(jax.jacfwd(jax.grad(error)))(jnp.asarray(point))).all()), point
+        assert bool(jnp.isfinite(second(jnp.asarray(point))).all()), point
 
 
 def test_slices_slide_on_their_own():
