@@ -26,6 +26,7 @@ from .newton import implicit_root as implicit_root
 from .newton import newton as newton
 from .newton import solve as solve
 from .newton import with_jacobian as with_jacobian
+from .polynomial import real_roots as real_roots
 from .programs import kernel as kernel
 from .programs import program as program
 from .progress import Callback as Callback
