@@ -112,10 +112,38 @@ def test_curve_through_its_folds():
     assert not curve.lower_stable.all() and curve.upper_stable[-1]
     # softening: at a frequency below omega_0 there are three, of which the middle one is unstable
     three = primary_resonance(state, [0.955])
-    assert np.isfinite(three.amplitude).all()
-    assert (np.asarray(three.stable[:, 0]) == [True, False, True]).all()
+    assert np.isfinite(three.amplitude[:3]).all() and np.isnan(three.amplitude[3:]).all()
+    assert (np.asarray(three.stable[:, 0]) == [True, False, True, False, False]).all()
     beyond = response_curve(state, [1.01 * peak])
     assert np.isnan(beyond.lower[0]) and not beyond.lower_stable[0]
+
+
+def helped(size, angle, detuning):
+    """Torque at Omega and the stiffness harmonic at 2 Omega; A falls with the square root of `size`."""
+    given = dimensionless_model(
+        load=0.5,
+        damping_ratio=0.04 * size,
+        stiffness_harmonics=[0.0, 0.1 * size, 0.0],
+        stiffness_angles=[0.0, angle, 0.0],
+        torque=0.006 * size**1.5,
+        torque_angle=0.3,
+        clearance=PolynomialClearance.published(),
+    )
+    frequency = NATURAL + detuning * size
+    found = primary_resonance(loaded_mean(given), [frequency])
+    settled = settled_vibration(given, frequency, settling=200, steps=64)
+    assert settled.settled and found.stable[0, 0]
+    return float(found.amplitude[0, 0]) / float(abs(settled.harmonic(1))), float(found.amplitude[0, 0])
+
+
+def test_stiffness_harmonic_of_twice_the_order_helps_or_hinders_by_its_phase():
+    """At two thirds of its threshold it changes the amplitude by up to a factor of three; errors fall with size."""
+    amplitudes = []
+    for angle, detuning in ((0.0, -0.02), (2.0, -0.02), (4.0, 0.02)):
+        (large, amplitude), (small, _) = (helped(size, angle, detuning) for size in (1.0, 0.5))
+        assert abs(large - 1) < 0.05 and abs(small - 1) < 0.6 * abs(large - 1)
+        amplitudes.append(amplitude)
+    assert amplitudes[1] > 3 * amplitudes[0]
 
 
 def super_harmonic(order, size, detuning):

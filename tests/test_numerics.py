@@ -12,6 +12,7 @@ from jaxgear.numerics import (
     gauss_legendre,
     optional_real,
     real,
+    real_roots,
     safe_divide,
     safe_log,
     safe_power,
@@ -64,6 +65,22 @@ def test_roots_at_the_ends_of_the_bracket_keep_their_value():
     low, high = jnp.asarray([1.0, 1.0]), jnp.asarray([2.0, 2.0])
     roots = bracketed_root(lambda x, a: x - a, low, high, jnp.asarray([1.0, 2.0]))
     np.testing.assert_allclose(roots, [1.0, 2.0], rtol=1e-15)
+
+
+def test_real_roots_of_a_polynomial_and_their_derivatives():
+    """(x + 3) (x - 1e-6) (x - 2) (x^2 + x + 1) has three; a root moves by -dp / p'."""
+    coefficients = np.polynomial.polynomial.polymul(np.poly([-3.0, 1e-6, 2.0])[::-1], [1.0, 1.0, 1.0])
+    found = real_roots(jnp.asarray(coefficients))
+    np.testing.assert_allclose(found[:3], [-3.0, 1e-6, 2.0], rtol=1e-12)
+    assert np.isnan(found[3:]).all()
+    slope = np.polyval(np.polyder(coefficients[::-1]), 2.0)
+    moved = jax.grad(lambda c: real_roots(c)[2])(jnp.asarray(coefficients))
+    np.testing.assert_allclose(moved, -(2.0 ** np.arange(6)) / slope, rtol=1e-10)
+
+
+def test_a_double_root_is_real_and_a_pair_beside_the_axis_is_not():
+    assert np.isfinite(real_roots(jnp.array([1.0, -2.0, 1.0]))).all()
+    assert np.isnan(real_roots(jnp.array([1.0 + 1e-8, -2.0, 1.0]))).all()
 
 
 @pytest.mark.parametrize(

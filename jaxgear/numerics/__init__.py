@@ -29,6 +29,7 @@ from .newton import with_jacobian as with_jacobian
 from .once import once as once
 from .pressed import Pressed as Pressed
 from .pressed import press as press
+from .polynomial import real_roots as real_roots
 from .programs import kernel as kernel
 from .programs import program as program
 from .progress import Callback as Callback

@@ -1,18 +1,21 @@
 """Response curves and thresholds of the resonances that the method of multiple scales finds."""
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
-from ...numerics import Checked, check, program, real, result, safe_sqrt, whole
+from ...numerics import Checked, check, program, real, real_roots, result, safe_divide, safe_sqrt, whole
 from .model import DimensionlessModel
 from .multiple_scales import LoadedMean, as_complex, effective_forcing, frequency_shift, turned
 
 Scalar = Float[Array, ""]
 Curve = Float[Array, " frequencies"]
+Solutions = Float[Array, "*many"]
 
-_POLISH = 3  # Newton steps on the roots of a cubic
+# There are no more solutions under a resonant forcing alone; with a parametric excitation there are up to five.
+_FORCED = 3
 
 
 class Resonance(Checked):
@@ -20,7 +23,8 @@ class Resonance(Checked):
 
     Attributes:
         frequency: Omega, shape (frequencies,).
-        amplitude: A, smallest first, NaN where there are fewer solutions; shape (solutions, frequencies).
+        amplitude: A, smallest first, NaN where there are fewer solutions; shape (solutions, frequencies). Up to five at
+            `primary_resonance` and `super_harmonic_resonance`.
         stable: likewise; False for NaN.
     """
 
@@ -46,11 +50,12 @@ class Backbone(Checked):
 
 
 def primary_resonance(state: LoadedMean, frequency) -> Resonance:
-    """Omega ~ omega_0: A^2 [(Omega - omega_0 - kappa A^2)^2 + zeta^2] = (P_1 / (2 omega_0))^2.
+    """Omega ~ omega_0: (i zeta - s) A + h A* / (2 omega_0) = P_1 / (2 omega_0), with a complex amplitude A.
 
-    The stiffness harmonic of twice the resonant order, here Q_2, excites the same vibration parametrically, which this
-    curve leaves out: it holds where `damping_threshold` of that order is well below zeta, and the integrated motion
-    (`settled_vibration`) is the reference elsewhere. Likewise for `super_harmonic_resonance`.
+    s = Omega - omega_0 - shift - kappa |A|^2, and h = 2 a_2 Lambda_2 + Q_2 / 2: the stiffness harmonic of twice the
+    resonant order excites the same vibration parametrically, and by its phase to that of the forcing makes it larger
+    or smaller. Without it A^2 [(Omega - omega_0 - kappa A^2)^2 + zeta^2] = (P_1 / (2 omega_0))^2. From
+    `damping_threshold` of that order on the vibration would grow without forcing too.
 
     Args:
         state: the expansion about the loaded mean.
@@ -75,8 +80,9 @@ def super_harmonic_resonance(state: LoadedMean, frequency, order: int = 2) -> Re
 def response_curve(state: LoadedMean, amplitude, *, order: int = 1) -> Backbone:
     """The curve of `primary_resonance` (order 1) or `super_harmonic_resonance` (2, 3) in closed form over A.
 
-    Omega = (omega_0 + kappa A^2 + shift -+ sqrt((P / (2 omega_0 A))^2 - zeta^2)) / order. Forcing and shift are those
-    at omega_0 / order, so that the curve differs from the exact one in what these change along it.
+    Omega = (omega_0 + kappa A^2 + shift + s) / order with the smallest and the largest s of this amplitude, which are
+    -+ sqrt((P / (2 omega_0 A))^2 - zeta^2) where nothing excites parametrically. Forcing, parametric excitation and
+    shift are those at omega_0 / order, so that the curve differs from the exact one in what these change along it.
 
     Args:
         state: the expansion about the loaded mean.
@@ -84,19 +90,8 @@ def response_curve(state: LoadedMean, amplitude, *, order: int = 1) -> Backbone:
         order: 1, 2 or 3.
     """
     check("response_curve", "amplitude", amplitude, "", low=0.0, open_low=True)
-    a, omega, zeta = real(amplitude), state.frequency, state.damping_ratio
-    at = omega / order
-    drive = jnp.abs(effective_forcing(state, at, order)) / (2 * omega)
-    shift = frequency_shift(state, at, order)
-    inner = (drive / a) ** 2 - zeta**2
-    there = inner >= 0
-    width = jnp.where(there, safe_sqrt(jnp.where(there, inner, 1.0)), jnp.nan)
-    middle = omega + shift + state.kappa * a**2
-
-    def stable(detuned):
-        return (detuned * (detuned - 2 * state.kappa * a**2) + zeta**2 > 0) & there
-
-    return Backbone(a, (middle - width) / order, (middle + width) / order, stable(-width), stable(width))
+    order = whole("response_curve", "order", order, 1, 3)
+    return _curve(state, jnp.atleast_1d(real(amplitude)), order)
 
 
 def sub_harmonic_resonance(state: LoadedMean, frequency, *, order: int = 1) -> Resonance:
@@ -165,19 +160,68 @@ def forced_amplitude(state: LoadedMean, forcing, detuning) -> Float[Array, " sol
         forcing: amplitude, complex or not.
         detuning: frequency of the forcing minus omega_0 (and its shift).
     """
-    return _amplitudes(state, jnp.abs(jnp.asarray(forcing)), real(detuning))
+    size = as_complex(jnp.abs(jnp.asarray(forcing)) / (2 * state.frequency))
+    return _amplitudes(state, _Slow(size, jnp.zeros_like(size)), real(detuning))[:_FORCED]
+
+
+class _Slow(NamedTuple):
+    """What drives the slow amplitude, (i zeta - s) A + coupling A* = forcing: both over 2 omega_0."""
+
+    forcing: Complex[Array, ""]
+    coupling: Complex[Array, ""]
+
+    def numerator(self, zeta: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+        """Coefficients of |A|^2 (s^2 + zeta^2 - |coupling|^2)^2 over s, from the constant one up."""
+        size, turned_by = jnp.abs(self.forcing) ** 2, self.forcing**2 * self.coupling.conj()
+        constant = size * (zeta**2 + jnp.abs(self.coupling) ** 2) - 2 * zeta * jnp.imag(turned_by)
+        return constant, 2 * jnp.real(turned_by), size
+
+    def margin(self, zeta: Scalar) -> Scalar:
+        """zeta^2 - |coupling|^2."""
+        return zeta**2 - jnp.abs(self.coupling) ** 2
+
+    def stable(self, state: LoadedMean, squared: Solutions, s: Solutions) -> Bool[Array, "*many"]:
+        """Whether small changes of a solution with |A|^2 at s die out: the slow motion has the trace -2 zeta."""
+        zeta, kappa = state.damping_ratio, state.kappa
+        inverse = as_complex(safe_divide(1.0, s**2 + self.margin(zeta)))
+        found = inverse * (-jax.lax.complex(s, zeta + 0 * s) * self.forcing - self.coupling * self.forcing.conj())
+        growth = jnp.abs(self.coupling + as_complex(kappa + 0 * s) * found**2) ** 2
+        return zeta**2 + (s - kappa * squared) ** 2 - growth > 0
+
+
+def _slow(state: LoadedMean, frequency: Scalar, order: int) -> _Slow:
+    over = as_complex(0.5 / state.frequency)
+    forcing = effective_forcing(state, frequency, order)
+    return _Slow(over * forcing, over * _coupling(state, frequency, 2 * order))
 
 
 @program
 def _resonance(state: LoadedMean, frequency: Curve, order: int) -> Resonance:
     def at(forced):
         detuning = order * forced - state.frequency - frequency_shift(state, forced, order)
-        found = _amplitudes(state, jnp.abs(effective_forcing(state, forced, order)), detuning)
-        square = state.kappa * found**2
-        return found, (detuning - square) * (detuning - 3 * square) + state.damping_ratio**2 > 0
+        slow = _slow(state, forced, order)
+        found = _amplitudes(state, slow, detuning)
+        return found, slow.stable(state, found**2, detuning - state.kappa * found**2)
 
     amplitude, stable = jax.vmap(at, out_axes=1)(frequency)
     return Resonance(frequency, amplitude, stable)
+
+
+@program
+def _curve(state: LoadedMean, amplitude: Curve, order: int) -> Backbone:
+    at = state.frequency / order
+    slow, shift, zeta = _slow(state, at, order), frequency_shift(state, at, order), state.damping_ratio
+
+    def of(a):
+        constant, linear, square = slow.numerator(zeta)
+        margin, squared, zero = slow.margin(zeta), a**2, jnp.zeros_like(a)
+        terms = margin**2 - constant / squared, -linear / squared, 2 * margin - square / squared, zero, zero + 1
+        roots = real_roots(jnp.stack(terms))
+        s = jnp.stack([jnp.nanmin(roots), jnp.nanmax(roots)])
+        return (state.frequency + state.kappa * squared + shift + s) / order, slow.stable(state, squared + 0 * s, s)
+
+    (lower, upper), stable = jax.vmap(of, out_axes=1)(amplitude)
+    return Backbone(amplitude, lower, upper, *stable)
 
 
 @program
@@ -226,31 +270,24 @@ def _of_line(state: LoadedMean, model: DimensionlessModel, frequency: Scalar, pl
     return 0.5 * forcing / state.receptance_inverse(forced), jnp.sum(jnp.where(same, state.parametric, 0.0))
 
 
-def _amplitudes(state: LoadedMean, forcing: Scalar, detuning: Scalar) -> Float[Array, " solutions"]:
-    """Roots A of the cubic in u = A^2 |kappa|: u ((d - u)^2 + zeta^2) = c, d with the sign of kappa."""
+def _amplitudes(state: LoadedMean, slow: _Slow, detuning: Scalar) -> Float[Array, " solutions"]:
+    """All |A| at a detuning: roots of a polynomial of order five in u = |kappa| A^2, where s = +-(d - u)."""
     kappa, zeta = state.kappa, state.damping_ratio
     size = jnp.maximum(jnp.abs(kappa), 1e-12)  # without kappa the curve is the linear one
-    drive = (forcing / (2 * state.frequency)) ** 2 * size
     sign = jnp.where(kappa < 0, -1.0, 1.0).astype(zeta.dtype)
     d = sign * detuning
-    # u = 2 d / 3 + t leaves t^3 + p t + q = 0
-    p = zeta**2 - d**2 / 3
-    q = 2 * d**3 / 27 + 2 * d * zeta**2 / 3 - drive
-    inner = 0.25 * q**2 + p**3 / 27
-    root = safe_sqrt(jnp.maximum(inner, 0.0))
-    # the sum of two cube roots, the smaller of which follows from their product
-    larger = jnp.cbrt(-0.5 * q - jnp.where(q > 0, root, -root))
-    single = larger - p / (3 * jnp.where(larger == 0, 1.0, larger))
-    radius = 2 * safe_sqrt(jnp.maximum(-p / 3, 0.0))
-    cosine = jnp.clip(-4 * q / jnp.where(radius > 0, radius, 1.0) ** 3, -1.0, 1.0)
-    turns = real(np.arange(3) * 2 * np.pi).astype(d.dtype)
-    triple = radius * jnp.cos((jnp.arccos(cosine) - turns) / 3)
-    three = inner < 0
-    u = 2 * d / 3 + jnp.where(three, triple, jnp.stack([single, *[single * jnp.nan] * 2]))
-
-    def polish(_, u):
-        value, slope = u * ((d - u) ** 2 + zeta**2) - drive, (d - u) * (d - 3 * u) + zeta**2
-        return u - jnp.where(slope == 0, 0.0, value / jnp.where(slope == 0, 1.0, slope))
-
-    u = jnp.sort(jax.lax.fori_loop(0, _POLISH, polish, u))
-    return jnp.where(u >= 0, safe_sqrt(jnp.where(u >= 0, u, 1.0) / size), jnp.nan)
+    constant, linear, square = (size * part for part in slow.numerator(zeta))
+    linear, inner = sign * linear, d**2 + slow.margin(zeta)
+    # u (u^2 - 2 d u + inner)^2 = constant + linear (d - u) + square (d - u)^2
+    terms = (
+        -(constant + linear * d + square * d**2),
+        inner**2 + linear + 2 * square * d,
+        -4 * d * inner - square,
+        2 * inner + 4 * d**2,
+        -4 * d,
+        jnp.ones_like(d),
+    )
+    u = real_roots(jnp.stack(terms))
+    u = jnp.sort(jnp.where(u >= 0, u, jnp.nan))
+    known = u >= 0
+    return jnp.where(known, safe_sqrt(jnp.where(known, u, 1.0) / size), jnp.nan)
