@@ -20,7 +20,7 @@ from .force_map import map_section
 from .gradients import gradient_section
 from .throughput import DESIGNS, FULL_DESIGNS, throughput_section
 
-_WIDTH = 180
+_WIDTH = 200
 _MAP = "map"  # the section that is about contact analyses and nothing else
 
 
