@@ -114,7 +114,10 @@ def test_contenders_take_turns():
     assert "".join(order) == "ababab" and all(one.wall >= 0 for one in times.values())
 
 
-@pytest.mark.parametrize("arguments", [["nonsense"], ["--full", "--quick"], ["map", "--quick"], ["--designs", "0"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["nonsense"], ["--full", "--quick"], ["map", "--quick"], ["--quick", "--designs", "4"], ["--designs", "0"]],
+)
 def test_what_cannot_be_asked_for_is_refused(arguments):
     with pytest.raises(SystemExit):
         main(arguments)

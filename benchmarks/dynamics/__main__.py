@@ -20,8 +20,9 @@ from .force_map import map_section
 from .gradients import gradient_section
 from .throughput import DESIGNS, FULL_DESIGNS, throughput_section
 
-_WIDTH = 180
-_MAP = "map"  # the section that is about contact analyses and nothing else
+_WIDTH = 200
+_MAP, _THROUGHPUT = "map", "throughput"
+_SLOW = _MAP, _THROUGHPUT  # sections that are about contact analyses, and about much of something
 
 
 def sections(options: argparse.Namespace) -> dict[str, Callable[[Console], list[str]]]:
@@ -33,7 +34,7 @@ def sections(options: argparse.Namespace) -> dict[str, Callable[[Console], list[
         _MAP: map_section,
         "gradients": lambda console: gradient_section(console, quick=quick),
         "cost": lambda console: cost_section(console, quick=quick),
-        "throughput": lambda console: throughput_section(console, quick=quick, designs=options.designs),
+        _THROUGHPUT: lambda console: throughput_section(console, designs=options.designs),
     }
 
 
@@ -50,10 +51,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name in options.sections:
         if name not in NAMES:
             parser.error(f"no section {name!r}: choose from {', '.join(NAMES)}")
-    if options.quick and _MAP in options.sections:
-        parser.error(f"section {_MAP!r} is not quick")
-    if options.full and (options.quick or options.designs is not None):
-        parser.error("--full goes with neither --quick nor --designs")
+    for name in set(_SLOW) & set(options.sections if options.quick else ()):
+        parser.error(f"section {name!r} is not quick")
+    if options.quick + options.full + (options.designs is not None) > 1:
+        parser.error("--quick, --full and --designs exclude each other")
     if options.designs is None:
         options.designs = FULL_DESIGNS if options.full else DESIGNS
     if options.designs < 1:
@@ -64,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     console = Console(width=_WIDTH)
     console.print(", ".join(f"{key} {value}" for key, value in machine(cores).items()), markup=False, highlight=False)
     missed = []
-    for name in options.sections or [name for name in NAMES if name != _MAP or not options.quick]:
+    for name in options.sections or [name for name in NAMES if name not in _SLOW or not options.quick]:
         missed += sections(options)[name](console)
     for line in missed:
         console.print(f"MISSED: {line}", markup=False, highlight=False)

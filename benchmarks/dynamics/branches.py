@@ -7,15 +7,16 @@ import jax.numpy as jnp
 
 from jaxgear.dynamics import Orbit, find_orbit, follow_orbits
 
-from .known import MORE_ZETA, dead_zone, frequency, rectangular
+from .known import MORE_ZETA, ZETA, dead_zone, frequency, rectangular
 
 _RANGE = 0.3, 2.4  # of the speeds
 _STEP = 0.05  # along a branch
+_AT = 1.9  # speed of the orbits that are followed over the damping
 
 
 def rectangular_branches(steps: int) -> Iterator[Orbit]:
-    """Through both folds of the primary and the super-harmonic resonance, and through the flip into orbits of two
-    cycles, with both damping ratios.
+    """Through both folds of the primary and the super-harmonic resonance, through the flip into orbits of two cycles,
+    and from those to more damping.
     """
     oscillator = rectangular()
     begin = find_orbit(oscillator, frequency(1.2), ([1.3], [0.9]), steps=steps)
@@ -27,15 +28,27 @@ def rectangular_branches(steps: int) -> Iterator[Orbit]:
     yield from _chain(oscillator, high, (0.35, 0.45), steps)
     yield from _chain(oscillator, begin, (1.7, 1.9, 2.0), steps)
     kept = list(_chain(oscillator, begin, (1.7,), steps))[-1]
-    yield from _doubled(oscillator, kept, 1.9, (1.9, 1.7), steps)
+    doubled = list(_doubled(oscillator, kept, _AT, (_AT, 1.7), steps))
+    yield from doubled
     damped = rectangular(MORE_ZETA)
-    begin = find_orbit(damped, frequency(1.0), ([1.65], [1.45]), steps=steps)
+    for omega, near, others in ((1.0, (1.65, 1.45), (0.9, 0.8)), (_AT, (1.03, 0.29), (2.0,))):
+        begin = find_orbit(damped, frequency(omega), ([near[0]], [near[1]]), steps=steps)
+        yield begin
+        yield from _chain(damped, begin, others, steps)
+    begin = more_damped(doubled[0], steps)
     yield begin
-    yield from _chain(damped, begin, (0.9, 0.8), steps)
-    begin = find_orbit(damped, frequency(1.9), ([1.03], [0.29]), steps=steps)
-    yield begin
-    yield from _chain(damped, begin, (2.0,), steps)
-    yield from _doubled(damped, begin, 2.0, (1.9, 1.7), steps)
+    yield from _chain(damped, begin, (1.7,), steps)
+
+
+def more_damped(begin: Orbit, steps: int) -> Orbit:
+    """The orbit at the same speed to which more damping leads, followed over the damping."""
+    within = ZETA, MORE_ZETA
+    branch = follow_orbits(_over_damping, begin, within=within, parameter=ZETA, step=_STEP, steps=steps)
+    return jax.tree.map(lambda part: part[-1], branch.orbits)
+
+
+def _over_damping(zeta):
+    return rectangular(zeta), jnp.asarray(frequency(_AT))
 
 
 def dead_zone_branches(steps: int) -> Iterator[Orbit]:

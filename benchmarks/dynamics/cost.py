@@ -24,7 +24,7 @@ _MOST_CYCLES = 500
 _FINER = 8  # times the steps of the reference
 _JUMP = 0.05  # relative difference of K_v that means another orbit
 _INNER_STEPS, _INNER_CYCLES, _INNER_SPEED = 128, 100, 2500.0
-_SIDE_BY_SIDE, _QUICK_DESIGNS = 32, 4
+_SIDE_BY_SIDE = 32
 _WORST = 0.5  # of K_v [%], to which all have to agree so that their times can be compared
 _DIRECTIONS = "up", "down"
 
@@ -73,15 +73,8 @@ def contenders(*, quick: bool) -> Iterator[Entry]:
 
     both = f"up and down, {len(speeds)} speeds"
     yield Entry("jaxgear, one design", both, swept, reference.size, np.array(swept()), reference)
-    count = _QUICK_DESIGNS if quick else _SIDE_BY_SIDE
-    many = jax.tree.map(lambda part: np.repeat(np.asarray(part)[None], count, axis=0), moving)
-
-    def swept_many():
-        return [speed_sweeps(many, speeds, direction=way, steps=chosen).dynamic_factor for way in _DIRECTIONS]
-
-    name = f"jaxgear, {count} designs"
-    found = np.array(swept_many())
-    yield Entry(name, both, swept_many, found.size, found[:, 0], reference)
+    if not quick:
+        yield _many_entry(moving, speeds, chosen, both, reference)
     plain = vibration_of(moving)
     if find_compiler():
         yield _c_entry(CSweep(plain, max(chosen)), moving, speeds, chosen, both, reference)
@@ -101,6 +94,20 @@ def contenders(*, quick: bool) -> Iterator[Entry]:
         numbers, what = solved(), f"up, {len(few)} of the speeds, rtol {tolerance:g}"
         cycles = float(np.abs(numbers[:, 2]).mean())
         yield Entry(f"SciPy {method}", what, solved, len(few), numbers[:, 0], reference[0, few], cycles)
+
+
+def _repeated(moving: Oscillator) -> Oscillator:
+    return jax.tree.map(lambda part: np.repeat(np.asarray(part)[None], _SIDE_BY_SIDE, axis=0), moving)
+
+
+def _many_entry(moving: Oscillator, speeds, chosen, both: str, reference) -> Entry:
+    many = _repeated(moving)
+
+    def swept():
+        return [speed_sweeps(many, speeds, direction=way, steps=chosen).dynamic_factor for way in _DIRECTIONS]
+
+    found = np.array(swept())
+    return Entry(f"jaxgear, {_SIDE_BY_SIDE} designs", both, swept, found.size, found[:, 0], reference)
 
 
 def _c_entry(kernel: CSweep, moving: Oscillator, speeds, chosen, both: str, reference) -> Entry:
@@ -125,12 +132,10 @@ def inner_loops(*, quick: bool) -> dict[str, tuple[int, Callable[[], object]]]:
     def one(moving):
         return settle(moving, _INNER_SPEED, start, cycles=_INNER_CYCLES, steps=_INNER_STEPS)
 
-    many = jax.tree.map(lambda part: np.repeat(np.asarray(part)[None], _SIDE_BY_SIDE, axis=0), moving)
-    together = jax.jit(jax.vmap(one))
-    found = {
-        "jaxgear, one design": (steps, lambda: one(moving)),
-        f"jaxgear, {_SIDE_BY_SIDE} designs side by side": (steps * _SIDE_BY_SIDE, lambda: together(many)),
-    }
+    found: dict[str, tuple[int, Callable[[], object]]] = {"jaxgear, one design": (steps, lambda: one(moving))}
+    if not quick:
+        many, together = _repeated(moving), jax.jit(jax.vmap(one))
+        found[f"jaxgear, {_SIDE_BY_SIDE} designs side by side"] = steps * _SIDE_BY_SIDE, lambda: together(many)
     if find_compiler():
         kernel = CSweep(vibration_of(moving), _INNER_STEPS)
         flat = np.concatenate(start)
