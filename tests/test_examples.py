@@ -19,6 +19,7 @@ EXAMPLES = (
     "is_it_robust_over_torque",
     "what_does_robust_design_buy",
     "drivetrain",
+    "what_does_dynamic_design_buy",
 )
 
 
@@ -37,7 +38,7 @@ def answers(name):
     return pytest.fixture(scope="module")(lambda: example(name).numbers(results(name)))
 
 
-relief, coupling, curve, robust, manufactured, driven = map(answers, EXAMPLES)
+relief, coupling, curve, robust, manufactured, driven, quiet = map(answers, EXAMPLES)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -168,3 +169,19 @@ def test_the_drivetrain_runs_up_and_its_derivative_is_that_of_a_central_differen
     assert driven["last_speed_rpm"] > 2100.0
     assert driven["force_rms_relief_N"] < 0.8 * driven["force_rms_unmodified_N"]
     assert driven["slope_N_per_um"] == pytest.approx(driven["difference_N_per_um"], rel=1e-3)
+
+
+def test_the_dynamic_design_is_the_quieter_one_over_speed_and_torque(quiet):
+    """Judged by the runs of a finer sweep, one of which, after a kick, the search does not have."""
+    assert quiet["worst_factor_lower_percent"] >= 15.0
+    assert quiet["dynamic_worst_factor"] == pytest.approx(quiet["dynamic_searched_factor"], rel=0.02)
+    assert quiet["static_settled_share"] == quiet["dynamic_settled_share"] == 1.0
+
+
+def test_the_static_design_is_quiet_at_its_torque_only(quiet):
+    assert quiet["static_ppte_um"] < 0.4 * quiet["dynamic_ppte_um"]
+    assert quiet["static_worst_factor_at_200_Nm"] < 1.3 < quiet["dynamic_worst_factor_at_200_Nm"]
+    for torque in (100, 400):
+        assert quiet[f"dynamic_worst_factor_at_{torque}_Nm"] < quiet[f"static_worst_factor_at_{torque}_Nm"]
+        # the resonance itself, not one of its fractions
+        assert 2700 < quiet[f"static_loudest_frequency_at_{torque}_Nm_Hz"] < 3400
