@@ -26,7 +26,7 @@ RUNS = {"damping_ratio": 0.0425, "pinion_inertia": 7.80e-3, "wheel_inertia": 7.8
 SEARCHED = [700, 750, 1000, 1400, 1500, 1600, 2600, 2700, 2800, 2850, 2900, 2950, 3000, 3050, 3100, 3150, 3175, 3200,
             3300, 3400, 4400]  # fmt: skip
 STEPS = 128  # of the integrator per mesh cycle in the search
-BOUNDS = {"amount": (5.0, 30.0), "length": (1.5, 4.0), "b1": (0.5, 2.5)}  # um, mm, -
+BOUNDS = {"height": (5.0, 25.0), "length": (1.6, 3.6), "ramp": (0.3, 0.9)}  # um, mm of roll length, share of the length
 NAMES = ("static", "dynamic")
 
 
@@ -46,9 +46,11 @@ def prepare() -> jg.Mesh:
 
 
 def design(parameters):
-    """Quadratic tip relief, the same on both gears: straight at b1 = 1, at larger b1 first steep and then level."""
-    b1 = parameters["b1"]
-    relief = jg.TipRelief(parameters["amount"], parameters["length"], jg.Quadratic(0.0, b1, 1 - b1))
+    """Tip relief that rises to its height over a part of its length and stays level up to the tip, on both gears."""
+    height, length, ramp = (parameters[name] for name in BOUNDS)
+    level = 1 - ramp
+    rise = jg.TipRelief(height / ramp, length, jg.Linear())
+    relief = rise - jg.TipRelief(height * level / ramp, level * length, jg.Linear())
     return relief, relief
 
 
