@@ -3,8 +3,14 @@
 The test pair of reproduce_50_50_dynamics.py with one and the same curve of tip relief, designed twice: for the least
 PPTE at the design torque, and by the gradient of the largest dynamic factor K_v over mesh frequencies from 0.5 to 5 kHz
 at half, one and two times that torque. Both are judged by sweeps that the search has not seen: many more speeds,
-rising, falling and falling after a kick, with a finer mesh force and smaller steps. Run it:
-`python examples/what_does_dynamic_design_buy.py`.
+rising, falling and falling after a kick, with a finer mesh force and smaller steps.
+
+The relief with the least PPTE is too much at half the torque and too little at twice that, over the whole of double
+contact, and the first harmonic of that error excites the resonance near 3 kHz. The quietest relief rises steeply about
+half a base pitch from the pitch point, so that it is wrong over a short part of the cycle only, and stays level up to
+the tip, so that two pairs share the largest torque as before.
+
+Run it: `python examples/what_does_dynamic_design_buy.py`. Most of the time it compiles.
 """
 
 import jax
