@@ -27,9 +27,9 @@ from .newton import newton as newton
 from .newton import solve as solve
 from .newton import with_jacobian as with_jacobian
 from .once import once as once
+from .polynomial import real_roots as real_roots
 from .pressed import Pressed as Pressed
 from .pressed import press as press
-from .polynomial import real_roots as real_roots
 from .programs import kernel as kernel
 from .programs import program as program
 from .progress import Callback as Callback
