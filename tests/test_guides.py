@@ -1,4 +1,4 @@
-"""README and guides keep their promises: every snippet runs, in the order of its page."""
+"""Guides keep their promises: every snippet runs, in the order of its page."""
 
 import re
 from pathlib import Path
@@ -11,22 +11,28 @@ matplotlib.use("Agg")
 
 ROOT = Path(__file__).parents[1]
 GUIDES = ROOT / "examples" / "guides"
-PAGES = [page for page in (ROOT / "README.md", *sorted(GUIDES.glob("*.md"))) if "```python" in page.read_text("utf-8")]
+PAGES = [page for page in sorted(GUIDES.glob("*.md")) if "```python" in page.read_text("utf-8")]
 
 
 def snippets(page: Path) -> list[str]:
     return re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_snippet_runs(page, tmp_path, monkeypatch, clean_figures):
-    monkeypatch.chdir(tmp_path)
+def run(page: Path):
+    """Runs the snippets of a page one after the other; yields their names after each."""
     names: dict = {}
     # what readers run has JAX's own rules of promotion
     with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
         for number, snippet in enumerate(snippets(page), 1):
             exec(compile(snippet, f"{page.name}, snippet {number}", "exec"), names)
+            yield names
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_snippet_runs(page, tmp_path, monkeypatch, clean_figures):
+    monkeypatch.chdir(tmp_path)
+    assert [*run(page)]
 
 
 def test_code_of_the_guides_is_marked_as_what_it_is():

@@ -28,10 +28,19 @@ CURVES = {
 
 def profile(rho, y=0.0):
     """Points at the given roll lengths [mm] and face coordinates [mm]."""
-    rho, y = jnp.asarray(rho, float), jnp.asarray(y, float)
-    rho, y = jnp.broadcast_arrays(rho, y)
+    return _points(*np.broadcast_arrays(np.asarray(rho, float), np.asarray(y, float)))
+
+
+@jax.jit
+def _points(rho, y):
     whole = lambda value: jnp.full(rho.shape, value)  # noqa: E731
     return Flank(rho, whole(TIP), whole(START), whole(BASE), y, whole(WIDTH))
+
+
+@jax.jit
+def at(function, points):
+    """Values of a curve or of a modification, by one program instead of one for each of its operations."""
+    return function(points)
 
 
 def along_face(y):
@@ -46,7 +55,7 @@ FACE = np.linspace(-WIDTH / 2, WIDTH / 2, 21)
 def test_curves_follow_their_formula(name):
     curve, formula = CURVES[name]
     d = np.linspace(0.0, 1.0, 17)
-    np.testing.assert_allclose(curve(jnp.asarray(d)), formula(d), atol=1e-15)
+    np.testing.assert_allclose(at(curve, jnp.asarray(d)), formula(d), atol=1e-15)
     assert curve(jnp.asarray(0.5)).shape == ()
 
 
@@ -63,10 +72,10 @@ def test_sinusoidal_curve_that_starts_from_zero_and_ends_at_one():
 
 def test_parabola_goes_on_along_its_tangent():
     """Continuous value and slope at the node, straight beyond it, and one at the tip for every node."""
-    slope = jax.vmap(jax.grad(lambda d, n: ParabolicLinear(n)(d)), (0, None))
+    slope = jax.jit(jax.vmap(jax.grad(lambda d, n: ParabolicLinear(n)(d)), (0, None)))
     for node in (0.05, 0.5, 0.9):
         curve, h = ParabolicLinear(node), 1e-9
-        before, after = curve(jnp.asarray([node - h, node + h]))
+        before, after = at(curve, jnp.asarray([node - h, node + h]))
         assert float(after - before) == pytest.approx(2 * h * 2 / (2 - node), rel=1e-6)
         np.testing.assert_allclose(slope(jnp.asarray([0.0, node, 1.0]), node), np.array([0, 2, 2]) / (2 - node))
         assert float(curve(jnp.asarray(1.0))) == pytest.approx(1.0, rel=1e-15)
@@ -86,10 +95,10 @@ def test_parabola_and_tangent_between_its_limits():
 
 def test_derivative_by_the_node_is_continuous_and_finite():
     """Also at the node itself, where the branches meet, and at a traced node of zero."""
-    by_node = jax.vmap(jax.grad(lambda n, d: ParabolicLinear(n)(d)), (None, 0))
+    by_node = jax.jit(jax.vmap(jax.grad(lambda n, d: ParabolicLinear(n)(d)), (None, 0)))
     d, h = jnp.linspace(0.0, 1.0, 41), 1e-6
     for node in (0.3, 0.5):
-        central = (ParabolicLinear(node + h)(d) - ParabolicLinear(node - h)(d)) / (2 * h)
+        central = (at(ParabolicLinear(node + h), d) - at(ParabolicLinear(node - h), d)) / (2 * h)
         np.testing.assert_allclose(by_node(node, d), central, atol=1e-6)
         np.testing.assert_allclose(
             by_node(node, jnp.asarray([node - 1e-9, node + 1e-9])), -2 * (1 - node) / (2 - node) ** 2, rtol=1e-7
@@ -103,11 +112,11 @@ def test_spline_curve_is_the_natural_cubic():
 
     values = np.array([0.0, 0.1, 0.5, 0.6, 1.0])
     curve, knots, d = jg.Spline(values), np.linspace(0, 1, 5), np.linspace(0, 1, 41)
-    np.testing.assert_allclose(curve(jnp.asarray(knots)), values, atol=1e-14)
-    np.testing.assert_allclose(curve(jnp.asarray(d)), CubicSpline(knots, values, bc_type="natural")(d), atol=1e-13)
-    np.testing.assert_allclose(jg.Spline([0.0, 0.5, 1.0])(jnp.asarray(d)), d, atol=1e-14)
+    np.testing.assert_allclose(at(curve, jnp.asarray(knots)), values, atol=1e-14)
+    np.testing.assert_allclose(at(curve, jnp.asarray(d)), CubicSpline(knots, values, bc_type="natural")(d), atol=1e-13)
+    np.testing.assert_allclose(at(jg.Spline([0.0, 0.5, 1.0]), jnp.asarray(d)), d, atol=1e-14)
     table = jg.TabulatedProfile(START + 8 * knots, values, method="cubic2")
-    np.testing.assert_allclose(table(profile(START + 8 * d)), curve(jnp.asarray(d)), atol=1e-13)
+    np.testing.assert_allclose(at(table, profile(START + 8 * d)), at(curve, jnp.asarray(d)), atol=1e-13)
 
 
 @pytest.mark.parametrize("name", [n for n in CURVES if n != "sinusoidal"])
@@ -158,7 +167,7 @@ def test_lead_crowning_and_slope():
 
 @pytest.mark.parametrize(("side", "ends"), [("both", (9, 9)), ("negative", (9, 0)), ("positive", (0, 9))])
 def test_end_relief(side, ends):
-    removed = jg.EndRelief(9.0, 4.0, jg.Parabolic(), side)(along_face(FACE))
+    removed = at(jg.EndRelief(9.0, 4.0, jg.Parabolic(), side), along_face(FACE))
     d = np.maximum(np.abs(FACE) - 6.0, 0.0) / 4.0
     chosen = np.where(FACE < 0, ends[0], ends[1])
     np.testing.assert_allclose(removed, chosen * (0.44 * d + 0.56 * d**2), atol=1e-13)
@@ -176,10 +185,11 @@ MODIFICATIONS = {
 @pytest.mark.parametrize("name", MODIFICATIONS)
 def test_zero_amount_and_zero_length_remove_nothing(name):
     make, points = MODIFICATIONS[name], profile(RHO, np.linspace(-10, 10, 33))
-    np.testing.assert_array_equal(make(0.0, 3.0)(points), 0.0)
-    np.testing.assert_array_equal(make(5.0, 0.0)(points), 0.0)
+    np.testing.assert_array_equal(at(make(0.0, 3.0), points), 0.0)
+    np.testing.assert_array_equal(at(make(5.0, 0.0), points), 0.0)
+    slopes = jax.jit(jax.jacfwd(lambda a, b: make(a, b)(points), (0, 1)))
     for amount, length in ((0.0, 3.0), (5.0, 0.0), (0.0, 0.0)):
-        by_amount, by_length = jax.jacfwd(lambda a, b: make(a, b)(points), (0, 1))(amount, length)
+        by_amount, by_length = slopes(amount, length)
         assert bool(jnp.all(jnp.isfinite(by_amount))) and bool(jnp.all(jnp.isfinite(by_length)))
     np.testing.assert_array_equal(jg.NoModification()(points), 0.0)
 
@@ -188,9 +198,9 @@ def test_zero_amount_and_zero_length_remove_nothing(name):
 def test_derivatives_by_amount_and_length(name):
     """Against central differences; the points avoid the start of the relief, where it has a kink."""
     make, points, h = MODIFICATIONS[name], profile(RHO + 0.01, np.linspace(-10, 10, 33) * 0.999), 1e-6
-    total = lambda x: make(x[0], x[1])(points)  # noqa: E731
+    total = jax.jit(lambda x: make(x[0], x[1])(points))
     x = jnp.asarray([5.0, 3.0])
-    jacobian = jax.jacfwd(total)(x)
+    jacobian = jax.jit(jax.jacfwd(total))(x)
     for k in range(2):
         step = h * jnp.eye(2)[k]
         np.testing.assert_allclose(jacobian[:, k], (total(x + step) - total(x - step)) / (2 * h), atol=1e-8)
@@ -213,28 +223,28 @@ def test_modifications_add_up():
 def test_tables_are_exact_at_their_knots_and_constant_beyond(method):
     position, amount = np.array([5.0, 6.0, 8.5, 10.0, 12.0]), np.array([3.0, 1.0, 0.0, 0.5, 6.0])
     table = jg.TabulatedProfile(position, amount, method=method)
-    np.testing.assert_allclose(table(profile(position)), amount, atol=1e-13)
-    np.testing.assert_allclose(table(profile([0.0, 20.0])), [3.0, 6.0], atol=1e-13)
-    middle = table(profile([9.25]))
+    np.testing.assert_allclose(at(table, profile(position)), amount, atol=1e-13)
+    np.testing.assert_allclose(at(table, profile([0.0, 20.0])), [3.0, 6.0], atol=1e-13)
+    middle = at(table, profile([9.25]))
     if method == "linear":
         assert float(middle[0]) == pytest.approx(0.25, rel=1e-14)
     if method == "monotonic":
-        fine = table(profile(np.linspace(8.5, 12.0, 50)))
+        fine = at(table, profile(np.linspace(8.5, 12.0, 50)))
         assert bool(jnp.all(jnp.diff(fine) >= -1e-14)), "no overshoot between rising knots"
 
 
 def test_tables_over_the_roll_angle():
     angle = np.array([10.0, 15.0, 20.0])
     table = jg.TabulatedProfile(angle, [1.0, 4.0, 2.0], coordinate="roll_angle")
-    np.testing.assert_allclose(table(profile(np.deg2rad(angle) * BASE)), [1.0, 4.0, 2.0], atol=1e-13)
+    np.testing.assert_allclose(at(table, profile(np.deg2rad(angle) * BASE)), [1.0, 4.0, 2.0], atol=1e-13)
 
 
 def test_table_reproduces_a_sampled_modification():
     relief = jg.TipRelief(7.0, 6.0) + jg.ProfileCrowning(2.0)
     knots = np.linspace(START, TIP, 200)
-    table = jg.TabulatedProfile(knots, relief(profile(knots)), method="cubic2")
+    table = jg.TabulatedProfile(knots, at(relief, profile(knots)), method="cubic2")
     fine = profile(np.linspace(6.5, TIP, 500))
-    np.testing.assert_allclose(table(fine), relief(fine), atol=2e-3)
+    np.testing.assert_allclose(at(table, fine), at(relief, fine), atol=2e-3)
 
 
 def test_relief_starts_without_a_step_and_parabolas_also_without_a_kink():
@@ -340,14 +350,14 @@ def test_derivative_by_the_node_is_right_for_any_node(node):
     r = jnp.asarray([0.0, 0.25, 0.5, 1.0 - 1e-9])
     d = r * node
     value, by_node, by_depth = (
-        jax.vmap(f, (None, 0))(node, d)
+        jax.jit(jax.vmap(f, (None, 0)))(node, d)
         for f in (lambda n, d: ParabolicLinear(n)(d), jax.grad(lambda n, d: ParabolicLinear(n)(d)),
                   jax.grad(lambda n, d: ParabolicLinear(n)(d), argnums=1))
     )  # fmt: skip
     np.testing.assert_allclose(value, node * r**2 / (2 - node), rtol=1e-14)
     np.testing.assert_allclose(by_node, r**2 * (2 * node - 2) / (2 - node) ** 2, rtol=1e-8, atol=1e-14)
     np.testing.assert_allclose(by_depth, 2 * r / (2 - node), rtol=1e-14)
-    beyond = jax.vmap(jax.grad(lambda n, d: ParabolicLinear(n)(d)), (None, 0))(node, jnp.asarray([0.3, 1.0]))
+    beyond = jax.jit(jax.vmap(jax.grad(lambda n, d: ParabolicLinear(n)(d)), (None, 0)))(node, jnp.asarray([0.3, 1.0]))
     assert bool(jnp.all(jnp.isfinite(beyond)))
 
 
@@ -359,7 +369,9 @@ def test_a_flank_table_without_variation_over_the_face_is_a_profile_table(method
     column = np.array([3.0, 1.0, 0.0, 0.5, 6.0])
     table = jg.TabulatedFlank(TABLE, [-10.0, 0.0, 4.0], np.stack([column] * 3, axis=1), method)
     points = profile(np.linspace(START, 14.0, 60), np.linspace(-14.0, 14.0, 60))
-    np.testing.assert_allclose(table(points), jg.TabulatedProfile(TABLE, column, method=method)(points), atol=1e-13)
+    np.testing.assert_allclose(
+        at(table, points), at(jg.TabulatedProfile(TABLE, column, method=method), points), atol=1e-13
+    )
     assert not table.varies_along_face
 
 
@@ -369,11 +381,11 @@ def test_a_flank_table_is_exact_at_its_points_linear_over_the_face_and_constant_
     amount = np.random.default_rng(3).normal(size=(5, 3))
     table = jg.TabulatedFlank(TABLE, face, amount, method)
     grid = profile(np.repeat(TABLE, 3), np.tile(face, 5))
-    np.testing.assert_allclose(table(grid), amount.reshape(-1), atol=1e-13)
-    columns = [jg.TabulatedProfile(TABLE, column, method=method)(profile(RHO)) for column in amount.T]
-    np.testing.assert_allclose(table(profile(RHO, 3.0)), 0.5 * (columns[1] + columns[2]), atol=1e-13)
-    np.testing.assert_allclose(table(profile(RHO, 99.0)), columns[2], atol=1e-13)
-    np.testing.assert_allclose(table(profile(RHO, -99.0)), columns[0], atol=1e-13)
+    np.testing.assert_allclose(at(table, grid), amount.reshape(-1), atol=1e-13)
+    columns = [at(jg.TabulatedProfile(TABLE, column, method=method), profile(RHO)) for column in amount.T]
+    np.testing.assert_allclose(at(table, profile(RHO, 3.0)), 0.5 * (columns[1] + columns[2]), atol=1e-13)
+    np.testing.assert_allclose(at(table, profile(RHO, 99.0)), columns[2], atol=1e-13)
+    np.testing.assert_allclose(at(table, profile(RHO, -99.0)), columns[0], atol=1e-13)
     assert table.varies_along_face
 
 

@@ -1,21 +1,24 @@
-"""The README keeps its promises: its script runs and its commands are the ones that CI runs."""
+"""The README keeps its promises: its snippets run and its commands are the ones that CI runs."""
 
 import re
 from pathlib import Path
 
 import pytest
+from test_guides import run
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
-def test_script_runs_as_printed(capsys):
-    script = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)[0]
-    names: dict = {}
-    exec(compile(script, "README.md", "exec"), names)
+def test_snippets_run_as_printed(tmp_path, monkeypatch, clean_figures, capsys):
+    """The first is the script; the others go on from it."""
+    monkeypatch.chdir(tmp_path)
+    rest = run(ROOT / "README.md")
+    names = next(rest)
     assert capsys.readouterr().out.count(", converged") == 3
     assert names["best"].ppte < 0.25 * float(names["jg"].peak_to_peak(names["unmodified"].transmission_error))
+    assert [*rest]
 
 
 def test_both_commands_stand_in_it():

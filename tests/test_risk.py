@@ -17,9 +17,14 @@ def sample(count=23, seed=1):
     return np.random.default_rng(seed).gamma(2.0, size=count)
 
 
+@jax.jit
+def _of(measure, values, weights):
+    """One program for each kind of measure and each number of values, for all levels."""
+    return measure(values, weights)
+
+
 def of(measure, values, weights=None):
-    values = jnp.asarray(values)
-    return float(measure(values, jnp.ones_like(values) if weights is None else jnp.asarray(weights)))
+    return float(_of(measure, values, np.ones_like(values) if weights is None else weights))
 
 
 def tail_mean(values, weights, level):

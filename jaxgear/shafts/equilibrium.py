@@ -43,8 +43,8 @@ class System(NamedTuple):
         bearings: K.
         housing: C.
         loose: 1 for movements that no bearing resists, which stay zero.
-        play: force of the bearings at no relative displacement, by which the tangent K of bearings with clearance misses
-            the origin [N, N mm]; zero of linear bearings.
+        play: force of the bearings at no relative displacement, by which the tangent K of bearings with clearance
+            misses the origin [N, N mm]; zero of linear bearings.
     """
 
     flexibility: Float[Array, "n n"]
