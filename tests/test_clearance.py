@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from test_shafts import PINION, WHEEL
 
 from jaxgear.shafts import (
@@ -74,6 +75,7 @@ def test_a_shaft_afloat_has_no_answer():
     assert np.isnan(np.asarray(bearing_reactions(beam((20.0, 35.0), (0.0, 0.0, 0.0))).shaft)).all()
 
 
+@pytest.mark.slow
 def test_derivative_of_the_factor_is_its_central_difference():
     @jax.jit
     def factor(values):
