@@ -1,5 +1,7 @@
 """Housing: limits, an exact frame, files and what is refused."""
 
+import importlib
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -190,3 +192,15 @@ def test_node_maps_must_fit_the_gearbox():
         two_stages(housing=Housing(("A.x",), np.eye(1)))
     with pytest.raises(ValueError, match="^with_and_without_housing: gearbox has no housing$"):
         with_and_without_housing(two_stages())
+
+
+@pytest.mark.slow
+def test_a_box_on_a_good_foundation_hardly_matters(tmp_path, monkeypatch):
+    """The example by scikit-fem: seats give way alike, so that the load over the face stays."""
+    pytest.importorskip("skfem")
+    monkeypatch.chdir(tmp_path)
+    found = importlib.import_module("examples.how_stiff_is_the_housing").main(fast=True)
+    assert found["rigid_seats_seat_um"] == 0.0 and found["good_foundation_seat_um"] > 0.5
+    rigid = found["rigid_seats_face_load_factor"]
+    assert found["good_foundation_face_load_factor"] == pytest.approx(rigid, rel=0.01)
+    assert found["corner_missing_seat_um"] > 2 * found["good_foundation_seat_um"]

@@ -43,8 +43,8 @@ class System(NamedTuple):
         bearings: K.
         housing: C.
         loose: 1 for movements that no bearing resists, which stay zero.
-        play: force of the bearings at no relative displacement, by which the tangent K of bearings with clearance
-            misses the origin [N, N mm]; zero of linear bearings.
+        play: f_0, force of the bearings at no displacement by their tangent K, which misses the origin where they have
+            clearance [N, N mm]; zero of linear bearings.
     """
 
     flexibility: Float[Array, "n n"]
@@ -101,9 +101,8 @@ def system(gearbox: Gearbox, patterns: list[Patterns]) -> System:
         stiffness = stiffness.at[index, :, index].set(matrix)
     stiffness = stiffness.reshape(_WAYS * count, -1)
     housing = jnp.zeros_like(stiffness) if gearbox.housing is None else gearbox.housing.at(gearbox.bearing_names)
-    return System(
-        total, jnp.concatenate(moving, axis=1), stiffness, housing, jnp.concatenate(loose), jnp.zeros(len(stiffness))
-    )
+    movements = jnp.concatenate(moving, axis=1), jnp.concatenate(loose)
+    return System(total, movements[0], stiffness, housing, movements[1], jnp.zeros(len(stiffness)))
 
 
 def solve(of: System, loads: Float[Array, "patterns loads"], *, actual: bool = False) -> Equilibrium:

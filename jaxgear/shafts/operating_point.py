@@ -6,7 +6,8 @@ nothing. The state under all loads, the force of every mesh even over its face, 
 load of a mesh changes about it is taken by the tangent there: its sum and direction are those of the state, so that
 only its distribution over the face is seen linearly. Without clearances all of it is linear and exact.
 
-Where the loads leave a shaft afloat in its clearances nothing holds it, and results are not finite.
+Where the loads leave a shaft afloat in its clearances nothing holds it, and results are NaN, as where Newton's method
+finds no state.
 """
 
 from functools import partial
@@ -22,6 +23,8 @@ from .gearbox import Gearbox
 from .loads import load_pattern
 
 _WAYS = len(DIRECTIONS)
+# What may be left of the conditions, relative to the largest load, over the square root of rounding.
+_SOLVED = 1e-2
 
 
 def system_under_load(gearbox: Gearbox, patterns: list[Patterns]) -> System:
@@ -77,4 +80,6 @@ def _state(of: System, clearance: Float[Array, " bearings"]) -> Float[Array, " b
         return jnp.concatenate([(force + resisted) / (load * stiff), balance])
 
     start = jnp.concatenate([linear.force[:, 0] / load, first * arm / length])
-    return displaced(implicit_root(conditions, start))
+    root = implicit_root(conditions, start)
+    missed = jnp.max(jnp.abs(conditions(root))) > _SOLVED * jnp.sqrt(jnp.finfo(start.dtype).eps)
+    return jnp.where(missed, jnp.nan, displaced(root))
