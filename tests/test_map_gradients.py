@@ -56,7 +56,7 @@ def cases(oscillator):
 @eqx.filter_jit
 def numbers_of(oscillator, frequency, start):
     orbit = find_orbit(oscillator, frequency, start, steps=STEPS)
-    return jnp.stack([orbit.dynamic_factor, orbit.approach_rms]), orbit.converged & orbit.stable
+    return jnp.stack([orbit.dynamic_factor, orbit.approach_rms]), orbit.no_contact, orbit.converged & orbit.stable
 
 
 @eqx.filter_jit
@@ -64,12 +64,13 @@ def slopes_of(oscillator, change, frequency, start):
     return jax.jvp(lambda oscillator: numbers_of(oscillator, frequency, start)[0], (oscillator,), (change,))[1]
 
 
-@pytest.mark.parametrize("frequency", [1800.0, 2600.0])
-def test_dynamic_factor_and_rms(cases, frequency):
-    """Below the resonance and on its flank, where contact is only just kept."""
+@pytest.mark.parametrize("frequency, apart", [(1800.0, False), (2600.0, False), (2900.0, True)])
+def test_dynamic_factor_and_rms(cases, frequency, apart):
+    """Below the resonance, on its flank, and where contact is lost."""
     moving, changes, beside = cases
     start = settle(moving, frequency, ([12.0], [0.0]), cycles=150, steps=STEPS)
-    assert bool(numbers_of(moving, frequency, start)[1])
+    _, no_contact, fine = numbers_of(moving, frequency, start)
+    assert bool(fine) and (float(no_contact) > 0.1) == apart
     for name, value, change, (above, below) in zip(NAMES, POINT, changes, beside):
         found = slopes_of(moving, change, frequency, start)
         ends = [numbers_of(each, frequency, start)[0] for each in (above, below)]
