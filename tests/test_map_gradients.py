@@ -1,4 +1,4 @@
-"""Derivatives through the whole chain, from flanks over the map of the mesh force to orbits and jumps."""
+"""Derivatives through the whole chain, from flanks over the map of the mesh force to orbits."""
 
 import equinox as eqx
 import jax
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxgear as jg
-from jaxgear.dynamics import bifurcation_of, find_orbit, follow_orbits, mesh_force, settle, torsional
+from jaxgear.dynamics import find_orbit, mesh_force, settle, torsional
 
 # compiles the derivatives of the contact analysis, once for all tests
 pytestmark = pytest.mark.slow
@@ -64,38 +64,15 @@ def slopes_of(oscillator, change, frequency, start):
     return jax.jvp(lambda oscillator: numbers_of(oscillator, frequency, start)[0], (oscillator,), (change,))[1]
 
 
-@pytest.mark.parametrize("frequency, apart", [(1800.0, False), (2600.0, False), (2300.0, True)])
+@pytest.mark.parametrize("frequency, apart", [(1800.0, False), (2600.0, False), (2900.0, True)])
 def test_dynamic_factor_and_rms(cases, frequency, apart):
-    """Of orbits that keep contact, and of one that loses it: next to the first."""
+    """Below the resonance, on its flank, and where contact is lost."""
     moving, changes, beside = cases
-    begin = ([12.0 - 60.0 * apart], [0.0])
-    start = settle(moving, frequency, begin, cycles=150, steps=STEPS)
+    start = settle(moving, frequency, ([12.0], [0.0]), cycles=150, steps=STEPS)
     _, no_contact, fine = numbers_of(moving, frequency, start)
-    assert bool(fine) and (float(no_contact) > 0.05) == apart
+    assert bool(fine) and (float(no_contact) > 0.1) == apart
     for name, value, change, (above, below) in zip(NAMES, POINT, changes, beside):
         found = slopes_of(moving, change, frequency, start)
         ends = [numbers_of(each, frequency, start)[0] for each in (above, below)]
         difference = (ends[0] - ends[1]) / (2 * STEP * value)
         np.testing.assert_allclose(found, difference, rtol=1e-4, err_msg=name)
-
-
-def test_the_speed_of_a_jump(cases):
-    moving, changes, beside = cases
-    begin = settle(moving, 2300.0, ([12.0], [0.0]), cycles=150, steps=STEPS)
-    start = find_orbit(moving, 2300.0, begin, steps=STEPS)
-    branch = follow_orbits(moving, start, within=(2000.0, 3200.0), step=0.05, steps=STEPS)
-    fold = next(found for found in branch.bifurcations if found.kind == "fold")
-
-    @eqx.filter_jit
-    def speed(oscillator):
-        found = bifurcation_of(oscillator, fold, steps=STEPS)
-        return found.parameter, found.converged
-
-    @eqx.filter_jit
-    def slope(oscillator, change):
-        return jax.jvp(lambda oscillator: speed(oscillator)[0], (oscillator,), (change,))[1]
-
-    assert bool(speed(moving)[1])
-    for name, value, change, (above, below) in zip(NAMES, POINT, changes, beside):
-        difference = (speed(above)[0] - speed(below)[0]) / (2 * STEP * value)
-        np.testing.assert_allclose(slope(moving, change), difference, rtol=1e-3, err_msg=name)

@@ -71,7 +71,7 @@ class Dynamics(Checked):
     wheel_bearing_damping: Bearing | None = number("N s/um", low=0.0, shape=_AXES, optional=True, default=None)
     model: Model = "map"
     positions: int = count(low=16, high=4096, default=128)
-    kick: Scalar = number("", low=1.0, default=3.0)
+    kick: Scalar = number("", low=1.0, default=3.1)
     steps: int | None = count(low=32, high=65_536, optional=True, default=None)
 
     def check_together(self) -> None:

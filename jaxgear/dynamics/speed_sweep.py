@@ -67,7 +67,7 @@ def speed_sweep(
             None for the static equilibrium.
         kick: dynamic factor, greater than 1, with which the flanks meet after they have been thrown apart, about
             (`kick.kicked`). It finds orbits that hang together with no other, such as those of two mesh cycles below
-            twice the natural frequency: 3 does from 1.6 times of it on, 3.5 from 1.5 times. None for no kick.
+            twice the natural frequency: 3.1 does from 1.6 times of it on. None for no kick.
         carry: whether each speed begins with the state of the one before; otherwise each begins as the first one does.
         steps: of the integrator per mesh cycle, even, one number or one for each speed, each a divisor of the largest;
             None for as many as the natural frequencies need, which have to be known then: where the oscillator is being
