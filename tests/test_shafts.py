@@ -348,7 +348,8 @@ def shaft(**changes):
         (lambda: MatrixBearing("A", 0.0, np.eye(4)), r'MatrixBearing "A": stiffness has shape \(4, 4\)'),
         (lambda: MatrixBearing("A", 0.0, np.triu(np.ones((5, 5)))), "stiffness must be symmetric, but"),
         (lambda: MatrixBearing("A", 0.0, -np.eye(5)), "must be positive semidefinite"),
-        (lambda: support(two_stages(), 2), "support: mesh = 2 must be at most 1"),
+        (lambda: support(two_stages(), 2), "mesh = 2 must be at most 1"),
+        (lambda: support(alone([Section(9, 9)], [Bearing("A", 0, 1.0, 0.0, 1.0)])), "gearbox has no mesh"),
         (lambda: elastic_line(two_stages(), "crank", [1.0]), 'elastic_line: shaft "crank" is not known'),
     ],
 )
