@@ -85,6 +85,29 @@ def test_wind_up_of_the_benchmark():
     np.testing.assert_allclose(root_face_load_factor(1.36, 6.6, 1.0), 1.30, atol=0.005)
 
 
+def test_points_that_all_feel_each_other_meet_every_condition():
+    """Random compliances far from diagonal: forces and openings are not negative, and one of them is zero."""
+    random = np.random.default_rng(0)
+    solve = jax.jit(press)
+    touching = []
+    for softness in (0.01, 0.1, 1.0) * 8:
+        part = random.normal(size=(21, 21))
+        matrix, gap = part @ part.T / 21 + softness * np.eye(21), 3 * random.normal(size=21)
+        load = 10.0 ** random.uniform(-1.0, 2.0)
+        found = solve(jnp.asarray(matrix), jnp.asarray(gap), jnp.asarray(load))
+        assert found.solved
+        force = np.asarray(found.force)
+        opening = matrix @ force + gap - float(found.approach)
+        assert force.min() >= -1e-10 and opening.min() >= -1e-10
+        np.testing.assert_allclose(force.sum(), load, rtol=1e-10)
+        np.testing.assert_allclose(force * opening, 0.0, atol=1e-8)
+        touching.append(int(found.in_contact.sum()))
+    assert min(touching) < 5 and max(touching) > 12
+    idle = solve(jnp.eye(3), jnp.array([1.0, -2.0, 0.5]), jnp.asarray(0.0))
+    np.testing.assert_array_equal(idle.force, 0.0)
+    np.testing.assert_allclose([idle.approach, *idle.opening], [-2.0, 3.0, 0.0, 2.5])
+
+
 def test_root_factor_keeps_to_wide_teeth():
     np.testing.assert_allclose(root_face_load_factor(2.0, 1.0, 1.0), 2.0 ** (9 / 13))
     assert float(root_face_load_factor(1.0, 20.0, 5.0)) == 1.0

@@ -115,14 +115,14 @@ TILTED[0, 4] = TILTED[4, 0] = 500.0
 TILTED[1, 3] = TILTED[3, 1] = -400.0
 
 
-def two_stages(radial=500.0, diameter=36.0, housing=None):
-    """A reducer whose second mesh sits at 100 degrees from the first one."""
+def two_stages(radial=500.0, diameter=36.0, housing=None, further=()):
+    """A reducer whose second mesh sits at 100 degrees from the first one; further couplings on its first shaft."""
     into = Shaft(
         "in",
         [Section(70, 30), Section(80, 25)],
         [Bearing("A", 10, radial, 50.0), Bearing("B", 140, 300.0)],
         [MountedGear("p1", PINION, 50, integral_diameter(PINION))],
-        [Coupling(0.0, 60.0)],
+        [Coupling(0.0, 60.0), *further],
     )
     middle = Shaft(
         "middle",
@@ -261,6 +261,26 @@ def test_force_of_one_mesh_is_in_the_gap_of_the_other_by_reciprocity(reducer):
     np.testing.assert_allclose(first / forces[1], second / forces[0], rtol=1e-9)
 
 
+def test_influence_and_gap_are_what_the_elastic_lines_show():
+    """Under even loads: how far both flanks move along the line of action, up to a rotation of the whole gears.
+
+    The torque of the pinion comes from both its sides, that of the wheel leaves behind its right end.
+    """
+    box = two_stages(further=[Coupling(150.0, -15.0)])
+    np.testing.assert_allclose(box.pinion_torques()[0], 45.0, rtol=1e-12)
+    points, weights = np.polynomial.legendre.leggauss(4)
+    y, radii = jnp.asarray(9.0 * points), (float(PINION.base_radius), float(WHEEL.base_radius))
+    given = support(box, 0)
+    found = np.asarray(given.influence(y)) @ (weights / 2 * 45e3 / radii[0]) + np.asarray(given.gap(y))
+    alpha = np.deg2rad(20.0)
+    normal = np.array([np.sin(alpha), np.cos(alpha), 0.0, 0.0, 0.0])
+    lines = [elastic_line(box, name, 50.0 + y) for name in ("in", "middle")]
+    moved = [np.asarray(line.displacement) @ normal + r * np.asarray(line.twist) for line, r in zip(lines, radii)]
+    opening = moved[1] - moved[0]
+    np.testing.assert_allclose(found - found.mean(), opening - opening.mean(), atol=1e-9)
+    assert np.ptp(found) > 0.3
+
+
 def test_an_idler_twists_between_its_two_meshes():
     """Torque that enters and leaves on the same face leaves no torque outside it."""
     idler = Shaft(
@@ -328,7 +348,8 @@ def shaft(**changes):
         (lambda: MatrixBearing("A", 0.0, np.eye(4)), r'MatrixBearing "A": stiffness has shape \(4, 4\)'),
         (lambda: MatrixBearing("A", 0.0, np.triu(np.ones((5, 5)))), "stiffness must be symmetric, but"),
         (lambda: MatrixBearing("A", 0.0, -np.eye(5)), "must be positive semidefinite"),
-        (lambda: support(two_stages(), 2), "support: mesh = 2 must be at most 1"),
+        (lambda: support(two_stages(), 2), "mesh = 2 must be at most 1"),
+        (lambda: support(alone([Section(9, 9)], [Bearing("A", 0, 1.0, 0.0, 1.0)])), "gearbox has no mesh"),
         (lambda: elastic_line(two_stages(), "crank", [1.0]), 'elastic_line: shaft "crank" is not known'),
     ],
 )

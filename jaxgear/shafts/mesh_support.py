@@ -21,7 +21,13 @@ Scalar = Float[Array, ""]
 
 
 class AbstractSupport(Checked):
-    """How the flanks of a mesh come apart along the line of action, over the face coordinate y."""
+    """How the flanks of a mesh come apart along the line of action, over the face coordinate y.
+
+    Attributes:
+        pair: the gears.
+    """
+
+    pair: eqx.AbstractVar[GearPair]
 
     @abstractmethod
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
@@ -57,11 +63,19 @@ class ShaftSupport(AbstractSupport):
 
     Attributes:
         gearbox: with the torques of its couplings.
-        mesh: which one.
+        mesh: number of the mesh, from 0.
+
+    Raises:
+        ValueError: for a number that no mesh has.
     """
 
     gearbox: Gearbox
     mesh: int = eqx.field(static=True)
+
+    def check_together(self) -> None:
+        if not self.gearbox.meshes:
+            raise ValueError("ShaftSupport: gearbox has no mesh")
+        whole("ShaftSupport", "mesh", self.mesh, 0, len(self.gearbox.meshes) - 1)
 
     @property
     def pair(self) -> GearPair:
@@ -96,7 +110,6 @@ def support(gearbox: Gearbox, mesh: int = 0) -> ShaftSupport:
     Raises:
         ValueError: for a number that no mesh has.
     """
-    whole("support", "mesh", mesh, 0, len(gearbox.meshes) - 1)
     return ShaftSupport(gearbox, mesh)
 
 
