@@ -101,7 +101,7 @@ def test_many_designs_are_each_as_alone(mesh):
         return runs, jnp.max(runs["down"].dynamic_factor)
 
     runs, worst = SETTINGS.runs_of(make, (heights, found), keep=keep, batch=2)
-    assert list(runs) == ["up", "down"] and runs["down"].direction == "down"
+    assert set(runs) == {"up", "down"} and runs["down"].direction == "down"
     assert worst[:2] == pytest.approx(np.asarray(runs["down"].dynamic_factor)[:2].max(axis=1)) and np.isnan(worst[2])
     assert np.isnan(runs["up"].approach_rms[2]).all() and not runs["up"].settled[2].any()
     for i in range(2):
