@@ -1,4 +1,10 @@
-"""Shafts, bearings and housing under a mesh: what they make of the gap over its face, and of the load there."""
+"""Shafts, bearings and housing under a mesh: what they make of the gap over its face, and of the load there.
+
+shafts with sections, bearings, gears, couplings -> Gearbox with meshes and housing
+-> bearing_reactions, elastic_line       displacements and forces
+-> support(gearbox, mesh)                .influence(y) [um/N] and .gap(y) [um] over the face, for a contact
+-> annex_e(support)                      line load and K_Hbeta with one mesh stiffness along the face
+"""
 
 from .bearing import AbstractBearing as AbstractBearing
 from .bearing import Bearing as Bearing

@@ -21,13 +21,12 @@ Scalar = Float[Array, ""]
 
 
 class AbstractSupport(Checked):
-    """How the flanks of a mesh come apart along the line of action, over the face coordinate y.
+    """How the flanks of a mesh come apart along the line of action, over the face coordinate y."""
 
-    Attributes:
-        pair: the gears.
-    """
-
-    pair: eqx.AbstractVar[GearPair]
+    @property
+    @abstractmethod
+    def pair(self) -> GearPair:
+        """The gears of the mesh."""
 
     @abstractmethod
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
@@ -42,12 +41,17 @@ class RigidSupport(AbstractSupport):
     """Axes that do not give way, but may not be parallel.
 
     Attributes:
-        pair: the gears.
+        gears: the pair.
         misalignment: of their axes.
     """
 
-    pair: GearPair
+    gears: GearPair
     misalignment: Misalignment = eqx.field(default_factory=Misalignment)
+
+    @property
+    def pair(self) -> GearPair:
+        """`gears`."""
+        return self.gears
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
         """Zero."""
