@@ -172,10 +172,17 @@ def test_malformed_files_are_refused_in_one_line(tmp_path, text):
 def test_other_files_are_refused_in_one_line(tmp_path):
     np.savez(tmp_path / "bare.npz", stiffness=np.eye(2))
     (tmp_path / "broken.npz").write_bytes(b"nothing")
+    whole = (tmp_path / "bare.npz").read_bytes()
+    (tmp_path / "cut.npz").write_bytes(whole[: len(whole) // 2])
+    np.savez(tmp_path / "words.npz", stiffness=np.array([["a"]]), nodes=["A.x"], unit="N/um")
+    np.savez(tmp_path / "wide.npz", stiffness=np.eye(2), nodes=["A.x"], unit="N/um")
     (tmp_path / "latin.csv").write_bytes(b"stiffness N/\xb5m")
     for name, fault in {
         "bare.npz": "must hold nodes, holds stiffness",
-        "broken.npz": "broken.npz: ",
+        "broken.npz": "is no npz archive",
+        "cut.npz": "is no npz archive",
+        "words.npz": "stiffness must hold real numbers",
+        "wide.npz": r"stiffness has shape \(2, 2\), must be \(1, 1\) as its nodes",
         "latin.csv": "must be text in UTF-8",
         "missing.csv": "no such file",
         "matrix.op2": "a housing is read from a .csv or .npz file",

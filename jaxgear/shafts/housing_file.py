@@ -16,6 +16,8 @@ the seat, forces act on the housing. The foundation is held.
 """
 
 import csv
+import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +48,7 @@ def read_housing(path: str | Path) -> Housing:
         raise ValueError(f"{path}: no such file")
     try:
         return _made(*readers[path.suffix.lower()](path))
-    except (ValueError, OSError, KeyError, csv.Error) as error:
+    except (ValueError, OSError, csv.Error, zipfile.BadZipFile, zlib.error) as error:
         raise ValueError(f"{path}: {' '.join(str(error).split())}") from None
 
 
@@ -120,6 +122,8 @@ def _number(cell: str, row: str, column: str) -> float:
 
 
 def _from_npz(path: Path) -> tuple[str, str, list[str], np.ndarray]:
+    if not zipfile.is_zipfile(path):
+        raise ValueError("is no npz archive")
     with np.load(path, allow_pickle=False) as given:
         kinds = [kind for kind in ("stiffness", "compliance") if kind in given]
         missing = [name for name in ("nodes", "unit") if name not in given]
