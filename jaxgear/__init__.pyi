@@ -11,6 +11,7 @@ from . import microgeometry as microgeometry
 from . import numerics as numerics
 from . import optimize as optimize
 from . import plot as plot
+from . import shafts as shafts
 from . import sizing as sizing
 from . import sweeps as sweeps
 from . import tolerance as tolerance
