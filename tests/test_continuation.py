@@ -182,3 +182,5 @@ def test_what_is_no_fold_or_flip_is_refused(resonance, parametric):
     start = find_orbit(rectangular(), frequency(1.2), ([1.3], [0.9]), steps=STEPS)
     with pytest.raises(ValueError, match="follow_orbits: parameter of the start = .* must be at least"):
         followed(start, within=(1.0, 2.0))
+    with pytest.raises(ValueError, match="follow_orbits: parameter belongs to a function of it"):
+        followed(start, within=(0.05, 0.3), parameter=0.2)

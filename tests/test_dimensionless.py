@@ -24,6 +24,7 @@ from jaxgear.dynamics.dimensionless import (
     settled_vibration,
     with_relief,
 )
+from jaxgear.dynamics.integrate import cycle_of
 from jaxgear.metrics import secant_stiffness
 from jaxgear.microgeometry import Linear, Parabolic, Power
 
@@ -167,6 +168,14 @@ def test_equation_of_motion_is_that_of_the_study():
     # x'' is q'' - e''
     assert np.isclose(slope[0] + frequency**2 * e, forced - 2 * 0.05 * v - inner)
     assert np.isclose(moved[0], v + rate)
+
+
+@pytest.mark.parametrize("steps", [64, 128])
+def test_a_relief_jumps_between_two_steps_of_a_sweep(steps):
+    oscillator = model_of(PolynomialClearance.published(), relief=relief(), relief_form="exact").oscillator()
+    ends = np.asarray(cycle_of(oscillator, steps).nodes)[::2]
+    for place in np.asarray(oscillator.mesh_force.relief.ends):
+        assert np.abs(ends - place).min() < 1e-12
 
 
 def test_dead_zone_without_stiffness_variation_is_the_linear_oscillator():

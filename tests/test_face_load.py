@@ -110,12 +110,15 @@ def test_points_that_all_feel_each_other_meet_every_condition():
 
 def test_root_factor_keeps_to_wide_teeth():
     np.testing.assert_allclose(root_face_load_factor(2.0, 1.0, 1.0), 2.0 ** (9 / 13))
-    assert float(root_face_load_factor(1.0, 20.0, 5.0)) == 1.0
+    assert float(root_face_load_factor(1.0, 20.0, 5.0)) == float(root_face_load_factor(1 - 1e-12, 20.0, 5.0)) == 1.0
 
 
 def test_factor_of_given_line_loads():
     np.testing.assert_allclose(face_load_factor(jnp.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]])), [1.5, 1.0])
     np.testing.assert_allclose(face_load_factor(jnp.array([4.0, 1.0]), jnp.array([1.0, 2.0])), 2.0)
+    assert np.isnan(face_load_factor(jnp.array([jnp.nan, 1.0])))  # not found is not level
+    idle = annex_e(RigidSupport(PAIR, Misalignment(direct=10.0)), torque=0.0, stations=5)
+    assert float(idle.face_load_factor) == 1.0 and bool(idle.converged)
 
 
 def test_method_c_of_a_stiff_pair_meets_the_one_dimensional_analysis():
@@ -175,9 +178,11 @@ def test_refusals():
         annex_e(RigidSupport(PAIR))
     with pytest.raises(ValueError, match=r"^annex_e: torque has no effect: that of the couplings counts$"):
         annex_e(support(BOX), torque=20.0)
-    with pytest.raises(ValueError, match="^Misalignment: skew needs bearing_span"):
+    with pytest.raises(ValueError, match="^Misalignment: skew = 3 um needs bearing_span"):
         Misalignment(skew=3.0)
     with pytest.raises(ValueError, match="^method_c: flank_line = 'round' must be one of none, "):
         method_c(100.0, 16.0, 1.0, 1.0, flank_line="round")
     with pytest.raises(ValueError, match="^method_c: through-hardened flanks need endurance_limit"):
         method_c(100.0, 16.0, 1.0, 1.0, hardening="through_hardened")
+    with pytest.raises(ValueError, match='^method_c: endurance_limit has no effect on hardening = "cast_iron"$'):
+        method_c(100.0, 16.0, 1.0, 1.0, hardening="cast_iron", endurance_limit=900.0)

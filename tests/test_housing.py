@@ -120,6 +120,23 @@ def test_spread_forces_have_the_resultant_they_stand_for():
     np.testing.assert_allclose(moments, np.eye(3, 5, 3), atol=1e-12)
     with pytest.raises(ValueError, match="lie on one line$"):
         spread_forces(np.outer(np.arange(4.0), [1, 1, 0]), [0, 0, 0], np.arange(12).reshape(4, 3), 12)
+    with pytest.raises(ValueError, match="^spread_forces: degrees_of_freedom .* no node of a seat can be held$"):
+        spread_forces(nodes, center, np.arange(-1, 20).reshape(7, 3), 21)
+
+
+def test_condensing_refuses_what_is_no_held_housing():
+    """A chain that floats is singular but for rounding; half of a symmetric matrix is another one."""
+    count = 30
+    chain = np.diag(np.full(count - 1, -7.3), 1)
+    chain = chain + chain.T
+    chain -= np.diag(chain.sum(1))
+    seat = {"A": np.eye(count)[:, :3]}
+    with pytest.raises(ValueError, match="^condense: stiffness is singular"):
+        condense(chain, seat)
+    held = chain + np.diag([50.0] + [0.0] * (count - 1))
+    condense(held, seat)
+    with pytest.raises(ValueError, match="must be square and symmetric, both of its triangles given$"):
+        condense(np.triu(held), seat)
 
 
 @pytest.mark.parametrize("ending", ["csv", "npz"])

@@ -206,7 +206,7 @@ def test_nonsense_is_refused_in_one_line(options, message):
 
 def test_many_oscillators_belong_to_the_other_function():
     stacked = jax.vmap(loaded)(jnp.ones(2))
-    with pytest.raises(ValueError, match="must be one; make many"):
+    with pytest.raises(ValueError, match="must be one; many are for speed_sweeps"):
         speed_sweep(stacked, SPEEDS)
     with pytest.raises(ValueError, match="must be \\(oscillators, coordinates\\)"):
         speed_sweeps(rectangular(), SPEEDS)

@@ -5,7 +5,6 @@ And one that needs no contact analysis and so no compilation of it, for what has
 
 from functools import cache
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -21,7 +20,6 @@ QUICK_SPEEDS = SPEEDS[5::14]
 _INERTIA = 7.80e-3  # kg m2, a solid disc
 _TIP, _BORE, _WIDTH = 154.5709, 40.0, 20.0  # mm
 _ALLOWANCE = -72.4  # of either gear [um]
-_SIDE_BY_SIDE = 4  # designs whose contacts are analysed at once
 # of the imagined pair: mean stiffness and its amplitude [N/um], growth over the deflection [1/um], clearance [um]
 _STIFFNESS, _VARIATION, _STIFFENING, _CLEARANCE = 230.0, 45.0, 0.004, 130.0
 _REACH, _LEVELS = 60.0, 48
@@ -70,16 +68,6 @@ def oscillator(of: jg.Mesh, amount=0.0, length=LENGTH, *, torque=TORQUE, damping
         positions=POSITIONS,
     )
     return settings.oscillator(of, torque, pinion=relief, wheel=relief)
-
-
-def relieved(amounts, lengths) -> Oscillator:
-    """Pairs with tip reliefs [um], [mm], one for each of two arrays: one axis in front of every array."""
-    return _relieved(mesh(), jnp.asarray(amounts), jnp.asarray(lengths))
-
-
-@jax.jit
-def _relieved(of, amounts, lengths):
-    return jax.lax.map(lambda row: oscillator(of, *row), (amounts, lengths), batch_size=_SIDE_BY_SIDE)
 
 
 def random_reliefs(count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -6,9 +6,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from jaxgear.dynamics import speed_sweep, speed_sweeps
+from jaxgear.dynamics import Dynamics, speed_sweep, steps_for
 
-from .pair import POSITIONS, SPEEDS, mesh, oscillator, random_reliefs, relieved
+from .pair import SPEEDS, mesh, oscillator, random_reliefs
 from .timing import best_of
 
 DESIGNS, FULL_DESIGNS = 64, 1000
@@ -22,15 +22,15 @@ def throughput_section(console: Console, *, designs: int) -> list[str]:
     of_one, of_many = (np.linspace(SPEEDS[0], SPEEDS[-1], count) for count in (_SPEEDS, _SPEEDS_OF_MANY))
     pairs = [oscillator(mesh(), torque=torque) for torque in _TORQUES]
     reliefs = random_reliefs(designs)
-    many = relieved(*reliefs)
+    settings = Dynamics(of_many, kick=1.0)  # rising and falling
+    steps = steps_for(oscillator(mesh()), of_many)
     calls: dict[str, Callable[[], object]] = {
         f"one design, {len(of_one)} speeds up and down, {len(_TORQUES)} torques": lambda: [
             speed_sweep(pair, of_one, direction=way).dynamic_factor for pair in pairs for way in _DIRECTIONS
         ],
-        f"{designs} designs, {len(of_many)} speeds up and down": lambda: [
-            speed_sweeps(many, of_many, direction=way).dynamic_factor for way in _DIRECTIONS
-        ],
-        f"force maps of {designs} designs, {POSITIONS} mesh positions": lambda: relieved(*reliefs).mass,
+        f"{designs} designs, {len(of_many)} speeds up and down, force maps included": lambda: settings.runs_of(
+            _made, reliefs, steps=steps, keep=_factors
+        ),
     }
     table = Table("once compiled")
     for title in (r"wall \[s]", r"processor \[s]"):
@@ -39,3 +39,11 @@ def throughput_section(console: Console, *, designs: int) -> list[str]:
         table.add_row(name, f"{times.wall:.2f}", f"{times.processor:.2f}")
     console.print(table)
     return []
+
+
+def _made(relief):
+    return oscillator(mesh(), *relief)
+
+
+def _factors(runs):
+    return {name: of.dynamic_factor for name, of in runs.items()}

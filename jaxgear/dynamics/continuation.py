@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from ..numerics import Checked, check, kernel, real, result, whole
 from .bifurcation import Bifurcation, Kind, Tests, bifurcation_at, tests_of
-from .corrector import Corrected, Scales, corrected, family_of, first_direction
+from .corrector import Corrected, OverSpeed, Scales, corrected, family_of, first_direction
 from .orbit import Orbit, orbit_at
 from .poincare import STEPS, nodes_of, scaled, steps_at
 
@@ -86,7 +86,7 @@ def follow_orbits(
         start: an orbit of the branch; or a flip of another branch, from which orbits of twice the period branch off.
         within: smallest and largest parameter.
         direction: of the parameter at the start; a branch from a flip goes where it must.
-        parameter: of the start, where a function is given.
+        parameter: of the start, where a function and an orbit are given; the mesh frequency of the orbit without it.
         step: first step along the branch, as part of the parameter and of the size of the orbit.
         points: largest number of points.
         steps: of a mesh cycle, as for `find_orbit`.
@@ -114,6 +114,8 @@ class _Follower:
         orbit = start.orbit if isinstance(start, Bifurcation) else start
         if not isinstance(orbit, Orbit):
             raise TypeError(f"follow_orbits: start is of type {type(start).__name__}, must be an Orbit or a flip")
+        if parameter is not None and (flip or isinstance(family, OverSpeed)):
+            raise ValueError("follow_orbits: parameter belongs to a function of it that starts from an orbit")
         given = start.parameter if flip else orbit.mesh_frequency if parameter is None else parameter
         self.family, self.periods = family, orbit.periods * (2 if flip else 1)
         dtype = orbit.displacement.dtype

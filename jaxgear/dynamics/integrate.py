@@ -90,8 +90,12 @@ class Cycle(NamedTuple):
 
 
 def cycle_of(oscillator: Oscillator, steps: int) -> Cycle:
-    """Mesh positions for so many steps per cycle, and for every half of that down to two steps."""
-    nodes = oscillator.mesh_force.nodes(2 * steps).astype(oscillator.mass.dtype)
+    """Mesh positions for so many steps per cycle, and for every half of that down to two steps.
+
+    The positions that the force asks for are ends of the steps, never the middle of one.
+    """
+    ends = oscillator.mesh_force.nodes(steps).astype(oscillator.mass.dtype)
+    nodes = jnp.zeros(2 * steps + 1, ends.dtype).at[::2].set(ends).at[1::2].set((ends[:-1] + ends[1:]) / 2)
     fine = steps_of(oscillator, nodes)
     return Cycle(fine.first, fine.last if oscillator.mesh_force.jumps else None, nodes)
 

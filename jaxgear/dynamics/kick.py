@@ -35,9 +35,10 @@ class Kick(NamedTuple):
 def kick_of(oscillator: Oscillator, rest: Rest, factor: Scalar) -> Kick:
     """The distance from which flanks meet again with a dynamic factor, and where on the cycle they are to have it.
 
-    With the static deflection d of the mesh stiffness, flanks that a constant force closes over a gap g are pressed to
-    the deflection d + (d^2 + 2 g d)^(1/2): a dynamic factor K needs g = ((K - 1)^2 - 1) d / 2. Up to K = 2 contact is
-    kept, and the approach is released from (K - 1) d behind that at rest.
+    With the static deflection d of the mesh stiffness at mesh position 0, flanks that a constant force closes over a
+    gap g are pressed to the deflection d + (d^2 + 2 g d)^(1/2): a dynamic factor K needs g = ((K - 1)^2 - 1) d / 2. Up
+    to K = 2 contact is kept, and the approach is released from (K - 1) d behind that at rest. Where the backlash is
+    less than the gap, the coast flanks throw them back harder.
 
     Orbits of two mesh cycles are farthest apart a quarter of a cycle behind the softest mesh position, when the mesh
     begins to stiffen. With a rectangular or a harmonic stiffness a gap there leads to them over a band of sizes about

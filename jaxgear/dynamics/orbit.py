@@ -37,8 +37,8 @@ class Orbit(Checked):
         approach: of the flanks [um], shape (samples,).
         approach_rate: its velocity [um/s], shape (samples,).
         force: elastic force of the mesh [N], shape (samples,).
-        dynamic_factor: largest force over the static one; where springs to ground carry some of the load, over the
-            mean of the force.
+        dynamic_factor: largest force over the static one, which is the mean over the cycle at rest where springs carry
+            some of the load.
         approach_rms: root mean square of the approach about its mean [um].
         approach_mean, approach_min, approach_max: [um].
         no_contact, coast_contact: share of the time without force, and with force on the coast flanks; they have no

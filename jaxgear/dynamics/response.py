@@ -35,8 +35,8 @@ class SpeedResponse(Checked):
             (speeds,).
         poincare_approach, poincare_velocity: approach [um] and its rate [um/s] at mesh position 0 of successive cycles,
             shape (speeds, points); they repeat where the orbit does.
-        settled: whether a steady state was reached, shape (speeds,); where it is not, the numbers are of a motion that
-            is aperiodic, or still on its way.
+        settled: whether a steady state was reached, of a mesh force whose contacts were found, shape (speeds,); where
+            it is not, the numbers are of a motion that is aperiodic, or still on its way, or of no such force.
         state: coordinates [um] and velocities [um/s] at mesh position 0, each of shape (speeds, coordinates).
         orders: multiples of the mesh frequency of the harmonics.
         direction: in which the speeds were gone through.

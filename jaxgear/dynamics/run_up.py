@@ -11,7 +11,7 @@ from ..numerics import Checked, check, concrete, kernel, real, result, whole
 from .history import history, largest, smallest
 from .integrate import cycle_of, one_step, step_of
 from .oscillator import Oscillator, State
-from .speed_sweep import start_of, steps_for
+from .speed_sweep import check_single, start_of, steps_for
 from .static import at_rest, static_force
 
 Scalar = Float[Array, ""]
@@ -69,8 +69,7 @@ def run_up(
     low, high = _number(owner, "first", first, "Hz"), _number(owner, "last", last, "Hz")
     time = _number(owner, "duration", duration, "s")
     samples = whole(owner, "samples", samples)
-    if oscillator.mass.ndim != 1:
-        raise ValueError(f"{owner}: oscillator holds oscillators of shape {oscillator.mass.shape[:-1]}, must be one")
+    check_single(owner, oscillator)
     cycles = int(np.floor((low + high) / 2 * time / samples))
     if cycles < 1:
         raise ValueError(

@@ -138,7 +138,8 @@ class Dynamics(Checked):
     def run_names(self) -> tuple[str, ...]:
         """What the speeds are gone through for: rising, falling, and falling after a kick at the highest speed."""
         kick = concrete(self.kick)
-        return UP, DOWN, *((KICKED,) if kick is None or kick > 1 else ())
+        falling = (DOWN,) if len(self.mesh_frequencies) > 1 else ()  # at one speed it is the rising run
+        return UP, *falling, *((KICKED,) if kick is None or kick > 1 else ())
 
     def run(self, oscillator: Oscillator, name: str, *, steps: Sequence[int] | int | None = None) -> SpeedResponse:
         """The steady states of one of the runs.

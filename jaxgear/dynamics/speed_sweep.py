@@ -135,7 +135,9 @@ def check_single(owner: str, oscillator: Oscillator) -> None:
     """Raises a one-line `ValueError` for many."""
     if oscillator.mass.ndim != 1:
         many = f"oscillators of shape {oscillator.mass.shape[:-1]}"
-        raise ValueError(f"{owner}: oscillator holds {many}, must be one; make many with speed_sweeps")
+        raise ValueError(
+            f"{owner}: oscillator holds {many}, must be one; many are for speed_sweeps or Dynamics.runs_of"
+        )
 
 
 class _Limits(NamedTuple):
@@ -239,7 +241,8 @@ def swept(
         period=found.period,
         poincare_approach=found.approach,
         poincare_velocity=found.velocity,
-        settled=found.period > 0,
+        # a map of contacts that were not found is no force
+        settled=(found.period > 0) & getattr(oscillator.mesh_force, "converged", True),
         state=found.state,
         orders=sizes.orders,
         direction="up",

@@ -66,12 +66,12 @@ def press(compliance: Float[Array, "points points"], gap: Vector, load: Float[Ar
         one = changed & (jnp.cumsum(changed) == 1)
         return jnp.where(step < _TOGETHER, wanted, active ^ one), changed, step + 1
 
-    active, changed, _ = jax.lax.while_loop(unfinished, advance, (start, start, 0))
+    active, *_ = jax.lax.while_loop(unfinished, advance, (start, start, 0))
     force, approach, opening = _at(active, compliance, gap, load)
     eps = _ROUNDING * jnp.finfo(gap.dtype).eps
     scale = jnp.max(jnp.abs(compliance)) * load + jnp.max(jnp.abs(gap)) - jnp.min(gap)
     holds = jnp.all(force >= -eps * load) & jnp.all(opening >= -eps * scale)
-    return Pressed(force, approach, opening, active, holds & ~jnp.any(changed))
+    return Pressed(force, approach, opening, active, holds)
 
 
 def _at(active: Bool[Array, " points"], compliance, gap, load):

@@ -24,13 +24,17 @@ from threadpoolctl import threadpool_limits
 from .beam import DIRECTIONS
 from .housing import Housing
 
+_ASYMMETRY = 1e-6  # of a stiffness matrix, relative to its largest entry
+_MISSED = 1e-6  # of unit loads, where the solution is one
+
 
 def spread_forces(
     nodes: np.ndarray, center, degrees_of_freedom: np.ndarray, size: int, *, tilting: bool = False
 ) -> np.ndarray:
     """Nodal forces of unit forces (and moments) on a seat in the directions x, y, z (, rx, ry).
 
-    Forces are equal on all nodes; moments are the smallest nodal forces with that moment and no resultant.
+    They are the smallest nodal forces with that resultant and no other: of a force equal on all nodes, where these lie
+    evenly around the centre.
 
     Args:
         nodes: coordinates of the nodes of the bore, shape (nodes, 3) [mm].
@@ -40,10 +44,16 @@ def spread_forces(
         tilting: whether the seat takes moments.
 
     Raises:
-        ValueError: for nodes that cannot carry the moments because they lie on one line.
+        ValueError: for nodes that cannot carry the moments because they lie on one line, or rows that are not there.
     """
     arms = np.asarray(nodes, float) - np.asarray(center, float)
     count = len(arms)
+    rows = np.asarray(degrees_of_freedom)
+    if rows.shape != (count, 3) or rows.min() < 0 or rows.max() >= size:
+        raise ValueError(
+            f"spread_forces: degrees_of_freedom of shape {rows.shape} must be {count} times 3 rows from 0 to "
+            f"{size - 1}: no node of a seat can be held"
+        )
     # resultant of nodal forces: x, y, z and moments about the centre
     zero, (x, y, z) = np.zeros(count), arms.T
     one = np.ones(count)
@@ -64,7 +74,7 @@ def spread_forces(
     spread = resultant.T @ np.linalg.inv(gram)
     ways = 5 if tilting else 3
     forces = np.zeros((size, ways))
-    np.add.at(forces, np.ravel(degrees_of_freedom), spread[:, :ways])
+    np.add.at(forces, rows.ravel(), spread[:, :ways])
     return forces
 
 
@@ -77,9 +87,13 @@ def condense(stiffness, seats: Mapping[str, np.ndarray]) -> Housing:
             `spread_forces`, shape (rows, 3 or 5).
 
     Raises:
-        ValueError: for seats that do not fit the matrix, or a model that is not held.
+        ValueError: for seats that do not fit the matrix, a matrix that is not symmetric, or a model that is not held.
     """
     matrix = scipy.sparse.csc_matrix(stiffness)
+    if matrix.shape[0] != matrix.shape[1] or abs(matrix - matrix.T).max() > _ASYMMETRY * abs(matrix).max():
+        raise ValueError(
+            f"condense: stiffness of shape {matrix.shape} must be square and symmetric, both of its triangles given"
+        )
     nodes: list[str] = []
     for name, forces in seats.items():
         if forces.ndim != 2 or forces.shape[0] != matrix.shape[0] or forces.shape[1] not in (3, 5):
@@ -98,5 +112,11 @@ def condense(stiffness, seats: Mapping[str, np.ndarray]) -> Housing:
             moved = factors.solve(loads)
     except RuntimeError:  # exactly singular
         raise ValueError("condense: stiffness is singular: is the housing fixed to its foundation?") from None
+    missed = np.abs(matrix @ moved - loads).max() / np.abs(loads).max()
+    if not missed < _MISSED:  # a model that floats is singular but for rounding
+        raise ValueError(
+            f"condense: stiffness is singular, forces are missed by {missed:.2g} of their size: is the housing fixed "
+            "to its foundation?"
+        )
     compliance = loads.T @ moved  # mm and rad per N and N mm
     return Housing(tuple(nodes), 1e3 * 0.5 * (compliance + compliance.T), "compliance")

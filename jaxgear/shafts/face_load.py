@@ -22,6 +22,7 @@ _STATIONS = 41
 # ISO 6336-1:2006/2019 clause 9: mesh stiffness for K_Hbeta over that for K_v and K_Halpha
 _FACE_SHARE = 0.85
 _WIDEST_TOOTH = 1 / 3  # largest h/b of ISO 6336-1 clause 7
+_LEVEL = 1 - 1e-5  # factor of an even load, less rounding
 
 
 class FaceLoad(Checked):
@@ -59,11 +60,13 @@ def face_load_factor(line_load: Float[Array, "... slices"], slice_width: Slices 
         slice_width: width of every slice [mm]; None where all are equal.
     """
     load = real(line_load)
-    width = jnp.ones_like(load[..., :1]) if slice_width is None else jnp.expand_dims(slice_width, range(load.ndim - 1))
+    check("face_load_factor", "slice_width", slice_width, "mm", low=0.0, open_low=True)
+    given = jnp.ones_like(load[..., :1]) if slice_width is None else real(slice_width)
+    width = jnp.expand_dims(given, range(load.ndim - given.ndim))
     width = jnp.broadcast_to(width, load.shape)
     mean = jnp.sum(load * width, axis=-1) / jnp.sum(width, axis=-1)
-    loaded = mean > 0
-    return jnp.where(loaded, maximum(load, axis=-1) / jnp.where(loaded, mean, 1.0), 1.0)
+    idle = mean <= 0  # loads that have not been found are not idle: they stay NaN
+    return jnp.where(idle, 1.0, maximum(load, axis=-1) / jnp.where(idle, 1.0, mean))
 
 
 def root_face_load_factor(factor, face_width, tooth_height) -> Float[Array, "..."]:
@@ -74,16 +77,20 @@ def root_face_load_factor(factor, face_width, tooth_height) -> Float[Array, "...
         face_width: b [mm], the smaller of the two gears.
         tooth_height: h from root to tip [mm], of the gear with the larger h/b; h/b counts as 1/3 at most.
     """
-    check("root_face_load_factor", "factor", factor, "", low=1.0)
+    check("root_face_load_factor", "factor", factor, "", low=_LEVEL)
     check("root_face_load_factor", "face_width", face_width, "mm", low=0.0, open_low=True)
     check("root_face_load_factor", "tooth_height", tooth_height, "mm", low=0.0, open_low=True)
     ratio = jnp.minimum(real(tooth_height) / real(face_width), _WIDEST_TOOTH)
-    return real(factor) ** (1 / (1 + ratio + ratio**2))
+    return jnp.maximum(real(factor), 1.0) ** (1 / (1 + ratio + ratio**2))
 
 
 def tooth_height(pair: GearPair) -> Scalar:
-    """h for `root_face_load_factor` [mm], the larger one of both gears."""
-    return jnp.maximum(*(gear.tip_radius - gear.root_circle_radius for gear in (pair.pinion, pair.wheel)))
+    """h for `root_face_load_factor` [mm]: over the common face width it gives the larger h/b of both gears."""
+
+    def of(gear: Gear) -> Scalar:
+        return pair.face_width / gear.face_width * (gear.tip_radius - gear.root_circle_radius)
+
+    return jnp.maximum(of(pair.pinion), of(pair.wheel))
 
 
 def mesh_stiffness(pair: GearPair, line_load) -> Scalar:
@@ -115,7 +122,8 @@ def annex_e(
         torque: on the pinion [N m], application factor included; None for that of the gearbox.
         pinion, wheel: modifications and deviations, taken along the pitch line; None for none.
         stiffness: c_gamma [N/(mm um)]; None for `mesh_stiffness`.
-        stations: over the face.
+        stations: over the face. The largest load is that of a station's middle, (K_Hbeta - 1) / stations below that
+            at the end of a straight line load.
 
     Raises:
         ValueError: for a torque beside that of a gearbox, or without any; for numbers out of their range.
@@ -138,7 +146,9 @@ def _annex_e(support, pinion, wheel, torque, stiffness, stations: int) -> FaceLo
     width = pair.face_width
     y, step = even_coordinates(width, stations), width / stations
     if stiffness is None:
-        stiffness = mesh_stiffness(pair, 1e3 * moment / (pair.pinion.pitch_radius * width))
+        # that of the standard vanishes with the load; without any, every stiffness gives the same
+        some = jnp.where(moment > 0, moment, 1.0)
+        stiffness = mesh_stiffness(pair, 1e3 * some / (pair.pinion.pitch_radius * width))
     influence = support.influence(y)
     gap = support.gap(y) + sum(item(flank) for item, flank in zip((pinion, wheel), pitch_lines(pair, y)))
     gap = jnp.broadcast_to(gap, y.shape)

@@ -58,6 +58,8 @@ class Gearbox(Checked):
     direction: Direction = eqx.field(static=True, default="counterclockwise")
 
     def check_together(self) -> None:
+        if not self.shafts:
+            raise ValueError("Gearbox: shafts must not be empty")
         names = [shaft.name for shaft in self.shafts]
         _check_single("shaft", names)
         _check_single("gear", [gear.name for shaft in self.shafts for gear in shaft.gears])

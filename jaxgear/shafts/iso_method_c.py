@@ -1,11 +1,11 @@
 """K_Hbeta by ISO 6336-1 Method C: an estimate in closed form, for comparison with analyses of load over the face.
 
 References:
-    ISO 6336-1:2006, clause 7 (Method C); coefficients of f_sh and f_ma as DIN 3990-11 and ISO 6336-1 give them, quoted
+    ISO 6336-1:2006, clause 7 (Method C); coefficients of f_sh as DIN 3990-11 and ISO 6336-1 give them, quoted
     from secondary sources.
 """
 
-from typing import Literal
+from typing import Literal, get_args
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -47,7 +47,7 @@ def iso_shaft_deformation(
     f_sh = (F_m / b) 0.023 (|B* + K' (l s / d1^2) (d1 / d_sh)^4 - 0.3| + 0.3) (b / d1)^2
 
     Args:
-        line_load: F_m / b [N/mm].
+        line_load: F_m / b = F_t K_A K_v / b [N/mm].
         face_width: b [mm].
         pitch_diameter: d1 of the pinion [mm].
         shaft_diameter: d_sh [mm].
@@ -90,7 +90,7 @@ def method_c(
     F_betax = 1.33 B1 f_sh + B2 f_ma, at least max(0.005 F_m / b, 0.5 f_Hbeta); running in takes y_beta off it.
 
     Args:
-        line_load: F_m / b [N/mm].
+        line_load: F_m / b = F_t K_A K_v / b [N/mm].
         stiffness: c_gamma_beta [N/(mm um)].
         shaft_deformation: f_sh [um], for instance `iso_shaft_deformation`.
         misalignment: f_ma [um].
@@ -123,7 +123,9 @@ def method_c(
 
 def _running_in(initial: Scalar, hardening: Hardening, endurance_limit) -> Scalar:
     """y_beta [um]."""
-    _check_choice("method_c", "hardening", hardening, ("surface_hardened", "through_hardened", "cast_iron"))
+    _check_choice("method_c", "hardening", hardening, get_args(Hardening))
+    if endurance_limit is not None and hardening != "through_hardened":
+        raise ValueError(f'method_c: endurance_limit has no effect on hardening = "{hardening}"')
     if hardening == "surface_hardened":
         return jnp.minimum(_RUN_IN * initial, _RUN_IN_MOST)
     if hardening == "cast_iron":

@@ -39,7 +39,8 @@ class Misalignment(Checked):
         for name, value in (("skew", self.skew), ("inclination", self.inclination)):
             known = concrete(value)
             if known is None or known != 0:
-                raise ValueError(f"Misalignment: {name} needs bearing_span, the distance over which it is measured")
+                given = "" if known is None else f" = {float(known):g} um"
+                raise ValueError(f"Misalignment: {name}{given} needs bearing_span [mm], over which it is measured")
 
     def over_face(self, pair: GearPair) -> Scalar:
         """f_ma over the face width [um]: direct + (skew cos(alpha_wt) + inclination sin(alpha_wt)) b / L."""

@@ -1,10 +1,11 @@
 """Bearings with radial clearance, at the loads of a gearbox.
 
 A bearing with clearance c resists with k max(0, |u| - c) in the direction in which the shaft lies against it: the
-stiffness across that direction is force over displacement, k (1 - c / |u|), and a bearing that carries nothing holds
-nothing. The state under all loads, the force of every mesh even over its face, is found by Newton's method. What the
-load of a mesh changes about it is taken by the tangent there: its sum and direction are those of the state, so that
-only its distribution over the face is seen linearly. Without clearances all of it is linear and exact.
+stiffness across that direction is force over displacement, k (1 - c / |u|). One that does not touch holds nothing
+radially; its axial and tilting stiffness act whatever the clearance. The state under all loads, the force of every mesh
+even over its face, is found by Newton's method. What the load of a mesh changes about it is taken by the tangent there:
+its sum and direction are those of the state, so that only its distribution over the face is seen linearly. Without
+clearances all of it is linear and exact.
 
 Where the loads leave a shaft afloat in its clearances nothing holds it, and results are NaN, as where Newton's method
 finds no state.
@@ -54,7 +55,8 @@ def _force(stiffness: Float[Array, "b b"], clearance: Float[Array, " bearings"],
 def _state(of: System, clearance: Float[Array, " bearings"]) -> Float[Array, " b"]:
     """Displacement of the shafts against the seats under the one load of a system."""
     count = len(of.bearings)
-    linear = solve(of, jnp.ones((1, 1)))
+    # start and scales only, on which the root does not depend; of no load the direction has no derivative
+    linear = jax.lax.stop_gradient(solve(of, jnp.ones((1, 1))))
     resisted = -linear.force[:, 0].reshape(-1, _WAYS)
     size = jnp.sqrt(jnp.sum(resisted[:, :2] ** 2, axis=1, keepdims=True))
     along = jnp.where(size > 0, resisted[:, :2] / jnp.where(size > 0, size, 1.0), 0.0)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, check, program, real, result
+from ..numerics import Checked, check, concrete, program, real, result
 from .beam import DIRECTIONS, twist
 from .equilibrium import Patterns, solve
 from .gearbox import Gearbox
@@ -15,6 +15,7 @@ from .loads import load_pattern, side_by_side, torques_on
 from .operating_point import system_under_load
 
 _WAYS = len(DIRECTIONS)
+_ROUNDED = 1 + 1e-6  # an end of a shaft in single precision
 
 
 class BearingReactions(Checked):
@@ -82,13 +83,15 @@ def elastic_line(gearbox: Gearbox, shaft: str, position) -> ElasticLine:
         position: from the left end [mm], shape (points,).
 
     Raises:
-        ValueError: for an unknown shaft, or a position left of it.
+        ValueError: for an unknown shaft, or a position beyond its ends.
     """
     names = [item.name for item in gearbox.shafts]
     if shaft not in names:
         raise ValueError(f'elastic_line: shaft "{shaft}" is not known, must be one of {", ".join(names)}')
-    check("elastic_line", "position", position, "mm", low=0.0)
-    return _line(gearbox, names.index(shaft), real(position))
+    end = concrete(gearbox.shafts[names.index(shaft)].length)
+    farthest = None if end is None else float(end) * _ROUNDED
+    check("elastic_line", "position", position, "mm", low=0.0, high=farthest)
+    return _line(gearbox, names.index(shaft), jnp.atleast_1d(real(position)))
 
 
 @program

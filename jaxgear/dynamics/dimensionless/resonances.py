@@ -227,7 +227,7 @@ def _curve(state: LoadedMean, amplitude: Curve, order: int) -> Backbone:
 @program
 def _sub_harmonic(state: LoadedMean, frequency: Curve, order: int) -> Resonance:
     def at(forced):
-        shift = frequency_shift(state, forced, parametric=order)
+        shift = frequency_shift(state, forced, _own(order), parametric=order)
         detuning = 0.5 * order * forced - state.frequency - shift
         drive = jnp.abs(_coupling(state, forced, order)) / (2 * state.frequency)
         inner = drive**2 - state.damping_ratio**2
@@ -248,8 +248,13 @@ def _instability(state: LoadedMean, order: int) -> tuple[Scalar, Scalar]:
     drive = jnp.abs(_coupling(state, at, order)) / (2 * state.frequency)
     inner = drive**2 - state.damping_ratio**2
     width = jnp.where(inner >= 0, safe_sqrt(jnp.maximum(inner, 0.0)), jnp.nan)
-    middle = state.frequency + frequency_shift(state, at, parametric=order)
+    middle = state.frequency + frequency_shift(state, at, _own(order), parametric=order)
     return 2 * (middle - width) / order, 2 * (middle + width) / order
+
+
+def _own(order: int) -> int:
+    """The order that resonates itself where `order` excites parametrically; 0 for none."""
+    return order // 2 if order % 2 == 0 else 0
 
 
 def _coupling(state: LoadedMean, frequency: Scalar, order: int) -> Complex[Array, ""]:
