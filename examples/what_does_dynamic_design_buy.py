@@ -117,15 +117,14 @@ def main(fast=False) -> dict:
 
 
 def draw(results):
-    import matplotlib.pyplot as plt
-
     from jaxgear import plot
 
-    figure, axes = plt.subplots(1, len(TORQUES), figsize=(9.6, 3.2), sharey=True, layout="constrained")
-    for axis, torque in zip(axes, TORQUES):
-        curves = {name: responses[torque] for name, (_, responses) in results.items()}
-        plot.speed_response(curves, ax=axis, title=f"{torque:g} N m")
-    plot.save(figure, "results/what_does_dynamic_design_buy.png")
+    with plot.figure.report_axes(None, columns=len(TORQUES), width=92.0 * len(TORQUES), height=84.0) as panels:
+        for number, (panel, torque) in enumerate(zip(panels, TORQUES)):
+            curves = {name: responses[torque] for name, (_, responses) in results.items()}
+            plot.speed_response(curves, ax=panel, title=f"{torque:g} N m")
+            panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
+    plot.save(panels[0].figure, "results/what_does_dynamic_design_buy.png")
 
 
 if __name__ == "__main__":
