@@ -121,16 +121,12 @@ def verdict(study: Study) -> Iterator[str]:
 def failures(study: Study) -> Iterator[str]:
     """A line for every design whose contact was not found at some approach."""
     for name, of_torques in study.oscillators.items():
-        bad = [f"{torque:g}" for torque, of in of_torques.items() if not bool(_converged(of))]
+        bad = [f"{torque:g}" for torque, of in of_torques.items() if not bool(of.converged)]
         if bad:
             yield (
                 f"MESH FORCE NOT CONVERGED: {name} at {', '.join(bad)} N m; its numbers are not to be trusted. "
                 "Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
             )
-
-
-def _converged(oscillator: Oscillator):
-    return getattr(oscillator.mesh_force, "converged", True)
 
 
 def summary(study: Study) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..numerics import Checked, number
 from .force import AbstractMeshForce
@@ -87,6 +87,11 @@ class Oscillator(Checked):
         if self.damping is not None:
             total = total - self.damping @ v
         return v, self.newton * total / self.mass
+
+    @property
+    def converged(self) -> Bool[Array, ""]:
+        """Whether the contacts that its mesh force was made of have been found; a force in closed form has none."""
+        return jnp.asarray(getattr(self.mesh_force, "converged", True))
 
     def approach(self, phase: Scalar, x: Coordinates) -> Scalar:
         """Approach of the flanks [um]."""

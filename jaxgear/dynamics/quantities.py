@@ -87,7 +87,7 @@ class _WithSettings:
             frequency = mesh_frequency(cycle.kinematics.pair.pinion.teeth, operation.speed)
             settings = dataclasses.replace(settings, mesh_frequencies=frequency[None])
         oscillator = settings.oscillator_of(cycle, mesh)
-        return settings.numbers(oscillator), oscillator.mesh_force.converged
+        return settings.numbers(oscillator), oscillator.converged
 
 
 @dataclasses.dataclass(frozen=True)

@@ -124,7 +124,7 @@ def _of_designs(rows, shared, make, keep, ways: _Ways, sizes, devices):
 
     def of_design(shared, oscillator):
         frequencies, limits = shared
-        converged = getattr(oscillator.mesh_force, "converged", jnp.asarray(True))
+        converged = oscillator.converged
         # the others of a batch do not wait for a motion that is none
         limits = limits._replace(
             most_cycles=jnp.where(converged, limits.most_cycles, jnp.zeros_like(limits.most_cycles))

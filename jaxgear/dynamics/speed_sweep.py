@@ -242,7 +242,7 @@ def swept(
         poincare_approach=found.approach,
         poincare_velocity=found.velocity,
         # a map of contacts that were not found is no force
-        settled=(found.period > 0) & getattr(oscillator.mesh_force, "converged", True),
+        settled=(found.period > 0) & oscillator.converged,
         state=found.state,
         orders=sizes.orders,
         direction="up",
