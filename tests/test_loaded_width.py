@@ -113,6 +113,7 @@ def test_batches_are_their_members(mesh, cycle):
     assert np.abs(both[0] - both[1]).max() > 0.1
 
 
+@pytest.mark.slow
 def test_slopes_of_a_linearization_are_those_of_the_curve(mesh):
     """One gradient of the contact serves all positions: widths depend on the loads at their own position alone."""
     problem = make_problem(
@@ -138,6 +139,7 @@ def test_every_slice_has_its_own_width(mesh):
     assert np.abs(found[:, 1] - narrow[:, 1]).max() > 0.02
 
 
+@pytest.mark.slow
 def test_a_prescribed_error_makes_its_own_widths(mesh, cycle):
     """There and back, up to what a third solution would change; the derivative is that of all that is computed."""
     teeth = cycle.transmission_error - mesh.hub * cycle.force / mesh.pair.face_width

@@ -88,6 +88,7 @@ def test_a_failed_solution_is_no_number(best, flat, folder):
     assert second(cycle, {}, best.pinion, best.wheel).ppte == np.inf
 
 
+@pytest.mark.slow
 def test_free_flanks_on_the_finite_element_structure(tabulated):
     free = jg.free_form(tabulated, 50.0, points=8, steps=12, positions=None)
     assert free.mesh.compliance is tabulated.compliance
