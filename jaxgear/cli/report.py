@@ -29,6 +29,7 @@ _ROWS = {
     "effective_contact_ratio": ("effective contact ratio", ".3f"),
     "pinion_root_stress_MPa": ("pinion root stress [MPa]", ".1f"),
     "wheel_root_stress_MPa": ("wheel root stress [MPa]", ".1f"),
+    "face_load_factor": ("face load factor K_Hbeta", ".3f"),
     "mesh_loss_factor": ("mesh loss factor", ".4f"),
     "max_flash_temperature_K": ("max flash temperature [K]", ".1f"),
 }
