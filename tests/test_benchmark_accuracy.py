@@ -71,7 +71,7 @@ def test_reference_is_complete_and_in_equilibrium():
 
 
 def test_reference_across_the_face_is_in_equilibrium():
-    """Force of the mean line load over the face, on the path of contact; beyond it the lever is shorter by up to 0.3 %."""
+    """Force of the mean line load over the face; beyond the path of contact the lever is shorter, by up to 0.3 %."""
     for case in face.cases():
         truth, pair = face.reference(case, 24), face.gear_pair(case.pair)
         force = truth.line_load.mean(axis=1).sum(axis=0) * float(pair.face_width)

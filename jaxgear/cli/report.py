@@ -177,7 +177,7 @@ def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: 
     maps = {"pressure_map": plot.pressure_map(cycle), "contact_pattern": plot.contact_pattern(cycle)}
     for drawn in maps.values():
         np.ravel(drawn)[0].set_title(name, loc="left", fontsize=_TITLE)
-    lines = {"line_load": plot.line_load(cycle), "face_gap": plot.face_gap(cycle)}
+    lines = {"line_load": plot.line_load(cycle), "face_gap": plot.face_gap(cycle.on(mesh))}
     for drawn in lines.values():
         drawn.get_legend().set(title=name, alignment="left")
     factors = {name: evaluation.face_load for name, evaluation in evaluations.items()}
