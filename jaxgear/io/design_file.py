@@ -127,7 +127,7 @@ class DesignFile:
 
     def begin_contact(self, first: Resolution, resolution: Resolution) -> None:
         """Starts to compile what prepares and solves the mesh, see `contact.begin_contact`."""
-        begin_contact(self._middle, self._compliance, first, resolution)
+        begin_contact(self._middle, self._compliance, first, resolution, self._support)
 
     def sweep_mesh(self, resolution: Resolution) -> Mesh | Callable[[Mapping[str, Any]], Mesh]:
         """The prepared mesh; a function of the parameters that prepares it where numbers of the gears are free."""
