@@ -39,8 +39,7 @@ def face_kernel(face_width: Scalar, root_chord: Scalar, slices: int) -> Kernel:
     """
     waves = np.arange(slices)
     cosines = jnp.asarray(face_waves(slices), jnp.result_type(face_width))
-    damped = 1 + (np.pi * waves * _DECAY * root_chord / face_width) ** 2
-    mirrored = cosines / damped[None] @ cosines.T
+    mirrored = cosines / (1 + (np.pi * waves * _DECAY * root_chord / face_width) ** 2) @ cosines.T
     decay, step = _END_DECAY * root_chord, face_width / slices
     # mean of exp(-distance / decay) over every slice
     near = jnp.exp(-waves[::-1] * step / decay) * -jnp.expm1(-step / decay) * decay / step
