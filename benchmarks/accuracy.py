@@ -1,8 +1,8 @@
 """How far jaxgear is from finite elements: `python -m benchmarks.accuracy`.
 
 Compares the default model, the usual published model and the default with one ingredient changed with 76 finite-element
-mesh cycles (`reference/README.md`). Exit code 1 when an error of the default model has grown past
-`accuracy_bounds.json`.
+mesh cycles (`reference/README.md`), then the load across the face with three-dimensional ones. Exit code 1 when an
+error of the default model has grown past `accuracy_bounds.json` or `face_bounds.json`.
 """
 
 import jax
@@ -18,6 +18,7 @@ from pathlib import Path  # noqa: E402
 
 import numpy as np  # noqa: E402
 
+from . import face  # noqa: E402
 from .cases import PAIRS, PLANES, Case, reference, select  # noqa: E402
 from .models import MODELS, Model, run  # noqa: E402
 from .quantities import QUANTITIES, errors  # noqa: E402
@@ -90,19 +91,45 @@ def _record(results, path: Path) -> None:
 def _arguments(argv) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=__doc__.split("\n\n")[0])
     parser.add_argument("--cases", default=",".join(PAIRS), help="gear pairs, for example A,B (default: all)")
-    parser.add_argument("--quick", action="store_true", help="default model, plane stress only")
+    parser.add_argument("--quick", action="store_true", help="default model, plane stress only, two dimensions")
+    parser.add_argument("--face", action="store_true", help="the load across the face alone")
     parser.add_argument("--detail", action="store_true", help="one table per quantity with every case")
     parser.add_argument("--figures", metavar="DIR", type=Path, help="write the figures to this folder")
     parser.add_argument("--record", action="store_true", help="record the worst errors as the new bounds")
     arguments = parser.parse_args(argv)
-    if arguments.record and (arguments.quick or arguments.cases != ",".join(PAIRS)):
+    some = arguments.quick or arguments.cases != ",".join(PAIRS)
+    if arguments.record and some:
         parser.error("--record needs all cases: leave out --quick and --cases")
+    if arguments.face and some:
+        parser.error("--face has no use for --quick and --cases")
+    arguments.across = not some
     return arguments
 
 
 def main(argv: Sequence[str] | None = None, models: Sequence[Model] = MODELS, bounds: Path = BOUNDS) -> int:
     """Runs the benchmark; the first of the models is held to the bounds. Returns the exit code."""
     arguments = _arguments(argv)
+    lines = [] if arguments.face else _sections(arguments, models, bounds)
+    if arguments.across:
+        lines += _across(record=arguments.record)
+    if not arguments.record:
+        print("\n".join(["", "Worse than recorded:", *lines]) if lines else "\nWithin the recorded bounds.")
+    return 1 if lines else 0
+
+
+def _across(*, record: bool) -> list[str]:
+    """Compares the load across the face; one line for every error beyond its bound."""
+    results = face.compare()
+    face.print_face(results)
+    if record:
+        face.record(results["coupled"])
+        print(f"recorded {face.BOUNDS}")
+        return []
+    return face.exceeded(results["coupled"], face.load_bounds())
+
+
+def _sections(arguments: argparse.Namespace, models: Sequence[Model], bounds: Path) -> list[str]:
+    """Compares the mesh cycles of two dimensions; one line for every error beyond its bound."""
     cases = select(arguments.cases.split(","), PLANES[:1] if arguments.quick else PLANES)
     models = models[:1] if arguments.quick else models
     results = compare(models, cases)
@@ -118,12 +145,8 @@ def main(argv: Sequence[str] | None = None, models: Sequence[Model] = MODELS, bo
     if arguments.record:
         _record(held, bounds)
         print(f"recorded {bounds}")
-        return 0
-    lines = exceeded(held, load_bounds(bounds))
-    print(
-        "\n".join(["", "Worse than recorded:", *lines]) if lines else f"\nWithin the recorded bounds of {bounds.name}."
-    )
-    return 1 if lines else 0
+        return []
+    return exceeded(held, load_bounds(bounds))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxgear as jg
-from benchmarks import accuracy, cases, goals, models, quantities, report
+from benchmarks import accuracy, cases, face, goals, models, quantities, report
 
 CASE = cases.Case("A", "strain", 50.0, "par7.81x5.05")
 OTHER = cases.Case("L", "stress", 100.0, "linshort")
@@ -68,6 +68,31 @@ def test_reference_is_complete_and_in_equilibrium():
         force = 1e3 * case.torque / float(cases.gear_pair(case.pair).pinion.base_radius)
         np.testing.assert_allclose(truth.force.sum(axis=0), force, rtol=1e-6)
         assert np.ptp(truth.transmission_error) > 0.5 and np.nanmax(truth.pressure) > 400
+
+
+def test_reference_across_the_face_is_in_equilibrium():
+    """Force of the mean line load over the face; beyond the path of contact the lever is shorter, by up to 0.3 %."""
+    for case in face.cases():
+        truth, pair = face.reference(case, 24), face.gear_pair(case.pair)
+        force = truth.line_load.mean(axis=1).sum(axis=0) * float(pair.face_width)
+        expected = 1e3 * face.inputs(case)["torque_Nm"] / float(pair.pinion.base_radius)
+        np.testing.assert_allclose(force, expected, rtol=3e-3)
+        assert np.ptp(truth.transmission_error) > 1.0
+        assert face.reference(case).factor <= truth.factor
+
+
+def test_errors_across_the_face_are_held(capsys):
+    case = face.FaceCase("b18", "slope20_50Nm")
+    bounds = face.load_bounds()
+    assert set(bounds) == {str(one) for one in face.cases()}
+    kept = face.Errors(0.5, 1.0, None, None)
+    held = {str(case): {key: 1.0 for key in face.TITLES}}
+    assert face.exceeded({case: kept}, held) == []
+    for bad in (face.Errors(-1.2, 1.0, None, None), face.Errors(0.5, float("nan"), None, None)):
+        assert len(face.exceeded({case: bad}, held)) == 1
+    face.print_face({"coupled": {case: kept}, "uncoupled": {case: face.Errors(-20.0, 25.0, 0.5, -0.4)}})
+    printed = capsys.readouterr().out
+    assert "+0.5 / -20.0" in printed and "- / +0.50" in printed
 
 
 def test_every_case_shares_one_compilation():

@@ -14,10 +14,12 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 from catalogue import gear_pair, prepare
+from test_shafts import two_stages
 
 import jaxgear as jg
 from jaxgear import plot
 from jaxgear.plot.figure import line_style
+from jaxgear.shafts import elastic_line
 
 pytestmark = pytest.mark.usefixtures("clean_figures")
 
@@ -63,11 +65,16 @@ def curves(solved):
 def draw(mesh, designs, cycles, curves):
     """Every picture by name, as a function of the Axes to draw into."""
     ppte = {name: jg.peak_to_peak(curve) for name, curve in curves.items()}
+    factors = {"unmodified": np.ones(4), "long relief": np.array([1.4, 1.3, 1.2, 1.1])}
     return {
         "transmission_error": lambda ax=None: plot.transmission_error(cycles, ax),
         "load_sharing": lambda ax=None: plot.load_sharing(cycles, ax),
         "pressure": lambda ax=None: plot.pressure(cycles, ax),
         "pressure_map": lambda ax=None: plot.pressure_map(cycles["long relief"], ax),
+        "contact_pattern": lambda ax=None: plot.contact_pattern(cycles["long relief"], ax),
+        "line_load": lambda ax=None: plot.line_load(cycles["long relief"], ax),
+        "face_gap": lambda ax=None: plot.face_gap(cycles["long relief"].on(mesh), ax),
+        "face_load_over_torque": lambda ax=None: plot.face_load_over_torque(TORQUES, factors, ax, design_torque=TORQUE),
         "ppte_over_torque": lambda ax=None: plot.ppte_over_torque(TORQUES, ppte, ax, design_torque=TORQUE),
         "harris_map": lambda ax=None: plot.harris_map(mesh.phase, TORQUES, curves["long relief"], ax),
         "k_chart": lambda ax=None: plot.k_chart(mesh, designs, ax),
@@ -80,6 +87,10 @@ UNITS = {
     "load_sharing": ("[mm]", "[-]"),
     "pressure": ("[mm]", "[MPa]"),
     "pressure_map": ("[mm]", "[mm]"),
+    "contact_pattern": ("[deg]", "[mm]"),
+    "line_load": ("[mm]", "[N/mm]"),
+    "face_gap": ("[mm]", "[µm]"),
+    "face_load_over_torque": ("[N m]", "[-]"),
     "ppte_over_torque": ("[N m]", "[µm]"),
     "harris_map": ("[base pitches]", "[µm]"),
     "k_chart": ("[deg]", "[µm]"),
@@ -97,13 +108,16 @@ def test_axes_name_their_units(draw, name):
 @pytest.mark.parametrize("name", UNITS)
 def test_a_given_ax_is_used_and_its_figure_gains_no_other(draw, name):
     figure, ax = plt.subplots(1, 2)
-    given = ax if name in ("k_chart", "lead_chart") else ax[0]
+    given = ax if name in ("k_chart", "lead_chart", "contact_pattern") else ax[0]
     returned = draw[name](given)
     assert np.all(np.atleast_1d(returned) == np.atleast_1d(given))
     assert plt.get_fignums() == [figure.number]
 
 
-@pytest.mark.parametrize("name", ["transmission_error", "load_sharing", "pressure", "ppte_over_torque"])
+LEGENDS = ("transmission_error", "load_sharing", "pressure", "ppte_over_torque", "face_load_over_torque", "line_load")
+
+
+@pytest.mark.parametrize("name", (*LEGENDS, "face_gap"))
 def test_legend_and_marks_cover_no_data(draw, name):
     ax = draw[name]()
     ax.figure.draw_without_rendering()
@@ -189,6 +203,75 @@ def test_pressure_map_has_one_row_per_slice(cycles, mesh):
     np.testing.assert_allclose(drawn.max(axis=1), jnp.max(cycle.contact_pressure, axis=(0, 2)), rtol=1e-12)
     assert drawn[1].max() > drawn[0].max()  # crowning loads the middle of the face
     assert ax.get_ylim() == pytest.approx((-9.0, 9.0))
+
+
+def test_contact_pattern_is_the_pressure_map_over_the_flanks_of_both_gears(cycles, mesh):
+    cycle = cycles["long relief"]
+    panels = plot.contact_pattern(cycle)
+    mapped = plot.pressure_map(cycle).collections[0]
+    for panel, gear, side in zip(panels, (mesh.pair.pinion, mesh.pair.wheel), mesh.sides):
+        drawn = panel.collections[0]
+        np.testing.assert_array_equal(drawn.get_array(), mapped.get_array())
+        assert drawn.get_clim() == panels[0].collections[0].get_clim()
+        ends = side.start_roll_length, gear.tip_roll_length
+        np.testing.assert_allclose(panel.get_xlim(), [float(jg.geometry.roll_angle(gear, end)) for end in ends])
+    # where the path is at the pitch point, so are both roll angles
+    path, (first, second) = (
+        mapped.get_coordinates()[0, :, 0],
+        (of.collections[0].get_coordinates()[0, :, 0] for of in panels),
+    )
+    for gear, side, angles in zip((mesh.pair.pinion, mesh.pair.wheel), mesh.sides, (first, second)):
+        pitch = float(jg.geometry.roll_angle(gear, side.pitch_roll_length))
+        assert np.interp(0.0, path, angles) == pytest.approx(pitch)
+    assert first[0] < first[-1] and second[0] > second[-1]
+
+
+def test_line_load_and_gap_over_the_face(cycles, mesh):
+    """Crowning: the middle of the face carries most, the ends are apart by its amount before the load comes."""
+    cycle = cycles["long relief"]
+    load = np.asarray(cycle.line_load)
+    ax = plot.line_load(cycle)
+    drawn = [line for line in ax.lines if len(line.get_xdata()) == mesh.resolution.slices]
+    position = load.max(axis=(0, 1)).argmax()
+    assert len(drawn) == (load[:, :, position].max(axis=1) > 0).sum()
+    assert max(line.get_ydata().max() for line in drawn) == load.max()
+    np.testing.assert_array_equal(drawn[0].get_xdata(), mesh.face_coordinate)
+    most = load[:, :, position].max(axis=1).argmax()
+    factor = load[most, :, position].max() / load[most, :, position].mean()
+    assert any(f"K = {factor:.2f}" in line.get_label() for line in drawn)
+    gap = plot.face_gap(cycle.on(mesh))
+    unloaded, under_load = (line.get_ydata() for line in gap.lines[:2])
+    ends = (2 * np.asarray(mesh.face_coordinate) / float(mesh.pair.face_width)) ** 2
+    np.testing.assert_allclose(unloaded, 4.0 * (ends - ends.min()), atol=1e-9)
+    assert (under_load <= unloaded).all() and (under_load[load[most, :, position] > 0] == 0).all()
+    other = plot.line_load(cycle, position=0)
+    assert max(np.max(line.get_ydata()) for line in other.lines) == load[:, :, 0].max()
+
+
+def test_face_load_starts_at_an_even_load():
+    ax = plot.face_load_over_torque(TORQUES, {"even": np.ones(4), "skewed": np.array([2.0, 1.6, 1.4, 1.2])})
+    assert ax.get_ylim()[0] == 1.0 and ax.get_ylim()[1] > 2.0
+    assert not ax.texts
+
+
+def test_shafts_lie_where_their_gears_mesh_and_name_their_deflection():
+    gearbox = two_stages()
+    panels = plot.shaft_deflection(gearbox)
+    assert [panel.get_ylabel() for panel in panels] == [f"{name}: radius [mm]" for name in ("in", "middle", "out")]
+    assert panels[-1].get_xlabel() == "axial coordinate [mm]"
+    places = {text.get_text(): text.get_position()[0] for panel in panels for text in panel.texts}
+    assert places["p1"] == places["w1"] == 50.0 and places["p2"] == places["w2"] == 100.0
+    for shaft, panel in zip(gearbox.shafts, panels):
+        along, drawn = next(line.get_data() for line in panel.lines if line.get_label().startswith("deflection"))
+        label = next(line.get_label() for line in panel.lines if line.get_label().startswith("deflection"))
+        factor, largest = (float(label.split(mark)[1].split()[0].rstrip(",")) for mark in ("x ", "largest "))
+        moved = np.asarray(elastic_line(gearbox, shaft.name, along).displacement)[:, :2]
+        assert largest == pytest.approx(np.hypot(*moved.T).max(), rel=5e-3)
+        assert drawn.max() == pytest.approx(1e-3 * factor * np.hypot(*moved.T).max())
+        thickest = max(float(section.diameter) for section in shaft.sections) / 2
+        assert 0.2 * thickest < drawn.max() < thickest
+    figure, given = plt.subplots(3, 1)
+    assert list(plot.shaft_deflection(gearbox, given)) == list(given)
 
 
 def test_ppte_over_torque_marks_the_design_torque(curves):

@@ -19,8 +19,9 @@ from jaxgear.sweeps.selection import front, smallest
 from jaxgear.sweeps.store import Store, load_manifest
 
 BOUNDS = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.5)}
-# without those that need a speed or settings
-NAMES = tuple(name for name in quantities if name not in ("max_flash_temperature", *DYNAMIC_QUANTITIES))
+# without those that need a speed, several slices or settings
+OTHERS = ("max_flash_temperature", "face_load_factor", "root_face_load_factor", "edge_load_factor", *DYNAMIC_QUANTITIES)
+NAMES = tuple(name for name in quantities if name not in OTHERS)
 FEW = ("ppte", "max_flank_pressure", "effective_contact_ratio")
 PLAN = jg.Sobol(BOUNDS, 40, seed=5)
 

@@ -29,6 +29,7 @@ _ROWS = {
     "effective_contact_ratio": ("effective contact ratio", ".3f"),
     "pinion_root_stress_MPa": ("pinion root stress [MPa]", ".1f"),
     "wheel_root_stress_MPa": ("wheel root stress [MPa]", ".1f"),
+    "face_load_factor": ("face load factor K_Hbeta", ".3f"),
     "mesh_loss_factor": ("mesh loss factor", ".4f"),
     "max_flash_temperature_K": ("max flash temperature [K]", ".1f"),
 }
@@ -164,10 +165,28 @@ def write_figures(folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evalu
         "k_chart": plot.k_chart(mesh, flanks(evaluations)),
     }
     if mesh.resolution.slices > 1:
-        axes["lead_chart"] = plot.lead_chart(mesh, flanks(evaluations))
-        axes["pressure_map"] = plot.pressure_map(main(evaluations).cycle)
-        axes["pressure_map"].set_title(_main_name(evaluations), loc="left", fontsize=_TITLE)
+        axes |= _over_face(file, mesh, evaluations, torques)
     save_figures(folder, axes)
+
+
+def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
+    """Figures of what several slices show; those of one design are of the main one."""
+    from .. import plot
+
+    cycle, name = main(evaluations).cycle, _main_name(evaluations)
+    maps = {"pressure_map": plot.pressure_map(cycle), "contact_pattern": plot.contact_pattern(cycle)}
+    for drawn in maps.values():
+        np.ravel(drawn)[0].set_title(name, loc="left", fontsize=_TITLE)
+    lines = {"line_load": plot.line_load(cycle), "face_gap": plot.face_gap(cycle.on(mesh))}
+    for drawn in lines.values():
+        drawn.get_legend().set(title=name, alignment="left")
+    factors = {name: evaluation.face_load for name, evaluation in evaluations.items()}
+    return {
+        **maps,
+        **lines,
+        "lead_chart": plot.lead_chart(mesh, flanks(evaluations)),
+        "face_load_over_torque": plot.face_load_over_torque(torques, factors, design_torque=file.torque),
+    }
 
 
 def save_figures(folder: Path, axes: Mapping[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """Evaluation of a design over the torques of a design file."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import jax
@@ -9,7 +10,7 @@ import numpy as np
 
 from ..contact import Mesh, MeshCycle
 from ..io import DesignFile
-from ..metrics import flash_temperature, summary
+from ..metrics import face_load_factor, flash_temperature, summary
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..optimize import Verified
@@ -32,6 +33,7 @@ class Evaluation:
         failed_torques: torques without a converged contact solution [N m], the design torque included.
         seconds: what finding and evaluating it took, without compilation of the latter [s].
         verified: what it is worth with the finite-element structure; None where nobody asked.
+        face_load: face load factor over the torques; empty on one slice.
     """
 
     pinion: AbstractModification
@@ -44,6 +46,7 @@ class Evaluation:
     seconds: float
     objectives: dict[str, float] = field(default_factory=dict)
     verified: Verified | None = None
+    face_load: np.ndarray = field(default_factory=lambda: np.empty(0))
 
 
 def evaluate(
@@ -69,6 +72,7 @@ def evaluate(
         ppte=np.ptp(curves[1:], axis=1),
         failed_torques=sorted({float(torque) for torque in every[~converged.all(axis=1)]}),
         seconds=seconds,
+        face_load=_face_load(cycles[1:]),
     )
 
 
@@ -81,6 +85,18 @@ def response_surface(mesh: Mesh, torque: float, pinion: AbstractModification, wh
     torques = np.linspace(0.0, _SURFACE_REACH * torque, _SURFACE_TORQUES)
     cycles = over_torques(mesh, torques, pinion=pinion, wheel=wheel)
     return torques, np.asarray([cycle.transmission_error for cycle in cycles])
+
+
+def _face_load(cycles: Sequence[MeshCycle]) -> np.ndarray:
+    if not cycles or cycles[0].kinematics.resolution.slices == 1:
+        return np.empty(0)
+    bare = (replace(cycle, pinion=None, wheel=None) for cycle in cycles)  # one program serves every kind of flank
+    return np.asarray([_factor(cycle) for cycle in bare])
+
+
+@program
+def _factor(cycle: MeshCycle):
+    return face_load_factor(cycle)
 
 
 @program

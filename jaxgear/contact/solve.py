@@ -13,6 +13,7 @@ from ..geometry import GearPair, reduced_radius
 from ..microgeometry import AbstractModification, NoModification, terms
 from ..numerics import ContactProblem, concrete, minimum, program, solve_contact, stored, tangent_stiffness
 from ..numerics.programs import begin
+from ..shafts import AbstractSupport
 from .cycle import MeshCycle
 from .loaded_width import loaded_material, unlabelled
 from .mesh import Mesh, prepare, prepare_from
@@ -141,14 +142,20 @@ def _material(mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: A
     return loaded_material(mesh, torque, pinion, wheel, first_contact)
 
 
-def begin_contact(pair: GearPair, compliance: AbstractCompliance, first: Resolution, resolution: Resolution) -> None:
+def begin_contact(
+    pair: GearPair,
+    compliance: AbstractCompliance,
+    first: Resolution,
+    resolution: Resolution,
+    support: AbstractSupport | None = None,
+) -> None:
     """Starts to compile what prepares a pair and solves its contact, where programs are kept; gives nothing.
 
     Who knows that this will be needed, and has something else to do until then, calls it. What prepares the pair at the
     array sizes that are needed `first` goes ahead.
     """
-    begin(prepare_from, np.zeros(()), pair, compliance, first, None)
-    mesh = begin(prepare_from, np.zeros(()), pair, compliance, resolution, None)
+    begin(prepare_from, np.zeros(()), pair, compliance, first, support)
+    mesh = begin(prepare_from, np.zeros(()), pair, compliance, resolution, support)
     if mesh is not None:
         dtype = mesh.slice_width.dtype
         nothing = jax.eval_shape(lambda: nothing_removed(resolution, dtype))

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -14,8 +13,10 @@ from ..contact import Mesh, Operation, Resolution, begin_contact, fewest_pairs, 
 from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
 from ..numerics import program
+from ..shafts import Misalignment, RigidSupport
 from ..sizing import iso_stiffness
 from . import schema, schema_dynamics, schema_sweep, template
+from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refuse_given, refused
 from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
@@ -32,45 +33,6 @@ _OPEN_PAIRS = 4
 _SLICES = 11
 # Torques of interest where the file names none, relative to the design torque.
 _TORQUE_RANGE = (0.5, 2.0)
-
-
-class FileDesign(eqx.Module):
-    """The flanks of a design file as a function of its free parameters; pure and traceable.
-
-    Attributes:
-        names: of the parameters.
-        pinion, wheel: the modifications, which are added up.
-    """
-
-    names: tuple[str, ...] = eqx.field(static=True)
-    pinion: list[template.Part]
-    wheel: list[template.Part]
-
-    def __call__(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
-        """Modifications of pinion and wheel.
-
-        Args:
-            parameters: value of every free parameter, scalar.
-        """
-        if set(parameters) != set(self.names):
-            raise ValueError(
-                f"design: parameters {', '.join(sorted(parameters)) or '(none)'} must be those of the file: "
-                f"{', '.join(sorted(self.names)) or '(none)'}"
-            )
-        return template.build(self.pinion, parameters), template.build(self.wheel, parameters)
-
-
-class FileMesh(eqx.Module):
-    """The prepared mesh of a design file as a function of its free parameters; pure and traceable."""
-
-    pair: template.Part
-    model: template.Part
-    resolution: Resolution
-
-    def __call__(self, parameters: Mapping[str, Any]) -> Mesh:
-        """The mesh."""
-        pair, compliance = self.pair.build(parameters), self.model.build(parameters)
-        return prepare(pair, compliance=compliance, resolution=self.resolution)
 
 
 @dataclass(frozen=True)
@@ -91,7 +53,7 @@ class DesignFile:
         tolerance: likewise, see `sweep_request`.
         dynamics: likewise, see `dynamics_request`.
         design: makes the modifications of pinion and wheel from the free parameters.
-        open_case: numbers of gears, pair, model and load that are variables; a sweep alone can vary them.
+        open_case: numbers of gears, pair, model, misalignment and load that are variables; a sweep alone can vary them.
     """
 
     path: Path
@@ -112,6 +74,8 @@ class DesignFile:
     _middle: GearPair
     _model: template.Part
     _compliance: AbstractCompliance
+    _misalignment: template.Part
+    _support: RigidSupport | None
     _load: template.Part
     _resolution: Resolution
 
@@ -156,19 +120,21 @@ class DesignFile:
         Raises:
             DesignFileError: when the resolution does not cover the path of contact.
         """
-        options = {"compliance": self._compliance, "resolution": resolution or self.resolution()}
+        sizes = resolution or self.resolution()
+        options = {"compliance": self._compliance, "resolution": sizes, "support": self._support}
         with naming(self.path):
             return refused("resolution", prepare, self._middle, **options)
 
     def begin_contact(self, first: Resolution, resolution: Resolution) -> None:
         """Starts to compile what prepares and solves the mesh, see `contact.begin_contact`."""
-        begin_contact(self._middle, self._compliance, first, resolution)
+        begin_contact(self._middle, self._compliance, first, resolution, self._support)
 
     def sweep_mesh(self, resolution: Resolution) -> Mesh | Callable[[Mapping[str, Any]], Mesh]:
         """The prepared mesh; a function of the parameters that prepares it where numbers of the gears are free."""
-        if not self._pair.free() and not self._model.free():
+        parts = self._pair, self._model, self._misalignment
+        if not any(part.free() for part in parts):
             return self.mesh(resolution)
-        return FileMesh(self._pair, self._model, resolution)
+        return FileMesh(*parts, resolution)
 
     def operation(self, parameters: Mapping[str, Any]) -> Operation:
         """Torque, speed and friction; pure and traceable.
@@ -215,14 +181,20 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         raise DesignFileError("optimize", "has no effect without [variables]")
     if optimize.verify and stiffness.structure == FINITE_ELEMENTS:
         raise DesignFileError("optimize.verify", f'has no effect with model.structure = "{FINITE_ELEMENTS}"')
-    open_case = [*pair.free(), *model.free(), *operation.free()]
+    axes = template.part_of(
+        "misalignment", decode("misalignment", top.misalignment or {}, schema.MisalignmentSection), Misalignment
+    )
+    open_case = [*pair.free(), *model.free(), *axes.free(), *operation.free()]
     open_flanks = [free for part in flanks for free in part.free()]
     bounds, units = read_variables(top.variables or {}, [*open_flanks, *open_case])
     ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
     usual_pair = pair.build(middle)
     built = {part.key: [part.build(end) for end in ends] for part in flanks}
+    built[axes.key] = [axes.build(end) for end in ends]
     uneven = [key for key, both in built.items() if any(one.varies_along_face for one in both)]
+    if axes.key not in uneven:  # zeros are parallel axes
+        axes = replace(axes, fields={})
     usual = operation.build(middle)
     torque = float(usual.torque)
     tolerance = None
@@ -255,6 +227,8 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         _middle=usual_pair,
         _model=model,
         _compliance=model.build(middle),
+        _misalignment=axes,
+        _support=RigidSupport(usual_pair, axes.build(middle)) if axes.fields else None,
         _load=operation,
         _resolution=resolution,
     )

@@ -16,6 +16,7 @@ from ..geometry import Gear, GearPair, Material
 from ..metrics import quantities
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
+from ..shafts import Misalignment
 from ..tolerance import Tolerance
 from . import schema, schema_dynamics, schema_sweep
 from .layout import Section, family, meanings, section_of, snake, summary
@@ -55,6 +56,7 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     for key, base in (("tooth", AbstractTooth), ("body", AbstractBody), ("contact", AbstractContact)):
         for name, cls in family(base, users=False).items():
             yield f'{key} = {{ type = "{name}" }}', section_of(cls), cls
+    yield "[misalignment]", schema.MisalignmentSection, Misalignment
     yield "[resolution]", schema.ResolutionSection, Resolution
     yield "[variables.NAME]", schema.VariableSection, None
     yield "[optimize]", schema.optimize_section(), None

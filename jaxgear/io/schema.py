@@ -13,6 +13,7 @@ from ..contact import Operation, Resolution
 from ..geometry import Gear, GearPair
 from ..numerics import Number
 from ..optimize import METHODS, Pareto
+from ..shafts import Misalignment
 from .kinds import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, switch, table, text
 from .layout import Section, section_of
 
@@ -35,6 +36,7 @@ class FileSection(Section):
         title: free text; the name of the file without it.
         pair: how the gears are mounted.
         model: the stiffness model; the library's default without it.
+        misalignment: of the axes; parallel ones without it.
         resolution: array sizes; the library's defaults without it.
         variables: numbers left open, with their bounds.
         optimize: what `jaxgear optimize` does.
@@ -49,6 +51,7 @@ class FileSection(Section):
     title: Annotated[str | None, text()] = None
     pair: Annotated[Tables | None, table()] = None
     model: Annotated[Tables | None, table()] = None
+    misalignment: Annotated[Tables | None, table()] = None
     resolution: Annotated[Tables | None, table()] = None
     variables: Annotated[Tables | None, table(table())] = None
     optimize: Annotated[Tables | None, table()] = None
@@ -68,6 +71,7 @@ class GearSection(section_of(Gear)):  # type: ignore[misc]
 
 
 PairSection = section_of(GearPair, ("pinion", "wheel"))
+MisalignmentSection = section_of(Misalignment)
 
 
 class LoadSection(section_of(Operation)):  # type: ignore[misc]

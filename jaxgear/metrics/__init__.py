@@ -11,6 +11,10 @@ from ..numerics.reductions import Min as Min
 from ..numerics.reductions import Range as Range
 from ..numerics.reductions import Rms as Rms
 from ..numerics.reductions import Value as Value
+from .face_load import edge_load_factor as edge_load_factor
+from .face_load import face_load_factor as face_load_factor
+from .face_load import face_load_factors as face_load_factors
+from .face_load import root_face_load_factor as root_face_load_factor
 from .flank import FlankSurface as FlankSurface
 from .flank import flank_surface as flank_surface
 from .flank import max_relief as max_relief

@@ -23,12 +23,15 @@ _SUMMARY = (
     "mesh_loss_factor",
 )
 
+_OVER_FACE = ("face_load_factor", "root_face_load_factor", "edge_load_factor")  # of several slices
+
 
 @over_batch
 def summary(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
     """The numbers that engineers ask for first, by name and unit; traceable, so it can be vmapped."""
+    names = _SUMMARY if cycle.kinematics.resolution.slices == 1 else (*_SUMMARY, *_OVER_FACE)
     return {
         "torque_Nm": cycle.torque,
-        **{quantities[name].key: quantities[name](cycle) for name in _SUMMARY},
+        **{quantities[name].key: quantities[name](cycle) for name in names},
         "converged": jnp.all(cycle.converged),
     }

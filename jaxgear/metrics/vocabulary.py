@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 from ..contact import MeshCycle
 from ..geometry import margins
 from ..numerics.reductions import Average, Harmonic, Max, Min, Range, Rms
+from .face_load import edge_load_factor, face_load_factor, root_face_load_factor
 from .flank import max_relief, relief_reversal, removed_volume
 from .flash import flash_temperature
 from .load import contact_shock, corner_force, effective_contact_ratio
@@ -91,6 +92,9 @@ quantities.add(
         "max_contact_pressure", _contact_pressure, "MPa", "largest pressure of flanks and tip edges", Max(), local=True
     ),
     Quantity("max_line_load", lambda c: c.line_load, "N/mm", "largest line load", Max(), local=True),
+    Quantity("face_load_factor", face_load_factor, meaning="K_Hbeta, largest over mean line load over the face"),
+    Quantity("root_face_load_factor", root_face_load_factor, meaning="K_Fbeta, the same for root stress"),
+    Quantity("edge_load_factor", edge_load_factor, meaning="line load at an end of the face over its mean"),
     Quantity(
         "contact_ratio",
         lambda c: c.kinematics.path_of_contact.contact_ratio,

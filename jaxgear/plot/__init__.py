@@ -10,6 +10,8 @@ from .dynamics import branches as branches
 from .dynamics import phase_portrait as phase_portrait
 from .dynamics import speed_response as speed_response
 from .dynamics import waterfall as waterfall
+from .face import face_gap as face_gap
+from .face import line_load as line_load
 from .fan import fan as fan
 from .fan import ppte_distribution as ppte_distribution
 from .fan import ppte_histogram as ppte_histogram
@@ -24,9 +26,12 @@ from .optimum_front import optimum_front as optimum_front
 from .parallel_coordinates import parallel_coordinates as parallel_coordinates
 from .pareto import pareto as pareto
 from .pressure import pressure as pressure
+from .pressure_map import contact_pattern as contact_pattern
 from .pressure_map import pressure_map as pressure_map
 from .radar import radar as radar
 from .response_surface import response_surface as response_surface
+from .shaft import shaft_deflection as shaft_deflection
+from .torque import face_load_over_torque as face_load_over_torque
 from .torque import harris_map as harris_map
 from .torque import ppte_over_torque as ppte_over_torque
 from .transmission_error import transmission_error as transmission_error

@@ -80,24 +80,27 @@ def point_style(index: int) -> dict:
 
 
 @contextmanager
-def report_axes(ax: Axes | None, *, columns: int = 1, width: float = WIDTH, height: float = HEIGHT) -> Iterator:
+def report_axes(
+    ax: Axes | None, *, columns: int = 1, rows: int = 1, width: float = WIDTH, height: float = HEIGHT
+) -> Iterator:
     """The given Axes as they are, or new ones in report style; the style is off again after the `with` block.
 
     Args:
-        ax: Axes, an array of them for several columns, or None.
+        ax: Axes, an array of them for several panels, or None.
         columns: number of panels side by side with a common ordinate; several give an array of Axes.
+        rows: number of panels on top of each other with a common abscissa, likewise.
         width, height: of a new figure [mm].
     """
     if ax is not None:
         yield ax
         return
     with report_figure(width, height) as figure:
-        panels = figure.subplots(1, columns, sharey=True, squeeze=False)[0]
+        panels = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False).ravel()
         for panel in panels:
             # ticks are made when the figure is drawn, long after the style has gone: they need their own sizes
             panel.tick_params(labelsize=FONT, width=0.6, length=3)
             panel.grid(True, color=PALE, linewidth=0.5)
-        yield panels if columns > 1 else panels[0]
+        yield panels if len(panels) > 1 else panels[0]
 
 
 @contextmanager

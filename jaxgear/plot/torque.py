@@ -1,4 +1,4 @@
-"""Transmission error over a range of torques."""
+"""Transmission error and load over the face over a range of torques."""
 
 from collections.abc import Mapping
 
@@ -24,18 +24,40 @@ def ppte_over_torque(
         ax: Axes to draw into; None for a new figure.
         design_torque: [N m]; None for no mark.
     """
-    torques = np.asarray(torques)
     with report_axes(ax) as ax:
-        for index, (name, curve) in enumerate(curves.items()):
-            ax.plot(torques, np.asarray(curve), label=name, **marker_style(index))
-        if design_torque is not None:
-            ax.axvline(float(design_torque), color=GREY, linewidth=0.8, zorder=0.5)
-            text_above(ax, float(design_torque), f"design torque {float(design_torque):g} N m")
-        ax.set_xlim(left=0)
-        ax.set_ylim(bottom=0)
-        ax.set(xlabel="pinion torque [N m]", ylabel="peak-to-peak\ntransmission error [µm]")
-        legend_above(ax, distance=4.0 if design_torque is None else ABOVE_MARKS)
+        _over_torque(ax, torques, curves, design_torque)
+        ax.set(ylim=(0, None), ylabel="peak-to-peak\ntransmission error [µm]")
     return ax
+
+
+def face_load_over_torque(
+    torques, curves: Mapping[str, np.ndarray], ax: Axes | None = None, design_torque: float | None = None
+) -> Axes:
+    """Face load factor K_Hbeta of several designs over the torque; 1 is a load that is even over the face.
+
+    Args:
+        torques: on the pinion [N m], shape (torques,).
+        curves: `metrics.face_load_factor` by the name of the design, each of shape (torques,).
+        ax: Axes to draw into; None for a new figure.
+        design_torque: [N m]; None for no mark.
+    """
+    with report_axes(ax) as ax:
+        _over_torque(ax, torques, curves, design_torque)
+        highest = max((float(np.nanmax(np.asarray(curve))) for curve in curves.values()), default=1.0)
+        # an even load lies on the foot of the Axes, and is seen to be even
+        ax.set(ylim=(1, 1 + 1.06 * max(highest - 1, 0.1)), ylabel="face load factor K$_{H\\beta}$ [-]")
+    return ax
+
+
+def _over_torque(ax: Axes, torques, curves: Mapping[str, np.ndarray], design_torque: float | None) -> None:
+    for index, (name, curve) in enumerate(curves.items()):
+        ax.plot(np.asarray(torques), np.asarray(curve), label=name, clip_on=False, **marker_style(index))
+    if design_torque is not None:
+        ax.axvline(float(design_torque), color=GREY, linewidth=0.8, zorder=0.5)
+        text_above(ax, float(design_torque), f"design torque {float(design_torque):g} N m")
+    ax.set_xlim(left=0)
+    ax.set_xlabel("pinion torque [N m]")
+    legend_above(ax, distance=4.0 if design_torque is None else ABOVE_MARKS)
 
 
 def harris_map(phase, torques, te, ax: Axes | None = None, *, design: str | None = None) -> Axes:

@@ -56,7 +56,8 @@ def face_load_factor(line_load: Float[Array, "... slices"], slice_width: Slices 
     """K_Hbeta: largest over mean line load over the face, 1 without load.
 
     Args:
-        line_load: over the face [N/mm], last axis; of a contact analysis the sum over the pairs at one mesh position.
+        line_load: over the face [N/mm], last axis; of a contact analysis that of one pair at one position, which
+            `metrics.face_load_factor` chooses.
         slice_width: width of every slice [mm]; None where all are equal.
     """
     load = real(line_load)
@@ -80,8 +81,13 @@ def root_face_load_factor(factor, face_width, tooth_height) -> Float[Array, "...
     check("root_face_load_factor", "factor", factor, "", low=_LEVEL)
     check("root_face_load_factor", "face_width", face_width, "mm", low=0.0, open_low=True)
     check("root_face_load_factor", "tooth_height", tooth_height, "mm", low=0.0, open_low=True)
-    ratio = jnp.minimum(real(tooth_height) / real(face_width), _WIDEST_TOOTH)
-    return jnp.maximum(real(factor), 1.0) ** (1 / (1 + ratio + ratio**2))
+    return jnp.maximum(real(factor), 1.0) ** root_exponent(real(face_width), real(tooth_height))
+
+
+def root_exponent(face_width: Scalar, tooth_height: Scalar) -> Scalar:
+    """N_F of `root_face_load_factor`."""
+    ratio = jnp.minimum(tooth_height / face_width, _WIDEST_TOOTH)
+    return 1 / (1 + ratio + ratio**2)
 
 
 def tooth_height(pair: GearPair) -> Scalar:

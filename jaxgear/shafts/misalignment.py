@@ -4,6 +4,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import GearPair
+from ..microgeometry.base import acts
 from ..numerics import Checked, check, concrete, number, real
 
 Scalar = Float[Array, ""]
@@ -41,6 +42,11 @@ class Misalignment(Checked):
             if known is None or known != 0:
                 given = "" if known is None else f" = {float(known):g} um"
                 raise ValueError(f"Misalignment: {name}{given} needs bearing_span [mm], over which it is measured")
+
+    @property
+    def varies_along_face(self) -> bool:
+        """Whether it opens the gap at all, which a mesh of one slice cannot show; a traced one may."""
+        return any(acts(value) for value in (self.skew, self.inclination, self.direct))
 
     def over_face(self, pair: GearPair) -> Scalar:
         """f_ma over the face width [um]: direct + (skew cos(alpha_wt) + inclination sin(alpha_wt)) b / L."""

@@ -1,0 +1,133 @@
+"""Axes that are not parallel open the gap over the face as a lead slope does: in the library, in files, in sweeps."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import gear_pair, prepare
+from test_cli import FIXED, assert_refused, call
+
+import jaxgear as jg
+from jaxgear.io import DesignFileError, load_design, optimize_request
+from jaxgear.shafts import Misalignment, RigidSupport
+
+SIZES = jg.Resolution(positions=8, slices=6, pairs=2)
+AMOUNT = 12.0
+# on both gears: no pair touches with a tip corner, beyond the path of contact, where a misalignment closes with the
+# lever of the transmission error and a slope does not
+RELIEF = jg.TipRelief(15.0, 3.0)
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return gear_pair()
+
+
+@pytest.fixture(scope="module")
+def sloped(pair):
+    return jg.solve(prepare(pair, resolution=SIZES), 50.0, pinion=RELIEF + jg.LeadSlope(AMOUNT), wheel=RELIEF)
+
+
+def skewed(pair, misalignment):
+    mesh = jg.prepare(pair, resolution=SIZES, support=RigidSupport(pair, misalignment))
+    return jg.solve(mesh, 50.0, pinion=RELIEF + jg.LeadSlope(0.0), wheel=RELIEF)
+
+
+def test_misalignment_is_the_lead_slope_of_its_amount(pair, sloped):
+    """Given over the face, or as f_Sigma_beta and f_Sigma_delta over the bearing span."""
+    angle, width = float(pair.working_pressure_angle), float(pair.face_width)
+    span, inclination = 120.0, 20.0
+    skew = (AMOUNT * span / width - inclination * np.sin(angle)) / np.cos(angle)
+    for given in (Misalignment(direct=AMOUNT), Misalignment(skew, inclination, span)):
+        found = skewed(pair, given)
+        np.testing.assert_allclose(found.transmission_error, sloped.transmission_error, rtol=1e-12)
+        np.testing.assert_allclose(found.line_load, sloped.line_load, rtol=1e-12, atol=1e-10)
+        assert bool(jnp.all(found.converged))
+    assert np.ptp(np.asarray(sloped.line_load)[0, :, 0]) > 50
+
+
+def test_a_slope_takes_a_misalignment_back(pair):
+    mesh = jg.prepare(pair, resolution=SIZES, support=RigidSupport(pair, Misalignment(direct=AMOUNT)))
+    level = jg.solve(mesh, 50.0, pinion=jg.LeadSlope(-AMOUNT))
+    np.testing.assert_allclose(jg.metrics.face_load_factor(level), 1.0, atol=1e-9)
+
+
+def test_one_slice_cannot_show_it(pair):
+    with pytest.raises(ValueError, match="1 slice"):
+        prepare_one = jg.Resolution(positions=8, pairs=2)
+        jg.prepare(pair, resolution=prepare_one, support=RigidSupport(pair, Misalignment(direct=AMOUNT)))
+
+
+@pytest.fixture
+def load(tmp_path):
+    def write_and_load(table, tail=""):
+        path = tmp_path / "gear.toml"
+        path.write_text(f"{FIXED}\n[misalignment]\n{table}\n{tail}", encoding="utf-8")
+        return load_design(path)
+
+    return write_and_load
+
+
+def test_design_files_take_it_and_enough_slices(load):
+    file = load("direct = 12.0")
+    assert file.resolution().slices == 11
+    assert load("direct = 0.0").resolution().slices == load("").resolution().slices == 1
+    with pytest.raises(DesignFileError, match=r"resolution.slices: must be at least 2, 1 cannot show misalignment"):
+        load_one = FIXED.replace("positions = 8", "positions = 8\nslices = 1")
+        file.path.write_text(f"{load_one}\n[misalignment]\ndirect = 12.0\n")
+        load_design(file.path)
+
+
+def test_design_file_gives_the_mesh_of_the_library(load):
+    file = load("skew = 40.0\nbearing_span = 120.0")
+    mesh = file.mesh(SIZES)
+    given = Misalignment(skew=40.0, bearing_span=120.0)
+    expected = jg.prepare(
+        mesh.pair, compliance=mesh.compliance, resolution=SIZES, support=RigidSupport(mesh.pair, given)
+    )
+    cycles = [jg.solve(one, 50.0, pinion=jg.TipRelief(5.0, 3.0)) for one in (mesh, expected)]
+    np.testing.assert_allclose(cycles[0].line_load, cycles[1].line_load, rtol=1e-12, atol=1e-10)
+
+
+def test_its_numbers_are_variables_of_a_sweep_alone(load):
+    variables = "[variables]\nf = { low = 0.0, high = 20.0 }\n"
+    tail = variables + '[sweep]\nsampling = "full_factorial"\nlevels = 2\nresults = ["face_load_factor"]\n'
+    file = load('direct = "f"', tail)
+    assert file.resolution().slices == 11 and file.units == {"f": "um"}
+    mesh = file.sweep_mesh(SIZES)
+    assert not isinstance(mesh, jg.Mesh)
+    cycles = [jg.solve(mesh({"f": amount}), 50.0, pinion=jg.TipRelief(5.0, 3.0)) for amount in (0.0, 20.0)]
+    even, skew = (float(jg.metrics.face_load_factor(cycle)) for cycle in cycles)
+    assert even == pytest.approx(1.0, abs=1e-9) and skew > 1.5
+    with pytest.raises(DesignFileError, match=r'misalignment\.direct: "f" is a variable, which a sweep alone'):
+        optimize_request(load('direct = "f"', variables + "[optimize]\n"))
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("skew = 3.0", "misalignment.skew: 3 um needs bearing_span"),
+        ("skew = 3.0\nbearing_span = 0", "misalignment.bearing_span"),
+        ("tilt = 3.0", "misalignment.tilt"),
+        ('direct = "much"', "misalignment.direct"),
+    ],
+)
+def test_refusals_of_a_design_file(load, table, message):
+    with pytest.raises(DesignFileError, match=message):
+        load(table)
+
+
+def test_the_command_refuses_it_in_one_line(tmp_path):
+    path = tmp_path / "gear.toml"
+    path.write_text(f"{FIXED}\n[misalignment]\nskew = 3.0\n")
+    assert_refused(call("analyze", path, "-o", tmp_path / "out"), "misalignment.skew: 3 um needs bearing_span")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_analyze_writes_what_is_seen_across_the_face(tmp_path):
+    path = tmp_path / "gear.toml"
+    path.write_text(FIXED.replace("positions = 8", "positions = 8\nslices = 4") + "\n[misalignment]\ndirect = 12.0\n")
+    result = call("analyze", path, "-o", tmp_path / "out")
+    assert result.code == 0 and "face load factor K_Hbeta" in result.out
+    written = {entry.name for entry in (tmp_path / "out").iterdir()}
+    assert {"contact_pattern.png", "line_load.png", "face_gap.png", "face_load_over_torque.png"} <= written

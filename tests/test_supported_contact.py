@@ -1,0 +1,145 @@
+"""Contact of a mesh whose shafts, bearings and housing give way: limits, symmetry, the one-dimensional analysis."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxgear as jg
+from jaxgear.metrics import face_load_factor
+from jaxgear.shafts import (
+    Bearing,
+    Coupling,
+    Gearbox,
+    GearMesh,
+    Housing,
+    MountedGear,
+    RigidSupport,
+    Section,
+    Shaft,
+    annex_e,
+    integral_diameter,
+    support,
+)
+
+PINION = jg.Gear(teeth=19, module=3.0, face_width=18.0, bore_diameter=24.0)
+WHEEL = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=40.0)
+PAIR = jg.GearPair(PINION, WHEEL)
+TORQUE, LENGTH = 50.0, 150.0
+SLICES = 8
+SIZES = jg.Resolution(positions=4, slices=SLICES, pairs=2)
+FLANK = jg.LeadSlope(4.0) + jg.LeadCrowning(5.0)
+
+
+def gearbox(radial=400.0, *, mirrored=False, modulus=206e3, housing=None, torque=TORQUE):
+    """One stage between bearings, its gears off the middle; `mirrored` about the plane across the shafts."""
+
+    def at(position):
+        return LENGTH - position if mirrored else position
+
+    def shaft(name, sections, seats, gear, coupling):
+        sections = [Section(length, diameter) for length, diameter in sections]
+        bearings = [Bearing(seat, at(place), radial, 50.0) for seat, place in zip(seats, (10.0, 140.0))]
+        material = jg.Material(elastic_modulus=modulus)
+        return Shaft(name, sections[::-1] if mirrored else sections, bearings, [gear], [coupling], material=material)
+
+    pinion = MountedGear("pinion", PINION, at(45.0), integral_diameter(PINION))
+    wheel = MountedGear("wheel", WHEEL, at(45.0))
+    shafts = [
+        shaft("in", [(50.0, 30.0), (100.0, 26.0)], "AB", pinion, Coupling(at(LENGTH), torque)),
+        shaft("out", [(150.0, 40.0)], "CD", wheel, Coupling(at(0.0))),
+    ]
+    return Gearbox(shafts, [GearMesh("pinion", "wheel")], housing)
+
+
+def solved(given, *, sizes=SIZES, compliance=None, pinion=FLANK):
+    mesh = jg.prepare(PAIR, compliance=compliance, resolution=sizes, support=given)
+    cycle = jg.solve(mesh, TORQUE, pinion=pinion)
+    assert bool(jnp.all(cycle.converged))
+    return cycle
+
+
+def assert_same(one, other, rtol=1e-9):
+    np.testing.assert_allclose(one.transmission_error, other.transmission_error, rtol=rtol)
+    np.testing.assert_allclose(one.line_load, other.line_load, rtol=rtol, atol=1e3 * rtol)
+
+
+@pytest.fixture(scope="module")
+def carried():
+    return solved(support(gearbox(), 0))
+
+
+@pytest.fixture(scope="module")
+def rigid():
+    return solved(None)
+
+
+def test_what_does_not_give_way_is_no_support(rigid, carried):
+    assert_same(solved(RigidSupport(PAIR)), rigid)
+    stiff = gearbox(radial=1e12, modulus=1e14)
+    assert_same(solved(support(stiff, 0)), rigid, rtol=1e-6)
+    assert abs(face_load_factor(carried) / face_load_factor(rigid) - 1) > 0.02
+
+
+def test_a_housing_of_no_compliance_is_none(carried):
+    nodes = tuple(f"{seat}.{way}" for seat in "ABCD" for way in "xyz")
+    assert_same(solved(support(gearbox(housing=Housing(nodes, np.zeros((12, 12)), "compliance")), 0)), carried)
+
+
+def test_a_mirrored_gearbox_mirrors_the_load(carried):
+    turned = solved(support(gearbox(mirrored=True), 0), pinion=jg.LeadSlope(-4.0) + jg.LeadCrowning(5.0))
+    np.testing.assert_allclose(turned.transmission_error, carried.transmission_error, rtol=1e-8)
+    np.testing.assert_allclose(turned.line_load[:, ::-1], carried.line_load, rtol=1e-7, atol=1e-6)
+
+
+@pytest.mark.parametrize("crowning", [5.0, 30.0])
+def test_one_pair_of_constant_stiffness_is_the_one_dimensional_analysis(crowning):
+    """Teeth that do not pass their load on over the face, under a linear law, at the pitch point: that is what the
+    standard computes."""
+    flank = jg.LeadSlope(4.0) + jg.LeadCrowning(crowning)
+    model, sizes = jg.legacy_compliance(), replace(SIZES, face_modes=SLICES)
+    mesh = jg.prepare(PAIR, compliance=model, resolution=sizes, support=support(gearbox(), 0))
+    even = replace(mesh.coupling, share=jnp.eye(SLICES), modes=jnp.eye(SLICES), rest=jnp.zeros(()))
+    mesh = replace(mesh, coupling=even)
+    aligned = solved(None, sizes=sizes, compliance=model, pinion=jg.LeadSlope(0.0))
+    mean = float(aligned.line_load[0, 0, 0])
+    stiffness = mean / (float(aligned.transmission_error[0]) - float(mesh.hub) * mean)
+    expected = annex_e(support(gearbox(), 0), pinion=flank, stiffness=stiffness, stations=SLICES)
+    found = jg.solve(mesh, TORQUE, pinion=flank)
+    load = np.asarray(found.line_load)[:, :, 0]
+    assert load[1].max() == 0  # the pitch point, where one pair carries all
+    np.testing.assert_allclose(load[0], expected.line_load, rtol=1e-8, atol=1e-6)
+    assert (load[0].min() == 0) == (crowning > 20)
+
+
+def housed(values):
+    """Gearbox with another radial stiffness of bearing A and another compliance of its seat in y."""
+    nodes = tuple(f"{seat}.{way}" for seat in "ABCD" for way in "xyz")
+    matrix = np.diag(np.full(len(nodes), 1 / 300.0)) + 1e-4
+    box = gearbox(housing=Housing(nodes, matrix, "compliance"))
+    return eqx.tree_at(
+        lambda of: (of.shafts[0].bearings[0].radial, of.housing.matrix),
+        box,
+        (values[0], jnp.asarray(matrix).at[1, 1].set(values[1])),
+    )
+
+
+@pytest.mark.slow
+def test_derivatives_of_the_face_load_factor_are_central_differences():
+    """By bearing, housing, slope and crowning, through shafts, influence and contact."""
+
+    def factor(values):
+        box = housed(values[:2])
+        mesh = jg.prepare(PAIR, resolution=SIZES, support=support(box, 0))
+        return face_load_factor(jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(values[2]) + jg.LeadCrowning(values[3])))
+
+    at = jnp.array([400.0, 1 / 300.0, 4.0, 5.0])
+    found, factor = jax.jit(jax.grad(factor))(at), jax.jit(factor)
+    assert np.all(np.abs(np.asarray(found * at)) > 1e-4)
+    for index, value in enumerate(np.asarray(at)):
+        step = jnp.zeros(4).at[index].set(1e-4 * value)
+        difference = (factor(at + step) - factor(at - step)) / (2e-4 * value)
+        np.testing.assert_allclose(found[index], difference, rtol=1e-5, err_msg=str(index))

@@ -1,0 +1,58 @@
+"""Line loads across the face against whole gears in three-dimensional finite elements.
+
+Absolute transmission errors of the reference carry those of its coarser section: changes against the aligned pair are
+compared, the load factor, and the line loads.
+"""
+
+import numpy as np
+import pytest
+
+from benchmarks import face
+
+# K [%]: slope of a face of 6 and of 20 modules, crowning with and without it, end relief; line loads rms [%]
+FACTOR = {"slope": {"b18": 5.0, "b60": 10.0}, "crown": {"b18": 3.0, "b60": 3.0}, "endrelief": {"b18": 20.0}}
+RMS = {"slope": 5.0, "crown": 5.0, "endrelief": 10.0}
+SHIFT, RIPPLE = 0.25, 0.3  # um
+
+
+@pytest.fixture(scope="module", params=["b18", "b60"])
+def found(request):
+    return face.run(request.param)
+
+
+def kind(case: face.FaceCase) -> str:
+    return next(name for name in ("aligned", "endrelief", "crown", "slope") if case.name.startswith(name))
+
+
+def test_load_factors_and_line_loads(found):
+    for case, error in face.errors(found).items():
+        if kind(case) != "aligned":
+            assert abs(error.factor) <= FACTOR[kind(case)][case.pair], case
+            assert error.rms <= RMS[kind(case)], case
+
+
+def test_change_of_the_transmission_error(found):
+    errors = [error for error in face.errors(found).values() if error.shift is not None]
+    assert errors
+    for error in errors:
+        assert abs(error.shift) <= SHIFT and abs(error.ppte) <= RIPPLE
+
+
+def test_aligned_pair_is_even(found):
+    """The reference has 2 ... 4 % more line load at its free ends."""
+    for case, of in found.items():
+        if kind(case) == "aligned":
+            assert of.factor == pytest.approx(1.0, abs=1e-9)
+            assert face.errors(found)[case].rms < 2.5
+
+
+@pytest.mark.slow
+def test_finer_slices_agree():
+    """12 and 24 slices, whose line loads are averaged in pairs."""
+    coarse, fine = face.run("b18"), face.run("b18", slices=24)
+    for case, error in face.errors(fine).items():
+        if kind(case) in ("slope", "crown"):
+            assert error.rms <= RMS[kind(case)], case
+        means = fine[case].line_load.reshape(4, 12, 2, -1).mean(axis=2)
+        difference = np.linalg.norm(means - coarse[case].line_load) / np.linalg.norm(means)
+        assert difference < (0.05 if kind(case) == "endrelief" else 0.02), case
