@@ -14,9 +14,11 @@ from ..contact import Mesh, Operation, Resolution, begin_contact, fewest_pairs, 
 from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
 from ..numerics import program
+from ..shafts import ShaftSupport
 from ..sizing import iso_stiffness
-from . import schema, schema_dynamics, schema_sweep, template
+from . import schema, schema_dynamics, schema_shafts, schema_sweep, template
 from .errors import DesignFileError, naming, refuse_given, refused
+from .gearbox import support_of
 from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
 from .variables import increasing, read_variables
@@ -90,6 +92,8 @@ class DesignFile:
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
         dynamics: likewise, see `dynamics_request`.
+        layout: likewise, see `layout_request`.
+        support: the mesh on its shafts; None without them.
         design: makes the modifications of pinion and wheel from the free parameters.
         open_case: numbers of gears, pair, model and load that are variables; a sweep alone can vary them.
     """
@@ -106,6 +110,8 @@ class DesignFile:
     sweep: schema_sweep.SweepSection | None
     tolerance: schema_sweep.ToleranceSection | None
     dynamics: schema_dynamics.DynamicsSection | None
+    layout: schema_shafts.LayoutSection | None
+    support: ShaftSupport | None
     design: FileDesign
     open_case: tuple[template.Free, ...]
     _pair: template.Part
@@ -234,6 +240,9 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         raise DesignFileError("sweep", "has no effect without [variables]")
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
     sweep = None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection)
+    layout = None if top.layout is None else decode("layout", top.layout, schema_shafts.LayoutSection)
+    if layout is not None and layout.profile is not None:
+        uneven.append("the flank lines of layout.profile")
     resolution = _resolution(top.resolution or {}, uneven)
     model = with_tables(model, stiffness, file.parent, pair, usual_pair)  # last, as it takes longer than all the rest
     return DesignFile(
@@ -249,6 +258,8 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         sweep=sweep,
         tolerance=tolerance,
         dynamics=None if top.dynamics is None else decode("dynamics", top.dynamics, schema_dynamics.DynamicsSection),
+        layout=layout,
+        support=support_of(top, layout, usual_pair, torque, file.parent),
         design=FileDesign(tuple(bounds), pinion_flank, wheel_flank),
         open_case=tuple(open_case),
         _pair=pair,

@@ -26,7 +26,7 @@ Kind = Literal["maximum", "statistical"]
 
 CASES = ("no deviation", "+f_Hb +f_ma", "+f_Hb -f_ma", "-f_Hb +f_ma", "-f_Hb -f_ma")
 _SIGNS = ((0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
-_LEVEL = 1e-6  # of the mean line load, rounding of an even one
+_LEVEL = 1e-3  # of the mean line load, by which an end has to be above the rest: an even load touches no edge
 _MOST = 16.0  # largest crowning that is tried, in sums of the deviations
 
 
@@ -200,7 +200,7 @@ def crowning_off_the_edges(
 def _worst_excess(crowning, given):
     face, tolerance, line, share, stiffness = given
     found = _cases(face, tolerance, FlankLine(crowning=crowning), line, stiffness)
-    return maximum(_excess(found.load.line_load, share)) - 0.5 * _LEVEL  # within what counts as none
+    return maximum(_excess(found.load.line_load, share))
 
 
 @program
@@ -211,7 +211,7 @@ def _off_the_edges(face: Stations, tolerance: FlankLineTolerance, line: FlankLin
     size = jax.lax.stop_gradient(_MOST * (size + jnp.abs(line.slope) + jnp.abs(line.crowning)))
     zero = jnp.zeros_like(size)
     found = bracketed_root(_worst_excess, zero, size, given)
-    enough, needed = _worst_excess(size, given) < 0, _worst_excess(zero, given) > 0
+    enough, needed = _worst_excess(size, given) < 0, _worst_excess(zero, given) > _LEVEL
     return jnp.where(needed, jnp.where(enough, found, jnp.nan), 0.0)
 
 
