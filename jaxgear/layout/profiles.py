@@ -23,7 +23,7 @@ from ..sweeps import SweepTable, VariantList, sweep
 
 Kind = Literal["tip_relief", "profile_crowning"]
 
-RESULTS = ("ppte", "effective_contact_ratio", "mesh_loss_factor")
+RESULTS = ("ppte", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure")
 # By so much the effective contact ratio may be above the theoretical one: positions resolve ends of contact to less.
 _SHOCK = 0.01
 _NAMES = "pinion_amount", "wheel_amount"
@@ -39,14 +39,14 @@ class ProfileLayout:
             wheel running fastest.
         best: number of the variant that was chosen.
         contact_ratio: theoretical one.
-        made: modifications of pinion and wheel of the variant that was chosen, flank lines included.
+        profiles: modifications of pinion and wheel of the variant that was chosen, without the flank lines.
     """
 
     kind: Kind
     table: SweepTable
     best: int
     contact_ratio: float
-    made: tuple[AbstractModification, AbstractModification]
+    profiles: tuple[AbstractModification, AbstractModification]
 
     @property
     def amounts(self) -> tuple[float, float]:
@@ -70,7 +70,7 @@ class ProfileLayout:
         ranked = [int(row) for row in np.argsort(ppte, kind="stable") if row and np.isfinite(ppte[row])]
         rows = list(dict.fromkeys([self.best, *ranked]))[:count]
         first, second = (self.table.column(name) for name in _NAMES)
-        return [0, *rows], ["no profile modification", *(f"{first[row]:g} and {second[row]:g} um" for row in rows)]
+        return [0, *rows], ["no profile modification", *(f"{first[row]:g} and {second[row]:g} µm" for row in rows)]
 
 
 def vary_profiles(
@@ -98,7 +98,7 @@ def vary_profiles(
         kind: "tip_relief", for spur gears a long one, or "profile_crowning".
         length: of the tip relief [mm]; None for the long one.
         curve: of the tip relief; None for its default.
-        results: further results, beside transmission error, contact ratio and loss.
+        results: further results, beside transmission error, contact ratio, loss and pressure.
         output: folder of the table; None keeps it in memory.
         callback: of the progress, as `sweep` takes it.
 
@@ -142,8 +142,8 @@ def vary_profiles(
     )
     theoretical = float(path_of_contact(mesh.pair).contact_ratio)
     best = _best(table, theoretical)
-    made = design(dict(zip(_NAMES, rows[best])))
-    return ProfileLayout(kind, table, best, theoretical, made)
+    first, second = rows[best]
+    return ProfileLayout(kind, table, best, theoretical, (profile(first), profile(second)))
 
 
 def _best(table: SweepTable, theoretical: float) -> int:

@@ -27,6 +27,8 @@ from .pressure import pressure as pressure
 from .pressure_map import pressure_map as pressure_map
 from .radar import radar as radar
 from .response_surface import response_surface as response_surface
+from .tolerance_cases import face_load_factors as face_load_factors
+from .tolerance_cases import tolerance_line_load as tolerance_line_load
 from .torque import harris_map as harris_map
 from .torque import ppte_over_torque as ppte_over_torque
 from .transmission_error import transmission_error as transmission_error
