@@ -63,8 +63,11 @@ class Problem:
         return self.force / (self.lever * self.slice_width.sum())
 
 
-def prepare(positions: int = 64, slices: int = 1):
-    """The prepared mesh of the 19/48 pair of `examples/spur_19_48.toml`, a `jaxgear.Mesh`."""
+def prepare(positions: int = 64, slices: int = 1, *, coupled: bool = False):
+    """The prepared mesh of the 19/48 pair of `examples/spur_19_48.toml`, a `jaxgear.Mesh`.
+
+    The slices of the baselines do not feel each other.
+    """
     import jaxgear as jg
 
     pinion = jg.Gear(teeth=19, module=3.0, face_width=20.0, bore_diameter=24.0)
@@ -72,7 +75,7 @@ def prepare(positions: int = 64, slices: int = 1):
     pair = jg.GearPair(pinion, wheel)
     pairs = jg.fewest_pairs(pair, deflection=DEFLECTION)
     # the baselines leave the contacts at their nominal places
-    sizes = jg.Resolution(positions=positions, slices=slices, pairs=pairs, slide_steps=0)
+    sizes = jg.Resolution(positions=positions, slices=slices, pairs=pairs, slide_steps=0, coupled_slices=coupled)
     return jg.prepare(pair, resolution=sizes)
 
 

@@ -36,7 +36,7 @@ class MeshCycle(eqx.Module):
             a position sum to `force`.
         opening: remaining gap [um] where positive, minus the contact deflection where loaded.
         gap: gap of the undeformed flanks at zero transmission error [um]: corner gap plus both modifications, where the
-            contact slides to.
+            contact slides to, on rigid, parallel shafts.
         shift: of the centre of contact along the flanks, which the slope of the modifications brings about, positive
             towards the pinion tip [mm]; shape (pairs, slices or 1, positions).
         bend: what the modifications add to the relative curvature of the flanks, times their relative radius; of

@@ -6,8 +6,8 @@ to 9 % too small, and the loaded width leaves 2.5 % at worst.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -55,5 +55,5 @@ def loaded_material(
 
 
 def unlabelled(mesh: Mesh) -> Mesh:
-    """The mesh for programs that read its prepared arrays alone: without its own compliance one serves them all."""
-    return eqx.tree_at(lambda mesh: mesh.compliance, mesh, default_compliance())
+    """The mesh for programs that read its prepared arrays alone: without its own models one serves them all."""
+    return replace(mesh, compliance=default_compliance(), support=None)

@@ -14,7 +14,9 @@ from ..compliance.plane import contact_plane
 from ..compliance.toothload import tooth_load
 from ..geometry import GearPair, Margins, PathOfContact, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import AbstractSpring, concrete, on_both, program
+from ..numerics import AbstractSpring, Coupling, concrete, on_both, program
+from ..shafts import AbstractSupport
+from .face_coupling import check_support, coupling_of
 from .kinematics import Contacts, Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution, reach
 
@@ -48,6 +50,9 @@ class Mesh(eqx.Module):
         width_factor: squared half width of the contact per line load [mm^2 per N/mm].
         hub: common wind-up of the gear bodies [um per N/mm].
         slice_width: [mm], shape (slices,).
+        coupling: how the slices feel each other; None where they do not.
+        support: what holds the gears; None for rigid, parallel shafts.
+        support_gap: by which it opens the flanks without the force of this mesh [um], shape (slices,); None without.
         automatic: whether the number of pairs was left to `prepare`: `solve` takes more where they are too few.
     """
 
@@ -65,6 +70,9 @@ class Mesh(eqx.Module):
     width_factor: Field
     hub: Scalar
     slice_width: Float[Array, " slices"]
+    coupling: Coupling | None = None
+    support: AbstractSupport | None = None
+    support_gap: Float[Array, " slices"] | None = None
     automatic: bool = eqx.field(static=True, default=False)
 
     def __repr__(self) -> str:
@@ -105,6 +113,10 @@ class Mesh(eqx.Module):
         """Middle of every slice [mm], shape (slices,)."""
         return self.kinematics.face_coordinate
 
+    def held(self, gap: Float[Array, "pairs slices positions"]) -> Float[Array, "pairs slices positions"]:
+        """A gap of the flanks [um] as what holds the gears leaves it."""
+        return gap if self.support_gap is None else gap + self.lever[:, None] * self.support_gap[:, None]
+
     def flanks(self, offset=0.0) -> tuple[Flank, Flank]:
         """Points of pinion and wheel that face each other at a distance from the centre of contact.
 
@@ -130,6 +142,7 @@ def prepare(
     compliance: AbstractCompliance | None = None,
     resolution: Resolution | None = None,
     deflection: float | None = None,
+    support: AbstractSupport | None = None,
 ) -> Mesh:
     """Prepares a gear pair for `solve`: contact points, corner gaps and compliances over one base pitch.
 
@@ -140,13 +153,16 @@ def prepare(
         deflection: transmission error that the pairs have to contain where the resolution leaves their number open
             [um]; None for 16 um per mm of module, at which root stresses are beyond 1000 MPa. Gears that are traced
             take four pairs.
+        support: what shafts, bearings, housing and misalignment do to the gap over the face, as `support` of a gearbox
+            gives it; None for rigid, parallel shafts. It needs slices that feel each other. That of a gearbox holds at
+            the gearbox's torque, which `solve` and the like then ask for.
 
     Returns:
         the mesh, to be shared by any number of modifications and torques.
 
     Raises:
         ValueError: when the path of contact is longer than the pairs of the resolution can cover, or the compliance is
-            a table of other gears.
+            a table of other gears; for a support of other gears, or on a mesh whose slices do not feel each other.
     """
     compliance = default_compliance() if compliance is None else compliance
     compliance.check(pair)
@@ -154,7 +170,8 @@ def prepare(
     automatic = resolution.pairs is None
     if automatic:
         resolution = replace(resolution, pairs=_pairs_for(pair, deflection))
-    mesh = prepare_from(np.zeros(()), pair, compliance, resolution)
+    check_support(support, pair, resolution)
+    mesh = prepare_from(np.zeros(()), pair, compliance, resolution, support)
     _check_cover(mesh.path_of_contact, resolution)
     return replace(mesh, automatic=True) if automatic else mesh
 
@@ -167,7 +184,13 @@ def _pairs_for(pair: GearPair, deflection: float | None) -> int:
 
 
 @program
-def prepare_from(first_phase, pair: GearPair, compliance: AbstractCompliance, resolution: Resolution) -> Mesh:
+def prepare_from(
+    first_phase,
+    pair: GearPair,
+    compliance: AbstractCompliance,
+    resolution: Resolution,
+    support: AbstractSupport | None,
+) -> Mesh:
     """The mesh over the base pitch that begins with a mesh position [base pitches]."""
     plane = contact_plane(compliance.plane)
     moving = kinematics(pair, first_phase, resolution, plane)
@@ -199,6 +222,9 @@ def prepare_from(first_phase, pair: GearPair, compliance: AbstractCompliance, re
         width_factor=geometry.width_factor[:, 0],
         hub=compliance.hub(pinion, wheel),
         slice_width=moving.slice_width,
+        coupling=coupling_of(moving, outlines, support),
+        support=support,
+        support_gap=None if support is None else support.gap(moving.face_coordinate).astype(moving.slice_width.dtype),
     )
 
 

@@ -104,10 +104,16 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
 
     Its deflection is then part of the approach and of the tangent stiffness, not of the transmission error.
     """
-    gap, law, structure = mesh.corner_gap[:, None] + removed.amount, mesh.law.moved(removed.shift), mesh.structure
+    gap, law, structure = (
+        mesh.held(mesh.corner_gap[:, None] + removed.amount),
+        mesh.law.moved(removed.shift),
+        mesh.structure,
+    )
     if shared is not None:
         structure = structure + shared * mesh.slice_width[0] * mesh.lever[:, None] * mesh.lever[None]
-    problem = ContactProblem(structure, law, gap, mesh.lever, mesh.slice_width, approach=approach)
+    problem = ContactProblem(
+        structure, law, gap, mesh.lever, mesh.slice_width, approach=approach, coupling=mesh.coupling
+    )
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
     pair_force = mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1)
     force = jnp.sum(pair_force, axis=0)

@@ -1,5 +1,7 @@
 """Array sizes of a mesh."""
 
+import equinox as eqx
+
 from ..numerics import Checked, count, number
 
 _SLIDING_NODES = 3  # a parabola
@@ -19,6 +21,11 @@ class Resolution(Checked):
             and steep flanks over its own width; 1 takes the nominal contact point alone.
         slide_steps: steps in which the contact slides down the slope of a modification; 0 keeps it at its nominal
             place. None for 2, and 0 where fewer than 3 points across the contact do not see slope and curvature.
+        coupled_slices: whether slices feel each other's load, as those of a real face do; without it each slice bends
+            on its own, and the peak of line loads that vary over the face comes out 10 to 40 % too small. One slice has
+            nothing to feel.
+        face_modes: waves over the face by which slices feel each other; more than slices are as many as slices. With 5
+            line loads are within 0.4 % of those with all.
         newton_steps: largest number of steps of the contact solution.
         rtol: residual at which the contact solution ends, relative to the transmission error and to the force;
             None for 1e-11 in double and 5e-6 in single precision.
@@ -29,6 +36,8 @@ class Resolution(Checked):
     pairs: int | None = count(low=2, optional=True, default=None)
     patch_nodes: int = count(default=4)
     slide_steps: int | None = count(low=0, high=20, optional=True, default=None)
+    coupled_slices: bool = eqx.field(static=True, default=True)
+    face_modes: int = count(low=2, default=5)
     newton_steps: int = count(default=8)
     rtol: float | None = number(
         "", low=0.0, high=1.0, open_low=True, open_high=True, static=True, optional=True, default=None
@@ -47,6 +56,11 @@ class Resolution(Checked):
         if self.slide_steps is not None:
             return self.slide_steps
         return _SLIDE_STEPS if self.patch_nodes >= _SLIDING_NODES else 0
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether there are slices that feel each other."""
+        return self.coupled_slices and self.slices > 1
 
     @property
     def chosen_pairs(self) -> int:

@@ -147,8 +147,8 @@ def begin_contact(pair: GearPair, compliance: AbstractCompliance, first: Resolut
     Who knows that this will be needed, and has something else to do until then, calls it. What prepares the pair at the
     array sizes that are needed `first` goes ahead.
     """
-    begin(prepare_from, np.zeros(()), pair, compliance, first)
-    mesh = begin(prepare_from, np.zeros(()), pair, compliance, resolution)
+    begin(prepare_from, np.zeros(()), pair, compliance, first, None)
+    mesh = begin(prepare_from, np.zeros(()), pair, compliance, resolution, None)
     if mesh is not None:
         dtype = mesh.slice_width.dtype
         nothing = jax.eval_shape(lambda: nothing_removed(resolution, dtype))
@@ -199,7 +199,7 @@ def _wider(mesh: Mesh, cycle: MeshCycle) -> Mesh | None:
     if beyond is None or not beyond.any():
         return None
     sizes = replace(mesh.resolution, pairs=mesh.resolution.chosen_pairs + 1)
-    wider = prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes)
+    wider = prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes, support=mesh.support)
     return replace(wider, automatic=True)
 
 
@@ -221,7 +221,10 @@ def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
     amount, gain = removed.amount, _sliding_gain(mesh, removed.shift)
     edge = jnp.stack([amount[-1, :, 0], amount[0, :, -1]])
     fall = jnp.minimum(edge - jnp.stack([amount[-1, :, 1], amount[0, :, -2]]), 0.0)
-    left = jnp.min((edge - 2 * gain)[..., None] + fall[..., None] * mesh.outer_steps[:, None], axis=1)
+    left = (edge - 2 * gain)[..., None] + fall[..., None] * mesh.outer_steps[:, None]
+    if mesh.support_gap is not None:
+        left = left + mesh.outer_lever[:, None] * mesh.support_gap[:, None]
+    left = jnp.min(left, axis=1)
     return jnp.min(mesh.outer_gap + left / mesh.outer_lever, axis=0)
 
 
@@ -240,11 +243,14 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
     force = _force(mesh, torque)
     removed = jax.tree.map(lambda field: field.astype(force.dtype), removed)
     gap, law = stored(mesh.corner_gap[:, None] + removed.amount), mesh.law.moved(stored(removed.shift))
-    problem = ContactProblem(mesh.structure, law, gap, mesh.lever, mesh.slice_width, force, start_law=mesh.law)
+    held = mesh.held(gap)
+    problem = ContactProblem(
+        mesh.structure, law, held, mesh.lever, mesh.slice_width, force, start_law=mesh.law, coupling=mesh.coupling
+    )
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
     windup = mesh.hub * force / mesh.pair.face_width
     contact_stiffness = tangent_stiffness(problem, solution)
-    unloaded = minimum(gap / mesh.lever[:, None], axis=(0, 1))
+    unloaded = minimum(held / mesh.lever[:, None], axis=(0, 1))
     return {
         "transmission_error": solution.approach + windup,
         "unloaded_transmission_error": unloaded,

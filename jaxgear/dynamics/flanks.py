@@ -74,10 +74,13 @@ def coast_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
     The coast contact moves against the mirrored direction while the gears turn on, hence the sign of the phase; its
     approach is measured from q = -j, and half of it again moves either gear. (R. G. Parker and co-workers name the
     phase between both sides: Y. Guo, R. G. Parker, Mech. Mach. Theory 78, 2014.)
+
+    What holds the gears is known along the line of action of the drive flanks alone: coast flanks meet as on rigid,
+    parallel shafts.
     """
     pair, sizes = mesh.pair, mesh.resolution
     first, shift, play = _coast_phase(mesh)
-    turned = prepare_from(first, pair, mesh.compliance, sizes)
+    turned = prepare_from(first, pair, mesh.compliance, sizes, None)
     pinion, wheel = modification
     removed = removed_material(turned, torque, pinion=pinion, wheel=wheel)
     order = (shift - jnp.arange(sizes.positions)) % sizes.positions

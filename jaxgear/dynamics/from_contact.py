@@ -94,12 +94,12 @@ def mesh_force(
     return made
 
 
-def _with(mesh: Mesh, **sizes: int) -> Mesh:
+def _with(mesh: Mesh, **sizes: Any) -> Mesh:
     """The mesh in other array sizes."""
     wanted = replace(mesh.resolution, **sizes)
     if wanted == mesh.resolution:
         return mesh
-    made = prepare_from(mesh.kinematics.first_phase, mesh.pair, mesh.compliance, wanted)
+    made = prepare_from(mesh.kinematics.first_phase, mesh.pair, mesh.compliance, wanted, mesh.support)
     return replace(made, automatic=mesh.automatic)
 
 

@@ -4,6 +4,7 @@ from .complementarity import solve_contact as solve_contact
 from .complementarity import tangent_stiffness as tangent_stiffness
 from .contact_problem import ContactProblem as ContactProblem
 from .contact_problem import ContactSolution as ContactSolution
+from .coupling import Coupling as Coupling
 from .extremes import maximum as maximum
 from .extremes import minimum as minimum
 from .extremes import spread as spread

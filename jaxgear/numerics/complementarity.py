@@ -7,7 +7,8 @@ For every position the unknowns are the line loads q[p, s] >= 0 of P springs in 
 
 C is symmetric positive semi-definite and h increases, so this is the optimality condition of a strictly convex
 programme: the solution exists and is unique. It is found by Newton's method on the active set; slices meet only in d,
-so each step is P x P eliminations and one scalar equation. Derivatives of any order come from the implicit function
+so each step is P x P eliminations and one scalar equation, and where they feel each other (`coupling`) a small dense
+system at every position. Derivatives of any order come from the implicit function
 theorem at the final active set, never from the iteration. Where d is prescribed instead of the load, the scalar
 equation drops out and everything else stays.
 
@@ -27,7 +28,16 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from .contact_problem import ContactProblem, ContactSolution
-from .elimination import at_approach, balance, factorize, product
+from .contact_system import (
+    eliminable,
+    eliminate,
+    given_approach,
+    given_load,
+    load_per_approach,
+    opening,
+    total,
+    without_gap,
+)
 from .spring import LOAD_FLOOR, AbstractSpring
 from .stored import unit
 from .tangents import jvp_of_given
@@ -76,8 +86,8 @@ def solve_contact(problem: ContactProblem, *, steps: int, tolerance: float | Non
     return ContactSolution(
         line_load=jnp.stack(load),
         approach=approach + common,
-        load=_total(problem, load),
-        opening=jnp.stack(_opening(problem, load, approach)),
+        load=total(problem, load),
+        opening=jnp.stack(opening(problem, load, approach)),
         in_contact=jnp.stack(_active(problem, v)),
         residual=residual,
         solved=residual < tolerance,
@@ -87,15 +97,14 @@ def solve_contact(problem: ContactProblem, *, steps: int, tolerance: float | Non
 def tangent_stiffness(problem: ContactProblem, solution: ContactSolution) -> Curve:
     """d load / d approach at the solution, for the springs in contact."""
     load = list(solution.line_load)
-    factors = factorize(
-        problem.compliance, problem.lever, list(solution.in_contact), _slopes(problem, load, _secants(problem, load))
-    )
-    return product(problem.weight, factors, factors.lever, factors.lever)
+    slope = _slopes(problem, load, _secants(problem, load))
+    return load_per_approach(problem, eliminate(eliminable(problem), list(solution.in_contact), slope))
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1))
 def _solve(steps: int, tolerance: float, problem: ContactProblem, common: Curve) -> tuple[Rows, Curve, Curve]:
     """The iterate v, the approach and the residual; `common` is what has been taken out of the gaps."""
+    problem = eliminable(problem)
     single = _cast(problem, jnp.float32)
     v, approach = _cast(_near(single), common.dtype)
     approach = approach if problem.approach is None else problem.approach
@@ -166,19 +175,19 @@ def _solve_jvp(steps, tolerance, primals, tangents):
 
     def conditions(data):
         d = approach if data.approach is None else data.approach
-        mismatch = [y + law.deflection(q) for y, law, q in zip(_without_gap(data, load, d), _laws(data), load)]
-        return jnp.stack(mismatch) + data.gap, d if data.load is None else _total(data, load) - data.load
+        mismatch = [y + law.deflection(q) for y, law, q in zip(without_gap(data, load, d), _laws(data), load)]
+        return jnp.stack(mismatch) + data.gap, d if data.load is None else total(data, load) - data.load
 
     _, (mismatch_dot, last_dot) = jvp_of_given(conditions, problem, problem_dot)
     slope = _slopes(problem, load, _secants(problem, load))
-    factors = factorize(problem.compliance, problem.lever, _active(problem, v), slope)
+    factors = eliminate(eliminable(problem), _active(problem, v), slope)
     # the sum and the division keep the loops of reverse mode apart: its rows are stored before they are put together
     place = jnp.arange(len(v))[:, None, None]
     known = [-jnp.sum(jnp.where(place == i, mismatch_dot, 0.0), axis=0) / unit(row) for i, row in enumerate(v)]
     if problem.load is None:
-        v_dot, approach_dot = at_approach(factors, known, jnp.zeros_like(approach)), last_dot
+        v_dot, approach_dot = given_approach(problem, factors, known, jnp.zeros_like(approach)), last_dot
     else:
-        v_dot, approach_dot = balance(problem.weight, factors, known, -last_dot)
+        v_dot, approach_dot = given_load(problem, factors, known, -last_dot)
     return (v, approach, residual), (v_dot, approach_dot, jnp.zeros_like(residual))
 
 
@@ -243,32 +252,16 @@ def _slopes(problem: ContactProblem, load: Rows, secant: Slopes) -> Slopes:
 def _newton(problem: ContactProblem, v: Rows, secant: Slopes, slope: Slopes) -> tuple[Rows, Curve]:
     """One Newton step on the active set; `secant` and `slope` belong to the loads of v."""
     active, carried = _active(problem, v), _carried(v)
-    factors = factorize(problem.compliance, problem.lever, active, slope)
+    factors = eliminate(problem, active, slope)
     known = [-gap - (c - s) * q for gap, c, s, q in zip(problem.gap, secant, slope, carried)]
     if problem.approach is not None:
-        load, approach = at_approach(factors, known, problem.approach), problem.approach
+        load, approach = given_approach(problem, factors, known, problem.approach), problem.approach
     else:
-        load, approach = balance(problem.weight, factors, known, problem.load)
-    opening = _opening(problem, load, approach)
+        load, approach = given_load(problem, factors, known, problem.load)
+    left = opening(problem, load, approach)
     return [
-        jnp.where(flag, q, -y * inverse) for flag, q, y, inverse in zip(active, load, opening, factors.inverse)
+        jnp.where(flag, q, -y * inverse) for flag, q, y, inverse in zip(active, load, left, factors.per_slope)
     ], approach
-
-
-def _opening(problem, load: Rows, approach: Curve) -> Rows:
-    """y without the springs' own deflection."""
-    return [y + gap for y, gap in zip(_without_gap(problem, load, approach), problem.gap)]
-
-
-def _without_gap(problem, load: Rows, approach: Curve) -> Rows:
-    result = []
-    for row, lever in zip(problem.compliance, problem.lever):
-        result.append(sum(c[None] * q for c, q in zip(row, load)) - (lever * approach)[None])
-    return result
-
-
-def _total(problem, load: Rows) -> Curve:
-    return sum(lever * jnp.sum(problem.weight[:, None] * q, axis=0) for lever, q in zip(problem.lever, load))
 
 
 def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Slopes, common: Curve) -> Curve:
@@ -279,7 +272,7 @@ def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Slopes,
     """
     load = _carried(v)
     worst, scale, softest = jnp.zeros_like(approach), jnp.abs(common), jnp.zeros_like(approach)
-    for i, (q, y, c, lever) in enumerate(zip(load, _opening(problem, load, approach), secant, problem.lever)):
+    for i, (q, y, c, lever) in enumerate(zip(load, opening(problem, load, approach), secant, problem.lever)):
         mismatch = y + c * q
         closing = jnp.abs(mismatch + (lever * approach)[None])
         worst = jnp.maximum(worst, jnp.max(jnp.where(q > 0, jnp.abs(mismatch), -mismatch), axis=0))
@@ -290,4 +283,4 @@ def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Slopes,
     if problem.load is None:
         return violation
     rounding = eps * (jnp.abs(common) / softest + LOAD_FLOOR) * jnp.sum(problem.weight)
-    return jnp.maximum(violation, jnp.abs(_total(problem, load) - problem.load) / (jnp.abs(problem.load) + rounding))
+    return jnp.maximum(violation, jnp.abs(total(problem, load) - problem.load) / (jnp.abs(problem.load) + rounding))

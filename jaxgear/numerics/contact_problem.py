@@ -3,6 +3,7 @@
 import equinox as eqx
 from jaxtyping import Array, Bool, Float
 
+from .coupling import Coupling
 from .spring import AbstractSpring
 
 
@@ -19,6 +20,7 @@ class ContactProblem(eqx.Module):
         approach: prescribed common approach d, shape (positions,); None where the load is.
         start_law: a law like h that many problems share, which spares each of them the evaluations that its solution
             starts from; None for h.
+        coupling: how slices feel each other, which then have one weight; None where only the approach is common.
 
     Raises:
         ValueError: unless one of load and approach is given.
@@ -32,6 +34,7 @@ class ContactProblem(eqx.Module):
     load: Float[Array, ""] | None = None
     approach: Float[Array, " positions"] | None = None
     start_law: AbstractSpring | None = None
+    coupling: Coupling | None = None
 
     def __check_init__(self):
         if (self.load is None) == (self.approach is None):

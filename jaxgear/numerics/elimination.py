@@ -26,6 +26,11 @@ class Factors(NamedTuple):
     lever: Rows
     active: Rows
 
+    @property
+    def per_slope(self) -> Slopes:
+        """Load per opening of every spring, about."""
+        return self.inverse
+
 
 def factorize(
     compliance: Float[Array, "pairs pairs positions"],
@@ -57,10 +62,10 @@ def factorize(
         diagonal.append(pivot)
         inverse.append(1 / pivot)
     levers = [flag * row[None] for flag, row in zip(mask, lever)]
-    return Factors(rows, diagonal, inverse, _forward(rows, inverse, levers), mask)
+    return Factors(rows, diagonal, inverse, forward(rows, inverse, levers), mask)
 
 
-def _forward(rows: list[Rows], inverse: Slopes, right: Rows) -> Rows:
+def forward(rows: list[Rows], inverse: Slopes, right: Rows) -> Rows:
     """L^-1 right"""
     result: Rows = []
     for i, value in enumerate(right):
@@ -91,7 +96,7 @@ def at_approach(factors: Factors, known: Rows, approach: Curve) -> Rows:
 
 def _of_known(factors: Factors, known: Rows) -> Rows:
     """L^-1 known on the active rows."""
-    return _forward(factors.rows, factors.inverse, [flag * row for flag, row in zip(factors.active, known)])
+    return forward(factors.rows, factors.inverse, [flag * row for flag, row in zip(factors.active, known)])
 
 
 def _backward(factors: Factors, part: Rows, approach: Curve) -> Rows:

@@ -1,0 +1,77 @@
+"""How the slices of a mesh feel each other: through teeth and bodies, and through what holds the gears."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..compliance import face_kernel, few_modes
+from ..geometry import GearPair
+from ..geometry.outline import Outline
+from ..numerics import Coupling, concrete
+from ..shafts import AbstractSupport
+from .kinematics import Kinematics
+from .resolution import Resolution
+
+_SAME = 1e-6  # relative difference of numbers that single precision keeps apart
+
+
+def coupling_of(
+    moving: Kinematics, outlines: tuple[Outline, Outline], support: AbstractSupport | None
+) -> Coupling | None:
+    """The coupling of the slices; None where they do not feel each other.
+
+    Teeth and bodies share the root chord of their mean (see `face_kernel`). A support bends in polynomials over the
+    face, as many as the resolution has modes.
+
+    Args:
+        moving: kinematics of the pair.
+        outlines: of both gears.
+        support: what holds the gears.
+    """
+    sizes = moving.resolution
+    if not sizes.is_coupled:
+        return None
+    root_chord = 0.5 * (outlines[0].root_chord + outlines[1].root_chord)
+    kernel = face_kernel(moving.pair.face_width, root_chord, sizes.slices)
+    coupling = Coupling(*few_modes(kernel, sizes.face_modes))
+    if support is None:
+        return coupling
+    bends = jnp.asarray(_polynomials(sizes.slices, min(sizes.face_modes, sizes.slices)), kernel.dtype)
+    influence = support.influence(moving.face_coordinate).astype(kernel.dtype) * moving.slice_width[0]
+    bent = jnp.linalg.multi_dot([bends.T, influence, bends])
+    return eqx.tree_at(
+        lambda c: (c.support_modes, c.support), coupling, (bends, bent), is_leaf=lambda leaf: leaf is None
+    )
+
+
+def _polynomials(slices: int, count: int) -> Float[Array, "slices count"]:
+    """Of degree 0, 1, 2, ... at the middles of the slices, orthonormal."""
+    middle = (np.arange(slices) + 0.5) / slices - 0.5
+    found, upper = np.linalg.qr(np.polynomial.legendre.legvander(2 * middle, count - 1))
+    return found * np.sign(np.diagonal(upper))
+
+
+def check_support(support: AbstractSupport | None, pair: GearPair, resolution: Resolution) -> None:
+    """Refuses a support that the mesh cannot take.
+
+    Raises:
+        TypeError: for something else than a support.
+        ValueError: for a support of other gears, or slices that do not feel each other.
+    """
+    if support is None:
+        return
+    if not isinstance(support, AbstractSupport):
+        raise TypeError(f"prepare: support is a {type(support).__name__}, must be a support: jaxgear.support makes one")
+    if resolution.slices == 1:
+        raise ValueError(
+            "prepare: support acts over the face, which a mesh of 1 slice cannot show: Resolution(slices=11)"
+        )
+    if not resolution.coupled_slices:
+        raise ValueError("prepare: support needs slices that feel each other: Resolution(coupled_slices=True)")
+    given, own = map(jax.tree.leaves, (support.pair, pair))
+    for one, other in zip(given, own):
+        here, there = concrete(one), concrete(other)
+        if here is not None and there is not None and not np.allclose(here, there, rtol=_SAME):
+            raise ValueError("prepare: support holds another pair than the one to prepare: take support.pair")

@@ -1,0 +1,72 @@
+"""The linear systems of a contact problem, with slices that feel each other or not, and what its loads deflect."""
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from .contact_problem import ContactProblem
+from .coupled_elimination import CoupledFactors, couple, respond, stiffness
+from .coupling import with_inverses
+from .elimination import Curve, Factors, Rows, Slopes, at_approach, balance, factorize, product
+
+
+def eliminable(problem: ContactProblem) -> ContactProblem:
+    """The problem with what its eliminations need to be evaluated once."""
+    if problem.coupling is None:
+        return problem
+    return eqx.tree_at(lambda p: p.coupling, problem, with_inverses(problem.coupling, problem.compliance))
+
+
+def eliminate(problem: ContactProblem, active: list, slope: Slopes) -> Factors | CoupledFactors:
+    """Eliminates the active springs of an `eliminable` problem.
+
+    Args:
+        problem: the data.
+        active: which springs are in contact, (slices, positions) each.
+        slope: of the springs.
+    """
+    if problem.coupling is None:
+        return factorize(problem.compliance, problem.lever, active, slope)
+    assert problem.coupling.held is not None
+    return couple(problem.coupling, problem.lever, factorize(problem.coupling.held.local, problem.lever, active, slope))
+
+
+def given_load(problem: ContactProblem, factors: Factors | CoupledFactors, known: Rows, load) -> tuple[Rows, Curve]:
+    """Line loads of the active springs and approach: deflection + slope x load = known + lever x approach."""
+    if isinstance(factors, CoupledFactors):
+        return respond(problem.weight, factors, known, load=load)[:2]
+    return balance(problem.weight, factors, known, load)
+
+
+def given_approach(problem: ContactProblem, factors: Factors | CoupledFactors, known: Rows, approach: Curve) -> Rows:
+    """Line loads of the active springs."""
+    if isinstance(factors, CoupledFactors):
+        return respond(problem.weight, factors, known, approach=approach).load
+    return at_approach(factors, known, approach)
+
+
+def load_per_approach(problem: ContactProblem, factors: Factors | CoupledFactors) -> Curve:
+    """d load / d approach of the active springs."""
+    if isinstance(factors, CoupledFactors):
+        return stiffness(problem.weight, factors)
+    return product(problem.weight, factors, factors.lever, factors.lever)
+
+
+def opening(problem: ContactProblem, load: Rows, approach: Curve) -> Rows:
+    """y without the springs' own deflection."""
+    return [y + gap for y, gap in zip(without_gap(problem, load, approach), problem.gap)]
+
+
+def without_gap(problem: ContactProblem, load: Rows, approach: Curve) -> Rows:
+    """The same without the gap."""
+    if problem.coupling is not None:
+        deflected = problem.coupling.deflection(problem.compliance, problem.lever, load)
+        return [row - (lever * approach)[None] for row, lever in zip(deflected, problem.lever)]
+    result = []
+    for row, lever in zip(problem.compliance, problem.lever):
+        result.append(sum(c[None] * q for c, q in zip(row, load)) - (lever * approach)[None])
+    return result
+
+
+def total(problem: ContactProblem, load: Rows) -> Curve:
+    """The load that line loads make."""
+    return sum(lever * jnp.sum(problem.weight[:, None] * q, axis=0) for lever, q in zip(problem.lever, load))

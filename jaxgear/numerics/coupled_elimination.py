@@ -1,0 +1,230 @@
+"""Elimination of a contact problem whose slices feel each other.
+
+Every slice is eliminated on its own, as if nothing but the rest of the compliance held it: A = rest C + slope. With the
+deflections p of the modes as unknowns, and b those of the support with the common approach in the first one, the active
+springs obey
+
+    A q = known + X b - V p,     (C^-1 x M^-1) p = V^T q,     b = sqrt(n) approach e_1 - H z,     z = X^T q,
+
+X being the levers times the support's modes. So p follows from the symmetric, positive definite matrix
+C^-1 x M^-1 + V^T A^-1 V, a few unknowns at every position, and what is left are the equations of the support. What
+several loops read ends with a division, for compilers to store it.
+"""
+
+from functools import reduce
+from operator import add
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .coupling import Coupling, along, contracted, onto
+from .elimination import Curve, Factors, Rows, Slopes, factorize, forward
+from .stored import unit
+
+Levers = Float[Array, "pairs positions"]
+Bends = Float[Array, "bends positions"]
+Sides = Float[Array, "sides pairs positions"]  # right sides of the modal system, of one mode
+
+
+class _Block(NamedTuple):
+    """The columns of one mode in the block elimination of the modal system, L D L^T; from this mode on.
+
+    Attributes:
+        scaled: L D.
+        lower: L.
+        inverse: of D.
+    """
+
+    scaled: Float[Array, "modes pairs pairs positions"]
+    lower: Float[Array, "modes pairs pairs positions"]
+    inverse: Float[Array, "pairs pairs positions"]
+
+
+class CoupledFactors(NamedTuple):
+    """The active system, eliminated.
+
+    Attributes:
+        coupling: of the slices.
+        lever: of the springs.
+        inverse: of the matrices A, zero where springs are apart, by springs.
+        blocks: of the modal system.
+        bent: L^-1 V^T A^-1 X by mode, and D^-1 times it.
+        force: z under unit b, symmetric.
+        per_slope: load per opening of every spring, about.
+    """
+
+    coupling: Coupling
+    lever: Levers
+    inverse: list[list[Float[Array, "slices positions"]]]
+    blocks: list[_Block]
+    bent: tuple[list[Sides], list[Sides]]
+    force: Float[Array, "bends bends positions"]
+    per_slope: Slopes
+
+
+class Response(NamedTuple):
+    """Line loads, common approach, and what presses the slices besides what is known: X b - V p."""
+
+    load: Rows
+    approach: Curve
+    pressed: Rows
+
+
+def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
+    """Eliminates what couples the slices.
+
+    Args:
+        coupling: with its inverses.
+        lever: what a spring closes per unit of common approach.
+        own: elimination of every slice with the local compliance and the slopes of the springs.
+    """
+    inverse = _inverse(own)
+    stacked = jnp.stack([jnp.stack(row) for row in inverse])
+    modal = jnp.moveaxis(contracted(coupling.modes, coupling.modes, stacked), (2, 3), (0, 1))
+    blocks = _eliminated(coupling, modal)
+    right, force = _of_support(coupling, lever, stacked, modal)
+    bent = _ahead(blocks, right)
+    force = force - _joined(bent[0], bent[1])
+    return CoupledFactors(coupling, lever, inverse, blocks, bent, force, own.per_slope)
+
+
+def _inverse(own: Factors) -> list[list[Float[Array, "slices positions"]]]:
+    count = len(own.active)
+    none = jnp.zeros_like(own.active[0])
+    ahead = [
+        forward(own.rows, own.inverse, [own.active[j] if i == j else none for i in range(count)]) for j in range(count)
+    ]
+    half = {}
+    for i in range(count):
+        for j in range(i + 1):
+            value = sum(ahead[i][k] * ahead[j][k] * own.inverse[k] for k in range(i, count))
+            half[i, j] = half[j, i] = value / unit(value)
+    return [[half[i, j] for j in range(count)] for i in range(count)]
+
+
+def _eliminated(coupling: Coupling, modal: Float[Array, "modes modes pairs pairs positions"]) -> list[_Block]:
+    held = coupling.held
+    blocks: list[_Block] = []
+    assert held is not None  # whoever eliminates gives the inverses
+    for mode in range(len(modal)):
+        scaled = modal[mode:, mode] + held.share_inverse[mode:, mode, None, None, None] * held.inverse
+        for before, block in enumerate(blocks):
+            ahead = mode - before
+            scaled = scaled - _times(block.lower[ahead:], jnp.swapaxes(block.scaled[ahead], 0, 1))
+        scaled = scaled / unit(scaled)
+        inverse = _small_inverse(scaled[0])
+        lower = _times(scaled, inverse)
+        blocks.append(_Block(scaled, lower / unit(lower), inverse))
+    return blocks
+
+
+def _times(first: Float[Array, "... pairs pairs positions"], second: Float[Array, "pairs pairs positions"]):
+    """Products of small matrices at every position."""
+    return sum(first[..., k, None, :] * second[k] for k in range(len(second)))
+
+
+def _small_inverse(matrix: Float[Array, "pairs pairs positions"]) -> Float[Array, "pairs pairs positions"]:
+    """Of a symmetric, positive definite matrix."""
+    none, all_of = jnp.zeros_like(matrix[0, 0])[None], jnp.ones_like(matrix[0, 0])[None]
+    count = len(matrix)
+    inverse = _inverse(factorize(matrix, matrix[0], [all_of] * count, [none] * count))
+    return jnp.stack([jnp.concatenate(row) for row in inverse])
+
+
+def _of_support(
+    coupling: Coupling, lever: Levers, inverse, modal
+) -> tuple[list[Sides], Float[Array, "bends bends positions"]]:
+    """V^T A^-1 X by mode, and X^T A^-1 X."""
+    if coupling.support_modes is None:
+        # what the common approach presses is the first mode
+        even = jnp.sum(modal[:, 0] * lever, axis=-2)
+        return list(even[:, None]), jnp.sum(even[0] * lever, axis=0)[None, None]
+    shapes = coupling.support_modes
+    pressed = jnp.sum(inverse * lever[:, None], axis=1)
+    right = jnp.moveaxis(contracted(shapes, coupling.modes, pressed), 0, 2)  # bends, modes, pairs, positions
+    force = jnp.sum(pressed * lever[:, None], axis=0)
+    return [right[:, mode] for mode in range(right.shape[1])], contracted(shapes, shapes, force)
+
+
+def _ahead(blocks: list[_Block], right: list[Sides]) -> tuple[list[Sides], list[Sides]]:
+    """L^-1 right, and D^-1 times it."""
+    whole: list[Sides] = []
+    divided: list[Sides] = []
+    for mode, value in enumerate(right):
+        for before, block in enumerate(blocks[:mode]):
+            value = value - _times(divided[before][:, None], jnp.swapaxes(block.scaled[mode - before], 0, 1))[:, 0]
+        value = value / unit(value)
+        # the first rows of L are one; D^-1 is symmetric
+        found = _times(value[:, None], blocks[mode].inverse)[:, 0]
+        whole.append(value)
+        divided.append(found / unit(found))
+    return whole, divided
+
+
+def _joined(first: list[Sides], second: list[Sides]) -> Float[Array, "sides sides positions"]:
+    """Sum over modes and springs."""
+    return reduce(add, [jnp.sum(a[:, None] * b[None], axis=2) for a, b in zip(first, second)])
+
+
+def _back(
+    blocks: list[_Block], divided: list[Float[Array, "pairs positions"]]
+) -> list[Float[Array, "pairs positions"]]:
+    """Solution of the modal system by mode, from D^-1 L^-1 of its right side."""
+    found: dict[int, Float[Array, "pairs positions"]] = {}
+    for mode in reversed(range(len(blocks))):
+        value = divided[mode]
+        for later in range(mode + 1, len(blocks)):
+            value = value - jnp.sum(blocks[mode].lower[later - mode] * found[later][:, None], axis=0)
+        found[mode] = value / unit(value)
+    return [found[mode] for mode in range(len(blocks))]
+
+
+def respond(
+    weight: Float[Array, " slices"], factors: CoupledFactors, known: Rows, *, load=None, approach=None
+) -> Response:
+    """Solves for a load or for an approach; see the top."""
+    coupling, count = factors.coupling, len(weight)
+    inside = [sum(x * row for x, row in zip(rows, known)) for rows in factors.inverse]  # A^-1 known
+    inside = [row / unit(row) for row in inside]
+    modal = onto(coupling.modes, jnp.stack(inside))
+    _, divided = _ahead(factors.blocks, [modal[:, mode][None] for mode in range(modal.shape[1])])
+    force = sum(height[None] * row for height, row in zip(factors.lever, inside))
+    constant = jnp.full((count, 1), count**-0.5, force.dtype)
+    shapes = constant if coupling.support_modes is None else coupling.support_modes
+    carried = onto(shapes, force) - _joined(factors.bent[0], divided)[:, 0]
+    bends, approach = _bends(factors, carried, None if load is None else load / weight[0], approach)
+    eliminated = [a[0] + jnp.sum(b * bends[:, None], axis=0) for a, b in zip(divided, factors.bent[1])]
+    deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated), axis=1))
+    pressed = list(factors.lever[:, None] * along(shapes, bends) - deflected)
+    loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(inside, factors.inverse)]
+    return Response(loads, approach, pressed)
+
+
+def stiffness(weight: Float[Array, " slices"], factors: CoupledFactors) -> Curve:
+    """Load per unit of approach."""
+    _, rise = _yielding(factors, jnp.zeros_like(factors.force[0]))
+    return jnp.sum(weight) * jnp.sum(factors.force[0] * rise, axis=0)
+
+
+def _bends(factors: CoupledFactors, carried: Bends, total, approach: Curve | None) -> tuple[Bends, Curve]:
+    """b and the approach, for that or for a total of the line loads; `carried` is z at b = 0."""
+    root = factors.coupling.modes.shape[0] ** 0.5
+    still, rise = _yielding(factors, carried)
+    if approach is None:
+        missing = total / root - carried[0] - jnp.sum(factors.force[0] * still, axis=0)
+        approach = missing / (root * jnp.sum(factors.force[0] * rise, axis=0))
+    return still + root * approach[None] * rise, approach
+
+
+def _yielding(factors: CoupledFactors, carried: Bends) -> tuple[Bends, Bends]:
+    """b without approach, and what it gains with it: (1 + H force) b = -H carried and e_1."""
+    support = factors.coupling.support
+    first = jnp.zeros_like(carried).at[0].set(1.0)
+    if support is None:
+        return jnp.zeros_like(carried), first
+    sides = jnp.stack([-jnp.tensordot(support, carried, 1), first], axis=1)
+    matrix = jnp.eye(len(support), dtype=carried.dtype)[..., None] + jnp.tensordot(support, factors.force, 1)
+    found = jnp.linalg.solve(jnp.moveaxis(matrix, -1, 0), jnp.moveaxis(sides, -1, 0))
+    found = jnp.moveaxis(found, 0, -1)
+    return found[:, 0], found[:, 1]

@@ -1,0 +1,93 @@
+"""Slices of a contact problem that feel each other, by few modes over the slices.
+
+The deflection of spring p in slice s under all line loads is
+
+    y[p, s] = sum_j C[p, j] ( rest q[j, s] + sum_{k, l, t} V[s, k] M[k, l] V[t, l] q[j, t] )
+            + lever[p] sum_{k, l, t} R[s, k] H[k, l] R[t, l] sum_j lever[j] q[j, t]:
+
+springs on bodies whose deflection at one place is felt at others, on a support that gives way under the force of all
+springs of a slice.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+Rows = list[Float[Array, "slices positions"]]
+Springs = Float[Array, "pairs pairs positions"]
+
+
+class Held(NamedTuple):
+    """What an elimination needs besides the coupling itself.
+
+    Attributes:
+        local: rest C.
+        inverse: of C.
+        share_inverse: of M.
+    """
+
+    local: Springs
+    inverse: Springs
+    share_inverse: Float[Array, "modes modes"]
+
+
+class Coupling(eqx.Module):
+    """How slices of equal weight feel each other.
+
+    Attributes:
+        modes: V, orthonormal, the constant first.
+        share: M, symmetric and positive definite.
+        rest: what all that is orthogonal to the modes has of C.
+        support_modes: R, orthonormal, the constant first; None without a support.
+        support: H, symmetric and positive semi-definite, the deflection under line loads; None without a support.
+        held: for eliminations, see `with_inverses`; None before.
+    """
+
+    modes: Float[Array, "slices modes"]
+    share: Float[Array, "modes modes"]
+    rest: Float[Array, ""]
+    support_modes: Float[Array, "slices bends"] | None = None
+    support: Float[Array, "bends bends"] | None = None
+    held: Held | None = None
+
+    def deflection(self, compliance: Springs, lever: Float[Array, "pairs positions"], load: Rows) -> Rows:
+        """y under line loads."""
+        uniform = jnp.stack([sum(c[None] * q for c, q in zip(row, load)) for row in compliance])
+        result = list(self.rest * uniform + along(self.modes, along(self.share, onto(self.modes, uniform))))
+        if self.support is None or self.support_modes is None:
+            return result
+        force = sum(height[None] * q for height, q in zip(lever, load))
+        bent = along(self.support_modes, along(self.support, onto(self.support_modes, force)))
+        return [row + height[None] * bent for row, height in zip(result, lever)]
+
+
+def with_inverses(coupling: Coupling, compliance: Springs) -> Coupling:
+    """The coupling ready for eliminations; C has to be positive definite."""
+    inverse = jnp.moveaxis(jnp.linalg.inv(jnp.moveaxis(compliance, -1, 0)), 0, -1)
+    held = Held(coupling.rest * compliance, inverse, jnp.linalg.inv(coupling.share))
+    return eqx.tree_at(lambda c: c.held, coupling, held, is_leaf=lambda leaf: leaf is None)
+
+
+def onto(
+    modes: Float[Array, "slices modes"], rows: Float[Array, "... slices positions"]
+) -> Float[Array, "... modes positions"]:
+    """V^T rows."""
+    return jnp.einsum("sk,...sx->...kx", modes, rows, precision="highest")
+
+
+def along(
+    modes: Float[Array, "slices modes"], modal: Float[Array, "... modes positions"]
+) -> Float[Array, "... slices positions"]:
+    """V modal."""
+    return jnp.einsum("sk,...kx->...sx", modes, modal, precision="highest")
+
+
+def contracted(
+    first: Float[Array, "slices first"],
+    second: Float[Array, "slices second"],
+    rows: Float[Array, "... slices positions"],
+) -> Float[Array, "... first second positions"]:
+    """First^T diag(rows) second."""
+    return jnp.einsum("skl,...sx->...klx", first[:, :, None] * second[:, None], rows, precision="highest")
