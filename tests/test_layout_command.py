@@ -116,7 +116,8 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     before, level, _ = housed["relative_life"]
     assert housed["torque_Nm"] == 150.0 and before < 0.9 and level == 1.0
     assert "life relative to the even load" in done.out and "life after step 1 [h]" in done.out
-    profile = found["profile"]
+    profile, other = (found["profiles"][name] for name in ("housing", "rigid seats"))
+    assert profile["best"]["ppte_um"] == pytest.approx(other["best"]["ppte_um"], rel=0.05)  # both are level
     assert profile["variants"] == 5 and profile["torque_Nm"] == pytest.approx(135.0)
     assert profile["best"]["ppte_um"] < profile["unmodified"]["ppte_um"]
     kinds = [one["type"] for one in found["designs"]["layout"]["wheel_modification"]]

@@ -1,14 +1,15 @@
 """What the command `layout` does, with its options."""
 
 import os
-from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
 import jax
 
+from ..contact import Mesh
 from ..io import DesignFile, LayoutRequest, layout_request, result_folder, write_flanks, write_summary
-from ..layout import FlankLine, FlankLineLayout, ProfileLayout, layout_flank_lines, vary_profiles
+from ..io.schema_shafts import ProfileSection
+from ..layout import FlankLine, FlankLineLayout, ProfileLayout, at_torque, layout_flank_lines, vary_profiles
 from . import interrupt, layout_report, report
 from .commands import import_ahead
 from .devices import compile_quickly
@@ -30,8 +31,8 @@ def run_layout(file: Path, output: Path | None, *, quick: bool, figures: bool, c
             study = _study(design, request, stages, quick=quick)
             stages.begin("writing the results")
             write_summary(folder / "summary.json", {**layout_report.summary(study), "quick": quick})
-            if study.profile is not None and study.mesh is not None:
-                write_flanks(folder / "flanks.csv", study.mesh, layout_report.designs(study))
+            if study.profile is not None:
+                write_flanks(folder / "flanks.csv", next(iter(study.meshes.values())), layout_report.designs(study))
                 study.profile.table.to_csv(folder / "profiles.csv")
             if figures:
                 layout_report.write_figures(folder, study)
@@ -53,27 +54,31 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
     for name, support in request.supports.items():
         stages.begin(f"flank lines, {name}")
         layouts[name] = layout_flank_lines(support, request.tolerances, **request.options)
-    mesh, profile = None, None
-    if request.profile is not None:
-        stages.begin("preparing the mesh")
-        size = design.resolution()
-        mesh = jax.block_until_ready(design.mesh(coarse(size) if quick else size))
-        stages.begin("profile modifications of both gears, in all combinations")
-        profile = _profile(request, mesh, layouts, stages)
-    return Study(design, request, layouts, mesh, profile)
-
-
-def _profile(request: LayoutRequest, mesh, layouts: Mapping[str, FlankLineLayout], stages: Stages) -> ProfileLayout:
-    """Step 3 on what the levelled flank lines leave: the further crowning, the same with and without housing."""
+    meshes: dict[str, Mesh] = {}
+    profiles: dict[str, ProfileLayout] = {}
     wanted = request.profile
-    assert wanted is not None
-    further = next(iter(layouts.values())).further
-    left = FlankLine(crowning=further[0]).modification, FlankLine(crowning=further[1]).modification
+    if wanted is not None:
+        for name in layouts if wanted.shafts else list(layouts)[:1]:
+            stages.begin("preparing the mesh" + (f", {name}" if wanted.shafts else ""))
+            size = design.resolution()
+            support = at_torque(request.supports[name], request.profile_torque) if wanted.shafts else None
+            mesh = jax.block_until_ready(design.mesh(coarse(size) if quick else size, support))
+            stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
+            meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
+    return Study(design, request, layouts, meshes, profiles)
+
+
+def _profile(
+    request: LayoutRequest, wanted: ProfileSection, mesh: Mesh, layout: FlankLineLayout, stages: Stages
+) -> ProfileLayout:
+    """Step 3 on the flank lines, or on what they leave where they have levelled the load: the further crowning."""
+    left = tuple(FlankLine(crowning=amount).modification for amount in layout.further)
+    pinion, wheel = layout.modifications if wanted.shafts else left
     given = {} if wanted.length is None else {"length": wanted.length}
     return vary_profiles(
         mesh,
         request.profile_torque,
-        left,
+        (pinion, wheel),
         wanted.pinion_amounts,
         wanted.wheel_amounts or wanted.pinion_amounts,
         kind="profile_crowning" if wanted.type == "profile_crowning" else "tip_relief",

@@ -30,15 +30,20 @@ class Study:
         design: the design file.
         request: what it asks for.
         layouts: flank lines, by the name of the support; the first is that of the design.
-        mesh: of step 3; None without it.
-        profile: profile modifications of step 3; None without it.
+        meshes: of step 3, likewise; empty without it.
+        profiles: profile modifications of step 3.
     """
 
     design: DesignFile
     request: LayoutRequest
     layouts: Mapping[str, FlankLineLayout]
-    mesh: Mesh | None
-    profile: ProfileLayout | None
+    meshes: Mapping[str, Mesh]
+    profiles: Mapping[str, ProfileLayout]
+
+    @property
+    def profile(self) -> ProfileLayout | None:
+        """The profile modifications of the design; None without step 3."""
+        return next(iter(self.profiles.values()), None)
 
     @property
     def main(self) -> FlankLineLayout:
@@ -125,25 +130,25 @@ def _bearings(study: Study) -> Table:
 
 def verdict(study: Study) -> Iterator[str]:
     """The layout in words."""
-    layout, profile = study.main, study.profile
+    layout = study.main
     for name, line in (("pinion", layout.pinion), ("wheel", layout.wheel)):
         yield f"{name}: slope {float(line.slope):.1f} um, crowning {float(line.crowning):.1f} um"
     if layout.damage:
         before, _, after = np.asarray(layout.relative_life)
         yield f"life relative to the even load: {before:.2f} without modification, {after:.2f} after step 2"
-    if profile is None:
-        return
+    for name, profile in study.profiles.items():
+        yield from _profile_verdict(study, profile, f", {name}" if len(study.profiles) > 1 else "")
+
+
+def _profile_verdict(study: Study, profile: ProfileLayout, where: str) -> Iterator[str]:
     words = "tip relief" if profile.kind == "tip_relief" else "profile crowning"
     first, second = profile.amounts
     torque = study.request.profile_torque
-    yield f"step 3 at {torque:g} N m: {words} {first:g} um on the pinion, {second:g} um on the wheel"
+    yield f"step 3 at {torque:g} N m{where}: {words} {first:g} um on the pinion, {second:g} um on the wheel"
     ratio = profile.table.column("effective_contact_ratio")
-    changes = ", ".join(
-        f"{label} {profile.change(name):+.0f} %" for name, label in (("ppte", "PPTE"), ("mesh_loss_factor", "loss"))
-    )
     yield (
-        f"{changes}; effective contact ratio {ratio[0]:.3f} to {ratio[profile.best]:.3f}, theoretical "
-        f"{profile.contact_ratio:.3f}"
+        f"  PPTE {profile.change('ppte'):+.0f} %, loss {profile.change('mesh_loss_factor'):+.0f} %; effective contact "
+        f"ratio {ratio[0]:.3f} to {ratio[profile.best]:.3f}, theoretical {profile.contact_ratio:.3f}"
     )
 
 
@@ -155,19 +160,17 @@ def failures(study: Study) -> Iterator[str]:
             yield f"LOAD OVER THE FACE NOT FOUND: {name}; its numbers are not to be trusted"
         if layout.touches_edges:
             yield f"the largest load is at an edge: {name}"
-    if study.profile is None:
-        return
-    failed = study.profile.table.failures()
-    if failed:
-        total = len(study.profile.table)
-        yield f"NOT CONVERGED: {failed} of {total} profile modifications; raise resolution.newton_steps"
-    if not study.profile.without_shock[study.profile.best]:
-        yield "every profile modification has contact shock: larger amounts are needed"
+    for profile in study.profiles.values():
+        failed = profile.table.failures()
+        if failed:
+            total = len(profile.table)
+            yield f"NOT CONVERGED: {failed} of {total} profile modifications; raise resolution.newton_steps"
+        if not profile.without_shock[profile.best]:
+            yield "every profile modification has contact shock: larger amounts are needed"
 
 
 def summary(study: Study) -> dict[str, Any]:
     """Contents of `summary.json`."""
-    profile = study.profile
     return {
         "title": study.design.title,
         "design_file": study.design.path.name,
@@ -178,7 +181,7 @@ def summary(study: Study) -> dict[str, Any]:
         },
         "layouts": {name: _layout(layout) for name, layout in study.layouts.items()},
         "bearings": {name: _reactions(support) for name, support in study.request.supports.items()},
-        "profile": None if profile is None else _profile(study, profile),
+        "profiles": {name: _profile(study, profile) for name, profile in study.profiles.items()},
         "designs": {
             name: {"pinion_modification": describe(pinion), "wheel_modification": describe(wheel)}
             for name, (pinion, wheel) in designs(study).items()

@@ -14,7 +14,7 @@ from ..contact import Mesh, Operation, Resolution, begin_contact, fewest_pairs, 
 from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
 from ..numerics import program
-from ..shafts import ShaftSupport
+from ..shafts import AbstractSupport, ShaftSupport
 from ..sizing import iso_stiffness
 from . import schema, schema_dynamics, schema_shafts, schema_sweep, template
 from .errors import DesignFileError, naming, refuse_given, refused
@@ -153,18 +153,19 @@ class DesignFile:
             pairs = max(pairs, _OPEN_PAIRS)
         return replace(self._resolution, pairs=pairs)
 
-    def mesh(self, resolution: Resolution | None = None) -> Mesh:
+    def mesh(self, resolution: Resolution | None = None, support: AbstractSupport | None = None) -> Mesh:
         """The prepared mesh.
 
         Args:
             resolution: array sizes in place of the file's.
+            support: what holds the gears; None for rigid, parallel shafts.
 
         Raises:
             DesignFileError: when the resolution does not cover the path of contact.
         """
         options = {"compliance": self._compliance, "resolution": resolution or self.resolution()}
         with naming(self.path):
-            return refused("resolution", prepare, self._middle, **options)
+            return refused("resolution", prepare, self._middle, **options, support=support)
 
     def begin_contact(self, first: Resolution, resolution: Resolution) -> None:
         """Starts to compile what prepares and solves the mesh, see `contact.begin_contact`."""

@@ -132,6 +132,8 @@ class ProfileSection(Section):
         wheel_amounts: amounts on the wheel; those of the pinion without it.
         length: of a tip relief; the long one, over the zone of double contact, without it.
         torque_factor: torque of the contact analysis, in design torques.
+        shafts: whether the contact feels shafts, bearings and housing, with the flank lines of both steps and once for
+            every support. Without them it has the further crowning alone, as on shafts whose bending is compensated.
     """
 
     type: Annotated[str, choice("tip_relief", "profile_crowning")] = "tip_relief"
@@ -139,3 +141,4 @@ class ProfileSection(Section):
     wheel_amounts: Annotated[list[float] | None, _AMOUNTS] = None
     length: Annotated[float | None, positive("mm")] = None
     torque_factor: Annotated[float, positive("")] = 0.9
+    shafts: Annotated[bool, switch()] = True
