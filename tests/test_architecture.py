@@ -27,6 +27,7 @@ ORDER = (
     "sizing",
     "sweeps",
     "optimize",
+    "layout",
     "io",
     "plot",
     "cli",

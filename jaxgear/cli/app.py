@@ -118,6 +118,25 @@ def dynamics(
 
 
 @app.command()
+def layout(
+    file: File,
+    output: Annotated[Path | None, _output("layout")] = None,
+    quick: Quick = False,
+    no_figures: NoFigures = False,
+    no_cache: NoCache = False,
+) -> int:
+    """Find the flank lines of the pair on its shafts, and its profile modifications, in three steps.
+
+    Step 1 levels the load over the face or finds the longest life under a duty cycle, step 2 keeps the load off the
+    edges within the tolerances, step 3 tries profile modifications in all combinations. With and without housing.
+    """
+    with interrupt.importing():
+        from . import layout as command
+    fine = command.run_layout(file, output, quick=quick, figures=not no_figures, cache=not no_cache)
+    return OK if fine else NOT_CONVERGED
+
+
+@app.command()
 def sweep(
     file: File,
     output: Annotated[Path | None, _output("sweep")] = None,

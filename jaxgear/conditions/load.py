@@ -16,14 +16,16 @@ class LoadSpectrum(Checked):
         weights: shares, which sum to 1, shape (torques,).
         speeds: of the pinion at every torque, shape (torques,); None where nothing asks for them.
         friction: mean coefficient of friction at all of them; None for the default of whatever needs it.
+        duration: of all of them together, for a life; None where nothing asks for it.
     """
 
     torques: Float[Array, " torques"] = number("N m", low=0.0, shape=("torques",))
     weights: Float[Array, " torques"] = number("", low=0.0, shape=("torques",))
     speeds: Float[Array, " torques"] | None = number("rpm", low=0.0, shape=("torques",), optional=True)
     friction: Float[Array, ""] | None = number("", low=0.0, optional=True)
+    duration: Float[Array, ""] | None = number("h", low=0.0, open_low=True, optional=True)
 
-    def __init__(self, torques, weights=None, speeds=None, friction=None):
+    def __init__(self, torques, weights=None, speeds=None, friction=None, duration=None):
         """Makes the spectrum.
 
         Args:
@@ -31,6 +33,7 @@ class LoadSpectrum(Checked):
             weights: of any sum; None for equal shares.
             speeds: of the pinion [rpm], one per torque or one for all; None for none.
             friction: mean coefficient of friction; None for the default of whatever needs it.
+            duration: of all loads together [h], of which the weights are shares; None for none.
 
         Raises:
             ValueError: for torques, weights or speeds that are negative, not finite or of different number, loads that
@@ -40,7 +43,7 @@ class LoadSpectrum(Checked):
         if self.torques.ndim != 1 or not len(self.torques):
             raise ValueError("LoadSpectrum: torques must be a list of at least one torque")
         self.speeds = None if speeds is None else self._as_many("speeds", real(speeds))
-        self.friction = optional_real(friction)
+        self.friction, self.duration = optional_real(friction), optional_real(duration)
         self._check_different()
         shares = real(np.ones(self.torques.shape, self.torques.dtype)) if weights is None else real(weights)
         check("LoadSpectrum", "weights", shares, "", low=0.0)
@@ -66,6 +69,29 @@ class LoadSpectrum(Checked):
             return
         if len(np.unique(np.stack(known, axis=1), axis=0)) != len(self.torques):
             raise ValueError("LoadSpectrum: torques must be different" + ", or their speeds" * (len(given) > 1))
+
+    @staticmethod
+    def from_hours(torques, hours, speeds=None, friction=None) -> "LoadSpectrum":
+        """A duty cycle: every torque with the hours that it is run for.
+
+        Args:
+            torques, speeds, friction: as for the class.
+            hours: at every torque [h].
+
+        Raises:
+            ValueError: as the class does, and for hours that are all zero.
+        """
+        spent = real(hours)
+        check("LoadSpectrum", "hours", spent, "h", low=0.0)
+        if spent.ndim != 1:
+            raise ValueError("LoadSpectrum: hours must be a list, one entry per torque")
+        check("LoadSpectrum", "sum of the hours", jnp.sum(spent), "h", low=0.0, open_low=True)
+        return LoadSpectrum(torques, spent, speeds, friction, jnp.sum(spent))
+
+    @property
+    def hours(self) -> Float[Array, " torques"] | None:
+        """At every torque [h]; None without a duration."""
+        return None if self.duration is None else self.weights * self.duration
 
     @staticmethod
     def of(operation: Operation) -> "LoadSpectrum":

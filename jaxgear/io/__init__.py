@@ -7,6 +7,8 @@ from .dynamics_request import dynamics_request as dynamics_request
 from .errors import DesignFileError as DesignFileError
 from .folder import result_folder as result_folder
 from .folder import writing as writing
+from .layout_request import LayoutRequest as LayoutRequest
+from .layout_request import layout_request as layout_request
 from .optimize_request import OptimizeRequest as OptimizeRequest
 from .optimize_request import optimize_request as optimize_request
 from .reference import reference as reference

@@ -13,11 +13,12 @@ from ..contact import Mesh, Operation, Resolution, begin_contact, fewest_pairs, 
 from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
 from ..numerics import program
-from ..shafts import Misalignment, RigidSupport
+from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
-from . import schema, schema_dynamics, schema_sweep, template
+from . import schema, schema_dynamics, schema_shafts, schema_sweep, template
 from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refuse_given, refused
+from .gearbox import support_of
 from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
 from .variables import increasing, read_variables
@@ -52,6 +53,8 @@ class DesignFile:
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
         dynamics: likewise, see `dynamics_request`.
+        layout: likewise, see `layout_request`.
+        support: the mesh on its shafts; None without them.
         design: makes the modifications of pinion and wheel from the free parameters.
         open_case: numbers of gears, pair, model, misalignment and load that are variables; a sweep alone can vary them.
     """
@@ -68,6 +71,8 @@ class DesignFile:
     sweep: schema_sweep.SweepSection | None
     tolerance: schema_sweep.ToleranceSection | None
     dynamics: schema_dynamics.DynamicsSection | None
+    layout: schema_shafts.LayoutSection | None
+    support: ShaftSupport | None
     design: FileDesign
     open_case: tuple[template.Free, ...]
     _pair: template.Part
@@ -111,17 +116,19 @@ class DesignFile:
             pairs = max(pairs, _OPEN_PAIRS)
         return replace(self._resolution, pairs=pairs)
 
-    def mesh(self, resolution: Resolution | None = None) -> Mesh:
+    def mesh(self, resolution: Resolution | None = None, support: AbstractSupport | None = None) -> Mesh:
         """The prepared mesh.
 
         Args:
             resolution: array sizes in place of the file's.
+            support: what holds the gears; None for rigid shafts with the file's misalignment.
 
         Raises:
             DesignFileError: when the resolution does not cover the path of contact.
         """
         sizes = resolution or self.resolution()
-        options = {"compliance": self._compliance, "resolution": sizes, "support": self._support}
+        held = self._support if support is None else support
+        options = {"compliance": self._compliance, "resolution": sizes, "support": held}
         with naming(self.path):
             return refused("resolution", prepare, self._middle, **options)
 
@@ -206,6 +213,11 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         raise DesignFileError("sweep", "has no effect without [variables]")
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
     sweep = None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection)
+    layout = None if top.layout is None else decode("layout", top.layout, schema_shafts.LayoutSection)
+    if layout is not None and axes.fields:
+        raise DesignFileError("misalignment", "has no effect with [layout], which takes that of [[meshes]]")
+    if layout is not None and layout.profile is not None:
+        uneven.append("the flank lines of layout.profile")
     resolution = _resolution(top.resolution or {}, uneven)
     model = with_tables(model, stiffness, file.parent, pair, usual_pair)  # last, as it takes longer than all the rest
     return DesignFile(
@@ -221,6 +233,8 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         sweep=sweep,
         tolerance=tolerance,
         dynamics=None if top.dynamics is None else decode("dynamics", top.dynamics, schema_dynamics.DynamicsSection),
+        layout=layout,
+        support=support_of(top, layout, usual_pair, torque, file.parent),
         design=FileDesign(tuple(bounds), pinion_flank, wheel_flank),
         open_case=tuple(open_case),
         _pair=pair,

@@ -39,7 +39,7 @@ def refuse_given(table: str, section: object, keys: Iterable[str], why: str) -> 
     """Refuses the keys of a table that have no effect."""
     for key in keys:
         if getattr(section, key) not in (None, []):
-            raise DesignFileError(f"{table}.{key}", f"has no effect{why}")
+            raise DesignFileError(f"{table}.{key}" if table else key, f"has no effect{why}")
 
 
 def check_known(key: str, name: str, names: Collection[str]) -> None:

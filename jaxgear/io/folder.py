@@ -38,6 +38,10 @@ RESULT_FILES = frozenset(
         "branches.png",
         "bifurcation.png",
         "phase_portrait.png",
+        "profiles.csv",
+        "tolerance_cases.png",
+        "face_load_factors.png",
+        "radar.png",
     }
 )
 

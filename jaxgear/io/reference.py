@@ -9,16 +9,18 @@ from typing import Any
 import jax
 import numpy as np
 
+from .. import shafts
 from ..compliance import AbstractBody, AbstractContact, AbstractTooth, Compliance
 from ..contact import Operation, Resolution
 from ..dynamics import Dynamics
 from ..geometry import Gear, GearPair, Material
+from ..layout import WoehlerLine
 from ..metrics import quantities
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from ..shafts import Misalignment
 from ..tolerance import Tolerance
-from . import schema, schema_dynamics, schema_sweep
+from . import schema, schema_dynamics, schema_shafts, schema_sweep
 from .layout import Section, family, meanings, section_of, snake, summary
 from .ranges import allowed
 
@@ -66,6 +68,23 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     yield "[sweep]", schema_sweep.SweepSection, None
     yield "[tolerance]", schema_sweep.ToleranceSection, Tolerance
     yield "[dynamics]", schema_dynamics.DynamicsSection, Dynamics
+    yield from _gearbox_tables()
+
+
+def _gearbox_tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
+    yield "[[shafts]]", schema_shafts.ShaftSection, None
+    yield "[[shafts.sections]]", schema_shafts.PartSection, shafts.Section
+    yield "[[shafts.bearings]]", schema_shafts.BearingSection, shafts.Bearing
+    yield "[[shafts.bearings]] with stiffness", schema_shafts.MatrixBearingSection, shafts.MatrixBearing
+    yield "[[shafts.gears]]", schema_shafts.MountedGearSection, shafts.MountedGear
+    yield "[[shafts.couplings]]", schema_shafts.CouplingSection, shafts.Coupling
+    yield "[[shafts.loads]]", schema_shafts.LoadOnShaftSection, shafts.ShaftLoad
+    yield "[[meshes]]", schema_shafts.MeshSection, shafts.GearMesh
+    yield "[meshes.misalignment]", schema_shafts.MisalignmentSection, shafts.Misalignment
+    yield "[housing]", schema_shafts.HousingSection, None
+    yield "[layout]", schema_shafts.LayoutSection, None
+    yield "[layout.pitting] and [layout.bending]", schema_shafts.WoehlerSection, WoehlerLine
+    yield "[layout.profile]", schema_shafts.ProfileSection, None
 
 
 def _table(title: str, section: type[Section], of: Callable[..., Any] | None) -> Iterator[str]:

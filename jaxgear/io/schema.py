@@ -43,6 +43,10 @@ class FileSection(Section):
         sweep: what `jaxgear sweep` does.
         tolerance: of manufactured gears, for a sweep or `optimize.manufactured`.
         dynamics: at which speeds the pair runs, and what vibrates.
+        shafts: that carry the gears, for `jaxgear layout`.
+        meshes: of their gears; that of pinion and wheel alone without it.
+        housing: that holds their bearings; rigid seats without it.
+        layout: what `jaxgear layout` does.
     """
 
     pinion: Annotated[Tables, table()]
@@ -58,6 +62,10 @@ class FileSection(Section):
     sweep: Annotated[Tables | None, table()] = None
     tolerance: Annotated[Tables | None, table()] = None
     dynamics: Annotated[Tables | None, table()] = None
+    shafts: Annotated[list[Tables], _TABLES] = []
+    meshes: Annotated[list[Tables], _TABLES] = []
+    housing: Annotated[Tables | None, table()] = None
+    layout: Annotated[Tables | None, table()] = None
 
 
 class GearSection(section_of(Gear)):  # type: ignore[misc]

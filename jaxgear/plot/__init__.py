@@ -31,6 +31,8 @@ from .pressure_map import pressure_map as pressure_map
 from .radar import radar as radar
 from .response_surface import response_surface as response_surface
 from .shaft import shaft_deflection as shaft_deflection
+from .tolerance_cases import face_load_factors as face_load_factors
+from .tolerance_cases import tolerance_line_load as tolerance_line_load
 from .torque import face_load_over_torque as face_load_over_torque
 from .torque import harris_map as harris_map
 from .torque import ppte_over_torque as ppte_over_torque

@@ -1,0 +1,128 @@
+"""The gearbox that the tables [[shafts]], [[meshes]] and [housing] of a design file describe."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..geometry import Gear, GearPair
+from ..shafts import (
+    Bearing,
+    Coupling,
+    Gearbox,
+    GearMesh,
+    MatrixBearing,
+    Misalignment,
+    MountedGear,
+    Shaft,
+    ShaftLoad,
+    ShaftSupport,
+    integral_diameter,
+    read_housing,
+    support,
+)
+from ..shafts import Section as ShaftPart
+from . import schema_shafts as schema
+from .errors import DesignFileError, refuse_given, refused
+from .layout import section_of
+from .schema import FileSection
+from .template import part_of
+from .toml import decode
+
+_OWN = "pinion", "wheel"
+_SAME_TORQUE = 1e-3  # relative; what is left is rounding of ratios written by hand
+
+
+def support_of(
+    top: FileSection, layout: schema.LayoutSection | None, pair: GearPair, torque: float, folder: Path
+) -> ShaftSupport | None:
+    """The mesh of pinion and wheel on its shafts; None for a file without a layout.
+
+    Args:
+        top: all tables.
+        layout: the table of that name.
+        pair: of the file.
+        torque: of the file, on the pinion [N m].
+        folder: of the design file.
+
+    Raises:
+        DesignFileError: for tables that do not make a gearbox with pinion and wheel in it, or whose couplings bring
+            another torque to the pinion.
+    """
+    if layout is None:
+        refuse_given("", top, ["shafts", "meshes", "housing"], " without [layout]")
+        return None
+    if not top.shafts:
+        raise DesignFileError("layout", "has no effect without [[shafts]]")
+    made = [_shaft(f"shafts[{i}]", each, pair) for i, each in enumerate(top.shafts)]
+    names = [gear.name for shaft in made for gear in shaft.gears]
+    for name in _OWN:
+        if name not in names:
+            raise DesignFileError("shafts", f'no shaft carries the gear "{name}"')
+    given = [_mesh(f"meshes[{i}]", each, pair) for i, each in enumerate(top.meshes)]
+    given = given or [GearMesh(*_OWN, center_distance=pair.center_distance)]
+    own = [index for index, mesh in enumerate(given) if (mesh.pinion, mesh.wheel) == _OWN]
+    if not own:
+        raise DesignFileError("meshes", 'none is that of "pinion" and "wheel"')
+    box = refused("meshes" if top.meshes else "shafts", Gearbox, made, given, None, layout.direction)
+    brought = float(box.pinion_torques()[own[0]])
+    if not np.isclose(brought, torque, rtol=_SAME_TORQUE):
+        raise DesignFileError("load.torque", f"{torque:g} N m must be {brought:g} N m, which the couplings bring")
+    if top.housing is not None:
+        section = decode("housing", top.housing, schema.HousingSection)
+        seats = refused("housing.file", read_housing, folder / section.file)
+        box = refused("housing.file", replace, box, housing=seats)
+    return support(box, own[0])
+
+
+def _shaft(key: str, table: Mapping[str, Any], pair: GearPair) -> Shaft:
+    section = decode(key, table, schema.ShaftSection)
+
+    def each(name, make):
+        return [make(f"{key}.{name}[{i}]", item) for i, item in enumerate(getattr(section, name))]
+
+    return refused(
+        key,
+        Shaft,
+        section.name,
+        each("sections", lambda at, item: _plain(at, item, ShaftPart)),
+        each("bearings", lambda at, item: _plain(at, item, MatrixBearing if "stiffness" in item else Bearing)),
+        each("gears", lambda at, item: _gear(at, item, pair)),
+        each("couplings", lambda at, item: _plain(at, item, Coupling)),
+        each("loads", lambda at, item: _plain(at, item, ShaftLoad)),
+    )
+
+
+def _plain(key: str, table: Mapping[str, Any], cls):
+    """An object of numbers from its table."""
+    return part_of(key, decode(key, table, section_of(cls, open=False)), cls).build({})
+
+
+def _gear(key: str, table: Mapping[str, Any], pair: GearPair) -> MountedGear:
+    section = decode(key, table, schema.MountedGearSection)
+    if section.name in _OWN:
+        if section.gear is not None:
+            raise DesignFileError(f"{key}.gear", f"has no effect, [{section.name}] is the {section.name}")
+        gear = getattr(pair, section.name)
+    elif section.gear is None:
+        raise DesignFileError(f"{key}.gear", f'missing, "{section.name}" is not the pinion or wheel of the file')
+    else:
+        gear = _plain(f"{key}.gear", section.gear, Gear)
+    if section.integral and section.body_diameter is not None:
+        raise DesignFileError(f"{key}.body_diameter", "has no effect on an integral gear")
+    body = integral_diameter(gear) if section.integral else section.body_diameter
+    return refused(key, MountedGear, section.name, gear, section.position, body)
+
+
+def _mesh(key: str, table: Mapping[str, Any], pair: GearPair) -> GearMesh:
+    section = decode(key, table, schema.MeshSection)
+    numbers = {name: value for name, value in section.given().items() if name in ("angle", "center_distance")}
+    if (section.pinion, section.wheel) == _OWN:
+        if "center_distance" in numbers:
+            raise DesignFileError(f"{key}.center_distance", "has no effect, pair.center_distance is that of the pair")
+        numbers["center_distance"] = pair.center_distance
+    if section.misalignment is not None:
+        numbers["misalignment"] = _plain(f"{key}.misalignment", section.misalignment, Misalignment)
+    return refused(key, GearMesh, section.pinion, section.wheel, **numbers)

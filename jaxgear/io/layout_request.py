@@ -1,0 +1,129 @@
+"""What the table [layout] of a design file asks for."""
+
+import dataclasses
+
+from ..conditions import LoadSpectrum
+from ..layout import (
+    Endurance,
+    FlankLineTolerance,
+    WoehlerLine,
+    flank_line_tolerance,
+    helix_slope_limits,
+    without_housing,
+)
+from ..shafts import ShaftSupport
+from .design_file import DesignFile
+from .errors import DesignFileError, naming, refuse_given, refused
+from .schema_shafts import LayoutSection, ProfileSection, WoehlerSection
+from .template import part_of
+from .toml import decode
+
+_QUICK_STATIONS, _QUICK_AMOUNTS = 21, 3
+
+
+@dataclasses.dataclass(frozen=True)
+class LayoutRequest:
+    """A layout of flank lines and profiles, checked.
+
+    Attributes:
+        supports: the mesh on its shafts, in the housing first where there is one, then on rigid seats.
+        tolerances: by name.
+        options: of `layout_flank_lines`.
+        profile: what step 3 tries; None for no step 3.
+        profile_torque: on the pinion, of step 3 [N m].
+    """
+
+    supports: dict[str, ShaftSupport]
+    tolerances: dict[str, FlankLineTolerance]
+    options: dict
+    profile: ProfileSection | None
+    profile_torque: float
+
+
+def layout_request(design: DesignFile, *, quick: bool = False) -> LayoutRequest:
+    """Checks what a design file says about a layout.
+
+    Args:
+        design: the design file.
+        quick: fewer stations and profile modifications, for a first look.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
+    """
+    with naming(design.path):
+        section, support = design.layout, design.support
+        if section is None or support is None:
+            raise DesignFileError("layout", "missing, nothing says which tolerances the flank lines have to bear")
+        _check_open(design)
+        pair = support.pair
+        classes = section.quality_class if isinstance(section.quality_class, int) else tuple(section.quality_class)
+        tolerances = {
+            kind: refused("layout.quality_class", flank_line_tolerance, pair, classes, section.bearing_span, kind=kind)
+            for kind in ("statistical", "maximum")
+        }
+        further = helix_slope_limits(pair, classes) if section.further_crowning == "rule" else None
+        options = {
+            "gear": section.gear,
+            "further": further,
+            "share": section.edge_share,
+            "hollow": section.hollow,
+            "stations": min(section.stations, _QUICK_STATIONS) if quick else section.stations,
+            **_life(section),
+        }
+        housed = support.gearbox.housing is not None
+        supports = {"housing": support, "rigid seats": without_housing(support)} if housed else {"rigid seats": support}
+        profile = None if section.profile is None else decode("layout.profile", section.profile, ProfileSection)
+        return LayoutRequest(supports, tolerances, options, _profile(profile, quick), _profile_torque(design, profile))
+
+
+def _check_open(design: DesignFile) -> None:
+    """Refuses what a layout finds itself."""
+    if design.bounds:
+        raise DesignFileError("variables", f"layout needs numbers, these are free: {', '.join(design.bounds)}")
+    for gear, parts in (("pinion", design.design.pinion), ("wheel", design.design.wheel)):
+        if parts:
+            raise DesignFileError(f"{gear}.modification", "layout finds the modifications, leave them out")
+
+
+def _life(section: LayoutSection) -> dict:
+    """Duty cycle and endurance."""
+    keys = ["hours", "speeds", "pitting", "bending"]
+    if section.torques is None:
+        refuse_given("layout", section, keys, " without layout.torques")
+        return {}
+    for key in keys:
+        if getattr(section, key) is None:
+            raise DesignFileError(f"layout.{key}", "missing, layout.torques needs it")
+    for key in ("hours", "speeds"):
+        count, wanted = len(getattr(section, key)), len(section.torques)
+        if count != wanted:
+            raise DesignFileError(f"layout.{key}", f"{count} numbers must be as many as the {wanted} torques")
+    load = refused("layout.torques", LoadSpectrum.from_hours, section.torques, section.hours, section.speeds)
+    lines = [_woehler(key, getattr(section, key)) for key in ("pitting", "bending")]
+    return {"duty_cycle": load, "endurance": Endurance(*lines)}
+
+
+def _woehler(name: str, table) -> WoehlerLine:
+    key = f"layout.{name}"
+    return part_of(key, decode(key, table, WoehlerSection), WoehlerLine).build({})
+
+
+def _profile(section: ProfileSection | None, quick: bool) -> ProfileSection | None:
+    if section is None:
+        return None
+    if section.type == "profile_crowning" and section.length is not None:
+        raise DesignFileError("layout.profile.length", 'has no effect with type = "profile_crowning"')
+    amounts = {
+        "pinion_amounts": section.pinion_amounts,
+        "wheel_amounts": section.wheel_amounts or section.pinion_amounts,
+    }
+    for key, values in amounts.items():
+        if len(set(values)) != len(values):
+            raise DesignFileError(f"layout.profile.{key}", "must all be different")
+    if quick:
+        amounts = {key: values[:: -(-len(values) // _QUICK_AMOUNTS)] for key, values in amounts.items()}
+    return section.model_copy(update=amounts)
+
+
+def _profile_torque(design: DesignFile, section: ProfileSection | None) -> float:
+    return design.torque if section is None else section.torque_factor * design.torque

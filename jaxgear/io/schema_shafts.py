@@ -1,0 +1,144 @@
+"""The layout of the tables [[shafts]], [[meshes]], [housing] and [layout]."""
+
+from typing import Annotated, Any
+
+from ..layout import WoehlerLine
+from ..numerics import Number
+from ..shafts import Bearing, Coupling, GearMesh, MatrixBearing, Misalignment, MountedGear, ShaftLoad
+from ..shafts import Section as ShaftPart
+from .kinds import choice, count, either, list_of, positive, real, switch, table, text
+from .layout import Section, section_of
+
+Tables = dict[str, Any]
+
+_ROWS, _ROWS_OR_NONE = list_of(table()), list_of(table(), empty=True)
+_AMOUNTS = list_of(real(Number("um", low=0.0)))
+_CLASS = real(Number(low=1.0, high=11.0, whole=True))
+_HOURS = list_of(real(Number("h", low=0.0)))
+
+PartSection = section_of(ShaftPart, open=False)
+BearingSection = section_of(Bearing, open=False)
+MatrixBearingSection = section_of(MatrixBearing, open=False)
+CouplingSection = section_of(Coupling, open=False)
+LoadOnShaftSection = section_of(ShaftLoad, open=False)
+MisalignmentSection = section_of(Misalignment, open=False)
+WoehlerSection = section_of(WoehlerLine, open=False)
+
+
+class ShaftSection(Section):
+    """A stepped shaft with what sits on it.
+
+    Attributes:
+        name: of the shaft.
+        sections: from left to right, each with `length`, `diameter` and `bore`.
+        bearings: each with `name`, `position`, `radial`, `axial`, `tilting` and `clearance`, or with `stiffness`, a
+            matrix of 5 x 5 numbers, in place of all but the first two.
+        gears: on the shaft.
+        couplings: where torque enters and leaves, each with `position` and `torque`; one of a gearbox has no torque.
+        loads: from outside, each with `position`, `force` and `moment`.
+    """
+
+    name: Annotated[str, text()]
+    sections: Annotated[list[Tables], _ROWS]
+    bearings: Annotated[list[Tables], _ROWS]
+    gears: Annotated[list[Tables], _ROWS_OR_NONE] = []
+    couplings: Annotated[list[Tables], _ROWS_OR_NONE] = []
+    loads: Annotated[list[Tables], _ROWS_OR_NONE] = []
+
+
+class MountedGearSection(section_of(MountedGear, ("name", "gear"), open=False)):  # type: ignore[misc]
+    """A gear on a shaft.
+
+    Attributes:
+        name: "pinion" or "wheel" for those of the file, another name for another gear.
+        gear: of another name, the keys of [pinion]; its modifications have no part in a layout.
+        integral: whether it is cut into the shaft, which its teeth stiffen; in place of `body_diameter`.
+    """
+
+    name: Annotated[str, text()]
+    gear: Annotated[Tables | None, table()] = None
+    integral: Annotated[bool, switch()] = False
+
+
+class MeshSection(section_of(GearMesh, ("pinion", "wheel", "misalignment"), open=False)):  # type: ignore[misc]
+    """Two gears that mesh, by their names.
+
+    Attributes:
+        pinion: the driving one.
+        wheel: the driven one.
+        misalignment: of their axes, with `skew`, `inclination`, `bearing_span` and `direct`.
+    """
+
+    pinion: Annotated[str, text()]
+    wheel: Annotated[str, text()]
+    misalignment: Annotated[Tables | None, table()] = None
+
+
+class HousingSection(Section):
+    """What holds the bearing seats.
+
+    Attributes:
+        file: CSV or npz file beside the design file with the stiffness or compliance of the housing between the seats.
+    """
+
+    file: Annotated[str, text()]
+
+
+class LayoutSection(Section):
+    """What `jaxgear layout` does.
+
+    Attributes:
+        quality_class: flank tolerance class of ISO 1328-1, of both gears or of pinion and wheel.
+        bearing_span: over which the deviations of the axes are measured; parallel axes without it.
+        gear: whose flank line levels the load.
+        direction: in which the first shaft turns, seen against z.
+        further_crowning: "rule" takes C_b = f_Hbeta of ISO 6336-1 Annex B for both gears and more where that does not
+            suffice; "least" as little as keeps the load off the edges.
+        edge_share: of the largest load inside, up to which the end of a face may be loaded.
+        hollow: whether the crowning of step 1 may be negative.
+        stations: over the face, of the one-dimensional analysis.
+        torques: on the pinion, of a duty cycle; the load is levelled at the design torque without it.
+        hours: at every torque.
+        speeds: of the pinion at every torque.
+        pitting: what the flanks bear, `endurance`, `exponent` and `cycles` of a Woehler line.
+        bending: what the tooth roots bear, likewise.
+        profile: profile modifications to be tried in step 3; none without it.
+    """
+
+    quality_class: Annotated[
+        int | list[int], either(_CLASS, list_of(_CLASS, length=2), "a whole number, or a list of two")
+    ]
+    bearing_span: Annotated[float | None, positive("mm")] = None
+    gear: Annotated[str, choice("pinion", "wheel")] = "wheel"
+    direction: Annotated[str, choice("counterclockwise", "clockwise")] = "counterclockwise"
+    further_crowning: Annotated[str, choice("rule", "least")] = "rule"
+    edge_share: Annotated[float, real(Number(low=0.0, high=1.0, open_low=True))] = 1.0
+    hollow: Annotated[bool, switch()] = False
+    stations: Annotated[int, count(5, 1001)] = 41
+    torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
+    hours: Annotated[list[float] | None, _HOURS] = None
+    speeds: Annotated[list[float] | None, list_of(positive("rpm"))] = None
+    pitting: Annotated[Tables | None, table()] = None
+    bending: Annotated[Tables | None, table()] = None
+    profile: Annotated[Tables | None, table()] = None
+
+
+class ProfileSection(Section):
+    """Profile modifications that step 3 tries, those of both gears in all combinations.
+
+    Attributes:
+        type: of the modification.
+        pinion_amounts: amounts on the pinion.
+        wheel_amounts: amounts on the wheel; those of the pinion without it.
+        length: of a tip relief; the long one, over the zone of double contact, without it.
+        torque_factor: torque of the contact analysis, in design torques.
+        shafts: whether the contact feels shafts, bearings and housing, with the flank lines of both steps and once for
+            every support. Without them it has the further crowning alone, as on shafts whose bending is compensated.
+    """
+
+    type: Annotated[str, choice("tip_relief", "profile_crowning")] = "tip_relief"
+    pinion_amounts: Annotated[list[float], _AMOUNTS]
+    wheel_amounts: Annotated[list[float] | None, _AMOUNTS] = None
+    length: Annotated[float | None, positive("mm")] = None
+    torque_factor: Annotated[float, positive("")] = 0.9
+    shafts: Annotated[bool, switch()] = True

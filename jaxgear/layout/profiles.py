@@ -1,0 +1,155 @@
+"""Step 3 of a layout: profile modifications in all combinations, with the flank lines of the first two steps kept.
+
+References:
+    U. Kissling's three-step layout of modifications: cross-variation of the modifications of both gears; the
+    best has the least peak-to-peak transmission error without contact shock, that is with an effective contact ratio
+    not above the theoretical one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ..contact import Mesh
+from ..geometry import path_of_contact
+from ..metrics import Quantity
+from ..microgeometry import AbstractCurve, AbstractModification, ProfileCrowning, TipRelief
+from ..numerics import Callback, check
+from ..sizing import long_relief_length
+from ..sweeps import SweepTable, VariantList, sweep
+
+Kind = Literal["tip_relief", "profile_crowning"]
+
+RESULTS = ("ppte", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure")
+# By so much the effective contact ratio may be above the theoretical one: positions resolve ends of contact to less.
+_SHOCK = 0.01
+_NAMES = "pinion_amount", "wheel_amount"
+
+
+@dataclass(frozen=True)
+class ProfileLayout:
+    """Profile modifications that were tried.
+
+    Attributes:
+        kind: of the modification.
+        table: a row per variant; the first has no profile modification, the others are all combinations, those of the
+            wheel running fastest.
+        best: number of the variant that was chosen.
+        contact_ratio: theoretical one.
+        profiles: modifications of pinion and wheel of the variant that was chosen, without the flank lines.
+    """
+
+    kind: Kind
+    table: SweepTable
+    best: int
+    contact_ratio: float
+    profiles: tuple[AbstractModification, AbstractModification]
+
+    @property
+    def amounts(self) -> tuple[float, float]:
+        """Of the variant that was chosen, on pinion and wheel [um]."""
+        first, second = (float(self.table.column(name)[self.best]) for name in _NAMES)
+        return first, second
+
+    @property
+    def without_shock(self) -> np.ndarray:
+        """Whether the teeth of every variant meet on the theoretical path of contact only."""
+        return self.table.column("effective_contact_ratio") <= self.contact_ratio + _SHOCK
+
+    def change(self, name: str) -> float:
+        """Of a result from no profile modification to the variant that was chosen, relative [%]."""
+        values = self.table.column(name)
+        return 100.0 * float(values[self.best] / values[0] - 1.0)
+
+    def radar_variants(self, count: int = 5) -> tuple[list[int], list[str]]:
+        """Rows and names for `plot.radar`: no profile modification, then the best ones without contact shock."""
+        ppte = np.where(self.without_shock, self.table.column("ppte"), np.inf)
+        ranked = [int(row) for row in np.argsort(ppte, kind="stable") if row and np.isfinite(ppte[row])]
+        rows = list(dict.fromkeys([self.best, *ranked]))[:count]
+        first, second = (self.table.column(name) for name in _NAMES)
+        return [0, *rows], ["no profile modification", *(f"{first[row]:g} and {second[row]:g} µm" for row in rows)]
+
+
+def vary_profiles(
+    mesh: Mesh,
+    torque,
+    flank_lines: tuple[AbstractModification, AbstractModification],
+    pinion_amounts: Sequence[float],
+    wheel_amounts: Sequence[float],
+    *,
+    kind: Kind = "tip_relief",
+    length=None,
+    curve: AbstractCurve | None = None,
+    results: Sequence[str | Quantity] = (),
+    output: str | Path | None = None,
+    callback: Callback | None = None,
+) -> ProfileLayout:
+    """Cross-variation of the profile modifications of both gears.
+
+    Args:
+        mesh: prepared mesh with slices: over shafts, the flank lines are those of the first two steps; without them,
+            what is left of the flank lines where they have levelled the load, the further crowning.
+        torque: on the pinion [N m].
+        flank_lines: modifications of pinion and wheel, kept in every variant.
+        pinion_amounts, wheel_amounts: of the modification [um], crossed with each other.
+        kind: "tip_relief", for spur gears a long one, or "profile_crowning".
+        length: of the tip relief [mm]; None for the long one.
+        curve: of the tip relief; None for its default.
+        results: further results, beside transmission error, contact ratio, loss and pressure.
+        output: folder of the table; None keeps it in memory.
+        callback: of the progress, as `sweep` takes it.
+
+    Raises:
+        ValueError: for another kind, a length or curve of a profile crowning, amounts that are negative or none, and
+            where every variant failed.
+    """
+    if kind not in ("tip_relief", "profile_crowning"):
+        raise ValueError(f'vary_profiles: kind = {kind!r} must be "tip_relief" or "profile_crowning"')
+    for name, value in (("length", length), ("curve", curve)):
+        if kind == "profile_crowning" and value is not None:
+            raise ValueError(f"vary_profiles: {name} has no effect on a profile crowning")
+    for name, amounts in (("pinion_amounts", pinion_amounts), ("wheel_amounts", wheel_amounts)):
+        check("vary_profiles", name, np.asarray(amounts, float), "um", low=0.0)
+        if not len(amounts):
+            raise ValueError(f"vary_profiles: {name} must not be empty")
+    along = long_relief_length(mesh.pair) if length is None else length
+    shape = {} if curve is None else {"curve": curve}
+
+    def profile(amount) -> AbstractModification:
+        return TipRelief(amount, along, **shape) if kind == "tip_relief" else ProfileCrowning(amount)
+
+    def design(variant):
+        both = zip(flank_lines, (variant[name] for name in _NAMES))
+        pinion, wheel = (line + profile(amount) for line, amount in both)
+        return pinion, wheel
+
+    rows = [(0.0, 0.0), *((first, second) for first in pinion_amounts for second in wheel_amounts)]
+    wanted = (*RESULTS, *(one for one in results if one not in RESULTS))
+    plan = VariantList(_NAMES, rows)
+    table = sweep(
+        design,
+        plan,
+        mesh=mesh,
+        torque=torque,
+        results=wanted,
+        output=output,
+        callback=callback,
+        title="profile modifications",
+        units=dict.fromkeys(_NAMES, "um"),
+    )
+    theoretical = float(path_of_contact(mesh.pair).contact_ratio)
+    best = _best(table, theoretical)
+    first, second = rows[best]
+    return ProfileLayout(kind, table, best, theoretical, (profile(first), profile(second)))
+
+
+def _best(table: SweepTable, theoretical: float) -> int:
+    """The least transmission error without contact shock; with the least shock where all have some."""
+    ppte, ratio = table.column("ppte"), table.column("effective_contact_ratio")
+    if not np.isfinite(ppte).any():
+        raise ValueError("vary_profiles: the contact of every variant failed")
+    free = ratio <= theoretical + _SHOCK
+    return int(np.nanargmin(np.where(free, ppte, np.nan) if free.any() else ratio))

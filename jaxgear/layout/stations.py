@@ -1,0 +1,117 @@
+"""What a support does at the stations of the one-dimensional analysis, worked out once for many flank lines."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry import GearPair
+from ..numerics import check, concrete, optional_real, program, real, result, whole
+from ..shafts import AbstractSupport, ShaftSupport
+from ..shafts.mesh_support import even_coordinates
+
+Slices = Float[Array, " slices"]
+Scalar = Float[Array, ""]
+
+STATIONS = 41  # over the face, as many as `annex_e` has
+
+
+class Stations(AbstractSupport):
+    """A support as numbers at evenly spaced stations, under one torque; made by `at_stations`.
+
+    Attributes:
+        gears: the pair.
+        torque: on the pinion.
+        matrix: gap per force between the stations.
+        opening: gap by everything else than the force of the mesh.
+    """
+
+    gears: GearPair
+    torque: Scalar = result("N m")
+    matrix: Float[Array, "slices slices"] = result("um/N")
+    opening: Slices = result("um")
+
+    @property
+    def pair(self) -> GearPair:
+        """`gears`."""
+        return self.gears
+
+    @property
+    def count(self) -> int:
+        """Number of stations."""
+        return self.opening.shape[-1]
+
+    def influence(self, y: Slices) -> Float[Array, "slices slices"]:
+        """`matrix`; the face coordinates must be those of the stations."""
+        self._check(y)
+        return self.matrix
+
+    def gap(self, y: Slices) -> Slices:
+        """`opening`; the face coordinates must be those of the stations."""
+        self._check(y)
+        return self.opening
+
+    def _check(self, y: Slices) -> None:
+        if len(y) != self.count:
+            raise ValueError(f"Stations: {len(y)} face coordinates must be the {self.count} stations")
+
+
+def at_torque(support: ShaftSupport, torque) -> ShaftSupport:
+    """The gearbox with the torques of all couplings in proportion, so that the pinion of the mesh carries a torque.
+
+    Loads from outside stay as they are.
+
+    Args:
+        support: shafts at the mesh.
+        torque: on its pinion [N m].
+
+    Raises:
+        ValueError: for a negative torque, and for a gearbox whose mesh carries none, which nothing can be in proportion
+            to.
+    """
+    check("at_torque", "torque", torque, "N m", low=0.0)
+    now = support.torque
+    known = concrete(now)
+    if known is not None and known <= 0:
+        raise ValueError("at_torque: the couplings bring no torque to the mesh, there is nothing to be scaled")
+    factor = real(torque) / now
+    given = [
+        (i, j)
+        for i, shaft in enumerate(support.gearbox.shafts)
+        for j, item in enumerate(shaft.couplings)
+        if item.torque is not None
+    ]
+
+    def torques(of: ShaftSupport):
+        return [of.gearbox.shafts[i].couplings[j].torque for i, j in given]
+
+    return eqx.tree_at(torques, support, [factor * each for each in torques(support)])
+
+
+def at_stations(support: AbstractSupport, torque=None, *, stations: int = STATIONS) -> Stations:
+    """A support at the stations of the one-dimensional analysis.
+
+    Args:
+        support: shafts at the mesh, or `RigidSupport`.
+        torque: on the pinion [N m]; None for that of the couplings. For another one they are scaled, see `at_torque`.
+        stations: over the face.
+
+    Raises:
+        ValueError: for a support without couplings and without a torque, or a torque out of range.
+    """
+    if isinstance(support, Stations):
+        return support if torque is None else eqx.tree_at(lambda it: it.torque, support, real(torque))
+    if not isinstance(support, ShaftSupport) and torque is None:
+        raise ValueError("at_stations: torque must be given: no coupling tells it")
+    check("at_stations", "torque", torque, "N m", low=0.0)
+    return _at_stations(support, optional_real(torque), whole("at_stations", "stations", stations, 3, 1001))
+
+
+@program
+def _at_stations(support: AbstractSupport, torque: Scalar | None, stations: int) -> Stations:
+    y = even_coordinates(support.pair.face_width, stations)
+    if isinstance(support, ShaftSupport):
+        support = support if torque is None else at_torque(support, torque)
+        torque = support.torque
+    assert torque is not None
+    gap = jnp.broadcast_to(support.gap(y), y.shape)
+    return Stations(support.pair, torque, support.influence(y), gap)

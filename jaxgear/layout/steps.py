@@ -1,0 +1,195 @@
+"""Steps 1 and 2 of a layout together: the flank lines of a mesh, and what tolerances leave of the even load."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..conditions import LoadSpectrum
+from ..microgeometry import AbstractModification
+from ..numerics import Checked, check, real, result
+from ..shafts import AbstractSupport, ShaftSupport, annex_e
+from .flank_line import FlankLine, GearName, level_load
+from .life import Damage, Endurance, damage
+from .longest_life import longest_life
+from .stations import STATIONS, at_stations
+from .tolerance_cases import CASES, FlankLineTolerance, ToleranceCases, crowning_off_the_edges, tolerance_cases
+
+Scalar = Float[Array, ""]
+
+
+class FlankLineLayout(Checked):
+    """Flank lines of a mesh by the first two steps.
+
+    Attributes:
+        gear: whose flank line levels the load, "pinion" or "wheel".
+        torque: of the layout, on the pinion.
+        line: of step 1.
+        further: C_b of step 2 on pinion and wheel, on top of step 1.
+        needed: C_b of both together, without which a case touches an edge.
+        factors: K_Hbeta without modification and after step 1, both without deviations.
+        before, after: the five cases with the flank line of step 1 alone, and with those of step 2, by the name of the
+            tolerance.
+        damage: under the duty cycle without modification, after step 1 and after step 2; empty without one.
+    """
+
+    gear: GearName = eqx.field(static=True)
+    torque: Scalar = result("N m")
+    line: FlankLine
+    further: Float[Array, "2"] = result("um")
+    needed: Scalar = result("um")
+    factors: Float[Array, "2"] = result()
+    before: dict[str, ToleranceCases]
+    after: dict[str, ToleranceCases]
+    damage: tuple[Damage, ...] = ()
+
+    @property
+    def pinion(self) -> FlankLine:
+        """Flank line of the pinion after step 2."""
+        return self._line("pinion", 0)
+
+    @property
+    def wheel(self) -> FlankLine:
+        """Flank line of the wheel after step 2."""
+        return self._line("wheel", 1)
+
+    @property
+    def modifications(self) -> tuple[AbstractModification, AbstractModification]:
+        """Of pinion and wheel after step 2."""
+        return self.pinion.modification, self.wheel.modification
+
+    @property
+    def touches_edges(self) -> bool:
+        """Whether the largest load of some case is at an edge after step 2."""
+        return any(bool(np.any(cases.edge_contact)) for cases in self.after.values())
+
+    @property
+    def relative_life(self) -> Float[Array, " steps"]:
+        """Life without modification, after step 1 and after step 2, relative to that after step 1.
+
+        Raises:
+            ValueError: for a layout without a duty cycle.
+        """
+        if not self.damage:
+            raise ValueError("FlankLineLayout: relative_life needs a duty cycle")
+        return jnp.stack([each.life for each in self.damage]) / self.damage[1].life
+
+    def _line(self, gear: GearName, index: int) -> FlankLine:
+        own = self.line if self.gear == gear else FlankLine()
+        return own.crowned(self.further[index])
+
+    def __str__(self) -> str:
+        before, after = (f"{float(value):.3f}" for value in self.factors)
+        lines = [
+            f"layout at {float(self.torque):g} N m: K_Hbeta {before}, {after} after step 1",
+            f"step 1, {self.gear}: slope {float(self.line.slope):.2f} um, crowning {float(self.line.crowning):.2f} um",
+            "step 2, further crowning: pinion {:.2f} um, wheel {:.2f} um".format(*map(float, self.further)),
+            f"{'K_Hbeta':24}" + "".join(f"{name:>14}" for name in CASES),
+        ]
+        for step, of in (("step 1", self.before), ("step 2", self.after)):
+            for name, cases in of.items():
+                marks = ["*" if edge else "" for edge in np.asarray(cases.edge_contact)]
+                values = [f"{float(value):.3f}{mark}" for value, mark in zip(cases.face_load_factor, marks)]
+                lines.append(f"{f'{step}, {name}':24}" + "".join(f"{value:>14}" for value in values))
+        return "\n".join([*lines, "* largest load at an edge"])
+
+
+def layout_flank_lines(
+    support: AbstractSupport,
+    tolerances: Mapping[str, FlankLineTolerance] | FlankLineTolerance,
+    *,
+    torque=None,
+    duty_cycle: LoadSpectrum | None = None,
+    endurance: Endurance | tuple[Endurance, Endurance] | None = None,
+    gear: GearName = "wheel",
+    further=None,
+    share: float = 1.0,
+    hollow: bool = False,
+    stations: int = STATIONS,
+) -> FlankLineLayout:
+    """Steps 1 and 2 of the layout of a mesh.
+
+    Step 1 levels the load at the torque (`level_load`), or finds the longest life under a duty cycle (`longest_life`).
+    Step 2 adds crowning to both gears so that the largest load of none of the five cases is at an edge: the given
+    amounts, C_b = f_HbetaT of either gear after equation 1 of the study and ISO 6336-1 Annex B (`helix_slope_limits`),
+    and more in proportion where they do not suffice; without any, as little as it takes, half of it on either gear.
+
+    Args:
+        support: shafts at the mesh, `support` of a gearbox or `RigidSupport`.
+        tolerances: by name, for instance {"statistical": ..., "maximum": ...}; the worst of all counts.
+        torque: on the pinion [N m]; None for the largest of the duty cycle, or that of the couplings.
+        duty_cycle: torques with their hours, for step 1; None to level the load.
+        endurance: of the gears under it.
+        gear: whose flank line levels the load.
+        further: C_b of pinion and wheel [um]; None for as little as it takes.
+        share: of the largest load inside, up to which an end may be loaded.
+        hollow: whether the crowning of step 1 may be negative.
+        stations: over the face.
+
+    Raises:
+        ValueError: for a duty cycle without endurance or the reverse, another gear, amounts or numbers out of range,
+            and where no crowning keeps the load off the edges.
+    """
+    if gear not in ("pinion", "wheel"):
+        raise ValueError(f'layout_flank_lines: gear = {gear!r} must be "pinion" or "wheel"')
+    if (duty_cycle is None) != (endurance is None):
+        given, missing = ("duty_cycle", "endurance") if endurance is None else ("endurance", "duty_cycle")
+        raise ValueError(f"layout_flank_lines: {given} has no effect without {missing}")
+    check("layout_flank_lines", "further", further, "um", low=0.0)
+    if torque is None and duty_cycle is not None:
+        torque = jnp.max(duty_cycle.torques)
+    several = tolerances if isinstance(tolerances, Mapping) else {"tolerance": tolerances}
+    if not several:
+        raise ValueError("layout_flank_lines: tolerances must not be empty")
+    face = at_stations(support, torque, stations=stations)
+    if duty_cycle is None or endurance is None:
+        line = level_load(face, hollow=hollow, stations=stations)
+    else:
+        line = longest_life(support, duty_cycle, endurance, hollow=hollow, stations=stations)
+    each = [crowning_off_the_edges(face, one, line=line, share=share, stations=stations) for one in several.values()]
+    needed = jnp.max(jnp.stack(each))
+    if not bool(jnp.isfinite(needed)):
+        raise ValueError("layout_flank_lines: no crowning keeps the load off the edges: the shafts are too soft")
+    added = _further(needed, further)
+    layout = FlankLineLayout(
+        gear=gear,
+        torque=face.torque,
+        line=line,
+        further=added,
+        needed=needed,
+        factors=jnp.stack(
+            [
+                annex_e(face, torque=face.torque, wheel=one.modification, stations=stations).face_load_factor
+                for one in (FlankLine(), line)
+            ]
+        ),
+        before={name: tolerance_cases(face, one, wheel=line, stations=stations) for name, one in several.items()},
+        after={
+            name: tolerance_cases(face, one, wheel=line.crowned(jnp.sum(added)), stations=stations)
+            for name, one in several.items()
+        },
+    )
+    if duty_cycle is None or endurance is None:
+        return layout
+    steps = FlankLine(), line, line.crowned(jnp.sum(added))
+    spent = tuple(damage(support, duty_cycle, endurance, wheel=one, stations=stations) for one in steps)
+    return replace(layout, damage=spent)
+
+
+def _further(needed: Scalar, given) -> Float[Array, "2"]:
+    """C_b of pinion and wheel."""
+    if given is None:
+        return 0.5 * needed * jnp.ones(2)
+    amounts = jnp.broadcast_to(real(given), (2,))
+    total = jnp.sum(amounts)
+    if float(total) <= 0:
+        return 0.5 * needed * jnp.ones(2)
+    return amounts * jnp.maximum(1.0, needed / total)
+
+
+def without_housing(support: ShaftSupport) -> ShaftSupport:
+    """The same shafts on rigid seats."""
+    return replace(support, gearbox=replace(support.gearbox, housing=None))

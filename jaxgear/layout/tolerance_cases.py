@@ -1,0 +1,226 @@
+"""Step 2 of a layout: what tolerances make of the load over the face, and the crowning that keeps it off the edges.
+
+References:
+    U. Kissling's three-step layout of modifications: five cases of helix slope and axis deviations,
+    equations 1 and 2; ISO 6336-1 Annexes B and E.
+"""
+
+from typing import Literal
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from ..geometry import GearPair
+from ..microgeometry import LeadSlope
+from ..numerics import Checked, bracketed_root, check, maximum, number, program, real, result
+from ..shafts import AbstractSupport, FaceLoad, annex_e, axis_tolerance, face_load_factor
+from ..tolerance import ToleranceClass
+from .flank_line import FlankLine
+from .stations import STATIONS, Stations, at_stations
+
+Scalar = Float[Array, ""]
+Cases = Float[Array, " cases"]
+Kind = Literal["maximum", "statistical"]
+
+CASES = ("no deviation", "+f_Hb +f_ma", "+f_Hb -f_ma", "-f_Hb +f_ma", "-f_Hb -f_ma")
+_SIGNS = ((0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
+_LEVEL = 1e-3  # of the mean line load, by which an end has to be above the rest: an even load touches no edge
+_MOST = 16.0  # largest crowning that is tried, in sums of the deviations
+
+
+class FlankLineTolerance(Checked):
+    """Deviations of a pair over its common face width, each of either sign.
+
+    Attributes:
+        helix_slope: f_Hbeta of both gears together.
+        misalignment: f_ma of the axes, in the plane of action.
+    """
+
+    helix_slope: Scalar = number("um", low=0.0)
+    misalignment: Scalar = number("um", low=0.0, default=0.0)
+
+    @property
+    def slopes(self) -> Cases:
+        """Slope of the gap over the face width in the five cases [um], see `CASES`."""
+        return jnp.stack([first * self.helix_slope + second * self.misalignment for first, second in _SIGNS])
+
+
+def flank_line_tolerance(
+    pair: GearPair, quality_class, bearing_span=None, *, kind: Kind = "statistical"
+) -> FlankLineTolerance:
+    """Deviations that flank tolerance classes and the parallelism of the axes allow.
+
+    "maximum" adds the limits: f_HbetaT1 + f_HbetaT2, and f_ma = (f_Sigma_beta cos(alpha_wt) + f_Sigma_delta
+    sin(alpha_wt)) b / L (equation 2 of the study, which leaves out the scaling from the bearing span to the face).
+    "statistical" takes the root of the sum of the squares: where every deviation is normal and 97 % of it lie within
+    its limits, 97 % of the independent sum lie within that.
+
+    Args:
+        pair: gear pair.
+        quality_class: flank tolerance class of ISO 1328-1, one for both gears or (pinion, wheel).
+        bearing_span: L [mm], over which the deviations of the axes are measured, see `axis_tolerance`; None for
+            parallel axes.
+        kind: "maximum" or "statistical".
+
+    Raises:
+        ValueError: for a class or gear outside of the range of the standard, or another kind.
+    """
+    if kind not in ("maximum", "statistical"):
+        raise ValueError(f'flank_line_tolerance: kind = {kind!r} must be "maximum" or "statistical"')
+    classes = quality_class if isinstance(quality_class, tuple | list) else (quality_class, quality_class)
+    if len(classes) != 2:
+        raise ValueError(f"flank_line_tolerance: quality_class has {len(classes)} entries, must be one or two")
+    gears = pair.pinion, pair.wheel
+    limits = [ToleranceClass.of(gear, each) for gear, each in zip(gears, classes)]
+    slopes = [limit.helix_slope * pair.face_width / gear.face_width for limit, gear in zip(limits, gears)]
+    if bearing_span is None:
+        parts = [jnp.zeros(())]
+    else:
+        angle = pair.working_pressure_angle
+        axes = axis_tolerance(jnp.maximum(*(limit.helix_total for limit in limits)), pair.face_width, bearing_span)
+        share = pair.face_width / real(bearing_span)
+        parts = [share * axes.skew * jnp.cos(angle), share * axes.inclination * jnp.sin(angle)]
+    return FlankLineTolerance(_together(slopes, kind), _together(parts, kind))
+
+
+def helix_slope_limits(pair: GearPair, quality_class) -> Float[Array, "2"]:
+    """f_HbetaT of pinion and wheel [um], which equation 1 of the study takes for the further crowning C_b of each."""
+    classes = quality_class if isinstance(quality_class, tuple | list) else (quality_class, quality_class)
+    return jnp.stack(
+        [ToleranceClass.of(gear, each).helix_slope for gear, each in zip((pair.pinion, pair.wheel), classes)]
+    )
+
+
+def _together(parts, kind: Kind) -> Scalar:
+    return sum(parts) if kind == "maximum" else jnp.sqrt(sum(part**2 for part in parts))
+
+
+class ToleranceCases(Checked):
+    """Load over the face in the five cases of `CASES`.
+
+    Attributes:
+        slope: of the gap over the face width that the deviations make.
+        load: of the one-dimensional analysis, with a leading axis (cases,).
+    """
+
+    slope: Cases = result("um")
+    load: FaceLoad = eqx.field()
+
+    @property
+    def face_load_factor(self) -> Cases:
+        """K_Hbeta of every case."""
+        return face_load_factor(self.load.line_load)
+
+    @property
+    def edge_excess(self) -> Cases:
+        """Larger line load of both end stations less the largest in between, over the mean."""
+        return _excess(self.load.line_load, 1.0)
+
+    @property
+    def edge_contact(self) -> Bool[Array, " cases"]:
+        """Whether the largest line load is at an end of the face; an even load touches no edge."""
+        return self.edge_excess > _LEVEL
+
+    @property
+    def loaded_share(self) -> Cases:
+        """Share of the face that carries load."""
+        return jnp.mean(self.load.in_contact.astype(self.slope.dtype), axis=-1)
+
+
+def tolerance_cases(
+    support: AbstractSupport,
+    tolerance: FlankLineTolerance,
+    *,
+    pinion: FlankLine | None = None,
+    wheel: FlankLine | None = None,
+    torque=None,
+    stiffness=None,
+    stations: int = STATIONS,
+) -> ToleranceCases:
+    """Load over the face without deviations and in the four combinations of the largest ones.
+
+    Args:
+        support: shafts at the mesh, `support` of a gearbox or `RigidSupport`.
+        tolerance: the deviations.
+        pinion, wheel: flank lines; None for none.
+        torque: on the pinion [N m]; None for that of the couplings, which are scaled for another one.
+        stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1.
+        stations: over the face.
+    """
+    face = at_stations(support, torque, stations=stations)
+    return _cases(face, tolerance, pinion or FlankLine(), wheel or FlankLine(), stiffness)
+
+
+@program
+def _cases(face: Stations, tolerance: FlankLineTolerance, pinion: FlankLine, wheel: FlankLine, stiffness):
+    def at(slope):
+        deviated = wheel.modification + LeadSlope(slope)
+        given = {"pinion": pinion.modification, "wheel": deviated, "stiffness": stiffness}
+        return annex_e(face, torque=face.torque, stations=face.count, **given)
+
+    return ToleranceCases(tolerance.slopes, jax.vmap(at)(tolerance.slopes))
+
+
+def crowning_off_the_edges(
+    support: AbstractSupport,
+    tolerance: FlankLineTolerance,
+    *,
+    line: FlankLine | None = None,
+    torque=None,
+    share: float = 1.0,
+    stiffness=None,
+    stations: int = STATIONS,
+) -> Scalar:
+    """Smallest further crowning, of both gears together, with which no case touches an edge [um].
+
+    A case touches an edge where its largest line load is at an end of the face. That is what the study looks for in the
+    picture of all five cases; here the crowning is where the worst end station carries as much as the largest station
+    inside, or a share of that.
+
+    Args:
+        support: shafts at the mesh.
+        tolerance: the deviations.
+        line: flank line of step 1, on either gear; None for none.
+        torque: on the pinion [N m]; None for that of the couplings.
+        share: of the largest load inside, up to which an end may be loaded.
+        stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1.
+        stations: over the face.
+
+    Returns:
+        the crowning, 0 where none is needed; NaN where 16 times the sum of all deviations and of the opening by bent
+        shafts are not enough. Differentiable.
+    """
+    check("crowning_off_the_edges", "share", share, "", low=0.0, high=1.0, open_low=True)
+    face = at_stations(support, torque, stations=stations)
+    return _off_the_edges(face, tolerance, line or FlankLine(), real(share), stiffness)
+
+
+def _worst_excess(crowning, given):
+    face, tolerance, line, share, stiffness = given
+    found = _cases(face, tolerance, FlankLine(crowning=crowning), line, stiffness)
+    return maximum(_excess(found.load.line_load, share))
+
+
+@program
+def _off_the_edges(face: Stations, tolerance: FlankLineTolerance, line: FlankLine, share, stiffness) -> Scalar:
+    given = face, tolerance, line, share, stiffness
+    bent = face.opening + face.matrix @ jnp.full_like(face.opening, _force(face) / face.count)
+    size = tolerance.helix_slope + tolerance.misalignment + jnp.max(bent) - jnp.min(bent)
+    size = jax.lax.stop_gradient(_MOST * (size + jnp.abs(line.slope) + jnp.abs(line.crowning)))
+    zero = jnp.zeros_like(size)
+    found = bracketed_root(_worst_excess, zero, size, given)
+    enough, needed = _worst_excess(size, given) < 0, _worst_excess(zero, given) > _LEVEL
+    return jnp.where(needed, jnp.where(enough, found, jnp.nan), 0.0)
+
+
+def _force(face: Stations) -> Scalar:
+    return 1e3 * face.torque / face.pair.pinion.base_radius
+
+
+def _excess(line_load: Float[Array, "... slices"], share) -> Float[Array, "..."]:
+    """Larger load of both ends less a share of the largest in between, over the mean."""
+    ends = jnp.maximum(line_load[..., 0], line_load[..., -1])
+    inner, mean = maximum(line_load[..., 1:-1], axis=-1), jnp.mean(line_load, axis=-1)
+    return (ends - share * inner) / jnp.where(mean > 0, mean, 1.0)

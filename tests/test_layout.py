@@ -1,0 +1,333 @@
+"""Flank lines: what they level has closed forms, crowning keeps the load off the edges, lives add up, refusals."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from test_shafts import PINION, WHEEL, two_stages
+
+import jaxgear as jg
+from jaxgear.layout import (
+    CASES,
+    Endurance,
+    FlankLine,
+    FlankLineTolerance,
+    WoehlerLine,
+    at_stations,
+    at_torque,
+    crowning_off_the_edges,
+    damage,
+    flank_line_tolerance,
+    helix_slope_limits,
+    layout_flank_lines,
+    level_load,
+    longest_life,
+    tolerance_cases,
+    without_housing,
+)
+from jaxgear.metrics.root_stress import root_factors
+from jaxgear.shafts import Housing, Misalignment, RigidSupport, annex_e, support
+from jaxgear.tolerance import ToleranceClass
+
+PAIR = jg.GearPair(PINION, WHEEL)
+WIDTH = 18.0
+STATIONS = 21
+TORQUE = 150.0
+BOX = two_stages()
+SUPPORT = support(BOX, 1)
+ENDURANCE = Endurance(WoehlerLine(1500.0, 13.2, 5e7), WoehlerLine(900.0, 8.7, 3e6))
+DUTY = jg.LoadSpectrum.from_hours([60.0, 120.0, 180.0], [3000.0, 500.0, 20.0], [1000.0, 800.0, 500.0])
+
+
+def rigid(misalignment=0.0):
+    return RigidSupport(PAIR, Misalignment(direct=misalignment))
+
+
+def test_flank_line_of_skewed_rigid_axes_is_their_opposite():
+    line = level_load(rigid(20.0), TORQUE, stations=STATIONS)
+    np.testing.assert_allclose([line.slope, line.crowning], [-20.0, 0.0], atol=1e-9)
+
+
+def test_flank_line_levels_bent_shafts():
+    """What is left has neither a slope nor a parabola: both are uncorrelated with the line load."""
+    line = level_load(SUPPORT, stations=STATIONS)
+    before = annex_e(SUPPORT, stations=STATIONS).face_load_factor
+    load = annex_e(SUPPORT, wheel=line.modification, stations=STATIONS)
+    assert float(before) > 1.2 and float(load.face_load_factor) < 1.001
+    # the least squares of the load are where its rest is normal to what both amounts can do to it
+    step = 1e-3
+    rest = np.asarray(load.line_load) - np.mean(load.line_load)
+    for other in (FlankLine(line.slope + step, line.crowning), FlankLine(line.slope, line.crowning + step)):
+        moved = np.asarray(annex_e(SUPPORT, wheel=other.modification, stations=STATIONS).line_load)
+        change = moved - np.asarray(load.line_load)
+        assert abs(rest @ change) < 1e-6 * np.linalg.norm(rest) * np.linalg.norm(change) + 1e-9 * np.linalg.norm(change)
+
+
+def test_a_flank_line_that_would_be_hollow_has_no_crowning():
+    """Barrelled gaps as a crowned pinion makes them: the best crowning of the wheel is its negative."""
+    bulged = eqx.tree_at(
+        lambda face: face.opening,
+        at_stations(rigid(8.0), TORQUE, stations=STATIONS),
+        replace_fn=lambda gap: gap + 6.0 * jnp.linspace(-1, 1, STATIONS) ** 2,
+    )
+    hollow = level_load(bulged, hollow=True, stations=STATIONS)
+    assert float(hollow.crowning) < -5.9
+    line = level_load(bulged, stations=STATIONS)
+    assert float(line.crowning) == 0.0
+    np.testing.assert_allclose(line.slope, -8.0, rtol=1e-6)
+
+
+def test_couplings_are_scaled_to_a_torque():
+    other = at_torque(SUPPORT, 80.0)
+    np.testing.assert_allclose(other.torque, 80.0, rtol=1e-12)
+    np.testing.assert_allclose(other.gearbox.pinion_torques()[0], 80.0 * 19 / 48, rtol=1e-12)
+
+
+TOLERANCE = FlankLineTolerance(12.0, 7.0)
+
+
+@jax.jit
+def amounts_of(diameter):
+    """Slope, crowning and further crowning over the diameter of the middle shaft, and their derivatives."""
+
+    def amounts(diameter):
+        box = eqx.tree_at(lambda box: box.shafts[1].sections[0].diameter, BOX, diameter)
+        face = at_stations(support(box, 1), stations=11)
+        line = level_load(face, stations=11)
+        further = crowning_off_the_edges(face, TOLERANCE, line=FlankLine(7.0, 2.0), stations=11)
+        return jnp.stack([line.slope, line.crowning, further])
+
+    return jax.jvp(amounts, (diameter,), (jnp.ones_like(diameter),))
+
+
+def test_flank_lines_are_differentiable_in_the_shafts():
+    at, step = jnp.asarray(36.0), 1e-3
+    slopes = (amounts_of(at + step)[0] - amounts_of(at - step)[0]) / (2 * step)
+    assert (jnp.abs(slopes) > 1e-4).all()
+    np.testing.assert_allclose(amounts_of(at)[1], slopes, rtol=1e-4)
+
+
+def test_tolerances_are_those_of_the_standards():
+    """Maxima add up, statistical limits are the root of their squares; equation 2 of the study."""
+    classes = [ToleranceClass.of(gear, grade) for gear, grade in ((PINION, 6), (WHEEL, 7))]
+    slopes = [float(one.helix_slope) for one in classes]
+    total = max(float(one.helix_total) for one in classes)
+    angle = np.deg2rad(20.0)
+    axes = 0.5 * total * np.array([np.cos(angle), 2 * np.sin(angle)])  # both grow with L / b, and act over b / L
+    most = flank_line_tolerance(PAIR, (6, 7), 120.0, kind="maximum")
+    usual = flank_line_tolerance(PAIR, (6, 7), 240.0)
+    np.testing.assert_allclose([most.helix_slope, most.misalignment], [sum(slopes), axes.sum()], rtol=1e-12)
+    np.testing.assert_allclose(
+        [usual.helix_slope, usual.misalignment], [np.hypot(*slopes), np.hypot(*axes)], rtol=1e-12
+    )
+    assert float(flank_line_tolerance(PAIR, 6).misalignment) == 0.0
+    np.testing.assert_allclose(helix_slope_limits(PAIR, (6, 7)), slopes, rtol=1e-12)
+
+
+def test_cases_of_a_level_rigid_pair_are_straight_lines():
+    """K = 1 + c f / 2 w at the end, less half a station; opposite deviations are mirror images."""
+    found = tolerance_cases(rigid(), FlankLineTolerance(4.0, 2.0), torque=TORQUE, stiffness=16.0, stations=STATIONS)
+    mean = 1e3 * TORQUE / float(PINION.base_radius) / WIDTH
+    ends = 0.5 * np.array([0.0, 6.0, 2.0, 2.0, 6.0]) * (1 - 1 / STATIONS)
+    np.testing.assert_allclose(found.face_load_factor, 1 + 16.0 * ends / mean, rtol=1e-12)
+    np.testing.assert_array_equal(found.edge_contact, [False, True, True, True, True])
+    np.testing.assert_allclose(found.load.line_load[1], found.load.line_load[4][::-1], rtol=1e-12)
+    assert len(CASES) == 5 and np.all(found.loaded_share == 1.0)
+
+
+def test_least_crowning_brings_the_peak_just_inside():
+    """Of a rigid pair with gap C (2y/b)^2 + f y/b the load is highest at y = -f b / 8 C: the end needs C = f / 4."""
+    slope = 10.0
+    tolerance = FlankLineTolerance(slope)
+    found = crowning_off_the_edges(rigid(), tolerance, torque=TORQUE, stiffness=16.0, stations=STATIONS)
+    # both stations at the end carry alike: the peak is between them
+    peak = 0.5 - 1.0 / STATIONS
+    np.testing.assert_allclose(found, slope / (8 * peak), rtol=1e-4)
+    given = {"torque": TORQUE, "stiffness": 16.0, "stations": STATIONS}
+    for factor, touches in ((0.98, True), (1.02, False)):
+        cases = tolerance_cases(rigid(), tolerance, wheel=FlankLine(0.0, factor * found), **given)
+        assert bool(cases.edge_contact.any()) == touches
+    stricter = crowning_off_the_edges(rigid(), tolerance, share=0.8, **given)
+    cases = tolerance_cases(rigid(), tolerance, wheel=FlankLine(0.0, stricter), **given)
+    load = np.asarray(cases.load.line_load[1])
+    np.testing.assert_allclose(max(load[0], load[-1]), 0.8 * load.max(), rtol=1e-4)
+    assert float(crowning_off_the_edges(rigid(), FlankLineTolerance(0.0), **given)) == 0.0
+
+
+@pytest.fixture(scope="module")
+def layout():
+    several = {kind: flank_line_tolerance(SUPPORT.pair, 6, 130.0, kind=kind) for kind in ("statistical", "maximum")}
+    return layout_flank_lines(
+        SUPPORT, several, further=helix_slope_limits(SUPPORT.pair, 6), gear="pinion", stations=STATIONS
+    )
+
+
+def test_two_steps_keep_the_load_off_the_edges(layout):
+    before, after = layout.factors
+    assert float(before) > 1.2 and float(after) < 1.001
+    assert np.all(layout.before["maximum"].edge_contact[1:]) and not layout.touches_edges
+    np.testing.assert_allclose(layout.further, helix_slope_limits(SUPPORT.pair, 6))  # the rule suffices
+    assert float(layout.needed) < float(layout.further.sum())
+    assert float(layout.after["maximum"].face_load_factor.max()) < float(
+        layout.before["maximum"].face_load_factor.max()
+    )
+    assert float(layout.after["statistical"].face_load_factor[0]) > 1.1  # what it costs without deviations
+    np.testing.assert_allclose(layout.pinion.slope, layout.line.slope)
+    np.testing.assert_allclose(layout.wheel.crowning, layout.further[1])
+    assert str(layout).count("*") == 8 + 1  # four cases of both kinds before step 2, and what the mark means
+
+
+def test_crowning_grows_where_the_rule_does_not_suffice(layout):
+    tolerance = FlankLineTolerance(30.0)
+    given = layout_flank_lines(SUPPORT, tolerance, further=(1.0, 2.0), stations=STATIONS)
+    assert float(given.needed) > 3.0 and not given.touches_edges
+    np.testing.assert_allclose(given.further, given.needed * np.array([1.0, 2.0]) / 3.0)
+    least = layout_flank_lines(SUPPORT, tolerance, stations=STATIONS)
+    np.testing.assert_allclose(least.further, 0.5 * given.needed)
+
+
+def test_damage_of_one_load_is_that_of_its_woehler_line():
+    """By hand: Hertz at the pitch point, ISO's root stress of the pinion at the outer point of single contact."""
+    torque, hours, speed = 100.0, 50.0, 600.0
+    load = jg.LoadSpectrum.from_hours([torque], [hours], [speed])
+    found = damage(rigid(), load, ENDURANCE, stations=STATIONS)
+    line_load = 1e3 * torque / float(PINION.base_radius) / WIDTH
+    radii = np.array([float(gear.pitch_radius) for gear in (PINION, WHEEL)]) * np.sin(np.deg2rad(20))
+    hertz = np.sqrt(line_load * 206e3 / (1 - 0.09) / 2 / np.pi / (radii.prod() / radii.sum()))
+    np.testing.assert_allclose(found.contact_stress, [hertz], rtol=1e-9)
+    cycles = 60 * hours * speed * np.array([[1.0], [19 / 48]])
+    np.testing.assert_allclose(found.pitting, cycles / (5e7 * (1500.0 / hertz) ** 13.2), rtol=1e-9)
+    path = jg.path_of_contact(PAIR)
+    factors = root_factors(PINION, path.pinion_roll_length(path.outer_single))
+    root = line_load * np.cos(np.deg2rad(20)) / 3.0 * float(factors.form * factors.correction)
+    np.testing.assert_allclose(found.root_stress[0], [root], rtol=1e-9)
+    np.testing.assert_allclose(found.bending[0], cycles[0] / (3e6 * (900.0 / root) ** 8.7), rtol=1e-9)
+    np.testing.assert_allclose(found.life, hours / found.largest)
+
+
+def test_damage_adds_up_and_grows_by_the_exponent():
+    """Miner: loads add up. Half the exponent on the load, as stress goes with its root; uneven loads shorten life."""
+    parts = [
+        damage(rigid(), jg.LoadSpectrum.from_hours([torque], [hours], [500.0]), ENDURANCE, stations=STATIONS)
+        for torque, hours in ((100.0, 10.0), (200.0, 20.0))
+    ]
+    both = damage(
+        rigid(), jg.LoadSpectrum.from_hours([100.0, 200.0], [10.0, 20.0], 500.0), ENDURANCE, stations=STATIONS
+    )
+    np.testing.assert_allclose(both.total, parts[0].total + parts[1].total, rtol=1e-9)
+    np.testing.assert_allclose(parts[1].pitting / parts[0].pitting, 2 * 2**6.6, rtol=1e-9)
+    skewed = damage(rigid(6.0), jg.LoadSpectrum.from_hours([200.0], [20.0], 500.0), ENDURANCE, stations=STATIONS)
+    factor = float(skewed.face_load_factor[0])
+    assert factor > 1.05
+    np.testing.assert_allclose(skewed.pitting / parts[1].pitting, factor**6.6, rtol=1e-9)
+
+
+def test_life_is_differentiable_and_idle_loads_do_no_damage():
+    load = jg.LoadSpectrum.from_hours([0.0, 120.0], [5.0, 10.0], 500.0)
+
+    @jax.jit
+    def life(slope):
+        return damage(SUPPORT, load, ENDURANCE, wheel=FlankLine(slope, 3.0), stations=STATIONS).life
+
+    at, step = jnp.asarray(3.0), 1e-4
+    slope = (life(at + step) - life(at - step)) / (2 * step)
+    np.testing.assert_allclose(jax.jit(jax.grad(life))(at), slope, rtol=1e-6)
+    found = damage(SUPPORT, load, ENDURANCE, stations=STATIONS)
+    np.testing.assert_allclose(found.pitting[:, 0], 0.0, atol=1e-100)
+    np.testing.assert_allclose(found.contact_stress[0], 0.0, atol=1e-4)
+
+
+def test_longest_life_beats_its_neighbours_and_every_single_layout():
+    line = longest_life(SUPPORT, DUTY, ENDURANCE, stations=STATIONS)
+
+    def worst(other):
+        return float(damage(SUPPORT, DUTY, ENDURANCE, wheel=other, stations=STATIONS).largest)
+
+    least = worst(line)
+    for angle in np.linspace(0, 2 * np.pi, 12, endpoint=False):
+        for reach in (0.05, 1.0):
+            other = FlankLine(line.slope + reach * np.cos(angle), line.crowning + reach * np.sin(angle))
+            assert worst(other) > least * (1 - 1e-7)
+    for torque in DUTY.torques:
+        assert worst(level_load(SUPPORT, torque, stations=STATIONS)) > least
+    # of one load it is the level one
+    single = jg.LoadSpectrum.from_hours([TORQUE], [10.0], 100.0)
+    alone = longest_life(rigid(9.0), single, ENDURANCE, stations=STATIONS)
+    np.testing.assert_allclose([alone.slope, alone.crowning], [-9.0, 0.0], atol=1e-2)
+
+
+def test_layout_for_a_duty_cycle_tells_relative_lives():
+    found = layout_flank_lines(
+        SUPPORT, FlankLineTolerance(8.0), duty_cycle=DUTY, endurance=ENDURANCE, stations=STATIONS
+    )
+    assert float(found.torque) == 180.0
+    before, level, after = found.relative_life
+    assert float(level) == 1.0 and float(before) < 0.9 and float(after) < 1.0
+
+
+def test_housing_can_be_left_out():
+    nodes = tuple(f"{name}.{way}" for name in BOX.bearing_names for way in ("x", "y"))
+    soft = Housing(nodes, np.diag(np.linspace(1e-4, 3e-3, len(nodes))), "compliance")
+    housed = support(two_stages(housing=soft), 1)
+    np.testing.assert_allclose(
+        level_load(without_housing(housed), stations=STATIONS).slope, level_load(SUPPORT, stations=STATIONS).slope
+    )
+    assert abs(float(level_load(housed, stations=STATIONS).slope - level_load(SUPPORT, stations=STATIONS).slope)) > 0.5
+
+
+def test_hours_are_weights_with_a_duration():
+    np.testing.assert_allclose(DUTY.weights, np.array([3000.0, 500.0, 20.0]) / 3520.0)
+    np.testing.assert_allclose(DUTY.hours, [3000.0, 500.0, 20.0])
+    assert jg.LoadSpectrum([1.0, 2.0]).hours is None
+
+
+@pytest.mark.parametrize(
+    "make, fault",
+    [
+        (lambda: level_load(rigid()), "at_stations: torque must be given: no coupling tells it"),
+        (lambda: level_load(SUPPORT, -1.0), "at_stations: torque = -1 N m must be at least 0 N m"),
+        (lambda: at_torque(support(two_stages_idle(), 0), 5.0), "at_torque: the couplings bring no torque to the mesh"),
+        (lambda: FlankLineTolerance(-1.0), "FlankLineTolerance: helix_slope = -1 um must be at least 0 um"),
+        (lambda: flank_line_tolerance(PAIR, 6, kind="usual"), "flank_line_tolerance: kind = 'usual' must be"),
+        (lambda: flank_line_tolerance(PAIR, (5, 6, 7)), "flank_line_tolerance: quality_class has 3 entries"),
+        (
+            lambda: flank_line_tolerance(PAIR, 14),
+            "ToleranceClass: quality_class = 14 must be at least 1 and at most 11",
+        ),
+        (lambda: layout_flank_lines(SUPPORT, {}), "layout_flank_lines: tolerances must not be empty"),
+        (lambda: layout_flank_lines(SUPPORT, TOLERANCE, gear="both"), "layout_flank_lines: gear = 'both' must be"),
+        (
+            lambda: layout_flank_lines(SUPPORT, TOLERANCE, duty_cycle=DUTY),
+            "layout_flank_lines: duty_cycle has no effect without endurance",
+        ),
+        (lambda: layout_flank_lines(SUPPORT, TOLERANCE, further=-1.0), "layout_flank_lines: further = -1 um must be"),
+        (
+            lambda: crowning_off_the_edges(SUPPORT, TOLERANCE, share=0.0),
+            "crowning_off_the_edges: share = 0 must be greater than 0 and at most 1",
+        ),
+        (
+            lambda: damage(SUPPORT, jg.LoadSpectrum([1.0], duration=3.0), ENDURANCE),
+            "damage: a load spectrum with a duration needs speeds",
+        ),
+        (
+            lambda: longest_life(SUPPORT, jg.LoadSpectrum([0.0]), ENDURANCE),
+            "longest_life: torques are all zero, every flank line lives for ever",
+        ),
+        (
+            lambda: jg.LoadSpectrum.from_hours([1.0, 2.0], [0.0, 0.0]),
+            "LoadSpectrum: sum of the hours = 0 h must be greater than 0 h",
+        ),
+        (lambda: jg.LoadSpectrum.from_hours([1.0], [-1.0]), "LoadSpectrum: hours = -1 h must be at least 0 h"),
+        (lambda: WoehlerLine(0.0, 5.0, 1e6), "WoehlerLine: endurance = 0 MPa must be greater than 0 MPa"),
+    ],
+)
+def test_refusals(make, fault):
+    with pytest.raises(ValueError) as caught:
+        make()
+    assert str(caught.value).startswith(fault) and "\n" not in str(caught.value)
+
+
+def two_stages_idle():
+    """The reducer without torque."""
+    return eqx.tree_at(lambda box: box.shafts[0].couplings[0].torque, BOX, jnp.zeros(()))
