@@ -13,10 +13,11 @@ The pipeline in reading order, every step differentiable and vmappable:
     minimize, free_form         the best modification, by gradient and by other methods
     dynamics                    mesh force, oscillators, steady states over the speed, orbits and their bifurcations
     shafts                      shafts, bearings, housing: the load over the face
+    manufacture                 grinding wheel, volumes ground off, measuring charts
 
 The rest lives in the namespaces `jaxgear.geometry`, `compliance`, `contact`, `tolerance`, `conditions`, `metrics`,
-`sizing`, `sweeps`, `optimize`, `dynamics`, `shafts`, `plot` and `io`, with their `Abstract...` classes as extension
-points.
+`sizing`, `sweeps`, `optimize`, `dynamics`, `shafts`, `manufacture`, `plot` and `io`, with their `Abstract...` classes
+as extension points.
 
 Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in
 constructors.

@@ -18,3 +18,5 @@ from .results import write_summary as write_summary
 from .sweep_request import SweepRequest as SweepRequest
 from .sweep_request import sweep_request as sweep_request
 from .variants import read_variants as read_variants
+from .wheel import write_wheel_drawing as write_wheel_drawing
+from .wheel import write_wheel_points as write_wheel_points

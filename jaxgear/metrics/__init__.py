@@ -13,6 +13,7 @@ from ..numerics.reductions import Rms as Rms
 from ..numerics.reductions import Value as Value
 from .flank import FlankSurface as FlankSurface
 from .flank import flank_surface as flank_surface
+from .flank import gear_volume as gear_volume
 from .flank import max_relief as max_relief
 from .flank import profile_relief as profile_relief
 from .flank import relief_reversal as relief_reversal
