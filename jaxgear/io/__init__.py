@@ -5,6 +5,8 @@ from .design_file import load_design as load_design
 from .dynamics_request import DynamicsRequest as DynamicsRequest
 from .dynamics_request import dynamics_request as dynamics_request
 from .errors import DesignFileError as DesignFileError
+from .flanks import read_flank as read_flank
+from .flanks import write_traces as write_traces
 from .folder import result_folder as result_folder
 from .folder import writing as writing
 from .optimize_request import OptimizeRequest as OptimizeRequest

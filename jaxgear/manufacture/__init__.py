@@ -5,6 +5,17 @@ Functions take one gear's side of the contact, of `mesh.sides`, and the modifica
 """
 
 from . import quantities as _quantities  # noqa: F401 - adds to the vocabulary
+from .chart import FlankDeviations as FlankDeviations
+from .chart import FlankPlace as FlankPlace
+from .chart import Trace as Trace
+from .chart import flank_deviations as flank_deviations
+from .chart import flank_place as flank_place
+from .chart import helix_range as helix_range
+from .chart import helix_trace as helix_trace
+from .chart import profile_range as profile_range
+from .chart import profile_trace as profile_trace
+from .chart import start_of_relief as start_of_relief
+from .chart import table_traces as table_traces
 from .spline import WheelSpline as WheelSpline
 from .spline import best_wheel_spline as best_wheel_spline
 from .spline import relief_start as relief_start
