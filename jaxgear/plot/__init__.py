@@ -14,6 +14,9 @@ from .fan import fan as fan
 from .fan import ppte_distribution as ppte_distribution
 from .fan import ppte_histogram as ppte_histogram
 from .figure import save as save
+from .grinding import tooth_space as tooth_space
+from .grinding import volumes as volumes
+from .grinding import wheel_deviation as wheel_deviation
 from .iterations import iterations_relief as iterations_relief
 from .iterations import iterations_transmission_error as iterations_transmission_error
 from .k_chart import k_chart as k_chart
@@ -27,6 +30,7 @@ from .pressure import pressure as pressure
 from .pressure_map import pressure_map as pressure_map
 from .radar import radar as radar
 from .response_surface import response_surface as response_surface
+from .topography import topography as topography
 from .torque import harris_map as harris_map
 from .torque import ppte_over_torque as ppte_over_torque
 from .transmission_error import transmission_error as transmission_error
