@@ -14,10 +14,11 @@ The pipeline in reading order, every step differentiable and vmappable:
     dynamics                    mesh force, oscillators, steady states over the speed, orbits and their bifurcations
     shafts                      shafts, bearings, housing: the load over the face
     layout                      flank lines and profiles of a mesh on its shafts, in three steps
+    manufacture                 grinding wheel, volumes ground off, measuring charts
 
 The rest lives in the namespaces `jaxgear.geometry`, `compliance`, `contact`, `tolerance`, `conditions`, `metrics`,
-`sizing`, `sweeps`, `optimize`, `dynamics`, `shafts`, `layout`, `plot` and `io`, with their `Abstract...` classes as
-extension points.
+`sizing`, `sweeps`, `optimize`, `dynamics`, `shafts`, `layout`, `manufacture`, `plot` and `io`, with their `Abstract...`
+classes as extension points.
 
 Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in
 constructors.

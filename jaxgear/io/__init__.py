@@ -5,6 +5,8 @@ from .design_file import load_design as load_design
 from .dynamics_request import DynamicsRequest as DynamicsRequest
 from .dynamics_request import dynamics_request as dynamics_request
 from .errors import DesignFileError as DesignFileError
+from .flanks import read_flank as read_flank
+from .flanks import write_traces as write_traces
 from .folder import result_folder as result_folder
 from .folder import writing as writing
 from .layout_request import LayoutRequest as LayoutRequest
@@ -20,3 +22,5 @@ from .results import write_summary as write_summary
 from .sweep_request import SweepRequest as SweepRequest
 from .sweep_request import sweep_request as sweep_request
 from .variants import read_variants as read_variants
+from .wheel import write_wheel_drawing as write_wheel_drawing
+from .wheel import write_wheel_points as write_wheel_points

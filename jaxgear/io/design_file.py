@@ -18,6 +18,7 @@ from ..sizing import iso_stiffness
 from . import schema, schema_dynamics, schema_shafts, schema_sweep, template
 from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refuse_given, refused
+from .flanks import flank_part
 from .gearbox import support_of
 from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
@@ -174,8 +175,8 @@ def load_design(path: str | Path) -> DesignFile:
 
 
 def _checked(file: Path, top: schema.FileSection) -> DesignFile:
-    pinion, pinion_flank = _gear("pinion", top.pinion)
-    wheel, wheel_flank = _gear("wheel", top.wheel)
+    pinion, pinion_flank = _gear("pinion", top.pinion, file.parent)
+    wheel, wheel_flank = _gear("wheel", top.wheel, file.parent)
     flanks = [*pinion_flank, *wheel_flank]
     mounting = template.part_of("pair", decode("pair", top.pair or {}, schema.PairSection), GearPair)
     pair = replace(mounting, fields={"pinion": pinion, "wheel": wheel, **mounting.fields})
@@ -248,11 +249,14 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     )
 
 
-def _gear(name: str, table: schema.Tables) -> tuple[template.Part, list[template.Part]]:
-    """A gear and its modifications."""
+def _gear(name: str, table: schema.Tables, folder: Path) -> tuple[template.Part, list[template.Part]]:
+    """A gear and its modifications; paths begin in the folder."""
     section = decode(name, table, schema.GearSection)
-    tables = enumerate(section.modification)
-    flank = [template.parse(f"{name}.modification[{i}]", each, AbstractModification) for i, each in tables]
+    flank = []
+    for index, each in enumerate(section.modification):
+        key = f"{name}.modification[{index}]"
+        read = each.get("type") == "file"
+        flank.append(flank_part(key, each, folder) if read else template.parse(key, each, AbstractModification))
     return template.part_of(name, section, Gear), flank
 
 

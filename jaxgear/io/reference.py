@@ -51,6 +51,7 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     yield "[pair]", schema.PairSection, GearPair
     for name, cls in family(AbstractModification, users=False).items():
         yield f'[[pinion.modification]] with type = "{name}"', section_of(cls), cls
+    yield '[[pinion.modification]] with type = "file"', schema.FlankFileSection, None
     for name, cls in family(AbstractCurve, users=False).items():
         yield f'curve = {{ type = "{name}" }}', section_of(cls), cls
     yield "[load]", schema.LoadSection, Operation

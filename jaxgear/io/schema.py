@@ -78,6 +78,23 @@ class GearSection(section_of(Gear)):  # type: ignore[misc]
     modification: Annotated[list[Tables], _TABLES] = []
 
 
+class FlankFileSection(Section):
+    """A flank from a CSV file, measured or computed: points on a grid of roll_length_mm and, where it varies over the
+    face, face_coordinate_mm, with measured_um (excess material) or modification_um (material removed).
+
+    Attributes:
+        file: CSV file, beside the design file.
+        gear: of a file with flanks of both gears.
+        design: of a file with several designs.
+        method: of interpolation along the profile.
+    """
+
+    file: Annotated[str, text()]
+    gear: Annotated[str | None, choice("pinion", "wheel")] = None
+    design: Annotated[str | None, text()] = None
+    method: Annotated[str, choice("linear", "cubic2", "monotonic")] = "linear"
+
+
 PairSection = section_of(GearPair, ("pinion", "wheel"))
 MisalignmentSection = section_of(Misalignment)
 

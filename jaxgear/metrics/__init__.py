@@ -17,6 +17,7 @@ from .face_load import face_load_factors as face_load_factors
 from .face_load import root_face_load_factor as root_face_load_factor
 from .flank import FlankSurface as FlankSurface
 from .flank import flank_surface as flank_surface
+from .flank import gear_volume as gear_volume
 from .flank import max_relief as max_relief
 from .flank import profile_relief as profile_relief
 from .flank import relief_reversal as relief_reversal

@@ -121,20 +121,23 @@ def removed_volume(
     V = sum over the gears of 2 z int int max(h, 0) rho / r_b d rho dy, with the arc length rho / r_b d rho of an
     involute of roll length rho. Where h is negative there is material to add, which does not count.
     """
-    dtype = _dtype(mesh)
-    total = jnp.zeros((), dtype)
+    on_pinion, on_wheel = (gear_volume(side, modification) for side, modification in _flanks(mesh, pinion, wheel))
+    return on_pinion + on_wheel
+
+
+@program
+def gear_volume(side: Side, modification: AbstractModification) -> Scalar:
+    """Material ground off all teeth of one gear, both flanks of every tooth alike [mm^3]; see `removed_volume`."""
+    dtype = side.start_roll_length.dtype
     along, profile_weight = _gauss(_PROFILE_CELLS, dtype)
     across, face_weight = _gauss(_FACE_CELLS, dtype)
-    width = mesh.pair.face_width
-    for side, modification in _flanks(mesh, pinion, wheel):
-        length = side.tip_roll_length - side.start_roll_length
-        rho = side.start_roll_length + along * length
-        removed = removed_at(side, modification, rho, (across - 0.5) * width)
-        # >= and not maximum: at an amount of zero the slope is that of the material which is about to be removed
-        removed = jnp.where(removed >= 0, removed, 0.0)
-        per_flank = face_weight @ removed @ (profile_weight * rho) * width * length / side.base_radius
-        total = total + 1e-3 * 2 * side.gear.teeth * per_flank
-    return total
+    length = side.tip_roll_length - side.start_roll_length
+    rho = side.start_roll_length + along * length
+    removed = removed_at(side, modification, rho, (across - 0.5) * side.face_width)
+    # >= and not maximum: at an amount of zero the slope is that of the material which is about to be removed
+    removed = jnp.where(removed >= 0, removed, 0.0)
+    per_flank = face_weight @ removed @ (profile_weight * rho) * side.face_width * length / side.base_radius
+    return 1e-3 * 2 * side.gear.teeth * per_flank
 
 
 @program

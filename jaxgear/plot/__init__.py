@@ -16,6 +16,9 @@ from .fan import fan as fan
 from .fan import ppte_distribution as ppte_distribution
 from .fan import ppte_histogram as ppte_histogram
 from .figure import save as save
+from .grinding import tooth_space as tooth_space
+from .grinding import volumes as volumes
+from .grinding import wheel_deviation as wheel_deviation
 from .iterations import iterations_relief as iterations_relief
 from .iterations import iterations_transmission_error as iterations_transmission_error
 from .k_chart import k_chart as k_chart
@@ -33,6 +36,7 @@ from .response_surface import response_surface as response_surface
 from .shaft import shaft_deflection as shaft_deflection
 from .tolerance_cases import face_load_factors as face_load_factors
 from .tolerance_cases import tolerance_line_load as tolerance_line_load
+from .topography import topography as topography
 from .torque import face_load_over_torque as face_load_over_torque
 from .torque import harris_map as harris_map
 from .torque import ppte_over_torque as ppte_over_torque

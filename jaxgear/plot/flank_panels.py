@@ -7,21 +7,34 @@ from matplotlib.axes import Axes
 
 from ..contact import Mesh, Side
 from ..microgeometry import AbstractModification, NoModification
-from .figure import ABOVE, HEIGHT, legend_above, legend_over_panels, line_style, report_axes
+from ..tolerance import ToleranceClass
+from .figure import ABOVE, HEIGHT, PALE, legend_above, legend_over_panels, line_style, report_axes
 
 WIDTH = 150.0  # of the two panels together [mm]
+_BAND = "tolerance of the class"
 
 Design = tuple[AbstractModification | None, AbstractModification | None]
+Tolerances = tuple[ToleranceClass | None, ToleranceClass | None]
 
 
 # abscissa and material removed [um] of a flank, of one shape
 Trace = Callable[[Side, AbstractModification], tuple[np.ndarray, np.ndarray]]
+# the band of the tolerance about a flank of a class: abscissa, lower and upper limit of the material removed [um]
+Band = Callable[[Side, AbstractModification, ToleranceClass], tuple[np.ndarray, np.ndarray, np.ndarray]]
 # labels the abscissa of the panel of one gear, "pinion" or "wheel"
 Frame = Callable[[Axes, Side, str], None]
 
 
 def flank_panels(
-    mesh: Mesh, designs: Mapping[str, Design], ax, trace: Trace, frame: Frame, *, above: float = ABOVE
+    mesh: Mesh,
+    designs: Mapping[str, Design],
+    ax,
+    trace: Trace,
+    frame: Frame,
+    *,
+    above: float = ABOVE,
+    tolerance: Tolerances | None = None,
+    band: Band | None = None,
 ) -> np.ndarray:
     """The two Axes: material removed goes down, and the nominal involute is the zero line.
 
@@ -32,6 +45,8 @@ def flank_panels(
         trace: one line.
         frame: labels of one panel.
         above: distance of a legend from a panel of a given figure [pt].
+        tolerance: classes of pinion and wheel, for a band about the first design.
+        band: what makes it of one panel.
     """
     own = ax is None
     with report_axes(ax, columns=2, width=WIDTH, height=HEIGHT) as panels:
@@ -40,6 +55,11 @@ def flank_panels(
                 abscissa, removed = trace(side, design[index] or NoModification())
                 panel.plot(abscissa, removed, label=name, **line_style(style))
                 panel.set_xlim(abscissa[0], abscissa[-1])
+            quality = tolerance[index] if tolerance else None
+            if band is not None and quality is not None:
+                first = next(iter(designs.values()))[index] or NoModification()
+                place, low, high = band(side, first, quality)
+                panel.fill_between(place, low, high, color=PALE, zorder=0.4, linewidth=0, label=_BAND)
             frame(panel, side, title)
         panels[0].set_ylabel("material removed [µm]")
         _downwards(panels)
@@ -53,7 +73,8 @@ def flank_panels(
 def _downwards(panels) -> None:
     """One common ordinate that points down and has the nominal involute in sight."""
     lines = [line.get_ydata() for panel in panels for line in panel.lines]
-    values = np.concatenate([[0.0], *lines])
+    bands = [path.vertices[:, 1] for panel in panels for band in panel.collections for path in band.get_paths()]
+    values = np.concatenate([[0.0], *lines, *bands])
     low, high = values.min(), max(values.max(), values.min() + 1.0)
     air = 0.06 * (high - low)
     for panel in panels:

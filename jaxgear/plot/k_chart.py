@@ -9,14 +9,16 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from ..contact import Mesh, Side
+from ..manufacture import profile_trace
 from ..metrics import flank_surface
 from ..microgeometry import AbstractModification, NoModification
-from .flank_panels import Design, flank_panels
+from ..tolerance import ToleranceClass
+from .flank_panels import Design, Tolerances, flank_panels
 
 _ABOVE_DIAMETERS = 34.0  # [pt]; clears numbers and label of the upper axis
 
 
-def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray:
+def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None, *, tolerance: Tolerances | None = None) -> np.ndarray:
     """Material removed from pinion and wheel [um] over the roll angle [deg], in the middle of the face.
 
     From the start of the active profile to the tip; the nominal involute is the zero line, material removed goes down
@@ -26,11 +28,21 @@ def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray:
         mesh: prepared mesh.
         designs: (pinion, wheel) modifications by the name of the design; None for the nominal involute.
         ax: two Axes, for pinion and wheel; None for a new figure.
+        tolerance: classes of pinion and wheel; shades the total profile tolerance about the first design, over the
+            evaluation range.
 
     Returns:
         the two Axes.
     """
-    return flank_panels(mesh, designs, ax, _profile, _over_roll_angle, above=_ABOVE_DIAMETERS)
+    return flank_panels(
+        mesh, designs, ax, _profile, _over_roll_angle, above=_ABOVE_DIAMETERS, tolerance=tolerance, band=_band
+    )
+
+
+def _band(side: Side, design: AbstractModification, quality: ToleranceClass):
+    trace = profile_trace(side, design, quality)
+    inside = np.isfinite(trace.upper)
+    return tuple(np.asarray(values)[inside] for values in (trace.roll_angle, -trace.upper, -trace.lower))
 
 
 def _profile(side: Side, modification: AbstractModification) -> tuple[np.ndarray, np.ndarray]:

@@ -7,14 +7,18 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..contact import Mesh, Side
+from ..manufacture import helix_trace
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification
-from .flank_panels import Design, flank_panels
+from ..tolerance import ToleranceClass
+from .flank_panels import Design, Tolerances, flank_panels
 
 _POINTS = 201  # across the common face
 
 
-def lead_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray:
+def lead_chart(
+    mesh: Mesh, designs: Mapping[str, Design], ax=None, *, tolerance: Tolerances | None = None
+) -> np.ndarray:
     """Material removed from pinion and wheel [um] across the common face width [mm], at the pitch point.
 
     Material removed goes down, as in the K-chart, which shows the profile in the middle of the face.
@@ -23,11 +27,19 @@ def lead_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None) -> np.ndarray
         mesh: prepared mesh.
         designs: (pinion, wheel) modifications by the name of the design; None for the nominal involute.
         ax: two Axes, for pinion and wheel; None for a new figure.
+        tolerance: classes of pinion and wheel; shades the total helix tolerance about the first design, over the
+            evaluation range.
 
     Returns:
         the two Axes.
     """
-    return flank_panels(mesh, designs, ax, _line, _over_face)
+    return flank_panels(mesh, designs, ax, _line, _over_face, tolerance=tolerance, band=_band)
+
+
+def _band(side: Side, design: AbstractModification, quality: ToleranceClass):
+    trace = helix_trace(side, design, quality)
+    inside = np.isfinite(trace.upper)
+    return tuple(np.asarray(values)[inside] for values in (trace.face_coordinate, -trace.upper, -trace.lower))
 
 
 def _line(side: Side, modification: AbstractModification) -> tuple[np.ndarray, np.ndarray]:

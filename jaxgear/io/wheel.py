@@ -1,0 +1,82 @@
+"""Files for the dressing of a grinding wheel: its active profile as points (CSV) and as a drawing (DXF)."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from ..manufacture import GrindingWheel, WheelProfile
+from .folder import writing
+
+_COLUMNS = ("flank", "x_mm", "y_mm", "gear_diameter_mm", "roll_length_mm", "modification_um")
+_DIGITS = 6  # behind the decimal point of a millimetre: a nanometre
+_MILLIMETRES = 4  # INSUNITS of DXF
+_LAYER = "WHEEL_PROFILE"
+_AXIS = "WHEEL_MIDDLE"
+
+
+def write_wheel_points(
+    path: str | Path, left: WheelProfile, right: WheelProfile | None = None, *, wheel: GrindingWheel | None = None
+) -> Path:
+    """Writes the active profile of a wheel as CSV, in its frame: origin on its outer diameter in the middle plane.
+
+    Args:
+        path: file to write.
+        left: of the flank at negative x.
+        right: of the flank at positive x; None where both are alike.
+        wheel: adds the radius of the wheel at every point.
+
+    Returns:
+        the path.
+
+    Raises:
+        ValueError: when the file cannot be written.
+    """
+    columns = _COLUMNS if wheel is None else (*_COLUMNS, "wheel_radius_mm")
+    with writing(path), Path(path).open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        for name, sign, profile in _sides(left, right):
+            x, y, *rest = (np.asarray(values, float) for values in profile)
+            table = [sign * x, y, *rest] if wheel is None else [sign * x, y, *rest, float(wheel.radius) - y]
+            writer.writerows([name, *(f"{value + 0.0:.{_DIGITS}f}" for value in row)] for row in zip(*table))
+    return Path(path)
+
+
+def write_wheel_drawing(path: str | Path, left: WheelProfile, right: WheelProfile | None = None) -> Path:
+    """Writes the active profile of a wheel as DXF (R2010, mm): one polyline per flank, and the middle plane.
+
+    Args:
+        path: file to write.
+        left: of the flank at negative x.
+        right: of the flank at positive x; None where both are alike.
+
+    Returns:
+        the path.
+
+    Raises:
+        ValueError: when the file cannot be written.
+        ModuleNotFoundError: without the package ezdxf, which the extra `cad` installs.
+    """
+    try:
+        import ezdxf
+    except ModuleNotFoundError:
+        raise ModuleNotFoundError(
+            "write_wheel_drawing: DXF files need the package ezdxf: pip install jaxgear[cad]"
+        ) from None
+    drawing = ezdxf.new("R2010", units=_MILLIMETRES)
+    drawing.linetypes.add("CENTER", [2.0, 1.25, -0.25, 0.25, -0.25])
+    drawing.layers.add(_LAYER)
+    drawing.layers.add(_AXIS, linetype="CENTER")
+    plane = drawing.modelspace()
+    for _, sign, profile in _sides(left, right):
+        plane.add_lwpolyline(np.stack([sign * np.asarray(profile.x), profile.y], axis=1), dxfattribs={"layer": _LAYER})
+    plane.add_line((0.0, 0.0), (0.0, float(left.y[-1])), dxfattribs={"layer": _AXIS})
+    with writing(path):
+        drawing.saveas(path)
+    return Path(path)
+
+
+def _sides(left: WheelProfile, right: WheelProfile | None):
+    yield "left", -1.0, left
+    yield "right", 1.0, left if right is None else right

@@ -1,0 +1,37 @@
+"""How flanks are made and measured: form-grinding wheel, volumes ground off, charts of the measuring machine.
+
+Functions take one gear's side of the contact, of `mesh.sides`, and the modification of its flanks. Importing adds
+`pinion_quadratic_deviation`, `pinion_removed_volume` and others to the vocabulary of quantities.
+"""
+
+from . import quantities as _quantities  # noqa: F401 - adds to the vocabulary
+from .chart import FlankDeviations as FlankDeviations
+from .chart import FlankPlace as FlankPlace
+from .chart import Trace as Trace
+from .chart import flank_deviations as flank_deviations
+from .chart import flank_place as flank_place
+from .chart import helix_range as helix_range
+from .chart import helix_trace as helix_trace
+from .chart import profile_range as profile_range
+from .chart import profile_trace as profile_trace
+from .chart import start_of_relief as start_of_relief
+from .chart import table_traces as table_traces
+from .spline import WheelSpline as WheelSpline
+from .spline import best_wheel_spline as best_wheel_spline
+from .spline import relief_start as relief_start
+from .spline import wheel_spline as wheel_spline
+from .tooth_space import SpaceFlank as SpaceFlank
+from .tooth_space import space_flank as space_flank
+from .volume import ReferenceVolumes as ReferenceVolumes
+from .volume import ground_volume as ground_volume
+from .volume import reference_volumes as reference_volumes
+from .volume import relative_volume as relative_volume
+from .wheel import GrindingMargins as GrindingMargins
+from .wheel import GrindingWheel as GrindingWheel
+from .wheel import WheelProfile as WheelProfile
+from .wheel import grinding_faults as grinding_faults
+from .wheel import grinding_margins as grinding_margins
+from .wheel import largest_wheel_radius as largest_wheel_radius
+from .wheel import run_out as run_out
+from .wheel import smallest_wheel_radius as smallest_wheel_radius
+from .wheel import wheel_profile as wheel_profile

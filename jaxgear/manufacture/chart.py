@@ -1,0 +1,234 @@
+"""What a gear measuring machine shows: traces of a flank, their evaluation range and tolerance band, deviations.
+
+Sign of the machines: deviations are normal to the flank and positive for excess material, so a relief is negative;
+modifications count the material removed. The nominal involute is the zero line.
+"""
+
+from typing import Literal, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from ..contact import Side
+from ..geometry import diameter, roll_angle
+from ..metrics import removed_at
+from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
+from ..numerics import Checked, program, result, spread
+from ..tolerance import ToleranceClass, iso_rounded
+from .spline import relief_start
+
+Scalar = Float[Array, ""]
+Points = Float[Array, " points"]
+
+_POINTS = 101
+_ROUNDING = 16  # of the last place
+_EVALUATED = 0.95  # of the profile from the start of the active profile on (ISO 1328-1:2013, L_alpha)
+_END = 0.05  # of the face width, left out at either end, or a module where that is less (ISO 1328-1:2013, L_beta)
+
+
+class Trace(Checked):
+    """One trace of a flank; every array has the shape (points,).
+
+    Attributes:
+        kind: "profile" along the tooth depth, or "helix" along the face.
+        face_coordinate: from the middle of the face [mm].
+        roll_angle: [deg].
+        roll_length: [mm].
+        diameter: [mm].
+        design: the design flank [um], positive for material added to the nominal involute.
+        upper, lower: limits [um], the total tolerance spread evenly about the design; NaN outside the evaluation range,
+            and everywhere without a tolerance.
+    """
+
+    kind: Literal["profile", "helix"] = eqx.field(static=True)
+    face_coordinate: Points = result("mm")
+    roll_angle: Points = result("deg")
+    roll_length: Points = result("mm")
+    diameter: Points = result("mm")
+    design: Points = result("um")
+    upper: Points = result("um")
+    lower: Points = result("um")
+
+
+class FlankPlace(NamedTuple):
+    """A place along the profile in the three ways that machines ask for it.
+
+    Attributes:
+        roll_length: [mm].
+        roll_angle: [deg].
+        diameter: [mm].
+    """
+
+    roll_length: Scalar
+    roll_angle: Scalar
+    diameter: Scalar
+
+
+class FlankDeviations(NamedTuple):
+    """Deviations of a measured trace from the design trace within the evaluation range (ISO 1328-1) [um].
+
+    Attributes:
+        slope: f_Halpha or f_Hbeta, rise of the mean line over the evaluation range; positive for excess material
+            towards the tip, or towards positive face coordinates.
+        form: f_falpha or f_fbeta, width of the band about the mean line.
+        total: F_alpha or F_beta, width of the band about the design.
+    """
+
+    slope: Scalar
+    form: Scalar
+    total: Scalar
+
+
+def profile_range(side: Side) -> tuple[Scalar, Scalar]:
+    """Roll lengths [mm] between which a profile is evaluated: 95 % of the active profile, from its start on."""
+    start = side.start_roll_length
+    return start, start + _EVALUATED * (side.tip_roll_length - start)
+
+
+def helix_range(side: Side) -> tuple[Scalar, Scalar]:
+    """Face coordinates [mm] between which a helix is evaluated: without 5 % of the face, or a module, at either end."""
+    half = 0.5 * side.face_width - jnp.minimum(_END * side.face_width, side.gear.module)
+    return -half, half
+
+
+def flank_place(side: Side, roll_length) -> FlankPlace:
+    """A roll length [mm] as roll angle and diameter too."""
+    return FlankPlace(roll_length, roll_angle(side.gear, roll_length), diameter(side.gear, roll_length))
+
+
+def start_of_relief(side: Side, modification: AbstractModification) -> FlankPlace:
+    """Where the relief of the tip starts (`relief_start`)."""
+    return flank_place(side, relief_start(side, modification))
+
+
+@program
+def profile_trace(
+    side: Side,
+    modification: AbstractModification,
+    tolerance: ToleranceClass | None = None,
+    *,
+    face_coordinate=0.0,
+    roll_length: Points | None = None,
+    points: int = _POINTS,
+) -> Trace:
+    """The profile of a flank, from the start of the active profile to the tip.
+
+    Args:
+        side: the gear's side of the contact, of `mesh.sides`.
+        modification: of the flank.
+        tolerance: class of the gear, for the band; None for no band.
+        face_coordinate: of the trace [mm].
+        roll_length: where, shape (points,) [mm]; None for evenly spaced points.
+        points: their number.
+    """
+    if roll_length is None:
+        roll_length = jnp.linspace(side.start_roll_length, side.tip_roll_length, points)
+    face = jnp.full_like(roll_length, face_coordinate)
+    low, high = profile_range(side)
+    inside = _between(roll_length, low, high)
+    removed = removed_at(side, modification, roll_length, face[:1])[0]
+    return _trace(
+        "profile", side, roll_length, face, removed, inside, None if tolerance is None else tolerance.profile_total
+    )
+
+
+@program
+def helix_trace(
+    side: Side,
+    modification: AbstractModification,
+    tolerance: ToleranceClass | None = None,
+    *,
+    roll_length=None,
+    face_coordinate: Points | None = None,
+    points: int = _POINTS,
+) -> Trace:
+    """The flank line, across the common face width.
+
+    Args:
+        side: the gear's side of the contact, of `mesh.sides`.
+        modification: of the flank.
+        tolerance: class of the gear, for the band; None for no band.
+        roll_length: of the trace [mm]; None for the pitch point.
+        face_coordinate: where, shape (points,) [mm]; None for evenly spaced points.
+        points: their number.
+    """
+    roll = side.pitch_roll_length if roll_length is None else roll_length
+    if face_coordinate is None:
+        face_coordinate = jnp.linspace(-0.5, 0.5, points, dtype=side.face_width.dtype) * side.face_width
+    along = jnp.full_like(face_coordinate, roll)
+    low, high = helix_range(side)
+    inside = _between(face_coordinate, low, high)
+    removed = removed_at(side, modification, along[:1], face_coordinate)[:, 0]
+    return _trace(
+        "helix", side, along, face_coordinate, removed, inside, None if tolerance is None else tolerance.helix_total
+    )
+
+
+def table_traces(
+    side: Side, table: TabulatedProfile | TabulatedFlank, tolerance: ToleranceClass | None = None
+) -> list[Trace]:
+    """Profile traces of a tabulated flank at the places of its table: what a machine has measured, as it was.
+
+    Args:
+        side: the gear's side of the contact, of `mesh.sides`.
+        table: a flank table, or a profile table over roll lengths.
+        tolerance: class of the gear, for the band; None for no band.
+    """
+    if isinstance(table, TabulatedFlank):
+        roll, faces = table.roll_length, table.face_coordinate
+    else:
+        roll, faces = table.position, jnp.zeros((1,), table.position.dtype)
+        if table.coordinate == "roll_angle":
+            roll = jnp.deg2rad(roll) * side.base_radius
+    return [profile_trace(side, table, tolerance, face_coordinate=face, roll_length=roll) for face in faces]
+
+
+def flank_deviations(side: Side, design: Trace, measured: Trace) -> FlankDeviations:
+    """Deviations of a measured trace from the design trace at the same places.
+
+    The mean line is that of least squares over the points in the evaluation range.
+
+    Raises:
+        ValueError: for traces of other kinds or places.
+    """
+    if design.kind != measured.kind or design.design.shape != measured.design.shape:
+        raise ValueError(
+            f"flank_deviations: measured is a {measured.kind} trace of {measured.design.shape[0]} points, must be a "
+            f"{design.kind} trace of {design.design.shape[0]} points like the design"
+        )
+    place = design.roll_length if design.kind == "profile" else design.face_coordinate
+    low, high = profile_range(side) if design.kind == "profile" else helix_range(side)
+    return _deviations(place, measured.design - design.design, low, high)
+
+
+@program
+def _deviations(place: Points, deviation: Points, low: Scalar, high: Scalar) -> FlankDeviations:
+    inside = _between(place, low, high)
+    weight = inside.astype(deviation.dtype)
+    count = jnp.sum(weight)
+    centre, mean = jnp.sum(weight * place) / count, jnp.sum(weight * deviation) / count
+    arm = weight * (place - centre)
+    rate = jnp.sum(arm * deviation) / jnp.sum(arm * (place - centre))
+    rest = deviation - mean - rate * (place - centre)
+    return FlankDeviations(rate * (high - low), _within(rest, inside), _within(deviation, inside))
+
+
+def _between(place: Points, low: Scalar, high: Scalar) -> Bool[Array, " points"]:
+    """Whether places lie within a range; rounding leaves none of its ends out."""
+    slack = _ROUNDING * jnp.finfo(place.dtype).eps * (jnp.abs(low) + jnp.abs(high))
+    return (place >= low - slack) & (place <= high + slack)
+
+
+def _within(values: Points, inside) -> Scalar:
+    """Spread of the values inside."""
+    first = values[jnp.argmax(inside)]
+    return spread(jnp.where(inside, values, first))
+
+
+def _trace(kind, side: Side, roll: Points, face: Points, removed: Points, inside, total: Scalar | None) -> Trace:
+    design = -removed
+    half = jnp.nan if total is None else 0.5 * iso_rounded(total)
+    band = jnp.where(inside, jnp.full_like(design, half), jnp.nan)
+    place = flank_place(side, roll)
+    return Trace(kind, face, place.roll_angle, roll, place.diameter, design, design + band, design - band)

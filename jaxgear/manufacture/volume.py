@@ -1,0 +1,87 @@
+"""What is ground off a gear, beside the reliefs that industry grinds otherwise.
+
+"Design for manufacturing of a spur gears profile modification based on the static transmission error for improving the
+dynamic behavior" (Int J Adv Manuf Technol 2023, doi 10.1007/s00170-023-12340-x, section 5, Fig. 22) compares the volume
+of its reliefs with linear and parabolic ones from the pitch point of the same amount at the tip.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..contact import Side
+from ..geometry import outline
+from ..metrics import gear_volume, removed_at
+from ..microgeometry import AbstractCurve, AbstractModification, Linear, Quadratic, TipRelief
+from ..numerics import program, real, safe_divide
+
+Scalar = Float[Array, ""]
+
+
+class ReferenceVolumes(NamedTuple):
+    """Volumes [mm^3] that tip reliefs of one amount take off one gear.
+
+    Attributes:
+        linear_from_pitch, parabolic_from_pitch: that start at the pitch point.
+        linear_from_single, parabolic_from_single: that start where single contact ends towards the tip.
+    """
+
+    linear_from_pitch: Scalar
+    parabolic_from_pitch: Scalar
+    linear_from_single: Scalar
+    parabolic_from_single: Scalar
+
+
+@program
+def reference_volumes(side: Side, amount) -> ReferenceVolumes:
+    """Volumes of the reference reliefs of a gear.
+
+    Args:
+        side: the gear's side of the contact, of `mesh.sides`.
+        amount: at the tip [um].
+    """
+    pitch = _addendum(side)
+    # the next pair touches at the start of the active profile, one base pitch below
+    single = side.tip_roll_length - side.start_roll_length - side.gear.base_pitch
+    volumes = [_relieved(side, amount, length, curve) for length in (pitch, single) for curve in _curves()]
+    return ReferenceVolumes(*volumes)
+
+
+def ground_volume(side: Side, modification: AbstractModification, *, stock=0.0) -> Scalar:
+    """Volume that finishing takes off one gear [mm^3]: the modification and the stock that roughing has left.
+
+    Args:
+        side: the gear's side of the contact, of `mesh.sides`.
+        modification: of both flanks of every tooth.
+        stock: machining allowance normal to the flank [um], from the form circle to the tip and over the common face.
+    """
+    form, tip = outline(side.gear).form_roll_length, side.tip_roll_length
+    arc = (tip**2 - form**2) / (2 * side.base_radius)
+    return gear_volume(side, modification) + 2 * side.gear.teeth * side.face_width * arc * 1e-3 * stock
+
+
+def relative_volume(side: Side, modification: AbstractModification, *, parabolic: bool = False) -> Scalar:
+    """Removed volume over that of a linear relief from the pitch point, or a parabolic one, of the same tip amount.
+
+    Zero where nothing is removed at the tip.
+    """
+    curve = _curves()[parabolic]
+    amount = jnp.maximum(removed_at(side, modification, side.tip_roll_length[None])[0], 0.0)
+    # volumes of a relief are proportional to its amount
+    per_um = _relieved(side, jnp.ones_like(amount), _addendum(side), curve)
+    return safe_divide(gear_volume(side, modification), amount * per_um)
+
+
+def _addendum(side: Side) -> Scalar:
+    """Roll length from the pitch point to the tip [mm]; profile shift can move the pitch point beyond the tip."""
+    return jnp.maximum(side.tip_roll_length - side.pitch_roll_length, 0.0)
+
+
+def _curves() -> tuple[AbstractCurve, AbstractCurve]:
+    """Linear and parabolic; made when they are asked for, so that importing makes no array."""
+    return Linear(), Quadratic(real(0.0), real(0.0), real(1.0))
+
+
+def _relieved(side: Side, amount, length: Scalar, curve: AbstractCurve) -> Scalar:
+    return gear_volume(side, TipRelief(amount, length, curve))

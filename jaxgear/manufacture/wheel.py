@@ -1,0 +1,135 @@
+"""The form-grinding wheel: its profile is that of the tooth space, and what limits its size.
+
+A wheel that is fed along the axis of a spur gear, its own axis across it, copies its axial section into the tooth
+space: the profile does not depend on the wheel's radius. Frame of the wheel: origin on its outer diameter in its
+middle plane, x along its axis, y towards its axis; the wheel reaches down to the root circle.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..contact import Side
+from ..geometry import outline
+from ..microgeometry import AbstractModification
+from ..numerics import Checked, minimum, number, program, result
+from .tooth_space import space_flank
+
+Scalar = Float[Array, ""]
+Profile = Float[Array, " points"]
+
+
+class WheelProfile(NamedTuple):
+    """Active profile of the wheel for one flank, from the form circle to the tip of the gear.
+
+    Attributes:
+        x: from the middle plane of the wheel [mm], shape (points,).
+        y: from the wheel's outer diameter towards its axis [mm].
+        diameter: of the gear, on which the point grinds [mm].
+        roll_length: of the unmodified flank [mm].
+        removed: by the modification [um].
+    """
+
+    x: Profile
+    y: Profile
+    diameter: Profile
+    roll_length: Profile
+    removed: Profile
+
+
+class GrindingMargins(Checked):
+    """Numbers that are positive where a wheel can grind a tooth space.
+
+    Attributes:
+        form_clearance: roll length of the active profile above the form circle, where the wheel meets the fillet [mm].
+        tip_width: width of the wheel where it starts to grind, on the form circle [mm]: the ground sides must not meet.
+        widening: least angle between the ground flank and the centreline of the space [deg]; a space that narrows
+            outwards cannot be left radially, and the dressing tool does not reach behind the wheel's edge.
+    """
+
+    form_clearance: Scalar = result("mm")
+    tip_width: Scalar = result("mm")
+    widening: Scalar = result("deg")
+
+
+class GrindingWheel(Checked):
+    """Size of a wheel.
+
+    Attributes:
+        radius: outer radius [mm].
+        flange_radius: of the flanges or the spindle that hold it [mm].
+    """
+
+    radius: Scalar = number("mm", low=0.0, open_low=True)
+    flange_radius: Scalar = number("mm", low=0.0, default=0.0)
+
+    def check_together(self) -> None:
+        radius, flange = np.asarray(self.radius), np.asarray(self.flange_radius)
+        if not (flange < radius).all():
+            raise ValueError(f"GrindingWheel: flange_radius = {flange:g} mm must be less than radius = {radius:g} mm")
+
+
+@program
+def wheel_profile(side: Side, modification: AbstractModification, *, points: int = 201) -> WheelProfile:
+    """Active profile of the wheel that grinds a flank.
+
+    Args:
+        side: the gear's side of the contact, of `mesh.sides`.
+        modification: of the flank, taken in the middle of the face; what varies along the face comes from the feed.
+        points: evenly spaced in roll length from the form circle to the tip.
+    """
+    flank = space_flank(side, modification, points=points)
+    y = flank.y - side.gear.root_circle_radius
+    return WheelProfile(flank.x, y, 2 * jnp.hypot(flank.x, flank.y), flank.roll_length, flank.removed)
+
+
+@program
+def grinding_margins(side: Side, modification: AbstractModification) -> GrindingMargins:
+    """How far a tooth space is from what no wheel can grind; differentiable."""
+    flank = space_flank(side, modification)
+    angle = jnp.arctan2(jnp.diff(flank.x), jnp.diff(flank.y))
+    clearance = side.start_roll_length - outline(side.gear).form_roll_length
+    return GrindingMargins(clearance, 2 * flank.x[0], jnp.rad2deg(minimum(angle)))
+
+
+def smallest_wheel_radius(side: Side, flange_radius) -> Scalar:
+    """Least outer radius [mm] that keeps flanges of a radius [mm] off the tip circle at full depth."""
+    return _depth(side) + flange_radius
+
+
+def run_out(side: Side, radius) -> Scalar:
+    """How far the axis of a wheel of a radius [mm] travels beyond the face until it has left the tooth space [mm].
+
+    A chord of the wheel at full depth t: sqrt(t (2 R - t)). A shoulder beside the gear must be farther away.
+    """
+    depth = _depth(side)
+    return jnp.sqrt(depth * (2 * radius - depth))
+
+
+def largest_wheel_radius(side: Side, gap) -> Scalar:
+    """Largest outer radius [mm] whose `run_out` stays within a gap to a shoulder [mm] that is as high as the teeth."""
+    depth = _depth(side)
+    return (gap**2 + depth**2) / (2 * depth)
+
+
+def grinding_faults(wheel: GrindingWheel, side: Side, modification: AbstractModification) -> tuple[str, ...]:
+    """Why a wheel cannot grind a concrete gear, one line each; empty if it can."""
+    margins, faults = grinding_margins(side, modification), []
+    for name, value, unit in (
+        ("form_clearance", margins.form_clearance, "mm"),
+        ("tip_width", margins.tip_width, "mm"),
+        ("widening", margins.widening, "deg"),
+    ):
+        if not float(value) > 0:
+            faults.append(f"grinding: {name} = {float(value):.4g} {unit} must be greater than 0 {unit}")
+    least = float(smallest_wheel_radius(side, wheel.flange_radius))
+    if float(wheel.radius) < least:
+        faults.append(f"GrindingWheel: radius = {float(wheel.radius):g} mm must be at least {least:.6g} mm")
+    return tuple(faults)
+
+
+def _depth(side: Side) -> Scalar:
+    """From the tip to the root circle [mm]."""
+    return side.gear.tip_radius - side.gear.root_circle_radius

@@ -1,0 +1,76 @@
+"""Linear fits of given columns to values: least squares, and least largest residual (Chebyshev).
+
+Columns times coefficients stand for the values: the columns of a polynomial are the powers of its argument. Both fits
+are differentiable by columns and values.
+"""
+
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+Columns = Float[Array, "points columns"]
+Values = Float[Array, " points"]
+Coefficients = Float[Array, " columns"]
+Criterion = Literal["least_squares", "minimax"]
+
+_EXCHANGES = 40  # of one point each; a few columns need about ten
+
+
+def fit(columns: Columns, values: Values, criterion: Criterion) -> Coefficients:
+    """Coefficients of the columns.
+
+    Args:
+        columns: of full rank. For "minimax" every square part of them must be (Haar's condition), as for powers of
+            positive numbers in increasing order.
+        values: what is fitted.
+        criterion: "least_squares", or "minimax" for the least largest residual, by Remez' exchange of one point at a
+            time; its derivative is that of the points that bear the largest residual.
+    """
+    # an orthonormal basis of the columns: powers are nearly dependent, and single precision would feel it
+    basis, triangle = jnp.linalg.qr(columns)
+    inner = basis.T @ values if criterion == "least_squares" else _minimax(basis, values)
+    return jax.lax.linalg.triangular_solve(triangle, inner[:, None], left_side=True, lower=False)[:, 0]
+
+
+def _minimax(basis: Columns, values: Values) -> Coefficients:
+    points, columns = basis.shape
+    fixed, wanted = jax.lax.stop_gradient((basis, values))
+    # the extremes of a Chebyshev polynomial, which are close to those of the residual of a smooth function
+    places = (1 - np.cos(np.pi * np.arange(columns + 1) / columns)) / 2 * (points - 1)
+    start = jnp.asarray(np.round(places), jnp.int32)
+    borne = jax.lax.fori_loop(0, _EXCHANGES, lambda _, at: _exchanged(at, fixed, wanted), start)
+    return _levelled(borne, basis, values)[:-1]
+
+
+def _levelled(reference: Int[Array, " borne"], basis: Columns, values: Values) -> Float[Array, " borne"]:
+    """Coefficients that leave residuals of one size and alternating sign at the reference, and that residual."""
+    signs = _signs(reference.shape[0], basis.dtype)
+    matrix = jnp.concatenate([basis[reference], signs[:, None]], axis=1)
+    return jnp.linalg.solve(matrix, values[reference])
+
+
+def _exchanged(reference: Int[Array, " borne"], basis: Columns, values: Values) -> Int[Array, " borne"]:
+    """The reference with the point of the largest residual in place of one whose residual has the same sign."""
+    solution = _levelled(reference, basis, values)
+    residual = values - basis @ solution[:-1]
+    worst = jnp.argmax(jnp.abs(residual)).astype(reference.dtype)
+    count = reference.shape[0]
+    signs = jnp.where(solution[-1] < 0, -1, 1).astype(basis.dtype) * _signs(count, basis.dtype)
+    sign = jnp.where(residual[worst] < 0, -1, 1).astype(basis.dtype)
+    below = jnp.sum(reference < worst)
+    left, right = jnp.clip(below - 1, 0, count - 1), jnp.clip(below, 0, count - 1)
+    # inside, one of the two neighbours has the sign; beyond an end the end has it, or the points move along
+    index = jnp.where(sign == signs[left], left, right)
+    swapped = reference.at[index].set(worst)
+    before = jnp.concatenate([worst[None], reference[:-1]])
+    after = jnp.concatenate([reference[1:], worst[None]])
+    moved = jnp.where((below == 0) & (sign != signs[0]), before, swapped)
+    moved = jnp.where((below == count) & (sign != signs[-1]), after, moved)
+    return jnp.where(jnp.any(reference == worst), reference, moved)
+
+
+def _signs(count: int, dtype) -> Float[Array, " borne"]:
+    return jnp.asarray((-1.0) ** np.arange(count), dtype)

@@ -1,0 +1,345 @@
+"""The form-grinding wheel against closed forms of the involute, its splines against independent fits, volumes."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import COARSE, flank, gear_pair, kahraman_gear, prepare, solve
+from scipy.optimize import linprog
+
+import jaxgear as jg
+from jaxgear import manufacture
+from jaxgear.contact.kinematics import kinematics
+from jaxgear.geometry import diameter, outline
+from jaxgear.manufacture import best_wheel_spline, relief_start, wheel_profile, wheel_spline
+from jaxgear.numerics.fits import fit
+
+PARABOLA = jg.Quadratic(0.0, 0.0, 1.0)
+LINEAR = jg.Linear()
+# roll length, half width and height of the space of the 50/50 pair: independent arithmetic on the involute
+SPACE = np.array(
+    [
+        [25.6515, 2.355805, 74.962988],
+        [18.0, 1.589749, 72.721886],
+        [22.0, 1.926498, 73.805749],
+        [29.5, 2.953781, 76.344778],
+        [31.7, 3.370005, 77.204489],
+    ]
+)
+
+
+@pytest.fixture(scope="module")
+def moving():
+    """The 50/50 pair of contact ratio 1.37."""
+    return kinematics(jg.GearPair(kahraman_gear(), kahraman_gear()), jnp.asarray(0.0), COARSE, "strain")
+
+
+@pytest.fixture(scope="module")
+def side(moving):
+    return moving.sides[0]
+
+
+@pytest.fixture(scope="module")
+def lengths(moving):
+    """Of the relief [mm]: from the pitch point and from the outer point of single contact."""
+    contact = moving.path_of_contact
+    return {"pitch": float(contact.end), "single": float(contact.end - contact.outer_single)}
+
+
+def test_tooth_space_of_the_nominal_gear(side):
+    """To all digits; at the pitch circle the space of a gear without shift is as wide as the tooth."""
+    space = manufacture.space_flank(side, jg.NoModification(), jnp.asarray(SPACE[:, 0]))
+    np.testing.assert_allclose(np.stack([space.x, space.y], axis=1), SPACE[:, 1:], atol=5.1e-7)
+    pitch = manufacture.space_flank(side, jg.NoModification(), side.pitch_roll_length[None])
+    assert float(pitch.x[0]) == pytest.approx(75.0 * np.sin(np.pi / 100), rel=1e-12)
+    assert float(jnp.hypot(pitch.x, pitch.y)[0]) == pytest.approx(75.0, rel=1e-12)
+
+
+def test_space_and_tooth_fill_the_circle():
+    """Half the angle of the space and of the tooth are half a pitch, on every diameter, with shift and allowance."""
+    pair = gear_pair((19, 48), shift=(0.3, -0.1))
+    for side in kinematics(pair, jnp.asarray(0.0), COARSE, "strain").sides:
+        space = manufacture.space_flank(side, jg.NoModification())
+        size = 2 * np.hypot(space.x, space.y)
+        tooth = np.asarray(jg.geometry.tooth_thickness(side.gear, size)) / size
+        np.testing.assert_allclose(np.arctan2(space.x, space.y) + tooth, np.pi / float(side.gear.teeth), rtol=1e-9)
+
+
+def test_a_relief_widens_the_space_along_the_normal(side):
+    """The points move by the relief, on the normals that touch the base circle: r' = hypot(r_b, L - h)."""
+    relief = jg.TipRelief(40.0, 5.0, LINEAR)
+    nominal, relieved = (manufacture.space_flank(side, flank) for flank in (jg.NoModification(), relief))
+    moved = np.hypot(relieved.x - nominal.x, relieved.y - nominal.y)
+    np.testing.assert_allclose(moved, 1e-3 * np.asarray(relieved.removed), atol=1e-12)
+    radius = np.hypot(relieved.x, relieved.y)
+    left = np.asarray(relieved.roll_length - 1e-3 * relieved.removed)
+    np.testing.assert_allclose(radius, np.hypot(float(side.base_radius), left), rtol=1e-13)
+    widened = relieved.x - nominal.x
+    assert float(widened[-1]) > 0.03 and abs(float(widened[0])) < 1e-14
+    # to first order the flank turns about the axis by h / r_b
+    turned = np.arctan2(relieved.x, relieved.y) - np.arctan2(nominal.x, nominal.y)
+    at_radius = np.interp(radius, np.hypot(nominal.x, nominal.y), np.arctan2(nominal.x, nominal.y))
+    turn = np.arctan2(relieved.x, relieved.y) - at_radius
+    np.testing.assert_allclose(
+        turn, 1e-3 * np.asarray(relieved.removed) / float(side.base_radius), rtol=2e-3, atol=1e-7
+    )
+    assert turned[-1] > 0
+
+
+def test_wheel_stands_on_the_root_circle(side):
+    profile = wheel_profile(side, jg.NoModification())
+    root = float(side.gear.root_circle_radius)
+    np.testing.assert_allclose(np.hypot(profile.x, profile.y + root), np.asarray(profile.diameter) / 2, rtol=1e-13)
+    assert float(profile.diameter[-1]) == pytest.approx(154.5709, rel=1e-9)
+    form = outline(side.gear).form_roll_length
+    assert float(profile.diameter[0]) == pytest.approx(float(diameter(side.gear, form)), rel=1e-12)
+
+
+def columns_of(points, degree, low=0.02):
+    t = np.linspace(low, 1.0, points)
+    return t, np.stack([t**k for k in range(1, degree + 1)], axis=1)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_minimax_fit_is_that_of_a_linear_program(degree):
+    """No coefficients have a smaller largest residual; wild values need exchanges beyond both ends."""
+    rng = np.random.default_rng(degree)
+    t, columns = columns_of(60, degree)
+    program = jax.jit(lambda values: fit(jnp.asarray(columns), values, "minimax"))
+    for values in (np.exp(2 * t), np.sin(9 * t), np.abs(t - 0.3), rng.normal(size=60), np.where(t < 0.1, 5.0, 0.0)):
+        residual = values - columns @ np.asarray(program(jnp.asarray(values)))
+        one = np.ones((60, 1))
+        rows = np.block([[columns, -one], [-columns, -one]])
+        free = [(None, None)] * degree + [(0, None)]
+        best = linprog(np.eye(degree + 1)[-1], rows, np.concatenate([values, -values]), bounds=free)
+        assert np.abs(residual).max() == pytest.approx(best.fun, rel=1e-7)
+
+
+def test_least_squares_fit_and_exact_fits():
+    t, columns = columns_of(40, 3)
+    values = jnp.asarray(np.cos(5 * t))
+    expected = np.linalg.lstsq(columns, values, rcond=None)[0]
+    np.testing.assert_allclose(fit(jnp.asarray(columns), values, "least_squares"), expected, rtol=1e-9)
+    for criterion in ("least_squares", "minimax"):
+        found = fit(jnp.asarray(columns), jnp.asarray(columns @ [3.0, -2.0, 0.5]), criterion)
+        np.testing.assert_allclose(found, [3.0, -2.0, 0.5], rtol=1e-9)
+
+
+@pytest.mark.parametrize("criterion", ["least_squares", "minimax"])
+@pytest.mark.parametrize("tangent", [False, True])
+def test_spline_and_its_deviation_are_those_of_the_wheel(side, lengths, criterion, tangent):
+    """The distance of the polynomial from the wheel profile, found anew on a dense profile."""
+    relief = jg.TipRelief(6.0, lengths["single"], jg.Power(3.0))
+    spline = wheel_spline(side, relief, criterion=criterion, tangent=tangent)
+    start = float(spline.node_roll_length)
+    assert start == pytest.approx(float(side.tip_roll_length) - lengths["single"], rel=1e-12)
+    roll = jnp.linspace(start, side.tip_roll_length, 2000)
+    space = manufacture.space_flank(side, relief, roll)
+    x, y = np.asarray(space.x), np.asarray(space.y) - float(side.gear.root_circle_radius)
+    radial_step = np.diff(x) / np.diff(y)
+    normal = np.cos(np.arctan(np.append(radial_step, radial_step[-1])))
+    deviation = 1e3 * normal * (np.asarray(spline.x(jnp.asarray(y))) - x)
+    given = np.interp(roll, spline.roll_length, spline.deviation)
+    # the normal of the relieved flank leans against that of the involute by the slope of the relief, up to 0.01
+    np.testing.assert_allclose(deviation, given, rtol=1e-2, atol=5e-4)
+    np.testing.assert_allclose(spline.deviation[:65], 0.0, atol=1e-30, err_msg="below the node it is the involute")
+    slope = float((spline.x(spline.node_y + 1e-6) - spline.node_x) / 1e-6)
+    nominal = manufacture.space_flank(side, jg.NoModification(), spline.node_roll_length[None]).inclination
+    assert (abs(slope - np.tan(float(nominal[0]))) < 1e-5) == tangent
+
+
+def test_minimax_is_never_worse_than_least_squares(side, lengths):
+    """And a cubic, or a polynomial that may kink, is never worse than what it contains."""
+    for exponent in (1.0, 2.0, 3.0):
+        relief = jg.TipRelief(6.0, lengths["single"], jg.Power(exponent))
+        largest = {
+            (degree, criterion, tangent): float(
+                wheel_spline(side, relief, degree=degree, criterion=criterion, tangent=tangent).largest
+            )
+            for degree in (2, 3)
+            for criterion in ("least_squares", "minimax")
+            for tangent in (False, True)
+        }
+        for degree in (2, 3):
+            for tangent in (False, True):
+                assert largest[degree, "minimax", tangent] <= largest[degree, "least_squares", tangent] + 1e-9
+            assert largest[degree, "minimax", False] <= largest[degree, "minimax", True] + 1e-9
+        assert largest[3, "minimax", False] <= largest[2, "minimax", False] + 1e-9
+
+
+def test_reliefs_of_the_study_are_ground_by_a_quadratic_within_a_micrometre(side, lengths):
+    """Parabolas and lines of 6 um; normal to the flank and in the direction of the wheel's radius, as published."""
+    for length in lengths.values():
+        for curve in (LINEAR, PARABOLA, jg.Parabolic()):
+            spline = wheel_spline(side, jg.TipRelief(6.0, length, curve))
+            assert float(spline.largest) < 0.2
+            assert np.abs(spline.radial_deviation).max() < 1.0
+    sharp = jg.TipRelief(20.0, lengths["single"], jg.Power(8.0))
+    assert float(wheel_spline(side, sharp).largest) > 1.0, "and there are reliefs that are not"
+
+
+def test_the_involute_itself_needs_no_polynomial(side):
+    assert float(wheel_spline(side, jg.NoModification()).largest) < 1e-3
+    root = wheel_spline(side, jg.RootRelief(5.0, 2.0))
+    assert float(root.largest) == pytest.approx(5.0), "one node cannot relieve the root"
+    assert float(root.deviation[0]) == pytest.approx(-5.0)
+
+
+def test_the_best_node_is_no_worse_and_explicit_nodes_are_taken(side, lengths):
+    relief = jg.TipRelief(6.0, lengths["single"], jg.Power(4.0))
+    given, best = wheel_spline(side, relief), best_wheel_spline(side, relief)
+    assert float(best.largest) < float(given.largest)
+    again = wheel_spline(side, relief, node=best.node_roll_length)
+    assert float(again.largest) == pytest.approx(float(best.largest), rel=1e-9)
+
+
+def test_start_of_the_relief(side, lengths):
+    """Exact for a tip relief, whatever happens along the face; found for a table; the ends where there is none."""
+    tip, first = float(side.tip_roll_length), float(side.start_roll_length)
+    relief = jg.TipRelief(6.0, 2.0)
+    assert float(relief_start(side, relief + jg.LeadCrowning(3.0))) == pytest.approx(tip - 2.0, rel=1e-12)
+    table = jg.TabulatedProfile([tip - 4.0, tip - 2.0, tip], [0.0, 0.0, 10.0])
+    assert float(relief_start(side, table)) == pytest.approx(tip - 2.0 + 0.01 / 5, abs=0.03)
+    assert float(relief_start(side, jg.NoModification())) == pytest.approx(tip)
+    assert float(relief_start(side, jg.TabulatedProfile([0.0, 1.0], [3.0, 3.0]))) == pytest.approx(first)
+
+
+@pytest.mark.parametrize("criterion", ["least_squares", "minimax"])
+def test_deviation_of_the_wheel_is_differentiable(side, lengths, criterion):
+    """By amount and length of a relief, or values of a table, against central differences; both modes alike."""
+    roll = jnp.linspace(side.pitch_roll_length, side.tip_roll_length, 9)
+
+    def of_relief(x):
+        return wheel_spline(side, jg.TipRelief(x[0], x[1], jg.Power(3.0)), criterion=criterion).largest
+
+    def of_table(amounts):
+        return wheel_spline(side, jg.TabulatedProfile(roll, amounts, method="cubic2"), criterion=criterion).largest
+
+    amounts = 6.0 * jnp.linspace(0.0, 1.0, 9) ** 3
+    given = {"least_squares": (of_relief, jnp.asarray([6.0, lengths["single"]])), "minimax": (of_table, amounts)}
+    function, x = given[criterion]
+    direction = jnp.asarray(np.random.default_rng(0).normal(size=x.size))
+    value, forward = jax.jit(lambda x: jax.jvp(function, (x,), (direction,)))(x)
+    gradient = jax.jit(jax.grad(function))(x)
+    assert float(forward) == pytest.approx(float(gradient @ direction), rel=1e-7)
+    central = (function(x + 1e-5 * direction) - function(x - 1e-5 * direction)) / 2e-5
+    assert float(forward) == pytest.approx(float(central), rel=1e-3) and abs(float(central)) > 1e-3
+    assert float(value) == pytest.approx(float(function(x)))
+
+
+def test_gradient_is_finite_without_any_relief(side):
+    slopes = jax.jit(jax.grad(lambda x: wheel_spline(side, jg.TipRelief(x[0], x[1])).largest))
+    for length in (0.0, 3.0):
+        assert np.isfinite(slopes(jnp.asarray([0.0, length]))).all()
+
+
+def test_single_precision_resolves_the_deviation(side, lengths):
+    low = jax.tree.map(lambda leaf: leaf.astype(jnp.float32), (side, jg.TipRelief(6.0, lengths["pitch"], PARABOLA)))
+    exact = wheel_spline(side, jg.TipRelief(6.0, lengths["pitch"], PARABOLA)).largest
+    rough = wheel_spline(*low).largest
+    assert rough.dtype == jnp.float32
+    assert float(rough) == pytest.approx(float(exact), abs=0.02)
+
+
+def test_a_batch_is_fitted_as_one_by_one(side):
+    amounts = jnp.asarray([2.0, 6.0, 12.0])
+    one = lambda amount: wheel_spline(side, jg.TipRelief(amount, 3.0, jg.Power(3.0))).largest  # noqa: E731
+    np.testing.assert_allclose(jax.jit(jax.vmap(one))(amounts), [one(a) for a in amounts], rtol=1e-9)
+
+
+def test_what_no_spline_is(side):
+    with pytest.raises(ValueError, match=r"wheel_spline: degree = 4 must be 2 or 3"):
+        wheel_spline(side, jg.NoModification(), degree=4)
+    with pytest.raises(ValueError, match="criterion = \"l1\" must be|criterion = 'l1' must be"):
+        wheel_spline(side, jg.NoModification(), criterion="l1")
+
+
+def test_size_of_the_wheel(side):
+    """Depth t = 154.5709 / 2 - 71.25 mm; the run-out is half a chord at depth t, and its inverse the largest wheel."""
+    depth = 154.5709 / 2 - 71.25
+    assert float(manufacture.smallest_wheel_radius(side, 40.0)) == pytest.approx(40.0 + depth)
+    beyond = manufacture.run_out(side, 150.0)
+    assert float(beyond) ** 2 + (150.0 - depth) ** 2 == pytest.approx(150.0**2)
+    assert float(manufacture.largest_wheel_radius(side, beyond)) == pytest.approx(150.0)
+    relief = jg.TipRelief(6.0, 3.0)
+    assert manufacture.grinding_faults(manufacture.GrindingWheel(150.0, 60.0), side, relief) == ()
+    (small,) = manufacture.grinding_faults(manufacture.GrindingWheel(45.0, 40.0), side, relief)
+    assert small == f"GrindingWheel: radius = 45 mm must be at least {40 + depth:.6g} mm"
+    with pytest.raises(ValueError, match="flange_radius = 60 mm must be less than radius = 50 mm"):
+        manufacture.GrindingWheel(50.0, 60.0)
+    with pytest.raises(ValueError, match="GrindingWheel: radius = 0 mm must be greater than 0 mm"):
+        manufacture.GrindingWheel(0.0)
+
+
+def test_spaces_that_no_wheel_grinds(side):
+    """Near the base circle of a gear with few teeth the space narrows outwards: a wheel cannot come out of it.
+
+    The flank leans by pi / z + atan(L / r_b) - half the angle of the tooth, which is negative at the base circle for
+    pi / (2 z) < inv(alpha): for more than 105 teeth, and no wheel grinds there.
+    """
+    for teeth, narrow in ((100, False), (112, True)):
+        pair = gear_pair((teeth, teeth), bores=(None, None))
+        many = kinematics(pair, jnp.asarray(0.0), COARSE, "strain").sides[0]
+        base = manufacture.space_flank(many, jg.NoModification(), jnp.zeros((1,)))
+        assert (float(base.inclination[0]) < 0) == narrow
+        assert float(manufacture.grinding_margins(many, jg.NoModification()).widening) > 10, "the form circle is above"
+    # a relief of a millimetre whose flank leans back
+    hollow = jg.TabulatedProfile([20.0, 25.0, 26.0, 33.0], [0.0, 2000.0, 0.0, 0.0])
+    (fault,) = manufacture.grinding_faults(manufacture.GrindingWheel(150.0), side, hollow)
+    assert "grinding: widening = -" in fault and fault.endswith("must be greater than 0 deg")
+
+
+VOLUMES = {
+    ("pitch", "linear"): (LINEAR, 15.337),
+    ("pitch", "parabolic"): (PARABOLA, 10.399),
+    ("single", "parabolic"): (PARABOLA, 5.747),
+    ("single", "linear"): (LINEAR, 8.544),
+}
+
+
+def test_reference_volumes_of_6_um(side, lengths):
+    """To 0.1 %, of all 100 flanks; ratios 2.67 and 1.81 to the parabola from the end of single contact, where the study
+    of ground modifications has 2.50 and 1.73 against its own relief of about 5 mm^3."""
+    found = manufacture.reference_volumes(side, 6.0)._asdict()
+    for (start, shape), (curve, volume) in VOLUMES.items():
+        assert float(found[f"{shape}_from_{start}"]) == pytest.approx(volume, rel=1e-3)
+        relief = jg.TipRelief(6.0, lengths[start], curve)
+        assert float(manufacture.ground_volume(side, relief)) == pytest.approx(volume, rel=1e-3)
+    parabola = found["parabolic_from_single"]
+    assert float(found["linear_from_pitch"] / parabola) == pytest.approx(2.67, abs=0.005)
+    assert float(found["parabolic_from_pitch"] / parabola) == pytest.approx(1.81, abs=0.005)
+
+
+def test_relative_volume(side, lengths):
+    relief = jg.TipRelief(3.0, lengths["single"], PARABOLA)
+    assert float(manufacture.relative_volume(side, relief)) == pytest.approx(5.747 / 15.337, rel=1e-3)
+    assert float(manufacture.relative_volume(side, relief, parabolic=True)) == pytest.approx(5.747 / 10.399, rel=1e-3)
+    assert float(manufacture.relative_volume(side, jg.NoModification())) == 0.0
+    slope = jax.grad(lambda amount: manufacture.relative_volume(side, jg.TipRelief(amount, 3.0)))
+    assert float(slope(4.0)) == pytest.approx(0.0, abs=1e-12), "the ratio does not depend on the amount"
+    assert np.isfinite(float(slope(0.0)))
+
+
+def test_grinding_stock(side):
+    """The flank is an involute from the form circle to the tip: arc (L_tip^2 - L_form^2) / (2 r_b)."""
+    form, tip = float(outline(side.gear).form_roll_length), float(side.tip_roll_length)
+    area = 2 * 50 * 20.0 * (tip**2 - form**2) / (2 * float(side.base_radius))
+    relief = jg.TipRelief(6.0, 3.0)
+    with_stock, without = (float(manufacture.ground_volume(side, relief, stock=stock)) for stock in (120.0, 0.0))
+    assert with_stock - without == pytest.approx(0.12 * area, rel=1e-9)
+
+
+def test_quantities_of_a_cycle(moving):
+    """By their names, of a cycle that knows its modifications; what they give is what the functions give."""
+    relief, none = flank(tip=9.0, tip_length=3.0, curve=(0.0, 1.0)), flank()
+    cycle = solve(prepare(moving.pair), jnp.asarray(200.0), relief, none)
+    names = ("quadratic_deviation", "cubic_deviation", "removed_volume", "volume_over_linear", "volume_over_parabolic")
+    found = {f"{gear}_{name}": jg.quantities[f"{gear}_{name}"] for gear in ("pinion", "wheel") for name in names}
+    values = {name: float(quantity(cycle)) for name, quantity in found.items()}
+    side = moving.sides[0]
+    assert values["pinion_quadratic_deviation"] == pytest.approx(float(wheel_spline(side, relief).largest))
+    assert values["pinion_cubic_deviation"] == pytest.approx(float(wheel_spline(side, relief, degree=3).largest))
+    assert values["wheel_quadratic_deviation"] < 1e-3 and values["wheel_removed_volume"] == 0.0
+    assert values["pinion_removed_volume"] == pytest.approx(float(jg.quantities["removed_volume"](cycle)), rel=1e-12)
+    assert values["pinion_volume_over_linear"] == pytest.approx(float(manufacture.relative_volume(side, relief)))
+    assert found["pinion_quadratic_deviation"].key == "pinion_quadratic_deviation_um"

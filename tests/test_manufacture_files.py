@@ -1,0 +1,260 @@
+"""Files of manufacture: dressing points and drawing of the wheel, charts of the measuring machine, measured flanks."""
+
+import csv
+import sys
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import COARSE, kahraman_gear
+
+import jaxgear as jg
+from jaxgear import io, manufacture
+from jaxgear.contact.kinematics import kinematics
+
+
+@pytest.fixture(scope="module")
+def side():
+    """Pinion of the 50/50 pair of contact ratio 1.37."""
+    pair = jg.GearPair(kahraman_gear(), kahraman_gear())
+    return kinematics(pair, jnp.asarray(0.0), COARSE, "strain").sides[0]
+
+
+@pytest.fixture(scope="module")
+def relief():
+    return jg.TipRelief(6.0, 3.0, jg.Linear())
+
+
+@pytest.fixture(scope="module")
+def profile(side, relief):
+    return manufacture.wheel_profile(side, relief, points=21)
+
+
+def rows_of(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_points_of_the_wheel(side, profile, tmp_path):
+    """Both flanks to a nanometre; the radius of the wheel falls by y."""
+    path = io.write_wheel_points(tmp_path / "wheel.csv", profile, wheel=manufacture.GrindingWheel(150.0, 40.0))
+    rows = rows_of(path)
+    assert [row["flank"] for row in rows] == ["left"] * 21 + ["right"] * 21
+    table = np.array([[float(value) for name, value in row.items() if name != "flank"] for row in rows])
+    x, y, size, roll, removed, radius = table.T
+    np.testing.assert_array_equal(x[:21], -x[21:])
+    np.testing.assert_allclose(x[21:], profile.x, atol=5.1e-7)
+    np.testing.assert_allclose(np.hypot(x, y + float(side.gear.root_circle_radius)), size / 2, atol=1e-6)
+    np.testing.assert_allclose(radius + y, 150.0, atol=1e-9)
+    assert removed[20] == 6.0 and roll[20] == pytest.approx(float(side.tip_roll_length), abs=1e-6)
+
+
+def test_flanks_that_differ(side, profile, tmp_path):
+    other = manufacture.wheel_profile(side, jg.NoModification(), points=21)
+    rows = rows_of(io.write_wheel_points(tmp_path / "wheel.csv", profile, other))
+    assert "wheel_radius_mm" not in rows[0]
+    assert float(rows[20]["x_mm"]) < -float(rows[41]["x_mm"]), "the relieved side is wider"
+
+
+def test_a_folder_that_is_not_there_is_named(profile, tmp_path):
+    with pytest.raises(ValueError, match="missing/wheel.csv: cannot be written: No such file"):
+        io.write_wheel_points(tmp_path / "missing" / "wheel.csv", profile)
+
+
+def test_drawing_of_the_wheel_holds_the_points(profile, tmp_path):
+    ezdxf = pytest.importorskip("ezdxf")
+    path = io.write_wheel_drawing(tmp_path / "wheel.dxf", profile)
+    drawing = ezdxf.readfile(path)
+    assert drawing.units == 4, "millimetres"
+    left, right = drawing.modelspace().query("LWPOLYLINE")
+    np.testing.assert_allclose(right.get_points("xy"), np.stack([profile.x, profile.y], axis=1), rtol=1e-12)
+    np.testing.assert_allclose(left.get_points("xy"), np.stack([-profile.x, profile.y], axis=1), rtol=1e-12)
+    assert not drawing.audit().has_errors
+
+
+def test_a_drawing_without_its_package_says_what_to_install(profile, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ezdxf", None)
+    with pytest.raises(ModuleNotFoundError, match=r"write_wheel_drawing: .* ezdxf: pip install jaxgear\[cad\]"):
+        io.write_wheel_drawing(tmp_path / "wheel.dxf", profile)
+    assert not list(tmp_path.iterdir())
+
+
+MEASURED = """trace,face_coordinate_mm,roll_length_mm,measured_um
+profile,-8.0,20.0,0.25
+profile,-8.0,26.5,-0.125
+profile,-8.0,31.7,-6.333333333
+profile,0.0,20.0,0.75
+profile,0.0,26.5,0.3
+profile,0.0,31.7,-5.123456789
+profile,9.5,20.0,-1.5
+profile,9.5,26.5,-2.0
+profile,9.5,31.7,-7.0
+"""
+
+
+def written(tmp_path, text, name="measured.csv"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_measured_flank_comes_back_as_it_was(side, tmp_path):
+    """Measured CSV, table, chart, CSV, table: to 1e-9 um, over the whole flank and for a profile alone."""
+    profile_alone = "\n".join(line for line in MEASURED.splitlines() if "-8.0" not in line and "9.5" not in line)
+    for text in (MEASURED, profile_alone):
+        first = io.read_flank(written(tmp_path, text))
+        traces = manufacture.table_traces(side, first)
+        path = io.write_traces(tmp_path / "chart.csv", traces, traces)
+        given = [float(line.split(",")[-1]) for line in text.splitlines()[1:]]
+        assert [float(row["measured_um"]) for row in rows_of(path)] == pytest.approx(given, abs=1e-9, rel=0)
+        second = io.read_flank(path)
+        assert type(second) is type(first)
+        np.testing.assert_allclose(second.amount, first.amount, atol=1e-9, rtol=0)
+        again = io.write_traces(tmp_path / "again.csv", manufacture.table_traces(side, second), traces)
+        assert again.read_text() == path.read_text()
+
+
+def test_excess_material_is_what_is_not_removed(tmp_path):
+    flank = io.read_flank(written(tmp_path, MEASURED))
+    np.testing.assert_array_equal(flank.face_coordinate, [-8.0, 0.0, 9.5])
+    np.testing.assert_array_equal(flank.roll_length, [20.0, 26.5, 31.7])
+    assert float(flank.amount[2, 2]) == 7.0 and flank.varies_along_face
+
+
+def test_flanks_csv_is_read_again(side, tmp_path):
+    """The flanks of a run: either gear of any design, profiles and flanks that vary over the face."""
+    mesh = kinematics(jg.GearPair(kahraman_gear(), kahraman_gear()), jnp.asarray(0.0), COARSE, "strain")
+    designs = {
+        "plain": (jg.TipRelief(6.0, 3.0), jg.NoModification()),
+        "crowned": (jg.TipRelief(6.0, 3.0) + jg.LeadCrowning(4.0), jg.TipRelief(2.0, 1.0)),
+    }
+    io.write_flanks(tmp_path / "flanks.csv", mesh, designs)
+    for name, flanks in designs.items():
+        for gear, design in zip(("pinion", "wheel"), flanks):
+            read = io.read_flank(tmp_path / "flanks.csv", gear=gear, design=name)
+            for trace in manufacture.table_traces(side, read):
+                wanted = manufacture.profile_trace(
+                    side, design, face_coordinate=trace.face_coordinate[0], roll_length=trace.roll_length
+                )
+                np.testing.assert_allclose(trace.design, wanted.design, atol=6e-6)
+    with pytest.raises(io.DesignFileError, match="flanks.csv: holds several: gear must be one of pinion, wheel"):
+        io.read_flank(tmp_path / "flanks.csv", design="plain")
+    with pytest.raises(io.DesignFileError, match='design = "plane" is not there, must be one of plain, crowned'):
+        io.read_flank(tmp_path / "flanks.csv", gear="wheel", design="plane")
+
+
+def test_a_profile_and_a_helix_make_a_flank(side, tmp_path):
+    """Where both are the design's, their sum is the design, whose profile and lead do not depend on each other."""
+    design = jg.TipRelief(6.0, 3.0, jg.Linear()) + jg.LeadCrowning(5.0)
+    traces = [manufacture.profile_trace(side, design, points=31), manufacture.helix_trace(side, design, points=21)]
+    flank = io.read_flank(io.write_traces(tmp_path / "chart.csv", traces))
+    for face in (-10.0, -4.0, 0.0, 10.0):
+        options = {"face_coordinate": face, "roll_length": traces[0].roll_length}
+        found, wanted = (manufacture.profile_trace(side, each, **options) for each in (flank, design))
+        np.testing.assert_allclose(found.design, wanted.design, atol=1e-8)
+
+
+@pytest.mark.parametrize("column", ["roll_angle_deg", "diameter_mm"])
+def test_other_coordinates_need_the_base_radius(side, relief, tmp_path, column):
+    trace = manufacture.profile_trace(side, relief, points=11)
+    rows = rows_of(io.write_traces(tmp_path / "chart.csv", [trace]))
+    lines = [f"{column},design_um", *(f"{row[column]},{row['design_um']}" for row in rows)]
+    path = written(tmp_path, "\n".join(lines))
+    flank = io.read_flank(path, base_radius=float(side.base_radius))
+    np.testing.assert_allclose(flank.position, trace.roll_length, rtol=1e-9)
+    np.testing.assert_allclose(flank.amount, -np.asarray(trace.design), atol=1e-9)
+    with pytest.raises(io.DesignFileError, match="has no column roll_length_mm, must have one where no base radius"):
+        io.read_flank(path)
+    if column == "diameter_mm":
+        with pytest.raises(io.DesignFileError, match=r"diameter_mm = .* mm must be at least 180 mm \(base circle\)"):
+            io.read_flank(path, base_radius=90.0)
+
+
+HEAD = "roll_length_mm,face_coordinate_mm,measured_um\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("", "holds no points"),
+        (HEAD, "holds no points"),
+        ("roll_length_mm,amount\n1,2\n", "has no column measured_um, modification_um, design_um, must have one"),
+        (HEAD + "20,0,1\n21,0,x\n", 'measured_um of point 2 is "x", must be a number'),
+        (HEAD + "20,0,1\n21,0\n", 'measured_um of point 2 is "", must be a number'),
+        (HEAD + "20,0,1\n21,0,nan\n", 'measured_um of point 2 is "nan", must be a number'),
+        (HEAD + "20,0,1\n20,0,2\n", "has 2 points at 1 roll lengths and 1 face coordinates, must be a grid"),
+        (HEAD + "20,0,1\n21,0,2\n20,5,2\n", "has 3 points at 2 roll lengths and 2 face coordinates, must be a grid"),
+        (HEAD + "20,0,1\n", "has 1 place along the profile, must have at least 2"),
+        ("trace," + HEAD + "helix,20,0,1\nhelix,20,1,1\n", "holds a helix alone, must hold a profile"),
+        ("face_coordinate_mm,measured_um\n0,1\n", "has no column roll_length_mm, must have one where no base radius"),
+    ],
+)
+def test_what_is_no_flank_is_refused_in_one_line(tmp_path, text, problem):
+    path = written(tmp_path, text)
+    with pytest.raises(io.DesignFileError) as caught:
+        io.read_flank(path)
+    assert str(caught.value).startswith(f"{path}: ") and problem in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_there_or_no_text(tmp_path):
+    with pytest.raises(io.DesignFileError, match="none.csv: No such file"):
+        io.read_flank(tmp_path / "none.csv")
+    (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(io.DesignFileError, match="binary.csv: is not text in UTF-8"):
+        io.read_flank(tmp_path / "binary.csv")
+
+
+DESIGN = """
+[pinion]
+teeth = 50
+module = 3.0
+face_width = 20.0
+tip_diameter = 154.5709
+[[pinion.modification]]
+type = "file"
+file = "{file}"
+{more}
+[wheel]
+teeth = 50
+module = 3.0
+face_width = 20.0
+tip_diameter = 154.5709
+[load]
+torque = 200.0
+"""
+
+
+def test_a_design_file_takes_a_measured_flank(tmp_path):
+    """Beside it; a flank that varies over the face brings slices along."""
+    written(tmp_path, MEASURED)
+    design = io.load_design(written(tmp_path, DESIGN.format(file="measured.csv", more=""), "design.toml"))
+    pinion, wheel = design.design({})
+    assert isinstance(pinion, jg.TabulatedFlank) and isinstance(wheel, jg.NoModification)
+    np.testing.assert_array_equal(pinion.amount, io.read_flank(tmp_path / "measured.csv").amount)
+    assert design.resolution().slices == 11
+    more = 'method = "cubic2"'
+    design = io.load_design(written(tmp_path, DESIGN.format(file="measured.csv", more=more), "design.toml"))
+    assert design.design({})[0].method == "cubic2"
+
+
+@pytest.mark.parametrize(
+    ("file", "more", "problem"),
+    [
+        ("none.csv", "", "pinion.modification[0].file: none.csv: No such file or directory"),
+        ("measured.csv", 'gear = "wheel"', 'file: measured.csv: gear = "wheel" is not there, there is no column gear'),
+        ("measured.csv", 'gear = "ring"', 'pinion.modification[0].gear: "ring" is not known, must be one of'),
+        ("measured.csv", "amount = 3.0", "pinion.modification[0].amount: unknown key"),
+        (
+            "measured.csv",
+            'method = "cubic"',
+            'pinion.modification[0].method: "cubic" is not known, did you mean "cubic2"',
+        ),
+    ],
+)
+def test_a_design_file_names_what_is_wrong_with_the_flank(tmp_path, file, more, problem):
+    written(tmp_path, MEASURED)
+    path = written(tmp_path, DESIGN.format(file=file, more=more), "design.toml")
+    with pytest.raises(io.DesignFileError) as caught:
+        io.load_design(path)
+    assert str(caught.value).startswith(f"{path}: ") and problem in str(caught.value)
