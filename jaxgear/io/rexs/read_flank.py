@@ -1,0 +1,220 @@
+"""The modifications of a flank from components of REXS.
+
+A parabola is taken as d^2 of the depth d into the relief, with a tangential start. An arc of a circle of the same
+height C over the length L lies within C^3 / (4 L^2) of it, which is read as the parabola where that is below 0.01 um.
+The exponential and the logarithmic shape are refused: REXS names them without a formula.
+"""
+
+from collections.abc import Callable, Iterator
+
+from ...microgeometry import (
+    AbstractCurve,
+    AbstractModification,
+    EndRelief,
+    LeadCrowning,
+    LeadSlope,
+    Linear,
+    Power,
+    ProfileCrowning,
+    ProfileSlope,
+    RootRelief,
+    TipRelief,
+)
+from .frame import Frame, same
+from .model import Component
+from .topography import flank_of
+
+_ARC_ERROR = 0.01  # um: less than any machine holds
+
+
+def read_modification(component: Component, frame: Frame) -> Iterator[AbstractModification]:
+    """The modifications that a component describes.
+
+    Raises:
+        DesignFileError: for what is missing or not of the library.
+    """
+    read = _READERS.get(component.type)
+    if read is None:
+        raise component.refuse("", "is no modification that this library has")
+    yield from read(component, frame)
+
+
+def _tip_relief(part: Component, frame: Frame) -> Iterator[AbstractModification]:
+    start = _roll_length(part, "tip_relief_datum_diameter", frame)
+    end = _roll_length(part, "tip_relief_evaluation_reference", frame, frame.tip)
+    length = frame.tip - start
+    if not start < min(end, frame.tip):
+        raise part.refuse(
+            "tip_relief_datum_diameter", "must be less than the tip diameter and where the depth is given"
+        )
+    curve, power = _relief_shape(part, _amount(part, "tip_relief_depth"), end - start)
+    yield TipRelief(_at_end(part, "tip_relief_depth", length, end - start, power), length, curve)
+
+
+def _root_relief(part: Component, frame: Frame) -> Iterator[AbstractModification]:
+    end = _roll_length(part, "root_relief_datum_diameter", frame)
+    start = _roll_length(part, "root_relief_evaluation_reference", frame)
+    length = end - frame.start
+    if not end > start:
+        raise part.refuse("root_relief_datum_diameter", "must be greater than the diameter where the depth is given")
+    if length <= 0:  # it ends below the active profile
+        return
+    curve, power = _relief_shape(part, _amount(part, "root_relief_depth"), end - start)
+    yield RootRelief(_at_end(part, "root_relief_depth", length, end - start, power), length, curve)
+
+
+def _end_relief(face: str) -> Callable[[Component, Frame], Iterator[AbstractModification]]:
+    depth, place = f"end_relief_depth_{face}", f"end_relief_evaluation_reference_{face}"
+
+    def read(part: Component, frame: Frame) -> Iterator[AbstractModification]:
+        whole = part.needed(f"end_relief_length_{face}", "mm")
+        coordinate = part.number(place, "mm")
+        beyond = 0.0  # from the end of the face to where the depth is given
+        if coordinate is not None:
+            beyond = coordinate if face == "datum_face" else frame.own_width - coordinate
+        given, length = whole - beyond, whole - frame.margin
+        if not given > 0:
+            raise part.refuse(place, f"{coordinate:g} mm lies outside the relief")
+        if length <= 0:  # it ends beyond the common face width
+            return
+        curve, power = _relief_shape(part, _amount(part, depth), given)
+        yield EndRelief(_at_end(part, depth, length, given, power), length, curve, side=frame.side(face))
+
+    return read
+
+
+def _profile_crowning(part: Component, frame: Frame) -> Iterator[AbstractModification]:
+    tip = _roll_length(part, "diameter_where_profile_crowning_tip_is_specified", frame, frame.tip)
+    root = _roll_length(part, "diameter_where_profile_crowning_root_is_specified", frame)
+    top = _roll_length(part, "profile_highest_point", frame, 0.5 * (root + tip))
+    at_root, at_tip = "profile_crowning_at_root", "profile_crowning_at_tip"
+    if not root < top < tip:
+        raise part.refuse("profile_highest_point", "must lie between the diameters where the amounts are given")
+    for amount, length in ((at_root, top - root), (at_tip, tip - top)):
+        _crowning_shape(part, "shape_of_profile_crowning", _amount(part, amount), length)
+    towards_root, towards_tip = top - frame.start, frame.tip - top
+    first = _at_end(part, at_root, max(towards_root, 0.0), top - root, 2)
+    last = _at_end(part, at_tip, max(towards_tip, 0.0), tip - top, 2)
+    if same(towards_root, towards_tip) and _equal(first, last):
+        yield ProfileCrowning(first)
+        return
+    if towards_root > 0:
+        yield RootRelief(first, towards_root, Power(2.0))
+    if towards_tip > 0:
+        yield TipRelief(last, towards_tip, Power(2.0))
+
+
+def _profile_slope(part: Component, frame: Frame) -> Iterator[AbstractModification]:
+    start = _roll_length(part, "profile_evaluation_start", frame)
+    end = _roll_length(part, "profile_evaluation_end", frame, frame.tip)
+    given = _roll_length(part, "diameter_where_profile_slope_amount_is_specified", frame, end)
+    if not given > start:
+        raise part.refuse("profile_evaluation_start", "must be less than the diameter where the amount is given")
+    yield ProfileSlope(_at_end(part, "profile_slope", frame.tip - frame.start, given - start, 1))
+
+
+def _helix_crowning(part: Component, frame: Frame) -> Iterator[AbstractModification]:
+    place = "coordinate_where_helix_crowning_is_specified_{}".format
+    first = part.number(place("datum_face"), "mm") or 0.0
+    last = part.number(place("non_datum_face"), "mm")
+    last = frame.own_width if last is None else last
+    highest = part.number("helix_highest_point", "mm")
+    top = 0.5 * (first + last) if highest is None else highest
+    if not first < top < last:
+        raise part.refuse("helix_highest_point", "must lie between the coordinates where the amounts are given")
+    amounts = []
+    for face, given, length in (
+        ("datum_face", top - first, top - frame.margin),
+        ("non_datum_face", last - top, frame.own_width - frame.margin - top),
+    ):
+        name = f"helix_crowning_amount_{face}"
+        _crowning_shape(part, "shape_of_helix_crowning", _amount(part, name), given)
+        amounts.append((face, _at_end(part, name, max(length, 0.0), given, 2), length))
+    if same(amounts[0][2], amounts[1][2]) and _equal(amounts[0][1], amounts[1][1]):
+        yield LeadCrowning(amounts[0][1])
+        return
+    for face, amount, length in amounts:
+        if length > 0:
+            yield EndRelief(amount, length, Power(2.0), side=frame.side(face))
+
+
+def _helix_slope(part: Component, frame: Frame) -> Iterator[AbstractModification]:
+    start, end = part.number("helix_evaluation_start", "mm"), part.number("helix_evaluation_end", "mm")
+    usual = "facewidth" if start is None or end is None else "helix_evaluation_length"
+    known = ["facewidth", "helix_evaluation_length"]
+    length = frame.own_width
+    if part.choice("helix_evaluation_reference", usual, known) == "helix_evaluation_length":
+        if start is None or end is None or not end > start:
+            raise part.refuse("helix_evaluation_end", "must be given, and greater than helix_evaluation_start")
+        length = end - start
+    yield LeadSlope(frame.sign * _at_end(part, "helix_slope", frame.width, length, 1))
+
+
+def _topography(part: Component, frame: Frame) -> Iterator[AbstractModification]:
+    yield flank_of(part, frame)
+
+
+def _roll_length(part: Component, name: str, frame: Frame, default: float | None = None) -> float:
+    """Roll length at a diameter."""
+    diameter = part.number(name, "mm")
+    if diameter is None:
+        if default is None:
+            raise part.refuse(name, "missing")
+        return default
+    found = float(frame.roll_length(diameter))
+    if not found >= 0:
+        raise part.refuse(name, f"{diameter:g} mm must be at least {2 * frame.base_radius:g} mm, the base diameter")
+    return found
+
+
+def _amount(part: Component, name: str) -> float:
+    """An amount [um]."""
+    amount = part.number(name, "mm", shift=3)
+    if amount is None:
+        raise part.refuse(name, "missing")
+    return amount
+
+
+def _at_end(part: Component, name: str, length: float, given: float, power: int) -> float:
+    """The amount [um] of a power law at another length than that for which it is given [mm]."""
+    amount = _amount(part, name)
+    return amount if same(length, given) else amount * (length / given) ** power
+
+
+def _relief_shape(part: Component, amount: float, length: float) -> tuple[AbstractCurve, int]:
+    """The curve of a relief, and the power of the depth that it is."""
+    if part.flag("specify_tangential_transition", False):
+        raise part.refuse("specify_tangential_transition", "is not supported, must be false")
+    shape = part.choice("shape_of_relief", None, ["linear", "parabolic", "circular"])
+    if shape == "linear":
+        return Linear(), 1
+    _check_arc(part, "shape_of_relief", shape, amount, length)
+    return Power(2.0), 2
+
+
+def _crowning_shape(part: Component, name: str, amount: float, length: float) -> None:
+    _check_arc(part, name, part.choice(name, "parabolic", ["parabolic", "circular"]), amount, length)
+
+
+def _check_arc(part: Component, name: str, shape: str, amount: float, length: float) -> None:
+    """Refuses an arc that is no parabola."""
+    error = abs(amount) * (1e-3 * amount / length) ** 2 / 4
+    if shape == "circular" and error > _ARC_ERROR:
+        raise part.refuse(name, f'"circular" is {error:.2g} um off the parabola, must be within {_ARC_ERROR:g} um')
+
+
+def _equal(first: float, second: float) -> bool:
+    return abs(first - second) <= 1e-12 * max(abs(first), abs(second))
+
+
+_READERS: dict[str, Callable[[Component, Frame], Iterator[AbstractModification]]] = {
+    "tip_relief": _tip_relief,
+    "root_relief": _root_relief,
+    "end_relief_datum_face": _end_relief("datum_face"),
+    "end_relief_non_datum_face": _end_relief("non_datum_face"),
+    "profile_crowning": _profile_crowning,
+    "profile_slope": _profile_slope,
+    "helix_crowning": _helix_crowning,
+    "helix_slope": _helix_slope,
+    "topographical_modification": _topography,
+}
