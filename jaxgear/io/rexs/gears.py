@@ -59,15 +59,15 @@ def read_gear(model: Model, gear: Component, flank: Component) -> Gear:
     if generated is not None and abs(generated - profile_shift) > _CLOSE:
         problem = f"{generated:g} must be the profile shift coefficient of the finished gear, {profile_shift:g}"
         raise settings.refuse("generated_addendum_modification_coefficient", problem)
-    given = {
+    options = {
         "tip_diameter": gear.number("tip_diameter", "mm"),
         "bore_diameter": gear.number("inner_diameter", "mm"),
         "addendum": flank.number("addendum_coefficient_basic_profile", "none"),
         "tip_edge_radius": gear.number(_EDGE, "mm"),
     }
-    if given["tip_diameter"] is None and given["addendum"] is None:
+    if options["tip_diameter"] is None and options["addendum"] is None:
         raise gear.refuse("tip_diameter", "missing")
-    if given["bore_diameter"] == 0:
+    if options["bore_diameter"] == 0:
         raise gear.refuse("inner_diameter", "0 mm: give the diameter at which the body is held, that of the shaft")
     rack = "addendum", "tip_corner_radius"
     dedendum, radius = (
@@ -86,7 +86,7 @@ def read_gear(model: Model, gear: Component, flank: Component) -> Gear:
         root_radius=radius,
         tooth_thickness_allowance=_allowance(gear, module, profile_shift, angle),
         material=_material(model, gear),
-        **{name: value for name, value in given.items() if value is not None},
+        **{name: value for name, value in options.items() if value is not None},
     )
 
 

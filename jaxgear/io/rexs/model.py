@@ -197,7 +197,7 @@ def shifted(value: Any, shift: int) -> str | tuple[str, ...]:
 
 def _shift(text: str, shift: int) -> str:
     number = Decimal(text)
-    return str(number.scaleb(shift)) if number else "0.0"
+    return str(number.scaleb(shift).normalize()) if number else "0.0"
 
 
 def decoded(text: str, code: str) -> tuple[str, ...]:

@@ -91,11 +91,12 @@ def _read(model: Model, stage: int | None, flank: str | None, load_case: int | N
     if common is not None and abs(common - width) > 1e-6 * width:
         problem = f"{common:g} mm must be the smaller face width, {width:g} mm: the gears are centred on each other"
         raise chosen.refuse("common_face_width", problem)
-    modifications = [_modification(model, *parts) for parts in zip(gears, flanks, frames(pair))]
+    sides = zip(gears, flanks, frames(pair))
+    on_pinion, on_wheel = (_modification(model, *side) for side in sides)
     torque, speed = _load(model, chosen, gears[0], load_case)
     units = [part for part in model.components.values() if part.type == "gear_unit"]
     title = units[0].text("model_name") if units else ""
-    return RexsPair(title, pair, *modifications, torque, speed)
+    return RexsPair(title, pair, on_pinion, on_wheel, torque, speed)
 
 
 def _stage(model: Model, wanted: int | None) -> Component:

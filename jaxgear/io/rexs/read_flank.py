@@ -20,6 +20,7 @@ from ...microgeometry import (
     RootRelief,
     TipRelief,
 )
+from ...numerics import real
 from .frame import Frame, same
 from .model import Component
 from .topography import flank_of
@@ -48,7 +49,7 @@ def _tip_relief(part: Component, frame: Frame) -> Iterator[AbstractModification]
             "tip_relief_datum_diameter", "must be less than the tip diameter and where the depth is given"
         )
     curve, power = _relief_shape(part, _amount(part, "tip_relief_depth"), end - start)
-    yield TipRelief(_at_end(part, "tip_relief_depth", length, end - start, power), length, curve)
+    yield TipRelief(real(_at_end(part, "tip_relief_depth", length, end - start, power)), real(length), curve)
 
 
 def _root_relief(part: Component, frame: Frame) -> Iterator[AbstractModification]:
@@ -60,7 +61,7 @@ def _root_relief(part: Component, frame: Frame) -> Iterator[AbstractModification
     if length <= 0:  # it ends below the active profile
         return
     curve, power = _relief_shape(part, _amount(part, "root_relief_depth"), end - start)
-    yield RootRelief(_at_end(part, "root_relief_depth", length, end - start, power), length, curve)
+    yield RootRelief(real(_at_end(part, "root_relief_depth", length, end - start, power)), real(length), curve)
 
 
 def _end_relief(face: str) -> Callable[[Component, Frame], Iterator[AbstractModification]]:
@@ -78,7 +79,7 @@ def _end_relief(face: str) -> Callable[[Component, Frame], Iterator[AbstractModi
         if length <= 0:  # it ends beyond the common face width
             return
         curve, power = _relief_shape(part, _amount(part, depth), given)
-        yield EndRelief(_at_end(part, depth, length, given, power), length, curve, side=frame.side(face))
+        yield EndRelief(real(_at_end(part, depth, length, given, power)), real(length), curve, side=frame.side(face))
 
     return read
 
@@ -96,12 +97,12 @@ def _profile_crowning(part: Component, frame: Frame) -> Iterator[AbstractModific
     first = _at_end(part, at_root, max(towards_root, 0.0), top - root, 2)
     last = _at_end(part, at_tip, max(towards_tip, 0.0), tip - top, 2)
     if same(towards_root, towards_tip) and _equal(first, last):
-        yield ProfileCrowning(first)
+        yield ProfileCrowning(real(first))
         return
     if towards_root > 0:
-        yield RootRelief(first, towards_root, Power(2.0))
+        yield RootRelief(real(first), real(towards_root), Power(real(2.0)))
     if towards_tip > 0:
-        yield TipRelief(last, towards_tip, Power(2.0))
+        yield TipRelief(real(last), real(towards_tip), Power(real(2.0)))
 
 
 def _profile_slope(part: Component, frame: Frame) -> Iterator[AbstractModification]:
@@ -110,7 +111,7 @@ def _profile_slope(part: Component, frame: Frame) -> Iterator[AbstractModificati
     given = _roll_length(part, "diameter_where_profile_slope_amount_is_specified", frame, end)
     if not given > start:
         raise part.refuse("profile_evaluation_start", "must be less than the diameter where the amount is given")
-    yield ProfileSlope(_at_end(part, "profile_slope", frame.tip - frame.start, given - start, 1))
+    yield ProfileSlope(real(_at_end(part, "profile_slope", frame.tip - frame.start, given - start, 1)))
 
 
 def _helix_crowning(part: Component, frame: Frame) -> Iterator[AbstractModification]:
@@ -131,11 +132,11 @@ def _helix_crowning(part: Component, frame: Frame) -> Iterator[AbstractModificat
         _crowning_shape(part, "shape_of_helix_crowning", _amount(part, name), given)
         amounts.append((face, _at_end(part, name, max(length, 0.0), given, 2), length))
     if same(amounts[0][2], amounts[1][2]) and _equal(amounts[0][1], amounts[1][1]):
-        yield LeadCrowning(amounts[0][1])
+        yield LeadCrowning(real(amounts[0][1]))
         return
     for face, amount, length in amounts:
         if length > 0:
-            yield EndRelief(amount, length, Power(2.0), side=frame.side(face))
+            yield EndRelief(real(amount), real(length), Power(real(2.0)), side=frame.side(face))
 
 
 def _helix_slope(part: Component, frame: Frame) -> Iterator[AbstractModification]:
@@ -147,7 +148,7 @@ def _helix_slope(part: Component, frame: Frame) -> Iterator[AbstractModification
         if start is None or end is None or not end > start:
             raise part.refuse("helix_evaluation_end", "must be given, and greater than helix_evaluation_start")
         length = end - start
-    yield LeadSlope(frame.sign * _at_end(part, "helix_slope", frame.width, length, 1))
+    yield LeadSlope(real(frame.sign * _at_end(part, "helix_slope", frame.width, length, 1)))
 
 
 def _topography(part: Component, frame: Frame) -> Iterator[AbstractModification]:
@@ -189,7 +190,7 @@ def _relief_shape(part: Component, amount: float, length: float) -> tuple[Abstra
     if shape == "linear":
         return Linear(), 1
     _check_arc(part, "shape_of_relief", shape, amount, length)
-    return Power(2.0), 2
+    return Power(real(2.0)), 2
 
 
 def _crowning_shape(part: Component, name: str, amount: float, length: float) -> None:

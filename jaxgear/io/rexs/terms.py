@@ -52,7 +52,7 @@ def plain_terms(modification: AbstractModification, factor=None) -> Iterator[Abs
         yield from plain_terms(modification.modification, _product(factor, modification.factor))
     elif factor is None:
         yield modification
-    elif type(modification) in _PROPORTIONAL:
+    elif isinstance(modification, _PROPORTIONAL):
         yield eqx.tree_at(lambda of: of.amount, modification, factor * modification.amount)
     else:
         yield Scaled(factor, modification)

@@ -15,6 +15,7 @@ from ...microgeometry import (
     TabulatedProfile,
     TipRelief,
 )
+from ...numerics import real
 from .frame import Frame
 from .model import Component
 
@@ -71,11 +72,11 @@ def flank_of(component: Component, frame: Frame) -> AbstractModification:
     if len(amount) != grid.size or np.isnan(grid).any() or len(diameters) < 2:
         wanted = "must be a full grid of at least 2 diameters, every point once"
         raise component.refuse(_POINTS, f"{wanted}: {len(amount)} points, {len(diameters)} x {len(coordinates)}")
-    roll = np.sqrt(np.maximum((0.5 * diameters) ** 2 - frame.base_radius**2, 0.0))
+    roll = real(np.sqrt(np.maximum((0.5 * diameters) ** 2 - frame.base_radius**2, 0.0)))
     if (grid == grid[:, :1]).all():
-        return TabulatedProfile(roll, grid[:, 0])
-    face = frame.from_middle(coordinates)
-    return TabulatedFlank(roll, face, grid) if frame.sign > 0 else TabulatedFlank(roll, face[::-1], grid[:, ::-1])
+        return TabulatedProfile(roll, real(grid[:, 0]))
+    face = slice(None, None, frame.sign)  # increasing
+    return TabulatedFlank(roll, real(frame.from_middle(coordinates)[face]), real(grid[:, face]))
 
 
 def _knots(modification: AbstractModification, frame: Frame) -> tuple[list[float], list[float]]:

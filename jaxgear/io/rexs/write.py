@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import equinox as eqx
 import jax
 import numpy as np
 
@@ -102,11 +103,7 @@ def _of_cycle(pair, cycle: MeshCycle, pinion, wheel, torque, speed, friction):
     if not np.all(np.asarray(cycle.converged)):
         count = int(np.sum(~np.asarray(cycle.converged)))
         raise ValueError(f"write_rexs: cycle did not converge at {count} of {len(cycle.phase)} positions")
-    own = cycle.kinematics.pair
-    if jax.tree.structure(own) != jax.tree.structure(pair) or any(
-        np.any(np.asarray(first) != np.asarray(second))
-        for first, second in zip(jax.tree.leaves(own), jax.tree.leaves(pair))
-    ):
+    if not eqx.tree_equal(cycle.kinematics.pair, pair):
         raise ValueError("write_rexs: cycle is of another pair")
     if cycle.pinion is None or cycle.wheel is None:
         raise ValueError("write_rexs: cycle does not hold its modifications, it comes from solve_removed")

@@ -55,7 +55,7 @@ class Writer:
                 self._points(term)
 
     def _add(self, kind: str, **values: tuple[Any, str]) -> None:
-        part = self._model.add(kind, is_additive_modification=(True, "none"), **values)
+        part = self._model.add(kind, "", is_additive_modification=(True, "none"), **values)
         for flank in self._flanks:
             self._model.relate("reference", origin=flank, referenced=part)
 
