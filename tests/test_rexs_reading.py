@@ -6,7 +6,7 @@ import io
 import re
 from types import SimpleNamespace
 
-import jax
+import equinox as eqx
 import numpy as np
 import pytest
 
@@ -65,7 +65,7 @@ def removed(modification, roll, face=0.0):
 
 
 ALONG = np.linspace(PINION.start, PINION.tip, 301)
-ACROSS = np.linspace(-9.0, 9.0, 181)  # from the middle; the datum face is at -10
+ACROSS = np.linspace(-9.0, 9.0, 181)  # the datum face is at -10
 
 
 @pytest.mark.parametrize("shape, power", [("linear", 1), ("parabolic", 2)])
@@ -114,10 +114,9 @@ def test_crownings_are_parabolas_through_the_amounts_that_are_given(written):
         "helix_crowning",
         helix_crowning_amount_datum_face="0.008",
         helix_crowning_amount_non_datum_face="0.004",
-        helix_highest_point="12.0",
+        helix_highest_point="2.0",
     )
-    place = ACROSS + 10.0
-    wanted = np.where(place < 12.0, 8.0 * ((12.0 - place) / 12.0) ** 2, 4.0 * ((place - 12.0) / 8.0) ** 2)
+    wanted = np.where(ACROSS < 2.0, 8.0 * ((2.0 - ACROSS) / 12.0) ** 2, 4.0 * ((ACROSS - 2.0) / 8.0) ** 2)
     np.testing.assert_allclose(removed(found, ALONG[0], ACROSS), wanted, atol=1e-11)
 
     symmetric = flank(
@@ -183,8 +182,6 @@ def test_slopes_are_those_between_the_places_that_are_given(written):
 def test_a_datum_face_at_the_other_end_mirrors_the_face(written):
     datum, other = 'unit="none">negative<', 'unit="none">positive<'
     turned = SimpleNamespace(text=written.text.replace(datum, other), path=written.path)
-    points = np.meshgrid([0.0, 4.0, 20.0], PINION.diameter(ALONG[::100]), indexing="ij")
-    amounts = 1e-3 * (points[0] + points[1] - 50.0) ** 2 / 10
     for kind, values in (
         ("helix_slope", {"helix_slope": "0.004"}),
         (
@@ -196,18 +193,63 @@ def test_a_datum_face_at_the_other_end_mirrors_the_face(written):
             },
         ),
         (
-            "topographical_modification",
+            "helix_crowning",
             {
-                "coordinates_of_topographical_modification": points[0].ravel().tolist(),
-                "diameters_of_topographical_modification": points[1].ravel().tolist(),
-                "topographical_modification_amounts": amounts.ravel().tolist(),
+                "helix_crowning_amount_datum_face": "0.008",
+                "coordinate_where_helix_crowning_is_specified_datum_face": "-7.0",
+                "helix_crowning_amount_non_datum_face": "0.003",
+                "coordinate_where_helix_crowning_is_specified_non_datum_face": "6.0",
+                "helix_highest_point": "1.0",
             },
         ),
     ):
-        usual, mirrored = flank(written, kind, **values), flank(turned, kind, **values)
+        opposite = {name: value.lstrip("-") if "-" in value else f"-{value}" for name, value in values.items()
+                    if "coordinate" in name or "point" in name}  # fmt: skip
+        usual, mirrored = flank(written, kind, **values), flank(turned, kind, **(values | opposite))
         roll = np.full_like(ACROSS, ALONG[150])
         assert np.ptp(removed(usual, roll, ACROSS)) > 1
         np.testing.assert_allclose(removed(mirrored, roll, ACROSS), removed(usual, roll, -ACROSS), atol=1e-12)
+
+
+def test_the_gear_that_drives_is_the_pinion(written):
+    driving, driven = ('id="is_driving_gear" unit="none">true', 'id="is_driving_gear" unit="none">false')
+    text = written.text.replace(driving, "*").replace(driven, driving).replace("*", driven)
+    written.path.write_text(text)
+    found = read_rexs(written.path)
+    assert float(found.pair.pinion.teeth) == 48 and isinstance(found.pinion, jg.NoModification)
+    assert found.torque is None  # the file names that of the other gear
+    written.path.write_text(re.sub(r'<attribute id="is_driving_gear".*?</attribute>', "", written.text))
+    assert float(read_rexs(written.path).pair.pinion.teeth) == 19
+
+
+def test_gears_that_count_along_their_faces_in_opposite_directions_are_refused(written):
+    text = written.text
+    for gear, axis in (("pinion", [1.0, 0.0, 0.0]), ("wheel", [-1.0, 0.0, 0.0])):
+        start = f'type="cylindrical_gear" name="{gear}">'
+        assert start in text
+        text = text.replace(start, start + attribute("u_axis_vector", axis))
+    written.path.write_text(text)
+    with pytest.raises(DesignFileError, match="u_axis_vector: must point in the direction of that of gear 3"):
+        read_rexs(written.path)
+    written.path.write_text(text.replace("-1.0</c>", "1.0</c>"))
+    assert read_rexs(written.path).torque == 50.0
+
+
+def test_names_and_units_of_earlier_versions(written):
+    text = written.text.replace('version="2.0.0"', 'version="1.4"').replace(
+        "tip_corner_radius_factor_reference_profile", "tip_radius_factor"
+    )
+    text = text.replace("thermal_contact_coefficient_agma_925_2003", "thermal_contact_coefficient_agma_925_a03")
+    text = (
+        text.replace('unit="MPa"', 'unit="N / mm^2"')
+        .replace('unit="none"', 'unit=""')
+        .replace('unit="deg"', 'unit="\u00b0"')
+    )
+    written.path.write_text(re.sub(r'<attribute id="is_additive_modification".*?</attribute>', "", text), "utf-8")
+    found = read_rexs(written.path)
+    written.path.write_text(written.text)
+    assert eqx.tree_equal(found.pair, read_rexs(written.path).pair)
+    np.testing.assert_allclose(removed(found.pinion, ALONG, 3.0), removed(RELIEFS, ALONG, 3.0), atol=1e-12)
 
 
 def test_which_end_of_the_face_is_meant_has_to_be_said_where_it_matters(written):
@@ -342,8 +384,14 @@ def test_flanks_that_differ_have_to_be_chosen(written):
     with pytest.raises(DesignFileError, match=r"flank 7: is modified otherwise than flank 8, choose left or right"):
         read_rexs(written.path)
     roll = PINION.tip
+    said = attribute("loaded_tooth_flank", "right", "none")
+    data = '<component id="15" type="cylindrical_stage_gear_data">'
     assert removed(read_rexs(written.path, flank="left").pinion, roll) == pytest.approx(6.0, abs=1e-12)
     assert removed(read_rexs(written.path, flank="right").pinion, roll) == 0.0
+    changed = written.path.read_text()
+    assert data in changed
+    written.path.write_text(changed.replace(data, data + said))
+    assert removed(read_rexs(written.path).pinion, roll) == 0.0
 
 
 def test_a_file_that_is_none_is_refused(tmp_path):
@@ -401,12 +449,12 @@ def test_the_command_converts_both_ways(tmp_path):
     assert done.code == 0 and "19/48 teeth, module 3 mm, centre distance 100.5 mm" in done.out
     found, read = load_design(design), read_rexs(rexs)
     assert (found.torque, found.speed, found.title) == (50.0, 3000.0, '19/48 "x"')
-    assert jax.tree.all(jax.tree.map(np.array_equal, found.pair(), read.pair))
+    assert eqx.tree_equal(found.pair(), read.pair)
     design.write_text(design.read_text() + "\n[resolution]\npositions = 16\n")
     done = call("convert", design, again)
     assert done.code == 0 and "left out, REXS has no place for it: [resolution]" in done.out
     first, last = (read_rexs(path) for path in (rexs, again))
-    assert jax.tree.all(jax.tree.map(np.array_equal, first.pair, last.pair))
+    assert eqx.tree_equal(first.pair, last.pair)
     points = np.meshgrid(ALONG, ACROSS)
     np.testing.assert_allclose(removed(last.pinion, *points), removed(first.pinion, *points), atol=1e-12)
 

@@ -1,8 +1,8 @@
 """Where something is on a flank: the coordinates of REXS and those of the library.
 
-REXS counts along the profile by diameters and over the face from the datum face, over the gear's own face width. The
-library counts by roll lengths, and from the middle of the common face width of the pair, on which both gears are
-centred.
+REXS counts along the profile by diameters, the library by roll lengths. Over the face both count along the axis from
+the middle of the face, REXS over the gear's own face width, the library over the common one of the pair, on which both
+gears are centred. Where REXS speaks of the datum face, its gears say at which end it is.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class Frame:
         start, tip: roll lengths at both ends of the active profile.
         own_width: face width of the gear.
         width: common face width of the pair.
-        sign: 1 where the datum face is at negative face coordinates of the library, -1 at positive ones.
+        datum: -1 where the datum face is at negative face coordinates, 1 at positive ones.
     """
 
     base_radius: float
@@ -35,7 +35,7 @@ class Frame:
     tip: float
     own_width: float
     width: float
-    sign: int = 1
+    datum: int = -1
 
     @property
     def margin(self) -> float:
@@ -51,17 +51,13 @@ class Frame:
         with np.errstate(invalid="ignore"):
             return np.sqrt((0.5 * np.asarray(diameter)) ** 2 - self.base_radius**2)
 
-    def from_datum_face(self, face_coordinate):
-        """Coordinate from the datum face at a face coordinate from the middle."""
-        return self.sign * np.asarray(face_coordinate) + 0.5 * self.own_width
-
-    def from_middle(self, coordinate):
-        """Face coordinate from the middle at a coordinate from the datum face."""
-        return self.sign * (np.asarray(coordinate) - 0.5 * self.own_width)
+    def place(self, face: str, length: float) -> float:
+        """Face coordinate at a distance from the middle towards the "datum_face" or the "non_datum_face"."""
+        return self.datum * length if face == "datum_face" else -self.datum * length
 
     def side(self, face: str) -> Literal["negative", "positive"]:
         """At which face coordinates the "datum_face" or the "non_datum_face" is."""
-        return "negative" if (face == "datum_face") == (self.sign > 0) else "positive"
+        return "negative" if self.place(face, 1.0) < 0 else "positive"
 
     def removed(self, modification: AbstractModification, roll_length, face_coordinate) -> np.ndarray:
         """Material removed at points of the flank [um], of the shape of their coordinates."""

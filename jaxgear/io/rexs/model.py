@@ -24,6 +24,18 @@ CUSTOM = (
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # what earlier versions call a unit of the current one
 _ALSO = {"deg": ("\u00b0",), "MPa": ("N / mm^2",), "none": ("",)}
+# names until REXS 1.7, by the type of the component
+_EARLIER = {
+    "rack_shaped_tool": {
+        "tip_radius": "tip_corner_radius_reference_profile",
+        "tip_radius_factor": "tip_corner_radius_factor_reference_profile",
+        "machining_allowance_din_3972": "machining_allowance_din_3972_1952",
+        "relative_machining_allowance_din_3972": "relative_machining_allowance_din_3972_1952",
+    },
+    "cylindrical_gear": {
+        "thermal_contact_coefficient_agma_925_a03": "thermal_contact_coefficient_agma_925_2003",
+    },
+}
 _CODES = {"float64": "<f8", "float32": "<f4", "int32": "<i4"}
 
 
@@ -170,6 +182,11 @@ class Model:
         """What a component says in a load case."""
         said = Component(component.id, component.type, component.name, attributes_of(values))
         self.cases.setdefault(case, {})[component.id] = said
+
+
+def current(kind: str, attribute: str) -> str:
+    """The name that an attribute of a type of component has in REXS 2."""
+    return _EARLIER.get(kind, {}).get(attribute, attribute)
 
 
 def attributes_of(values: dict[str, tuple[Any, str]]) -> dict[str, Attribute]:

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from ..errors import DesignFileError
-from .model import Attribute, Component, Model, Relation, decoded
+from .model import Attribute, Component, Model, Relation, current, decoded
 
 _DEEPEST = 16  # twice the depth of the schema
 
@@ -86,7 +86,7 @@ def _component(element: Element) -> Component:
     for item in element.iterfind("attribute"):
         name = item.get("id", "")
         try:
-            component.attributes[name] = Attribute(_value(item), item.get("unit"))
+            component.attributes[current(component.type, name)] = Attribute(_value(item), item.get("unit"))
         except ValueError as error:
             raise component.refuse(name, str(error)) from None
     return component

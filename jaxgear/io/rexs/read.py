@@ -19,6 +19,7 @@ from .parse import parse
 from .read_flank import read_modification
 
 _OLDEST, _NEWEST = (1, 4), (2,)
+_ALIKE = 1e-9  # um
 _ALONG, _ACROSS = "position_of_profile_modification", "diameter_of_helix_modification"
 _GEOMETRY = (
     "normal_pressure_angle",
@@ -79,10 +80,12 @@ def read_rexs(
 
 def _read(model: Model, stage: int | None, flank: str | None, load_case: int | None) -> RexsPair:
     chosen = _stage(model, stage)
-    gears = [_one(model.related("stage", "stage", chosen.id, role), chosen, role) for role in ("gear_1", "gear_2")]
+    gears = _driving_first(model, chosen)
     for gear in gears:
         check_spur(gear)
     _check_version(model)
+    _check_axes(gears)
+    flank = _loaded(model, chosen, gears) if flank is None else flank
     flanks = [_flank(model, gear, flank) for gear in gears]
     pinion, wheel = (read_gear(model, gear, face) for gear, face in zip(gears, flanks))
     distance = chosen.needed("center_distance", "mm")
@@ -111,6 +114,34 @@ def _stage(model: Model, wanted: int | None) -> Component:
     if not found:
         raise DesignFileError("", f"has no cylindrical_stage {wanted}, must be one of {known}")
     return found[0]
+
+
+def _driving_first(model: Model, stage: Component) -> list[Component]:
+    """The gears of a stage: gear 1 and 2, or the other way round where the file says that gear 2 drives."""
+    gears = [_one(model.related("stage", "stage", stage.id, role), stage, role) for role in ("gear_1", "gear_2")]
+    drives = [any(part.flag("is_driving_gear", False) for part in _data(model, stage, gear)) for gear in gears]
+    return gears[::-1] if drives == [False, True] else gears
+
+
+def _data(model: Model, stage: Component, gear: Component) -> list[Component]:
+    """What the stage says of one of its gears."""
+    found = model.related("stage_gear_data", "stage", stage.id, "stage_gear_data")
+    return [part for part in found if gear in model.related("stage_gear_data", "stage_gear_data", part.id, "gear")]
+
+
+def _loaded(model: Model, stage: Component, gears: list[Component]) -> str | None:
+    """Which flanks touch, where the file says so."""
+    sides = {part.text("loaded_tooth_flank") for gear in gears for part in _data(model, stage, gear)} - {""}
+    if len(sides) > 1:
+        raise stage.refuse("loaded_tooth_flank", "differs between its gears, must be the same: left touches left")
+    return sides.pop() if sides else None
+
+
+def _check_axes(gears: list[Component]) -> None:
+    """Refuses gears that count along their faces in opposite directions."""
+    axes = [gear.numbers("u_axis_vector", "mm") for gear in gears if "u_axis_vector" in gear.attributes]
+    if len(axes) == 2 and (axes[0].shape != axes[1].shape or not axes[0] @ axes[1] > 0):
+        raise gears[1].refuse("u_axis_vector", f"must point in the direction of that of gear {gears[0].id}")
 
 
 def _check_version(model: Model) -> None:
@@ -162,21 +193,19 @@ def _modification(model: Model, gear: Component, flank: Component, frame: Frame)
         if len(parts) > 1 and not part.flag("is_additive_modification", True):
             raise part.refuse("is_additive_modification", "must be true beside other modifications")
     datum_face = gear.choice("datum_face_orientation", "negative", ["negative", "positive"])
-    frame = replace(frame, sign=1 if datum_face == "negative" else -1)
-    terms = [term for part in parts for term in read_modification(part, frame)]
-    total = reduce(add, terms) if terms else NoModification()
-    if "datum_face_orientation" not in gear.attributes and not _symmetric(total, frame):
-        raise gear.refuse("datum_face_orientation", "missing, the ends of the face are modified differently")
+    frame = replace(frame, datum=-1 if datum_face == "negative" else 1)
+    total = _sum(parts, frame)
+    if "datum_face_orientation" not in gear.attributes:
+        other = _sum(parts, replace(frame, datum=1))
+        roll, face = np.meshgrid(np.linspace(frame.start, frame.tip, 33), np.linspace(-0.5, 0.5, 61) * frame.width)
+        if np.abs(frame.removed(total, roll, face) - frame.removed(other, roll, face)).max() > _ALIKE:
+            raise gear.refuse("datum_face_orientation", "missing, the ends of the face are modified differently")
     return total
 
 
-def _symmetric(modification: AbstractModification, frame: Frame) -> bool:
-    """Whether both halves of the face are alike."""
-    if not modification.varies_along_face:
-        return True
-    roll, face = np.meshgrid(np.linspace(frame.start, frame.tip, 33), np.linspace(0.0, 0.5 * frame.width, 31))
-    differences = frame.removed(modification, roll, face) - frame.removed(modification, roll, -face)
-    return bool(np.abs(differences).max() <= 1e-9)
+def _sum(parts: list[Component], frame: Frame) -> AbstractModification:
+    terms = [term for part in parts for term in read_modification(part, frame)]
+    return reduce(add, terms) if terms else NoModification()
 
 
 def _load(model: Model, stage: Component, pinion: Component, wanted: int | None) -> tuple[float | None, float | None]:
@@ -188,11 +217,7 @@ def _load(model: Model, stage: Component, pinion: Component, wanted: int | None)
     if wanted is None and len(cases) > 1:
         raise DesignFileError("", f"has {len(cases)} load cases, choose one of {known} by its id (load_case)")
     case = cases[wanted] if wanted is not None else next(iter(cases.values()), {})
-    data = [
-        part.id
-        for part in model.related("stage_gear_data", "stage", stage.id, "stage_gear_data")
-        if pinion in model.related("stage_gear_data", "stage_gear_data", part.id, "gear")
-    ]
+    data = [part.id for part in _data(model, stage, pinion)]
     shafts = [part.id for part in model.related("assembly", "part", pinion.id, "assembly") if part.type == "shaft"]
     torque = _said_of(model, case, data, "torque", "N m")
     speed = _said_of(model, case, [pinion.id, *shafts], "rotational_speed", "1 / min")

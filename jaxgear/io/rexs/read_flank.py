@@ -68,12 +68,11 @@ def _end_relief(face: str) -> Callable[[Component, Frame], Iterator[AbstractModi
     depth, place = f"end_relief_depth_{face}", f"end_relief_evaluation_reference_{face}"
 
     def read(part: Component, frame: Frame) -> Iterator[AbstractModification]:
-        whole = part.needed(f"end_relief_length_{face}", "mm")
+        whole, end = part.needed(f"end_relief_length_{face}", "mm"), 0.5 * frame.own_width
         coordinate = part.number(place, "mm")
-        beyond = 0.0  # from the end of the face to where the depth is given
-        if coordinate is not None:
-            beyond = coordinate if face == "datum_face" else frame.own_width - coordinate
-        given, length = whole - beyond, whole - frame.margin
+        # from where the depth is given, and from the end of the common face width, to the start of the relief
+        given = whole if coordinate is None else whole - (end - frame.place(face, coordinate))
+        length = whole - frame.margin
         if not given > 0:
             raise part.refuse(place, f"{coordinate:g} mm lies outside the relief")
         if length <= 0:  # it ends beyond the common face width
@@ -115,23 +114,20 @@ def _profile_slope(part: Component, frame: Frame) -> Iterator[AbstractModificati
 
 
 def _helix_crowning(part: Component, frame: Frame) -> Iterator[AbstractModification]:
-    place = "coordinate_where_helix_crowning_is_specified_{}".format
-    first = part.number(place("datum_face"), "mm") or 0.0
-    last = part.number(place("non_datum_face"), "mm")
-    last = frame.own_width if last is None else last
+    faces, half = ("datum_face", "non_datum_face"), 0.5 * frame.width
+    given = [part.number(f"coordinate_where_helix_crowning_is_specified_{face}", "mm") for face in faces]
+    # from the middle towards each face
+    ends = [0.5 * frame.own_width if at is None else frame.place(face, at) for face, at in zip(faces, given)]
     highest = part.number("helix_highest_point", "mm")
-    top = 0.5 * (first + last) if highest is None else highest
-    if not first < top < last:
+    top = 0.5 * (ends[0] - ends[1]) if highest is None else frame.place("datum_face", highest)
+    if not -ends[1] < top < ends[0]:
         raise part.refuse("helix_highest_point", "must lie between the coordinates where the amounts are given")
     amounts = []
-    for face, given, length in (
-        ("datum_face", top - first, top - frame.margin),
-        ("non_datum_face", last - top, frame.own_width - frame.margin - top),
-    ):
+    for face, there, length in ((faces[0], ends[0] - top, half - top), (faces[1], ends[1] + top, half + top)):
         name = f"helix_crowning_amount_{face}"
-        _crowning_shape(part, "shape_of_helix_crowning", _amount(part, name), given)
-        amounts.append((face, _at_end(part, name, max(length, 0.0), given, 2), length))
-    if same(amounts[0][2], amounts[1][2]) and _equal(amounts[0][1], amounts[1][1]):
+        _crowning_shape(part, "shape_of_helix_crowning", _amount(part, name), there)
+        amounts.append((face, _at_end(part, name, max(length, 0.0), there, 2), length))
+    if same(top, 0.0) and _equal(amounts[0][1], amounts[1][1]):
         yield LeadCrowning(real(amounts[0][1]))
         return
     for face, amount, length in amounts:
@@ -148,7 +144,7 @@ def _helix_slope(part: Component, frame: Frame) -> Iterator[AbstractModification
         if start is None or end is None or not end > start:
             raise part.refuse("helix_evaluation_end", "must be given, and greater than helix_evaluation_start")
         length = end - start
-    yield LeadSlope(real(frame.sign * _at_end(part, "helix_slope", frame.width, length, 1)))
+    yield LeadSlope(real(-frame.datum * _at_end(part, "helix_slope", frame.width, length, 1)))
 
 
 def _topography(part: Component, frame: Frame) -> Iterator[AbstractModification]:

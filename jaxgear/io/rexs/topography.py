@@ -1,6 +1,6 @@
 """Curves that REXS does not know, as points of the flank between which it is interpolated linearly.
 
-Every point has its coordinate from the datum face, its diameter and its amount: three arrays of one length, which
+Every point has its face coordinate, its diameter and its amount: three arrays of one length, which
 cannot be misread. Points are denser where the flank is curved, so that the interpolation stays within a given error,
 whether it is linear in the roll length, as this library does it, or in the diameter.
 """
@@ -75,8 +75,7 @@ def flank_of(component: Component, frame: Frame) -> AbstractModification:
     roll = real(np.sqrt(np.maximum((0.5 * diameters) ** 2 - frame.base_radius**2, 0.0)))
     if (grid == grid[:, :1]).all():
         return TabulatedProfile(roll, real(grid[:, 0]))
-    face = slice(None, None, frame.sign)  # increasing
-    return TabulatedFlank(roll, real(frame.from_middle(coordinates)[face]), real(grid[:, face]))
+    return TabulatedFlank(roll, real(coordinates), real(grid))
 
 
 def _knots(modification: AbstractModification, frame: Frame) -> tuple[list[float], list[float]]:

@@ -75,7 +75,7 @@ def write_rexs(
     model.relate("assembly", assembly=unit, part=stage)
     gears, flanks = zip(*(write_gear(model, getattr(pair, name), name) for name in ("pinion", "wheel")))
     model.relate("stage", stage=stage, gear_1=gears[0], gear_2=gears[1])
-    data = [model.add("cylindrical_stage_gear_data") for _ in gears]
+    data = [model.add("cylindrical_stage_gear_data", is_driving_gear=(first, "none")) for first in (True, False)]
     for gear, part in zip(gears, data):
         model.relate("stage_gear_data", stage=stage, gear=gear, stage_gear_data=part)
     for name, both, frame, modification in zip(("pinion", "wheel"), flanks, frames(pair), (pinion, wheel)):

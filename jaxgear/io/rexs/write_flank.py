@@ -1,8 +1,8 @@
 """The modifications of a flank as components of REXS.
 
 Amounts are in mm and positive where material is removed; every component is additive. What the library says by lengths
-goes out by diameters and by coordinates from the datum face, which leave no question of where a length begins. A relief
-of b1 d + b2 d^2 is a linear and a parabolic one together. Other curves go out as points.
+goes out by diameters and face coordinates, which leave no question of where a length begins. A relief of b1 d + b2 d^2
+is a linear and a parabolic one together. Other curves go out as points.
 """
 
 from collections.abc import Callable
@@ -94,16 +94,15 @@ class Writer:
         )
 
     def _end_relief(self, term: EndRelief) -> bool:
-        margin = self._frame.margin
-        places = {"datum_face": margin, "non_datum_face": self._frame.own_width - margin}
+        frame = self._frame
 
         def add(shape, amount) -> None:
             for face, side in (("datum_face", "negative"), ("non_datum_face", "positive")):
                 if term.side in ("both", side):
                     self._add(f"end_relief_{face}", shape_of_relief=shape, **{
                         f"end_relief_depth_{face}": amount,
-                        f"end_relief_length_{face}": self._mm(margin + float(term.length)),
-                        f"end_relief_evaluation_reference_{face}": self._mm(places[face]),
+                        f"end_relief_length_{face}": self._mm(frame.margin + float(term.length)),
+                        f"end_relief_evaluation_reference_{face}": self._mm(frame.place(face, 0.5 * frame.width)),
                     })  # fmt: skip
 
         return self._relief(term, True, add)
@@ -150,9 +149,9 @@ class Writer:
             shape_of_helix_crowning=("parabolic", "none"),
             helix_crowning_amount_datum_face=self._amount(term.amount),
             helix_crowning_amount_non_datum_face=self._amount(term.amount),
-            coordinate_where_helix_crowning_is_specified_datum_face=self._mm(frame.margin),
-            coordinate_where_helix_crowning_is_specified_non_datum_face=self._mm(frame.own_width - frame.margin),
-            helix_highest_point=self._mm(0.5 * frame.own_width),
+            coordinate_where_helix_crowning_is_specified_datum_face=self._mm(-0.5 * frame.width),
+            coordinate_where_helix_crowning_is_specified_non_datum_face=self._mm(0.5 * frame.width),
+            helix_highest_point=self._mm(0.0),
         )
         return True
 
@@ -162,8 +161,8 @@ class Writer:
             "helix_slope",
             helix_slope=self._amount(term.amount),
             helix_evaluation_reference=("helix_evaluation_length", "none"),
-            helix_evaluation_start=self._mm(frame.margin),
-            helix_evaluation_end=self._mm(frame.own_width - frame.margin),
+            helix_evaluation_start=self._mm(-0.5 * frame.width),
+            helix_evaluation_end=self._mm(0.5 * frame.width),
         )
         return True
 
@@ -172,9 +171,7 @@ class Writer:
             roll, face, amount = points(term, self._frame, self._error)
         except ValueError as error:
             raise DesignFileError(self._owner, f"{type(term).__name__} {error}") from None
-        diameters, coordinates = np.meshgrid(
-            self._frame.diameter(roll), self._frame.from_datum_face(face), indexing="ij"
-        )
+        diameters, coordinates = np.meshgrid(self._frame.diameter(roll), face, indexing="ij")
         self._add(
             "topographical_modification",
             type_of_interpolation_topographical_modification=("linear", "none"),
