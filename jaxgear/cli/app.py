@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Literal, NoReturn
 
 import typer
 
@@ -169,6 +169,30 @@ def sweep(
         file, output, samples=samples, best=best, quick=quick, figures=not no_figures, cache=not no_cache
     )
     return OK if fine else NOT_CONVERGED
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="FILE.toml or FILE.rexs.", show_default=False)],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="The other kind of file.", show_default=False)],
+    stage: Annotated[int | None, typer.Option(metavar="ID", help="Cylindrical stage, where there are several.")] = None,
+    flank: Annotated[
+        Literal["left", "right"] | None, typer.Option(help="Flanks that touch, where both are modified differently.")
+    ] = None,
+    load_case: Annotated[int | None, typer.Option(metavar="ID", help="Load case, where there are several.")] = None,
+    torque: Annotated[
+        float | None, typer.Option(metavar="NM", help="Torque on the pinion in N m, in place of that of a REXS file.")
+    ] = None,
+) -> int:
+    """Convert a design file into a REXS file, or a stage of a REXS file into a design file.
+
+    REXS is the open exchange format for gearbox data. The gears with their modifications, torque and speed are
+    converted. A file that is there is never replaced.
+    """
+    with interrupt.importing():
+        from .convert import convert
+    convert(source, target, stage=stage, flank=flank, load_case=load_case, torque=torque)
+    return OK
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

@@ -1,4 +1,4 @@
-"""Files: design files (TOML) in, results (JSON, CSV) out."""
+"""Files: design files (TOML) in, results (JSON, CSV) out, gear pairs to and from other programs (REXS)."""
 
 from .design_file import DesignFile as DesignFile
 from .design_file import load_design as load_design
@@ -19,8 +19,12 @@ from .results import flank_rows as flank_rows
 from .results import write_flanks as write_flanks
 from .results import write_front as write_front
 from .results import write_summary as write_summary
+from .rexs import RexsPair as RexsPair
+from .rexs import read_rexs as read_rexs
+from .rexs import write_rexs as write_rexs
 from .sweep_request import SweepRequest as SweepRequest
 from .sweep_request import sweep_request as sweep_request
 from .variants import read_variants as read_variants
 from .wheel import write_wheel_drawing as write_wheel_drawing
 from .wheel import write_wheel_points as write_wheel_points
+from .write_design import write_design as write_design

@@ -16,22 +16,31 @@ S = TypeVar("S", bound=BaseModel)
 _CONTAINERS = {"list_type": "a list", "dict_type": "a table", "model_type": "a table"}
 
 
+def content(path: Path) -> bytes:
+    """What a file holds.
+
+    Raises:
+        DesignFileError: when it cannot be read.
+    """
+    try:
+        if path.exists() and not path.is_file():
+            raise ValueError("is a folder, not a file" if path.is_dir() else "is not a regular file")
+        return path.read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: also a path with a null byte
+        raise DesignFileError("", getattr(error, "strerror", None) or error) from None
+
+
 def read(path: Path) -> dict[str, Any]:
     """Reads a TOML file.
 
     Raises:
         DesignFileError: when it cannot be read or is not TOML.
     """
+    held = content(path)
     try:
-        if path.exists() and not path.is_file():
-            raise ValueError("is a folder, not a file" if path.is_dir() else "is not a regular file")
-        content = path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: also a path with a null byte
-        raise DesignFileError("", getattr(error, "strerror", None) or error) from None
-    try:
-        text = content.decode("utf-8-sig")
+        text = held.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
+        line = held.count(b"\n", 0, error.start) + 1
         raise DesignFileError("", f"line {line}: not UTF-8 text") from None
     try:
         return tomllib.loads(text)

@@ -1,0 +1,85 @@
+"""What the command `convert` does: a design file as a REXS file, and the other way round."""
+
+from pathlib import Path
+from typing import Literal
+
+import jax
+
+from ..geometry import GearPair
+from ..io import DesignFileError, load_design, read_rexs, write_design, write_rexs
+from ..io.toml import read
+from . import interrupt, report
+
+_REXS, _DESIGN = (".rexs", ".xml"), (".toml",)
+_TAKEN = {"title", "pinion", "wheel", "pair", "load"}  # tables of a design file that REXS has a place for
+
+
+def convert(
+    source: Path,
+    target: Path,
+    *,
+    stage: int | None,
+    flank: Literal["left", "right"] | None,
+    load_case: int | None,
+    torque: float | None,
+) -> None:
+    """Converts a file by the ends of both names; a file that is there is never replaced."""
+    jax.config.update("jax_enable_x64", True)
+    if target.exists():
+        raise ValueError(f"{target}: exists already, choose another name")
+    if source.suffix in _REXS and target.suffix in _DESIGN:
+        found = read_rexs(source, stage=stage, flank=flank, load_case=load_case)
+        torque = found.torque if torque is None else torque
+        if torque is None:
+            raise DesignFileError("", "names no torque of the pinion, give it with --torque", source)
+        with interrupt.held(f"{target} is there"):
+            write_design(
+                target,
+                found.pair,
+                torque=torque,
+                pinion=found.pinion,
+                wheel=found.wheel,
+                speed=found.speed,
+                title=found.title,
+            )
+        _say(target, found.pair)
+    elif source.suffix in _DESIGN and target.suffix in _REXS:
+        options = {"--stage": stage, "--flank": flank, "--load-case": load_case, "--torque": torque}
+        for name, given in options.items():
+            if given is not None:
+                raise ValueError(f"{name} has no effect on a design file, leave it out")
+        _to_rexs(source, target)
+    else:
+        raise ValueError(f"{source.name} to {target.name}: one name must end in .toml, the other in .rexs or .xml")
+
+
+def _to_rexs(source: Path, target: Path) -> None:
+    design = load_design(source)
+    if design.bounds:
+        problem = f"convert needs numbers, these are free: {', '.join(design.bounds)}"
+        raise DesignFileError("variables", problem, source)
+    pinion, wheel = design.design({})
+    with interrupt.held(f"{target} is there"):
+        write_rexs(
+            target,
+            design.pair(),
+            pinion=pinion,
+            wheel=wheel,
+            torque=design.torque,
+            speed=design.speed,
+            title=design.title,
+        )
+    _say(target, design.pair())
+    tables = read(source)
+    left = [f"[{name}]" for name in tables if name not in _TAKEN]
+    left += [f"load.{name}" for name in tables["load"] if name not in ("torque", "speed")]
+    if left:
+        report.say(f"left out, REXS has no place for it: {', '.join(left)}")
+
+
+def _say(target: Path, pair: GearPair) -> None:
+    pinion, wheel = pair.pinion, pair.wheel
+    report.say(
+        f"{target}: {int(pinion.teeth)}/{int(wheel.teeth)} teeth, module {float(pinion.module):g} mm, "
+        f"centre distance {float(pair.working_center_distance):.6g} mm"
+    )

@@ -1,0 +1,5 @@
+"""REXS files (https://www.rexs.info): the open exchange format for gearbox data, read and written."""
+
+from .read import RexsPair as RexsPair
+from .read import read_rexs as read_rexs
+from .write import write_rexs as write_rexs

@@ -1,0 +1,97 @@
+"""Where something is on a flank: the coordinates of REXS and those of the library.
+
+REXS counts along the profile by diameters, the library by roll lengths. Over the face both count along the axis from
+the middle of the face, REXS over the gear's own face width, the library over the common one of the pair, on which both
+gears are centred. Where REXS speaks of the datum face, its gears say at which end it is.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import jax.numpy as jnp
+import numpy as np
+
+from ...geometry import Gear, GearPair, path_of_contact
+from ...microgeometry import AbstractModification, Flank
+
+_SAME = 1e-9  # mm: what a diameter in 12 digits leaves open
+_POINTS = 1024  # evaluated at a time: one shape is compiled once
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One gear's flank within its pair, all numbers in mm.
+
+    Attributes:
+        base_radius: of the gear.
+        start, tip: roll lengths at both ends of the active profile.
+        own_width: face width of the gear.
+        width: common face width of the pair.
+        datum: -1 where the datum face is at negative face coordinates, 1 at positive ones.
+    """
+
+    base_radius: float
+    start: float
+    tip: float
+    own_width: float
+    width: float
+    datum: int = -1
+
+    @property
+    def margin(self) -> float:
+        """From the end of the gear's face to that of the common face width."""
+        return 0.5 * (self.own_width - self.width)
+
+    def diameter(self, roll_length):
+        """Diameter at a roll length."""
+        return 2 * np.hypot(self.base_radius, roll_length)
+
+    def roll_length(self, diameter):
+        """Roll length at a diameter; NaN below the base circle."""
+        with np.errstate(invalid="ignore"):
+            return np.sqrt((0.5 * np.asarray(diameter)) ** 2 - self.base_radius**2)
+
+    def place(self, face: str, length: float) -> float:
+        """Face coordinate at a distance from the middle towards the "datum_face" or the "non_datum_face"."""
+        return self.datum * length if face == "datum_face" else -self.datum * length
+
+    def side(self, face: str) -> Literal["negative", "positive"]:
+        """At which face coordinates the "datum_face" or the "non_datum_face" is."""
+        return "negative" if self.place(face, 1.0) < 0 else "positive"
+
+    def removed(self, modification: AbstractModification, roll_length, face_coordinate) -> np.ndarray:
+        """Material removed at points of the flank [um], of the shape of their coordinates."""
+        shape, count = np.shape(roll_length), np.size(roll_length)
+        chunks = -(-count // _POINTS)
+        padding = (0, chunks * _POINTS - count)
+        points = [np.pad(np.ravel(of), padding, mode="edge") for of in (roll_length, face_coordinate)]
+        parts = zip(*(np.split(of, chunks) for of in points))
+        found = [np.asarray(modification(self._flank(rho, y))) for rho, y in parts]
+        return np.concatenate([np.broadcast_to(part, _POINTS) for part in found])[:count].reshape(shape)
+
+    def _flank(self, roll_length, face_coordinate) -> Flank:
+        return Flank(
+            roll_length=jnp.asarray(roll_length),
+            tip_roll_length=jnp.asarray(self.tip),
+            start_roll_length=jnp.asarray(self.start),
+            base_radius=jnp.asarray(self.base_radius),
+            face_coordinate=jnp.asarray(face_coordinate),
+            face_width=jnp.asarray(self.width),
+        )
+
+
+def frames(pair: GearPair) -> tuple[Frame, Frame]:
+    """The flanks of pinion and wheel."""
+    path, width = path_of_contact(pair), float(pair.face_width)
+    starts = path.pinion_roll_length(path.start), path.wheel_roll_length(path.end)
+    pinion, wheel = (_frame(gear, start, width) for gear, start in zip((pair.pinion, pair.wheel), starts))
+    return pinion, wheel
+
+
+def _frame(gear: Gear, start, width: float) -> Frame:
+    return Frame(float(gear.base_radius), float(start), float(gear.tip_roll_length), float(gear.face_width), width)
+
+
+def same(first: float, second: float) -> bool:
+    """Whether two lengths differ by no more than their digits [mm]."""
+    return abs(first - second) <= _SAME

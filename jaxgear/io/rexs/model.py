@@ -1,0 +1,232 @@
+"""A REXS model as data: components with attributes, relations between them, load cases.
+
+REXS, the Reusable Engineering EXchange Standard of FVA (https://www.rexs.info), describes a gear unit by its parts and
+what they have to do with each other. A file holds one model. Whatever is wrong with it is refused in one line that
+names component and attribute.
+"""
+
+import base64
+import binascii
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+
+from ..errors import DesignFileError
+
+CUSTOM = (
+    "custom_jaxgear_"  # of attributes that REXS does not know; it leaves names that begin with "custom_" to programs
+)
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+# what earlier versions call a unit of the current one
+_ALSO = {"deg": ("\u00b0",), "MPa": ("N / mm^2",), "none": ("",)}
+# names until REXS 1.7, by the type of the component
+_EARLIER = {
+    "rack_shaped_tool": {
+        "tip_radius": "tip_corner_radius_reference_profile",
+        "tip_radius_factor": "tip_corner_radius_factor_reference_profile",
+        "machining_allowance_din_3972": "machining_allowance_din_3972_1952",
+        "relative_machining_allowance_din_3972": "relative_machining_allowance_din_3972_1952",
+    },
+    "cylindrical_gear": {
+        "thermal_contact_coefficient_agma_925_a03": "thermal_contact_coefficient_agma_925_2003",
+    },
+}
+_CODES = {"float64": "<f8", "float32": "<f4", "int32": "<i4"}
+
+
+@dataclass(frozen=True)
+class Attribute:
+    """What a component says of itself.
+
+    Attributes:
+        value: text of a scalar, texts of an array, None for a matrix or another nested value.
+        unit: None where the file names none.
+    """
+
+    value: str | tuple[str, ...] | None
+    unit: str | None = None
+
+
+@dataclass
+class Component:
+    """A part of the gear unit, or something that belongs to one."""
+
+    id: int
+    type: str
+    name: str = ""
+    attributes: dict[str, Attribute] = field(default_factory=dict)
+
+    def where(self, attribute: str = "") -> str:
+        """`cylindrical_gear 15: face_width`."""
+        return f"{self.type} {self.id}" + (f": {attribute}" if attribute else "")
+
+    def refuse(self, attribute: str, problem: str) -> DesignFileError:
+        """The refusal of an attribute."""
+        return DesignFileError(self.where(attribute), problem)
+
+    def number(self, attribute: str, unit: str, *, shift: int = 0) -> float | None:
+        """A number times 10^shift, None where it is absent. The shift is of the decimal digits, so that it is exact."""
+        value = self._value(attribute, unit)
+        if value is None:
+            return None
+        if not isinstance(value, str):
+            raise self.refuse(attribute, "must be a number, not an array")
+        return self._float(attribute, value, shift)
+
+    def needed(self, attribute: str, unit: str) -> float:
+        """A number that has to be there."""
+        value = self.number(attribute, unit)
+        if value is None:
+            raise self.refuse(attribute, "missing")
+        return value
+
+    def numbers(self, attribute: str, unit: str, *, shift: int = 0) -> np.ndarray:
+        """An array that has to be there, times 10^shift."""
+        value = self._value(attribute, unit)
+        if value is None:
+            raise self.refuse(attribute, "missing")
+        if isinstance(value, str):
+            raise self.refuse(attribute, "must be an array, not a single value")
+        return np.array([self._float(attribute, item, shift) for item in value])
+
+    def choice(self, attribute: str, default: str | None, allowed: Iterable[str]) -> str:
+        """One of several words, which has to be there where there is no default."""
+        value = self._value(attribute, "none") or default
+        names = tuple(allowed)
+        if value is None:
+            raise self.refuse(attribute, f"missing, must be one of {', '.join(names)}")
+        if value not in names:
+            raise self.refuse(attribute, f'"{value}" is not supported, must be one of {", ".join(names)}')
+        return str(value)
+
+    def flag(self, attribute: str, default: bool) -> bool:
+        """True or false."""
+        return self.choice(attribute, str(default).lower(), ("true", "false")) == "true"
+
+    def text(self, attribute: str) -> str:
+        """Free text, "" where it is absent."""
+        value = self.attributes[attribute].value if attribute in self.attributes else ""
+        return value if isinstance(value, str) else ""
+
+    def _value(self, attribute: str, unit: str) -> str | tuple[str, ...] | None:
+        if attribute not in self.attributes:
+            return None
+        held = self.attributes[attribute]
+        if held.unit is not None and held.unit != unit and held.unit not in _ALSO.get(unit, ()):
+            raise self.refuse(attribute, f'unit "{held.unit}" must be "{unit}"')
+        if held.value is None:
+            raise self.refuse(attribute, "must be a single value or an array, not a matrix")
+        return held.value or None  # an empty element says nothing
+
+    def _float(self, attribute: str, text: str, shift: int) -> float:
+        if not _NUMBER.fullmatch(text) or not math.isfinite(value := float(text)):
+            raise self.refuse(attribute, f'"{text[:40]}" is not a finite number')
+        return float(Decimal(text).scaleb(shift)) if value else 0.0
+
+
+@dataclass(frozen=True)
+class Relation:
+    """What several components have to do with each other: (role, id of the component) of each."""
+
+    type: str
+    refs: tuple[tuple[str, int], ...]
+    order: int | None = None
+
+
+@dataclass
+class Model:
+    """What a file holds.
+
+    Attributes:
+        version: of REXS.
+        components: by their ids.
+        relations: in their order.
+        cases: of the load spectrum by their ids; each holds what a component says under this load.
+    """
+
+    version: str
+    components: dict[int, Component] = field(default_factory=dict)
+    relations: list[Relation] = field(default_factory=list)
+    cases: dict[int, dict[int, Component]] = field(default_factory=dict)
+
+    def component(self, number: int) -> Component:
+        """The component of an id."""
+        if number not in self.components:
+            raise DesignFileError("", f"a relation names component {number}, which is missing")
+        return self.components[number]
+
+    def related(self, kind: str, role: str, number: int, wanted: str) -> list[Component]:
+        """The components with a wanted role in the relations of a kind in which a component has a role."""
+        found = [
+            relation.refs for relation in self.relations if relation.type == kind and (role, number) in relation.refs
+        ]
+        ids = [other for refs in found for name, other in refs if name == wanted]
+        return [self.component(other) for other in dict.fromkeys(ids)]
+
+    def add(self, kind: str, name: str = "", **values: tuple[Any, str]) -> Component:
+        """A new component; values are (value, unit), those of None are left out."""
+        component = Component(len(self.components) + 1, kind, name, attributes_of(values))
+        self.components[component.id] = component
+        return component
+
+    def relate(self, kind: str, *, order: int | None = None, **roles: Component) -> None:
+        """A new relation."""
+        self.relations.append(Relation(kind, tuple((role, part.id) for role, part in roles.items()), order))
+
+    def under_load(self, case: int, component: Component, **values: tuple[Any, str]) -> None:
+        """What a component says in a load case."""
+        said = Component(component.id, component.type, component.name, attributes_of(values))
+        self.cases.setdefault(case, {})[component.id] = said
+
+
+def current(kind: str, attribute: str) -> str:
+    """The name that an attribute of a type of component has in REXS 2."""
+    return _EARLIER.get(kind, {}).get(attribute, attribute)
+
+
+def attributes_of(values: dict[str, tuple[Any, str]]) -> dict[str, Attribute]:
+    """Attributes from (value, unit); those of None are left out."""
+    return {name: Attribute(written(value), unit) for name, (value, unit) in values.items() if value is not None}
+
+
+def written(value: Any) -> str | tuple[str, ...]:
+    """A value as text: numbers by the shortest digits that read back as the same number."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return str(value).lower()
+    array = np.asarray(value)
+    return tuple(str(item) for item in array) if array.ndim else str(array[()])
+
+
+def shifted(value: Any, shift: int) -> str | tuple[str, ...]:
+    """Numbers times 10^shift as text; the shift is of the decimal digits, so that it is exact."""
+    text = written(value)
+    if isinstance(text, tuple):
+        return tuple(_shift(item, shift) for item in text)
+    return _shift(text, shift)
+
+
+def _shift(text: str, shift: int) -> str:
+    number = Decimal(text)
+    return str(number.scaleb(shift).normalize()) if number else "0.0"
+
+
+def decoded(text: str, code: str) -> tuple[str, ...]:
+    """The numbers of an array in base64, little-endian (REXS 1.4).
+
+    Raises:
+        ValueError: where it is none.
+    """
+    if code not in _CODES:
+        raise ValueError(f'code "{code}" is not known, must be one of {", ".join(_CODES)}')
+    try:
+        content = base64.b64decode("".join(text.split()), validate=True)
+        return tuple(str(item) for item in np.frombuffer(content, _CODES[code]))
+    except (binascii.Error, ValueError):
+        raise ValueError(f"is not an array of {code} in base64") from None

@@ -1,0 +1,234 @@
+"""Reads a gear pair with its modifications and its load from a REXS file."""
+
+from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ...geometry import GearPair
+from ...microgeometry import AbstractModification, NoModification
+from ..errors import DesignFileError, naming, refused
+from ..toml import content
+from .frame import Frame, frames
+from .gears import check_spur, read_gear
+from .model import Component, Model
+from .parse import parse
+from .read_flank import read_modification
+
+_OLDEST, _NEWEST = (1, 4), (2,)
+_ALIKE = 1e-9  # um
+_ALONG, _ACROSS = "position_of_profile_modification", "diameter_of_helix_modification"
+_GEOMETRY = (
+    "normal_pressure_angle",
+    "addendum_modification_coefficient",
+    "addendum_modification",
+    "addendum_coefficient_basic_profile",
+)
+
+
+@dataclass(frozen=True)
+class RexsPair:
+    """What a REXS file says of a cylindrical stage.
+
+    Attributes:
+        title: name of the model, "" where it has none.
+        pair: the gears; gear 1 of the stage is the pinion, which drives.
+        pinion, wheel: modifications of the flanks.
+        torque: on the pinion [N m], None where the file names none.
+        speed: of the pinion [rpm], likewise.
+    """
+
+    title: str
+    pair: GearPair
+    pinion: AbstractModification
+    wheel: AbstractModification
+    torque: float | None
+    speed: float | None
+
+
+def read_rexs(
+    path: str | Path,
+    *,
+    stage: int | None = None,
+    flank: Literal["left", "right"] | None = None,
+    load_case: int | None = None,
+) -> RexsPair:
+    """Reads an external spur pair from a REXS file of version 1.4 or later.
+
+    Both gears are taken as centred on each other. A gear without a material is of steel, and one without an inner
+    diameter has the bore that `Gear` gives it. A modification that is given at other places than the ends of the
+    library's flank goes on to these by its own law.
+
+    Args:
+        path: of the file.
+        stage: id of the cylindrical stage, needed where the file has several.
+        flank: which flanks touch, needed where the left and the right ones are modified differently.
+        load_case: id of the load case, needed where the file has several.
+
+    Raises:
+        DesignFileError: for whatever is wrong with the file or not of this library, in one line that names component
+            and attribute: helical and internal gears, protuberance, chamfers, several tools, shapes of a relief without
+            a formula, missing data, other units, XML that is not well-formed or declares a document type.
+    """
+    file = Path(path)
+    with naming(file):
+        return _read(parse(content(file)), stage, flank, load_case)
+
+
+def _read(model: Model, stage: int | None, flank: str | None, load_case: int | None) -> RexsPair:
+    chosen = _stage(model, stage)
+    gears = _driving_first(model, chosen)
+    for gear in gears:
+        check_spur(gear)
+    _check_version(model)
+    _check_axes(gears)
+    flank = _loaded(model, chosen, gears) if flank is None else flank
+    flanks = [_flank(model, gear, flank) for gear in gears]
+    pinion, wheel = (read_gear(model, gear, face) for gear, face in zip(gears, flanks))
+    distance = chosen.needed("center_distance", "mm")
+    pair: GearPair = refused(chosen.where(), GearPair, pinion, wheel, distance)
+    width, common = float(pair.face_width), chosen.number("common_face_width", "mm")
+    if common is not None and abs(common - width) > 1e-6 * width:
+        problem = f"{common:g} mm must be the smaller face width, {width:g} mm: the gears are centred on each other"
+        raise chosen.refuse("common_face_width", problem)
+    sides = zip(gears, flanks, frames(pair))
+    on_pinion, on_wheel = (_modification(model, *side) for side in sides)
+    torque, speed = _load(model, chosen, gears[0], load_case)
+    units = [part for part in model.components.values() if part.type == "gear_unit"]
+    title = units[0].text("model_name") if units else ""
+    return RexsPair(title, pair, on_pinion, on_wheel, torque, speed)
+
+
+def _stage(model: Model, wanted: int | None) -> Component:
+    """The stage of an id, or the only one."""
+    stages = [part for part in model.components.values() if part.type == "cylindrical_stage"]
+    known = ", ".join(str(part.id) for part in stages)
+    if not stages:
+        raise DesignFileError("", "has no cylindrical_stage")
+    if wanted is None and len(stages) > 1:
+        raise DesignFileError("", f"has {len(stages)} cylindrical stages, choose one of {known} by its id (stage)")
+    found = [part for part in stages if wanted in (None, part.id)]
+    if not found:
+        raise DesignFileError("", f"has no cylindrical_stage {wanted}, must be one of {known}")
+    return found[0]
+
+
+def _driving_first(model: Model, stage: Component) -> list[Component]:
+    """The gears of a stage: gear 1 and 2, or the other way round where the file says that gear 2 drives."""
+    gears = [_one(model.related("stage", "stage", stage.id, role), stage, role) for role in ("gear_1", "gear_2")]
+    drives = [any(part.flag("is_driving_gear", False) for part in _data(model, stage, gear)) for gear in gears]
+    return gears[::-1] if drives == [False, True] else gears
+
+
+def _data(model: Model, stage: Component, gear: Component) -> list[Component]:
+    """What the stage says of one of its gears."""
+    found = model.related("stage_gear_data", "stage", stage.id, "stage_gear_data")
+    return [part for part in found if gear in model.related("stage_gear_data", "stage_gear_data", part.id, "gear")]
+
+
+def _loaded(model: Model, stage: Component, gears: list[Component]) -> str | None:
+    """Which flanks touch, where the file says so."""
+    sides = {part.text("loaded_tooth_flank") for gear in gears for part in _data(model, stage, gear)} - {""}
+    if len(sides) > 1:
+        raise stage.refuse("loaded_tooth_flank", "differs between its gears, must be the same: left touches left")
+    return sides.pop() if sides else None
+
+
+def _check_axes(gears: list[Component]) -> None:
+    """Refuses gears that count along their faces in opposite directions."""
+    axes = [gear.numbers("u_axis_vector", "mm") for gear in gears if "u_axis_vector" in gear.attributes]
+    if len(axes) == 2 and (axes[0].shape != axes[1].shape or not axes[0] @ axes[1] > 0):
+        raise gears[1].refuse("u_axis_vector", f"must point in the direction of that of gear {gears[0].id}")
+
+
+def _check_version(model: Model) -> None:
+    version = tuple(int(part) for part in model.version.split("."))
+    if version[:2] < _OLDEST or version[:1] > _NEWEST:
+        raise DesignFileError("", f"is of REXS {model.version}, must be of 1.4 to 2")
+
+
+def _one(found: list[Component], owner: Component, role: str) -> Component:
+    if len(found) != 1:
+        raise owner.refuse(role, "missing" if not found else f"is {len(found)} components, must be one")
+    return found[0]
+
+
+def _flank(model: Model, gear: Component, wanted: str | None) -> Component:
+    """The flank that touches: the wanted one, or any where both are the same."""
+    sides = {side: model.related("flank", "gear", gear.id, side) for side in ("left", "right")}
+    found = {side: _one(flanks, gear, f"{side} flank") for side, flanks in sides.items() if flanks}
+    if not found or (wanted is not None and wanted not in found):
+        raise gear.refuse("", f"has no {wanted or 'left or right'} flank in a relation of type flank")
+    flanks = list(found.values())
+    for name in _GEOMETRY:
+        if len({str(flank.attributes.get(name)) for flank in flanks}) > 1:
+            raise flanks[0].refuse(name, f"differs from that of flank {flanks[1].id}: teeth must be symmetric")
+    if wanted is not None:
+        return found[wanted]
+    if len(flanks) > 1 and _said(model, flanks[0]) != _said(model, flanks[1]):
+        problem = f"is modified otherwise than flank {flanks[1].id}, choose left or right (flank)"
+        raise flanks[0].refuse("", problem)
+    return flanks[0]
+
+
+def _said(model: Model, flank: Component) -> list[str]:
+    """Everything that the modifications of a flank say, in an order that depends on nothing else."""
+    parts = model.related("reference", "origin", flank.id, "referenced")
+    return sorted(f"{part.type} {sorted(part.attributes.items())}" for part in parts)
+
+
+def _modification(model: Model, gear: Component, flank: Component, frame: Frame) -> AbstractModification:
+    """The sum of what is taken off a flank."""
+    parts = model.related("reference", "origin", flank.id, "referenced")
+    for name in (_ALONG, _ACROSS):
+        places = {part.number(name, "mm"): part for part in parts if name in part.attributes}
+        if len(places) > 1:
+            raise list(places.values())[1].refuse(
+                name, "differs from that of another part: one place must hold for all"
+            )
+    for part in parts:
+        if len(parts) > 1 and not part.flag("is_additive_modification", True):
+            raise part.refuse("is_additive_modification", "must be true beside other modifications")
+    datum_face = gear.choice("datum_face_orientation", "negative", ["negative", "positive"])
+    frame = replace(frame, datum=-1 if datum_face == "negative" else 1)
+    total = _sum(parts, frame)
+    if "datum_face_orientation" not in gear.attributes:
+        other = _sum(parts, replace(frame, datum=1))
+        roll, face = np.meshgrid(np.linspace(frame.start, frame.tip, 33), np.linspace(-0.5, 0.5, 61) * frame.width)
+        if np.abs(frame.removed(total, roll, face) - frame.removed(other, roll, face)).max() > _ALIKE:
+            raise gear.refuse("datum_face_orientation", "missing, the ends of the face are modified differently")
+    return total
+
+
+def _sum(parts: list[Component], frame: Frame) -> AbstractModification:
+    terms = [term for part in parts for term in read_modification(part, frame)]
+    return reduce(add, terms) if terms else NoModification()
+
+
+def _load(model: Model, stage: Component, pinion: Component, wanted: int | None) -> tuple[float | None, float | None]:
+    """Torque [N m] and speed [rpm] of the pinion."""
+    cases = model.cases
+    known = ", ".join(map(str, cases))
+    if wanted is not None and wanted not in cases:
+        raise DesignFileError("", f"has no load_case {wanted}, must be one of {known or 'none'}")
+    if wanted is None and len(cases) > 1:
+        raise DesignFileError("", f"has {len(cases)} load cases, choose one of {known} by its id (load_case)")
+    case = cases[wanted] if wanted is not None else next(iter(cases.values()), {})
+    data = [part.id for part in _data(model, stage, pinion)]
+    shafts = [part.id for part in model.related("assembly", "part", pinion.id, "assembly") if part.type == "shaft"]
+    torque = _said_of(model, case, data, "torque", "N m")
+    speed = _said_of(model, case, [pinion.id, *shafts], "rotational_speed", "1 / min")
+    return torque, speed
+
+
+def _said_of(model: Model, case: dict[int, Component], ids: list[int], name: str, unit: str) -> float | None:
+    """Size of a number that the first of several components names, in the load case or without one."""
+    for number in ids:
+        for part in (case.get(number), model.component(number)):
+            value = None if part is None else part.number(name, unit)
+            if value is not None:
+                return abs(value)
+    return None

@@ -1,0 +1,68 @@
+"""What a loaded tooth contact has found, as `meshing_contact_stage_data_set` of REXS."""
+
+import numpy as np
+
+from ...contact import MeshCycle
+from ...geometry import tooth_thickness
+from ...metrics import flash_temperature
+from .model import Component, Model
+
+
+def write_results(
+    model: Model, stage_data: Component, cycle: MeshCycle, *, case: int, speed: float | None, friction: float | None
+) -> None:
+    """Writes line load and Hertzian stress, with a speed sliding velocity and flash temperature too.
+
+    They belong to points of the pinion flank: radius, angle from the centreline of the tooth and face coordinate from
+    the middle of the face, line after line across the face. Points are where contact is on the path of contact; what
+    tip corners carry beyond it has no place of its own on this flank and is left out.
+
+    Args:
+        model: where they go.
+        stage_data: component that holds the pinion's data of the stage.
+        cycle: solved mesh cycle.
+        case: load case under which they stand.
+        speed: of the pinion [rpm].
+        friction: mean coefficient of friction, None for the library's default.
+    """
+    kinematics, (side, _) = cycle.kinematics, cycle.sides
+    pair, position = np.nonzero(np.asarray(kinematics.outside) == 0)
+    order = np.argsort(np.asarray(side.contact_roll_length)[pair, position])
+    pair, position = pair[order], position[order]
+    roll = np.asarray(side.contact_roll_length)[pair, position]
+    face = np.asarray(kinematics.face_coordinate)
+
+    def spread(values) -> np.ndarray:
+        """One value per slice and position, or per position, as one per point."""
+        array = np.broadcast_to(np.asarray(values), (len(face), len(roll)))
+        return array.ravel()
+
+    def loaded(values) -> np.ndarray:
+        return spread(np.asarray(values)[pair, :, position].T)
+
+    identifiers = np.arange(1, len(face) * len(roll) + 1)
+    radius = np.hypot(float(side.base_radius), roll)
+    angle = np.rad2deg(np.asarray(tooth_thickness(side.gear, 2 * radius)) / (2 * radius))
+    points = model.add(
+        "point_list",
+        "contact on the pinion flank",
+        kind_of_point_list=("meshing_contact_points", "none"),
+        point_ids=(identifiers, "none"),
+        point_coordinates_radius=(spread(radius), "mm"),
+        point_coordinates_angle_about_u_axis=(spread(angle), "deg"),
+        point_coordinates_u_coord=(spread(face[:, None]), "mm"),
+    )
+    data = model.add("meshing_contact_stage_data_set", set_ids=(identifiers, "none"))
+    model.relate("assembly", assembly=stage_data, part=points)
+    model.relate("reference", origin=points, referenced=data)
+    found = {
+        "local_normal_line_load": (loaded(cycle.line_load), "N / mm"),
+        "local_hertzian_contact_stress": (loaded(cycle.contact_pressure), "MPa"),
+    }
+    if speed is not None:
+        path = np.asarray(kinematics.path)[pair, position]
+        known = {} if friction is None else {"friction": friction}
+        flash = flash_temperature(cycle, speed, **known)
+        found["local_sliding_velocity"] = (spread(kinematics.path_of_contact.sliding_speed(path, speed)), "m / s")
+        found["local_flash_temperature_blok_1937"] = (loaded(flash), "K")
+    model.under_load(case, data, **found)

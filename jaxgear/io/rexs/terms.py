@@ -1,0 +1,82 @@
+"""Modifications as REXS has them: a sum of parts, each with an amount of its own."""
+
+from collections.abc import Iterator
+
+import equinox as eqx
+
+from ...microgeometry import (
+    AbstractCurve,
+    AbstractModification,
+    EndRelief,
+    LeadCrowning,
+    LeadSlope,
+    Linear,
+    NoModification,
+    Parabolic,
+    ParabolicLinear,
+    Polynomial,
+    Power,
+    ProfileCrowning,
+    ProfileSlope,
+    Quadratic,
+    RootRelief,
+    Scaled,
+    Sum,
+    TabulatedFlank,
+    TabulatedProfile,
+    TipRelief,
+)
+
+# their amounts are proportional to what they remove
+_PROPORTIONAL = (
+    TipRelief,
+    RootRelief,
+    ProfileCrowning,
+    ProfileSlope,
+    LeadCrowning,
+    LeadSlope,
+    EndRelief,
+    TabulatedProfile,
+    TabulatedFlank,
+)
+
+
+def plain_terms(modification: AbstractModification, factor=None) -> Iterator[AbstractModification]:
+    """The terms of a modification without sums and factors, except for factors of classes from outside the library."""
+    if isinstance(modification, NoModification):
+        return
+    if isinstance(modification, Sum):
+        for term in modification.terms:
+            yield from plain_terms(term, factor)
+    elif isinstance(modification, Scaled):
+        yield from plain_terms(modification.modification, _product(factor, modification.factor))
+    elif factor is None:
+        yield modification
+    elif isinstance(modification, _PROPORTIONAL):
+        yield eqx.tree_at(lambda of: of.amount, modification, factor * modification.amount)
+    else:
+        yield Scaled(factor, modification)
+
+
+def powers(curve: AbstractCurve) -> dict[int, float] | None:
+    """Coefficients of a curve that is b1 d + b2 d^2, by their powers; None for any other."""
+    if isinstance(curve, Linear):
+        return {1: 1.0}
+    if isinstance(curve, Parabolic):
+        return {1: 0.44, 2: 0.56}
+    if isinstance(curve, Power):
+        return {int(curve.exponent): 1.0} if float(curve.exponent) in (1.0, 2.0) else None
+    if isinstance(curve, ParabolicLinear):
+        return {2: 1.0} if float(curve.node) == 1.0 else None
+    if isinstance(curve, Quadratic):
+        return _of_coefficients([curve.b0, curve.b1, curve.b2])
+    return _of_coefficients(curve.coefficients) if isinstance(curve, Polynomial) else None
+
+
+def _of_coefficients(coefficients) -> dict[int, float] | None:
+    known = {power: float(value) for power, value in enumerate(coefficients) if float(value)}
+    return known if set(known) <= {1, 2} else None
+
+
+def _product(first, second):
+    return second if first is None else first * second

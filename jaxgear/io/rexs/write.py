@@ -1,0 +1,118 @@
+"""Writes a gear pair with its modifications, its load and what a loaded tooth contact has found as a REXS file."""
+
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from ...contact import MeshCycle
+from ...geometry import GearPair
+from ...microgeometry import AbstractModification
+from ...numerics import check
+from ...numerics.durable import write_durably
+from ..folder import writing
+from .frame import frames
+from .gears import write_gear
+from .model import Model
+from .results import write_results
+from .text import xml
+from .write_flank import Writer
+
+_VERSION = "2.0.0"
+_CASE = 1
+
+
+def write_rexs(
+    path: str | Path,
+    pair: GearPair,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+    torque: float | None = None,
+    speed: float | None = None,
+    cycle: MeshCycle | None = None,
+    friction: float | None = None,
+    title: str = "",
+    error: float = 0.01,
+) -> None:
+    """Writes a REXS 2.0 file. It appears as a whole or not at all, in place of an earlier one.
+
+    What the pair leaves open, tip diameters and centre distance, is written as the numbers that it means; a bore that
+    is left open is left out. Both flanks of a tooth are modified alike. What REXS has no place for, the radius of the
+    tip edges, goes into attributes of the name `custom_jaxgear_...`, which REXS leaves to programs.
+
+    Args:
+        path: of the file.
+        pair: gear pair; the pinion is gear 1 of the stage.
+        pinion, wheel: modifications of the flanks.
+        torque: on the pinion [N m].
+        speed: of the pinion [rpm].
+        cycle: solved mesh cycle of the pair, whose line load and Hertzian stress are written, with a speed also sliding
+            velocity and flash temperature; its modifications, torque and speed are those of the file.
+        friction: mean coefficient of friction for the flash temperature; None for that of the cycle, or the library's.
+        title: free text.
+        error: by how much the points that stand for a curve unknown to REXS may be off it [um].
+
+    Raises:
+        ValueError: for traced numbers or several pairs, a cycle of another pair, with batch axes or that did not
+            converge, arguments that a cycle gives already, a modification with a step, or where the file cannot be
+            written.
+    """
+    check("write_rexs", "error", error, "um", low=0.0, open_low=True)
+    if cycle is not None:
+        pinion, wheel, torque, speed, friction = _of_cycle(pair, cycle, pinion, wheel, torque, speed, friction)
+    if any(isinstance(leaf, jax.core.Tracer) or np.ndim(leaf) for leaf in jax.tree.leaves(pair)):
+        raise ValueError("write_rexs: pair must be one pair of concrete numbers")
+    model = Model(_VERSION)
+    title = "".join(letter for letter in title if letter.isprintable())
+    unit = model.add("gear_unit", model_name=(title or None, "none"))
+    stage = model.add(
+        "cylindrical_stage",
+        center_distance=(pair.working_center_distance, "mm"),
+        common_face_width=(pair.face_width, "mm"),
+    )
+    model.relate("assembly", assembly=unit, part=stage)
+    gears, flanks = zip(*(write_gear(model, getattr(pair, name), name) for name in ("pinion", "wheel")))
+    model.relate("stage", stage=stage, gear_1=gears[0], gear_2=gears[1])
+    data = [model.add("cylindrical_stage_gear_data", is_driving_gear=(first, "none")) for first in (True, False)]
+    for gear, part in zip(gears, data):
+        model.relate("stage_gear_data", stage=stage, gear=gear, stage_gear_data=part)
+    for name, both, frame, modification in zip(("pinion", "wheel"), flanks, frames(pair), (pinion, wheel)):
+        if modification is not None:
+            Writer(model, both, frame, f"write_rexs: {name}", error).write(modification)
+    if torque is not None:
+        check("write_rexs", "torque", torque, "N m", low=0.0)
+        model.under_load(_CASE, data[0], torque=(np.asarray(torque), "N m"))
+    if speed is not None:
+        check("write_rexs", "speed", speed, "rpm", low=0.0)
+        model.under_load(_CASE, gears[0], rotational_speed=(np.asarray(speed), "1 / min"))
+    if cycle is not None:
+        write_results(model, data[0], cycle, case=_CASE, speed=speed, friction=friction)
+    with writing(path):
+        write_durably(Path(path), lambda file: file.write(xml(model)))
+
+
+def _of_cycle(pair, cycle: MeshCycle, pinion, wheel, torque, speed, friction):
+    """What a cycle says of its modifications and operation."""
+    for name, given in (("pinion", pinion), ("wheel", wheel), ("torque", torque)):
+        if given is not None:
+            raise ValueError(f"write_rexs: {name} has no effect with cycle, leave it out")
+    if cycle.batch_ndim:
+        raise ValueError(f"write_rexs: cycle holds cycles of shape {cycle.transmission_error.shape[:-1]}, must be one")
+    if not np.all(np.asarray(cycle.converged)):
+        count = int(np.sum(~np.asarray(cycle.converged)))
+        raise ValueError(f"write_rexs: cycle did not converge at {count} of {len(cycle.phase)} positions")
+    if not eqx.tree_equal(cycle.kinematics.pair, pair):
+        raise ValueError("write_rexs: cycle is of another pair")
+    if cycle.pinion is None or cycle.wheel is None:
+        raise ValueError("write_rexs: cycle does not hold its modifications, it comes from solve_removed")
+    operation = cycle.operation
+    speed = operation.speed if speed is None else speed
+    return (
+        cycle.pinion,
+        cycle.wheel,
+        operation.torque,
+        None if speed is None else float(speed),
+        operation.friction if friction is None else friction,
+    )

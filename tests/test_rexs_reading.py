@@ -1,0 +1,484 @@
+"""REXS files of others: what they say by other places and shapes, and what is refused in one line."""
+
+import base64
+import contextlib
+import io
+import re
+from types import SimpleNamespace
+
+import equinox as eqx
+import numpy as np
+import pytest
+
+import jaxgear as jg
+from jaxgear.cli import main
+from jaxgear.io import DesignFileError, load_design, read_rexs, write_rexs
+from jaxgear.io.rexs.frame import frames
+
+PAIR = jg.GearPair(
+    jg.Gear(teeth=19, module=3.0, face_width=20.0, bore_diameter=24.0),
+    jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=70.0),
+    100.5,
+)
+PINION, _ = frames(PAIR)  # the common face width is 1 mm away from both ends of the pinion's face
+RELIEFS = jg.TipRelief(6.0, 3.0, jg.Linear()) + jg.LeadSlope(4.0)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The text of a file in which the pinion is modified, and where changed ones go."""
+    path = tmp_path_factory.mktemp("rexs") / "pair.rexs"
+    write_rexs(path, PAIR, pinion=RELIEFS, torque=50.0, speed=3000.0)
+    return SimpleNamespace(text=path.read_text("utf-8-sig"), path=path)
+
+
+def attribute(name, value, unit="mm"):
+    inner = value if isinstance(value, str) else "<array>" + "".join(f"<c>{v!r}</c>" for v in value) + "</array>"
+    return f'<attribute id="{name}" unit="{unit}">{inner}</attribute>'
+
+
+def flank(written, kind, **values):
+    """What is read where a component of values (value, unit or mm) stands in place of the modifications."""
+    text = re.sub(
+        r'<component id="\d+" type="(tip_relief|helix_slope)".*?</component>', "", written.text, flags=re.DOTALL
+    )
+    text = re.sub(r'<relation id="\d+" type="reference">\s*<ref id="\d+" role="origin" hint="cylindrical_gear_flank"'
+                  r".*?</relation>", "", text, flags=re.DOTALL)  # fmt: skip
+    held = "".join(attribute(name, *(v if isinstance(v, tuple) else (v,))) for name, v in values.items())
+    part = f'<component id="90" type="{kind}">{held}</component>'
+    relation = (
+        '<relation id="{}" type="reference"><ref id="{}" role="origin"/><ref id="90" role="referenced"/></relation>'
+    )
+    names = "pinion left flank", "pinion right flank"
+    flanks = [
+        re.search(rf'<component id="(\d+)" type="cylindrical_gear_flank" name="{each}"', text)[1] for each in names
+    ]
+    relations = "".join(relation.format(900 + i, flanks[i]) for i in (0, 1))
+    text = text.replace("</components>", part + "</components>").replace("</relations>", relations + "</relations>")
+    written.path.write_text(text)
+    return read_rexs(written.path).pinion
+
+
+def removed(modification, roll, face=0.0):
+    roll, face = np.broadcast_arrays(np.asarray(roll, float), np.asarray(face, float))
+    return PINION.removed(modification, roll, face)
+
+
+ALONG = np.linspace(PINION.start, PINION.tip, 301)
+ACROSS = np.linspace(-9.0, 9.0, 181)  # the datum face is at -10
+
+
+@pytest.mark.parametrize("shape, power", [("linear", 1), ("parabolic", 2)])
+def test_a_relief_given_below_the_tip_goes_on_to_the_tip(written, shape, power):
+    start, given = PINION.tip - 4.0, PINION.tip - 1.0
+    found = flank(
+        written,
+        "tip_relief",
+        shape_of_relief=(shape, "none"),
+        tip_relief_depth="0.006",
+        tip_relief_datum_diameter=str(PINION.diameter(start)),
+        tip_relief_evaluation_reference=str(PINION.diameter(given)),
+    )
+    wanted = 6.0 * np.maximum((ALONG - start) / (given - start), 0.0) ** power
+    np.testing.assert_allclose(removed(found, ALONG), wanted, atol=1e-11)
+
+
+def test_a_root_relief_given_below_the_active_profile(written):
+    given, end = PINION.start - 1.0, PINION.start + 2.0
+    found = flank(
+        written,
+        "root_relief",
+        shape_of_relief=("linear", "none"),
+        root_relief_depth="0.006",
+        root_relief_datum_diameter=str(PINION.diameter(end)),
+        root_relief_evaluation_reference=str(PINION.diameter(given)),
+    )
+    np.testing.assert_allclose(removed(found, ALONG), 6.0 * np.maximum((end - ALONG) / 3.0, 0.0), atol=1e-11)
+
+
+def test_an_end_relief_is_counted_from_the_gears_own_face(written):
+    found = flank(
+        written,
+        "end_relief_datum_face",
+        shape_of_relief=("parabolic", "none"),
+        end_relief_depth_datum_face="0.01",
+        end_relief_length_datum_face="5.0",
+    )
+    wanted = 10.0 * np.maximum((5.0 - (ACROSS + 10.0)) / 5.0, 0.0) ** 2
+    np.testing.assert_allclose(removed(found, ALONG[0], ACROSS), wanted, atol=1e-11)
+
+
+def test_crownings_are_parabolas_through_the_amounts_that_are_given(written):
+    found = flank(
+        written,
+        "helix_crowning",
+        helix_crowning_amount_datum_face="0.008",
+        helix_crowning_amount_non_datum_face="0.004",
+        helix_highest_point="2.0",
+    )
+    wanted = np.where(ACROSS < 2.0, 8.0 * ((2.0 - ACROSS) / 12.0) ** 2, 4.0 * ((ACROSS - 2.0) / 8.0) ** 2)
+    np.testing.assert_allclose(removed(found, ALONG[0], ACROSS), wanted, atol=1e-11)
+
+    symmetric = flank(
+        written,
+        "helix_crowning",
+        helix_crowning_amount_datum_face="0.008",
+        helix_crowning_amount_non_datum_face="0.008",
+    )
+    assert isinstance(symmetric, jg.LeadCrowning)
+    np.testing.assert_allclose(symmetric.amount, 8.0 * (18.0 / 20.0) ** 2, rtol=1e-12)
+
+    top, root = PINION.start + 6.0, PINION.start + 1.0
+    found = flank(
+        written,
+        "profile_crowning",
+        shape_of_profile_crowning=("circular", "none"),
+        profile_crowning_at_root="0.003",
+        profile_crowning_at_tip="0.005",
+        diameter_where_profile_crowning_root_is_specified=str(PINION.diameter(root)),
+        profile_highest_point=str(PINION.diameter(top)),
+    )
+    below, above = 3.0 * ((top - ALONG) / 5.0) ** 2, 5.0 * ((ALONG - top) / (PINION.tip - top)) ** 2
+    np.testing.assert_allclose(removed(found, ALONG), np.where(ALONG < top, below, above), atol=1e-10)
+
+
+def test_an_arc_is_read_as_a_parabola_where_none_can_tell(written):
+    """The bound of the error holds for a true circle, and an arc beyond it is refused."""
+
+    def relief(depth):
+        return flank(
+            written,
+            "tip_relief",
+            shape_of_relief=("circular", "none"),
+            tip_relief_depth=str(depth),
+            tip_relief_datum_diameter=str(PINION.diameter(PINION.tip - 2.0)),
+        )
+
+    depth, length = 0.05, 2.0
+    radius = (length**2 + depth**2) / (2 * depth)
+    place = ALONG - (PINION.tip - length)
+    arc = 1e3 * np.where(place > 0, radius - np.sqrt(radius**2 - place**2), 0.0)
+    error = np.abs(removed(relief(depth), ALONG) - arc).max()
+    assert 0.5 * 1e3 * depth**3 / (4 * length**2) < error < 1.01 * 1e3 * depth**3 / (4 * length**2) < 0.01
+    with pytest.raises(DesignFileError, match='shape_of_relief: "circular" is 0.017 um off the parabola'):
+        relief(0.065)
+
+
+def test_slopes_are_those_between_the_places_that_are_given(written):
+    found = flank(
+        written,
+        "profile_slope",
+        profile_slope="0.004",
+        profile_evaluation_start=str(PINION.diameter(PINION.start + 1.0)),
+        profile_evaluation_end=str(PINION.diameter(PINION.tip - 3.0)),
+    )
+    np.testing.assert_allclose(
+        np.diff(removed(found, ALONG)) / np.diff(ALONG), 4.0 / (PINION.tip - PINION.start - 4.0), rtol=1e-9
+    )
+    found = flank(written, "helix_slope", helix_slope="0.004")
+    np.testing.assert_allclose(removed(found, ALONG[0], ACROSS), 4.0 * ACROSS / 20.0, atol=1e-12)
+
+
+def test_a_datum_face_at_the_other_end_mirrors_the_face(written):
+    datum, other = 'unit="none">negative<', 'unit="none">positive<'
+    turned = SimpleNamespace(text=written.text.replace(datum, other), path=written.path)
+    for kind, values in (
+        ("helix_slope", {"helix_slope": "0.004"}),
+        (
+            "end_relief_datum_face",
+            {
+                "shape_of_relief": ("linear", "none"),
+                "end_relief_depth_datum_face": "0.01",
+                "end_relief_length_datum_face": "6.0",
+            },
+        ),
+        (
+            "helix_crowning",
+            {
+                "helix_crowning_amount_datum_face": "0.008",
+                "coordinate_where_helix_crowning_is_specified_datum_face": "-7.0",
+                "helix_crowning_amount_non_datum_face": "0.003",
+                "coordinate_where_helix_crowning_is_specified_non_datum_face": "6.0",
+                "helix_highest_point": "1.0",
+            },
+        ),
+    ):
+        opposite = {name: value.lstrip("-") if "-" in value else f"-{value}" for name, value in values.items()
+                    if "coordinate" in name or "point" in name}  # fmt: skip
+        usual, mirrored = flank(written, kind, **values), flank(turned, kind, **(values | opposite))
+        roll = np.full_like(ACROSS, ALONG[150])
+        assert np.ptp(removed(usual, roll, ACROSS)) > 1
+        np.testing.assert_allclose(removed(mirrored, roll, ACROSS), removed(usual, roll, -ACROSS), atol=1e-12)
+
+
+def test_the_gear_that_drives_is_the_pinion(written):
+    driving, driven = ('id="is_driving_gear" unit="none">true', 'id="is_driving_gear" unit="none">false')
+    text = written.text.replace(driving, "*").replace(driven, driving).replace("*", driven)
+    written.path.write_text(text)
+    found = read_rexs(written.path)
+    assert float(found.pair.pinion.teeth) == 48 and isinstance(found.pinion, jg.NoModification)
+    assert found.torque is None  # the file names that of the other gear
+    written.path.write_text(re.sub(r'<attribute id="is_driving_gear".*?</attribute>', "", written.text))
+    assert float(read_rexs(written.path).pair.pinion.teeth) == 19
+
+
+def test_gears_that_count_along_their_faces_in_opposite_directions_are_refused(written):
+    text = written.text
+    for gear, axis in (("pinion", [1.0, 0.0, 0.0]), ("wheel", [-1.0, 0.0, 0.0])):
+        start = f'type="cylindrical_gear" name="{gear}">'
+        assert start in text
+        text = text.replace(start, start + attribute("u_axis_vector", axis))
+    written.path.write_text(text)
+    with pytest.raises(DesignFileError, match="u_axis_vector: must point in the direction of that of gear 3"):
+        read_rexs(written.path)
+    written.path.write_text(text.replace("-1.0</c>", "1.0</c>"))
+    assert read_rexs(written.path).torque == 50.0
+
+
+def test_names_and_units_of_earlier_versions(written):
+    text = written.text.replace('version="2.0.0"', 'version="1.4"').replace(
+        "tip_corner_radius_factor_reference_profile", "tip_radius_factor"
+    )
+    text = text.replace("thermal_contact_coefficient_agma_925_2003", "thermal_contact_coefficient_agma_925_a03")
+    text = (
+        text.replace('unit="MPa"', 'unit="N / mm^2"')
+        .replace('unit="none"', 'unit=""')
+        .replace('unit="deg"', 'unit="\u00b0"')
+    )
+    written.path.write_text(re.sub(r'<attribute id="is_additive_modification".*?</attribute>', "", text), "utf-8")
+    found = read_rexs(written.path)
+    written.path.write_text(written.text)
+    assert eqx.tree_equal(found.pair, read_rexs(written.path).pair)
+    np.testing.assert_allclose(removed(found.pinion, ALONG, 3.0), removed(RELIEFS, ALONG, 3.0), atol=1e-12)
+
+
+def test_which_end_of_the_face_is_meant_has_to_be_said_where_it_matters(written):
+    silent = re.sub(r'<attribute id="datum_face_orientation".*?</attribute>', "", written.text)
+    unsaid = SimpleNamespace(text=silent, path=written.path)
+    both = {"helix_crowning_amount_datum_face": "0.008", "helix_crowning_amount_non_datum_face": "0.008"}
+    assert isinstance(flank(unsaid, "helix_crowning", **both), jg.LeadCrowning)
+    with pytest.raises(DesignFileError, match="cylindrical_gear 3: datum_face_orientation: missing, the ends"):
+        flank(unsaid, "helix_slope", helix_slope="0.004")
+
+
+def test_arrays_may_be_in_base64(written):
+    roll = PINION.diameter(np.array([8.0, 11.0, 14.0]))
+    coded = base64.b64encode(roll.astype("<f8").tobytes()).decode()
+    found = flank(
+        written,
+        "topographical_modification",
+        coordinates_of_topographical_modification=[0.0, 0.0, 0.0],
+        diameters_of_topographical_modification=f'<array code="float64">{coded}</array>',
+        topographical_modification_amounts=[0.001, -0.002, 0.004],
+    )
+    assert isinstance(found, jg.TabulatedProfile)
+    np.testing.assert_allclose(found.position, [8.0, 11.0, 14.0], rtol=1e-13)
+    np.testing.assert_array_equal(found.amount, [1.0, -2.0, 4.0])
+
+
+TEETH = '<attribute id="number_of_teeth" unit="none">19<'
+HELIX = '<attribute id="helix_angle_reference_diameter" unit="deg">0.0<'
+SHAPE = '<attribute id="shape_of_relief" unit="none">linear<'
+DEPTH = '<attribute id="tip_relief_depth" unit="mm">0.006<'
+WIDTH = '<attribute id="face_width" unit="mm">20.0<'
+RACK = '<attribute id="tip_corner_radius_factor_reference_profile" unit="none">0.38</attribute>'
+REFUSED = {
+    "helical": (HELIX, HELIX.replace("0.0", "-12.5"), "helix_angle_reference_diameter: -12.5 deg must be 0 deg"),
+    "internal": (TEETH, TEETH.replace("19", "-19"), "number_of_teeth: is negative: an internal gear"),
+    "ring gear": ('type="cylindrical_gear"', 'type="ring_gear"', "ring_gear 3: is an internal gear"),
+    "protuberance": (RACK, RACK + attribute("protuberance_amount", "0.1"), "protuberance_amount: 0.1 must be 0"),
+    "chamfer": (TEETH, attribute("chamfer_at_tooth_end", "0.5") + TEETH, "chamfer_at_tooth_end: 0.5 must be 0"),
+    "no corner radius": (RACK, "", "tip_corner_radius_factor_reference_profile: missing"),
+    "no tool": ('type="manufacturing_step"', 'type="step"', "must be made by one rack_shaped_tool"),
+    "another tool": ('type="rack_shaped_tool"', 'type="profile_tool"', "makes a flank, must be a rack_shaped_tool"),
+    "another module": ('name="pinion tool">\n      <attribute id="normal_module" unit="mm">3.0',
+                       'name="pinion tool">\n      <attribute id="normal_module" unit="mm">3.5',
+                       "normal_module: 3.5 mm must be that of the gear, 3 mm"),
+    "no width": ('id="face_width" unit="mm">20.0', 'id="width" unit="mm">20.0', "gear 3: face_width: missing"),
+    "solid": ('id="inner_diameter" unit="mm">24.0', 'id="inner_diameter" unit="mm">0', "inner_diameter: 0 mm: give"),
+    "no distance": ('id="center_distance"', 'id="distance"', "cylindrical_stage 2: center_distance: missing"),
+    "unit": ('id="face_width" unit="mm"', 'id="face_width" unit="inch"', 'face_width: unit "inch" must be "mm"'),
+    "no number": (WIDTH, WIDTH.replace("20.0", "20,0"), 'face_width: "20,0" is not a finite number'),
+    "not finite": (WIDTH, WIDTH.replace("20.0", "1e999"), 'face_width: "1e999" is not a finite number'),
+    "not a gear": (">24.0<", ">60.0<", "cylindrical_gear 3: bore_diameter = 60 mm must be less than 49.5 mm"),
+    "not a pair": (">100.5<", ">99.0<", "cylindrical_stage 2: center_distance = 99 mm"),
+    "exponential": (SHAPE, SHAPE.replace("linear", "exponential"), 'shape_of_relief: "exponential" is not supported'),
+    "no shape": (SHAPE, SHAPE.replace("shape_of_relief", "shape"), "shape_of_relief: missing, must be one of linear"),
+    "transition": (DEPTH, attribute("specify_tangential_transition", "true", "none") + DEPTH, "transition: is not"),
+    "no depth": (DEPTH, DEPTH.replace("depth", "deep"), "tip_relief_depth: missing"),
+    "not additive": ('id="is_additive_modification" unit="none">true',
+                     'id="is_additive_modification" unit="none">false',
+                     "is_additive_modification: must be true beside other modifications"),
+    "unknown kind": ('type="helix_slope"', 'type="profile_twist"', "profile_twist 18: is no modification"),
+    "offset faces": ('id="common_face_width" unit="mm">18.0', 'id="common_face_width" unit="mm">15', "15 mm must be"),
+    "no component": ('<ref id="9" role="gear_2"', '<ref id="99" role="gear_2"', "names component 99, which"),
+    "no gear": ('role="gear_2"', 'role="gear_3"', "cylindrical_stage 2: gear_2: missing"),
+    "twice": ('<component id="4"', '<component id="3"', "material 3: stands twice in the file"),
+    "old": ('version="2.0.0"', 'version="1.3"', "is of REXS 1.3, must be of 1.4 to 2"),
+    "new": ('version="2.0.0"', 'version="3.0"', "is of REXS 3.0, must be of 1.4 to 2"),
+    "no version": ('version="2.0.0"', 'version="DEV"', 'model: version: "DEV" is not a version of REXS'),
+    "no id": ('<component id="4"', '<component id="four"', 'component: id: "four" is not a whole number'),
+    "no flank": ('type="flank"', 'type="flanks"', "cylindrical_gear 3: has no left or right flank"),
+    "no stage": ('type="cylindrical_stage"', 'type="bevel_stage"', "has no cylindrical_stage"),
+    "not closed": ("</components>", "", "no XML: mismatched tag"),
+    "cut off": ("</model>", "", "no XML: no element found"),
+    "something else": ("<model ", "<other ", "no XML: mismatched tag"),
+    "not text": ("pinion left flank", "\x01", "no XML: not well-formed (invalid token)"),
+    "nested": ("</components>", "<a>" * 40 + "</a>" * 40 + "</components>", "elements are nested too deeply"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_meant_is_refused_in_one_line(written, name):
+    old, new, wanted = REFUSED[name]
+    assert old in written.text
+    changed = written.text.replace(old, new) if name != "twice" else written.text.replace(old, new, 1)
+    written.path.write_text(changed)
+    with pytest.raises(DesignFileError) as caught:
+        read_rexs(written.path)
+    message = str(caught.value)
+    assert wanted in message and message.startswith(f"{written.path}: ") and "\n" not in message
+
+
+@pytest.mark.parametrize(
+    "declaration",
+    [
+        '<!DOCTYPE model [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>',
+        '<!DOCTYPE model [<!ENTITY secret SYSTEM "file:///etc/hostname">]>',
+        '<!DOCTYPE model SYSTEM "http://localhost/model.dtd">',
+    ],
+)
+def test_no_entity_is_ever_expanded(written, declaration):
+    written.path.write_text(written.text.replace("<model ", declaration + "<model ").replace(">20.0<", ">&b;<"))
+    with pytest.raises(DesignFileError, match="line 2: declares a document type, which REXS does not have$"):
+        read_rexs(written.path)
+
+
+def test_a_stage_of_several_is_chosen_by_its_id(written):
+    written.path.write_text(
+        written.text.replace("</components>", '<component id="70" type="cylindrical_stage"/></components>')
+    )
+    with pytest.raises(DesignFileError, match=r"has 2 cylindrical stages, choose one of 2, 70 by its id \(stage\)"):
+        read_rexs(written.path)
+    assert read_rexs(written.path, stage=2).torque == 50.0
+    with pytest.raises(DesignFileError, match="has no cylindrical_stage 5, must be one of 2, 70"):
+        read_rexs(written.path, stage=5)
+
+
+def test_a_load_case_of_several_is_chosen_by_its_id(written):
+    case = re.search(r'<load_case id="1">.*</load_case>', written.text, re.DOTALL)[0]
+    other = case.replace('id="1"', 'id="2"').replace("50.0", "-70.0")
+    written.path.write_text(written.text.replace(case, case + other))
+    with pytest.raises(DesignFileError, match=r"has 2 load cases, choose one of 1, 2 by its id \(load_case\)"):
+        read_rexs(written.path)
+    assert read_rexs(written.path, load_case=2).torque == 70.0  # its sign tells which way the gears turn
+    with pytest.raises(DesignFileError, match="has no load_case 3, must be one of 1, 2"):
+        read_rexs(written.path, load_case=3)
+
+
+def test_flanks_that_differ_have_to_be_chosen(written):
+    relation = re.search(r'<relation id="\d+" type="reference">\s*<ref id="8" .*?</relation>', written.text, re.DOTALL)[
+        0
+    ]
+    written.path.write_text(written.text.replace(relation, ""))  # the right flank has no tip relief now
+    with pytest.raises(DesignFileError, match=r"flank 7: is modified otherwise than flank 8, choose left or right"):
+        read_rexs(written.path)
+    roll = PINION.tip
+    said = attribute("loaded_tooth_flank", "right", "none")
+    data = '<component id="15" type="cylindrical_stage_gear_data">'
+    assert removed(read_rexs(written.path, flank="left").pinion, roll) == pytest.approx(6.0, abs=1e-12)
+    assert removed(read_rexs(written.path, flank="right").pinion, roll) == 0.0
+    changed = written.path.read_text()
+    assert data in changed
+    written.path.write_text(changed.replace(data, data + said))
+    assert removed(read_rexs(written.path).pinion, roll) == 0.0
+
+
+def test_a_file_that_is_none_is_refused(tmp_path):
+    for path, wanted in ((tmp_path / "none.rexs", "No such file or directory"), (tmp_path, "is a folder, not a file")):
+        with pytest.raises(DesignFileError, match=wanted):
+            read_rexs(path)
+    (tmp_path / "empty.rexs").write_bytes(b"")
+    with pytest.raises(DesignFileError, match="empty.rexs: line 1, column 1: no XML: no element found"):
+        read_rexs(tmp_path / "empty.rexs")
+
+
+@pytest.mark.parametrize(
+    "given, wanted",
+    [
+        ({"pinion": jg.TipRelief(9.0, 3.0, jg.Quadratic(0.5, 0.5, 0.0))}, "pinion: TipRelief has a step"),
+        ({"error": 0.0}, "error = 0 um must be greater than 0 um"),
+        ({"torque": -1.0}, "torque = -1 N m must be at least 0 N m"),
+        ({"speed": np.nan}, "speed = nan"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_and_leaves_nothing(tmp_path, given, wanted):
+    with pytest.raises(ValueError, match=re.escape(wanted)):
+        write_rexs(tmp_path / "pair.rexs", PAIR, **given)
+    assert not [*tmp_path.iterdir()]
+
+
+def test_a_cycle_says_its_own_torque_and_pair(tmp_path, mesh):
+    path, pair, cycle = tmp_path / "pair.rexs", mesh.pair, jg.solve(mesh, 20.0)
+    for given, wanted in (
+        ({"torque": 20.0}, "torque has no effect with cycle"),
+        ({"pinion": jg.TipRelief(1.0, 1.0)}, "pinion has no effect with cycle"),
+    ):
+        with pytest.raises(ValueError, match=wanted):
+            write_rexs(path, pair, cycle=cycle, **given)
+    with pytest.raises(ValueError, match="cycle is of another pair"):
+        write_rexs(path, PAIR, cycle=cycle)
+    with pytest.raises(ValueError, match="cannot be written"):
+        write_rexs(tmp_path / "missing" / "pair.rexs", PAIR)
+    assert not [*tmp_path.iterdir()]
+
+
+def call(*arguments):
+    """Exit code, stdout and stderr of the command."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as exit_:
+        main([str(argument) for argument in arguments])
+    return SimpleNamespace(code=exit_.value.code, out=out.getvalue(), err=err.getvalue())
+
+
+def test_the_command_converts_both_ways(tmp_path):
+    rexs, design, again = tmp_path / "pair.rexs", tmp_path / "pair.toml", tmp_path / "again.rexs"
+    pinion = jg.TipRelief(6.0, 3.0, jg.Power(1.5)) + jg.LeadCrowning(4.0)
+    write_rexs(rexs, PAIR, pinion=pinion, torque=50.0, speed=3000.0, title='19/48 "x"')
+    done = call("convert", rexs, design)
+    assert done.code == 0 and "19/48 teeth, module 3 mm, centre distance 100.5 mm" in done.out
+    found, read = load_design(design), read_rexs(rexs)
+    assert (found.torque, found.speed, found.title) == (50.0, 3000.0, '19/48 "x"')
+    assert eqx.tree_equal(found.pair(), read.pair)
+    design.write_text(design.read_text() + "\n[resolution]\npositions = 16\n")
+    done = call("convert", design, again)
+    assert done.code == 0 and "left out, REXS has no place for it: [resolution]" in done.out
+    first, last = (read_rexs(path) for path in (rexs, again))
+    assert eqx.tree_equal(first.pair, last.pair)
+    points = np.meshgrid(ALONG, ACROSS)
+    np.testing.assert_allclose(removed(last.pinion, *points), removed(first.pinion, *points), atol=1e-12)
+
+
+def test_the_command_refuses_in_one_line_and_writes_nothing(tmp_path):
+    rexs, free, there = tmp_path / "pair.rexs", tmp_path / "free.toml", tmp_path / "there.toml"
+    write_rexs(rexs, PAIR)
+    there.write_text("# mine\n")
+    free.write_text(
+        "[pinion]\nteeth = 19\nmodule = 3.0\nface_width = 20.0\n[wheel]\nteeth = 48\nmodule = 3.0\nface_width = 18.0\n"
+        '[[wheel.modification]]\ntype = "lead_slope"\namount = "free"\n[load]\ntorque = 50.0\n'
+        "[variables]\nfree = { low = 0.0, high = 9.0 }\n"
+    )
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    for arguments, wanted in (
+        ((rexs, tmp_path / "new.toml"), "names no torque of the pinion, give it with --torque"),
+        ((rexs, there, "--torque", "50"), "there.toml: exists already, choose another name"),
+        ((rexs, tmp_path / "new.txt"), "pair.rexs to new.txt: one name must end in .toml, the other in .rexs or .xml"),
+        ((rexs, tmp_path / "new.toml", "--stage", "7"), "has no cylindrical_stage 7, must be one of 2"),
+        ((rexs, tmp_path / "new.toml", "--torque", "0"), "torque = 0 N m must be greater than 0 N m"),
+        ((free, tmp_path / "new.rexs"), "convert needs numbers, these are free: free"),
+        ((free, tmp_path / "new.rexs", "--torque", "5"), "--torque has no effect on a design file, leave it out"),
+    ):
+        done = call("convert", *arguments)
+        assert done.code == 2 and done.out == "" and wanted in done.err and done.err.count("\n") == 1
+        assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert call("convert", rexs, tmp_path / "new.toml", "--torque", "50").code == 0
