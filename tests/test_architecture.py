@@ -24,6 +24,7 @@ ORDER = (
     "tolerance",
     "conditions",
     "dynamics",
+    "wear",
     "sizing",
     "sweeps",
     "optimize",
