@@ -30,13 +30,11 @@ class OfLubrication(eqx.Module):
     of: Callable[..., Any]
 
     def __call__(self, cycle: MeshCycle) -> Field:
-        kinematics, (first, second) = cycle.kinematics, cycle.sides
-        speed = cycle.operation.speed
+        kinematics, speed = cycle.kinematics, cycle.operation.speed
         assert speed is not None  # `wear_law` has asked for it
         friction = {} if cycle.operation.friction is None else {"friction": cycle.operation.friction}
-        sliding = kinematics.path_of_contact.sliding_speed(
-            first.contact_roll_length - first.pitch_roll_length, speed
-        )
+        contact = kinematics.path_of_contact
+        sliding = contact.sliding_speed(jnp.clip(kinematics.path, contact.start, contact.end), speed)
         pressure = cycle.contact_pressure + cycle.corner_pressure
         shape = cycle.line_load.shape
         given = (

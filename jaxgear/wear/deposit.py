@@ -79,7 +79,7 @@ def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
     half_width = place_of(mesh, torque).half_width[:, 0, :, None]
     lengths = grid(mesh, points)
     made = [
-        _spread(roll, half_width * side.base_radius / roll, sliding, knots, mesh.resolution.patch_nodes)
+        _spread(roll, half_width, sliding, knots, side.base_radius, mesh.resolution.patch_nodes)
         for roll, side, knots in zip(rolls, mesh.sides, lengths)
     ]
     arc = jnp.stack([arcs(knots, side.base_radius) for knots, side in zip(lengths, mesh.sides)])
@@ -103,13 +103,20 @@ def _sliding(mesh: Mesh, ends: Float[Array, "pairs positions ends"]) -> Float[Ar
     return jnp.stack([jnp.diff(flank, axis=-1), jnp.abs(jnp.diff(corner, axis=-1))])
 
 
-def _spread(roll, half_width, sliding, knots, nodes: int) -> Float[Array, "parts points pairs positions"]:
-    """Sliding by the points of one grid; `half_width` in roll length."""
+def _spread(roll, half_width, sliding, knots, base_radius, nodes: int) -> Float[Array, "parts points pairs positions"]:
+    """Sliding by the points of one grid."""
     total = jnp.zeros((sliding.shape[0], *knots.shape, *roll.shape[:-1]), roll.dtype)
-    width = knots[1] - knots[0]
+    width, first, last = knots[1] - knots[0], _arc(knots[0], base_radius), _arc(knots[-1], base_radius)
     for node in patch_nodes(nodes):
-        # material beyond the ends of the flank is not there: its share wears the end
-        place = jnp.clip(roll + node.place * half_width, knots[0], knots[-1])
+        arc = _arc(roll, base_radius) + node.place * half_width
+        # the contact ends with the flank: the share that would lie beyond wears what is left of it
+        arc = jnp.clip(jnp.where(arc < first, 2 * first - arc, jnp.where(arc > last, 2 * last - arc, arc)), first, last)
+        place = jnp.clip(jnp.sqrt(2 * base_radius * arc), knots[0], knots[-1])
         hat = jnp.maximum(1 - jnp.abs(place - knots[:, None, None, None]) / width, 0.0)
         total = total + node.mean * jnp.einsum("xijm,kijm->kxij", hat, sliding)
     return total
+
+
+def _arc(roll_length: Float[Array, "..."], base_radius: Scalar) -> Float[Array, "..."]:
+    """Arc of an involute from the base circle [mm]."""
+    return roll_length**2 / (2 * base_radius)

@@ -21,7 +21,7 @@ Scalar = Float[Array, ""]
 Lives = Float[Array, " lives"]
 Depths = Float[Array, "lives slices points"]
 
-_BLOCKS = 20
+BLOCKS = 20
 # what a cycle holds that differs from flank to flank
 _FOUND = (
     "transmission_error",
@@ -44,7 +44,9 @@ class WearLife(Checked):
     Attributes:
         revolutions: of the pinion, shape (lives,).
         roll_length: of the grid points of pinion and wheel [mm], shape (gears, points).
+        arc: of the flank that belongs to every point [mm], shape (gears, points).
         face_coordinate: of the lines along the profile [mm], shape (slices,).
+        slice_width: of the face that belongs to every line [mm], shape (slices,).
         depth: worn off pinion and wheel by contact of the flanks and by tip corners [um], shape (lives, gears, parts,
             slices, points).
         error: estimate of the error of that depth by the length of the blocks, largest of all points [um], shape
@@ -55,7 +57,9 @@ class WearLife(Checked):
 
     revolutions: Lives = result()
     roll_length: Float[Array, "gears points"] = result("mm")
+    arc: Float[Array, "gears points"] = result("mm")
     face_coordinate: Float[Array, " slices"] = result("mm")
+    slice_width: Float[Array, " slices"] = result("mm")
     depth: Float[Array, "lives gears parts slices points"] = result("um")
     error: Lives = result("um")
     cycles: MeshCycle
@@ -85,11 +89,13 @@ class WearLife(Checked):
 def tables(roll_length, face_coordinate, depth) -> tuple[AbstractModification, AbstractModification]:
     """Worn material (gears, parts, slices, points) as modifications of pinion and wheel."""
     total = jnp.sum(depth, axis=1)
-    if len(face_coordinate) == 1:
-        pinion, wheel = (TabulatedProfile(roll, flank[0]) for roll, flank in zip(roll_length, total))
-    else:
-        pinion, wheel = (TabulatedFlank(roll, face_coordinate, flank.T) for roll, flank in zip(roll_length, total))
-    return pinion, wheel
+
+    def of(gear: int) -> AbstractModification:
+        if len(face_coordinate) == 1:
+            return TabulatedProfile(roll_length[gear], total[gear, 0])
+        return TabulatedFlank(roll_length[gear], face_coordinate, total[gear].T)
+
+    return of(0), of(1)
 
 
 def wear(
@@ -100,7 +106,8 @@ def wear(
     coefficient: Any,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
-    blocks: int = _BLOCKS,
+    deviation: Any = None,
+    blocks: int = BLOCKS,
     points: int | None = None,
 ) -> WearLife:
     """Wear of both flanks over their life, in blocks of revolutions of one length: contact, wear, new flank, again.
@@ -120,6 +127,8 @@ def wear(
             pressure [MPa], sliding speed [m/s] and flash temperature [K], arrays of shape (pairs, slices, positions),
             to such an array or a pair of them; traced. It needs the speed of an `Operation`.
         pinion, wheel: modifications of the new flanks; None for nominal involutes.
+        deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions);
+            None for perfect gears.
         blocks: of equal length, even: two and two are compared with one of double length.
         points: of the grid on each flank, evenly spaced from the start of the active profile to the tip; None for half
             as many as the mesh has positions, and one. Points nearer to each other than the contact is wide show no
@@ -138,12 +147,20 @@ def wear(
     dtype = mesh.slice_width.dtype
     loads, weights = _loads(torque, dtype)
     revolutions = real(revolutions).astype(dtype)
-    check("wear", "revolutions", revolutions, "", low=0.0)
-    if whole("wear", "blocks", blocks, low=2) % BLOCKS_OF_A_PAIR:
-        raise ValueError(f"wear: blocks = {blocks} must be even: two and two are compared with one of double length")
+    if revolutions.ndim:
+        raise ValueError(f"wear: revolutions has shape {revolutions.shape}, must be a single number")
+    check("wear", "revolutions", revolutions, "", low=0.0, open_low=True)
+    check_blocks("wear", blocks)
     points = mesh.resolution.positions // 2 + 1 if points is None else whole("wear", "points", points, low=3)
     law = wear_law(coefficient, loads, dtype)
-    return _wear(mesh, loads, weights, revolutions, law, pinion, wheel, blocks, points)
+    other = jnp.zeros((), dtype) if deviation is None else real(deviation).astype(dtype)
+    return _wear(mesh, loads, weights, revolutions, law, pinion, wheel, other, blocks, points)
+
+
+def check_blocks(owner: str, blocks: int) -> None:
+    """Raises a one-line `ValueError` for something else than an even number of blocks."""
+    if whole(owner, "blocks", blocks, low=2) % BLOCKS_OF_A_PAIR:
+        raise ValueError(f"{owner}: blocks = {blocks} must be even: two and two are compared with one of double length")
 
 
 def _loads(torque: Any, dtype) -> tuple[Operation, Float[Array, " torques"] | None]:
@@ -161,7 +178,9 @@ def _loads(torque: Any, dtype) -> tuple[Operation, Float[Array, " torques"] | No
 
 
 @kernel
-def _wear(mesh: Mesh, loads: Operation, weights, revolutions, law, pinion, wheel, blocks: int, points: int) -> WearLife:
+def _wear(
+    mesh: Mesh, loads: Operation, weights, revolutions, law, pinion, wheel, deviation, blocks: int, points: int
+) -> WearLife:
     sizes, dtype = mesh.resolution, mesh.slice_width.dtype
     places = jax.vmap(lambda load: deposit(mesh, load.torque, points))(loads)
     roll_length, face = places.roll_length[0], mesh.face_coordinate
@@ -171,7 +190,7 @@ def _wear(mesh: Mesh, loads: Operation, weights, revolutions, law, pinion, wheel
     def cycle_on(depth, load: Operation) -> MeshCycle:
         tabled = tables(roll_length, face, depth)
         now = {"pinion": pinion + tabled[0], "wheel": wheel + tabled[1]}
-        return solve_removed(mesh, load, removed_material(mesh, load, **now), **now)
+        return solve_removed(mesh, load, removed_material(mesh, load, **now) + deviation, **now)
 
     def rate(depth):
         def under(load: Operation, place: Deposit):
@@ -201,11 +220,21 @@ def _wear(mesh: Mesh, loads: Operation, weights, revolutions, law, pinion, wheel
     if weights is None:
         cycles = jax.tree.map(lambda leaf: leaf[:, 0], cycles)
     done = jnp.arange(blocks + 1, dtype=dtype) / blocks * revolutions
-    return WearLife(done, roll_length, face, found.depth, _total_error(found.error), cycles, weights)
+    return WearLife(
+        revolutions=done,
+        roll_length=roll_length,
+        arc=places.arc[0],
+        face_coordinate=face,
+        slice_width=mesh.slice_width,
+        depth=found.depth,
+        error=_total_error(found.error),
+        cycles=cycles,
+        weights=weights,
+    )
 
 
 def _total_error(error: Float[Array, "pairs gears parts slices points"]) -> Lives:
-    """Largest error of the depth so far, at the start, after the first and after the second block of every pair [um]."""
+    """Largest error of the depth so far [um]: at the start, and after both blocks of every pair."""
     error = jnp.sum(error, axis=2)
     before = jnp.cumsum(error, axis=0) - error
     lives = jnp.stack([before, before + error / 2], axis=1).reshape(-1, *error.shape[1:])

@@ -18,8 +18,8 @@ Rate = Callable[[Depth], tuple[Depth, Any]]
 
 BLOCKS_OF_A_PAIR = 2
 
-# Rates of wear that lead to the flank of every analysis, in blocks: at the start, at the end of the first block as Euler
-# sees it, after that block, at the end of the second one as Euler sees it, at the end of the double one as Euler sees it.
+# Rates of wear that lead to the flank of every analysis, in blocks: at the start, at the end of the first block as
+# Euler sees it, after that block, and at the ends of the second and of the double one as Euler sees them.
 _STAGES = np.array(
     [
         [0.0, 0.0, 0.0, 0.0, 0.0],
