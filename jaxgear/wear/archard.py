@@ -17,8 +17,9 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..contact import Kinematics, Mesh, MeshCycle
-from ..numerics import program
+from ..contact import MeshCycle
+from ..geometry import PathOfContact
+from ..numerics import check, program, real
 from .deposit import Deposit
 
 Load = Float[Array, "pairs slices positions"]
@@ -27,16 +28,15 @@ Load = Float[Array, "pairs slices positions"]
 UM_PER_LOAD = 1e9
 
 
-def specific_sliding(mesh: Mesh | Kinematics) -> tuple[Any, Any]:
-    """Sliding over rolling |u1 - u2| / u_i of pinion and wheel at every contact, shape (pairs, positions) each.
+def specific_sliding(contact: PathOfContact, path: Any) -> tuple[Any, Any]:
+    """Sliding over rolling |u1 - u2| / u_i of pinion and wheel at a path position [mm], of its shape.
 
-    Beyond the path of contact it is that at the end of the path: there a tip corner slides over the mate's flank.
+    Beyond the path of contact it is that at its end: there a tip corner slides over the mate's flank.
     """
-    contact = mesh.path_of_contact
-    path = jnp.clip(mesh.path, contact.start, contact.end)
+    path = jnp.clip(path, contact.start, contact.end)
+    sliding = jnp.abs(path) * (1 / contact.pinion_base_radius + 1 / contact.wheel_base_radius)
     pinion = contact.pinion_roll_length(path) / contact.pinion_base_radius
     wheel = contact.wheel_roll_length(path) / contact.wheel_base_radius
-    sliding = jnp.abs(path) * (1 / contact.pinion_base_radius + 1 / contact.wheel_base_radius)
     return sliding / pinion, sliding / wheel
 
 
@@ -45,12 +45,17 @@ def passage_depth(cycle: MeshCycle, coefficient: Any) -> tuple[Load, Load]:
 
     Args:
         cycle: solved mesh cycle, without batch axes.
-        coefficient: of wear [m2/N], a number or one for every contact, shape (pairs, slices, positions).
+        coefficient: of wear [m2/N], a number, or one for every contact, shape (pairs, slices, positions).
 
     Returns:
         k_w q |u1 - u2| / u_i of both gears, shape (pairs, slices, positions) each.
+
+    Raises:
+        ValueError: for a negative coefficient.
     """
-    pinion, wheel = specific_sliding(cycle.kinematics)
+    coefficient = real(coefficient).astype(cycle.line_load.dtype)
+    check("passage_depth", "coefficient", coefficient, "m2/N", low=0.0)
+    pinion, wheel = specific_sliding(cycle.kinematics.path_of_contact, cycle.kinematics.path)
     worn = UM_PER_LOAD * coefficient * cycle.line_load
     return worn * pinion[:, None], worn * wheel[:, None]
 
@@ -64,5 +69,5 @@ def worn(line_load: Load, coefficient: Any, place: Deposit) -> Float[Array, "gea
         coefficient: of wear [m2/N]; of every gear and contact, to be broadcast to (gears, pairs, slices, positions).
         place: where contacts wear the flanks.
     """
-    worn = jnp.broadcast_to(UM_PER_LOAD * coefficient * line_load, (2, *line_load.shape))
+    worn = jnp.broadcast_to(UM_PER_LOAD * coefficient * line_load[None], (2, *line_load.shape))
     return jnp.einsum("gkxij,gisj->gksx", place.spread, worn) / place.arc[:, None, None]

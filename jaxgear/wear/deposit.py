@@ -71,8 +71,8 @@ def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
     contact, dtype = mesh.path_of_contact, mesh.slice_width.dtype
     step = contact.base_pitch / mesh.resolution.positions
     # middle of every part of a piece, and its ends
-    middles = jnp.asarray((np.arange(_PLACES) + 0.5) / _PLACES - 0.5, dtype)
-    ends = jnp.asarray(np.arange(_PLACES + 1) / _PLACES - 0.5, dtype)
+    middles = jnp.asarray((np.arange(_PLACES) + 0.5) / _PLACES - 0.5, dtype)[None, None]
+    ends = jnp.asarray(np.arange(_PLACES + 1) / _PLACES - 0.5, dtype)[None, None]
     sliding = _sliding(mesh, mesh.path[..., None] + step * ends)
     at = contacts(mesh.pair, contact, mesh.path[..., None] + step * middles)
     rolls = at.pinion_roll_length, at.wheel_roll_length
@@ -112,7 +112,7 @@ def _spread(roll, half_width, sliding, knots, base_radius, nodes: int) -> Float[
         # the contact ends with the flank: the share that would lie beyond wears what is left of it
         arc = jnp.clip(jnp.where(arc < first, 2 * first - arc, jnp.where(arc > last, 2 * last - arc, arc)), first, last)
         place = jnp.clip(jnp.sqrt(2 * base_radius * arc), knots[0], knots[-1])
-        hat = jnp.maximum(1 - jnp.abs(place - knots[:, None, None, None]) / width, 0.0)
+        hat = jnp.maximum(1 - jnp.abs(place[None] - knots[:, None, None, None]) / width, 0.0)
         total = total + node.mean * jnp.einsum("xijm,kijm->kxij", hat, sliding)
     return total
 

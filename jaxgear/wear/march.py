@@ -73,7 +73,7 @@ def march(rate: Rate, depth: Depth, revolutions: Float[Array, " pairs"]) -> Marc
         rates = rates.at[number].set(found)
         end, doubled = (length * jnp.tensordot(shares, rates, 1) for shares in (both, double))
         start = jnp.where(number == _ANALYSES - 1, start + end, start)
-        return (start, rates), (flank, seen, _SHARE * (end - doubled))
+        return (start, rates), (flank, seen, _SHARE * (doubled - end))
 
     nothing = jnp.zeros((_ANALYSES, *depth.shape), dtype)
     # backwards the contacts are found again instead of kept
