@@ -12,13 +12,14 @@ The pipeline in reading order, every step differentiable and vmappable:
     sweep                       any number of modifications -> SweepTable
     minimize, free_form         the best modification, by gradient and by other methods
     dynamics                    mesh force, oscillators, steady states over the speed, orbits and their bifurcations
+    wear                        the flanks over their life, worn by their own contact
     shafts                      shafts, bearings, housing: the load over the face
     layout                      flank lines and profiles of a mesh on its shafts, in three steps
     manufacture                 grinding wheel, volumes ground off, measuring charts
 
 The rest lives in the namespaces `jaxgear.geometry`, `compliance`, `contact`, `tolerance`, `conditions`, `metrics`,
-`sizing`, `sweeps`, `optimize`, `dynamics`, `shafts`, `layout`, `manufacture`, `plot` and `io`, with their `Abstract...`
-classes as extension points.
+`sizing`, `sweeps`, `optimize`, `dynamics`, `wear`, `shafts`, `layout`, `manufacture`, `plot` and `io`, with their
+`Abstract...` classes as extension points.
 
 Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in
 constructors.

@@ -17,6 +17,7 @@ from . import shafts as shafts
 from . import sizing as sizing
 from . import sweeps as sweeps
 from . import tolerance as tolerance
+from . import wear as wear
 from .compliance import Compliance as Compliance
 from .compliance import default_compliance as default_compliance
 from .compliance import finite_element_compliance as finite_element_compliance

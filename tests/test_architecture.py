@@ -24,6 +24,7 @@ ORDER = (
     "tolerance",
     "conditions",
     "dynamics",
+    "wear",
     "manufacture",
     "sizing",
     "sweeps",

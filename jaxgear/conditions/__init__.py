@@ -9,6 +9,7 @@ from .join import joined as joined
 from .join import label as label
 from .join import ranked as ranked
 from .load import LoadSpectrum as LoadSpectrum
+from .solved import deviation_of as deviation_of
 from .solved import solve_case as solve_case
 from .solved import solved as solved
 from .variant import Design as Design

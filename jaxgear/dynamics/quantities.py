@@ -13,7 +13,8 @@ from jaxtyping import Array, Bool, Float
 
 from ..contact import MeshCycle
 from ..metrics import Quantity, quantities
-from ..numerics import Checked, concrete, once
+from ..metrics.settings import WithoutSettings, WithSettings, settled
+from ..numerics import Checked, once
 from ..numerics.reductions import Max
 from .steady import SteadyNumbers
 
@@ -60,47 +61,28 @@ def with_settings(name: str, settings: Checked) -> Quantity:
     """
     if name not in DYNAMIC_QUANTITIES:
         raise ValueError(f'Dynamics: quantity "{name}" is not known, must be one of {", ".join(DYNAMIC_QUANTITIES)}')
-    return _quantity(name, _WithSettings(name, type(settings), _plain(settings)))
+    return _quantity(name, settled(name, settings, _numbers_of))
 
 
-@dataclasses.dataclass(frozen=True)
-class _WithSettings:
-    """The numbers of a cycle, whose worst counts; settings as plain data, so that programs know them again."""
-
-    name: str
-    make: type[Any]
-    fields: tuple[tuple[str, Any], ...]
-
-    def __call__(self, cycle: MeshCycle) -> Numbers:
-        kind = DYNAMIC_QUANTITIES[self.name]
-        # all quantities of the same settings come from one sweep
-        found, converged = once(cycle, (self.make, self.fields, kind.at_speed), lambda: self._numbers(cycle, kind))
-        # a map of contacts that were not found is no force
-        return jnp.where(converged, getattr(found, kind.field), jnp.nan)
-
-    def _numbers(self, cycle: MeshCycle, kind: Kind) -> tuple[SteadyNumbers, Bool[Array, ""]]:
-        settings = self.make(**dict(self.fields))
-        mesh, operation = cycle.mesh_for(self.name), cycle.operation
-        if kind.at_speed:
-            if operation.speed is None:
-                raise ValueError(f"{self.name}: needs a speed, solve with Operation(torque, speed)")
-            frequency = mesh_frequency(cycle.kinematics.pair.pinion.teeth, operation.speed)
-            settings = dataclasses.replace(settings, mesh_frequencies=frequency[None])
-        oscillator = settings.oscillator_of(cycle, mesh)
-        return settings.numbers(oscillator), oscillator.converged
+def _numbers_of(given: WithSettings, cycle: MeshCycle) -> Numbers:
+    """The numbers of a cycle, whose worst counts."""
+    kind = DYNAMIC_QUANTITIES[given.name]
+    # all quantities of the same settings come from one sweep
+    found, converged = once(cycle, (given.make, given.fields, kind.at_speed), lambda: _swept(given, cycle, kind))
+    # a map of contacts that were not found is no force
+    return jnp.where(converged, getattr(found, kind.field), jnp.nan)
 
 
-@dataclasses.dataclass(frozen=True)
-class _WithoutSettings:
-    """Stands in the vocabulary, where names are looked up."""
-
-    name: str
-
-    def __call__(self, cycle: MeshCycle) -> Numbers:
-        raise ValueError(
-            f'{self.name}: needs settings, give jaxgear.dynamics.Dynamics(...).quantity("{self.name}"), or a design '
-            "file with the table [dynamics]"
-        )
+def _swept(given: WithSettings, cycle: MeshCycle, kind: Kind) -> tuple[SteadyNumbers, Bool[Array, ""]]:
+    settings = given.settings
+    mesh, operation = cycle.mesh_for(given.name), cycle.operation
+    if kind.at_speed:
+        if operation.speed is None:
+            raise ValueError(f"{given.name}: needs a speed, solve with Operation(torque, speed)")
+        frequency = mesh_frequency(cycle.kinematics.pair.pinion.teeth, operation.speed)
+        settings = dataclasses.replace(settings, mesh_frequencies=frequency[None])
+    oscillator = settings.oscillator_of(cycle, mesh)
+    return settings.numbers(oscillator), oscillator.converged
 
 
 def mesh_frequency(teeth, speed):
@@ -113,18 +95,6 @@ def _quantity(name: str, of: Callable[[MeshCycle], Any]) -> Quantity:
     return Quantity(name, of, kind.unit, kind.meaning, Max())
 
 
-def _plain(settings: Checked) -> tuple[tuple[str, Any], ...]:
-    names = [field.name for field in dataclasses.fields(settings)]
-    return tuple((name, _hashable(name, getattr(settings, name))) for name in names)
-
-
-def _hashable(name: str, value: Any) -> Any:
-    if value is None or isinstance(value, str | int):
-        return value
-    known = concrete(value)
-    if known is None:
-        raise ValueError(f"Dynamics: {name} is being traced, a quantity needs numbers")
-    return tuple(known.tolist()) if known.ndim else known.item()
-
-
-quantities.add(*(_quantity(name, _WithoutSettings(name)) for name in DYNAMIC_QUANTITIES))
+quantities.add(
+    *(_quantity(name, WithoutSettings(name, "jaxgear.dynamics.Dynamics", "dynamics")) for name in DYNAMIC_QUANTITIES)
+)

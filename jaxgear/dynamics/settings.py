@@ -8,7 +8,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..contact import Mesh, MeshCycle, removed_material
+from ..conditions import deviation_of
+from ..contact import Mesh, MeshCycle
 from ..geometry import GearPair
 from ..metrics import Quantity
 from ..microgeometry import AbstractModification
@@ -231,7 +232,4 @@ class Dynamics(Checked):
     def oscillator_of(self, cycle: MeshCycle, mesh: Mesh) -> Oscillator:
         """What vibrates, of a design that a cycle on the mesh is of, its manufacturing deviations included."""
         flanks = {"pinion": cycle.pinion, "wheel": cycle.wheel}
-        deviation = cycle.gap - mesh.corner_gap[:, None] - removed_material(mesh, cycle.torque, **flanks).amount
-        if cycle.pinion is not None and cycle.wheel is not None:
-            deviation = jax.lax.stop_gradient(deviation)  # of the design it does not depend but by rounding
-        return self._oscillator(mesh, cycle.torque, **flanks, deviation=deviation)
+        return self._oscillator(mesh, cycle.torque, **flanks, deviation=deviation_of(cycle, mesh))

@@ -1,0 +1,14 @@
+"""Wear: the flank as a state over its life."""
+
+from .archard import passage_depth as passage_depth
+from .archard import specific_sliding as specific_sliding
+from .life import WearLife as WearLife
+from .life import wear as wear
+from .over_life import life_to as life_to
+from .over_life import life_to_depth as life_to_depth
+from .over_life import mean_over_life as mean_over_life
+from .over_life import over_life as over_life
+from .over_life import wear_depth as wear_depth
+from .over_life import worn_volume as worn_volume
+from .quantities import WEAR_QUANTITIES as WEAR_QUANTITIES
+from .settings import Wear as Wear

@@ -1,0 +1,111 @@
+"""What wear makes of a mesh over its life: quantities at every life, their mean, and the life to a limit."""
+
+from typing import Any, Literal
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..conditions import joined, solved
+from ..metrics import Quantity, quantity_of
+from ..numerics import AbstractMeasure, Mean, check, maximum, real
+from .life import WearLife
+
+Scalar = Float[Array, ""]
+Lives = Float[Array, " lives"]
+Worn = Literal["pinion", "wheel", "both"]
+
+
+def over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Lives:
+    """A quantity of the mesh at every life, shape (lives,); NaN where the contact was not found.
+
+    Args:
+        life: of one pair of flanks.
+        of: a name of the vocabulary, a `Quantity`, or a function of a cycle.
+        measure: how the torques of a load spectrum are joined; None for their mean.
+
+    Raises:
+        ValueError: for an unknown name.
+    """
+    quantity = quantity_of(of, "over_life")
+    values = jnp.where(solved(life.cycles), quantity(life.cycles), jnp.nan)
+    if life.weights is None:
+        return values
+    many = [joined(measure or Mean(), row, life.weights, quantity.better) for row in values]
+    return jnp.stack(many)
+
+
+def mean_over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Scalar:
+    """Mean of a quantity over the revolutions of a life; arguments as for `over_life`."""
+    values, done = over_life(life, of, measure), life.revolutions
+    return 0.5 * jnp.sum((values[1:] + values[:-1]) * jnp.diff(done)) / (done[-1] - done[0])
+
+
+def wear_depth(life: WearLife, gear: Worn = "both") -> Lives:
+    """Largest wear depth of the flank of a gear, or of both, at every life [um], shape (lives,).
+
+    Raises:
+        ValueError: for another gear than "pinion", "wheel" or "both".
+    """
+    depths = {
+        "pinion": [life.pinion_depth],
+        "wheel": [life.wheel_depth],
+        "both": [life.pinion_depth, life.wheel_depth],
+    }
+    if gear not in depths:
+        raise ValueError(f'wear_depth: gear = {gear!r} must be "pinion", "wheel" or "both"')
+    return maximum(jnp.stack(depths[gear]), axis=(0, 2, 3))
+
+
+def worn_volume(life: WearLife) -> Float[Array, "lives gears parts"]:
+    """Volume worn off one flank of every tooth of pinion and wheel, on the flank and at tip corners [mm3].
+
+    Where a gear wears at tip corners, its tip edge and its flank at the mate's tip corners count alike.
+    """
+    return 1e-3 * jnp.einsum("lgpsk,gk,s->lgp", life.depth, life.arc, life.slice_width)
+
+
+def life_to_depth(life: WearLife, limit: Any, gear: Worn = "both") -> Scalar:
+    """Revolutions of the pinion until the deepest wear reaches a limit [um].
+
+    Between two lives the depth is linear; beyond the last one it goes on as in the last block. Infinite where nothing
+    wears.
+
+    Raises:
+        ValueError: for a limit that is not greater than 0, and as `wear_depth`.
+    """
+    limit = real(limit).astype(life.revolutions.dtype)
+    check("life_to_depth", "limit", limit, "um", low=0.0, open_low=True)
+    return _reached(life.revolutions, wear_depth(life, gear), limit, goes_on=True)
+
+
+def life_to(life: WearLife, of: str | Quantity | Any, limit: Any, measure: AbstractMeasure | None = None) -> Scalar:
+    """Revolutions of the pinion until a quantity first passes a limit on its bad side; infinite where it never does.
+
+    Between two lives the quantity is linear. Zero where the new flanks are beyond the limit; NaN where the contact was
+    not found before.
+
+    Args:
+        life, of, measure: as for `over_life`.
+        limit: in the unit of the quantity.
+    """
+    quantity = quantity_of(of, "life_to")
+    limit = real(limit).astype(life.revolutions.dtype)
+    check("life_to", "limit", limit, quantity.unit)
+    values = over_life(life, quantity, measure)
+    return _reached(life.revolutions, quantity.sign * values, quantity.sign * limit, goes_on=False)
+
+
+def _reached(done: Lives, values: Lives, limit: Scalar, *, goes_on: bool) -> Scalar:
+    """Where values first exceed a limit."""
+    # written so that NaN counts as reached, and is what comes out
+    beyond = ~(values < limit)
+    last = len(done) - 2
+    found = jnp.any(beyond)
+    after = jnp.where(found, jnp.argmax(beyond), last + 1)
+    left = jnp.clip(after - 1, 0, last)
+    low, high = values[left], values[left + 1]
+    rises = (high > low) | jnp.isnan(high)
+    share = (limit - low) / jnp.where(rises, high - low, 1.0)
+    at = done[left] + share * (done[left + 1] - done[left])
+    at = jnp.where(found | (goes_on & rises), at, jnp.inf)
+    return jnp.where(beyond[0], jnp.where(jnp.isnan(values[0]), jnp.nan, jnp.zeros_like(at)), at)

@@ -1,0 +1,106 @@
+"""Numbers of worn flanks in the vocabulary of quantities: objectives, limits, columns of sweeps.
+
+A name alone does not say for how many revolutions, and with which coefficient of wear: `Wear.quantity` gives the
+quantity, and a design file has the table [wear].
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, NamedTuple
+
+import jax.numpy as jnp
+
+from ..conditions import deviation_of, solved
+from ..contact import MeshCycle
+from ..metrics import Quantity, quantities
+from ..metrics.settings import WithoutSettings, WithSettings, settled
+from ..numerics import Checked, maximum, once
+from .life import WearLife
+from .over_life import life_to, life_to_depth, mean_over_life, over_life, wear_depth
+
+
+class Kind(NamedTuple):
+    """A quantity of worn flanks before its settings are known.
+
+    Attributes:
+        of: computes it from a life and its settings.
+        unit: "" for a pure number.
+        meaning: in a few words.
+        better: as of `Quantity`.
+        needs: field of the settings that must be given.
+    """
+
+    of: Callable[[WearLife, Any], Any]
+    unit: str
+    meaning: str
+    better: Literal["smaller", "larger"] = "smaller"
+    needs: str | None = None
+
+
+WEAR_QUANTITIES: Mapping[str, Kind] = {
+    "worn_ppte": Kind(lambda life, _: over_life(life, "ppte")[-1], "um", "peak-to-peak transmission error when worn"),
+    "mean_ppte_over_life": Kind(
+        lambda life, _: mean_over_life(life, "ppte"), "um", "peak-to-peak transmission error, mean over the life"
+    ),
+    "max_ppte_over_life": Kind(
+        lambda life, _: maximum(over_life(life, "ppte")), "um", "peak-to-peak transmission error, worst of the life"
+    ),
+    "max_pressure_over_life": Kind(
+        lambda life, _: maximum(over_life(life, "max_contact_pressure")), "MPa", "largest pressure of the life"
+    ),
+    "wear_depth": Kind(lambda life, _: wear_depth(life)[-1], "um", "largest wear depth of both gears"),
+    "pinion_wear_depth": Kind(lambda life, _: wear_depth(life, "pinion")[-1], "um", "largest wear depth, pinion"),
+    "wheel_wear_depth": Kind(lambda life, _: wear_depth(life, "wheel")[-1], "um", "largest wear depth, wheel"),
+    "life_to_depth": Kind(
+        lambda life, settings: life_to_depth(life, settings.depth_limit),
+        "revolutions",
+        "life to the limit of the wear depth",
+        "larger",
+        "depth_limit",
+    ),
+    "life_to_ppte": Kind(
+        lambda life, settings: life_to(life, "ppte", settings.ppte_limit),
+        "revolutions",
+        "life to the limit of peak-to-peak transmission error",
+        "larger",
+        "ppte_limit",
+    ),
+}
+
+
+def with_settings(name: str, settings: Checked) -> Quantity:
+    """A quantity of worn flanks with the settings that it needs; equal settings make equal quantities.
+
+    Args:
+        name: one of `WEAR_QUANTITIES`.
+        settings: a `Wear` of concrete numbers.
+
+    Raises:
+        ValueError: for another name, settings that are being traced, or a limit that they do not have.
+    """
+    if name not in WEAR_QUANTITIES:
+        raise ValueError(f'Wear: quantity "{name}" is not known, must be one of {", ".join(WEAR_QUANTITIES)}')
+    needs = WEAR_QUANTITIES[name].needs
+    if needs is not None and getattr(settings, needs) is None:
+        raise ValueError(f'Wear: quantity "{name}" needs {needs}')
+    return _quantity(name, settled(name, settings, _number))
+
+
+def _number(given: WithSettings, cycle: MeshCycle):
+    settings = given.settings
+    # all quantities of the same settings come from one life
+    life = once(cycle, (given.make, given.fields), lambda: _life(given.name, settings, cycle))
+    return jnp.where(jnp.all(solved(life.cycles)), WEAR_QUANTITIES[given.name].of(life, settings), jnp.nan)
+
+
+def _life(name: str, settings: Any, cycle: MeshCycle) -> WearLife:
+    mesh = cycle.mesh_for(name)
+    flanks = {"pinion": cycle.pinion, "wheel": cycle.wheel}
+    return settings.life(mesh, cycle.operation, **flanks, deviation=deviation_of(cycle, mesh))
+
+
+def _quantity(name: str, of: Callable[[MeshCycle], Any]) -> Quantity:
+    kind = WEAR_QUANTITIES[name]
+    return Quantity(name, of, kind.unit, kind.meaning, better=kind.better)
+
+
+quantities.add(*(_quantity(name, WithoutSettings(name, "jaxgear.wear.Wear", "wear")) for name in WEAR_QUANTITIES))

@@ -1,0 +1,77 @@
+"""What a mesh is worn by: revolutions, coefficients of wear and limits, and the quantities that are made of them."""
+
+from typing import Any
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..contact import Mesh
+from ..metrics import Quantity
+from ..microgeometry import AbstractModification
+from ..numerics import Checked, count, number
+from .life import BLOCKS, WearLife, check_blocks, wear
+from .quantities import with_settings
+
+Scalar = Float[Array, ""]
+
+
+class Wear(Checked):
+    """How long a mesh runs, and how fast it wears.
+
+    Attributes:
+        revolutions: of the pinion.
+        coefficient: of wear of the pinion, and of the wheel where it has none of its own: from 1e-18 for good films to
+            5e-16 for mild wear in mixed lubrication.
+        wheel_coefficient: of wear of the wheel; None for that of the pinion.
+        blocks: contact analyses and steps of wear in turn, of equal length; even.
+        points: of the grid on each flank; None for half as many as the mesh has positions, and one.
+        depth_limit: depth to which a life is asked for.
+        ppte_limit: peak-to-peak transmission error to which a life is asked for.
+    """
+
+    revolutions: Scalar = number("", low=0.0, open_low=True)
+    coefficient: Scalar = number("m2/N", low=0.0)
+    wheel_coefficient: Scalar | None = number("m2/N", low=0.0, optional=True, default=None)
+    blocks: int = count(low=2, high=100_000, default=BLOCKS)
+    points: int | None = count(low=3, high=10_000, optional=True, default=None)
+    depth_limit: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
+    ppte_limit: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
+
+    def check_together(self) -> None:
+        check_blocks("Wear", self.blocks)
+
+    @property
+    def coefficients(self) -> Float[Array, " gears"]:
+        """Of pinion and wheel [m2/N]."""
+        wheel = self.coefficient if self.wheel_coefficient is None else self.wheel_coefficient
+        return jnp.stack([self.coefficient, wheel])
+
+    def life(
+        self,
+        mesh: Mesh,
+        torque: Any,
+        *,
+        pinion: AbstractModification | None = None,
+        wheel: AbstractModification | None = None,
+        deviation: Any = None,
+    ) -> WearLife:
+        """The life of a design; arguments and errors as `wear`."""
+        options: dict[str, Any] = {"coefficient": self.coefficients, "blocks": self.blocks, "points": self.points}
+        flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
+        return wear(mesh, torque, self.revolutions, **flanks, **options)
+
+    def quantity(self, name: str) -> Quantity:
+        """A quantity of the life for objectives, constraints, sweeps and Pareto fronts, with these settings.
+
+        Every load of a spectrum and every manufactured pair is taken to run the whole life, and the lives are joined
+        as all numbers of such cases are.
+
+        Args:
+            name: one of `WEAR_QUANTITIES`: "worn_ppte", "mean_ppte_over_life", "max_ppte_over_life",
+                "max_pressure_over_life", "wear_depth", "pinion_wear_depth", "wheel_wear_depth", "life_to_depth" (needs
+                `depth_limit`) or "life_to_ppte" (needs `ppte_limit`).
+
+        Raises:
+            ValueError: for another name, and for a limit that is missing.
+        """
+        return with_settings(name, self)

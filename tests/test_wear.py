@@ -1,0 +1,312 @@
+"""Wear: Archard's law, where worn material goes, how blocks add up, and what is made of a life."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import gear_pair, prepare
+
+import jaxgear as jg
+from jaxgear.wear import (
+    life_to,
+    life_to_depth,
+    mean_over_life,
+    over_life,
+    passage_depth,
+    specific_sliding,
+    wear_depth,
+    worn_volume,
+)
+from jaxgear.wear import wear as worn_flanks
+from jaxgear.wear.archard import worn
+from jaxgear.wear.deposit import deposit
+from jaxgear.wear.march import march
+
+# contacts that stay at their nominal places: sliding down a kinked flank they see rounding, by up to 1e-3 um
+SIZES = jg.Resolution(positions=16, pairs=2, slide_steps=0)
+TORQUE, COEFFICIENT, REVOLUTIONS = 100.0, 1e-18, 4e7
+BLOCKS = 8
+RELIEF = jg.TipRelief(5.0, 2.0)
+
+
+def pair_of(*teeth):
+    return gear_pair(teeth, face_width=20.0, bores=(None, None))
+
+
+def life_of(mesh, torque=TORQUE, revolutions=REVOLUTIONS, **options):
+    return worn_flanks(mesh, torque, revolutions, **{"coefficient": COEFFICIENT, "blocks": BLOCKS, **options})
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return prepare(pair_of(20, 30), resolution=SIZES)
+
+
+@pytest.fixture(scope="module")
+def life(mesh):
+    return life_of(mesh)
+
+
+@pytest.fixture(scope="module")
+def equal():
+    return prepare(pair_of(30, 30), resolution=SIZES)
+
+
+def test_specific_sliding_is_that_of_the_rolling_speeds(mesh):
+    path = mesh.path_of_contact
+    at = jnp.linspace(path.start, path.end, 7)
+    first, second = path.rolling_speeds(at, 1000.0)
+    pinion, wheel = specific_sliding(path, at)
+    np.testing.assert_allclose(pinion, np.abs(first - second) / first, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(wheel, np.abs(first - second) / second, rtol=1e-12, atol=1e-15)
+
+
+def test_depths_of_the_50_50_pair_are_the_known_ones():
+    """Two pairs share the load equally: um per million cycles of gear 1, at 200 N m and 1e-18 m2/N."""
+
+    def gear():
+        return jg.Gear(50, 3.0, face_width=20.0, tip_diameter=154.5709)
+
+    path = jg.path_of_contact(jg.GearPair(gear(), gear(), center_distance=150.0))
+    at = jnp.stack([path.start, path.inner_single, jnp.zeros(()), path.outer_single, path.end])
+    load = 2837.8 / 20.0 * np.array([0.5, 1.0, 1.0, 1.0, 0.5])
+    depth = 1e6 * 1e9 * 1e-18 * load * np.asarray(specific_sliding(path, at)[0])
+    # at the two inner points the load is the full one or half of it: the full one is meant
+    np.testing.assert_allclose(depth, [0.0440, 0.0346, 0.0, 0.0278, 0.0271], atol=6e-5)
+
+
+def test_nothing_wears_at_the_pitch_point(life):
+    cycle = jax.tree.map(lambda leaf: leaf[0], life.cycles)
+    pitch = np.asarray(cycle.kinematics.path) == 0
+    assert pitch.any() and np.asarray(cycle.line_load)[:, 0][pitch].all()
+    for depth in passage_depth(cycle, COEFFICIENT):
+        assert (np.asarray(depth)[:, 0][pitch] == 0).all()
+        assert np.asarray(depth).max() > 0
+
+
+def test_flanks_slide_by_the_closed_form_and_beyond_the_path_on(mesh):
+    path, place = mesh.path_of_contact, deposit(mesh, jnp.asarray(TORQUE), 9)
+    inverse = 1 / path.pinion_base_radius + 1 / path.wheel_base_radius
+    flank, corner = np.asarray(place.sliding)
+    np.testing.assert_allclose(flank.sum(), 0.5 * (path.start**2 + path.end**2) * inverse, rtol=1e-12)
+    beyond = np.asarray(mesh.outside) > float(path.base_pitch) / 16
+    assert (flank[beyond] == 0).all() and (corner[beyond] > 0).all()
+    # corners begin to slide as fast as the flanks did at the end of the path
+    piece = float(path.base_pitch) / 16
+    nearest = np.where(beyond, np.asarray(mesh.outside), np.inf).argmin()
+    expected = piece * float(inverse) * max(-float(path.start), float(path.end))
+    assert 0.5 * expected < corner.ravel()[nearest] < 1.2 * expected
+
+
+def test_worn_volume_is_coefficient_times_force_times_sliding(mesh):
+    place = deposit(mesh, jnp.asarray(TORQUE), 9)
+    load = np.random.default_rng(1).uniform(0, 100, (2, 1, 16))
+    coefficients = np.array([2e-18, 5e-18])
+    depth = worn(jnp.asarray(load), jnp.asarray(coefficients)[:, None, None, None], place)
+    width = float(mesh.slice_width[0])
+    volume = 1e-3 * np.einsum("gpk,gk->gp", np.asarray(depth)[:, :, 0], np.asarray(place.arc)) * width
+    sliding = np.einsum("ij,pij->p", load[:, 0] * width, np.asarray(place.sliding))
+    np.testing.assert_allclose(volume, 1e6 * coefficients[:, None] * sliding, rtol=1e-10)
+
+
+def test_an_even_load_wears_by_the_formula_at_every_point(equal):
+    place = deposit(equal, jnp.asarray(TORQUE), 33)
+    depth = np.asarray(worn(jnp.full((2, 1, 16), 100.0), 1e-18, place))[:, 0, 0]
+    path, length = equal.path_of_contact, np.asarray(place.roll_length)
+    at = length[0] - path.pinion_pitch_roll_length, path.wheel_pitch_roll_length - length[1]
+    exact = 1e9 * 1e-18 * 100.0 * np.stack([specific_sliding(path, s)[gear] for gear, s in enumerate(at)])
+    error = np.abs(depth - exact) / exact.max()
+    # the contact is as wide as a step of the grid: it sees the bend at the pitch point, and half of itself at the root
+    inner = np.abs(np.stack(at)) > 1.0
+    inner[:, 0] = False
+    assert error[inner].max() < 0.01 and error.max() < 0.06
+
+
+def test_depth_does_not_depend_on_the_number_of_positions():
+    def depth(positions):
+        mesh = prepare(pair_of(20, 30), resolution=jg.Resolution(positions=positions, pairs=2))
+        path = mesh.path_of_contact
+        # a load that rises and falls smoothly over the path of contact
+        share = jnp.clip((mesh.path - path.start) / (path.end - path.start), 0.0, 1.0)
+        load = 100.0 * jnp.sin(jnp.pi * share)[:, None] ** 2
+        return np.asarray(worn(load, 1e-18, deposit(mesh, jnp.asarray(TORQUE), 9)))[:, 0, 0]
+
+    fine = depth(128)
+    assert np.abs(depth(16) - fine).max() < 0.01 * fine.max()
+    assert np.abs(depth(64) - fine).max() < 0.001 * fine.max()
+
+
+def test_equal_gears_wear_as_mirror_images(equal):
+    life = life_of(equal)
+    assert wear_depth(life)[-1] > 1.0
+    np.testing.assert_allclose(life.pinion_depth, life.wheel_depth, rtol=1e-9, atol=1e-12)
+
+
+def test_the_wheel_wears_by_its_own_revolutions(life):
+    """In one passage both gears lose the same volume; a wheel tooth has fewer of them."""
+    pinion, wheel = np.asarray(worn_volume(life))[-1].sum(axis=-1)
+    assert wheel == pytest.approx(pinion * 20 / 30, rel=1e-10)
+
+
+def test_wear_is_deepest_at_the_root_of_the_driver_and_least_at_the_pitch_point(life):
+    depth = np.asarray(life.pinion_depth)[-1, 0]
+    assert depth.argmax() == 0
+    pitch = np.searchsorted(life.roll_length[0], float(life.cycles.sides[0].pitch_roll_length[0]))
+    assert abs(int(depth.argmin()) - pitch) <= 1 and depth.min() < 0.2 * depth.max()
+
+
+def test_twice_the_coefficient_over_half_of_the_revolutions_gives_the_same_flank(mesh, life):
+    other = life_of(mesh, revolutions=REVOLUTIONS / 2, coefficient=2 * COEFFICIENT)
+    np.testing.assert_allclose(other.depth, life.depth, rtol=1e-12)
+
+
+def test_half_of_the_revolutions_of_a_spectrum_without_load_wear_nothing(mesh, life):
+    spectrum = jg.LoadSpectrum([TORQUE, 0.0])
+    half = life_of(mesh, spectrum, revolutions=2 * REVOLUTIONS)
+    np.testing.assert_allclose(half.depth, life.depth, rtol=1e-9, atol=1e-12)
+    assert over_life(half, "mean_te").shape == (BLOCKS + 1,)
+    np.testing.assert_allclose(over_life(half, "mean_te"), np.asarray(half.cycles.transmission_error).mean((1, 2)))
+
+
+@pytest.fixture(scope="module")
+def relieved(mesh):
+    return life_of(mesh, pinion=RELIEF)
+
+
+def test_the_flanks_of_a_life_give_its_mesh_again(mesh, relieved):
+    pinion, wheel = relieved.flanks()
+    assert isinstance(pinion, jg.TabulatedProfile)
+    again = jg.solve(mesh, TORQUE, pinion=RELIEF + pinion, wheel=wheel)
+    np.testing.assert_allclose(again.transmission_error, relieved.cycles.transmission_error[-1], rtol=1e-9)
+    first = jg.solve(mesh, TORQUE, pinion=RELIEF + 0.0 * pinion, wheel=0.0 * wheel)
+    np.testing.assert_allclose(first.transmission_error, relieved.cycles.transmission_error[0], rtol=1e-9)
+
+
+def test_slices_of_an_even_load_wear_alike_and_crowning_wears_in_the_middle(mesh, life):
+    sliced = prepare(pair_of(20, 30), resolution=replace(SIZES, slices=3))
+    even = life_of(sliced, pinion=jg.LeadCrowning(0.0))
+    np.testing.assert_allclose(even.pinion_depth, np.repeat(life.pinion_depth, 3, axis=1), rtol=1e-6, atol=1e-9)
+    crowned = life_of(sliced, pinion=jg.LeadCrowning(10.0))
+    depth = np.asarray(crowned.pinion_depth)[-1].max(axis=-1)
+    assert depth[1] > 1.1 * depth[0] and depth[0] == pytest.approx(depth[2], rel=1e-6)
+
+
+def test_blocks_are_of_second_order_and_tell_their_error():
+    """d y / d n = 1 - y from y = 0."""
+
+    def end(pairs):
+        found = march(lambda y: (1 - y, y), jnp.zeros((1, 1, 1, 1)), jnp.full(pairs, 0.5 / pairs))
+        assert found.depth.shape[0] == 2 * pairs + 1 and (found.depth == found.seen).all()
+        return float(found.depth[-1].sum()), float(found.error.sum())
+
+    exact = 1 - np.exp(-1)
+    (few, said), (many, said_then) = end(4), end(8)
+    assert (few - exact) / (many - exact) == pytest.approx(4, rel=0.1)
+    # the equation itself halves errors made at its start
+    assert 1 < said / (few - exact) < 3 and said / said_then == pytest.approx(4, rel=0.1)
+
+
+def test_an_overlong_block_overshoots():
+    """Beyond twice what the load deflects a step of wear grows what it should level."""
+
+    def end(length):
+        return float(march(lambda y: (1 - y, y), jnp.zeros((1, 1, 1, 1)), jnp.full(20, length)).depth[-1].sum())
+
+    assert end(1.9) == pytest.approx(1, abs=0.05) and abs(end(2.1) - 1) > 1
+
+
+def test_halving_the_blocks_changes_the_flank_by_what_was_said(mesh, life):
+    finer = life_of(mesh, blocks=2 * BLOCKS)
+    changed = np.abs(np.asarray(finer.depth[-1] - life.depth[-1]).sum(axis=1)).max()
+    assert 0.2 * float(life.error[-1]) < changed < float(life.error[-1])
+    assert float(life.error[-1]) / float(finer.error[-1]) == pytest.approx(4, rel=0.25)
+
+
+def test_contacts_that_slide_wear_the_same_flank_again(relieved):
+    """With the default resolution: the flanks of a life give its mesh, to what rounding does on their kinks."""
+    sliding = prepare(pair_of(20, 30), resolution=replace(SIZES, slide_steps=None))
+    life = life_of(sliding, pinion=RELIEF)
+    pinion, wheel = life.flanks()
+    again = jg.solve(sliding, TORQUE, pinion=RELIEF + pinion, wheel=wheel)
+    np.testing.assert_allclose(again.transmission_error, life.cycles.transmission_error[-1], atol=2e-3)
+    assert np.abs(life.depth - relieved.depth).max() < 0.05 * float(wear_depth(life)[-1])
+
+
+def test_the_life_to_a_depth_is_where_the_depth_is_reached(life):
+    depths, done = np.asarray(wear_depth(life)), np.asarray(life.revolutions)
+    np.testing.assert_allclose(life_to_depth(life, depths[3]), done[3], rtol=1e-12)
+    middle = 0.5 * (depths[3] + depths[4])
+    np.testing.assert_allclose(life_to_depth(life, middle), 0.5 * (done[3] + done[4]), rtol=1e-12)
+    beyond = depths[-1] + (depths[-1] - depths[-2])
+    np.testing.assert_allclose(life_to_depth(life, beyond), done[-1] + (done[-1] - done[-2]), rtol=1e-9)
+    wheel = float(life_to_depth(life, 1.0, "wheel"))
+    assert wheel > float(life_to_depth(life, 1.0, "pinion")) == pytest.approx(float(life_to_depth(life, 1.0)))
+
+
+def test_the_life_to_a_limit_of_a_quantity(life):
+    ppte = np.asarray(over_life(life, "ppte"))
+    np.testing.assert_allclose(ppte, np.ptp(life.cycles.transmission_error, axis=1), rtol=1e-12)
+    assert float(life_to(life, "ppte", ppte[0] - 0.1)) == 0
+    assert np.isinf(life_to(life, "ppte", ppte.max() + 1))
+    # the contact ratio does not change, and is bad where it is small
+    assert float(life_to(life, "contact_ratio", 2.0)) == 0 and np.isinf(life_to(life, "contact_ratio", 1.0))
+    expected = np.trapezoid(ppte, life.revolutions) / REVOLUTIONS
+    assert float(mean_over_life(life, "ppte")) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_contact_that_was_not_found_is_no_number(life):
+    lost = eqx.tree_at(lambda life: life.cycles.converged, life, life.cycles.converged.at[2, 0].set(False))
+    assert np.isnan(over_life(lost, "ppte")).tolist() == [life == 2 for life in range(BLOCKS + 1)]
+    assert np.isnan(life_to(lost, "ppte", 1e3))
+
+
+def test_a_function_of_the_lubrication(mesh, life):
+    speed = jg.Operation(TORQUE, 1000.0)
+
+    def constant(pressure, sliding, temperature):
+        assert pressure.shape == sliding.shape == temperature.shape == (2, 1, 16)
+        return 0.0 * pressure + COEFFICIENT, 0.0
+
+    other = life_of(mesh, speed, coefficient=constant)
+    assert not np.asarray(other.wheel_depth).any()
+    only = life_of(mesh, coefficient=(COEFFICIENT, 0.0))
+    np.testing.assert_allclose(other.depth, only.depth, rtol=1e-9)
+    assert float(wear_depth(only)[-1]) > float(wear_depth(life)[-1])  # the wheel does not level the load
+
+
+def test_no_load_wears_nothing(mesh):
+    life = life_of(mesh, 0.0)
+    assert not np.asarray(life.depth).any() and np.isinf(life_to_depth(life, 1.0))
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"blocks": 7}, "wear: blocks = 7 must be even: two and two are compared with one of double length"),
+        ({"blocks": 0}, "wear: blocks = 0 must be a whole number of at least 2"),
+        ({"points": 2}, "wear: points = 2 must be a whole number of at least 3"),
+        ({"revolutions": 0.0}, "wear: revolutions = 0 must be greater than 0"),
+        ({"revolutions": [1.0, 2.0]}, r"wear: revolutions has shape \(2,\), must be a single number"),
+        ({"coefficient": -1e-18}, "wear: coefficient = -1e-18 m2/N must be at least 0 m2/N"),
+        ({"coefficient": [1e-18] * 3}, r"wear: coefficient has shape \(3,\), must be one number or a pair"),
+        ({"coefficient": lambda *_: 1e-18}, "wear: coefficient is a function, which needs a speed"),
+        ({"torque": -1.0}, "wear: torque = -1 N m must be at least 0 N m"),
+        ({"pinion": jg.LeadCrowning(5.0)}, "varies along the face, which a mesh of 1 slice cannot show"),
+    ],
+)
+def test_refuses_in_one_line(mesh, options, message):
+    with pytest.raises(ValueError, match=message) as refused:
+        life_of(mesh, **options)
+    assert "\n" not in str(refused.value)
+
+
+def test_refuses_results_that_are_not_there(life):
+    with pytest.raises(ValueError, match='wear_depth: gear = "rack"|wear_depth: gear = \'rack\' must be "pinion"'):
+        wear_depth(life, "rack")
+    with pytest.raises(ValueError, match="life_to_depth: limit = 0 um must be greater than 0 um"):
+        life_to_depth(life, 0.0)
+    with pytest.raises(ValueError, match="passage_depth: coefficient = -1 m2/N"):
+        passage_depth(life.cycles, -1.0)

@@ -1,0 +1,97 @@
+"""Quantities of worn flanks, gradients of a life, and designs by the thousand."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import gear_pair, prepare
+
+import jaxgear as jg
+from jaxgear.conditions import solve_case
+from jaxgear.wear import WEAR_QUANTITIES, Wear, life_to, life_to_depth, mean_over_life, over_life, wear, wear_depth
+
+SIZES = jg.Resolution(positions=16, pairs=2, slide_steps=0)
+TORQUE = 100.0
+SETTINGS = Wear(4e7, 1e-18, blocks=4, depth_limit=2.0, ppte_limit=6.0)
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return prepare(gear_pair((20, 30), face_width=20.0, bores=(None, None)), resolution=SIZES)
+
+
+def test_quantities_are_those_of_the_life(mesh):
+    relief = jg.TipRelief(5.0, 2.0)
+    cycle = solve_case(mesh, TORQUE, relief, relief)
+    life = SETTINGS.life(mesh, TORQUE, pinion=relief, wheel=relief)
+    found = {name: float(SETTINGS.quantity(name)(cycle.on(mesh))) for name in ("worn_ppte", "wear_depth")}
+    assert found["worn_ppte"] == pytest.approx(float(over_life(life, "ppte")[-1]), rel=1e-9)
+    assert found["wear_depth"] == pytest.approx(float(wear_depth(life)[-1]), rel=1e-9)
+    expected = {
+        "mean_ppte_over_life": mean_over_life(life, "ppte"),
+        "max_ppte_over_life": over_life(life, "ppte").max(),
+        "max_pressure_over_life": over_life(life, "max_contact_pressure").max(),
+        "pinion_wear_depth": wear_depth(life, "pinion")[-1],
+        "wheel_wear_depth": wear_depth(life, "wheel")[-1],
+        "life_to_depth": life_to_depth(life, 2.0),
+        "life_to_ppte": life_to(life, "ppte", 6.0),
+    }
+    assert {*expected, *found} == {*WEAR_QUANTITIES}
+    for name, number in expected.items():
+        np.testing.assert_allclose(WEAR_QUANTITIES[name].of(life, SETTINGS), number, rtol=1e-12)
+
+
+def test_equal_settings_make_equal_quantities():
+    again = Wear(4e7, 1e-18, blocks=4, depth_limit=2.0, ppte_limit=6.0)
+    assert SETTINGS.quantity("wear_depth") == again.quantity("wear_depth") != Wear(1e7, 1e-18).quantity("wear_depth")
+    assert SETTINGS.quantity("life_to_depth").better == "larger"
+    np.testing.assert_array_equal(Wear(1e7, 1e-18, 3e-18).coefficients, [1e-18, 3e-18])
+
+
+def test_a_name_without_settings_says_what_it_needs(mesh):
+    cycle = jg.solve(mesh, TORQUE)
+    for name in WEAR_QUANTITIES:
+        with pytest.raises(ValueError, match=rf'{name}: needs settings, give jaxgear.wear.Wear\(...\).quantity\("'):
+            jg.quantities[name](cycle)
+
+
+@pytest.mark.parametrize(
+    "make, message",
+    [
+        (lambda: SETTINGS.quantity("depth"), 'Wear: quantity "depth" is not known, must be one of worn_ppte'),
+        (lambda: Wear(1e7, 1e-18).quantity("life_to_depth"), 'Wear: quantity "life_to_depth" needs depth_limit'),
+        (lambda: Wear(1e7, 1e-18).quantity("life_to_ppte"), 'Wear: quantity "life_to_ppte" needs ppte_limit'),
+        (lambda: Wear(-1.0, 1e-18), "Wear: revolutions = -1 must be greater than 0"),
+        (lambda: Wear(1e7, -1e-18), "Wear: coefficient = -1e-18 m2/N must be at least 0 m2/N"),
+        (lambda: Wear(1e7, 1e-18, -1.0), "Wear: wheel_coefficient = -1 m2/N must be at least 0 m2/N"),
+        (lambda: Wear(1e7, 1e-18, blocks=5), "Wear: blocks = 5 must be even"),
+        (lambda: Wear(1e7, 1e-18, points=2), "Wear: points = 2 must be a whole number of at least 3"),
+        (lambda: Wear(1e7, 1e-18, depth_limit=0.0), "Wear: depth_limit = 0 um must be greater than 0 um"),
+        (lambda: Wear(1e7, 1e-18, ppte_limit=0.0), "Wear: ppte_limit = 0 um must be greater than 0 um"),
+    ],
+)
+def test_refuses_in_one_line(make, message):
+    with pytest.raises(ValueError, match=message) as refused:
+        make()
+    assert "\n" not in str(refused.value)
+
+
+def test_settings_that_are_traced_make_no_quantity():
+    with pytest.raises(ValueError, match="Wear: revolutions is being traced, a quantity needs numbers"):
+        jax.jit(lambda n: Wear(n, 1e-18).quantity("wear_depth").sign)(1e7)
+
+
+def test_gradients_of_worn_ppte_are_those_of_differences_and_designs_go_side_by_side(mesh):
+    """After 20 blocks, by amount and length of the relief and by the coefficient of wear."""
+
+    def ppte(design):
+        relief = jg.TipRelief(design[0], design[1])
+        life = wear(mesh, TORQUE, 4e7, pinion=relief, wheel=relief, coefficient=1e-18 * design[2], blocks=20, points=9)
+        return over_life(life, "ppte")[-1]
+
+    design, step = jnp.array([5.0, 2.0, 1.0]), 1e-4
+    moved = jnp.concatenate([design[None] + step * jnp.eye(3), design[None] - step * jnp.eye(3)])
+    values, gradient = jax.jit(lambda: (jax.lax.map(ppte, moved, batch_size=6), jax.grad(ppte)(design)))()
+    difference = (values[:3] - values[3:]) / (2 * step)
+    np.testing.assert_allclose(gradient, difference, rtol=1e-4, atol=1e-6)
+    assert np.abs(difference).min() > 1e-3
