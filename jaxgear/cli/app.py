@@ -14,6 +14,7 @@ from typing import Annotated, Literal, NoReturn
 import typer
 
 from . import interrupt
+from .options import File, NoCache, NoFigures, Quick, Reported, output_option, typed
 from .version import version as own_version
 
 # of `optimize.METHODS` and of the search for flanks without parameters, as a test makes sure
@@ -36,23 +37,6 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit()
 
 
-File = Annotated[Path, typer.Argument(metavar="FILE.toml", help="Design file.", show_default=False)]
-
-
-def _output(folder: str):
-    """The option --output of a command with its own folder, which a quick run marks with -quick."""
-    return typer.Option("--output", "-o", metavar="DIR", help="Result folder.", show_default=f"results/FILE/{folder}")
-
-
-NoFigures = Annotated[bool, typer.Option("--no-figures", help="Write no figures.")]
-NoCache = Annotated[
-    bool, typer.Option("--no-cache", envvar="JAXGEAR_NO_CACHE", help="Do not keep compiled programs on disk.")
-]
-Quick = Annotated[
-    bool, typer.Option("--quick", help="Coarse positions and a short search: for a first look, not for a result.")
-]
-
-
 @app.callback()
 def root(
     version: Annotated[
@@ -64,27 +48,31 @@ def root(
 
 @app.command()
 def analyze(
+    context: typer.Context,
     file: File,
-    output: Annotated[Path | None, _output("analyze")] = None,
+    output: Annotated[Path | None, output_option("analyze")] = None,
     no_figures: NoFigures = False,
+    reported: Reported = False,
     no_cache: NoCache = False,
 ) -> int:
     """Analyze the unmodified pair and the modification of the design file."""
     with interrupt.importing():
         from . import commands
-    fine = commands.analyze(file, output, figures=not no_figures, cache=not no_cache)
+    fine = commands.analyze(file, output, figures=not no_figures, cache=not no_cache, command=typed(context, reported))
     return OK if fine else NOT_CONVERGED
 
 
 @app.command()
 def optimize(
+    context: typer.Context,
     file: File,
-    output: Annotated[Path | None, _output("optimize/METHOD")] = None,
+    output: Annotated[Path | None, output_option("optimize/METHOD")] = None,
     method: Annotated[
         str | None, typer.Option("--method", "-m", metavar="NAME", help=f"In place of the file's: {METHODS}.")
     ] = None,
     quick: Quick = False,
     no_figures: NoFigures = False,
+    reported: Reported = False,
     no_cache: NoCache = False,
 ) -> int:
     """Find the best variables or flanks by the method and for the objective of the design file.
@@ -94,16 +82,26 @@ def optimize(
     """
     with interrupt.importing():
         from . import commands
-    fine = commands.optimize(file, output, method=method, quick=quick, figures=not no_figures, cache=not no_cache)
+    fine = commands.optimize(
+        file,
+        output,
+        method=method,
+        quick=quick,
+        figures=not no_figures,
+        cache=not no_cache,
+        command=typed(context, reported),
+    )
     return OK if fine else NOT_CONVERGED
 
 
 @app.command()
 def dynamics(
+    context: typer.Context,
     file: File,
-    output: Annotated[Path | None, _output("dynamics")] = None,
+    output: Annotated[Path | None, output_option("dynamics")] = None,
     quick: Quick = False,
     no_figures: NoFigures = False,
+    reported: Reported = False,
     no_cache: NoCache = False,
 ) -> int:
     """Run the pair through the speeds of the table `dynamics`, up and down, under several torques.
@@ -113,16 +111,20 @@ def dynamics(
     """
     with interrupt.importing():
         from . import dynamics
-    fine = dynamics.run_dynamics(file, output, quick=quick, figures=not no_figures, cache=not no_cache)
+    fine = dynamics.run_dynamics(
+        file, output, quick=quick, figures=not no_figures, cache=not no_cache, command=typed(context, reported)
+    )
     return OK if fine else NOT_CONVERGED
 
 
 @app.command()
 def layout(
+    context: typer.Context,
     file: File,
-    output: Annotated[Path | None, _output("layout")] = None,
+    output: Annotated[Path | None, output_option("layout")] = None,
     quick: Quick = False,
     no_figures: NoFigures = False,
+    reported: Reported = False,
     no_cache: NoCache = False,
 ) -> int:
     """Find the flank lines of the pair on its shafts, and its profile modifications, in three steps.
@@ -132,14 +134,17 @@ def layout(
     """
     with interrupt.importing():
         from . import layout as command
-    fine = command.run_layout(file, output, quick=quick, figures=not no_figures, cache=not no_cache)
+    fine = command.run_layout(
+        file, output, quick=quick, figures=not no_figures, cache=not no_cache, command=typed(context, reported)
+    )
     return OK if fine else NOT_CONVERGED
 
 
 @app.command()
 def sweep(
+    context: typer.Context,
     file: File,
-    output: Annotated[Path | None, _output("sweep")] = None,
+    output: Annotated[Path | None, output_option("sweep")] = None,
     samples: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Number of variants in place of the file's.")
     ] = None,
@@ -154,6 +159,7 @@ def sweep(
     ] = False,
     quick: Quick = False,
     no_figures: NoFigures = False,
+    reported: Reported = False,
     no_cache: NoCache = False,
 ) -> int:
     """Evaluate the variants that the design file asks for, any number of them, into a table of Parquet files.
@@ -166,7 +172,14 @@ def sweep(
     devices.use_all_cores()
     devices.join_processes(coordinator, processes, process, automatic=distributed)
     fine = sweep.run_sweep(
-        file, output, samples=samples, best=best, quick=quick, figures=not no_figures, cache=not no_cache
+        file,
+        output,
+        samples=samples,
+        best=best,
+        quick=quick,
+        figures=not no_figures,
+        cache=not no_cache,
+        command=typed(context, reported),
     )
     return OK if fine else NOT_CONVERGED
 
@@ -221,7 +234,8 @@ def _warnings() -> Iterator[None]:
 
 def _run(arguments: Sequence[str] | None) -> int:
     try:
-        code = app(args=arguments, prog_name="jaxgear", standalone_mode=False)
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        code = app(args=given, obj=given, prog_name="jaxgear", standalone_mode=False)
         if code == INTERRUPTED or interrupt.state.asked:
             return _say_interrupted()
     except (KeyboardInterrupt, typer.Abort):

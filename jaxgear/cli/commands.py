@@ -2,6 +2,7 @@
 
 import importlib
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +13,21 @@ from ..microgeometry import AbstractModification, NoModification
 from ..numerics import program
 from ..sizing import iso_relief
 from .devices import compile_quickly
+from .document import document
 from .progress import Stages
 from .run import default_folder, opened, run
 
 _SEARCH, _FIGURES = ("scipy.optimize", "scipy.stats"), ("matplotlib.pyplot",)
 
 
-def analyze(file: Path, output: Path | None, *, figures: bool, cache: bool) -> bool:
-    """Evaluates the unmodified pair and the modification of the file; False when a solution failed."""
+def analyze(
+    file: Path, output: Path | None, *, figures: bool, cache: bool, command: Sequence[str] | None = None
+) -> bool:
+    """Evaluates the unmodified pair and the modification of the file; False when a solution failed.
+
+    A report is written where a `command` line is given.
+    """
+    asked = document(command, file)
     compile_quickly()
     with Stages() as stages:
         design = opened(file, cache=cache)
@@ -34,12 +42,25 @@ def analyze(file: Path, output: Path | None, *, figures: bool, cache: bool) -> b
             pinion, wheel = design.design({})
             if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
                 current.evaluate("modified", pinion, wheel)
-            current.write(figures=figures)
+            current.write(figures=figures, document=asked)
     return current.show()
 
 
-def optimize(file: Path, output: Path | None, *, method: str | None, quick: bool, figures: bool, cache: bool) -> bool:
-    """Searches the optimum and compares it; False when a solution failed or a constraint is not met."""
+def optimize(
+    file: Path,
+    output: Path | None,
+    *,
+    method: str | None,
+    quick: bool,
+    figures: bool,
+    cache: bool,
+    command: Sequence[str] | None = None,
+) -> bool:
+    """Searches the optimum and compares it; False when a solution failed or a constraint is not met.
+
+    A report is written where a `command` line is given.
+    """
+    asked = document(command, file)
     compile_quickly()
     with Stages() as stages:
         design = opened(file, cache=cache)
@@ -51,7 +72,7 @@ def optimize(file: Path, output: Path | None, *, method: str | None, quick: bool
             relief = rule_based(design)
             involute = NoModification()
             current.search(request, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
-            current.write(figures=figures)
+            current.write(figures=figures, document=asked)
     return current.show()
 
 

@@ -1,7 +1,7 @@
 """The command `jaxgear dynamics`: from a design file to the vibration of its designs over the speed."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -27,6 +27,7 @@ from ..optimize import Front
 from . import dynamics_figures, dynamics_report, interrupt, report
 from .commands import import_ahead, rule_based
 from .devices import compile_quickly
+from .document import document
 from .dynamics_branches import branches_of
 from .dynamics_report import Study, next_to_design
 from .kept import Kept
@@ -36,8 +37,17 @@ from .run import coarse, default_folder, opened
 Modifications = tuple[AbstractModification, AbstractModification]
 
 
-def run_dynamics(file: Path, output: Path | None, *, quick: bool, figures: bool, cache: bool) -> bool:
+def run_dynamics(
+    file: Path,
+    output: Path | None,
+    *,
+    quick: bool,
+    figures: bool,
+    cache: bool,
+    command: Sequence[str] | None = None,
+) -> bool:
     """The command with its options; False when a contact was not found."""
+    asked = document(command, file)
     compile_quickly()
     with Stages() as stages:
         design = opened(file, cache=cache)
@@ -51,10 +61,12 @@ def run_dynamics(file: Path, output: Path | None, *, quick: bool, figures: bool,
             kept = Kept(target.with_name(f".{target.name}.runs"), _count(designs, request))
             study = _study(design, request, mesh, designs, kept, stages)
             stages.begin("writing the results")
-            write_summary(folder / "summary.json", {**dynamics_report.summary(study), "quick": quick})
+            data = {**dynamics_report.summary(study), "quick": quick}
+            write_summary(folder / "summary.json", data)
             dynamics_report.write_responses(folder / "responses.csv", study)
-            if figures:
-                dynamics_figures.write_figures(folder, study)
+            files = dynamics_figures.write_figures(folder, study) if figures else []
+            if asked is not None:
+                asked.write(folder, design, data, dynamics_report.found(study, files))
             putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
             putting_in_place.callback(kept.remove)
     report.console().print(dynamics_report.table(study))

@@ -12,8 +12,8 @@ from .dynamics_report import Study, peak
 _PANEL, _HEIGHT, _WIDE = 92.0, 84.0, 130.0  # [mm]
 
 
-def write_figures(folder: Path, study: Study) -> None:
-    """Writes all figures: responses of all designs, and the first and the last design more closely."""
+def write_figures(folder: Path, study: Study) -> list[Path]:
+    """Writes all figures: responses of all designs, and the first and the last design more closely; gives the files."""
     import matplotlib
 
     matplotlib.use("Agg")  # the command line never shows a window
@@ -42,7 +42,7 @@ def write_figures(folder: Path, study: Study) -> None:
         title = f"unmodified, {study.torque:g} N m"
         with plot.figure.report_axes(None, width=_WIDE, height=_HEIGHT) as axis:
             axes["branches"] = plot.branches(study.branches, ax=axis, responses=swept, title=title)
-    report.save_figures(folder, axes)
+    return report.save_figures(folder, axes)
 
 
 def _draw(kind: str, panel, study: Study, name: str) -> None:

@@ -2,13 +2,11 @@
 
 import csv
 import dataclasses
-import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
@@ -17,7 +15,10 @@ from ..contact import Mesh
 from ..dynamics import Branch, Oscillator, SpeedResponse
 from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
-from .version import version
+from .document import Found
+from .geometry import geometry
+from .version import versions
+from .written import model
 
 _COLUMNS = {
     "dynamic_factor": "dynamic_factor",
@@ -129,6 +130,11 @@ def failures(study: Study) -> Iterator[str]:
             )
 
 
+def found(study: Study, figures: Sequence[Path]) -> Found:
+    """What a report shows beside `summary`."""
+    return Found(list(verdict(study)), list(failures(study)), tables=[table(study)], figures=figures)
+
+
 def summary(study: Study) -> dict[str, Any]:
     """Contents of `summary.json`."""
     settings = study.request.settings
@@ -154,12 +160,9 @@ def summary(study: Study) -> dict[str, Any]:
         "steps": [min(study.steps), max(study.steps)],
         "designs": designs,
         "branches_of_unmodified": [_branch(branch) for branch in study.branches],
-        "versions": {
-            "jaxgear": version(),
-            "jax": jax.__version__,
-            "numpy": np.__version__,
-            "python": platform.python_version(),
-        },
+        "geometry": geometry(study.design.pair()),
+        "model": model(study.mesh),
+        "versions": versions(),
     }
 
 

@@ -1,6 +1,7 @@
 """What the command `layout` does, with its options."""
 
 import os
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -13,13 +14,23 @@ from ..layout import FlankLine, FlankLineLayout, ProfileLayout, at_torque, layou
 from . import interrupt, layout_report, report
 from .commands import import_ahead
 from .devices import compile_quickly
+from .document import document
 from .layout_report import Study
 from .progress import Stages
 from .run import coarse, default_folder, opened
 
 
-def run_layout(file: Path, output: Path | None, *, quick: bool, figures: bool, cache: bool) -> bool:
+def run_layout(
+    file: Path,
+    output: Path | None,
+    *,
+    quick: bool,
+    figures: bool,
+    cache: bool,
+    command: Sequence[str] | None = None,
+) -> bool:
     """The command with its options; False when a contact was not found or an edge is touched."""
+    asked = document(command, file)
     compile_quickly()
     with Stages() as stages:
         design = opened(file, cache=cache)
@@ -30,12 +41,14 @@ def run_layout(file: Path, output: Path | None, *, quick: bool, figures: bool, c
                 import_ahead("matplotlib.pyplot")
             study = _study(design, request, stages, quick=quick)
             stages.begin("writing the results")
-            write_summary(folder / "summary.json", {**layout_report.summary(study), "quick": quick})
+            data = {**layout_report.summary(study), "quick": quick}
+            write_summary(folder / "summary.json", data)
             if study.profile is not None:
                 write_flanks(folder / "flanks.csv", next(iter(study.meshes.values())), layout_report.designs(study))
                 study.profile.table.to_csv(folder / "profiles.csv")
-            if figures:
-                layout_report.write_figures(folder, study)
+            files = layout_report.write_figures(folder, study) if figures else []
+            if asked is not None:
+                asked.write(folder, design, data, layout_report.found(study, files))
             putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
     for table in layout_report.tables(study):
         report.console().print(table)

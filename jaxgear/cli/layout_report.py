@@ -1,12 +1,10 @@
 """What `jaxgear layout` says, writes and draws."""
 
-import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
@@ -17,7 +15,9 @@ from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, Tolerance
 from ..microgeometry import AbstractModification
 from ..shafts import bearing_reactions
 from . import report
-from .version import version
+from .document import Found
+from .geometry import geometry
+from .version import versions
 
 _PANEL, _HEIGHT = 92.0, 90.0  # [mm]
 
@@ -169,6 +169,11 @@ def failures(study: Study) -> Iterator[str]:
             yield "every profile modification has contact shock: larger amounts are needed"
 
 
+def found(study: Study, figures: Sequence[Path]) -> Found:
+    """What a report shows beside `summary`."""
+    return Found(list(verdict(study)), list(failures(study)), tables=list(tables(study)), figures=figures)
+
+
 def summary(study: Study) -> dict[str, Any]:
     """Contents of `summary.json`."""
     return {
@@ -186,12 +191,8 @@ def summary(study: Study) -> dict[str, Any]:
             name: {"pinion_modification": describe(pinion), "wheel_modification": describe(wheel)}
             for name, (pinion, wheel) in designs(study).items()
         },
-        "versions": {
-            "jaxgear": version(),
-            "jax": jax.__version__,
-            "numpy": np.__version__,
-            "python": platform.python_version(),
-        },
+        "geometry": geometry(study.design.pair()),
+        "versions": versions(),
     }
 
 
@@ -249,8 +250,8 @@ def _profile(study: Study, profile: ProfileLayout) -> dict[str, Any]:
     }
 
 
-def write_figures(folder: Path, study: Study) -> None:
-    """Writes all figures: the five cases after both steps, their factors, and charts of the profile modifications."""
+def write_figures(folder: Path, study: Study) -> list[Path]:
+    """Writes all figures: the cases of both steps, and charts of the profile modifications; gives the files."""
     import matplotlib
 
     matplotlib.use("Agg")  # the command line never shows a window
@@ -275,4 +276,4 @@ def write_figures(folder: Path, study: Study) -> None:
         results = ["ppte_um", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure_MPa"]
         values = {one: study.profile.table.column(one) for one in results}
         axes["radar"] = plot.radar(values, results, rows, names)
-    report.save_figures(folder, axes)
+    return report.save_figures(folder, axes)

@@ -84,8 +84,8 @@ def front_lines(front: Front) -> Iterator[str]:
     yield f"no step improves all objectives of one of them by more than {left:.2g} spans per full range"
 
 
-def write_figures(folder: Path, mesh: Mesh, torque: float, optimum: Optimum, front: Front | None) -> None:
-    """Writes the figures of the search and of the optimum over all loads."""
+def write_figures(folder: Path, mesh: Mesh, torque: float, optimum: Optimum, front: Front | None) -> list[Path]:
+    """Writes the figures of the search and of the optimum over all loads; gives the files."""
     from .. import plot
 
     torques, errors = response_surface(mesh, torque, optimum.pinion, optimum.wheel)
@@ -102,7 +102,7 @@ def write_figures(folder: Path, mesh: Mesh, torque: float, optimum: Optimum, fro
         axes["iterations_transmission_error"] = plot.iterations_transmission_error(optimum, mesh.phase)
     if front is not None:
         axes["front"] = plot.optimum_front(front, chosen=front.chosen)
-    report.save_figures(folder, axes)
+    return report.save_figures(folder, axes)
 
 
 def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[str]:

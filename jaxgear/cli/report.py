@@ -143,8 +143,10 @@ def _main_name(evaluations: Evaluations) -> str:
     return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
 
 
-def write_figures(folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> None:
-    """Writes the figures of the designs; the Harris map shows the main one."""
+def write_figures(
+    folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray
+) -> list[Path]:
+    """Writes the figures of the designs; the Harris map shows the main one. Gives the files."""
     import matplotlib
 
     matplotlib.use("Agg")  # the command line never shows a window
@@ -166,7 +168,7 @@ def write_figures(folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evalu
     }
     if mesh.resolution.slices > 1:
         axes |= _over_face(file, mesh, evaluations, torques)
-    save_figures(folder, axes)
+    return save_figures(folder, axes)
 
 
 def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
@@ -189,12 +191,11 @@ def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: 
     }
 
 
-def save_figures(folder: Path, axes: Mapping[str, Any]) -> None:
-    """Writes the figures that hold the axes, each under its name."""
+def save_figures(folder: Path, axes: Mapping[str, Any]) -> list[Path]:
+    """Writes the figures that hold the axes, each under its name; gives the files."""
     from .. import plot
 
-    for name, drawn in axes.items():
-        plot.save(np.ravel(drawn)[0].figure, folder / f"{name}.png")
+    return [plot.save(np.ravel(drawn)[0].figure, folder / f"{name}.png") for name, drawn in axes.items()]
 
 
 def flanks(evaluations: Evaluations):

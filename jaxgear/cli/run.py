@@ -9,6 +9,7 @@ from pathlib import Path
 
 import jax
 import numpy as np
+from rich.table import Table
 
 from ..compliance import Compliance, TabulatedCompliance
 from ..contact import Mesh, Resolution
@@ -36,6 +37,7 @@ from ..optimize import (
 )
 from . import interrupt, optimum_report, report, written
 from .cache import enable_cache
+from .document import Document, Found
 from .progress import Stages
 from .study import Evaluation, evaluate
 
@@ -134,43 +136,65 @@ class Run:
             found = by_finite_elements(claimed.cycle, claimed.objectives, claimed.pinion, claimed.wheel)
             self._evaluations[name] = dataclasses.replace(claimed, verified=found)
 
-    def write(self, *, figures: bool) -> None:
-        """Writes the result files."""
+    def write(self, *, figures: bool, document: Document | None = None) -> None:
+        """Writes the result files, with a report where there is a document."""
         self._stages.begin("writing the results")
         self._doubts = report.doubts(self.design, self._mesh, self._evaluations)
         data = written.summary(self.design, self._mesh, self._evaluations, self._torques, self._doubts)
         if self._optimum is not None:
             data["optimum"] = optimum_report.summary(self.design, self._optimum, self._projection)
-        write_summary(self._folder / "summary.json", {**data, "quick": self._quick})
+        data["quick"] = self._quick
+        write_summary(self._folder / "summary.json", data)
         write_flanks(self._folder / "flanks.csv", self._mesh, report.flanks(self._evaluations))
         if self._front is not None:
             write_front(self._folder / "front.csv", self._front)
-        if figures:
-            report.write_figures(self._folder, self.design, self._mesh, self._evaluations, self._torques)
-            if self._optimum is not None:
-                optimum_report.write_figures(self._folder, self._mesh, self.design.torque, self._optimum, self._front)
+        files = self._draw() if figures else []
+        if document is not None:
+            found = Found(list(self._lines()), self._failures(), list(self._doubt_lines()), [self._table()], files)
+            document.write(self._folder, self.design, data, found)
+
+    def _draw(self) -> list[Path]:
+        files = report.write_figures(self._folder, self.design, self._mesh, self._evaluations, self._torques)
+        if self._optimum is not None:
+            of = self._mesh, self.design.torque, self._optimum, self._front
+            files += optimum_report.write_figures(self._folder, *of)
+        return files
 
     def show(self) -> bool:
         """Prints the comparison, after the results are in place; False when a solution or a constraint failed."""
-        report.console().print(report.table(self.design, self._evaluations))
-        if self._optimum is not None:
-            found = self._optimum, self._projection, self._evaluations
-            report.say(*optimum_report.verdict(self.design, *found, searched_at=self._searched_at))
-        if self._front is not None:
-            report.say(*optimum_report.front_lines(self._front))
-        if self._quick:
-            report.say("quick run: coarse positions and a short search, not a result to build on")
-        if self._unverified:
-            report.say(f"not verified by finite elements: {self._unverified}")
-        report.say(report.bores(self.design))
-        report.say(*report.doubt_lines(self._doubts))
+        report.console().print(self._table())
+        report.say(*self._lines(), *self._doubt_lines())
         report.say(f"results in {self._target}{os.sep}, {self._stages.elapsed:.1f} s")
-        failures = list(report.failures(self._evaluations))
-        if self._optimum is not None and not self._optimum.feasible:
-            failures.append("constraints are not met")
+        failures = self._failures()
         for line in failures:
             report.warn(line)
         return not failures
+
+    def _table(self) -> Table:
+        return report.table(self.design, self._evaluations)
+
+    def _lines(self) -> Iterator[str]:
+        """The results in words."""
+        if self._optimum is not None:
+            found = self._optimum, self._projection, self._evaluations
+            yield from optimum_report.verdict(self.design, *found, searched_at=self._searched_at)
+        if self._front is not None:
+            yield from optimum_report.front_lines(self._front)
+        if self._quick:
+            yield "quick run: coarse positions and a short search, not a result to build on"
+        if self._unverified:
+            yield f"not verified by finite elements: {self._unverified}"
+        yield report.bores(self.design)
+
+    def _doubt_lines(self) -> Iterator[str]:
+        return report.doubt_lines(self._doubts)
+
+    def _failures(self) -> list[str]:
+        """What is not to be trusted, or not reached."""
+        failures = list(report.failures(self._evaluations))
+        if self._optimum is not None and not self._optimum.feasible:
+            failures.append("constraints are not met")
+        return failures
 
 
 def opened(file: Path, *, cache: bool) -> DesignFile:

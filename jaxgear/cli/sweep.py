@@ -1,6 +1,7 @@
 """The command `jaxgear sweep`: from a design file to a table of variants."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ from rich.table import Table
 
 from ..io import sweep_request, writing
 from ..sweeps import SweepTable, sweep
-from . import interrupt, report
+from . import interrupt, report, sweep_document
+from .document import document
 from .progress import Meter
 from .run import coarse, default_folder, opened
 from .sweep_figures import write_figures
@@ -21,9 +23,18 @@ _LABEL_WIDTH, _CELL_WIDTH = 32, 10  # of the table of the best designs
 
 
 def run_sweep(
-    file: Path, output: Path | None, *, samples: int | None, best: int, quick: bool, figures: bool, cache: bool
+    file: Path,
+    output: Path | None,
+    *,
+    samples: int | None,
+    best: int,
+    quick: bool,
+    figures: bool,
+    cache: bool,
+    command: Sequence[str] | None = None,
 ) -> bool:
     """The command with its options; False when a variant failed."""
+    asked = document(command, file, "xlsxwriter")
     design = opened(file, cache=cache)
     request = sweep_request(design, samples=samples, most=_QUICK_SAMPLES if quick else None)
     size = design.resolution(request.highest_torque)
@@ -52,8 +63,9 @@ def run_sweep(
     with writing(target / _BEST_FILE):
         chosen.to_csv(target / _BEST_FILE)
     interrupt.note(f"the table and {_BEST_FILE} are complete in {target}{os.sep}, not all figures are drawn")
-    if figures and len(chosen):
-        write_figures(target, table, request.results)
+    files = write_figures(target, table, request.results) if figures and len(chosen) else []
+    if asked is not None:
+        sweep_document.write(target, asked, design, table, chosen, files, quick=quick)
     interrupt.note(f"all results are in {target}{os.sep}")
     return _show(table, chosen, target, meter, quick=quick)
 

@@ -14,8 +14,8 @@ _DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory
 _CHARTS = 6  # radar charts
 
 
-def write_figures(folder: Path, table: SweepTable, results: Sequence[str | Quantity]) -> None:
-    """Writes all figures that the results allow, of a table with at least one variant that did not fail."""
+def write_figures(folder: Path, table: SweepTable, results: Sequence[str | Quantity]) -> list[Path]:
+    """Writes all figures that the results allow, of a table with a variant that did not fail; gives the files."""
     import matplotlib
 
     matplotlib.use("Agg")  # the command line never shows a window
@@ -52,7 +52,7 @@ def write_figures(folder: Path, table: SweepTable, results: Sequence[str | Quant
         for name in axes.keys() - {"radar"}:
             axis = np.ravel(axes[name])[0]
             axis.set_title(note, loc="left", pad=32, fontsize=axis.xaxis.label.get_fontsize())
-    report.save_figures(folder, axes)
+    return report.save_figures(folder, axes)
 
 
 def _columns(table: SweepTable, names: Sequence[str]) -> dict[str, np.ndarray]:

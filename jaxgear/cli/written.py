@@ -1,12 +1,10 @@
 """What a run writes as `summary.json`: every number of its designs, its gears and its model."""
 
 import dataclasses
-import platform
 from collections.abc import Mapping
 from typing import Any
 
 import equinox as eqx
-import jax
 import numpy as np
 
 from ..contact import Mesh
@@ -15,9 +13,10 @@ from ..io import DesignFile, describe
 from ..metrics import Doubt
 from ..numerics import fields_of
 from ..optimize import Verified
+from .geometry import geometry
 from .report import Evaluations, diameters, reduction
 from .study import Evaluation
-from .version import version
+from .version import versions
 
 
 def summary(
@@ -38,7 +37,7 @@ def summary(
         "friction": file.friction,
         "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
         "center_distance_mm": _center_distance(mesh),
-        "model": {"compliance": _words(mesh.compliance), "plane": mesh.compliance.plane},
+        "model": model(mesh),
         "designs": {
             name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
             for name, several in found.items()
@@ -48,13 +47,9 @@ def summary(
             "torque_Nm": torques,
             **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
         },
+        "geometry": geometry(file.pair()),
         "resolution": {field.name: getattr(size, field.name) for field in dataclasses.fields(size)},
-        "versions": {
-            "jaxgear": version(),
-            "jax": jax.__version__,
-            "numpy": np.__version__,
-            "python": platform.python_version(),
-        },
+        "versions": versions(),
     }
 
 
@@ -95,6 +90,11 @@ def _center_distance(mesh: Mesh) -> float:
         np.hypot(contact.pinion_base_radius, contact.pinion_pitch_roll_length)
         + np.hypot(contact.wheel_base_radius, contact.wheel_pitch_roll_length)
     )
+
+
+def model(mesh: Mesh) -> dict[str, str]:
+    """The compliance and its plane state in words."""
+    return {"compliance": _words(mesh.compliance), "plane": mesh.compliance.plane}
 
 
 def _words(part: eqx.Module) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 RESULT_FILES = frozenset(
     {
         "summary.json",
+        "report.html",
         "flanks.csv",
         "front.csv",
         "front.png",

@@ -63,6 +63,11 @@ class SweepTable:
         """Unit of every column, "" for a pure number."""
         return {column.name: column.unit for column in self.columns}
 
+    @property
+    def headings(self) -> dict[str, str]:
+        """Name of every column with its unit, once."""
+        return {column.name: _heading(column) for column in self.columns}
+
     def find(self, name: str) -> Column:
         """The column of a name: with or without its unit, a result's own name standing for its (weighted) mean.
 
@@ -182,7 +187,7 @@ class SweepTable:
         """Writes all rows as CSV with the units in the header; cells of failed results are empty."""
         from pyarrow import csv
 
-        header = ",".join(f'"{_heading(column)}"' for column in self.columns)
+        header = ",".join(f'"{heading}"' for heading in self.headings.values())
 
         def write(file):
             file.write(f"{header}\n".encode())

@@ -1,0 +1,211 @@
+"""The report of a command, put together from what it prints, writes and draws."""
+
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import rich.table
+
+from ..io import DesignFile
+from ..io.toml import content
+from ..report import Report, Section, Source, Table, figure, heading, needed, numbers, read_table, text, write_report
+
+REPORT = "report.html"
+_NOTHING = "-"
+_GEOMETRY_NOTE = (
+    "Positions on the path of contact count from the pitch point C, positive towards the tip of the pinion: A start of "
+    "contact, B and D inner and outer point of single contact, E end of contact. The usable involute starts at the "
+    "root form diameter, the mate's tip touches it down to the active root diameter."
+)
+_ASSUMED = (
+    "External involute spur gears of one common face width.",
+    "The contact is frictionless, quasi-static and linear elastic; bores are held.",
+    "Gear bodies are solid: thin rims, webs and spokes are not in the closed forms.",
+    "The pressure of a tip corner is an estimate, which depends on the edge radius, and is given apart.",
+)
+_RIGID = "Shafts, bearings and housing are rigid."
+_SUPPORTED = "Shafts, bearings and housing are those of the design file."
+_EVEN = "One slice stands for the whole face: the load is the same everywhere over it."
+# what summary.json says of the inputs, before its results
+_INPUTS = (
+    "torque_Nm",
+    "torques_Nm",
+    "torque_range_Nm",
+    "speed_rpm",
+    "friction",
+    "mesh_frequencies_Hz",
+    "speeds",
+    "settings",
+    "equivalent_mass_kg",
+    "tolerances",
+    "model",
+    "resolution",
+    "quick",
+)
+_IDENTITY = ("title", "design_file", "versions", "geometry")
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a command has to say.
+
+    Attributes:
+        lines: its results in words.
+        warnings: what is not to be trusted, or is not reached.
+        doubts: what is not usual.
+        tables: those that it prints.
+        figures: files of its pictures.
+        pages: further parts.
+    """
+
+    lines: Sequence[str]
+    warnings: Sequence[str] = ()
+    doubts: Sequence[str] = ()
+    tables: Sequence[rich.table.Table] = ()
+    figures: Sequence[Path] = ()
+    pages: Sequence[Section] = field(default_factory=tuple)
+
+
+@dataclass(frozen=True)
+class Document:
+    """A report that was asked for.
+
+    Attributes:
+        command: the command line, from its name to the last option.
+        source: the design file as it was when the command began.
+        began: when.
+    """
+
+    command: tuple[str, ...]
+    source: Source
+    began: datetime
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        """What identifies the report, but for the versions."""
+        return [
+            ("design file", self.source.name),
+            ("SHA-256", self.source.sha256),
+            ("date", self.began.isoformat(" ", "seconds")),
+            ("command", shlex.join(("jaxgear", *self.command))),
+        ]
+
+    def write(self, folder: Path, design: DesignFile, data: Mapping[str, Any], found: Found) -> None:
+        """Writes the report.
+
+        Args:
+            folder: of the results.
+            design: the design file.
+            data: what `summary.json` holds.
+            found: what the command says.
+        """
+        versions = [(name, str(version)) for name, version in data["versions"].items()]
+        sections = [
+            Section("Results", found.lines, found.warnings, tables=[read_table(table) for table in found.tables]),
+            *found.pages,
+            *_figures(found.figures),
+            _validity(found, data),
+            _inputs(design, data),
+            Section("Geometry", [_GEOMETRY_NOTE], tables=geometry_tables(data["geometry"]), new_page=True),
+            _all_numbers(data),
+            Section(
+                "Design file",
+                [f"{self.source.name} as it was read; the command on the first page repeats the calculation."],
+                literal=self.source.text,
+                new_page=True,
+            ),
+        ]
+        subtitle = f"jaxgear {self.command[0]}" if self.command else "jaxgear"
+        write_report(folder / REPORT, Report(design.title, subtitle, [*self.facts, *versions], sections))
+
+
+def asked_for(command: Sequence[str] | None, *libraries: str) -> datetime | None:
+    """Looks whether a report can be written, before long work begins; None where none was asked for.
+
+    Raises:
+        ValueError: when one of the libraries is not installed.
+    """
+    if command is None:
+        return None
+    needed("jinja2", *libraries)
+    return datetime.now().astimezone()
+
+
+def document(command: Sequence[str] | None, file: Path, *libraries: str) -> Document | None:
+    """A report of a command line on a design file; None where none was asked for.
+
+    Raises:
+        ValueError: when one of the libraries that it needs is not installed, or the file cannot be read.
+    """
+    began = asked_for(command, *libraries)
+    if command is None or began is None:
+        return None
+    return Document(tuple(command), Source.of(file, content(file)), began)
+
+
+def geometry_tables(geometry: Mapping[str, Mapping[str, Any]]) -> list[Table]:
+    """Both gears side by side, and the pair."""
+    pinion, wheel, pair = (geometry[name] for name in ("pinion", "wheel", "pair"))
+    gears = tuple((heading(name), text(pinion[name]), text(wheel[name])) for name in pinion)
+    both = tuple((heading(name), text(value)) for name, value in pair.items())
+    return [Table(("", "pinion", "wheel"), gears, "gears"), Table(("", "pair"), both, "pair")]
+
+
+def _figures(files: Iterable[Path]) -> list[Section]:
+    pictures = [figure(path) for path in files]
+    if not pictures:
+        return []
+    return [Section("Figures", figures=pictures, new_page=True)]
+
+
+def _validity(found: Found, data: Mapping[str, Any]) -> Section:
+    """What the numbers can be trusted for."""
+    lines = []
+    if not found.warnings:
+        lines.append("Every contact solution converged and every limit is met.")
+    if data.get("quick"):
+        lines.append("Quick run: coarse positions and a short search, not a result to build on.")
+    if not found.doubts:
+        lines.append("Inputs and results lie within the usual ranges.")
+    checks = []
+    for name, design in data.get("designs", {}).items():
+        checks += [
+            (f"{name}: {heading(key)}", text(design[key]))
+            for key in ("converged", "failed_torques_Nm")
+            if key in design
+        ]
+        checks += [(f"{name}: by finite elements, {key}", value) for key, value in numbers(design.get("verified", {}))]
+    optimum = data.get("optimum", {})
+    checks += [
+        (heading(key), text(optimum[key]))
+        for key in ("feasible", "objective_change_at_twice_the_positions", "decrease_left_per_range", "evaluations")
+        if key in optimum
+    ]
+    tables = [Table(("", "value"), tuple(checks), "checks")] if checks else []
+    return Section("Convergence and validity", lines, found.warnings, found.doubts, tables, new_page=True)
+
+
+def _inputs(design: DesignFile, data: Mapping[str, Any]) -> Section:
+    """What was assumed."""
+    given = {name: data[name] for name in _INPUTS if data.get(name) is not None}
+    points = [*_ASSUMED, _SUPPORTED if design.support is not None else _RIGID]
+    if design.resolution().slices == 1:
+        points.append(_EVEN)
+    return Section("Inputs and assumptions", (), (), points, [Table(("", "value"), tuple(numbers(given)), "inputs")])
+
+
+def _all_numbers(data: Mapping[str, Any]) -> Section:
+    """What `summary.json` holds beside what stands in other sections."""
+    rest = {name: value for name, value in data.items() if name not in (*_INPUTS, *_IDENTITY)}
+    tables = []
+    for name, value in rest.items():
+        if isinstance(value, Mapping):
+            rows = tuple(numbers(value))
+            tables += [Table(("", "value"), rows, heading(name))] if rows else []
+    loose = {name: value for name, value in rest.items() if not isinstance(value, Mapping)}
+    if loose:
+        tables.insert(0, Table(("", "value"), tuple(numbers(loose)), ""))
+    return Section("All numbers", ["As in summary.json, which has every digit."], tables=tables, new_page=True)

@@ -1,0 +1,112 @@
+"""The geometry of a pair as an engineer lists it."""
+
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..geometry import Gear, GearPair, PathOfContact, diameter, margins, outline, path_of_contact
+from ..numerics import program
+
+# the names of ISO 21771 with the unit, in the order of their numbers below
+_GEAR = (
+    "teeth",
+    "module_mm",
+    "pressure_angle_deg",
+    "profile_shift_coefficient",
+    "face_width_mm",
+    "reference_diameter_mm",
+    "pitch_circle_diameter_mm",
+    "base_diameter_mm",
+    "tip_diameter_mm",
+    "root_diameter_mm",
+    "root_form_diameter_mm",
+    "active_root_diameter_mm",
+    "bore_diameter_mm",
+    "tip_land_mm",
+    "tip_clearance_mm",
+    "tooth_thickness_allowance_um",
+)
+_PAIR = (
+    "center_distance_mm",
+    "working_pressure_angle_deg",
+    "gear_ratio",
+    "common_face_width_mm",
+    "base_pitch_mm",
+    "transverse_contact_ratio",
+    "length_of_path_of_contact_mm",
+    "path_of_contact_A_mm",
+    "path_of_contact_B_mm",
+    "path_of_contact_D_mm",
+    "path_of_contact_E_mm",
+    "backlash_on_line_of_action_um",
+)
+
+Scalar = Float[Array, ""]
+
+
+def geometry(pair: GearPair) -> dict[str, dict[str, Any]]:
+    """Numbers of both gears and of the pair, by name and unit.
+
+    Points of the path of contact are positions from the pitch point C, positive towards the tip of the pinion. The root
+    form diameter is where the usable involute starts, the active root diameter where the mate's tip touches it.
+    """
+    pinion, wheel, together = jax.tree.map(np.asarray, _numbers(pair))
+    return {
+        "pinion": dict(zip(_GEAR, pinion, strict=True)),
+        "wheel": dict(zip(_GEAR, wheel, strict=True)),
+        "pair": dict(zip(_PAIR, together, strict=True)),
+    }
+
+
+@program
+def _numbers(pair: GearPair):
+    contact, room = path_of_contact(pair), margins(pair)
+    pitch = contact.pinion_pitch_roll_length, contact.wheel_pitch_roll_length
+    lowest = contact.pinion_roll_length(contact.start), contact.wheel_roll_length(contact.end)
+    return (
+        _gear(pair.pinion, pitch[0], lowest[0], room.pinion_tip_clearance),
+        _gear(pair.wheel, pitch[1], lowest[1], room.wheel_tip_clearance),
+        _together(pair, contact, room.backlash),
+    )
+
+
+def _gear(gear: Gear, pitch: Scalar, lowest: Scalar, tip_clearance: Scalar) -> tuple[Scalar, ...]:
+    """`_GEAR`, of the roll lengths at the pitch point and at the end of the active profile [mm]."""
+    return (
+        gear.teeth,
+        gear.module,
+        gear.pressure_angle,
+        gear.profile_shift,
+        gear.face_width,
+        2 * gear.pitch_radius,
+        diameter(gear, pitch),
+        2 * gear.base_radius,
+        2 * gear.tip_radius,
+        2 * gear.root_circle_radius,
+        diameter(gear, outline(gear).form_roll_length),
+        diameter(gear, lowest),
+        2 * gear.bore_radius,
+        gear.tip_land,
+        tip_clearance,
+        gear.tooth_thickness_allowance,
+    )
+
+
+def _together(pair: GearPair, contact: PathOfContact, backlash: Scalar) -> tuple[Scalar, ...]:
+    """`_PAIR`."""
+    return (
+        pair.working_center_distance,
+        jax.numpy.rad2deg(pair.working_pressure_angle),
+        pair.gear_ratio,
+        pair.face_width,
+        contact.base_pitch,
+        contact.contact_ratio,
+        contact.end - contact.start,
+        contact.start,
+        contact.inner_single,
+        contact.outer_single,
+        contact.end,
+        backlash,
+    )

@@ -1,0 +1,32 @@
+"""Options that several commands share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+File = Annotated[Path, typer.Argument(metavar="FILE.toml", help="Design file.", show_default=False)]
+
+
+def output_option(folder: str):
+    """The option --output of a command with its own folder, which a quick run marks with -quick."""
+    return typer.Option("--output", "-o", metavar="DIR", help="Result folder.", show_default=f"results/FILE/{folder}")
+
+
+NoFigures = Annotated[bool, typer.Option("--no-figures", help="Write no figures.")]
+NoCache = Annotated[
+    bool, typer.Option("--no-cache", envvar="JAXGEAR_NO_CACHE", help="Do not keep compiled programs on disk.")
+]
+Quick = Annotated[
+    bool, typer.Option("--quick", help="Coarse positions and a short search: for a first look, not for a result.")
+]
+
+
+Reported = Annotated[
+    bool, typer.Option("--report", help="Write report.html too, one file to hand in (needs jaxgear[report]).")
+]
+
+
+def typed(context: typer.Context, wanted: bool) -> list[str] | None:
+    """What was typed after the name of the program, for a report that is wanted."""
+    return list(context.obj) if wanted else None

@@ -1,0 +1,99 @@
+"""The report of a sweep: its best variants, a page for each of the first of them, and a workbook."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..io import DesignFile
+from ..report import Section, Table, text, write_workbook
+from ..sweeps import SweepTable
+from .document import Document, Found
+from .geometry import geometry
+from .version import versions
+
+WORKBOOK = "variants.xlsx"
+_PAGES = 3  # variants with a page of their own
+_TABLE = 6  # side by side on one page
+
+
+def write(
+    folder: Path,
+    asked: Document,
+    design: DesignFile,
+    table: SweepTable,
+    best: SweepTable,
+    figures: Sequence[Path],
+    *,
+    quick: bool,
+) -> None:
+    """Writes the workbook and the report.
+
+    Args:
+        folder: of the results.
+        asked: what the report is of.
+        design: the design file.
+        table: all variants.
+        best: the best of them, best first.
+        figures: files of the pictures.
+        quick: whether the run was a quick one.
+    """
+    release = versions()
+    write_workbook(folder / WORKBOOK, [*asked.facts, *release.items()], best, table)
+    failed = table.failures()
+    lines = [
+        f"{len(table)} variants, ranked by {table.results[0]}; the best {len(best)} and all of them are in {WORKBOOK}, "
+        "with units and filters."
+    ]
+    warnings = (
+        [f"{failed} variants failed (column converged); they are in the table, without results."] if failed else []
+    )
+    pages = [_side_by_side(best), *(_page(table, best, place) for place in range(min(_PAGES, len(best))))]
+    data: dict[str, Any] = {
+        "torque_Nm": design.torque,
+        "torque_range_Nm": design.torque_range,
+        "speed_rpm": design.speed,
+        "friction": design.friction,
+        "quick": quick,
+        "variables": {name: {"low": low, "high": high} for name, (low, high) in design.bounds.items()},
+        "geometry": geometry(design.pair()),
+        "versions": release,
+    }
+    asked.write(folder, design, data, Found(lines, warnings, figures=figures, pages=pages if len(best) else ()))
+
+
+def _side_by_side(best: SweepTable) -> Section:
+    shown = best.take(range(min(_TABLE, len(best))))
+    columns = [_values(shown, name) for name in shown.names if name != "variant"]
+    names = (shown.headings[name] for name in shown.names if name != "variant")
+    header = ("", *(f"variant {number}" for number in _values(shown, "variant")))
+    rows = tuple((name, *column) for name, column in zip(names, columns))
+    return Section("Best variants", tables=[Table(header, rows, "best first")], new_page=True)
+
+
+def _page(table: SweepTable, best: SweepTable, place: int) -> Section:
+    """One variant, and what it is among the others."""
+    number = _values(best, "variant")[place]
+    rows = []
+    for name in (*best.parameters, *best.results):
+        ranked = table.find(name)
+        low, high = (text(one) for one in _range(table, name))
+        better = {"larger": "larger", "smaller": "smaller"}.get(str(ranked.better), "") if name in best.results else ""
+        rows.append((best.headings[name], text(best.column(name)[place]), low, high, better))
+    header = ("", f"variant {number}", "least of all", "largest of all", "better is")
+    return Section(f"Variant {number}", tables=[Table(header, tuple(rows))], new_page=True)
+
+
+def _values(table: SweepTable, name: str) -> list[str]:
+    return [text(value) for value in table.column(name).tolist()]
+
+
+def _range(table: SweepTable, name: str) -> tuple[float, float]:
+    """Least and largest value of a column, part by part."""
+    least, largest = np.inf, -np.inf
+    for batch in table.batches([name]):
+        values = batch[name][np.isfinite(batch[name])]
+        if len(values):
+            least, largest = min(least, float(values.min())), max(largest, float(values.max()))
+    return least, largest

@@ -1,0 +1,68 @@
+"""Pictures of a result folder, with what they show."""
+
+import base64
+import struct
+from pathlib import Path
+
+from .contents import Figure
+
+# in the order of the report; k-charts and other charts by the names of their files
+CAPTIONS = {
+    "transmission_error": "Loaded transmission error over two base pitches at the design torque, with its peak-to-peak "
+    "value (PPTE).",
+    "harmonics": "Amplitudes of the transmission error at the orders of the mesh frequency.",
+    "load_sharing": "Share of the load that one tooth pair carries on its way along the path of contact.",
+    "pressure": "Largest flank pressure of one tooth pair along the path of contact.",
+    "pressure_map": "Pressure over path of contact and face width.",
+    "contact_pattern": "Contact pattern: largest pressure of every place of the flank over a whole mesh.",
+    "line_load": "Load per length over the face.",
+    "face_gap": "Gap over the face before the load closes it.",
+    "k_chart": "Profile modification of both gears over the roll angle, material removed downwards (K-chart). A shaded "
+    "band is the total profile tolerance of the quality class.",
+    "lead_chart": "Modification across the face, at the pitch point. A shaded band is the total helix tolerance of the "
+    "quality class.",
+    "ppte_over_torque": "PPTE over the torque.",
+    "harris_map": "Harris map: transmission error over two base pitches at several torques.",
+    "response_surface": "Transmission error over phase and torque.",
+    "face_load_over_torque": "Face load factor over the torque.",
+    "convergence": "Course of the search: best objective over the contact analyses spent.",
+    "front": "Pareto front: designs of which none is better in every objective.",
+    "iterations_relief": "Relief after every iteration of the search.",
+    "iterations_transmission_error": "Transmission error after every iteration of the search.",
+    "dynamic_factor": "Dynamic factor over the mesh frequency, speed going up and down.",
+    "approach_rms": "Root mean square of the approach over the mesh frequency.",
+    "waterfall": "Orders of the mesh force over the mesh frequency.",
+    "bifurcation": "Approach at the start of every mesh cycle over the mesh frequency.",
+    "phase_portrait": "Motion at the speed of the largest dynamic factor; marked once per mesh cycle.",
+    "branches": "Stable and unstable periodic motions of the unmodified design.",
+    "tolerance_cases": "Load over the face under the combinations of deviations within the tolerances.",
+    "face_load_factors": "Face load factor under the combinations of deviations within the tolerances.",
+    "pareto": "Results of the variants against each other, with the Pareto front.",
+    "parallel_coordinates": "Variables and results of the variants, one line per variant.",
+    "radar": "Results of chosen variants side by side.",
+}
+
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_SIZE_AT = 16  # bytes before width and height (PNG specification, chunk IHDR)
+_DENSITY = b"pHYs"  # pixels per unit in both directions, and the unit
+_PER_METRE = 1
+_MM = 1000.0  # per m
+
+
+def figure(path: Path) -> Figure:
+    """A PNG file with its density written in it, to be embedded.
+
+    Raises:
+        ValueError: when it is no such file.
+    """
+    held = path.read_bytes()
+    place = held.find(_DENSITY)
+    if not held.startswith(_SIGNATURE) or place < 0:
+        raise ValueError(f"{path}: is not a PNG file that tells its density")
+    (pixels,) = struct.unpack_from(">I", held, _SIZE_AT)
+    density, _, unit = struct.unpack_from(">IIB", held, place + len(_DENSITY))
+    if unit != _PER_METRE or density == 0:
+        raise ValueError(f"{path}: does not tell its pixels per metre")
+    data = f"data:image/png;base64,{base64.b64encode(held).decode()}"
+    caption = CAPTIONS.get(path.stem, f"{path.stem.replace('_', ' ')}.")
+    return Figure(path.stem, caption, data, pixels / density * _MM)

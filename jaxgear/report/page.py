@@ -1,0 +1,39 @@
+"""The report as an HTML page."""
+
+from pathlib import Path
+
+from ..numerics.durable import write_durably
+from .contents import Report
+from .needed import needed
+
+_TEMPLATES = Path(__file__).parent / "templates"
+# between the margins of A4 [mm]: wider pictures lie on their side
+_UPRIGHT = 180.0
+
+
+def write_report(path: Path, report: Report) -> None:
+    """Writes a report as one HTML file that refers to nothing outside of it.
+
+    All text is escaped: names and contents of files may hold anything.
+
+    Raises:
+        ValueError: without the library jinja2, or when the file cannot be written.
+    """
+    needed("jinja2")
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    page = environment.get_template("report.html").render(report=report, upright=_UPRIGHT)
+    # the name of a file may hold bytes that are no text; neither these nor controls can stand in a page
+    allowed = "".join(sign if sign.isprintable() or sign in "\n\t" or sign.isspace() else "\ufffd" for sign in page)
+    held = allowed.encode("utf-8", "replace")
+    try:
+        write_durably(path, lambda file: file.write(held))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
