@@ -32,6 +32,7 @@ ORDER = (
     "layout",
     "io",
     "plot",
+    "report",
     "cli",
 )
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -68,7 +69,18 @@ def test_layers_import_only_earlier_ones(path):
 
 
 # imported where they are used, so that the library starts fast and without what it does not need
-HEAVY = {"evosax", "ezdxf", "importlib", "matplotlib", "optax", "pyarrow", "xarray", "jaxgear.plot"}
+HEAVY = {
+    "evosax",
+    "ezdxf",
+    "importlib",
+    "jinja2",
+    "matplotlib",
+    "optax",
+    "pyarrow",
+    "xarray",
+    "xlsxwriter",
+    "jaxgear.plot",
+}
 # so do the commands, and their help without any of the library
 COMMANDS = {
     "jaxgear.cli.commands",

@@ -15,6 +15,7 @@ from ..report import Report, Section, Source, Table, figure, heading, needed, nu
 
 REPORT = "report.html"
 _NOTHING = "-"
+_SIDE_BY_SIDE = 5  # columns of a table
 _GEOMETRY_NOTE = (
     "Positions on the path of contact count from the pitch point C, positive towards the tip of the pinion: A start of "
     "contact, B and D inner and outer point of single contact, E end of contact. The usable involute starts at the "
@@ -102,7 +103,7 @@ class Document:
             data: what `summary.json` holds.
             found: what the command says.
         """
-        versions = [(name, str(version)) for name, version in data["versions"].items()]
+        versions = ("made by", ", ".join(f"{name} {version}" for name, version in data["versions"].items()))
         sections = [
             Section("Results", found.lines, found.warnings, tables=[read_table(table) for table in found.tables]),
             *found.pages,
@@ -119,7 +120,7 @@ class Document:
             ),
         ]
         subtitle = f"jaxgear {self.command[0]}" if self.command else "jaxgear"
-        write_report(folder / REPORT, Report(design.title, subtitle, [*self.facts, *versions], sections))
+        write_report(folder / REPORT, Report(design.title, subtitle, [*self.facts, versions], sections))
 
 
 def asked_for(command: Sequence[str] | None, *libraries: str) -> datetime | None:
@@ -197,14 +198,31 @@ def _inputs(design: DesignFile, data: Mapping[str, Any]) -> Section:
     return Section("Inputs and assumptions", (), (), points, [Table(("", "value"), tuple(numbers(given)), "inputs")])
 
 
+def _listed(title: str, data: Mapping[str, Any]) -> list[Table]:
+    """Nested data as a table; those of several alike side by side."""
+    if len(data) > 1 and all(isinstance(value, Mapping) for value in data.values()):
+        columns = [dict(numbers(value)) for value in data.values()]
+        names = dict.fromkeys(name for column in columns for name in column)
+        rows = tuple((name, *(column.get(name, _NOTHING) for column in columns)) for name in names)
+        return [Table(("", *data), rows, title)] if len(data) <= _SIDE_BY_SIDE else _split(title, data)
+    rows = tuple(numbers(data))
+    return [Table(("", "value"), rows, title)] if rows else []
+
+
+def _split(title: str, data: Mapping[str, Any]) -> list[Table]:
+    """Several tables of as many columns as a page holds."""
+    names = list(data)
+    parts = (names[first : first + _SIDE_BY_SIDE] for first in range(0, len(names), _SIDE_BY_SIDE))
+    return [table for part in parts for table in _listed(title, {name: data[name] for name in part})]
+
+
 def _all_numbers(data: Mapping[str, Any]) -> Section:
     """What `summary.json` holds beside what stands in other sections."""
     rest = {name: value for name, value in data.items() if name not in (*_INPUTS, *_IDENTITY)}
     tables = []
     for name, value in rest.items():
         if isinstance(value, Mapping):
-            rows = tuple(numbers(value))
-            tables += [Table(("", "value"), rows, heading(name))] if rows else []
+            tables += _listed(heading(name), value)
     loose = {name: value for name, value in rest.items() if not isinstance(value, Mapping)}
     if loose:
         tables.insert(0, Table(("", "value"), tuple(numbers(loose)), ""))

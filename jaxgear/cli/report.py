@@ -11,6 +11,7 @@ from rich.table import Table
 from ..contact import Mesh
 from ..geometry import Gear
 from ..io import DesignFile, describe
+from ..io.cases import quality_classes
 from ..io.results import unit_of
 from ..metrics import Doubt, plausibility
 from ..numerics import program
@@ -156,6 +157,7 @@ def write_figures(
     few = np.unique(np.linspace(0, len(torques) - 1, _HARRIS_CURVES).round().astype(int))
     axes: dict[str, Any] = {
         "transmission_error": plot.transmission_error(cycles),
+        "mesh_orders": plot.mesh_orders(cycles),
         "load_sharing": plot.load_sharing(cycles),
         "pressure": plot.pressure(cycles),
         "ppte_over_torque": plot.ppte_over_torque(
@@ -164,7 +166,7 @@ def write_figures(
         "harris_map": plot.harris_map(
             mesh.phase, torques[few], main(evaluations).transmission_error[few], design=_main_name(evaluations)
         ),
-        "k_chart": plot.k_chart(mesh, flanks(evaluations)),
+        "k_chart": plot.k_chart(mesh, flanks(evaluations), **_band(file, evaluations)),
     }
     if mesh.resolution.slices > 1:
         axes |= _over_face(file, mesh, evaluations, torques)
@@ -186,9 +188,15 @@ def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: 
     return {
         **maps,
         **lines,
-        "lead_chart": plot.lead_chart(mesh, flanks(evaluations)),
+        "lead_chart": plot.lead_chart(mesh, flanks(evaluations), **_band(file, evaluations)),
         "face_load_over_torque": plot.face_load_over_torque(torques, factors, design_torque=file.torque),
     }
+
+
+def _band(file: DesignFile, evaluations: Evaluations) -> dict[str, Any]:
+    """The tolerance band of a chart about the main design, where the file names a quality class."""
+    classes = quality_classes(file)
+    return {} if classes is None else {"tolerance": classes, "about": _main_name(evaluations)}
 
 
 def save_figures(folder: Path, axes: Mapping[str, Any]) -> list[Path]:

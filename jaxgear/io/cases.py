@@ -1,7 +1,7 @@
 """Loads and tolerances that the tables of a design file ask for."""
 
 from ..conditions import LoadSpectrum
-from ..tolerance import Tolerance
+from ..tolerance import Tolerance, ToleranceClass
 from .design_file import DesignFile
 from .errors import DesignFileError, refuse_given, refused
 from .schema import OptimizeSection
@@ -18,6 +18,17 @@ def load_of(design: DesignFile, table: str, section: OptimizeSection | SweepSect
     if section.weights is None:
         return load
     return refused(f"{table}.weights", LoadSpectrum, torques, section.weights, **run_at)
+
+
+def quality_classes(design: DesignFile) -> tuple[ToleranceClass, ToleranceClass] | None:
+    """The classes of pinion and wheel in the table [tolerance] if there is one."""
+    section = design.tolerance
+    if section is None:
+        return None
+    both = section.quality_class
+    first, second = both if isinstance(both, list) else (both, both)
+    pair = design.pair()
+    return ToleranceClass.of(pair.pinion, first), ToleranceClass.of(pair.wheel, second)
 
 
 def tolerance_of(design: DesignFile) -> Tolerance | None:

@@ -21,6 +21,7 @@ RESULT_FILES = frozenset(
         "iterations_transmission_error.png",
         "response_surface.png",
         "transmission_error.png",
+        "mesh_orders.png",
         "load_sharing.png",
         "pressure.png",
         "ppte_over_torque.png",

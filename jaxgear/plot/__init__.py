@@ -24,6 +24,7 @@ from .iterations import iterations_transmission_error as iterations_transmission
 from .k_chart import k_chart as k_chart
 from .lead_chart import lead_chart as lead_chart
 from .load_sharing import load_sharing as load_sharing
+from .mesh_orders import mesh_orders as mesh_orders
 from .optimizer_comparison import optimizer_comparison as optimizer_comparison
 from .optimum_front import optimum_front as optimum_front
 from .parallel_coordinates import parallel_coordinates as parallel_coordinates

@@ -34,6 +34,7 @@ def flank_panels(
     *,
     above: float = ABOVE,
     tolerance: Tolerances | None = None,
+    about: str | None = None,
     band: Band | None = None,
 ) -> np.ndarray:
     """The two Axes: material removed goes down, and the nominal involute is the zero line.
@@ -45,7 +46,8 @@ def flank_panels(
         trace: one line.
         frame: labels of one panel.
         above: distance of a legend from a panel of a given figure [pt].
-        tolerance: classes of pinion and wheel, for a band about the first design.
+        tolerance: classes of pinion and wheel, for a band about a design.
+        about: the name of this design; None for the first.
         band: what makes it of one panel.
     """
     own = ax is None
@@ -57,8 +59,8 @@ def flank_panels(
                 panel.set_xlim(abscissa[0], abscissa[-1])
             quality = tolerance[index] if tolerance else None
             if band is not None and quality is not None:
-                first = next(iter(designs.values()))[index] or NoModification()
-                place, low, high = band(side, first, quality)
+                middle = designs[next(iter(designs)) if about is None else about][index] or NoModification()
+                place, low, high = band(side, middle, quality)
                 panel.fill_between(place, low, high, color=PALE, zorder=0.4, linewidth=0, label=_BAND)
             frame(panel, side, title)
         panels[0].set_ylabel("material removed [µm]")

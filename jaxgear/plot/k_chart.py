@@ -18,7 +18,14 @@ from .flank_panels import Design, Tolerances, flank_panels
 _ABOVE_DIAMETERS = 34.0  # [pt]; clears numbers and label of the upper axis
 
 
-def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None, *, tolerance: Tolerances | None = None) -> np.ndarray:
+def k_chart(
+    mesh: Mesh,
+    designs: Mapping[str, Design],
+    ax=None,
+    *,
+    tolerance: Tolerances | None = None,
+    about: str | None = None,
+) -> np.ndarray:
     """Material removed from pinion and wheel [um] over the roll angle [deg], in the middle of the face.
 
     From the start of the active profile to the tip; the nominal involute is the zero line, material removed goes down
@@ -28,14 +35,23 @@ def k_chart(mesh: Mesh, designs: Mapping[str, Design], ax=None, *, tolerance: To
         mesh: prepared mesh.
         designs: (pinion, wheel) modifications by the name of the design; None for the nominal involute.
         ax: two Axes, for pinion and wheel; None for a new figure.
-        tolerance: classes of pinion and wheel; shades the total profile tolerance about the first design, over the
-            evaluation range.
+        tolerance: classes of pinion and wheel; shades the total profile tolerance about a design, over the evaluation
+            range.
+        about: the name of this design; None for the first.
 
     Returns:
         the two Axes.
     """
     return flank_panels(
-        mesh, designs, ax, _profile, _over_roll_angle, above=_ABOVE_DIAMETERS, tolerance=tolerance, band=_band
+        mesh,
+        designs,
+        ax,
+        _profile,
+        _over_roll_angle,
+        above=_ABOVE_DIAMETERS,
+        tolerance=tolerance,
+        about=about,
+        band=_band,
     )
 
 

@@ -17,7 +17,12 @@ _POINTS = 201  # across the common face
 
 
 def lead_chart(
-    mesh: Mesh, designs: Mapping[str, Design], ax=None, *, tolerance: Tolerances | None = None
+    mesh: Mesh,
+    designs: Mapping[str, Design],
+    ax=None,
+    *,
+    tolerance: Tolerances | None = None,
+    about: str | None = None,
 ) -> np.ndarray:
     """Material removed from pinion and wheel [um] across the common face width [mm], at the pitch point.
 
@@ -27,13 +32,14 @@ def lead_chart(
         mesh: prepared mesh.
         designs: (pinion, wheel) modifications by the name of the design; None for the nominal involute.
         ax: two Axes, for pinion and wheel; None for a new figure.
-        tolerance: classes of pinion and wheel; shades the total helix tolerance about the first design, over the
-            evaluation range.
+        tolerance: classes of pinion and wheel; shades the total helix tolerance about a design, over the evaluation
+            range.
+        about: the name of this design; None for the first.
 
     Returns:
         the two Axes.
     """
-    return flank_panels(mesh, designs, ax, _line, _over_face, tolerance=tolerance, band=_band)
+    return flank_panels(mesh, designs, ax, _line, _over_face, tolerance=tolerance, about=about, band=_band)
 
 
 def _band(side: Side, design: AbstractModification, quality: ToleranceClass):

@@ -10,7 +10,7 @@ from .contents import Figure
 CAPTIONS = {
     "transmission_error": "Loaded transmission error over two base pitches at the design torque, with its peak-to-peak "
     "value (PPTE).",
-    "harmonics": "Amplitudes of the transmission error at the orders of the mesh frequency.",
+    "mesh_orders": "Amplitudes of the transmission error at the orders of the mesh frequency.",
     "load_sharing": "Share of the load that one tooth pair carries on its way along the path of contact.",
     "pressure": "Largest flank pressure of one tooth pair along the path of contact.",
     "pressure_map": "Pressure over path of contact and face width.",

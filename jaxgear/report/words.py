@@ -7,6 +7,7 @@ import numpy as np
 
 # ending of a name -> unit; the first that fits counts
 _UNITS = {
+    "N_per_(ms^0.5K)": "N/(m s^0.5 K)",
     "kg_per_m^3": "kg/m^3",
     "N_per_mm": "N/mm",
     "percent": "%",
