@@ -87,6 +87,7 @@ COMMANDS = {
     "jaxgear.cli.convert",
     "jaxgear.cli.dynamics",
     "jaxgear.cli.devices",
+    "jaxgear.cli.layout",
     "jaxgear.cli.sweep",
 }
 

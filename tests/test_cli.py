@@ -18,6 +18,7 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
+from report_page import check_report
 
 import jaxgear as jg
 from jaxgear import plot
@@ -97,14 +98,14 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def analyzed(folder):
     os.environ["JAXGEAR_NO_CACHE"] = "1"
-    result = call("analyze", folder / "fixed.toml", "-o", folder / "analyzed", "--no-figures")
+    result = call("analyze", folder / "fixed.toml", "-o", folder / "analyzed", "--no-figures", "--report")
     return SimpleNamespace(**vars(result), summary=json.loads((folder / "analyzed" / "summary.json").read_text()))
 
 
 @pytest.fixture(scope="module")
 def optimized(folder):
     os.environ["JAXGEAR_NO_CACHE"] = "1"
-    result = call("optimize", folder / "free.toml", "--output", folder / "optimized")
+    result = call("optimize", folder / "free.toml", "--output", folder / "optimized", "--report")
     return SimpleNamespace(**vars(result), summary=json.loads((folder / "optimized" / "summary.json").read_text()))
 
 
@@ -186,6 +187,21 @@ def test_rule_based_design_is_the_iso_relief_on_both_tips(folder, optimized):
         assert part["length"] == pytest.approx(float(relief.length))
 
 
+def test_the_reports_hold_what_was_found(folder, analyzed, optimized):
+    file = folder / "fixed.toml"
+    page = check_report(
+        folder / "analyzed", file, "analyze", file, "-o", folder / "analyzed", "--no-figures", "--report"
+    )
+    assert "img" not in page.tags
+    file = folder / "free.toml"
+    page = check_report(folder / "optimized", file, "optimize", file, "--output", folder / "optimized", "--report")
+    printed = [row for row in page.rows if row[0] == "PPTE [um]"]
+    ppte = [f"{design['ppte_um']:.3f}" for design in optimized.summary["designs"].values()]
+    assert printed == [["PPTE [um]", *ppte]]
+    text = (folder / "optimized" / "report.html").read_text("utf-8")
+    assert "a [small] pair" in text and "contact analyses by method minimax" in text
+
+
 def test_all_result_files_are_there(folder, analyzed, optimized):
     of_others = {"front.csv", "front.png", "iterations_relief.png", "iterations_transmission_error.png"}
     # one slice shows nothing over the face
@@ -193,8 +209,9 @@ def test_all_result_files_are_there(folder, analyzed, optimized):
     of_others |= {"line_load.png", "face_gap.png", "face_load_over_torque.png"}
     of_others |= {"responses.csv", "dynamic_factor.png", "approach_rms.png", "waterfall.png", "bifurcation.png"}
     of_others |= {"phase_portrait.png", "branches.png"}  # of `jaxgear dynamics`
+    of_others |= {"profiles.csv", "tolerance_cases.png", "face_load_factors.png", "radar.png"}  # of `jaxgear layout`
     assert {path.name for path in (folder / "optimized").iterdir()} == RESULT_FILES - of_others
-    assert {path.name for path in (folder / "analyzed").iterdir()} == {"summary.json", "flanks.csv"}
+    assert {path.name for path in (folder / "analyzed").iterdir()} == {"summary.json", "flanks.csv", "report.html"}
     for path in (folder / "optimized").glob("*.png"):
         assert path.read_bytes().startswith(b"\x89PNG")
 

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from report_page import check_report
 from test_cli import call
 
 from jaxgear.cli import interrupt
@@ -61,12 +62,13 @@ def file(tmp_path):
 
 def test_the_command_writes_what_it_says(file, tmp_path):
     path, folder = file(PAIR + TABLE), tmp_path / "out"
-    done = call("dynamics", str(path), "--output", str(folder))
+    done = call("dynamics", str(path), "--output", str(folder), "--report")
     code, out, err = done.code, done.out, done.err
     assert code == 0, err
     assert {entry.name for entry in folder.iterdir()} == {
         "summary.json",
         "responses.csv",
+        "report.html",
         *(f"{name}.png" for name in FIGURES),
     }
     assert {entry.name for entry in folder.iterdir()} <= RESULT_FILES
@@ -87,6 +89,8 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     assert f"unmodified {worst['unmodified']:.3f}, rule-based {worst['rule-based']:.3f}" in out
     assert "rule-based" in out and "down, kicked" in out
     check_branches(summary, rows)
+    page = check_report(folder, path, "dynamics", path, "--output", folder, "--report")
+    assert any(row[0] == "unmodified" and f"{worst['unmodified']:.3f}" in row for row in page.rows)
 
 
 def check_branches(summary, rows):

@@ -47,7 +47,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sweep")
     (folder / "gear.toml").write_text(SWEEP)
     os.environ["JAXGEAR_NO_CACHE"] = "1"
-    result = call("sweep", folder / "gear.toml", "-o", folder / "out", "--best", "5")
+    result = call("sweep", folder / "gear.toml", "-o", folder / "out", "--best", "5", "--report")
     assert result.code == 0, result.err
     return folder, result
 

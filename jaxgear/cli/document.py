@@ -10,6 +10,7 @@ from typing import Any
 import rich.table
 
 from ..io import DesignFile
+from ..io.errors import naming
 from ..io.toml import content
 from ..report import Report, Section, Source, Table, figure, heading, needed, numbers, read_table, text, write_report
 
@@ -42,6 +43,7 @@ _INPUTS = (
     "settings",
     "equivalent_mass_kg",
     "tolerances",
+    "variables",
     "model",
     "resolution",
     "quick",
@@ -56,7 +58,7 @@ class Found:
     Attributes:
         lines: its results in words.
         warnings: what is not to be trusted, or is not reached.
-        doubts: what is not usual.
+        doubts: what is not usual; None where nobody looked.
         tables: those that it prints.
         figures: files of its pictures.
         pages: further parts.
@@ -64,7 +66,7 @@ class Found:
 
     lines: Sequence[str]
     warnings: Sequence[str] = ()
-    doubts: Sequence[str] = ()
+    doubts: Sequence[str] | None = None
     tables: Sequence[rich.table.Table] = ()
     figures: Sequence[Path] = ()
     pages: Sequence[Section] = field(default_factory=tuple)
@@ -111,7 +113,7 @@ class Document:
             _validity(found, data),
             _inputs(design, data),
             Section("Geometry", [_GEOMETRY_NOTE], tables=geometry_tables(data["geometry"]), new_page=True),
-            _all_numbers(data),
+            *_all_numbers(data),
             Section(
                 "Design file",
                 [f"{self.source.name} as it was read; the command on the first page repeats the calculation."],
@@ -144,7 +146,8 @@ def document(command: Sequence[str] | None, file: Path, *libraries: str) -> Docu
     began = asked_for(command, *libraries)
     if command is None or began is None:
         return None
-    return Document(tuple(command), Source.of(file, content(file)), began)
+    with naming(file):
+        return Document(tuple(command), Source.of(file, content(file)), began)
 
 
 def geometry_tables(geometry: Mapping[str, Mapping[str, Any]]) -> list[Table]:
@@ -166,10 +169,10 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
     """What the numbers can be trusted for."""
     lines = []
     if not found.warnings:
-        lines.append("Every contact solution converged and every limit is met.")
+        lines.append("Every solution converged, and no limit is passed.")
     if data.get("quick"):
         lines.append("Quick run: coarse positions and a short search, not a result to build on.")
-    if not found.doubts:
+    if found.doubts is not None and not found.doubts:
         lines.append("Inputs and results lie within the usual ranges.")
     checks = []
     for name, design in data.get("designs", {}).items():
@@ -186,7 +189,7 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
         if key in optimum
     ]
     tables = [Table(("", "value"), tuple(checks), "checks")] if checks else []
-    return Section("Convergence and validity", lines, found.warnings, found.doubts, tables, new_page=True)
+    return Section("Convergence and validity", lines, found.warnings, found.doubts or (), tables, new_page=True)
 
 
 def _inputs(design: DesignFile, data: Mapping[str, Any]) -> Section:
@@ -216,7 +219,7 @@ def _split(title: str, data: Mapping[str, Any]) -> list[Table]:
     return [table for part in parts for table in _listed(title, {name: data[name] for name in part})]
 
 
-def _all_numbers(data: Mapping[str, Any]) -> Section:
+def _all_numbers(data: Mapping[str, Any]) -> list[Section]:
     """What `summary.json` holds beside what stands in other sections."""
     rest = {name: value for name, value in data.items() if name not in (*_INPUTS, *_IDENTITY)}
     tables = []
@@ -226,4 +229,7 @@ def _all_numbers(data: Mapping[str, Any]) -> Section:
     loose = {name: value for name, value in rest.items() if not isinstance(value, Mapping)}
     if loose:
         tables.insert(0, Table(("", "value"), tuple(numbers(loose)), ""))
-    return Section("All numbers", ["As in summary.json, which has every digit."], tables=tables, new_page=True)
+    if not tables:
+        return []
+    section = Section("All numbers", ["As in summary.json, which has every digit."], tables=tables, new_page=True)
+    return [section]

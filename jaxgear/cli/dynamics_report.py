@@ -17,8 +17,7 @@ from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
 from .document import Found
 from .geometry import geometry
-from .version import versions
-from .written import model
+from .written import model, versions
 
 _COLUMNS = {
     "dynamic_factor": "dynamic_factor",

@@ -17,7 +17,7 @@ from ..shafts import bearing_reactions
 from . import report
 from .document import Found
 from .geometry import geometry
-from .version import versions
+from .written import versions
 
 _PANEL, _HEIGHT = 92.0, 90.0  # [mm]
 

@@ -37,7 +37,8 @@ def run_sweep(
     asked = document(command, file, "xlsxwriter")
     design = opened(file, cache=cache)
     request = sweep_request(design, samples=samples, most=_QUICK_SAMPLES if quick else None)
-    size = design.resolution(request.highest_torque)
+    asked_size = design.resolution(request.highest_torque)
+    size = coarse(asked_size) if quick else asked_size
     target = output or default_folder(file, "sweep", quick=quick)
     _check(target)
     options: dict[str, Any] = {} if request.part_rows is None else {"part_rows": request.part_rows}
@@ -45,7 +46,7 @@ def run_sweep(
         table = sweep(
             design.design,
             request.plan,
-            mesh=design.sweep_mesh(coarse(size) if quick else size),
+            mesh=design.sweep_mesh(size),
             torque=request.load,
             results=request.results,
             output=target / _TABLE,
@@ -65,7 +66,7 @@ def run_sweep(
     interrupt.note(f"the table and {_BEST_FILE} are complete in {target}{os.sep}, not all figures are drawn")
     files = write_figures(target, table, request.results) if figures and len(chosen) else []
     if asked is not None:
-        sweep_document.write(target, asked, design, table, chosen, files, quick=quick)
+        sweep_document.write(target, asked, design, table, chosen, files, size=size, quick=quick)
     interrupt.note(f"all results are in {target}{os.sep}")
     return _show(table, chosen, target, meter, quick=quick)
 

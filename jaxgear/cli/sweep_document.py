@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from ..contact import Resolution
 from ..io import DesignFile
 from ..report import Section, Table, text, write_workbook
 from ..sweeps import SweepTable
 from .document import Document, Found
 from .geometry import geometry
-from .version import versions
+from .written import sizes, versions
 
 WORKBOOK = "variants.xlsx"
 _PAGES = 3  # variants with a page of their own
@@ -26,6 +27,7 @@ def write(
     best: SweepTable,
     figures: Sequence[Path],
     *,
+    size: Resolution,
     quick: bool,
 ) -> None:
     """Writes the workbook and the report.
@@ -37,6 +39,7 @@ def write(
         table: all variants.
         best: the best of them, best first.
         figures: files of the pictures.
+        size: array sizes of a mesh.
         quick: whether the run was a quick one.
     """
     release = versions()
@@ -55,6 +58,7 @@ def write(
         "torque_range_Nm": design.torque_range,
         "speed_rpm": design.speed,
         "friction": design.friction,
+        "resolution": sizes(size),
         "quick": quick,
         "variables": {name: {"low": low, "high": high} for name, (low, high) in design.bounds.items()},
         "geometry": geometry(design.pair()),

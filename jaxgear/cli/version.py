@@ -1,6 +1,4 @@
-"""The versions of the installed package and of what it runs on."""
-
-import platform
+"""The version of the installed package."""
 
 
 def version() -> str:
@@ -11,17 +9,3 @@ def version() -> str:
         return metadata.version("jaxgear")
     except metadata.PackageNotFoundError:
         return "unknown (not installed)"
-
-
-def versions() -> dict[str, str]:
-    """Of everything that a result depends on, by name."""
-    import jax
-    import numpy
-
-    return {
-        "jaxgear": version(),
-        "jax": jax.__version__,
-        "numpy": numpy.__version__,
-        "python": platform.python_version(),
-        "platform": platform.platform(),
-    }

@@ -1,13 +1,15 @@
 """What a run writes as `summary.json`: every number of its designs, its gears and its model."""
 
 import dataclasses
+import platform
 from collections.abc import Mapping
 from typing import Any
 
 import equinox as eqx
+import jax
 import numpy as np
 
-from ..contact import Mesh
+from ..contact import Mesh, Resolution
 from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..metrics import Doubt
@@ -16,7 +18,7 @@ from ..optimize import Verified
 from .geometry import geometry
 from .report import Evaluations, diameters, reduction
 from .study import Evaluation
-from .version import versions
+from .version import version
 
 
 def summary(
@@ -27,7 +29,6 @@ def summary(
     found: Mapping[str, tuple[Doubt, ...]],
 ) -> dict[str, Any]:
     """Contents of `summary.json`, with the doubts that were `found` of every design."""
-    size = mesh.resolution
     return {
         "title": file.title,
         "design_file": file.path.name,
@@ -48,7 +49,7 @@ def summary(
             **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
         },
         "geometry": geometry(file.pair()),
-        "resolution": {field.name: getattr(size, field.name) for field in dataclasses.fields(size)},
+        "resolution": sizes(mesh.resolution),
         "versions": versions(),
     }
 
@@ -90,6 +91,22 @@ def _center_distance(mesh: Mesh) -> float:
         np.hypot(contact.pinion_base_radius, contact.pinion_pitch_roll_length)
         + np.hypot(contact.wheel_base_radius, contact.wheel_pitch_roll_length)
     )
+
+
+def versions() -> dict[str, str]:
+    """Of everything that a result depends on, by name."""
+    return {
+        "jaxgear": version(),
+        "jax": jax.__version__,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+    }
+
+
+def sizes(of: Resolution) -> dict[str, Any]:
+    """Array sizes by name."""
+    return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
 
 
 def model(mesh: Mesh) -> dict[str, str]:

@@ -1,0 +1,232 @@
+"""The report: nothing from outside, no text taken for code, and one line where it cannot be written."""
+
+import builtins
+import datetime
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import matplotlib.pyplot as plt
+import numpy as np
+import openpyxl
+import pytest
+from report_page import Page, assert_well_formed
+from rich.table import Table as Printed
+from test_cli import FIXED, assert_refused, call
+from test_sweep_command import SWEEP
+
+from jaxgear import plot, report
+from jaxgear.cli import document
+from jaxgear.io.folder import RESULT_FILES
+from jaxgear.sweeps.columns import Column
+from jaxgear.sweeps.table import in_memory
+
+HOSTILE = '<script>alert("1")</script> & \'<img src="http://example.com/x.png">\' </pre></style>'
+FACTS = [("design file", "pair.toml")]
+
+
+@pytest.fixture(autouse=True)
+def no_cache(monkeypatch):
+    """The tests keep their own compilation cache."""
+    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
+
+
+@pytest.fixture
+def without(monkeypatch):
+    """Makes a library look as if it were not installed."""
+
+    def hide(name):
+        real = builtins.__import__
+
+        def refuse(module, *rest):
+            if module.partition(".")[0] == name:
+                raise ModuleNotFoundError(f"No module named '{name}'")
+            return real(module, *rest)
+
+        monkeypatch.setitem(sys.modules, name, None)
+        monkeypatch.setattr(builtins, "__import__", refuse)
+
+    return hide
+
+
+def written(path: Path, **parts) -> Page:
+    """A page with one section."""
+    section = report.Section("Part", **parts)
+    report.write_report(path, report.Report(HOSTILE, HOSTILE, [("name", HOSTILE)], [section]))
+    assert_well_formed(path.read_bytes())
+    return Page(path.read_text("utf-8"))
+
+
+def test_text_of_others_is_text_everywhere(tmp_path):
+    table = report.Table((HOSTILE, "b"), ((HOSTILE, HOSTILE),), HOSTILE, HOSTILE)
+    picture = report.Figure("a", HOSTILE, "data:image/png;base64,AAAA", 100.0)
+    texts = {"lines": [HOSTILE], "warnings": [HOSTILE], "points": [HOSTILE]}
+    page = written(tmp_path / "page.html", **texts, tables=[table], figures=[picture], literal=f"\n{HOSTILE}")
+    assert "script" not in page.tags and page.tags.count("img") == 1
+    assert page.references == ["#section-1", "data:image/png;base64,AAAA"]
+    assert [HOSTILE, HOSTILE] in page.rows and page.literal.strip() == HOSTILE
+
+
+def test_what_is_no_text_is_replaced(tmp_path):
+    page = written(tmp_path / "page.html", lines=["\udcff"], literal="a\x00\x07b\nc\td")
+    assert page.literal.strip() == "a\ufffd\ufffdb\nc\td"
+    assert "\udcff" not in (tmp_path / "page.html").read_text("utf-8")
+
+
+def test_a_file_that_cannot_be_written_is_one_line(tmp_path):
+    with pytest.raises(ValueError, match="page.html: cannot be written: No such file"):
+        written(tmp_path / "none" / "page.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_table_is_the_one_that_is_printed():
+    printed = Printed(title="title", caption="note")
+    printed.add_column("")
+    printed.add_column("a")
+    printed.add_row("x", "1")
+    printed.add_section()
+    printed.add_row("y", "2")
+    table = report.read_table(printed)
+    assert table == report.Table(("", "a"), (("x", "1"), ("y", "2")), "title", "note", (0,))
+
+
+@pytest.mark.parametrize("width", [100.0, 250.0])
+def test_a_picture_has_its_own_size_on_paper(tmp_path, width):
+    with plot.figure.report_figure(width, 60.0) as figure:
+        figure.subplots().set_axis_off()
+        figure.patch.set_alpha(0)
+    path = tmp_path / "k_chart.png"
+    figure.savefig(path, dpi=200)
+    plt.close(figure)
+    found = report.figure(path)
+    assert found.width == pytest.approx(width, abs=0.2) and "K-chart" in found.caption
+    page = tmp_path / "page.html"
+    written(page, figures=[found])
+    assert ('class="wide"' in page.read_text("utf-8")) == (width > 180)
+
+
+def test_a_file_that_is_no_picture_is_refused(tmp_path):
+    (tmp_path / "a.png").write_bytes(b"no picture")
+    with pytest.raises(ValueError, match="a.png: is not a PNG file"):
+        report.figure(tmp_path / "a.png")
+
+
+def test_every_picture_has_its_caption():
+    names = {Path(name).stem for name in RESULT_FILES if name.endswith(".png")} | {"pareto", "parallel_coordinates"}
+    assert names == set(report.CAPTIONS)
+
+
+@pytest.mark.parametrize(
+    "name, words",
+    [
+        ("max_flank_pressure_MPa", "max flank pressure [MPa]"),
+        ("max_line_load_N_per_mm", "max line load [N/mm]"),
+        ("thermal_contact_coefficient_N_per_(ms^0.5K)", "thermal contact coefficient [N/(m s^0.5 K)]"),
+        ("contact_ratio", "contact ratio"),
+        ("teeth", "teeth"),
+    ],
+)
+def test_a_name_in_words(name, words):
+    assert report.heading(name) == words
+
+
+def test_numbers_of_nested_data_keep_their_place():
+    data = {
+        "a_mm": {"b": 1.23456789, "c": [{"d": True}, {"d": False}]},
+        "e": None,
+        "f": np.array([1.0, np.nan]),
+        "g": {},
+    }
+    assert list(report.numbers(data)) == [
+        ("a [mm] / b", "1.23457"),
+        ("a [mm] / c / 1 / d", "yes"),
+        ("a [mm] / c / 2 / d", "no"),
+        ("e", "-"),
+        ("g", "-"),
+        ("f", "1, -"),
+    ]
+
+
+def test_what_nobody_looked_at_is_not_called_usual(tmp_path):
+    design = SimpleNamespace(title="pair", support=None, resolution=lambda: SimpleNamespace(slices=1))
+    source = report.Source.of(Path("pair.toml"), b"title = 1\n")
+    pair = {name: {"teeth": 19} for name in ("pinion", "wheel", "pair")}
+    data = {"versions": {"jaxgear": "1"}, "geometry": pair}
+    asked = document.Document(("analyze", "pair.toml"), source, datetime.datetime.now())
+    for doubts, said in (((), True), (None, False), (["please check: this"], False)):
+        asked.write(tmp_path, design, data, document.Found(["line"], doubts=doubts))
+        page = (tmp_path / "report.html").read_text("utf-8")
+        assert ("within the usual ranges" in page) == said and ("please check: this" in page) == bool(doubts)
+        assert "no limit is passed" in page
+    asked.write(tmp_path, design, data, document.Found(["line"], ["NOT CONVERGED"]))
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "no limit is passed" not in page and page.count("NOT CONVERGED") == 2
+
+
+def test_the_workbook_holds_the_table(tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    columns = [
+        Column("variant", "", "number"),
+        Column("=1+1", "um", "parameter"),
+        Column("ppte_um", "um", "result", "smaller"),
+        Column("converged", "", "flag"),
+    ]
+    values = {"variant": [0, 1, 2], "=1+1": [1.5, 2.5, 3.5], "ppte_um": [0.3, np.nan, 0.2]}
+    table = in_memory("t", columns, [pyarrow.table({**values, "converged": [True, False, True]})])
+    path = tmp_path / "variants.xlsx"
+    report.write_workbook(path, FACTS, table.best(2), table)
+    book = openpyxl.load_workbook(path)
+    assert book.sheetnames == ["about", "best", "variants"]
+    assert [cell.value for cell in book["about"][1]] == ["design file", "pair.toml"]
+    sheet = book["variants"]
+    assert [[cell.value for cell in row] for row in sheet.iter_rows()] == [
+        ["variant", "=1+1 [um]", "ppte_um", "converged"],
+        [0, 1.5, 0.3, True],
+        [1, 2.5, None, False],
+        [2, 3.5, 0.2, True],
+    ]
+    assert all(cell.data_type == "s" for cell in sheet[1])  # no formula
+    assert sheet.freeze_panes == "B2" and sheet.auto_filter.ref == "A1:D4"
+    assert [row[0].value for row in book["best"].iter_rows(min_row=2)] == [2, 0]
+
+
+@pytest.mark.parametrize(
+    "command, library", [("analyze", "jinja2"), ("optimize", "jinja2"), ("sweep", "jinja2"), ("sweep", "xlsxwriter")]
+)
+def test_without_the_libraries_nothing_begins(tmp_path, without, command, library):
+    file = tmp_path / "pair.toml"
+    file.write_text(SWEEP if command == "sweep" else FIXED)
+    without(library)
+    done = call(command, file, "--report", "--output", tmp_path / "out")
+    assert_refused(done, f"--report needs the library {library}: pip install 'jaxgear[report]'")
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_the_libraries_other_commands_run(tmp_path, without):
+    """They are asked for where a report is."""
+    without("jinja2")
+    assert document.document(None, tmp_path / "none.toml") is None
+
+
+@pytest.mark.parametrize("command", ["analyze", "dynamics", "layout"])
+def test_a_file_that_is_not_there_is_one_line(tmp_path, command):
+    done = call(command, tmp_path / "none.toml", "--report", "--output", tmp_path / "out")
+    assert_refused(done, "none.toml", "No such file")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs the browser")
+def test_a_browser_prints_it(tmp_path):
+    """Two short sections, one of which begins on a new page, on paper of the size A4."""
+    page = tmp_path / "page.html"
+    sections = [report.Section("a", ["b"]), report.Section("c", ["d"], new_page=True)]
+    report.write_report(page, report.Report("title", "sub", FACTS, sections))
+    paper = tmp_path / "page.pdf"
+    options = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}")
+    command = ("chromium", *options, f"--print-to-pdf={paper}", page.as_uri())
+    subprocess.run(command, check=True, capture_output=True, timeout=60)
+    held = paper.read_bytes()
+    assert held.count(b"/Type /Page\n") == 2 or b"/Count 2" in held
+    assert b"/MediaBox [0 0 594.95996 841.91998]" in held or b"[0 0 595" in held
