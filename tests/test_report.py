@@ -144,8 +144,8 @@ def test_numbers_of_nested_data_keep_their_place():
         ("a [mm] / c / 1 / d", "yes"),
         ("a [mm] / c / 2 / d", "no"),
         ("e", "-"),
-        ("g", "-"),
         ("f", "1, -"),
+        ("g", "-"),
     ]
 
 

@@ -10,9 +10,11 @@ from pathlib import Path
 import jax
 import matplotlib.pyplot as plt
 import numpy as np
+import openpyxl
 import pyarrow
 import pyarrow.parquet as parquet
 import pytest
+from report_page import assert_row, check_report
 from test_cli import FREE, assert_refused, call
 
 import jaxgear as jg
@@ -50,6 +52,24 @@ def folder(tmp_path_factory):
     result = call("sweep", folder / "gear.toml", "-o", folder / "out", "--best", "5", "--report")
     assert result.code == 0, result.err
     return folder, result
+
+
+def test_the_report_shows_the_best_variants(folder):
+    folder, _ = folder
+    typed = "sweep", folder / "gear.toml", "-o", folder / "out", "--best", "5", "--report"
+    page = check_report(folder / "out", folder / "gear.toml", *typed)
+    best = jg.open_sweep(folder / "out" / "table").best(5)
+    names = [f"variant {number}" for number in best.column("variant")]
+    assert ["", *names] in page.rows
+    for name, heading in (("height", "height [um]"), ("ppte_um", "ppte_um")):
+        assert_row(page, heading, list(best.column(name)))
+    for number in names[:3]:  # a page each
+        assert ["", number, "least of all", "largest of all", "better is"] in page.rows
+    book = openpyxl.load_workbook(folder / "out" / "variants.xlsx")
+    found = [[cell.value for cell in row] for row in book["best"].iter_rows(min_row=2)]
+    assert [row[0] for row in found] == list(best.column("variant"))
+    assert [row[2] for row in found] == pytest.approx(list(best.column("ppte_um")))
+    assert book["variants"].max_row == 61
 
 
 @pytest.mark.slow
