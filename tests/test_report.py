@@ -104,7 +104,7 @@ def test_a_picture_has_its_own_size_on_paper(tmp_path, width):
     assert found.width == pytest.approx(width, abs=0.2) and "K-chart" in found.caption
     page = tmp_path / "page.html"
     written(page, figures=[found])
-    assert ('class="wide"' in page.read_text("utf-8")) == (width > 180)
+    assert ('class="wide"' in page.read_text("utf-8")) == (width > 210)
 
 
 def test_a_file_that_is_no_picture_is_refused(tmp_path):

@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ _ASSUMED = (
     "Gear bodies are solid: thin rims, webs and spokes are not in the closed forms.",
     "The pressure of a tip corner is an estimate, which depends on the edge radius, and is given apart.",
 )
-_RIGID = "Shafts, bearings and housing are rigid."
+_RIGID = "In the contact analysis shafts, bearings and housing are rigid."
 _SUPPORTED = "Shafts, bearings and housing are those of the design file."
 _EVEN = "One slice stands for the whole face: the load is the same everywhere over it."
 # what summary.json says of the inputs, before its results
@@ -62,6 +62,7 @@ class Found:
         tables: those that it prints.
         figures: files of its pictures.
         pages: further parts.
+        assumptions: of this command, beside those of every contact analysis.
     """
 
     lines: Sequence[str]
@@ -69,7 +70,8 @@ class Found:
     doubts: Sequence[str] | None = None
     tables: Sequence[rich.table.Table] = ()
     figures: Sequence[Path] = ()
-    pages: Sequence[Section] = field(default_factory=tuple)
+    pages: Sequence[Section] = ()
+    assumptions: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ class Document:
             *found.pages,
             *_figures(found.figures),
             _validity(found, data),
-            _inputs(design, data),
+            _inputs(design, data, found.assumptions),
             Section("Geometry", [_GEOMETRY_NOTE], tables=geometry_tables(data["geometry"]), new_page=True),
             *_all_numbers(data),
             Section(
@@ -192,10 +194,10 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
     return Section("Convergence and validity", lines, found.warnings, found.doubts or (), tables, new_page=True)
 
 
-def _inputs(design: DesignFile, data: Mapping[str, Any]) -> Section:
+def _inputs(design: DesignFile, data: Mapping[str, Any], further: Sequence[str]) -> Section:
     """What was assumed."""
     given = {name: data[name] for name in _INPUTS if data.get(name) is not None}
-    points = [*_ASSUMED, _SUPPORTED if design.support is not None else _RIGID]
+    points = [*_ASSUMED, *further, _SUPPORTED if design.support is not None else _RIGID]
     if design.resolution().slices == 1:
         points.append(_EVEN)
     return Section("Inputs and assumptions", (), (), points, [Table(("", "value"), tuple(numbers(given)), "inputs")])

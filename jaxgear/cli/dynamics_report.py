@@ -32,6 +32,9 @@ _COLUMNS = {
 }
 
 
+_ASSUMED = "Both gears are rigid masses that vibrate on the force of this contact, with the damping and bearings given."
+
+
 @dataclass(frozen=True)
 class Study:
     """What has been found of all designs.
@@ -131,7 +134,8 @@ def failures(study: Study) -> Iterator[str]:
 
 def found(study: Study, figures: Sequence[Path]) -> Found:
     """What a report shows beside `summary`."""
-    return Found(list(verdict(study)), list(failures(study)), tables=[table(study)], figures=figures)
+    lines, warnings = list(verdict(study)), list(failures(study))
+    return Found(lines, warnings, tables=[table(study)], figures=figures, assumptions=[_ASSUMED])
 
 
 def summary(study: Study) -> dict[str, Any]:

@@ -7,8 +7,9 @@ from .contents import Report
 from .needed import needed
 
 _TEMPLATES = Path(__file__).parent / "templates"
-# between the margins of A4 [mm]: wider pictures lie on their side
-_UPRIGHT = 180.0
+# Between the margins of A4 are 180 mm: letters of a picture of this width [mm] shrink from 9 to 7.7 points, and
+# wider ones lie on their side.
+_UPRIGHT = 210.0
 
 
 def write_report(path: Path, report: Report) -> None:
