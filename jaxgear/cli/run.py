@@ -77,7 +77,7 @@ class Run:
             self.design.begin_contact(size, dataclasses.replace(size, positions=max(finer, size.positions)))
         self._mesh: Mesh = jax.block_until_ready(self.design.mesh(coarse(size) if quick else size))
         self._searched_at = self._mesh.resolution.positions
-        self._torques = np.linspace(*self.design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
+        self._torques = torques_of(self.design, quick=quick)
         if verify or (verify is None and isinstance(self._mesh.compliance, Compliance)):
             self._make_tables(finer, required=verify is not None)
 
@@ -208,6 +208,11 @@ def opened(file: Path, *, cache: bool) -> DesignFile:
 def coarse(size: Resolution) -> Resolution:
     """The array sizes of a quick run."""
     return dataclasses.replace(size, positions=min(size.positions, _QUICK_POSITIONS))
+
+
+def torques_of(design: DesignFile, *, quick: bool) -> np.ndarray:
+    """Torques over the range of a design file [N m], at which its designs are evaluated."""
+    return np.linspace(*design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
 
 
 def default_folder(file: Path, *command: str, quick: bool = False) -> Path:

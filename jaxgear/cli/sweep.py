@@ -15,6 +15,7 @@ from . import interrupt, report, sweep_document
 from .document import document
 from .progress import Meter
 from .run import coarse, default_folder, opened
+from .sweep_chosen import evaluate_best
 from .sweep_figures import write_figures
 
 _QUICK_SAMPLES = 4096
@@ -66,7 +67,8 @@ def run_sweep(
     interrupt.note(f"the table and {_BEST_FILE} are complete in {target}{os.sep}, not all figures are drawn")
     files = write_figures(target, table, request.results) if figures and len(chosen) else []
     if asked is not None:
-        sweep_document.write(target, asked, design, table, chosen, files, size=size, quick=quick)
+        closer = evaluate_best(target, design, chosen, size, quick=quick, figures=figures)
+        sweep_document.write(target, asked, design, table, chosen, closer, files, size=size, quick=quick)
     interrupt.note(f"all results are in {target}{os.sep}")
     return _show(table, chosen, target, meter, quick=quick)
 

@@ -12,10 +12,10 @@ from ..report import Section, Table, text, write_workbook
 from ..sweeps import SweepTable
 from .document import Document, Found
 from .geometry import geometry
+from .sweep_chosen import CHOSEN, Chosen
 from .written import sizes, versions
 
 WORKBOOK = "variants.xlsx"
-_PAGES = 3  # variants with a page of their own
 _TABLE = 6  # side by side on one page
 
 
@@ -25,6 +25,7 @@ def write(
     design: DesignFile,
     table: SweepTable,
     best: SweepTable,
+    chosen: Chosen,
     figures: Sequence[Path],
     *,
     size: Resolution,
@@ -38,7 +39,8 @@ def write(
         design: the design file.
         table: all variants.
         best: the best of them, best first.
-        figures: files of the pictures.
+        chosen: what was found of the first of them.
+        figures: files of the pictures of the sweep.
         size: array sizes of a mesh.
         quick: whether the run was a quick one.
     """
@@ -46,13 +48,12 @@ def write(
     write_workbook(folder / WORKBOOK, [*asked.facts, *release.items()], best, table)
     failed = table.failures()
     lines = [
-        f"{len(table)} variants, ranked by {table.results[0]}; the best {len(best)} and all of them are in {WORKBOOK}, "
-        "with units and filters."
+        f"{len(table)} variants, ranked by {table.results[0]}; the best {len(best)} and the table are in {WORKBOOK}, "
+        "with units and filters.",
+        *chosen.lines,
     ]
-    warnings = (
-        [f"{failed} variants failed (column converged); they are in the table, without results."] if failed else []
-    )
-    pages = [_side_by_side(best), *(_page(table, best, place) for place in range(min(_PAGES, len(best))))]
+    warnings = [*chosen.failures, *([f"{failed} variants failed and have no results"] if failed else [])]
+    pages = [_side_by_side(best), *(_page(table, best, place) for place in range(min(CHOSEN, len(best))))]
     data: dict[str, Any] = {
         "torque_Nm": design.torque,
         "torque_range_Nm": design.torque_range,
@@ -60,11 +61,17 @@ def write(
         "friction": design.friction,
         "resolution": sizes(size),
         "quick": quick,
-        "variables": {name: {"low": low, "high": high} for name, (low, high) in design.bounds.items()},
+        "variables": {_with_unit(design, name): limits for name, limits in design.bounds.items()},
         "geometry": geometry(design.pair()),
         "versions": release,
     }
-    asked.write(folder, design, data, Found(lines, warnings, figures=figures, pages=pages if len(best) else ()))
+    pictures = [*chosen.figures, *figures]
+    found = Found(lines, warnings, chosen.doubts, chosen.tables, pictures, pages if len(best) else ())
+    asked.write(folder, design, data, found)
+
+
+def _with_unit(design: DesignFile, name: str) -> str:
+    return f"{name} [{design.units[name]}]" if design.units[name] else name
 
 
 def _side_by_side(best: SweepTable) -> Section:

@@ -1,0 +1,69 @@
+"""The best variants of a sweep, evaluated like the designs of `jaxgear analyze`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import jax
+import rich.table
+
+from ..contact import Resolution
+from ..io import DesignFile
+from ..microgeometry import NoModification
+from ..sweeps import SweepTable
+from . import report
+from .progress import Stages
+from .run import torques_of
+from .study import evaluate
+
+CHOSEN = 3  # variants
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What was found of the best variants.
+
+    Attributes:
+        tables: side by side with the unmodified pair, the best one last.
+        figures: files of their pictures.
+        doubts: what is not usual of them; None where they are not evaluated.
+        failures: what is not to be trusted.
+        lines: why they are not evaluated.
+    """
+
+    tables: Sequence[rich.table.Table] = ()
+    figures: Sequence[Path] = ()
+    doubts: Sequence[str] | None = None
+    failures: Sequence[str] = ()
+    lines: Sequence[str] = field(default_factory=tuple)
+
+
+def evaluate_best(
+    folder: Path, design: DesignFile, best: SweepTable, size: Resolution, *, quick: bool, figures: bool
+) -> Chosen:
+    """Evaluates the best variants at the torques of the design file.
+
+    Variants of more than the flanks, of other gears or loads, have no common mesh and stay as the table has them.
+
+    Args:
+        folder: for the pictures.
+        design: the design file.
+        best: the best variants, best first.
+        size: array sizes of the mesh.
+        quick: few torques.
+        figures: whether pictures are drawn.
+    """
+    if design.open_case or not len(best):
+        why = ["The variants differ in more than their flanks: their numbers are those of the table."]
+        return Chosen(lines=why if len(best) else ())
+    with Stages() as stages:
+        stages.begin("evaluating the best variants")
+        mesh, torques = jax.block_until_ready(design.mesh(size)), torques_of(design, quick=quick)
+        modifications = {"unmodified": (NoModification(), NoModification())}
+        first = best.take(range(min(CHOSEN, len(best))))
+        for number, parameters in reversed([*zip(first.column("variant"), first.designs())]):
+            modifications[f"variant {number}"] = design.design(parameters)
+        found = {name: evaluate(design, mesh, torques, *flanks) for name, flanks in modifications.items()}
+        drawn = report.write_figures(folder, design, mesh, found, torques) if figures else []
+    doubts = report.doubt_lines(report.doubts(design, mesh, found))
+    return Chosen([report.table(design, found)], drawn, list(doubts), list(report.failures(found)))
