@@ -68,6 +68,7 @@ def draw(mesh, designs, cycles, curves):
     factors = {"unmodified": np.ones(4), "long relief": np.array([1.4, 1.3, 1.2, 1.1])}
     return {
         "transmission_error": lambda ax=None: plot.transmission_error(cycles, ax),
+        "mesh_orders": lambda ax=None: plot.mesh_orders(cycles, ax),
         "load_sharing": lambda ax=None: plot.load_sharing(cycles, ax),
         "pressure": lambda ax=None: plot.pressure(cycles, ax),
         "pressure_map": lambda ax=None: plot.pressure_map(cycles["long relief"], ax),
@@ -84,6 +85,7 @@ def draw(mesh, designs, cycles, curves):
 
 UNITS = {
     "transmission_error": ("[base pitches]", "[µm]"),
+    "mesh_orders": ("[-]", "[µm]"),
     "load_sharing": ("[mm]", "[-]"),
     "pressure": ("[mm]", "[MPa]"),
     "pressure_map": ("[mm]", "[mm]"),
@@ -114,7 +116,40 @@ def test_a_given_ax_is_used_and_its_figure_gains_no_other(draw, name):
     assert plt.get_fignums() == [figure.number]
 
 
-LEGENDS = ("transmission_error", "load_sharing", "pressure", "ppte_over_torque", "face_load_over_torque", "line_load")
+LEGENDS = (
+    "transmission_error",
+    "mesh_orders",
+    "load_sharing",
+    "pressure",
+    "ppte_over_torque",
+    "face_load_over_torque",
+    "line_load",
+)
+
+
+def test_bars_are_the_amplitudes_of_the_orders(cycles):
+    ax = plot.mesh_orders(cycles)
+    for bars, cycle in zip(ax.containers, cycles.values(), strict=True):
+        curve = np.asarray(cycle.transmission_error)
+        spectrum = 2 * np.abs(np.fft.rfft(curve)) / len(curve)
+        heights = [bar.get_height() for bar in bars]
+        np.testing.assert_allclose(heights, spectrum[1 : len(heights) + 1], rtol=1e-9, atol=1e-12)
+        assert [round(bar.get_x() + bar.get_width() / 2) for bar in bars] == list(range(1, len(heights) + 1))
+
+
+def test_the_tolerance_lies_about_the_named_design(mesh, designs):
+    """Upper limit and lower limit enclose the curve of that design, and only its own middle."""
+    classes = tuple(jg.tolerance.ToleranceClass.of(gear, 5) for gear in (mesh.pair.pinion, mesh.pair.wheel))
+    for name, chart in [(name, chart) for name in designs for chart in (plot.k_chart, plot.lead_chart)]:
+        panel = chart(mesh, designs, tolerance=classes, about=name)[0]
+        line = next(line for line in panel.lines if line.get_label() == name)
+        (path,) = panel.collections[0].get_paths()
+        place = path.vertices[:, 0]
+        middle = np.interp(place, *(np.asarray(values)[np.argsort(line.get_xdata())] for values in line.get_data()))
+        assert (path.vertices[:, 1] - middle).min() < -1 and (path.vertices[:, 1] - middle).max() > 1
+        low, high = (reach(path.vertices[:, 1] - middle) for reach in (np.min, np.max))
+        assert high == pytest.approx(-low, abs=0.35)
+    plt.close("all")
 
 
 @pytest.mark.parametrize("name", (*LEGENDS, "face_gap"))

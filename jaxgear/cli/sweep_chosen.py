@@ -1,13 +1,13 @@
 """The best variants of a sweep, evaluated like the designs of `jaxgear analyze`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import jax
 import rich.table
 
-from ..contact import Resolution
+from ..contact import Mesh, Resolution
 from ..io import DesignFile
 from ..microgeometry import NoModification
 from ..sweeps import SweepTable
@@ -26,6 +26,7 @@ class Chosen:
     Attributes:
         tables: side by side with the unmodified pair, the best one last.
         figures: files of their pictures.
+        pages: those of each variant alone, by its name.
         doubts: what is not usual of them; None where they are not evaluated.
         failures: what is not to be trusted.
         lines: why they are not evaluated.
@@ -33,9 +34,10 @@ class Chosen:
 
     tables: Sequence[rich.table.Table] = ()
     figures: Sequence[Path] = ()
+    pages: Mapping[str, Sequence[Path]] = field(default_factory=dict)
     doubts: Sequence[str] | None = None
     failures: Sequence[str] = ()
-    lines: Sequence[str] = field(default_factory=tuple)
+    lines: Sequence[str] = ()
 
 
 def evaluate_best(
@@ -65,5 +67,22 @@ def evaluate_best(
             modifications[f"variant {number}"] = design.design(parameters)
         found = {name: evaluate(design, mesh, torques, *flanks) for name, flanks in modifications.items()}
         drawn = report.write_figures(folder, design, mesh, found, torques) if figures else []
+        pages = _alone(folder, mesh, found) if figures else {}
     doubts = report.doubt_lines(report.doubts(design, mesh, found))
-    return Chosen([report.table(design, found)], drawn, list(doubts), list(report.failures(found)))
+    return Chosen([report.table(design, found)], drawn, pages, list(doubts), list(report.failures(found)))
+
+
+def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, list[Path]]:
+    """Pictures of each variant beside the unmodified pair alone."""
+    from .. import plot
+
+    first, *others = found
+    pages = {}
+    for name in others:
+        both = {first: found[first], name: found[name]}
+        axes = {
+            "transmission_error": plot.transmission_error({one: of.cycle for one, of in both.items()}),
+            "k_chart": plot.k_chart(mesh, report.flanks(both)),
+        }
+        pages[name] = report.save_figures(folder, {f"{kind}_{name.replace(' ', '_')}": ax for kind, ax in axes.items()})
+    return pages

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..contact import Resolution
 from ..io import DesignFile
-from ..report import Section, Table, text, write_workbook
+from ..report import Section, Table, figure, text, write_workbook
 from ..sweeps import SweepTable
 from .document import Document, Found
 from .geometry import geometry
@@ -53,7 +53,7 @@ def write(
         *chosen.lines,
     ]
     warnings = [*chosen.failures, *([f"{failed} variants failed and have no results"] if failed else [])]
-    pages = [_side_by_side(best), *(_page(table, best, place) for place in range(min(CHOSEN, len(best))))]
+    pages = [_side_by_side(best), *(_page(table, best, place, chosen) for place in range(min(CHOSEN, len(best))))]
     data: dict[str, Any] = {
         "torque_Nm": design.torque,
         "torque_range_Nm": design.torque_range,
@@ -83,7 +83,7 @@ def _side_by_side(best: SweepTable) -> Section:
     return Section("Best variants", tables=[Table(header, rows, "best first")], new_page=True)
 
 
-def _page(table: SweepTable, best: SweepTable, place: int) -> Section:
+def _page(table: SweepTable, best: SweepTable, place: int, chosen: Chosen) -> Section:
     """One variant, and what it is among the others."""
     number = _values(best, "variant")[place]
     rows = []
@@ -93,7 +93,8 @@ def _page(table: SweepTable, best: SweepTable, place: int) -> Section:
         better = {"larger": "larger", "smaller": "smaller"}.get(str(ranked.better), "") if name in best.results else ""
         rows.append((best.headings[name], text(best.column(name)[place]), low, high, better))
     header = ("", f"variant {number}", "least of all", "largest of all", "better is")
-    return Section(f"Variant {number}", tables=[Table(header, tuple(rows))], new_page=True)
+    pictures = [figure(path) for path in chosen.pages.get(f"variant {number}", ())]
+    return Section(f"Variant {number}", tables=[Table(header, tuple(rows))], figures=pictures, new_page=True)
 
 
 def _values(table: SweepTable, name: str) -> list[str]:

@@ -42,6 +42,7 @@ CAPTIONS = {
     "radar": "Results of chosen variants side by side.",
 }
 
+_VARIANT = "_variant_"  # before the number in the name of a file
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _SIZE_AT = 16  # bytes before width and height (PNG specification, chunk IHDR)
 _DENSITY = b"pHYs"  # pixels per unit in both directions, and the unit
@@ -64,5 +65,6 @@ def figure(path: Path) -> Figure:
     if unit != _PER_METRE or density == 0:
         raise ValueError(f"{path}: does not tell its pixels per metre")
     data = f"data:image/png;base64,{base64.b64encode(held).decode()}"
-    caption = CAPTIONS.get(path.stem, f"{path.stem.replace('_', ' ')}.")
+    kind = path.stem.partition(_VARIANT)[0]  # of one variant: what is said of the picture of several
+    caption = CAPTIONS.get(kind, f"{path.stem.replace('_', ' ')}.")
     return Figure(path.stem, caption, data, pixels / density * _MM)
