@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .coupling import Coupling, along, onto
-from .elimination import Curve, Factors, Rows, Slopes, factorize, forward
+from .elimination import Curve, Factors, Rows, Slopes, inverse_of, small_inverse
 from .stored import unit
 
 Levers = Float[Array, "pairs positions"]
@@ -81,7 +81,7 @@ def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
         lever: what a spring closes per unit of common approach.
         own: elimination of every slice with the local compliance and the slopes of the springs.
     """
-    inverse = _inverse(own)
+    inverse = inverse_of(own)
     modal = _products(coupling.modes, inverse)
     blocks = _eliminated(coupling, modal)
     right, force = _of_support(coupling, lever, inverse, modal)
@@ -90,21 +90,7 @@ def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
     return CoupledFactors(coupling, lever, inverse, blocks, bent, force, own.per_slope)
 
 
-def _inverse(own: Factors) -> Inverse:
-    count = len(own.active)
-    none = jnp.zeros_like(own.active[0])
-    ahead = [
-        forward(own.rows, own.inverse, [own.active[j] if i == j else none for i in range(count)]) for j in range(count)
-    ]
-    half = {}
-    for i in range(count):
-        for j in range(i + 1):
-            value = sum(ahead[i][k] * ahead[j][k] * own.inverse[k] for k in range(i, count))
-            half[i, j] = half[j, i] = value / unit(value)
-    return [[half[i, j] for j in range(count)] for i in range(count)]
-
-
-def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "modes pairs pairs positions"]]:
+def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "_ pairs pairs positions"]]:
     """V^T rows V: of every mode with itself and those after it, by mode."""
     count = modes.shape[1]
     weight = jnp.concatenate([modes[:, k : k + 1] * modes[:, k:] for k in range(count)], axis=1)
@@ -117,33 +103,26 @@ def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[
     return jnp.split(jnp.stack(whole, axis=1), ends[:-1])
 
 
-def _eliminated(coupling: Coupling, modal: list[Float[Array, "modes pairs pairs positions"]]) -> list[_Block]:
+def _eliminated(coupling: Coupling, modal: list[Float[Array, "_ pairs pairs positions"]]) -> list[_Block]:
     held = coupling.held
     blocks: list[_Block] = []
     assert held is not None  # whoever eliminates gives the inverses
     for mode in range(len(modal)):
-        scaled = modal[mode] + held.share_inverse[mode:, mode, None, None, None] * held.inverse
+        scaled = modal[mode] + held.share_inverse[mode:, mode, None, None, None] * held.inverse[None]
         for before, block in enumerate(blocks):
             ahead = mode - before
             scaled = scaled - _times(block.lower[ahead:], jnp.swapaxes(block.scaled[ahead], 0, 1))
         scaled = scaled / unit(scaled)
-        inverse = _small_inverse(scaled[0])
+        inverse = small_inverse(scaled[0])
         lower = _times(scaled, inverse)
         blocks.append(_Block(scaled, lower / unit(lower), inverse))
     return blocks
 
 
-def _times(first: Float[Array, "... pairs pairs positions"], second: Float[Array, "pairs pairs positions"]):
+def _times(first: Float[Array, "... rows pairs positions"], second: Float[Array, "pairs pairs positions"]):
     """Products of small matrices at every position."""
-    return sum(first[..., k, None, :] * second[k] for k in range(len(second)))
-
-
-def _small_inverse(matrix: Float[Array, "pairs pairs positions"]) -> Float[Array, "pairs pairs positions"]:
-    """Of a symmetric, positive definite matrix."""
-    none, all_of = jnp.zeros_like(matrix[0, 0])[None], jnp.ones_like(matrix[0, 0])[None]
-    count = len(matrix)
-    inverse = _inverse(factorize(matrix, matrix[0], [all_of] * count, [none] * count))
-    return jnp.stack([jnp.concatenate(row) for row in inverse])
+    wide = second.reshape(-1, *[1] * (first.ndim - 2), *second.shape[1:])
+    return sum(first[..., k, None, :] * wide[k] for k in range(len(second)))
 
 
 def _of_support(
@@ -152,10 +131,10 @@ def _of_support(
     """V^T A^-1 X by mode, and X^T A^-1 X."""
     if coupling.support_modes is None:
         # what the common approach presses is the first mode
-        even = jnp.sum(modal[0] * lever, axis=-2)
+        even = jnp.sum(modal[0] * lever[None, None], axis=-2)
         return list(even[:, None]), jnp.sum(even[0] * lever, axis=0)[None, None]
     shapes = coupling.support_modes
-    pressed = jnp.stack([sum(x * height for x, height in zip(row, lever)) for row in inverse])
+    pressed = jnp.stack([sum(x * height[None] for x, height in zip(row, lever)) for row in inverse])
     right = [onto(mode[:, None] * shapes, pressed) for mode in coupling.modes.T]
     force = jnp.sum(pressed * lever[:, None], axis=0)
     return right, jnp.stack([onto(shape[:, None] * shapes, force) for shape in shapes.T])
@@ -176,7 +155,9 @@ def _ahead(blocks: list[_Block], right: list[Sides]) -> tuple[list[Sides], list[
     return whole, divided
 
 
-def _joined(first: list[Sides], second: list[Sides]) -> Float[Array, "sides sides positions"]:
+def _joined(
+    first: list[Sides], second: list[Float[Array, "others pairs positions"]]
+) -> Float[Array, "sides others positions"]:
     """Sum over modes and springs."""
     return reduce(add, [jnp.sum(a[:, None] * b[None], axis=2) for a, b in zip(first, second)])
 
@@ -210,7 +191,8 @@ def respond(
     eliminated = [a[0] + jnp.sum(b * bends[:, None], axis=0) for a, b in zip(divided, factors.bent[1])]
     deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
     even = along(shapes, bends)
-    pressed = [height * even - deflected[:, i] for i, height in enumerate(factors.lever)]
+    pressed = [height[None] * even - deflected[:, i] for i, height in enumerate(factors.lever)]
+    pressed = [row / unit(row) for row in pressed]
     loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(inside, factors.inverse)]
     return Response(loads, approach, pressed)
 
