@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .coupling import Coupling, along, onto
-from .elimination import Curve, Factors, Rows, Slopes, factorize, forward
+from .elimination import Curve, Factors, Rows, Slopes, inverse_of, small_inverse
 from .stored import unit
 
 Levers = Float[Array, "pairs positions"]
@@ -81,27 +81,13 @@ def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
         lever: what a spring closes per unit of common approach.
         own: elimination of every slice with the local compliance and the slopes of the springs.
     """
-    inverse = _inverse(own)
+    inverse = inverse_of(own)
     modal = _products(coupling.modes, inverse)
     blocks = _eliminated(coupling, modal)
     right, force = _of_support(coupling, lever, inverse, modal)
     bent = _ahead(blocks, right)
     force = force - _joined(bent[0], bent[1])
     return CoupledFactors(coupling, lever, inverse, blocks, bent, force, own.per_slope)
-
-
-def _inverse(own: Factors) -> Inverse:
-    count = len(own.active)
-    none = jnp.zeros_like(own.active[0])
-    ahead = [
-        forward(own.rows, own.inverse, [own.active[j] if i == j else none for i in range(count)]) for j in range(count)
-    ]
-    half = {}
-    for i in range(count):
-        for j in range(i + 1):
-            value = sum(ahead[i][k] * ahead[j][k] * own.inverse[k] for k in range(i, count))
-            half[i, j] = half[j, i] = value / unit(value)
-    return [[half[i, j] for j in range(count)] for i in range(count)]
 
 
 def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "modes pairs pairs positions"]]:
@@ -127,7 +113,7 @@ def _eliminated(coupling: Coupling, modal: list[Float[Array, "modes pairs pairs 
             ahead = mode - before
             scaled = scaled - _times(block.lower[ahead:], jnp.swapaxes(block.scaled[ahead], 0, 1))
         scaled = scaled / unit(scaled)
-        inverse = _small_inverse(scaled[0])
+        inverse = small_inverse(scaled[0])
         lower = _times(scaled, inverse)
         blocks.append(_Block(scaled, lower / unit(lower), inverse))
     return blocks
@@ -136,14 +122,6 @@ def _eliminated(coupling: Coupling, modal: list[Float[Array, "modes pairs pairs 
 def _times(first: Float[Array, "... pairs pairs positions"], second: Float[Array, "pairs pairs positions"]):
     """Products of small matrices at every position."""
     return sum(first[..., k, None, :] * second[k] for k in range(len(second)))
-
-
-def _small_inverse(matrix: Float[Array, "pairs pairs positions"]) -> Float[Array, "pairs pairs positions"]:
-    """Of a symmetric, positive definite matrix."""
-    none, all_of = jnp.zeros_like(matrix[0, 0])[None], jnp.ones_like(matrix[0, 0])[None]
-    count = len(matrix)
-    inverse = _inverse(factorize(matrix, matrix[0], [all_of] * count, [none] * count))
-    return jnp.stack([jnp.concatenate(row) for row in inverse])
 
 
 def _of_support(

@@ -17,6 +17,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .elimination import small_inverse
+
 Rows = list[Float[Array, "slices positions"]]
 Springs = Float[Array, "pairs pairs positions"]
 
@@ -68,8 +70,8 @@ class Coupling(eqx.Module):
 
 def with_inverses(coupling: Coupling, compliance: Springs) -> Coupling:
     """The coupling ready for eliminations; C has to be positive definite."""
-    inverse = jnp.moveaxis(jnp.linalg.inv(jnp.moveaxis(compliance, -1, 0)), 0, -1)
-    held = Held(coupling.rest * compliance, inverse, jnp.linalg.inv(coupling.share))
+    share = small_inverse(coupling.share[..., None])[..., 0]
+    held = Held(coupling.rest * compliance, small_inverse(compliance), share)
     return eqx.tree_at(lambda c: c.held, coupling, held, is_leaf=lambda leaf: leaf is None)
 
 
