@@ -1,5 +1,7 @@
 """Axes that are not parallel open the gap over the face as a lead slope does: in the library, in files, in sweeps."""
 
+import json
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -128,5 +130,6 @@ def test_analyze_writes_what_is_seen_across_the_face(tmp_path):
     path.write_text(FIXED.replace("positions = 8", "positions = 8\nslices = 4") + "\n[misalignment]\ndirect = 12.0\n")
     result = call("analyze", path, "-o", tmp_path / "out")
     assert result.code == 0 and "face load factor K_Hbeta" in result.out
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["misalignment_um"] == 12.0
     written = {entry.name for entry in (tmp_path / "out").iterdir()}
     assert {"contact_pattern.png", "line_load.png", "face_gap.png", "face_load_over_torque.png"} <= written
