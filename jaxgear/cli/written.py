@@ -15,6 +15,7 @@ from ..io import DesignFile, describe
 from ..metrics import Doubt
 from ..numerics import fields_of
 from ..optimize import Verified
+from ..shafts import RigidSupport
 from .report import Evaluations, diameters, reduction
 from .study import Evaluation
 from .version import version
@@ -38,6 +39,7 @@ def summary(
         "friction": file.friction,
         "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
         "center_distance_mm": _center_distance(mesh),
+        **_misalignment(mesh),
         "model": {"compliance": _words(mesh.compliance), "plane": mesh.compliance.plane},
         "designs": {
             name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
@@ -95,6 +97,13 @@ def _center_distance(mesh: Mesh) -> float:
         np.hypot(contact.pinion_base_radius, contact.pinion_pitch_roll_length)
         + np.hypot(contact.wheel_base_radius, contact.wheel_pitch_roll_length)
     )
+
+
+def _misalignment(mesh: Mesh) -> dict[str, float]:
+    """Misalignment over the face where the axes are not parallel [um]."""
+    if not isinstance(mesh.support, RigidSupport):
+        return {}
+    return {"misalignment_um": float(mesh.support.misalignment.over_face(mesh.pair))}
 
 
 def _words(part: eqx.Module) -> str:

@@ -8,7 +8,8 @@ springs obey
 
 X being the levers times the support's modes. So p follows from the symmetric, positive definite matrix
 C^-1 x M^-1 + V^T A^-1 V, a few unknowns at every position, and what is left are the equations of the support. What
-several loops read ends with a division, for compilers to store it.
+several loops read ends with a division, for compilers to store it; the divisor is of the factors, because a derivative
+in reverse mode is linear in what a response is to.
 """
 
 from functools import reduce
@@ -147,11 +148,11 @@ def _ahead(blocks: list[_Block], right: list[Sides]) -> tuple[list[Sides], list[
     for mode, value in enumerate(right):
         for before, block in enumerate(blocks[:mode]):
             value = value - _times(divided[before][:, None], jnp.swapaxes(block.scaled[mode - before], 0, 1))[:, 0]
-        value = value / unit(value)
+        value = value / unit(blocks[mode].inverse[0])[None]
         # the first rows of L are one; D^-1 is symmetric
         found = _times(value[:, None], blocks[mode].inverse)[:, 0]
         whole.append(value)
-        divided.append(found / unit(found))
+        divided.append(found / unit(blocks[mode].inverse[0])[None])
     return whole, divided
 
 
@@ -171,7 +172,7 @@ def _back(
         value = divided[mode]
         for later in range(mode + 1, len(blocks)):
             value = value - jnp.sum(blocks[mode].lower[later - mode] * found[later][:, None], axis=0)
-        found[mode] = value / unit(value)
+        found[mode] = value / unit(blocks[mode].inverse[0])
     return [found[mode] for mode in range(len(blocks))]
 
 
@@ -181,7 +182,7 @@ def respond(
     """Solves for a load or for an approach; see the top."""
     coupling, count = factors.coupling, len(weight)
     inside = [sum(x * row for x, row in zip(rows, known)) for rows in factors.inverse]  # A^-1 known
-    inside = [row / unit(row) for row in inside]
+    inside = [row / unit(rows[0]) for row, rows in zip(inside, factors.inverse)]
     _, divided = _ahead(factors.blocks, list(onto(coupling.modes, jnp.stack(inside))[:, None]))
     force = sum(height[None] * row for height, row in zip(factors.lever, inside))
     constant = jnp.full((count, 1), count**-0.5, force.dtype)
@@ -192,7 +193,7 @@ def respond(
     deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
     even = along(shapes, bends)
     pressed = [height[None] * even - deflected[:, i] for i, height in enumerate(factors.lever)]
-    pressed = [row / unit(row) for row in pressed]
+    pressed = [row / unit(rows[0]) for row, rows in zip(pressed, factors.inverse)]
     loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(inside, factors.inverse)]
     return Response(loads, approach, pressed)
 
@@ -219,8 +220,11 @@ def _yielding(factors: CoupledFactors, carried: Bends) -> tuple[Bends, Bends]:
     first = jnp.zeros_like(carried).at[0].set(1.0)
     if support is None:
         return jnp.zeros_like(carried), first
-    sides = jnp.stack([-jnp.tensordot(support, carried, 1), first], axis=1)
     matrix = jnp.eye(len(support), dtype=carried.dtype)[..., None] + jnp.tensordot(support, factors.force, 1)
-    found = jnp.linalg.solve(jnp.moveaxis(matrix, -1, 0), jnp.moveaxis(sides, -1, 0))
-    found = jnp.moveaxis(found, 0, -1)
-    return found[:, 0], found[:, 1]
+    matrix = jnp.moveaxis(matrix, -1, 0)
+
+    def solved(side):
+        return jnp.linalg.solve(matrix, side.T[..., None])[..., 0].T
+
+    # one after the other: reverse mode is linear in the first alone
+    return solved(-jnp.tensordot(support, carried, 1)), solved(first)
