@@ -16,14 +16,16 @@ from operator import add
 from typing import NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
-from .coupling import Coupling, along, contracted, onto
-from .elimination import Curve, Factors, Rows, Slopes, factorize, forward
+from .coupling import Coupling, along, onto
+from .elimination import Curve, Factors, Rows, Slopes, inverse_of, small_inverse
 from .stored import unit
 
 Levers = Float[Array, "pairs positions"]
 Bends = Float[Array, "bends positions"]
+Inverse = list[list[Float[Array, "slices positions"]]]  # of every slice on its own, by springs
 Sides = Float[Array, "sides pairs positions"]  # right sides of the modal system, of one mode
 
 
@@ -56,7 +58,7 @@ class CoupledFactors(NamedTuple):
 
     coupling: Coupling
     lever: Levers
-    inverse: list[list[Float[Array, "slices positions"]]]
+    inverse: Inverse
     blocks: list[_Block]
     bent: tuple[list[Sides], list[Sides]]
     force: Float[Array, "bends bends positions"]
@@ -79,41 +81,39 @@ def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
         lever: what a spring closes per unit of common approach.
         own: elimination of every slice with the local compliance and the slopes of the springs.
     """
-    inverse = _inverse(own)
-    stacked = jnp.stack([jnp.stack(row) for row in inverse])
-    modal = jnp.moveaxis(contracted(coupling.modes, coupling.modes, stacked), (2, 3), (0, 1))
+    inverse = inverse_of(own)
+    modal = _products(coupling.modes, inverse)
     blocks = _eliminated(coupling, modal)
-    right, force = _of_support(coupling, lever, stacked, modal)
+    right, force = _of_support(coupling, lever, inverse, modal)
     bent = _ahead(blocks, right)
     force = force - _joined(bent[0], bent[1])
     return CoupledFactors(coupling, lever, inverse, blocks, bent, force, own.per_slope)
 
 
-def _inverse(own: Factors) -> list[list[Float[Array, "slices positions"]]]:
-    count = len(own.active)
-    none = jnp.zeros_like(own.active[0])
-    ahead = [
-        forward(own.rows, own.inverse, [own.active[j] if i == j else none for i in range(count)]) for j in range(count)
-    ]
-    half = {}
-    for i in range(count):
-        for j in range(i + 1):
-            value = sum(ahead[i][k] * ahead[j][k] * own.inverse[k] for k in range(i, count))
-            half[i, j] = half[j, i] = value / unit(value)
-    return [[half[i, j] for j in range(count)] for i in range(count)]
+def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "modes pairs pairs positions"]]:
+    """V^T rows V: of every mode with itself and those after it, by mode."""
+    count = modes.shape[1]
+    weight = jnp.concatenate([modes[:, k : k + 1] * modes[:, k:] for k in range(count)], axis=1)
+    springs = range(len(rows))
+    half = [(i, j) for i in springs for j in range(i + 1)]
+    found = onto(weight, jnp.stack([rows[i][j] for i, j in half]))
+    place = {pair: index for index, pair in enumerate(half)}
+    whole = [jnp.stack([found[:, place[max(i, j), min(i, j)]] for j in springs], axis=1) for i in springs]
+    ends = np.cumsum(np.arange(count, 0, -1))
+    return jnp.split(jnp.stack(whole, axis=1), ends[:-1])
 
 
-def _eliminated(coupling: Coupling, modal: Float[Array, "modes modes pairs pairs positions"]) -> list[_Block]:
+def _eliminated(coupling: Coupling, modal: list[Float[Array, "modes pairs pairs positions"]]) -> list[_Block]:
     held = coupling.held
     blocks: list[_Block] = []
     assert held is not None  # whoever eliminates gives the inverses
     for mode in range(len(modal)):
-        scaled = modal[mode:, mode] + held.share_inverse[mode:, mode, None, None, None] * held.inverse
+        scaled = modal[mode] + held.share_inverse[mode:, mode, None, None, None] * held.inverse
         for before, block in enumerate(blocks):
             ahead = mode - before
             scaled = scaled - _times(block.lower[ahead:], jnp.swapaxes(block.scaled[ahead], 0, 1))
         scaled = scaled / unit(scaled)
-        inverse = _small_inverse(scaled[0])
+        inverse = small_inverse(scaled[0])
         lower = _times(scaled, inverse)
         blocks.append(_Block(scaled, lower / unit(lower), inverse))
     return blocks
@@ -124,27 +124,19 @@ def _times(first: Float[Array, "... pairs pairs positions"], second: Float[Array
     return sum(first[..., k, None, :] * second[k] for k in range(len(second)))
 
 
-def _small_inverse(matrix: Float[Array, "pairs pairs positions"]) -> Float[Array, "pairs pairs positions"]:
-    """Of a symmetric, positive definite matrix."""
-    none, all_of = jnp.zeros_like(matrix[0, 0])[None], jnp.ones_like(matrix[0, 0])[None]
-    count = len(matrix)
-    inverse = _inverse(factorize(matrix, matrix[0], [all_of] * count, [none] * count))
-    return jnp.stack([jnp.concatenate(row) for row in inverse])
-
-
 def _of_support(
     coupling: Coupling, lever: Levers, inverse, modal
 ) -> tuple[list[Sides], Float[Array, "bends bends positions"]]:
     """V^T A^-1 X by mode, and X^T A^-1 X."""
     if coupling.support_modes is None:
         # what the common approach presses is the first mode
-        even = jnp.sum(modal[:, 0] * lever, axis=-2)
+        even = jnp.sum(modal[0] * lever, axis=-2)
         return list(even[:, None]), jnp.sum(even[0] * lever, axis=0)[None, None]
     shapes = coupling.support_modes
-    pressed = jnp.sum(inverse * lever[:, None], axis=1)
-    right = jnp.moveaxis(contracted(shapes, coupling.modes, pressed), 0, 2)  # bends, modes, pairs, positions
+    pressed = jnp.stack([sum(x * height for x, height in zip(row, lever)) for row in inverse])
+    right = [onto(mode[:, None] * shapes, pressed) for mode in coupling.modes.T]
     force = jnp.sum(pressed * lever[:, None], axis=0)
-    return [right[:, mode] for mode in range(right.shape[1])], contracted(shapes, shapes, force)
+    return right, jnp.stack([onto(shape[:, None] * shapes, force) for shape in shapes.T])
 
 
 def _ahead(blocks: list[_Block], right: list[Sides]) -> tuple[list[Sides], list[Sides]]:
@@ -187,16 +179,16 @@ def respond(
     coupling, count = factors.coupling, len(weight)
     inside = [sum(x * row for x, row in zip(rows, known)) for rows in factors.inverse]  # A^-1 known
     inside = [row / unit(row) for row in inside]
-    modal = onto(coupling.modes, jnp.stack(inside))
-    _, divided = _ahead(factors.blocks, [modal[:, mode][None] for mode in range(modal.shape[1])])
+    _, divided = _ahead(factors.blocks, list(onto(coupling.modes, jnp.stack(inside))[:, None]))
     force = sum(height[None] * row for height, row in zip(factors.lever, inside))
     constant = jnp.full((count, 1), count**-0.5, force.dtype)
     shapes = constant if coupling.support_modes is None else coupling.support_modes
     carried = onto(shapes, force) - _joined(factors.bent[0], divided)[:, 0]
     bends, approach = _bends(factors, carried, None if load is None else load / weight[0], approach)
     eliminated = [a[0] + jnp.sum(b * bends[:, None], axis=0) for a, b in zip(divided, factors.bent[1])]
-    deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated), axis=1))
-    pressed = list(factors.lever[:, None] * along(shapes, bends) - deflected)
+    deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
+    even = along(shapes, bends)
+    pressed = [height * even - deflected[:, i] for i, height in enumerate(factors.lever)]
     loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(inside, factors.inverse)]
     return Response(loads, approach, pressed)
 

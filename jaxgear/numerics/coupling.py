@@ -9,11 +9,15 @@ springs on bodies whose deflection at one place is felt at others, on a support 
 springs of a slice.
 """
 
+from functools import reduce
+from operator import add
 from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+
+from .elimination import small_inverse
 
 Rows = list[Float[Array, "slices positions"]]
 Springs = Float[Array, "pairs pairs positions"]
@@ -55,7 +59,8 @@ class Coupling(eqx.Module):
     def deflection(self, compliance: Springs, lever: Float[Array, "pairs positions"], load: Rows) -> Rows:
         """y under line loads."""
         uniform = jnp.stack([sum(c[None] * q for c, q in zip(row, load)) for row in compliance])
-        result = list(self.rest * uniform + along(self.modes, along(self.share, onto(self.modes, uniform))))
+        modal = along(self.modes, along(self.share, onto(self.modes, uniform)))
+        result = [self.rest * row + modal[:, i] for i, row in enumerate(uniform)]
         if self.support is None or self.support_modes is None:
             return result
         force = sum(height[None] * q for height, q in zip(lever, load))
@@ -65,29 +70,27 @@ class Coupling(eqx.Module):
 
 def with_inverses(coupling: Coupling, compliance: Springs) -> Coupling:
     """The coupling ready for eliminations; C has to be positive definite."""
-    inverse = jnp.moveaxis(jnp.linalg.inv(jnp.moveaxis(compliance, -1, 0)), 0, -1)
-    held = Held(coupling.rest * compliance, inverse, jnp.linalg.inv(coupling.share))
+    share = small_inverse(coupling.share[..., None])[..., 0]
+    held = Held(coupling.rest * compliance, small_inverse(compliance), share)
     return eqx.tree_at(lambda c: c.held, coupling, held, is_leaf=lambda leaf: leaf is None)
+
+
+# Sums over few terms rather than products of matrices: compilers fuse them, and turn no array around for them.
 
 
 def onto(
     modes: Float[Array, "slices modes"], rows: Float[Array, "... slices positions"]
-) -> Float[Array, "... modes positions"]:
+) -> Float[Array, "modes ... positions"]:
     """V^T rows."""
-    return jnp.einsum("sk,...sx->...kx", modes, rows, precision="highest")
+    return reduce(add, [_outer(weight, rows[..., s, :]) for s, weight in enumerate(modes)])
 
 
 def along(
-    modes: Float[Array, "slices modes"], modal: Float[Array, "... modes positions"]
-) -> Float[Array, "... slices positions"]:
+    modes: Float[Array, "slices modes"], modal: Float[Array, "modes ... positions"]
+) -> Float[Array, "slices ... positions"]:
     """V modal."""
-    return jnp.einsum("sk,...kx->...sx", modes, modal, precision="highest")
+    return reduce(add, [_outer(weight, value) for weight, value in zip(modes.T, modal)])
 
 
-def contracted(
-    first: Float[Array, "slices first"],
-    second: Float[Array, "slices second"],
-    rows: Float[Array, "... slices positions"],
-) -> Float[Array, "... first second positions"]:
-    """First^T diag(rows) second."""
-    return jnp.einsum("skl,...sx->...klx", first[:, :, None] * second[:, None], rows, precision="highest")
+def _outer(weight: Float[Array, " modes"], row: Float[Array, "... positions"]) -> Float[Array, "modes ... positions"]:
+    return weight.reshape(-1, *[1] * row.ndim) * row
