@@ -116,7 +116,7 @@ def profiles(support, lines, fast):
     amounts = np.round(deflection * np.linspace(0.6, 1.4, 3 if fast else 5))
     mesh = jg.prepare(
         support.pair,
-        resolution=jg.Resolution(positions=32, slices=8),
+        resolution=jg.Resolution(positions=32, slices=6),
         support=layout.at_torque(support, torque),
     )
     return layout.vary_profiles(mesh, torque, lines.modifications, amounts, amounts)
