@@ -33,6 +33,7 @@ SPAN = 330.0  # mm, between the bearings of every shaft
 STAGES = "high speed", "low speed"
 HOUSINGS = "rigid seats", "good foundation", "bad foundation"
 SEATS = ("A", "B"), ("C", "D"), ("E", "F")  # of input, intermediate and output shaft: front and back wall
+SLICES = 6
 PART_LOAD = 0.9  # of the nominal load, at which the profiles are laid out
 
 
@@ -114,11 +115,9 @@ def profiles(support, lines, fast):
     torque = PART_LOAD * float(support.torque)
     deflection = float(jg.iso_relief(support.pair, torque).amount)
     amounts = np.round(deflection * np.linspace(0.6, 1.4, 3 if fast else 5))
-    mesh = jg.prepare(
-        support.pair,
-        resolution=jg.Resolution(positions=32, slices=6),
-        support=layout.at_torque(support, torque),
-    )
+    # as numbers, so that what is compiled for one stage serves the other
+    support = layout.at_stations(support, torque, stations=SLICES)
+    mesh = jg.prepare(support.pair, resolution=jg.Resolution(positions=32, slices=SLICES), support=support)
     return layout.vary_profiles(mesh, torque, lines.modifications, amounts, amounts)
 
 

@@ -295,6 +295,10 @@ def test_hours_are_weights_with_a_duration():
             lambda: flank_line_tolerance(PAIR, 14),
             "ToleranceClass: quality_class = 14 must be at least 1 and at most 11",
         ),
+        (
+            lambda: tolerance_cases(rigid(), TOLERANCE, torque=9.0, stations=2).edge_contact,
+            "tolerance_cases: 2 stations",
+        ),
         (lambda: layout_flank_lines(SUPPORT, {}), "layout_flank_lines: tolerances must not be empty"),
         (lambda: layout_flank_lines(SUPPORT, TOLERANCE, gear="both"), "layout_flank_lines: gear = 'both' must be"),
         (

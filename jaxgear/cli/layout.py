@@ -9,7 +9,7 @@ import jax
 from ..contact import Mesh
 from ..io import DesignFile, LayoutRequest, layout_request, result_folder, write_flanks, write_summary
 from ..io.schema_shafts import ProfileSection
-from ..layout import FlankLine, FlankLineLayout, ProfileLayout, at_torque, layout_flank_lines, vary_profiles
+from ..layout import FlankLine, FlankLineLayout, ProfileLayout, at_stations, layout_flank_lines, vary_profiles
 from . import interrupt, layout_report, report
 from .commands import import_ahead
 from .devices import compile_quickly
@@ -61,7 +61,9 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
         for name in layouts if wanted.shafts else list(layouts)[:1]:
             stages.begin("preparing the mesh" + (f", {name}" if wanted.shafts else ""))
             size = design.resolution()
-            support = at_torque(request.supports[name], request.profile_torque) if wanted.shafts else None
+            support = None
+            if wanted.shafts:
+                support = at_stations(request.supports[name], request.profile_torque, stations=size.slices)
             mesh = jax.block_until_ready(design.mesh(coarse(size) if quick else size, support))
             stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
             meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)

@@ -18,6 +18,9 @@ STATIONS = 41  # over the face, as many as `annex_e` has
 class Stations(AbstractSupport):
     """A support as numbers at evenly spaced stations, under one torque; made by `at_stations`.
 
+    With as many stations as slices it stands for the support in `prepare`, and programs compiled for one gearbox serve
+    every other.
+
     Attributes:
         gears: the pair.
         torque: on the pinion.
@@ -103,7 +106,7 @@ def at_stations(support: AbstractSupport, torque=None, *, stations: int = STATIO
     if not isinstance(support, ShaftSupport) and torque is None:
         raise ValueError("at_stations: torque must be given: no coupling tells it")
     check("at_stations", "torque", torque, "N m", low=0.0)
-    return _at_stations(support, optional_real(torque), whole("at_stations", "stations", stations, 3, 1001))
+    return _at_stations(support, optional_real(torque), whole("at_stations", "stations", stations, 2, 1001))
 
 
 @program

@@ -221,6 +221,10 @@ def _force(face: Stations) -> Scalar:
 
 def _excess(line_load: Float[Array, "... slices"], share) -> Float[Array, "..."]:
     """Larger load of both ends less a share of the largest in between, over the mean."""
+    if line_load.shape[-1] < 3:
+        raise ValueError(
+            f"tolerance_cases: {line_load.shape[-1]} stations must be at least 3, two of them are the edges"
+        )
     ends = jnp.maximum(line_load[..., 0], line_load[..., -1])
     inner, mean = maximum(line_load[..., 1:-1], axis=-1), jnp.mean(line_load, axis=-1)
     return (ends - share * inner) / jnp.where(mean > 0, mean, 1.0)
