@@ -14,6 +14,7 @@ from ..microgeometry import AbstractModification, NoModification, terms
 from ..numerics import ContactProblem, concrete, minimum, program, solve_contact, stored, tangent_stiffness
 from ..numerics.programs import begin
 from .cycle import MeshCycle
+from .face_coupling import check_torque
 from .loaded_width import loaded_material, unlabelled
 from .mesh import Mesh, prepare, prepare_from
 from .operation import Operation, operation_of
@@ -49,11 +50,12 @@ def solve(
 
     Raises:
         TypeError: for something else than a prepared mesh or a modification.
-        ValueError: for a negative or non-finite torque, an array of torques, or a modification that varies along the
-            face on a mesh of one slice.
+        ValueError: for a negative or non-finite torque, an array of torques, a modification that varies along the
+            face on a mesh of one slice, or a torque that is not that of the gearbox which holds the gears.
     """
     check_mesh("solve", mesh)
     operation = operation_of("solve", torque, mesh.slice_width.dtype)
+    check_torque("solve", mesh.support, operation.torque)
     pinion, wheel = flanks_of("solve", mesh, pinion, wheel)
     # two programs: that of the contact, by far the longer one to compile, serves every kind of modification
     removed = _material(mesh, operation.torque, pinion, wheel)
@@ -81,10 +83,12 @@ def solve_removed(
 
     Raises:
         TypeError: for something else than a prepared mesh.
-        ValueError: for a negative or non-finite torque, an array of torques, or removed material of another shape.
+        ValueError: for a negative or non-finite torque, an array of torques, removed material of another shape, or a
+            torque that is not that of the gearbox which holds the gears.
     """
     check_mesh("solve_removed", mesh)
     operation = operation_of("solve_removed", torque, mesh.slice_width.dtype)
+    check_torque("solve_removed", mesh.support, operation.torque)
     shape = jnp.shape(removed.amount if isinstance(removed, RemovedMaterial) else removed)
     wanted = (mesh.resolution.pairs, mesh.resolution.slices, mesh.resolution.positions)
     if shape != wanted:

@@ -35,6 +35,7 @@ from .contact_system import (
     given_load,
     load_per_approach,
     opening,
+    step,
     total,
     without_gap,
 )
@@ -149,15 +150,18 @@ def _iterate(
         return v, approach, secant, _residual(problem, v, approach, secant, common)
 
     def advance(state):
-        step, (v, _, secant, _) = state
+        count, (v, approach, secant, _) = state
         load32, secant32 = _cast((_carried(v), secant), jnp.float32)
+        if problem.coupling is not None:
+            slope32 = _slopes(single, load32, secant32)
+            return count + 1, evaluated(*_corrected(problem, single, v, approach, secant, slope32))
         share = [slope / c for slope, c in zip(_slopes(single, load32, secant32), secant32)]
         slope = [part * c for part, c in zip(_cast(share, dtype), secant)]
-        return step + 1, evaluated(*_newton(problem, v, secant, slope))
+        return count + 1, evaluated(*_newton(problem, v, secant, slope))
 
     def unfinished(state):
-        step, (*_, residual) = state
-        return (step < steps) & ~jnp.all(residual < tolerance)
+        count, (*_, residual) = state
+        return (count < steps) & ~jnp.all(residual < tolerance)
 
     _, (v, approach, _, residual) = jax.lax.while_loop(unfinished, advance, (0, evaluated(v, approach)))
     return v, approach, residual
@@ -254,14 +258,29 @@ def _newton(problem: ContactProblem, v: Rows, secant: Slopes, slope: Slopes) -> 
     active, carried = _active(problem, v), _carried(v)
     factors = eliminate(problem, active, slope)
     known = [-gap - (c - s) * q for gap, c, s, q in zip(problem.gap, secant, slope, carried)]
-    if problem.approach is not None:
-        load, approach = given_approach(problem, factors, known, problem.approach), problem.approach
-    else:
-        load, approach = given_load(problem, factors, known, problem.load)
-    left = opening(problem, load, approach)
+    load, approach, left = step(problem, factors, known)
     return [
         jnp.where(flag, q, -y * inverse) for flag, q, y, inverse in zip(active, load, left, factors.per_slope)
     ], approach
+
+
+def _corrected(
+    problem: ContactProblem, single: ContactProblem, v: Rows, approach: Curve, secant: Slopes, slope: Slopes
+) -> tuple[Rows, Curve]:
+    """One Newton step of coupled slices, as a correction of what is left of the conditions in single precision."""
+    active, carried = _active(problem, v), _carried(v)
+    left = opening(problem, carried, approach)
+    missing = None if problem.load is None else problem.load - total(problem, carried)
+    known, gap, load = _cast(([-(y + c * q) for y, c, q in zip(left, secant, carried)], left, missing), jnp.float32)
+    change = replace(
+        single, gap=jnp.stack(gap), load=load, approach=None if single.approach is None else 0 * single.approach
+    )
+    factors = eliminate(single, active, slope)
+    added, more, left = step(change, factors, known)
+    return [
+        jnp.where(flag, q + x, -y * inverse)
+        for flag, q, x, y, inverse in zip(active, carried, added, left, factors.per_slope)
+    ], approach + more
 
 
 def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Slopes, common: Curve) -> Curve:

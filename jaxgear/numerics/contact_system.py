@@ -44,6 +44,23 @@ def given_approach(problem: ContactProblem, factors: Factors | CoupledFactors, k
     return at_approach(factors, known, approach)
 
 
+def step(problem: ContactProblem, factors: Factors | CoupledFactors, known: Rows) -> tuple[Rows, Curve, Rows]:
+    """Line loads of the active springs, approach and `opening` for what the problem prescribes."""
+    if not isinstance(factors, CoupledFactors):
+        if problem.approach is not None:
+            load, approach = at_approach(factors, known, problem.approach), problem.approach
+        else:
+            load, approach = balance(problem.weight, factors, known, problem.load)
+        return load, approach, opening(problem, load, approach)
+    assert problem.coupling is not None and problem.coupling.held is not None
+    found = respond(problem.weight, factors, known, load=problem.load, approach=problem.approach)
+    left = [
+        sum(c[None] * q for c, q in zip(row, found.load)) + gap - pressed
+        for row, gap, pressed in zip(problem.coupling.held.local, problem.gap, found.pressed)
+    ]
+    return found.load, found.approach, left
+
+
 def load_per_approach(problem: ContactProblem, factors: Factors | CoupledFactors) -> Curve:
     """d load / d approach of the active springs."""
     if isinstance(factors, CoupledFactors):

@@ -108,7 +108,7 @@ def _eliminated(coupling: Coupling, modal: list[Float[Array, "modes pairs pairs 
     blocks: list[_Block] = []
     assert held is not None  # whoever eliminates gives the inverses
     for mode in range(len(modal)):
-        scaled = modal[mode] + held.share_inverse[mode:, mode, None, None, None] * held.inverse
+        scaled = modal[mode] + held.share_inverse[mode:, mode, None, None, None] * held.inverse[None]
         for before, block in enumerate(blocks):
             ahead = mode - before
             scaled = scaled - _times(block.lower[ahead:], jnp.swapaxes(block.scaled[ahead], 0, 1))
@@ -121,7 +121,8 @@ def _eliminated(coupling: Coupling, modal: list[Float[Array, "modes pairs pairs 
 
 def _times(first: Float[Array, "... pairs pairs positions"], second: Float[Array, "pairs pairs positions"]):
     """Products of small matrices at every position."""
-    return sum(first[..., k, None, :] * second[k] for k in range(len(second)))
+    wide = second.reshape(-1, *[1] * (first.ndim - 2), *second.shape[1:])
+    return sum(first[..., k, None, :] * wide[k] for k in range(len(second)))
 
 
 def _of_support(
@@ -130,10 +131,10 @@ def _of_support(
     """V^T A^-1 X by mode, and X^T A^-1 X."""
     if coupling.support_modes is None:
         # what the common approach presses is the first mode
-        even = jnp.sum(modal[0] * lever, axis=-2)
+        even = jnp.sum(modal[0] * lever[None, None], axis=-2)
         return list(even[:, None]), jnp.sum(even[0] * lever, axis=0)[None, None]
     shapes = coupling.support_modes
-    pressed = jnp.stack([sum(x * height for x, height in zip(row, lever)) for row in inverse])
+    pressed = jnp.stack([sum(x * height[None] for x, height in zip(row, lever)) for row in inverse])
     right = [onto(mode[:, None] * shapes, pressed) for mode in coupling.modes.T]
     force = jnp.sum(pressed * lever[:, None], axis=0)
     return right, jnp.stack([onto(shape[:, None] * shapes, force) for shape in shapes.T])
@@ -188,7 +189,8 @@ def respond(
     eliminated = [a[0] + jnp.sum(b * bends[:, None], axis=0) for a, b in zip(divided, factors.bent[1])]
     deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
     even = along(shapes, bends)
-    pressed = [height * even - deflected[:, i] for i, height in enumerate(factors.lever)]
+    pressed = [height[None] * even - deflected[:, i] for i, height in enumerate(factors.lever)]
+    pressed = [row / unit(row) for row in pressed]
     loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(inside, factors.inverse)]
     return Response(loads, approach, pressed)
 

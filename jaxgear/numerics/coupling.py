@@ -18,6 +18,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .elimination import small_inverse
+from .stored import unit
 
 Rows = list[Float[Array, "slices positions"]]
 Springs = Float[Array, "pairs pairs positions"]
@@ -59,8 +60,11 @@ class Coupling(eqx.Module):
     def deflection(self, compliance: Springs, lever: Float[Array, "pairs positions"], load: Rows) -> Rows:
         """y under line loads."""
         uniform = jnp.stack([sum(c[None] * q for c, q in zip(row, load)) for row in compliance])
-        modal = along(self.modes, along(self.share, onto(self.modes, uniform)))
+        uniform = uniform / unit(uniform)
+        modal = along(self.share, onto(self.modes, uniform))
+        modal = along(self.modes, modal / unit(modal))
         result = [self.rest * row + modal[:, i] for i, row in enumerate(uniform)]
+        result = [row / unit(row) for row in result]
         if self.support is None or self.support_modes is None:
             return result
         force = sum(height[None] * q for height, q in zip(lever, load))
@@ -93,4 +97,4 @@ def along(
 
 
 def _outer(weight: Float[Array, " modes"], row: Float[Array, "... positions"]) -> Float[Array, "modes ... positions"]:
-    return weight.reshape(-1, *[1] * row.ndim) * row
+    return weight.reshape(-1, *[1] * row.ndim) * row[None]
