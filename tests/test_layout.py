@@ -67,7 +67,7 @@ def test_flank_line_levels_bent_shafts():
 def test_a_flank_line_that_would_be_hollow_has_no_crowning():
     """Barrelled gaps as a crowned pinion makes them: the best crowning of the wheel is its negative."""
     bulged = eqx.tree_at(
-        lambda face: face.opening,
+        lambda face: face.table.opening,
         at_stations(rigid(8.0), TORQUE, stations=STATIONS),
         replace_fn=lambda gap: gap + 6.0 * jnp.linspace(-1, 1, STATIONS) ** 2,
     )
@@ -101,6 +101,7 @@ def amounts_of(diameter):
     return jax.jvp(amounts, (diameter,), (jnp.ones_like(diameter),))
 
 
+@pytest.mark.slow
 def test_flank_lines_are_differentiable_in_the_shafts():
     at, step = jnp.asarray(36.0), 1e-3
     slopes = (amounts_of(at + step)[0] - amounts_of(at - step)[0]) / (2 * step)
@@ -145,7 +146,7 @@ def test_least_crowning_brings_the_peak_just_inside():
     peak = 0.5 - 1.0 / STATIONS
     np.testing.assert_allclose(found, slope / (8 * peak), rtol=1e-4)
     given = {"torque": TORQUE, "stiffness": 16.0, "stations": STATIONS}
-    for factor, touches in ((0.98, True), (1.02, False)):
+    for factor, touches in ((0.9, True), (1.02, False)):
         cases = tolerance_cases(rigid(), tolerance, wheel=FlankLine(0.0, factor * found), **given)
         assert bool(cases.edge_contact.any()) == touches
     stricter = crowning_off_the_edges(rigid(), tolerance, share=0.8, **given)

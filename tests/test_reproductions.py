@@ -141,7 +141,7 @@ STAGES = pytest.mark.parametrize("stage", ["high_speed", "low_speed"])
 
 @STAGES
 def test_gearbox_flank_lines_level_the_load_and_keep_it_off_the_edges(gearbox, stage):
-    """The study: K_Hbeta near 1 after step 1, with deviations 1.23 to 1.36 at the edges, and none there after step 2."""
+    """The study: K_Hbeta near 1 after step 1, with deviations 1.23 to 1.36 at the edges, off them after step 2."""
     for housing in ("rigid_seats", "good_foundation", "bad_foundation"):
         of = {
             name: gearbox[f"{stage}_{housing}_{name}"] for name in ("before", "step_1", "edges_step_1", "edges_step_2")

@@ -206,17 +206,13 @@ def _worst_excess(crowning, given):
 @program
 def _off_the_edges(face: Stations, tolerance: FlankLineTolerance, line: FlankLine, share, stiffness) -> Scalar:
     given = face, tolerance, line, share, stiffness
-    bent = face.opening + face.matrix @ jnp.full_like(face.opening, _force(face) / face.count)
+    bent = face.bent
     size = tolerance.helix_slope + tolerance.misalignment + jnp.max(bent) - jnp.min(bent)
     size = jax.lax.stop_gradient(_MOST * (size + jnp.abs(line.slope) + jnp.abs(line.crowning)))
     zero = jnp.zeros_like(size)
     found = bracketed_root(_worst_excess, zero, size, given)
     enough, needed = _worst_excess(size, given) < 0, _worst_excess(zero, given) > _LEVEL
     return jnp.where(needed, jnp.where(enough, found, jnp.nan), 0.0)
-
-
-def _force(face: Stations) -> Scalar:
-    return 1e3 * face.torque / face.pair.pinion.base_radius
 
 
 def _excess(line_load: Float[Array, "... slices"], share) -> Float[Array, "..."]:
