@@ -47,7 +47,7 @@ def coupling_of(
     )
 
 
-def _polynomials(slices: int, count: int) -> Float[Array, "slices count"]:
+def _polynomials(slices: int, count: int) -> Float[np.ndarray, "slices count"]:
     """Of degree 0, 1, 2, ... at the middles of the slices, orthonormal."""
     middle = (np.arange(slices) + 0.5) / slices - 0.5
     found, upper = np.linalg.qr(np.polynomial.legendre.legvander(2 * middle, count - 1))

@@ -227,7 +227,7 @@ def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
     fall = jnp.minimum(edge - jnp.stack([amount[-1, :, 1], amount[0, :, -2]]), 0.0)
     left = (edge - 2 * gain)[..., None] + fall[..., None] * mesh.outer_steps[:, None]
     if mesh.support_gap is not None:
-        left = left + mesh.outer_lever[:, None] * mesh.support_gap[:, None]
+        left = left + mesh.outer_lever[:, None] * mesh.support_gap[None, :, None]
     left = jnp.min(left, axis=1)
     return jnp.min(mesh.outer_gap + left / mesh.outer_lever, axis=0)
 

@@ -90,7 +90,7 @@ def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
     return CoupledFactors(coupling, lever, inverse, blocks, bent, force, own.per_slope)
 
 
-def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "modes pairs pairs positions"]]:
+def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "_ pairs pairs positions"]]:
     """V^T rows V: of every mode with itself and those after it, by mode."""
     count = modes.shape[1]
     weight = jnp.concatenate([modes[:, k : k + 1] * modes[:, k:] for k in range(count)], axis=1)
@@ -103,7 +103,7 @@ def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[
     return jnp.split(jnp.stack(whole, axis=1), ends[:-1])
 
 
-def _eliminated(coupling: Coupling, modal: list[Float[Array, "modes pairs pairs positions"]]) -> list[_Block]:
+def _eliminated(coupling: Coupling, modal: list[Float[Array, "_ pairs pairs positions"]]) -> list[_Block]:
     held = coupling.held
     blocks: list[_Block] = []
     assert held is not None  # whoever eliminates gives the inverses
@@ -119,7 +119,7 @@ def _eliminated(coupling: Coupling, modal: list[Float[Array, "modes pairs pairs 
     return blocks
 
 
-def _times(first: Float[Array, "... pairs pairs positions"], second: Float[Array, "pairs pairs positions"]):
+def _times(first: Float[Array, "... rows pairs positions"], second: Float[Array, "pairs pairs positions"]):
     """Products of small matrices at every position."""
     wide = second.reshape(-1, *[1] * (first.ndim - 2), *second.shape[1:])
     return sum(first[..., k, None, :] * wide[k] for k in range(len(second)))
@@ -155,7 +155,9 @@ def _ahead(blocks: list[_Block], right: list[Sides]) -> tuple[list[Sides], list[
     return whole, divided
 
 
-def _joined(first: list[Sides], second: list[Sides]) -> Float[Array, "sides sides positions"]:
+def _joined(
+    first: list[Sides], second: list[Float[Array, "others pairs positions"]]
+) -> Float[Array, "sides others positions"]:
     """Sum over modes and springs."""
     return reduce(add, [jnp.sum(a[:, None] * b[None], axis=2) for a, b in zip(first, second)])
 
