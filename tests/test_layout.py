@@ -336,3 +336,20 @@ def test_refusals(make, fault):
 def two_stages_idle():
     """The reducer without torque."""
     return eqx.tree_at(lambda box: box.shafts[0].couplings[0].torque, BOX, jnp.zeros(()))
+
+
+def test_pictures_mark_the_edges(layout, clean_figures):
+    """One curve per case, a cross where an end is touched; hollow marks of the same cases."""
+    from jaxgear import plot
+
+    cases = layout.before["maximum"]
+    panel = plot.tolerance_line_load(cases)
+    curves = [line for line in panel.get_lines() if len(line.get_xdata()) == STATIONS]
+    crosses = [line for line in panel.get_lines() if len(line.get_xdata()) == 1]
+    assert len(curves) == len(CASES) and len(crosses) == int(cases.edge_contact.sum()) == 4
+    tops = sorted(float(cross.get_ydata()[0]) for cross in crosses)
+    np.testing.assert_allclose(tops, np.sort(np.asarray(cases.load.line_load).max(axis=1))[1:])
+    assert "[mm]" in panel.get_xlabel() and "[N/mm]" in panel.get_ylabel()
+    panel = plot.face_load_factors({"step 1": cases, "step 2": layout.after["maximum"]})
+    hollow = [line for line in panel.get_lines() if line.get_markerfacecolor() == "white"]
+    assert [len(line.get_xdata()) for line in hollow] == [4, 0]
