@@ -3,6 +3,7 @@
 import base64
 import contextlib
 import io
+import random
 import re
 from types import SimpleNamespace
 
@@ -288,6 +289,12 @@ REFUSED = {
     "ring gear": ('type="cylindrical_gear"', 'type="ring_gear"', "ring_gear 3: is an internal gear"),
     "protuberance": (RACK, RACK + attribute("protuberance_amount", "0.1"), "protuberance_amount: 0.1 must be 0"),
     "chamfer": (TEETH, attribute("chamfer_at_tooth_end", "0.5") + TEETH, "chamfer_at_tooth_end: 0.5 must be 0"),
+    "tip chamfer": (TEETH, attribute("tip_form_diameter", "62.5") + TEETH, "62.5 mm must be the tip diameter, 63 mm"),
+    "not a length": (WIDTH, WIDTH.replace("20.0", "1e7"), "face_width: 1e+07 mm must be at least"),
+    "length alone": ('id="tip_relief_datum_diameter"', 'id="tip_relief_datum_length"', "datum_diameter: missing"),
+    "no module": ('id="normal_module" unit="mm">3.0', 'id="normal_module" unit="mm">0', "0 mm must be greater than 0"),
+    "thicker tooth": (TEETH, attribute("chordal_tooth_thickness_upper_deviation", "0.05") + TEETH,
+                      "0.05 mm is the middle of the allowances, must be greater than -4.712 mm and at most 0 mm"),
     "no corner radius": (RACK, "", "tip_corner_radius_factor_reference_profile: missing"),
     "no tool": ('type="manufacturing_step"', 'type="step"', "must be made by one rack_shaped_tool"),
     "another tool": ('type="rack_shaped_tool"', 'type="profile_tool"', "makes a flank, must be a rack_shaped_tool"),
@@ -338,6 +345,36 @@ def test_what_cannot_be_meant_is_refused_in_one_line(written, name):
         read_rexs(written.path)
     message = str(caught.value)
     assert wanted in message and message.startswith(f"{written.path}: ") and "\n" not in message
+
+
+def test_whatever_is_changed_is_read_or_refused_in_one_line(written):
+    """Slips of a hand: a value, an attribute, an id, a part or a letter."""
+    rng, values = (
+        random.Random(1),
+        ["", "0", "-1", "1e300", "nan", "abc", "0.5", "true", "1,5", "<array><c>1</c></array>"],
+    )
+    pieces = [
+        (r"(<attribute [^>]*>)[^<]*(</attribute>)", lambda found: found[1] + rng.choice(values) + found[2]),
+        (r"<attribute [^>]*>[^<]*</attribute>", lambda found: ""),
+        (
+            r'(id|role|type|unit|order)="[^"]*"',
+            lambda found: f'{found[1]}="{rng.choice(["2", "99", "", "mm", "gear"])}"',
+        ),
+        (r"<(component|relation)\b.*?</\1>", lambda found: ""),
+        (r"(?s).", lambda found: rng.choice(["<", "&", "\0", "5"])),
+    ]
+    places = [[*re.finditer(pattern, written.text, re.DOTALL)] for pattern, _ in pieces]
+    refused = 0
+    for _ in range(200):
+        kind = rng.randrange(len(pieces))
+        found = rng.choice(places[kind])
+        written.path.write_text(written.text[: found.start()] + pieces[kind][1](found) + written.text[found.end() :])
+        try:
+            read_rexs(written.path)
+        except DesignFileError as error:
+            refused += 1
+            assert str(error).startswith(f"{written.path}: ") and "\n" not in str(error)
+    assert refused > 100
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from ...numerics import Number
 from ..errors import DesignFileError
+from ..ranges import outside
 
 CUSTOM = (
     "custom_jaxgear_"  # of attributes that REXS does not know; it leaves names that begin with "custom_" to programs
@@ -35,6 +37,14 @@ _EARLIER = {
     "cylindrical_gear": {
         "thermal_contact_coefficient_agma_925_a03": "thermal_contact_coefficient_agma_925_2003",
     },
+}
+# the library's names of units of REXS, by the shift between them
+_OWN = {
+    ("mm", 3): "um",
+    ("1 / min", 0): "rpm",
+    ("kg / dm^3", 3): "kg/m^3",
+    ("N / (mm s^0.5 K)", 3): "N/(m s^0.5 K)",
+    ("none", 0): "",
 }
 _CODES = {"float64": "<f8", "float32": "<f4", "int32": "<i4"}
 
@@ -76,7 +86,7 @@ class Component:
             return None
         if not isinstance(value, str):
             raise self.refuse(attribute, "must be a number, not an array")
-        return self._float(attribute, value, shift)
+        return self._float(attribute, value, unit, shift)
 
     def needed(self, attribute: str, unit: str) -> float:
         """A number that has to be there."""
@@ -92,7 +102,7 @@ class Component:
             raise self.refuse(attribute, "missing")
         if isinstance(value, str):
             raise self.refuse(attribute, "must be an array, not a single value")
-        return np.array([self._float(attribute, item, shift) for item in value])
+        return np.array([self._float(attribute, item, unit, shift) for item in value])
 
     def choice(self, attribute: str, default: str | None, allowed: Iterable[str]) -> str:
         """One of several words, which has to be there where there is no default."""
@@ -123,10 +133,13 @@ class Component:
             raise self.refuse(attribute, "must be a single value or an array, not a matrix")
         return held.value or None  # an empty element says nothing
 
-    def _float(self, attribute: str, text: str, shift: int) -> float:
+    def _float(self, attribute: str, text: str, unit: str, shift: int) -> float:
         if not _NUMBER.fullmatch(text) or not math.isfinite(value := float(text)):
             raise self.refuse(attribute, f'"{text[:40]}" is not a finite number')
-        return float(Decimal(text).scaleb(shift)) if value else 0.0
+        value = float(Decimal(text).scaleb(shift)) if value else 0.0
+        if problem := outside(Number(_OWN.get((unit, shift), unit)), value):
+            raise self.refuse(attribute, problem)
+        return value
 
 
 @dataclass(frozen=True)
