@@ -509,7 +509,10 @@ def test_the_command_refuses_in_one_line_and_writes_nothing(tmp_path):
     for arguments, wanted in (
         ((rexs, tmp_path / "new.toml"), "names no torque of the pinion, give it with --torque"),
         ((rexs, there, "--torque", "50"), "there.toml: exists already, choose another name"),
-        ((rexs, tmp_path / "new.txt"), "pair.rexs to new.txt: one name must end in .toml, the other in .rexs or .xml"),
+        (
+            (rexs, tmp_path / "new.txt"),
+            "pair.rexs to new.txt: one name must end in .toml, the other in .rexs or .rexsj",
+        ),
         ((rexs, tmp_path / "new.toml", "--stage", "7"), "has no cylindrical_stage 7, must be one of 2"),
         ((rexs, tmp_path / "new.toml", "--torque", "0"), "torque = 0 N m must be greater than 0 N m"),
         ((free, tmp_path / "new.rexs"), "convert needs numbers, these are free: free"),

@@ -7,7 +7,8 @@ import numpy as np
 from ...geometry import Gear, Material
 from ...numerics import real
 from ..errors import refused
-from .model import CUSTOM, Component, Model, shifted
+from .model import CUSTOM, Component, Model
+from .values import shifted
 
 _EDGE = f"{CUSTOM}tip_edge_radius"
 _THERMAL = "thermal_contact_coefficient_agma_925_2003"
@@ -110,7 +111,7 @@ def write_gear(model: Model, gear: Gear, name: str) -> tuple[Component, list[Com
     part = model.add(
         "cylindrical_gear",
         name,
-        number_of_teeth=(str(int(gear.teeth)), "none"),
+        number_of_teeth=(int(gear.teeth), "none"),
         normal_module=(gear.module, "mm"),
         helix_angle_reference_diameter=(0.0, "deg"),
         face_width=(gear.face_width, "mm"),
