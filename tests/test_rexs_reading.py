@@ -413,6 +413,40 @@ def test_a_load_case_of_several_is_chosen_by_its_id(written):
         read_rexs(written.path, load_case=3)
 
 
+def test_a_gear_turns_with_its_shaft(written):
+    """Where the file names no speed of the gear."""
+    text = re.sub(r'<attribute id="rotational_speed".*?</attribute>', "", written.text)
+    shaft = f'<component id="80" type="shaft">{attribute("rotational_speed", "-1234.5", "1 / min")}</component>'
+    relation = '<relation id="99" type="assembly"><ref id="80" role="assembly"/><ref id="3" role="part"/></relation>'
+    written.path.write_text(text.replace("</components>", shaft + "</components>"))
+    assert read_rexs(written.path).speed is None
+    with_shaft = text.replace("</components>", shaft + "</components>").replace(
+        "</relations>", relation + "</relations>"
+    )
+    written.path.write_text(with_shaft)
+    assert read_rexs(written.path).speed == 1234.5
+
+
+@pytest.mark.parametrize(
+    "points, wanted",
+    [
+        (([0.0, 0.0], [60.0, 61.0], [0.001]), "must be one per point, with its coordinate and diameter, not 2 coord"),
+        (([0.0, 0.0, 5.0], [60.0, 61.0, 60.0], [0.001, 0.0, 0.0]), "must be a full grid of at least 2 diameters"),
+        (([0.0, 0.0], [60.0, 60.0], [0.001, 0.0]), "must be a full grid of at least 2 diameters"),
+        (([0.0, 5.0], [60.0, 60.0], [0.001, 0.0]), "must be a full grid of at least 2 diameters"),
+        (([0.0, 0.0], [50.0, 60.0], [0.001, 0.0]), "50 mm must be at least 53.5624794 mm, the base diameter"),
+    ],
+)
+def test_points_that_make_no_flank_are_refused(written, points, wanted):
+    names = "coordinates_of_{}", "diameters_of_{}", "{}_amounts"
+    kind = "topographical_modification"
+    with pytest.raises(DesignFileError, match=re.escape(wanted)):
+        flank(written, kind, **{name.format(kind): values for name, values in zip(names, points)})
+    usual = {name.format(kind): values for name, values in zip(names, ([0.0, 0.0], [60.0, 61.0], [0.001, 0.002]))}
+    with pytest.raises(DesignFileError, match='type_of_interpolation_topographical_modification: "spline" is not'):
+        flank(written, kind, **usual, type_of_interpolation_topographical_modification=("spline", "none"))
+
+
 def test_flanks_that_differ_have_to_be_chosen(written):
     relation = re.search(r'<relation id="\d+" type="reference">\s*<ref id="8" .*?</relation>', written.text, re.DOTALL)[
         0
