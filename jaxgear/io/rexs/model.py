@@ -19,13 +19,11 @@ from ..errors import DesignFileError
 from ..ranges import outside
 from .values import kind_of, written
 
-CUSTOM = (
-    "custom_jaxgear_"  # of attributes that REXS does not know; it leaves names that begin with "custom_" to programs
-)
+CUSTOM = "custom_jaxgear_"  # of attributes that REXS does not know: it leaves "custom_..." to programs
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # what earlier versions call a unit of the current one
 _ALSO = {"deg": ("\u00b0",), "MPa": ("N / mm^2",), "none": ("",)}
-# names until REXS 1.7, by the type of the component
+# names in versions before 2, by the type of the component
 _EARLIER = {
     "rack_shaped_tool": {
         "tip_radius": "tip_corner_radius_reference_profile",
