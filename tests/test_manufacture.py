@@ -191,6 +191,17 @@ def test_the_best_node_is_no_worse_and_explicit_nodes_are_taken(side, lengths):
     assert float(best.largest) < float(given.largest)
     again = wheel_spline(side, relief, node=best.node_roll_length)
     assert float(again.largest) == pytest.approx(float(best.largest), rel=1e-9)
+    exact = jg.TipRelief(6.0, 2.345, LINEAR)
+    assert float(best_wheel_spline(side, exact).largest) <= float(wheel_spline(side, exact).largest) < 0.02
+
+
+def test_what_the_wheel_grinds_is_the_design_and_the_deviation(side, lengths):
+    """A table for the mesh: at the places of the spline, and in between on its polynomial."""
+    relief = jg.TipRelief(6.0, lengths["single"], jg.Power(4.0))
+    spline = wheel_spline(side, relief)
+    flank = side.flank(spline.roll_length, jnp.zeros_like(spline.roll_length))
+    np.testing.assert_allclose(spline.ground(flank), relief(flank) + spline.deviation, atol=1e-12)
+    assert float(jnp.abs(spline.ground(flank) - relief(flank)).max()) == pytest.approx(float(spline.largest))
 
 
 def test_start_of_the_relief(side, lengths):
