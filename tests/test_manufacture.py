@@ -354,3 +354,23 @@ def test_quantities_of_a_cycle(moving):
     assert values["pinion_removed_volume"] == pytest.approx(float(jg.quantities["removed_volume"](cycle)), rel=1e-12)
     assert values["pinion_volume_over_linear"] == pytest.approx(float(manufacture.relative_volume(side, relief)))
     assert found["pinion_quadratic_deviation"].key == "pinion_quadratic_deviation_um"
+
+
+@pytest.mark.slow
+def test_an_optimizer_keeps_to_what_the_wheel_grinds(moving):
+    """A limit far below that of the free optimum is reached from above and kept, on both gears."""
+    mesh = jg.prepare(moving.pair, resolution=jg.Resolution(positions=16, pairs=2, slide_steps=0))
+
+    def design(x):
+        relief = jg.TipRelief(x["amount"], x["length"], jg.Power(x["exponent"]))
+        return relief, relief
+
+    bounds = {"amount": (2.0, 12.0), "length": (2.0, 6.0), "exponent": (1.0, 4.0)}
+    options = {"mesh": mesh, "torque": 200.0, "starts": 1, "steps": 12, "positions": None}
+    free = jg.minimize(design, bounds, **options)
+    limit = 0.25 * float(jg.quantities["pinion_quadratic_deviation"](free.cycle))
+    limits = [jg.Constraint(f"{gear}_quadratic_deviation", high=limit) for gear in ("pinion", "wheel")]
+    held = jg.minimize(design, bounds, constraints=limits, **options)
+    for gear in ("pinion", "wheel"):
+        assert float(jg.quantities[f"{gear}_quadratic_deviation"](held.cycle)) <= 1.01 * limit
+    assert free.ppte <= held.ppte < float(jg.peak_to_peak(jg.solve(mesh, 200.0).transmission_error))
