@@ -19,7 +19,7 @@ _WIDEST = 3.0  # tan(pressure angle) at the ball centre, about 72 degrees
 def teeth_spanned(gear: Gear) -> int:
     """Number of teeth k over which a span is measured, of a concrete gear.
 
-    The anvils then touch nearest to the diameter d + 2 x m: with tan(alpha_v) = sqrt((d + 2 x m)^2 - d_b^2) / d_b there,
+    The anvils then touch nearest to the diameter d + 2 x m, where tan(alpha_v) = sqrt((d + 2 x m)^2 - d_b^2) / d_b:
     k = z / pi (tan(alpha_v) - inv(alpha)) - 2 x tan(alpha) / pi + 0.5, rounded, and at least 2.
     """
     tangent = np.tan(np.deg2rad(float(gear.pressure_angle)))
