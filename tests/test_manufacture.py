@@ -338,12 +338,16 @@ def test_grinding_stock(side):
     relief = jg.TipRelief(6.0, 3.0)
     with_stock, without = (float(manufacture.ground_volume(side, relief, stock=stock)) for stock in (120.0, 0.0))
     assert with_stock - without == pytest.approx(0.12 * area, rel=1e-9)
+    assert float(manufacture.ground_area(side)) == pytest.approx(area, rel=1e-12)
 
 
 def test_quantities_of_a_cycle(moving):
     """By their names, of a cycle that knows its modifications; what they give is what the functions give."""
     relief, none = flank(tip=9.0, tip_length=3.0, curve=(0.0, 1.0)), flank()
     cycle = solve(prepare(moving.pair), jnp.asarray(200.0), relief, none)
+    assert float(jg.quantities["pinion_ground_area"](cycle)) == pytest.approx(
+        float(manufacture.ground_area(cycle.sides[0]))
+    )
     names = ("quadratic_deviation", "cubic_deviation", "removed_volume", "volume_over_linear", "volume_over_parabolic")
     found = {f"{gear}_{name}": jg.quantities[f"{gear}_{name}"] for gear in ("pinion", "wheel") for name in names}
     values = {name: float(quantity(cycle)) for name, quantity in found.items()}

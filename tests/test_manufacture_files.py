@@ -258,3 +258,19 @@ def test_a_design_file_names_what_is_wrong_with_the_flank(tmp_path, file, more, 
     with pytest.raises(io.DesignFileError) as caught:
         io.load_design(path)
     assert str(caught.value).startswith(f"{path}: ") and problem in str(caught.value)
+
+
+def test_a_design_file_holds_a_search_to_what_the_wheel_grinds(tmp_path):
+    """By the name of the quantity, in either spelling."""
+    variables = "\n[variables]\nh = { low = 1.0, high = 9.0 }\n"
+    relief = '[[pinion.modification]]\ntype = "tip_relief"\namount = "h"\nlength = 3.0\n[wheel]'
+    written(tmp_path, MEASURED)
+
+    def request(name):
+        limits = f'[[optimize.constraint]]\nof = "{name}"\nhigh = 1.0\n'
+        text = DESIGN.replace("[wheel]", relief).format(file="measured.csv", more="") + variables + limits
+        return io.optimize_request(io.load_design(written(tmp_path, text, "design.toml")))
+
+    assert request("pinion_quadratic_deviation").method == request("wheel_cubic_deviation_um").method == "minimax"
+    with pytest.raises(io.DesignFileError, match='"pinion_quadratic" is not known, did you mean "pinion_quadratic_dev'):
+        request("pinion_quadratic")

@@ -28,6 +28,7 @@ from .tooth_thickness import over_balls as over_balls
 from .tooth_thickness import span as span
 from .tooth_thickness import teeth_spanned as teeth_spanned
 from .volume import ReferenceVolumes as ReferenceVolumes
+from .volume import ground_area as ground_area
 from .volume import ground_volume as ground_volume
 from .volume import reference_volumes as reference_volumes
 from .volume import relative_volume as relative_volume

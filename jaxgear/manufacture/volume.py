@@ -56,9 +56,16 @@ def ground_volume(side: Side, modification: AbstractModification, *, stock=0.0) 
         modification: of both flanks of every tooth.
         stock: machining allowance normal to the flank [um], from the form circle to the tip and over the common face.
     """
+    return gear_volume(side, modification) + 1e-3 * stock * ground_area(side)
+
+
+def ground_area(side: Side) -> Scalar:
+    """Area of all flanks of one gear from the form circle to the tip, over the common face [mm^2].
+
+    2 z b (L_tip^2 - L_form^2) / (2 r_b): the volume of any grinding stock is its thickness times this.
+    """
     form, tip = outline(side.gear).form_roll_length, side.tip_roll_length
-    arc = (tip**2 - form**2) / (2 * side.base_radius)
-    return gear_volume(side, modification) + 2 * side.gear.teeth * side.face_width * arc * 1e-3 * stock
+    return 2 * side.gear.teeth * side.face_width * (tip**2 - form**2) / (2 * side.base_radius)
 
 
 def relative_volume(side: Side, modification: AbstractModification, *, parabolic: bool = False) -> Scalar:
