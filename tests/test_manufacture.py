@@ -1,5 +1,7 @@
 """The form-grinding wheel against closed forms of the involute, its splines against independent fits, volumes."""
 
+from contextlib import contextmanager
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +18,7 @@ from jaxgear.numerics.fits import fit
 
 PARABOLA = jg.Quadratic(0.0, 0.0, 1.0)
 LINEAR = jg.Linear()
+NONE = jg.NoModification()
 # roll length, half width and height of the space of the 50/50 pair: independent arithmetic on the involute
 SPACE = np.array(
     [
@@ -263,6 +266,75 @@ def test_what_no_spline_is(side):
         wheel_spline(side, jg.NoModification(), degree=4)
     with pytest.raises(ValueError, match="criterion = \"l1\" must be|criterion = 'l1' must be"):
         wheel_spline(side, jg.NoModification(), criterion="l1")
+
+
+@contextmanager
+def compilations():
+    """Names of what is compiled within the block."""
+    found = []
+
+    def listen(event, duration, **_):
+        if event.endswith("backend_compile_duration"):
+            found.append(event)
+
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    try:
+        yield found
+    finally:
+        jax.monitoring.unregister_event_duration_listener(listen)
+
+
+@pytest.mark.parametrize(
+    ("call", "problem"),
+    [
+        (lambda s: wheel_spline(s, NONE, node=12.0), "wheel_spline: node = 12 mm must be at least 19.5"),
+        (
+            lambda s: wheel_spline(s, NONE, node=31.5),
+            "node = 31.5 mm must be .* at most 31.1",
+        ),
+        (lambda s: relief_start(s, NONE, -1.0), "relief_start: threshold = -1 um must be at least 0 um"),
+        (
+            lambda s: manufacture.space_flank(s, NONE, points=1),
+            "points = 1 must be a whole number",
+        ),
+        (lambda s: manufacture.run_out(s, 3.0), "run_out: radius = 3 mm must be greater than 6.0.* mm"),
+        (
+            lambda s: manufacture.largest_wheel_radius(s, 0.0),
+            "gap = 0 mm must be greater than 0 mm",
+        ),
+        (lambda s: manufacture.smallest_wheel_radius(s, -1.0), "flange_radius = -1 mm must be at least 0 mm"),
+        (lambda s: manufacture.reference_volumes(s, -6.0), "reference_volumes: amount = -6 um must be at least 0 um"),
+        (
+            lambda s: manufacture.ground_volume(s, NONE, stock=-1.0),
+            "stock = -1 um must be at least 0 um",
+        ),
+        (lambda s: manufacture.span(s.gear, 2.5), "span: teeth = 2.5 must be a whole number of at least 1"),
+        (lambda s: manufacture.span(s.gear, 51), "span: teeth = 51 must be at most 50"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(side, call, problem):
+    with pytest.raises(ValueError, match=problem):
+        call(side)
+
+
+def test_other_numbers_compile_nothing_anew(side):
+    """Amounts, stocks, nodes and places are no constants of a program."""
+    relief = jg.TipRelief(6.0, 3.0)
+    calls = (
+        lambda x: manufacture.reference_volumes(side, x),
+        lambda x: wheel_spline(side, relief, node=20.0 + x),
+        lambda x: relief_start(side, jg.ProfileCrowning(2.0), 0.01 * x),
+        lambda x: manufacture.profile_trace(side, relief, face_coordinate=x),
+        lambda x: manufacture.helix_trace(side, relief, roll_length=20.0 + x),
+    )
+    with compilations() as compiled:
+        manufacture.profile_trace(side, relief, points=83)
+    assert compiled, "the count sees what is compiled"
+    for call in calls:
+        call(1.0)
+        with compilations() as compiled:
+            call(2.0)
+        assert not compiled, call
 
 
 def test_size_of_the_wheel(side):

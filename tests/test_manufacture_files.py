@@ -154,6 +154,17 @@ def test_a_profile_and_a_helix_make_a_flank(side, tmp_path):
         np.testing.assert_allclose(found.design, wanted.design, atol=1e-8)
 
 
+def test_measured_traces_of_other_places_are_refused(side, relief, tmp_path):
+    design = manufacture.profile_trace(side, relief, points=11)
+    few = manufacture.profile_trace(side, relief, points=9)
+    moved = manufacture.profile_trace(side, relief, face_coordinate=2.0, points=11)
+    with pytest.raises(ValueError, match=r"measured has traces of \[\(9,\)\] points, must be \[\(11,\)\]"):
+        io.write_traces(tmp_path / "chart.csv", [design], [few])
+    with pytest.raises(ValueError, match="write_traces: face_coordinate of measured trace 0 is not that of the design"):
+        io.write_traces(tmp_path / "chart.csv", [design], [moved])
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("column", ["roll_angle_deg", "diameter_mm"])
 def test_other_coordinates_need_the_base_radius(side, relief, tmp_path, column):
     trace = manufacture.profile_trace(side, relief, points=11)

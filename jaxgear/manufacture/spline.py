@@ -24,7 +24,7 @@ from ..microgeometry import (
     TipRelief,
     terms,
 )
-from ..numerics import Checked, maximum, program, result
+from ..numerics import Checked, check, concrete, maximum, program, result
 from ..numerics.fits import Criterion, fit
 from .tooth_space import space_point
 
@@ -36,6 +36,7 @@ _BELOW, _BEYOND = 65, 129  # points below the node and beyond it
 _SEARCHED = 257  # points among which the start of the relief is looked for
 _NODES = 65  # among which the best one is looked for
 START = 0.01  # um; a relief starts where more than this is removed, a tenth of what measuring machines resolve
+_ROUNDING = 1e-6
 _SHORTEST = 0.05  # of the active profile; a polynomial over less is none
 
 
@@ -80,14 +81,22 @@ class WheelSpline(Checked):
         return self.node_x + sum(steps)
 
 
-@program
-def relief_start(side: Side, modification: AbstractModification, threshold: float = START) -> Scalar:
+def relief_start(side: Side, modification: AbstractModification, threshold=START) -> Scalar:
     """Roll length at which the relief of the tip starts [mm]; differentiable.
 
     Of a single `TipRelief`, beside modifications along the face, it is the start by definition. Of anything else it is
     where, in the middle of the face, from there on up to the tip, more than a threshold [um] is removed: the start of
     the active profile where all of it is modified, and the tip where nothing is.
+
+    Raises:
+        ValueError: for a negative threshold.
     """
+    check("relief_start", "threshold", threshold, "um", low=0.0)
+    return _relief_start(side, modification, jnp.asarray(threshold, side.start_roll_length.dtype))
+
+
+@program
+def _relief_start(side: Side, modification: AbstractModification, threshold: Scalar) -> Scalar:
     length = _relief_length(modification)
     if length is not None:
         return jnp.maximum(side.tip_roll_length - length, side.start_roll_length)
@@ -121,14 +130,19 @@ def wheel_spline(
         modification: of the flank, taken in the middle of the face.
         degree: of the polynomial, 2 or 3.
         criterion: what is made small: "least_squares", or "minimax" for the largest deviation.
-        node: roll length of the node [mm]; None for the start of the relief (`relief_start`).
+        node: roll length of the node [mm], within the first 95 % of the active profile; None for the start of the
+            relief (`relief_start`), or the end of these 95 % where that is earlier.
         tangent: the polynomial starts in the direction of the involute. Without it a kink is allowed, as at the start
             of a linear relief.
 
     Raises:
-        ValueError: for another degree or criterion.
+        ValueError: for another degree or criterion, or a node elsewhere.
     """
     _check(degree, criterion)
+    start, tip = concrete(side.start_roll_length), concrete(side.tip_roll_length)
+    if start is not None and tip is not None:
+        last = float(tip - _SHORTEST * (tip - start))
+        check("wheel_spline", "node", node, "mm", low=float(start) * (1 - _ROUNDING), high=last * (1 + _ROUNDING))
     node = None if node is None else jnp.asarray(node, side.start_roll_length.dtype)
     return _fitted(side, modification, node, degree, criterion, tangent)
 

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import Gear
 from ..geometry.involute import involute
-from ..numerics import bracketed_root, check, concrete
+from ..numerics import bracketed_root, check, concrete, whole
 
 Scalar = Float[Array, ""]
 
@@ -30,7 +30,7 @@ def teeth_spanned(gear: Gear) -> int:
     return max(round(exact - 2 * float(gear.profile_shift) * tangent / np.pi + 0.5), 2)
 
 
-def span(gear: Gear, teeth) -> Scalar:
+def span(gear: Gear, teeth: int) -> Scalar:
     """Base tangent length W_k [mm] over a number of teeth k: (k - 1) p_b + s_b.
 
     W_k = m cos(alpha) (pi (k - 0.5) + z inv(alpha)) + 2 x m sin(alpha) + E_sns cos(alpha).
@@ -38,7 +38,12 @@ def span(gear: Gear, teeth) -> Scalar:
     Args:
         gear: the gear, with its tooth thickness allowance.
         teeth: k, see `teeth_spanned`.
+
+    Raises:
+        ValueError: unless k is a whole number from 1 to the number of teeth.
     """
+    most = concrete(gear.teeth)
+    whole("span", "teeth", teeth, 1, float("inf") if most is None else float(most))
     alpha = jnp.deg2rad(gear.pressure_angle)
     nominal = jnp.pi * (teeth - 0.5) + gear.teeth * involute(jnp.tan(alpha))
     shifted = 2 * gear.profile_shift * gear.module * jnp.sin(alpha)
@@ -68,7 +73,7 @@ def over_balls(gear: Gear, ball) -> Scalar:
     return 2 * radius * _offset(gear) + ball
 
 
-def allowance_of_span(gear: Gear, teeth, measured) -> Scalar:
+def allowance_of_span(gear: Gear, teeth: int, measured) -> Scalar:
     """Tooth thickness allowance E_sns [um] of a base tangent length W_k [mm] over k teeth; the inverse of `span`.
 
     Args:

@@ -14,7 +14,7 @@ from ..contact import Side
 from ..geometry import outline
 from ..metrics import gear_volume, removed_at
 from ..microgeometry import AbstractCurve, AbstractModification, Linear, Quadratic, TipRelief
-from ..numerics import program, real, safe_divide
+from ..numerics import check, program, real, safe_divide
 
 Scalar = Float[Array, ""]
 
@@ -33,14 +33,22 @@ class ReferenceVolumes(NamedTuple):
     parabolic_from_single: Scalar
 
 
-@program
 def reference_volumes(side: Side, amount) -> ReferenceVolumes:
     """Volumes of the reference reliefs of a gear.
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
         amount: at the tip [um].
+
+    Raises:
+        ValueError: for a negative amount.
     """
+    check("reference_volumes", "amount", amount, "um", low=0.0)
+    return _reference_volumes(side, jnp.asarray(amount, side.start_roll_length.dtype))
+
+
+@program
+def _reference_volumes(side: Side, amount: Scalar) -> ReferenceVolumes:
     pitch = _addendum(side)
     # the next pair touches at the start of the active profile, one base pitch below
     single = side.tip_roll_length - side.start_roll_length - side.gear.base_pitch
@@ -55,7 +63,11 @@ def ground_volume(side: Side, modification: AbstractModification, *, stock=0.0) 
         side: the gear's side of the contact, of `mesh.sides`.
         modification: of both flanks of every tooth.
         stock: machining allowance normal to the flank [um], from the form circle to the tip and over the common face.
+
+    Raises:
+        ValueError: for a negative stock.
     """
+    check("ground_volume", "stock", stock, "um", low=0.0)
     return gear_volume(side, modification) + 1e-3 * stock * ground_area(side)
 
 
