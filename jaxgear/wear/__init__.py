@@ -12,3 +12,4 @@ from .over_life import wear_depth as wear_depth
 from .over_life import worn_volume as worn_volume
 from .quantities import WEAR_QUANTITIES as WEAR_QUANTITIES
 from .settings import Wear as Wear
+from .steps import wear_in_steps as wear_in_steps
