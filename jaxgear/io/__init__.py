@@ -18,3 +18,7 @@ from .results import write_summary as write_summary
 from .sweep_request import SweepRequest as SweepRequest
 from .sweep_request import sweep_request as sweep_request
 from .variants import read_variants as read_variants
+from .wear_request import WearRequest as WearRequest
+from .wear_request import wear_request as wear_request
+from .worn import read_worn as read_worn
+from .worn import write_worn as write_worn

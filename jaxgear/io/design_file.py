@@ -15,7 +15,7 @@ from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..sizing import iso_stiffness
-from . import schema, schema_dynamics, schema_sweep, template
+from . import schema, schema_dynamics, schema_sweep, schema_wear, template
 from .errors import DesignFileError, naming, refuse_given, refused
 from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
@@ -90,6 +90,7 @@ class DesignFile:
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
         dynamics: likewise, see `dynamics_request`.
+        wear: likewise, see `wear_request`.
         design: makes the modifications of pinion and wheel from the free parameters.
         open_case: numbers of gears, pair, model and load that are variables; a sweep alone can vary them.
     """
@@ -106,6 +107,7 @@ class DesignFile:
     sweep: schema_sweep.SweepSection | None
     tolerance: schema_sweep.ToleranceSection | None
     dynamics: schema_dynamics.DynamicsSection | None
+    wear: schema_wear.WearSection | None
     design: FileDesign
     open_case: tuple[template.Free, ...]
     _pair: template.Part
@@ -249,6 +251,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         sweep=sweep,
         tolerance=tolerance,
         dynamics=None if top.dynamics is None else decode("dynamics", top.dynamics, schema_dynamics.DynamicsSection),
+        wear=None if top.wear is None else decode("wear", top.wear, schema_wear.WearSection),
         design=FileDesign(tuple(bounds), pinion_flank, wheel_flank),
         open_case=tuple(open_case),
         _pair=pair,

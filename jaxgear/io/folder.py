@@ -34,6 +34,12 @@ RESULT_FILES = frozenset(
         "branches.png",
         "bifurcation.png",
         "phase_portrait.png",
+        "life.csv",
+        "worn_flanks.csv",
+        "worn_pinion.png",
+        "worn_wheel.png",
+        "ppte_over_life.png",
+        "depth_over_life.png",
     }
 )
 

@@ -17,7 +17,8 @@ from ..metrics import quantities
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from ..tolerance import Tolerance
-from . import schema, schema_dynamics, schema_sweep
+from ..wear import Wear
+from . import schema, schema_dynamics, schema_sweep, schema_wear
 from .layout import Section, family, meanings, section_of, snake, summary
 from .ranges import allowed
 
@@ -64,6 +65,7 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     yield "[sweep]", schema_sweep.SweepSection, None
     yield "[tolerance]", schema_sweep.ToleranceSection, Tolerance
     yield "[dynamics]", schema_dynamics.DynamicsSection, Dynamics
+    yield "[wear]", schema_wear.WearSection, Wear
 
 
 def _table(title: str, section: type[Section], of: Callable[..., Any] | None) -> Iterator[str]:

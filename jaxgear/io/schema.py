@@ -41,6 +41,7 @@ class FileSection(Section):
         sweep: what `jaxgear sweep` does.
         tolerance: of manufactured gears, for a sweep or `optimize.manufactured`.
         dynamics: at which speeds the pair runs, and what vibrates.
+        wear: how long the pair runs, and how fast it wears.
     """
 
     pinion: Annotated[Tables, table()]
@@ -55,6 +56,7 @@ class FileSection(Section):
     sweep: Annotated[Tables | None, table()] = None
     tolerance: Annotated[Tables | None, table()] = None
     dynamics: Annotated[Tables | None, table()] = None
+    wear: Annotated[Tables | None, table()] = None
 
 
 class GearSection(section_of(Gear)):  # type: ignore[misc]

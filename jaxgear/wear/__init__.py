@@ -4,6 +4,7 @@ from .archard import passage_depth as passage_depth
 from .archard import specific_sliding as specific_sliding
 from .life import WearLife as WearLife
 from .life import wear as wear
+from .march import March as March
 from .over_life import life_to as life_to
 from .over_life import life_to_depth as life_to_depth
 from .over_life import mean_over_life as mean_over_life

@@ -2,10 +2,12 @@
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import Mesh, MeshCycle
+from ..geometry import Gear
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, check, maximum, program, real, result, whole
 from .case import Case, case_of, marched, tables
@@ -55,6 +57,14 @@ class WearLife(Checked):
     def wheel_depth(self) -> Depths:
         """Worn off the wheel in all [um], shape (lives, slices, points)."""
         return jnp.sum(self.depth[..., 1, :, :, :], axis=-3)
+
+    @property
+    def gears(self) -> tuple[Gear, Gear]:
+        """Pinion and wheel."""
+        pair = self.cycles.kinematics.pair
+        first = (0,) * self.cycles.batch_ndim  # of all lives the same
+        pinion, wheel = jax.tree.map(lambda leaf: leaf[first], (pair.pinion, pair.wheel))
+        return pinion, wheel
 
     def flanks(self, life: int = -1) -> tuple[AbstractModification, AbstractModification]:
         """What is worn off pinion and wheel, as modifications: `TabulatedProfile`, or `TabulatedFlank` over slices.
