@@ -39,9 +39,10 @@ def worn_flank(life: WearLife, gear: str, ax: Axes | None = None, *, title: str 
         for index, each in enumerate(shown):
             label = f"{float(life.revolutions[each]):.3g} revolutions"
             ax.plot(angle, depths[each, line], label=label, **line_style(index))
-        ax.invert_yaxis()
+        if not ax.yaxis_inverted():  # panels share it
+            ax.invert_yaxis()
         ax.set(xlabel=f"roll angle of the {gear} [deg]", ylabel="wear depth [µm]", title=title)
-        legend_above(ax) if not title else ax.legend(frameon=False)
+        legend_above(ax) if not title else ax.legend(frameon=False, loc="lower right")
     return ax
 
 
