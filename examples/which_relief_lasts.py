@@ -59,9 +59,9 @@ def designs(name, mesh, fast=False, callback=None) -> dict:
     options = {
         "mesh": mesh,
         "torque": TORQUES[name],
-        "positions": None,
+        "positions": None,  # the grid of the wear goes with them
         "callback": callback,
-    }  # the grid of the wear stays the same
+    }
     lasting = search.quantity("mean_ppte_over_life")
     return {
         DESIGNS[0]: jg.minimize(design, BOUNDS[name], **options),
