@@ -21,6 +21,7 @@ EXAMPLES = (
     "drivetrain",
     "inside_a_simulation",
     "what_does_dynamic_design_buy",
+    "which_relief_lasts",
 )
 
 
@@ -39,7 +40,7 @@ def answers(name):
     return pytest.fixture(scope="module")(lambda: example(name).numbers(results(name)))
 
 
-relief, coupling, curve, robust, manufactured, driven, simulated, quiet = map(answers, EXAMPLES)
+relief, coupling, curve, robust, manufactured, driven, simulated, quiet, lasting = map(answers, EXAMPLES)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -192,3 +193,18 @@ def test_the_static_design_is_quiet_at_its_torque_only(quiet):
         assert quiet[f"dynamic_worst_factor_at_{torque}_Nm"] < quiet[f"static_worst_factor_at_{torque}_Nm"]
         # the resonance itself, not one of its fractions
         assert 2700 < quiet[f"static_loudest_frequency_at_{torque}_Nm_Hz"] < 3400
+
+
+@pytest.mark.parametrize("pair", ["30_30", "20_30"])
+def test_the_relief_that_lasts_is_the_better_one_over_the_life(lasting, pair):
+    """Judged by twice the blocks and points of the search; when new, the other one is."""
+    new, over = (
+        {key: lasting[f"{pair} {name}: {key} PPTE [um]"] for key in ("new", "mean")}
+        for name in ("when new", "over life")
+    )
+    assert new["new"] < over["new"] and over["mean"] < new["mean"]
+    assert lasting[f"{pair} mean PPTE lower by [%]"] >= 10.0
+    assert over["mean"] < 0.5 * lasting[f"{pair} unmodified: mean PPTE [um]"]
+    for name in ("unmodified", "when new", "over life"):
+        assert lasting[f"{pair} {name}: uncertainty of the depth [um]"] < 0.02
+        assert 1 < lasting[f"{pair} {name}: wear depth [um]"] < 10
