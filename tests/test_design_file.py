@@ -710,12 +710,8 @@ def test_a_resolution_that_misses_part_of_the_path_is_refused(load):
 def test_examples_load_and_are_what_their_name_says(path):
     file = load_design(path)
     teeth = [int(gear.teeth) for gear in (file.pair().pinion, file.pair().wheel)]
-    kinds = {
-        "sweep": file.sweep,
-        "dynamics": file.dynamics,
-        "wear": file.wear,
-        "robust": file.optimize.manufactured or None,
-    }
+    kinds = {"sweep": file.sweep, "dynamics": file.dynamics, "wear": file.wear}
+    kinds["robust"] = file.optimize.manufactured or None
     kind = next((name for name, section in kinds.items() if section is not None), "spur")
     assert path.stem == f"{kind}_{teeth[0]}_{teeth[1]}"
     assert (file.bounds or file.optimize.method in METHODS_WITHOUT_VARIABLES) and file.title
