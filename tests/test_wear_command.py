@@ -9,6 +9,7 @@ import pytest
 from test_cli import call
 
 import jaxgear as jg
+from jaxgear import plot
 from jaxgear.cli.kept import Kept, Marches
 from jaxgear.io import DesignFileError, load_design, read_worn, sweep_request, wear_request, write_worn
 from jaxgear.io.folder import RESULT_FILES
@@ -187,3 +188,9 @@ def test_other_files_are_refused_in_one_line(tmp_path):
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(ValueError, match="other.csv: holds no worn flanks as jaxgear writes them"):
         read_worn(tmp_path / "other.csv")
+
+
+def test_pictures_of_other_gears_are_refused_in_one_line():
+    with pytest.raises(ValueError, match='worn_flank: gear = \'rack\' must be "pinion" or "wheel"') as refused:
+        plot.worn_flank(None, "rack")
+    assert "\n" not in str(refused.value)
