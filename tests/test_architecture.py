@@ -75,7 +75,9 @@ COMMANDS = {
     "jaxgear.cli.convert",
     "jaxgear.cli.dynamics",
     "jaxgear.cli.devices",
+    "jaxgear.cli.layout",
     "jaxgear.cli.sweep",
+    "jaxgear.cli.wear",
 }
 
 

@@ -22,6 +22,7 @@ EXAMPLES = (
     "inside_a_simulation",
     "what_does_dynamic_design_buy",
     "can_it_be_ground",
+    "which_relief_lasts",
 )
 
 
@@ -40,7 +41,7 @@ def answers(name):
     return pytest.fixture(scope="module")(lambda: example(name).numbers(results(name)))
 
 
-relief, coupling, curve, robust, manufactured, driven, simulated, quiet, made = map(answers, EXAMPLES)
+relief, coupling, curve, robust, manufactured, driven, simulated, quiet, made, lasting = map(answers, EXAMPLES)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -212,3 +213,16 @@ def test_reference_volumes_of_the_study(made):
     parabola = made["reference_parabolic_from_single_mm3"]
     assert made["reference_linear_from_pitch_mm3"] / parabola == pytest.approx(2.67, abs=0.01)
     assert made["reference_parabolic_from_pitch_mm3"] / parabola == pytest.approx(1.81, abs=0.01)
+
+
+def test_the_relief_that_lasts_is_the_better_one_over_the_life(lasting):
+    """Judged by twice the blocks of the search; when new, the other one is the better."""
+    new, over, never = (
+        {key: lasting[f"30_30 {name}: {key} PPTE [um]"] for key in ("new", "mean")}
+        for name in ("when new", "over life", "unmodified")
+    )
+    assert new["new"] < over["new"] < never["new"] and over["mean"] < new["mean"] < never["mean"]
+    assert lasting["30_30 mean PPTE lower by [%]"] >= 25.0
+    for name in ("unmodified", "when new", "over life"):
+        assert lasting[f"30_30 {name}: uncertainty of the depth [um]"] < 0.02
+        assert 1 < lasting[f"30_30 {name}: wear depth [um]"] < 10

@@ -76,6 +76,21 @@ def test_trends_over_the_relief(key):
     assert study[f"uncoupled_double_stiffness_{key}"] > 1.05 * study[f"double_stiffness_{key}"]
 
 
+def test_30_30_wear_has_the_trends_of_the_study():
+    """Error at A grows with the wear of any design; wear takes the second pair off unmodified flanks, and puts it on
+    again behind a relief that had kept it apart."""
+    study = found("reproduce_30_30_20_30_study")
+    te, stiffness, depth, error = (np.array(study[f"worn_{key}"]) for key in ("te", "stiffness", "depth", "error"))
+    assert (np.diff(te, axis=1) > 0).all() and (error < 0.02 * (1 + depth)).all()
+    assert (np.diff(stiffness[0]) < 0).all()
+    relieved = stiffness[3]
+    assert np.ptp(relieved[:3]) < 1e-6 * relieved[0]
+    assert (np.diff(relieved) > -1e-6 * relieved[0]).all() and relieved[-1] > 1.01 * relieved[0]
+    # nothing brings it back behind the largest relief, and the driver wears most at its root
+    assert np.ptp(stiffness[-1]) < 1e-6 * stiffness[-1, 0]
+    np.testing.assert_allclose(study["worn_root"][0], depth[0], rtol=1e-9)
+
+
 def test_20_30_against_finite_elements():
     truth = cases.reference(cases.Case("C", "stress", 98.0, "none"))
     force = truth.force.sum(axis=0) / truth.transmission_error

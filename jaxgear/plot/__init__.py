@@ -45,3 +45,5 @@ from .torque import harris_map as harris_map
 from .torque import ppte_over_torque as ppte_over_torque
 from .transmission_error import transmission_error as transmission_error
 from .variants import label as label
+from .wear import lives as lives
+from .wear import worn_flank as worn_flank
