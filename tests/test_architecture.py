@@ -89,6 +89,7 @@ COMMANDS = {
     "jaxgear.cli.devices",
     "jaxgear.cli.layout",
     "jaxgear.cli.sweep",
+    "jaxgear.cli.wear",
 }
 
 

@@ -714,6 +714,7 @@ def test_examples_load_and_are_what_their_name_says(path):
         "sweep": file.sweep,
         "dynamics": file.dynamics,
         "robust": file.optimize.manufactured or None,
+        "wear": file.wear,
         "layout": file.layout,
     }
     kind = next((name for name, section in kinds.items() if section is not None), "spur")

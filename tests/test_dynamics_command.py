@@ -9,7 +9,7 @@ from report_page import check_report
 from test_cli import call
 
 from jaxgear.cli import interrupt
-from jaxgear.cli.kept import Kept
+from jaxgear.cli.kept import Kept, SpeedResponses
 from jaxgear.dynamics import Oscillator, RectangularStiffness, speed_sweep
 from jaxgear.io import DesignFileError, dynamics_request, load_design, sweep_request
 from jaxgear.io.folder import RESULT_FILES
@@ -175,14 +175,14 @@ def test_kept_responses_are_not_made_again(tmp_path):
         made.append(1)
         return speed_sweep(oscillator, [0.1, 0.2], steps=32, points=4)
 
-    first = Kept(tmp_path / ".runs", 2)((oscillator, "up"), sweep)
+    first = Kept(tmp_path / ".runs", SpeedResponses(), 2)((oscillator, "up"), sweep)
     assert "1 of 2 runs are kept" in interrupt.state.written
-    again = Kept(tmp_path / ".runs", 2)((oscillator, "up"), sweep)
+    again = Kept(tmp_path / ".runs", SpeedResponses(), 2)((oscillator, "up"), sweep)
     assert len(made) == 1
     for one, other in zip((first.dynamic_factor, *first.state), (again.dynamic_factor, *again.state)):
         assert np.array_equal(one, other)
     assert (again.direction, again.orders) == (first.direction, first.orders)
-    kept = Kept(tmp_path / ".runs", 2)
+    kept = Kept(tmp_path / ".runs", SpeedResponses(), 2)
     kept((oscillator, "down"), sweep)
     assert len(made) == 2
     next((tmp_path / ".runs").iterdir()).write_bytes(b"torn")

@@ -26,7 +26,7 @@ SLICES = 6
 
 @pytest.fixture(scope="module")
 def mesh():
-    return prepare(gear_pair(), resolution=jg.Resolution(positions=8, slices=SLICES, pairs=2))
+    return prepare(gear_pair(), resolution=jg.Resolution(positions=8, slices=SLICES, pairs=2, face_modes=2))
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,7 @@
 """The form-grinding wheel against closed forms of the involute, its splines against independent fits, volumes."""
 
+from contextlib import contextmanager
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +18,7 @@ from jaxgear.numerics.fits import fit
 
 PARABOLA = jg.Quadratic(0.0, 0.0, 1.0)
 LINEAR = jg.Linear()
+NONE = jg.NoModification()
 # roll length, half width and height of the space of the 50/50 pair: independent arithmetic on the involute
 SPACE = np.array(
     [
@@ -191,6 +194,17 @@ def test_the_best_node_is_no_worse_and_explicit_nodes_are_taken(side, lengths):
     assert float(best.largest) < float(given.largest)
     again = wheel_spline(side, relief, node=best.node_roll_length)
     assert float(again.largest) == pytest.approx(float(best.largest), rel=1e-9)
+    exact = jg.TipRelief(6.0, 2.345, LINEAR)
+    assert float(best_wheel_spline(side, exact).largest) <= float(wheel_spline(side, exact).largest) < 0.02
+
+
+def test_what_the_wheel_grinds_is_the_design_and_the_deviation(side, lengths):
+    """A table for the mesh: at the places of the spline, and in between on its polynomial."""
+    relief = jg.TipRelief(6.0, lengths["single"], jg.Power(4.0))
+    spline = wheel_spline(side, relief)
+    flank = side.flank(spline.roll_length, jnp.zeros_like(spline.roll_length))
+    np.testing.assert_allclose(spline.ground(flank), relief(flank) + spline.deviation, atol=1e-12)
+    assert float(jnp.abs(spline.ground(flank) - relief(flank)).max()) == pytest.approx(float(spline.largest))
 
 
 def test_start_of_the_relief(side, lengths):
@@ -252,6 +266,75 @@ def test_what_no_spline_is(side):
         wheel_spline(side, jg.NoModification(), degree=4)
     with pytest.raises(ValueError, match="criterion = \"l1\" must be|criterion = 'l1' must be"):
         wheel_spline(side, jg.NoModification(), criterion="l1")
+
+
+@contextmanager
+def compilations():
+    """Names of what is compiled within the block."""
+    found = []
+
+    def listen(event, duration, **_):
+        if event.endswith("backend_compile_duration"):
+            found.append(event)
+
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    try:
+        yield found
+    finally:
+        jax.monitoring.unregister_event_duration_listener(listen)
+
+
+@pytest.mark.parametrize(
+    ("call", "problem"),
+    [
+        (lambda s: wheel_spline(s, NONE, node=12.0), "wheel_spline: node = 12 mm must be at least 19.5"),
+        (
+            lambda s: wheel_spline(s, NONE, node=31.5),
+            "node = 31.5 mm must be .* at most 31.1",
+        ),
+        (lambda s: relief_start(s, NONE, -1.0), "relief_start: threshold = -1 um must be at least 0 um"),
+        (
+            lambda s: manufacture.space_flank(s, NONE, points=1),
+            "points = 1 must be a whole number",
+        ),
+        (lambda s: manufacture.run_out(s, 3.0), "run_out: radius = 3 mm must be greater than 6.0.* mm"),
+        (
+            lambda s: manufacture.largest_wheel_radius(s, 0.0),
+            "gap = 0 mm must be greater than 0 mm",
+        ),
+        (lambda s: manufacture.smallest_wheel_radius(s, -1.0), "flange_radius = -1 mm must be at least 0 mm"),
+        (lambda s: manufacture.reference_volumes(s, -6.0), "reference_volumes: amount = -6 um must be at least 0 um"),
+        (
+            lambda s: manufacture.ground_volume(s, NONE, stock=-1.0),
+            "stock = -1 um must be at least 0 um",
+        ),
+        (lambda s: manufacture.span(s.gear, 2.5), "span: teeth = 2.5 must be a whole number of at least 1"),
+        (lambda s: manufacture.span(s.gear, 51), "span: teeth = 51 must be at most 50"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(side, call, problem):
+    with pytest.raises(ValueError, match=problem):
+        call(side)
+
+
+def test_other_numbers_compile_nothing_anew(side):
+    """Amounts, stocks, nodes and places are no constants of a program."""
+    relief = jg.TipRelief(6.0, 3.0)
+    calls = (
+        lambda x: manufacture.reference_volumes(side, x),
+        lambda x: wheel_spline(side, relief, node=20.0 + x),
+        lambda x: relief_start(side, jg.ProfileCrowning(2.0), 0.01 * x),
+        lambda x: manufacture.profile_trace(side, relief, face_coordinate=x),
+        lambda x: manufacture.helix_trace(side, relief, roll_length=20.0 + x),
+    )
+    with compilations() as compiled:
+        manufacture.profile_trace(side, relief, points=83)
+    assert compiled, "the count sees what is compiled"
+    for call in calls:
+        call(1.0)
+        with compilations() as compiled:
+            call(2.0)
+        assert not compiled, call
 
 
 def test_size_of_the_wheel(side):
@@ -327,12 +410,16 @@ def test_grinding_stock(side):
     relief = jg.TipRelief(6.0, 3.0)
     with_stock, without = (float(manufacture.ground_volume(side, relief, stock=stock)) for stock in (120.0, 0.0))
     assert with_stock - without == pytest.approx(0.12 * area, rel=1e-9)
+    assert float(manufacture.ground_area(side)) == pytest.approx(area, rel=1e-12)
 
 
 def test_quantities_of_a_cycle(moving):
     """By their names, of a cycle that knows its modifications; what they give is what the functions give."""
     relief, none = flank(tip=9.0, tip_length=3.0, curve=(0.0, 1.0)), flank()
     cycle = solve(prepare(moving.pair), jnp.asarray(200.0), relief, none)
+    assert float(jg.quantities["pinion_ground_area"](cycle)) == pytest.approx(
+        float(manufacture.ground_area(cycle.sides[0]))
+    )
     names = ("quadratic_deviation", "cubic_deviation", "removed_volume", "volume_over_linear", "volume_over_parabolic")
     found = {f"{gear}_{name}": jg.quantities[f"{gear}_{name}"] for gear in ("pinion", "wheel") for name in names}
     values = {name: float(quantity(cycle)) for name, quantity in found.items()}
@@ -343,3 +430,23 @@ def test_quantities_of_a_cycle(moving):
     assert values["pinion_removed_volume"] == pytest.approx(float(jg.quantities["removed_volume"](cycle)), rel=1e-12)
     assert values["pinion_volume_over_linear"] == pytest.approx(float(manufacture.relative_volume(side, relief)))
     assert found["pinion_quadratic_deviation"].key == "pinion_quadratic_deviation_um"
+
+
+@pytest.mark.slow
+def test_an_optimizer_keeps_to_what_the_wheel_grinds(moving):
+    """A limit far below that of the free optimum is reached from above and kept, on both gears."""
+    mesh = jg.prepare(moving.pair, resolution=jg.Resolution(positions=16, pairs=2, slide_steps=0))
+
+    def design(x):
+        relief = jg.TipRelief(x["amount"], x["length"], jg.Power(x["exponent"]))
+        return relief, relief
+
+    bounds = {"amount": (2.0, 12.0), "length": (2.0, 6.0), "exponent": (1.0, 4.0)}
+    options = {"mesh": mesh, "torque": 200.0, "starts": 1, "steps": 12, "positions": None}
+    free = jg.minimize(design, bounds, **options)
+    limit = 0.25 * float(jg.quantities["pinion_quadratic_deviation"](free.cycle))
+    limits = [jg.Constraint(f"{gear}_quadratic_deviation", high=limit) for gear in ("pinion", "wheel")]
+    held = jg.minimize(design, bounds, constraints=limits, **options)
+    for gear in ("pinion", "wheel"):
+        assert float(jg.quantities[f"{gear}_quadratic_deviation"](held.cycle)) <= 1.01 * limit
+    assert free.ppte <= held.ppte < float(jg.peak_to_peak(jg.solve(mesh, 200.0).transmission_error))

@@ -154,6 +154,17 @@ def test_a_profile_and_a_helix_make_a_flank(side, tmp_path):
         np.testing.assert_allclose(found.design, wanted.design, atol=1e-8)
 
 
+def test_measured_traces_of_other_places_are_refused(side, relief, tmp_path):
+    design = manufacture.profile_trace(side, relief, points=11)
+    few = manufacture.profile_trace(side, relief, points=9)
+    moved = manufacture.profile_trace(side, relief, face_coordinate=2.0, points=11)
+    with pytest.raises(ValueError, match=r"measured has traces of \[\(9,\)\] points, must be \[\(11,\)\]"):
+        io.write_traces(tmp_path / "chart.csv", [design], [few])
+    with pytest.raises(ValueError, match="write_traces: face_coordinate of measured trace 0 is not that of the design"):
+        io.write_traces(tmp_path / "chart.csv", [design], [moved])
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("column", ["roll_angle_deg", "diameter_mm"])
 def test_other_coordinates_need_the_base_radius(side, relief, tmp_path, column):
     trace = manufacture.profile_trace(side, relief, points=11)
@@ -258,3 +269,19 @@ def test_a_design_file_names_what_is_wrong_with_the_flank(tmp_path, file, more, 
     with pytest.raises(io.DesignFileError) as caught:
         io.load_design(path)
     assert str(caught.value).startswith(f"{path}: ") and problem in str(caught.value)
+
+
+def test_a_design_file_holds_a_search_to_what_the_wheel_grinds(tmp_path):
+    """By the name of the quantity, in either spelling."""
+    variables = "\n[variables]\nh = { low = 1.0, high = 9.0 }\n"
+    relief = '[[pinion.modification]]\ntype = "tip_relief"\namount = "h"\nlength = 3.0\n[wheel]'
+    written(tmp_path, MEASURED)
+
+    def request(name):
+        limits = f'[[optimize.constraint]]\nof = "{name}"\nhigh = 1.0\n'
+        text = DESIGN.replace("[wheel]", relief).format(file="measured.csv", more="") + variables + limits
+        return io.optimize_request(io.load_design(written(tmp_path, text, "design.toml")))
+
+    assert request("pinion_quadratic_deviation").method == request("wheel_cubic_deviation_um").method == "minimax"
+    with pytest.raises(io.DesignFileError, match='"pinion_quadratic" is not known, did you mean "pinion_quadratic_dev'):
+        request("pinion_quadratic")

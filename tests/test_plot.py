@@ -68,7 +68,6 @@ def draw(mesh, designs, cycles, curves):
     factors = {"unmodified": np.ones(4), "long relief": np.array([1.4, 1.3, 1.2, 1.1])}
     return {
         "transmission_error": lambda ax=None: plot.transmission_error(cycles, ax),
-        "mesh_orders": lambda ax=None: plot.mesh_orders(cycles, ax),
         "load_sharing": lambda ax=None: plot.load_sharing(cycles, ax),
         "pressure": lambda ax=None: plot.pressure(cycles, ax),
         "pressure_map": lambda ax=None: plot.pressure_map(cycles["long relief"], ax),
@@ -85,7 +84,6 @@ def draw(mesh, designs, cycles, curves):
 
 UNITS = {
     "transmission_error": ("[base pitches]", "[µm]"),
-    "mesh_orders": ("[-]", "[µm]"),
     "load_sharing": ("[mm]", "[-]"),
     "pressure": ("[mm]", "[MPa]"),
     "pressure_map": ("[mm]", "[mm]"),
@@ -125,16 +123,6 @@ LEGENDS = (
     "face_load_over_torque",
     "line_load",
 )
-
-
-def test_bars_are_the_amplitudes_of_the_orders(cycles):
-    ax = plot.mesh_orders(cycles)
-    for bars, cycle in zip(ax.containers, cycles.values(), strict=True):
-        curve = np.asarray(cycle.transmission_error)
-        spectrum = 2 * np.abs(np.fft.rfft(curve)) / len(curve)
-        heights = [bar.get_height() for bar in bars]
-        np.testing.assert_allclose(heights, spectrum[1 : len(heights) + 1], rtol=1e-9, atol=1e-12)
-        assert [round(bar.get_x() + bar.get_width() / 2) for bar in bars] == list(range(1, len(heights) + 1))
 
 
 def test_the_tolerance_lies_about_the_named_design(mesh, designs):

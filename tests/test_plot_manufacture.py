@@ -8,7 +8,7 @@ import jax.numpy as jnp  # noqa: E402
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
-from catalogue import kahraman_gear, prepare  # noqa: E402
+from catalogue import flank, kahraman_gear, prepare, solve  # noqa: E402
 
 import jaxgear as jg  # noqa: E402
 from jaxgear import manufacture, plot  # noqa: E402
@@ -97,3 +97,46 @@ def test_band_of_the_class_about_the_first_design(mesh, quality, chart):
     labels = [text.get_text() for text in panels[0].figure.legends[0].get_texts()]
     assert labels == ["design", "none", "tolerance of the class"]
     assert float(jnp.max(manufacture.profile_trace(mesh.sides[0], design, quality).design)) == 0.0
+
+
+@pytest.fixture(scope="module")
+def cycles(mesh):
+    return {
+        name: solve(mesh, jnp.asarray(200.0), flank(tip=a), flank(tip=a)) for name, a in (("none", 0.0), ("some", 6.0))
+    }
+
+
+def test_orders_as_bars(cycles):
+    ax = plot.transmission_error_orders(cycles, count=4)
+    heights = np.reshape([bar.get_height() for bar in ax.patches], (2, 4))
+    for row, cycle in zip(heights, cycles.values()):
+        np.testing.assert_allclose(row, jg.harmonics(cycle.transmission_error, 4).amplitude)
+    middle = np.reshape([bar.get_x() + bar.get_width() / 2 for bar in ax.patches], (2, 4)).mean(axis=0)
+    np.testing.assert_allclose(middle, [1, 2, 3, 4])
+    with pytest.raises(ValueError, match="harmonics: count = 16 must be"):
+        plot.transmission_error_orders(cycles, count=16)
+
+
+def test_mesh_stiffness_over_the_phase(cycles):
+    cycle = cycles["some"]
+    tangent, secant = plot.mesh_stiffness(cycle).lines
+    np.testing.assert_array_equal(tangent.get_ydata()[:32], cycle.tangent_stiffness)
+    np.testing.assert_array_equal(secant.get_ydata()[:32], jg.secant_stiffness(cycle))
+    assert tangent.axes.get_ylim()[0] == 0 and tangent.axes.get_ylabel() == "mesh stiffness [N/µm]"
+
+
+def test_meshing_diagram_shows_contact_on_the_line_of_action_and_on_the_tip_circles(cycles):
+    """Loaded pairs touch on the line between A and E, and beyond it on the tip circle of a gear."""
+    cycle = cycles["none"]
+    ax = plot.meshing_diagram(cycle)
+    line, points = ax.lines[-2].get_xydata(), ax.lines[-1].get_xydata()
+    contact, tip = cycle.kinematics.path_of_contact, 0.5 * 154.5709
+    along = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
+    assert np.linalg.norm(line[0]) == pytest.approx(float(contact.pinion_pitch_roll_length))
+    position, off = points @ along, points @ [-along[1], along[0]]
+    inside = (position > float(contact.start)) & (position < float(contact.end)) & (abs(off) < 1e-9)
+    recess, approach = points[(position > 0) & ~inside], points[(position < 0) & ~inside]
+    assert len(recess) and len(approach) and inside.sum() > 30, "unmodified teeth touch beyond both ends"
+    np.testing.assert_allclose(np.hypot(recess[:, 0], recess[:, 1] + 75.0), tip, rtol=1e-12)
+    np.testing.assert_allclose(np.hypot(approach[:, 0], approach[:, 1] - 75.0), tip, rtol=1e-12)
+    assert (off[(position > 0) & ~inside] < 0).all() and (off[(position < 0) & ~inside] > 0).all()

@@ -67,6 +67,13 @@ OTHERS = {
 }
 
 
+class Blunt(jg.Linear):
+    """A curve of a user's own, derived from one of the library."""
+
+    def __call__(self, d):
+        return d * d * (3.0 - 2.0 * d)
+
+
 class Bump(AbstractModification):
     """A hollow in the middle of the flank, of a user's own class."""
 
@@ -140,6 +147,11 @@ def test_a_modification_of_a_users_own_goes_through_points(tmp_path, most):
     assert isinstance(found, TabulatedFlank)
     error = difference(OF_PINION, -0.5 * Bump(18.0), found)
     assert most / 50 < error <= most  # no more points than needed
+
+
+def test_a_curve_of_a_users_own_is_not_taken_for_what_it_derives_from(tmp_path):
+    found = again(tmp_path / "flank.rexs", pinion=jg.TipRelief(9.0, 5.0, Blunt())).pinion
+    assert difference(OF_PINION, jg.TipRelief(9.0, 5.0, Blunt()), found) <= POINTS
 
 
 def test_points_serve_programs_that_interpolate_over_the_diameter(tmp_path):

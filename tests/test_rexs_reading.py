@@ -3,6 +3,7 @@
 import base64
 import contextlib
 import io
+import random
 import re
 from types import SimpleNamespace
 
@@ -288,6 +289,12 @@ REFUSED = {
     "ring gear": ('type="cylindrical_gear"', 'type="ring_gear"', "ring_gear 3: is an internal gear"),
     "protuberance": (RACK, RACK + attribute("protuberance_amount", "0.1"), "protuberance_amount: 0.1 must be 0"),
     "chamfer": (TEETH, attribute("chamfer_at_tooth_end", "0.5") + TEETH, "chamfer_at_tooth_end: 0.5 must be 0"),
+    "tip chamfer": (TEETH, attribute("tip_form_diameter", "62.5") + TEETH, "62.5 mm must be the tip diameter, 63 mm"),
+    "not a length": (WIDTH, WIDTH.replace("20.0", "1e7"), "face_width: 1e+07 mm must be at least"),
+    "length alone": ('id="tip_relief_datum_diameter"', 'id="tip_relief_datum_length"', "datum_diameter: missing"),
+    "no module": ('id="normal_module" unit="mm">3.0', 'id="normal_module" unit="mm">0', "0 mm must be greater than 0"),
+    "thicker tooth": (TEETH, attribute("chordal_tooth_thickness_upper_deviation", "0.05") + TEETH,
+                      "0.05 mm is the middle of the allowances, must be greater than -4.712 mm and at most 0 mm"),
     "no corner radius": (RACK, "", "tip_corner_radius_factor_reference_profile: missing"),
     "no tool": ('type="manufacturing_step"', 'type="step"', "must be made by one rack_shaped_tool"),
     "another tool": ('type="rack_shaped_tool"', 'type="profile_tool"', "makes a flank, must be a rack_shaped_tool"),
@@ -340,6 +347,36 @@ def test_what_cannot_be_meant_is_refused_in_one_line(written, name):
     assert wanted in message and message.startswith(f"{written.path}: ") and "\n" not in message
 
 
+def test_whatever_is_changed_is_read_or_refused_in_one_line(written):
+    """Slips of a hand: a value, an attribute, an id, a part or a letter."""
+    rng, values = (
+        random.Random(1),
+        ["", "0", "-1", "1e300", "nan", "abc", "0.5", "true", "1,5", "<array><c>1</c></array>"],
+    )
+    pieces = [
+        (r"(<attribute [^>]*>)[^<]*(</attribute>)", lambda found: found[1] + rng.choice(values) + found[2]),
+        (r"<attribute [^>]*>[^<]*</attribute>", lambda found: ""),
+        (
+            r'(id|role|type|unit|order)="[^"]*"',
+            lambda found: f'{found[1]}="{rng.choice(["2", "99", "", "mm", "gear"])}"',
+        ),
+        (r"<(component|relation)\b.*?</\1>", lambda found: ""),
+        (r"(?s).", lambda found: rng.choice(["<", "&", "\0", "5"])),
+    ]
+    places = [[*re.finditer(pattern, written.text, re.DOTALL)] for pattern, _ in pieces]
+    refused = 0
+    for _ in range(200):
+        kind = rng.randrange(len(pieces))
+        found = rng.choice(places[kind])
+        written.path.write_text(written.text[: found.start()] + pieces[kind][1](found) + written.text[found.end() :])
+        try:
+            read_rexs(written.path)
+        except DesignFileError as error:
+            refused += 1
+            assert str(error).startswith(f"{written.path}: ") and "\n" not in str(error)
+    assert refused > 100
+
+
 @pytest.mark.parametrize(
     "declaration",
     [
@@ -374,6 +411,40 @@ def test_a_load_case_of_several_is_chosen_by_its_id(written):
     assert read_rexs(written.path, load_case=2).torque == 70.0  # its sign tells which way the gears turn
     with pytest.raises(DesignFileError, match="has no load_case 3, must be one of 1, 2"):
         read_rexs(written.path, load_case=3)
+
+
+def test_a_gear_turns_with_its_shaft(written):
+    """Where the file names no speed of the gear."""
+    text = re.sub(r'<attribute id="rotational_speed".*?</attribute>', "", written.text)
+    shaft = f'<component id="80" type="shaft">{attribute("rotational_speed", "-1234.5", "1 / min")}</component>'
+    relation = '<relation id="99" type="assembly"><ref id="80" role="assembly"/><ref id="3" role="part"/></relation>'
+    written.path.write_text(text.replace("</components>", shaft + "</components>"))
+    assert read_rexs(written.path).speed is None
+    with_shaft = text.replace("</components>", shaft + "</components>").replace(
+        "</relations>", relation + "</relations>"
+    )
+    written.path.write_text(with_shaft)
+    assert read_rexs(written.path).speed == 1234.5
+
+
+@pytest.mark.parametrize(
+    "points, wanted",
+    [
+        (([0.0, 0.0], [60.0, 61.0], [0.001]), "must be one per point, with its coordinate and diameter, not 2 coord"),
+        (([0.0, 0.0, 5.0], [60.0, 61.0, 60.0], [0.001, 0.0, 0.0]), "must be a full grid of at least 2 diameters"),
+        (([0.0, 0.0], [60.0, 60.0], [0.001, 0.0]), "must be a full grid of at least 2 diameters"),
+        (([0.0, 5.0], [60.0, 60.0], [0.001, 0.0]), "must be a full grid of at least 2 diameters"),
+        (([0.0, 0.0], [50.0, 60.0], [0.001, 0.0]), "50 mm must be at least 53.5624794 mm, the base diameter"),
+    ],
+)
+def test_points_that_make_no_flank_are_refused(written, points, wanted):
+    names = "coordinates_of_{}", "diameters_of_{}", "{}_amounts"
+    kind = "topographical_modification"
+    with pytest.raises(DesignFileError, match=re.escape(wanted)):
+        flank(written, kind, **{name.format(kind): values for name, values in zip(names, points)})
+    usual = {name.format(kind): values for name, values in zip(names, ([0.0, 0.0], [60.0, 61.0], [0.001, 0.002]))}
+    with pytest.raises(DesignFileError, match='type_of_interpolation_topographical_modification: "spline" is not'):
+        flank(written, kind, **usual, type_of_interpolation_topographical_modification=("spline", "none"))
 
 
 def test_flanks_that_differ_have_to_be_chosen(written):
@@ -472,7 +543,10 @@ def test_the_command_refuses_in_one_line_and_writes_nothing(tmp_path):
     for arguments, wanted in (
         ((rexs, tmp_path / "new.toml"), "names no torque of the pinion, give it with --torque"),
         ((rexs, there, "--torque", "50"), "there.toml: exists already, choose another name"),
-        ((rexs, tmp_path / "new.txt"), "pair.rexs to new.txt: one name must end in .toml, the other in .rexs or .xml"),
+        (
+            (rexs, tmp_path / "new.txt"),
+            "pair.rexs to new.txt: one name must end in .toml, the other in .rexs or .rexsj",
+        ),
         ((rexs, tmp_path / "new.toml", "--stage", "7"), "has no cylindrical_stage 7, must be one of 2"),
         ((rexs, tmp_path / "new.toml", "--torque", "0"), "torque = 0 N m must be greater than 0 N m"),
         ((free, tmp_path / "new.rexs"), "convert needs numbers, these are free: free"),

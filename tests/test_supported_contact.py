@@ -29,12 +29,12 @@ PINION = jg.Gear(teeth=19, module=3.0, face_width=18.0, bore_diameter=24.0)
 WHEEL = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=40.0)
 PAIR = jg.GearPair(PINION, WHEEL)
 TORQUE, LENGTH = 50.0, 150.0
-SLICES = 8
+SLICES = 5
 SIZES = jg.Resolution(positions=4, slices=SLICES, pairs=2)
 FLANK = jg.LeadSlope(4.0) + jg.LeadCrowning(5.0)
 
 
-def gearbox(radial=400.0, *, mirrored=False, modulus=206e3, housing=None, torque=TORQUE):
+def gearbox(radial=150.0, *, mirrored=False, modulus=206e3, housing=None, torque=TORQUE):
     """One stage between bearings, its gears off the middle; `mirrored` about the plane across the shafts."""
 
     def at(position):
@@ -55,8 +55,8 @@ def gearbox(radial=400.0, *, mirrored=False, modulus=206e3, housing=None, torque
     return Gearbox(shafts, [GearMesh("pinion", "wheel")], housing)
 
 
-def solved(given, *, sizes=SIZES, compliance=None, pinion=FLANK):
-    mesh = jg.prepare(PAIR, compliance=compliance, resolution=sizes, support=given)
+def solved(given, *, compliance=None, pinion=FLANK):
+    mesh = jg.prepare(PAIR, compliance=compliance, resolution=SIZES, support=given)
     cycle = jg.solve(mesh, TORQUE, pinion=pinion)
     assert bool(jnp.all(cycle.converged))
     return cycle
@@ -81,7 +81,8 @@ def test_what_does_not_give_way_is_no_support(rigid, carried):
     assert_same(solved(RigidSupport(PAIR)), rigid)
     stiff = gearbox(radial=1e12, modulus=1e14)
     assert_same(solved(support(stiff, 0)), rigid, rtol=1e-6)
-    assert abs(face_load_factor(carried) / face_load_factor(rigid) - 1) > 0.02
+    difference = np.abs(np.asarray(carried.line_load - rigid.line_load)).max()
+    assert difference > 0.02 * float(jnp.max(rigid.line_load))
 
 
 def test_a_housing_of_no_compliance_is_none(carried):
@@ -100,11 +101,11 @@ def test_one_pair_of_constant_stiffness_is_the_one_dimensional_analysis(crowning
     """Teeth that do not pass their load on over the face, under a linear law, at the pitch point: that is what the
     standard computes."""
     flank = jg.LeadSlope(4.0) + jg.LeadCrowning(crowning)
-    model, sizes = jg.legacy_compliance(), replace(SIZES, face_modes=SLICES)
-    mesh = jg.prepare(PAIR, compliance=model, resolution=sizes, support=support(gearbox(), 0))
+    model = jg.legacy_compliance()
+    mesh = jg.prepare(PAIR, compliance=model, resolution=SIZES, support=support(gearbox(), 0))
     even = replace(mesh.coupling, share=jnp.eye(SLICES), modes=jnp.eye(SLICES), rest=jnp.zeros(()))
     mesh = replace(mesh, coupling=even)
-    aligned = solved(None, sizes=sizes, compliance=model, pinion=jg.LeadSlope(0.0))
+    aligned = solved(None, compliance=model, pinion=jg.LeadSlope(0.0))
     mean = float(aligned.line_load[0, 0, 0])
     stiffness = mean / (float(aligned.transmission_error[0]) - float(mesh.hub) * mean)
     expected = annex_e(support(gearbox(), 0), pinion=flank, stiffness=stiffness, stations=SLICES)
@@ -113,6 +114,14 @@ def test_one_pair_of_constant_stiffness_is_the_one_dimensional_analysis(crowning
     assert load[1].max() == 0  # the pitch point, where one pair carries all
     np.testing.assert_allclose(load[0], expected.line_load, rtol=1e-8, atol=1e-6)
     assert (load[0].min() == 0) == (crowning > 20)
+
+
+def test_teeth_that_pass_their_load_on_raise_the_factor_of_the_one_dimensional_analysis(carried):
+    """A load gives way less the shorter it is; one stiffness along the face does not know. 5 to 25 % here."""
+    given = support(gearbox(), 0)
+    alone = float(annex_e(given, pinion=FLANK, stations=SLICES).face_load_factor)
+    assert alone > 1.2
+    assert 1.05 < float(face_load_factor(carried)) / alone < 1.25
 
 
 def housed(values):
@@ -136,7 +145,7 @@ def test_derivatives_of_the_face_load_factor_are_central_differences():
         mesh = jg.prepare(PAIR, resolution=SIZES, support=support(box, 0))
         return face_load_factor(jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(values[2]) + jg.LeadCrowning(values[3])))
 
-    at = jnp.array([400.0, 1 / 300.0, 4.0, 5.0])
+    at = jnp.array([150.0, 1 / 300.0, 4.0, 5.0])
     found, factor = jax.jit(jax.grad(factor))(at), jax.jit(factor)
     assert np.all(np.abs(np.asarray(found * at)) > 1e-4)
     for index, value in enumerate(np.asarray(at)):

@@ -18,6 +18,7 @@ from jaxgear.wear import (
     passage_depth,
     specific_sliding,
     wear_depth,
+    wear_in_steps,
     worn_volume,
 )
 from jaxgear.wear import wear as worn_flanks
@@ -310,3 +311,32 @@ def test_refuses_results_that_are_not_there(life):
         life_to_depth(life, 0.0)
     with pytest.raises(ValueError, match="passage_depth: coefficient = -1 m2/N"):
         passage_depth(life.cycles, -1.0)
+
+
+def test_steps_of_equal_length_are_the_blocks(mesh, life):
+    seen, kept = [], []
+
+    def keep(made_of, make):
+        kept.append(made_of)
+        return make()
+
+    options = {"coefficient": COEFFICIENT, "blocks": BLOCKS, "keep": keep}
+    steps = wear_in_steps(mesh, TORQUE, REVOLUTIONS, callback=lambda *given: seen.append(given), **options)
+    np.testing.assert_allclose(steps.depth, life.depth, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(steps.revolutions, life.revolutions)
+    np.testing.assert_allclose(steps.error, life.error, rtol=1e-6, atol=1e-9)
+    assert len(kept) == BLOCKS / 2 and seen[-1] == (REVOLUTIONS, REVOLUTIONS)
+
+
+def test_no_step_wears_more_than_the_increment(mesh, life):
+    steps = wear_in_steps(mesh, TORQUE, REVOLUTIONS, coefficient=COEFFICIENT, largest_increment=0.7)
+    worn_off = np.diff(np.asarray(steps.depth).sum(axis=2), axis=0).max(axis=(1, 2, 3))
+    assert worn_off.max() < 1.1 * 0.7 and len(worn_off) < 16
+    assert steps.revolutions[-1] == REVOLUTIONS
+    error = np.abs(np.asarray(steps.depth[-1] - life.depth[-1]).sum(axis=1)).max()
+    assert error < float(life.error[-1] + steps.error[-1])
+
+
+def test_steps_refuse_in_one_line(mesh):
+    with pytest.raises(ValueError, match="wear_in_steps: largest_increment = 0 um must be greater than 0 um"):
+        wear_in_steps(mesh, TORQUE, REVOLUTIONS, coefficient=COEFFICIENT, largest_increment=0.0)

@@ -118,6 +118,29 @@ def dynamics(
 
 
 @app.command()
+def wear(
+    context: typer.Context,
+    file: File,
+    output: Annotated[Path | None, output_option("wear")] = None,
+    quick: Quick = False,
+    no_figures: NoFigures = False,
+    reported: Reported = False,
+    no_cache: NoCache = False,
+) -> int:
+    """Wear the flanks of the pair over the revolutions of the table `wear`.
+
+    Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the design file or
+    the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.
+    """
+    with interrupt.importing():
+        from . import wear
+    fine = wear.run_wear(
+        file, output, quick=quick, figures=not no_figures, cache=not no_cache, command=typed(context, reported)
+    )
+    return OK if fine else NOT_CONVERGED
+
+
+@app.command()
 def layout(
     context: typer.Context,
     file: File,

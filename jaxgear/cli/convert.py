@@ -10,7 +10,7 @@ from ..io import DesignFileError, load_design, read_rexs, write_design, write_re
 from ..io.toml import read
 from . import interrupt, report
 
-_REXS, _DESIGN = (".rexs", ".xml"), (".toml",)
+_REXS, _DESIGN = (".rexs", ".xml", ".rexsj", ".json"), (".toml",)
 _TAKEN = {"title", "pinion", "wheel", "pair", "load"}  # tables of a design file that REXS has a place for
 
 
@@ -50,7 +50,7 @@ def convert(
                 raise ValueError(f"{name} has no effect on a design file, leave it out")
         _to_rexs(source, target)
     else:
-        raise ValueError(f"{source.name} to {target.name}: one name must end in .toml, the other in .rexs or .xml")
+        raise ValueError(f"{source.name} to {target.name}: one name must end in .toml, the other in .rexs or .rexsj")
 
 
 def _to_rexs(source: Path, target: Path) -> None:

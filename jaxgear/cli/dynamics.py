@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 
 from ..contact import Mesh
@@ -15,26 +14,20 @@ from ..dynamics import Dynamics, Oscillator, steps_for
 from ..io import (
     DesignFile,
     DynamicsRequest,
-    OptimizeRequest,
     dynamics_request,
-    optimize_request,
     result_folder,
     write_summary,
 )
-from ..io.schema import METHODS_WITHOUT_VARIABLES
-from ..microgeometry import AbstractModification, NoModification
-from ..optimize import Front
 from . import dynamics_figures, dynamics_report, interrupt, report
-from .commands import import_ahead, rule_based
+from .commands import import_ahead
+from .compared import Modifications, compared, search_of
 from .devices import compile_quickly
 from .document import document
 from .dynamics_branches import branches_of
 from .dynamics_report import Study, next_to_design
-from .kept import Kept
+from .kept import Kept, SpeedResponses
 from .progress import Stages
-from .run import coarse, default_folder, opened
-
-Modifications = tuple[AbstractModification, AbstractModification]
+from .run import default_folder, opened
 
 
 def run_dynamics(
@@ -52,13 +45,14 @@ def run_dynamics(
     with Stages() as stages:
         design = opened(file, cache=cache)
         request = dynamics_request(design, quick=quick)
-        search = _search(design, quick=quick)
+        search = search_of(design, quick=quick)
         target = output or default_folder(file, "dynamics", quick=quick)
         with ExitStack() as putting_in_place, result_folder(target) as folder:
             if figures:
                 import_ahead("matplotlib.pyplot")
-            mesh, designs = _designs(design, request, search, stages, quick=quick)
-            kept = Kept(target.with_name(f".{target.name}.runs"), _count(designs, request))
+            torque = max(design.torque, *request.torques)
+            mesh, designs = compared(design, torque, search, stages, quick=quick)
+            kept = Kept(target.with_name(f".{target.name}.runs"), SpeedResponses(), _count(designs, request))
             study = _study(design, request, mesh, designs, kept, stages)
             stages.begin("writing the results")
             data = {**dynamics_report.summary(study), "quick": quick}
@@ -78,36 +72,6 @@ def run_dynamics(
     for line in failures:
         report.warn(line)
     return not failures
-
-
-def _search(design: DesignFile, *, quick: bool) -> OptimizeRequest | None:
-    """The search that the file asks for; None where its modifications are numbers and it names no method."""
-    if design.bounds or design.optimize.method in METHODS_WITHOUT_VARIABLES:
-        return optimize_request(design, quick=quick)
-    return None
-
-
-def _designs(
-    design: DesignFile, request: DynamicsRequest, search: OptimizeRequest | None, stages: Stages, *, quick: bool
-) -> tuple[Mesh, dict[str, Modifications]]:
-    """The designs by their names, and the mesh on which they are compared."""
-    stages.begin("preparing the mesh")
-    size = design.resolution(max(design.torque, *request.torques))
-    mesh = jax.block_until_ready(design.mesh(coarse(size) if quick else size))
-    involute = NoModification()
-    relief = rule_based(design)
-    designs: dict[str, Modifications] = {"unmodified": (involute, involute), "rule-based": (relief, relief)}
-    if not design.bounds:
-        given = design.design({})
-        if any(not isinstance(flank, NoModification) for flank in given):
-            designs["modified"] = given
-    if search is not None:
-        stages.begin(f"searching the optimum ({search.method})")
-        found = search(mesh, stages.step)
-        optimum = found.compromise if isinstance(found, Front) else found
-        designs["optimum"] = optimum.pinion, optimum.wheel
-        mesh = optimum.mesh  # on which the search has ended
-    return mesh, designs
 
 
 def _count(designs: Mapping[str, Any], request: DynamicsRequest) -> int:

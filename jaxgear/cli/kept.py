@@ -6,7 +6,7 @@ import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 from zipfile import BadZipFile
 
 import jax
@@ -15,41 +15,70 @@ import numpy as np
 
 from ..dynamics import SpeedResponse
 from ..io import writing
+from ..wear import March
 from . import interrupt
 from .version import version
+
+_Found = TypeVar("_Found")
 
 _PAIR = "state"  # a field of two arrays
 
 
-class Kept:
-    """Speed responses on the disk, by the digest of what they were made of.
+class Codec(Protocol[_Found]):
+    """How results become named arrays and results again."""
+
+    def arrays(self, found: _Found) -> dict[str, Any]:
+        """All that a result holds."""
+
+    def result(self, arrays: dict[str, Any]) -> _Found:
+        """The result; raises `KeyError`, `TypeError` or `ValueError` for other arrays."""
+
+
+class Kept(Generic[_Found]):
+    """Results on the disk, by the digest of what they were made of.
 
     Args:
         folder: where they lie, beside the results; it goes when these are complete.
-        total: how many there will be.
+        codec: of the results.
+        total: how many there will be; None where nobody knows.
     """
 
-    def __init__(self, folder: Path, total: int):
-        self._folder, self._total, self._done = folder, total, 0
+    def __init__(self, folder: Path, codec: Codec[_Found], total: int | None = None):
+        self._folder, self._codec, self._total, self._done = folder, codec, total, 0
 
-    def __call__(self, made_of: Any, make: Callable[[], SpeedResponse]) -> SpeedResponse:
-        """The response that is there, or that is made and then kept.
+    def __call__(self, made_of: Any, make: Callable[[], _Found]) -> _Found:
+        """The result that is there, or that is made and then kept.
 
         Args:
             made_of: a pytree of all that it depends on.
             make: makes it.
         """
         path = self._folder / f"{_digest(made_of)}.npz"
-        found = _read(path)
+        found = self._read(path)
         if found is None:
             found = jax.block_until_ready(make())
             with writing(path):
                 self._folder.mkdir(parents=True, exist_ok=True)
-                _write(path, found)
+                self._write(path, found)
         self._done += 1
-        there = f"{self._done} of {self._total} runs are kept in {self._folder}{os.sep}"
+        of_all = "" if self._total is None else f" of {self._total}"
+        there = f"{self._done}{of_all} runs are kept in {self._folder}{os.sep}"
         interrupt.note(f"{there}, go on with the same command")
         return found
+
+    def _write(self, path: Path, found: _Found) -> None:
+        temporary = path.with_suffix(".part")
+        with temporary.open("wb") as file:
+            arrays: dict[str, Any] = {name: np.asarray(value) for name, value in self._codec.arrays(found).items()}
+            np.savez(file, **arrays)
+        temporary.replace(path)
+
+    def _read(self, path: Path) -> _Found | None:
+        try:
+            with np.load(path) as file:
+                return self._codec.result(dict(file))
+        except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):  # not there, or torn
+            return None
 
     def remove(self) -> None:
         """All is in the results now."""
@@ -65,24 +94,32 @@ def _digest(tree: Any) -> str:
     return digest.hexdigest()
 
 
-def _write(path: Path, response: SpeedResponse) -> None:
-    fields = {field.name: getattr(response, field.name) for field in dataclasses.fields(response)}
-    displacement, velocity = fields.pop(_PAIR)
-    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in fields.items()}
-    temporary = path.with_suffix(".part")
-    with temporary.open("wb") as file:
-        np.savez(file, displacement=np.asarray(displacement), velocity=np.asarray(velocity), **arrays)
-    temporary.replace(path)
+class SpeedResponses:
+    """Speed responses as arrays."""
+
+    def arrays(self, found: SpeedResponse) -> dict[str, Any]:
+        """All that a response holds."""
+        fields = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
+        displacement, velocity = fields.pop(_PAIR)
+        return {"displacement": displacement, "velocity": velocity, **fields}
+
+    def result(self, arrays: dict[str, Any]) -> SpeedResponse:
+        """The response."""
+        orders = tuple(arrays.pop("orders").tolist())
+        direction: Any = str(arrays.pop("direction"))
+        known: dict[str, Any] = {name: jnp.asarray(value) for name, value in arrays.items()}
+        known[_PAIR] = known.pop("displacement"), known.pop("velocity")
+        return SpeedResponse(**known, orders=orders, direction=direction)
 
 
-def _read(path: Path) -> SpeedResponse | None:
-    try:
-        with np.load(path) as file:
-            data: dict[str, Any] = dict(file)
-        orders = tuple(data.pop("orders").tolist())
-        direction: Any = str(data.pop("direction"))
-        arrays: dict[str, Any] = {name: jnp.asarray(value) for name, value in data.items()}
-        arrays[_PAIR] = arrays.pop("displacement"), arrays.pop("velocity")
-        return SpeedResponse(**arrays, orders=orders, direction=direction)
-    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):  # not there, or torn
-        return None
+class Marches:
+    """Blocks of wear as arrays."""
+
+    def arrays(self, found: March) -> dict[str, Any]:
+        """All that they hold."""
+        return {"depth": found.depth, "error": found.error, **found.seen}
+
+    def result(self, arrays: dict[str, Any]) -> March:
+        """The blocks."""
+        known = {name: jnp.asarray(value) for name, value in arrays.items()}
+        return March(known.pop("depth"), known.pop("error"), known)

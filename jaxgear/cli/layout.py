@@ -10,7 +10,7 @@ import jax
 from ..contact import Mesh
 from ..io import DesignFile, LayoutRequest, layout_request, result_folder, write_flanks, write_summary
 from ..io.schema_shafts import ProfileSection
-from ..layout import FlankLine, FlankLineLayout, ProfileLayout, at_torque, layout_flank_lines, vary_profiles
+from ..layout import FlankLine, FlankLineLayout, ProfileLayout, at_stations, layout_flank_lines, vary_profiles
 from . import interrupt, layout_report, report
 from .commands import import_ahead
 from .devices import compile_quickly
@@ -74,8 +74,10 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
         for name in layouts if wanted.shafts else list(layouts)[:1]:
             stages.begin("preparing the mesh" + (f", {name}" if wanted.shafts else ""))
             size = design.resolution()
-            support = at_torque(request.supports[name], request.profile_torque) if wanted.shafts else None
-            mesh = jax.block_until_ready(design.mesh(coarse(size) if quick else size, support))
+            # as numbers, so that what is compiled for one support serves the other
+            held = at_stations(request.supports[name], request.profile_torque, stations=size.slices)
+            given = coarse(size) if quick else size, held if wanted.shafts else None
+            mesh = jax.block_until_ready(design.mesh(*given))
             stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
             meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
     return Study(design, request, layouts, meshes, profiles)
@@ -87,7 +89,6 @@ def _profile(
     """Step 3 on the flank lines, or on what they leave where they have levelled the load: the further crowning."""
     left = tuple(FlankLine(crowning=amount).modification for amount in layout.further)
     pinion, wheel = layout.modifications if wanted.shafts else left
-    given = {} if wanted.length is None else {"length": wanted.length}
     return vary_profiles(
         mesh,
         request.profile_torque,
@@ -95,6 +96,6 @@ def _profile(
         wanted.pinion_amounts,
         wanted.wheel_amounts or wanted.pinion_amounts,
         kind="profile_crowning" if wanted.type == "profile_crowning" else "tip_relief",
+        length=wanted.length,
         callback=lambda done, total, _: stages.count(done, total, "variants"),
-        **given,
     )

@@ -36,6 +36,7 @@ _ROWS = {
 }
 _BY_FINITE_ELEMENTS = "  by finite elements"
 _HARRIS_CURVES = 7
+_ORDERS = 8  # of the transmission error that are drawn
 _TITLE = 9.0  # [pt]
 _WIDTH = 120  # of a file [characters]
 
@@ -157,7 +158,7 @@ def write_figures(
     few = np.unique(np.linspace(0, len(torques) - 1, _HARRIS_CURVES).round().astype(int))
     axes: dict[str, Any] = {
         "transmission_error": plot.transmission_error(cycles),
-        "mesh_orders": plot.mesh_orders(cycles),
+        "transmission_error_orders": plot.transmission_error_orders(cycles, count=_orders(mesh)),
         "load_sharing": plot.load_sharing(cycles),
         "pressure": plot.pressure(cycles),
         "ppte_over_torque": plot.ppte_over_torque(
@@ -191,6 +192,11 @@ def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: 
         "lead_chart": plot.lead_chart(mesh, flanks(evaluations), **_band(file, evaluations)),
         "face_load_over_torque": plot.face_load_over_torque(torques, factors, design_torque=file.torque),
     }
+
+
+def _orders(mesh: Mesh) -> int:
+    """As many as the positions resolve."""
+    return max(1, min(_ORDERS, (mesh.resolution.positions - 1) // 2))
 
 
 def _band(file: DesignFile, evaluations: Evaluations) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from ..io import DesignFile, describe
 from ..metrics import Doubt
 from ..numerics import fields_of
 from ..optimize import Verified
+from ..shafts import RigidSupport
 from .geometry import geometry
 from .report import Evaluations, diameters, reduction
 from .study import Evaluation
@@ -38,6 +39,7 @@ def summary(
         "friction": file.friction,
         "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
         "center_distance_mm": _center_distance(mesh),
+        **_misalignment(mesh),
         "model": model(mesh),
         "designs": {
             name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
@@ -112,6 +114,13 @@ def sizes(of: Resolution) -> dict[str, Any]:
 def model(mesh: Mesh) -> dict[str, str]:
     """The compliance and its plane state in words."""
     return {"compliance": _words(mesh.compliance), "plane": mesh.compliance.plane}
+
+
+def _misalignment(mesh: Mesh) -> dict[str, float]:
+    """Misalignment over the face where the axes are not parallel [um]."""
+    if not isinstance(mesh.support, RigidSupport):
+        return {}
+    return {"misalignment_um": float(mesh.support.misalignment.over_face(mesh.pair))}
 
 
 def _words(part: eqx.Module) -> str:

@@ -37,14 +37,15 @@ def face_kernel(face_width: Scalar, root_chord: Scalar, slices: int) -> Kernel:
         root_chord: S of the teeth, mean of both gears [mm].
         slices: of equal width over the face.
     """
-    waves = np.arange(slices)
-    cosines = jnp.asarray(face_waves(slices), jnp.result_type(face_width))
-    mirrored = cosines / (1 + (np.pi * waves * _DECAY * root_chord / face_width) ** 2) @ cosines.T
+    dtype = jnp.result_type(face_width)
+    waves, cosines = jnp.arange(slices, dtype=dtype), jnp.asarray(face_waves(slices), dtype)
+    falling = 1 / (1 + (jnp.pi * waves * _DECAY * root_chord / face_width) ** 2)
+    mirrored = (cosines * falling[None]) @ cosines.T
     decay, step = _END_DECAY * root_chord, face_width / slices
     # mean of exp(-distance / decay) over every slice
     near = jnp.exp(-waves[::-1] * step / decay) * -jnp.expm1(-step / decay) * decay / step
     ends = jnp.stack([near, near[::-1]], axis=1)
-    ends = ends - jnp.mean(ends, axis=0)
+    ends = ends - jnp.mean(ends, axis=0, keepdims=True)
     return mirrored + 2 * _END_SOFTNESS * step / decay * ends @ ends.T
 
 

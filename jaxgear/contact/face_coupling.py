@@ -15,6 +15,7 @@ from .kinematics import Kinematics
 from .resolution import Resolution
 
 _SAME = 1e-6  # relative difference of numbers that single precision keeps apart
+_SAME_TORQUE = 1e-4
 
 
 def coupling_of(
@@ -46,7 +47,7 @@ def coupling_of(
     )
 
 
-def _polynomials(slices: int, count: int) -> Float[Array, "slices count"]:
+def _polynomials(slices: int, count: int) -> Float[np.ndarray, "slices count"]:
     """Of degree 0, 1, 2, ... at the middles of the slices, orthonormal."""
     middle = (np.arange(slices) + 0.5) / slices - 0.5
     found, upper = np.linalg.qr(np.polynomial.legendre.legvander(2 * middle, count - 1))
@@ -63,7 +64,9 @@ def check_support(support: AbstractSupport | None, pair: GearPair, resolution: R
     if support is None:
         return
     if not isinstance(support, AbstractSupport):
-        raise TypeError(f"prepare: support is a {type(support).__name__}, must be a support: jaxgear.support makes one")
+        raise TypeError(
+            f"prepare: support is a {type(support).__name__}, must be a support: jaxgear.shafts.support makes one"
+        )
     if resolution.slices == 1:
         raise ValueError(
             "prepare: support acts over the face, which a mesh of 1 slice cannot show: Resolution(slices=11)"
@@ -75,3 +78,19 @@ def check_support(support: AbstractSupport | None, pair: GearPair, resolution: R
         here, there = concrete(one), concrete(other)
         if here is not None and there is not None and not np.allclose(here, there, rtol=_SAME):
             raise ValueError("prepare: support holds another pair than the one to prepare: take support.pair")
+
+
+def check_torque(owner: str, support: AbstractSupport | None, torque: Float[Array, ""]) -> None:
+    """Refuses a torque at which the support does not hold, as far as both are known.
+
+    Raises:
+        ValueError: for another torque than that of the gearbox whose shafts are the support.
+    """
+    wanted = None if support is None else support.torque
+    given, known = concrete(torque), None if wanted is None else concrete(wanted)
+    if given is None or known is None or np.isclose(given, known, rtol=_SAME_TORQUE, atol=0.0):
+        return
+    raise ValueError(
+        f"{owner}: torque = {float(given):g} N m, but the gearbox that holds the gears has {float(known):g} N m on "
+        "this pinion: prepare with the gearbox at that torque"
+    )

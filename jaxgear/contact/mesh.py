@@ -115,7 +115,7 @@ class Mesh(eqx.Module):
 
     def held(self, gap: Float[Array, "pairs slices positions"]) -> Float[Array, "pairs slices positions"]:
         """A gap of the flanks [um] as what holds the gears leaves it."""
-        return gap if self.support_gap is None else gap + self.lever[:, None] * self.support_gap[:, None]
+        return gap if self.support_gap is None else gap + self.lever[:, None] * self.support_gap[None, :, None]
 
     def flanks(self, offset=0.0) -> tuple[Flank, Flank]:
         """Points of pinion and wheel that face each other at a distance from the centre of contact.

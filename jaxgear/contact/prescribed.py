@@ -8,6 +8,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, ContactProblem, check, program, real, result, solve_contact, tangent_stiffness
+from .face_coupling import check_torque
 from .loaded_width import loaded_material, unlabelled
 from .mesh import Mesh
 from .operation import operation_of
@@ -88,6 +89,7 @@ def solve_at(
         )
     check("solve_at", "transmission_error", error, "um")
     torque = operation_of("solve_at", torque, mesh.slice_width.dtype).torque
+    check_torque("solve_at", mesh.support, torque)
     flanks, prepared = flanks_of("solve_at", mesh, pinion, wheel), unlabelled(mesh)
     error = jnp.broadcast_to(error.astype(torque.dtype), (positions,))
 

@@ -15,6 +15,7 @@ from ..numerics import ContactProblem, concrete, minimum, program, solve_contact
 from ..numerics.programs import begin
 from ..shafts import AbstractSupport
 from .cycle import MeshCycle
+from .face_coupling import check_torque
 from .loaded_width import loaded_material, unlabelled
 from .mesh import Mesh, prepare, prepare_from
 from .operation import Operation, operation_of
@@ -50,11 +51,12 @@ def solve(
 
     Raises:
         TypeError: for something else than a prepared mesh or a modification.
-        ValueError: for a negative or non-finite torque, an array of torques, or a modification that varies along the
-            face on a mesh of one slice.
+        ValueError: for a negative or non-finite torque, an array of torques, a modification that varies along the
+            face on a mesh of one slice, or a torque that is not that of the gearbox which holds the gears.
     """
     check_mesh("solve", mesh)
     operation = operation_of("solve", torque, mesh.slice_width.dtype)
+    check_torque("solve", mesh.support, operation.torque)
     pinion, wheel = flanks_of("solve", mesh, pinion, wheel)
     # two programs: that of the contact, by far the longer one to compile, serves every kind of modification
     removed = _material(mesh, operation.torque, pinion, wheel)
@@ -82,10 +84,12 @@ def solve_removed(
 
     Raises:
         TypeError: for something else than a prepared mesh.
-        ValueError: for a negative or non-finite torque, an array of torques, or removed material of another shape.
+        ValueError: for a negative or non-finite torque, an array of torques, removed material of another shape, or a
+            torque that is not that of the gearbox which holds the gears.
     """
     check_mesh("solve_removed", mesh)
     operation = operation_of("solve_removed", torque, mesh.slice_width.dtype)
+    check_torque("solve_removed", mesh.support, operation.torque)
     shape = jnp.shape(removed.amount if isinstance(removed, RemovedMaterial) else removed)
     wanted = (mesh.resolution.pairs, mesh.resolution.slices, mesh.resolution.positions)
     if shape != wanted:
@@ -230,7 +234,7 @@ def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
     fall = jnp.minimum(edge - jnp.stack([amount[-1, :, 1], amount[0, :, -2]]), 0.0)
     left = (edge - 2 * gain)[..., None] + fall[..., None] * mesh.outer_steps[:, None]
     if mesh.support_gap is not None:
-        left = left + mesh.outer_lever[:, None] * mesh.support_gap[:, None]
+        left = left + mesh.outer_lever[:, None] * mesh.support_gap[None, :, None]
     left = jnp.min(left, axis=1)
     return jnp.min(mesh.outer_gap + left / mesh.outer_lever, axis=0)
 

@@ -25,6 +25,10 @@ from .rexs import write_rexs as write_rexs
 from .sweep_request import SweepRequest as SweepRequest
 from .sweep_request import sweep_request as sweep_request
 from .variants import read_variants as read_variants
+from .wear_request import WearRequest as WearRequest
+from .wear_request import wear_request as wear_request
 from .wheel import write_wheel_drawing as write_wheel_drawing
 from .wheel import write_wheel_points as write_wheel_points
+from .worn import read_worn as read_worn
+from .worn import write_worn as write_worn
 from .write_design import write_design as write_design

@@ -15,7 +15,7 @@ from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
-from . import schema, schema_dynamics, schema_shafts, schema_sweep, template
+from . import schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, template
 from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refuse_given, refused
 from .flanks import flank_part
@@ -54,6 +54,7 @@ class DesignFile:
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
         dynamics: likewise, see `dynamics_request`.
+        wear: likewise, see `wear_request`.
         layout: likewise, see `layout_request`.
         support: the mesh on its shafts; None without them.
         design: makes the modifications of pinion and wheel from the free parameters.
@@ -72,6 +73,7 @@ class DesignFile:
     sweep: schema_sweep.SweepSection | None
     tolerance: schema_sweep.ToleranceSection | None
     dynamics: schema_dynamics.DynamicsSection | None
+    wear: schema_wear.WearSection | None
     layout: schema_shafts.LayoutSection | None
     support: ShaftSupport | None
     design: FileDesign
@@ -234,6 +236,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         sweep=sweep,
         tolerance=tolerance,
         dynamics=None if top.dynamics is None else decode("dynamics", top.dynamics, schema_dynamics.DynamicsSection),
+        wear=None if top.wear is None else decode("wear", top.wear, schema_wear.WearSection),
         layout=layout,
         support=support_of(top, layout, usual_pair, torque, file.parent),
         design=FileDesign(tuple(bounds), pinion_flank, wheel_flank),

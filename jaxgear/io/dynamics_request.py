@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from ..dynamics import DYNAMIC_QUANTITIES, Dynamics
-from ..metrics import Quantity, quantities
+from ..metrics import Quantity
 from .design_file import DesignFile
-from .errors import DesignFileError, check_known, naming
+from .errors import DesignFileError, naming
 from .schema_dynamics import DynamicsSection
 from .template import part_of
 from .variables import increasing
@@ -53,26 +53,17 @@ def dynamics_request(design: DesignFile, *, quick: bool = False) -> DynamicsRequ
         )
 
 
-def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
-    """What a name of the vocabulary means in a design file: quantities of the dynamics with its table [dynamics].
-
-    Args:
-        design: the design file.
-        key: where the name stands.
-        name: in either spelling.
+def dynamic_quantity(design: DesignFile, key: str, name: str) -> Quantity:
+    """A dynamic quantity with the settings of the table [dynamics].
 
     Raises:
-        DesignFileError: for an unknown name, and for one that needs a table or a speed that the file does not have.
+        DesignFileError: without the table, or a speed that the quantity needs.
     """
-    check_known(key, name, quantities)
-    plain = quantities[name].name
-    if plain not in DYNAMIC_QUANTITIES:
-        return name
     if design.dynamics is None:
         raise DesignFileError(key, f'"{name}" needs the table [dynamics]')
-    if DYNAMIC_QUANTITIES[plain].at_speed and design.speed is None:
-        raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{plain}" is that of all speeds of [dynamics]')
-    return _settings(design, design.dynamics, design.dynamics.number).quantity(plain)
+    if DYNAMIC_QUANTITIES[name].at_speed and design.speed is None:
+        raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{name}" is that of all speeds of [dynamics]')
+    return _settings(design, design.dynamics, design.dynamics.number).quantity(name)
 
 
 def _settings(design: DesignFile, section: DynamicsSection, number: int) -> Dynamics:

@@ -31,6 +31,7 @@ _PLACE = {
 _MEASURED, _REMOVED, _DESIGN = "measured_um", "modification_um", "design_um"
 _AMOUNTS = {_MEASURED: -1.0, _REMOVED: 1.0, _DESIGN: -1.0}  # what makes material removed of the first of them
 _ALONG, _ACROSS = "roll_length_mm", "face_coordinate_mm"
+_SAME_PLACE = 1e-3  # mm, of a measured and a designed point
 _DIGITS = 9  # behind the decimal point: what is read and written again does not drift
 
 Rows = list[dict[str, str]]
@@ -58,6 +59,10 @@ def write_traces(path: str | Path, traces: Sequence[Trace], measured: Sequence[T
         shapes = [[np.shape(trace.design) for trace in many] for many in (traces, measured)]
         if shapes[0] != shapes[1]:
             raise ValueError(f"write_traces: measured has traces of {shapes[1]} points, must be {shapes[0]}")
+        for number, (one, other) in enumerate(zip(traces, measured)):
+            for field in ("roll_length", "face_coordinate"):
+                if not np.allclose(getattr(one, field), getattr(other, field), rtol=0, atol=_SAME_PLACE):
+                    raise ValueError(f"write_traces: {field} of measured trace {number} is not that of the design")
         columns[_MEASURED] = [np.asarray(trace.design) for trace in measured]
     with writing(path), Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

@@ -23,8 +23,8 @@ from ..optimize.refine import POSITIONS
 from . import schema
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
-from .dynamics_request import quantity_named
 from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
+from .named import quantity_named
 from .toml import decode
 
 _DEFAULT_METHOD = "minimax"

@@ -20,7 +20,8 @@ from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from ..shafts import Misalignment
 from ..tolerance import Tolerance
-from . import schema, schema_dynamics, schema_shafts, schema_sweep
+from ..wear import Wear
+from . import schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear
 from .layout import Section, family, meanings, section_of, snake, summary
 from .ranges import allowed
 
@@ -69,6 +70,7 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     yield "[sweep]", schema_sweep.SweepSection, None
     yield "[tolerance]", schema_sweep.ToleranceSection, Tolerance
     yield "[dynamics]", schema_dynamics.DynamicsSection, Dynamics
+    yield "[wear]", schema_wear.WearSection, Wear
     yield from _gearbox_tables()
 
 

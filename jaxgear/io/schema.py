@@ -43,6 +43,7 @@ class FileSection(Section):
         sweep: what `jaxgear sweep` does.
         tolerance: of manufactured gears, for a sweep or `optimize.manufactured`.
         dynamics: at which speeds the pair runs, and what vibrates.
+        wear: how long the pair runs, and how fast it wears.
         shafts: that carry the gears, for `jaxgear layout`.
         meshes: of their gears; that of pinion and wheel alone without it.
         housing: that holds their bearings; rigid seats without it.
@@ -62,6 +63,7 @@ class FileSection(Section):
     sweep: Annotated[Tables | None, table()] = None
     tolerance: Annotated[Tables | None, table()] = None
     dynamics: Annotated[Tables | None, table()] = None
+    wear: Annotated[Tables | None, table()] = None
     shafts: Annotated[list[Tables], _TABLES] = []
     meshes: Annotated[list[Tables], _TABLES] = []
     housing: Annotated[Tables | None, table()] = None

@@ -13,8 +13,8 @@ from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
-from .dynamics_request import quantity_named
 from .errors import DesignFileError, naming, refuse_given, refused
+from .named import quantity_named
 from .schema_sweep import SweepSection
 from .variants import read_variants
 

@@ -87,9 +87,7 @@ def _level(face: Stations, stiffness, hollow: bool) -> FlankLine:
 
     def best(shapes):
         basis = jnp.stack([jnp.ones_like(slope), *shapes], axis=1)
-        force = 1e3 * face.torque / face.pair.pinion.base_radius / face.count
-        gap = face.opening + face.matrix @ jnp.full_like(slope, force)
-        return implicit_root(jax.grad(unevenness), -jnp.linalg.lstsq(basis, gap)[0][1:])
+        return implicit_root(jax.grad(unevenness), -jnp.linalg.lstsq(basis, face.bent)[0][1:])
 
     both = best((slope, crowning))
     if hollow:

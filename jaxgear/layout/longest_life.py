@@ -56,10 +56,10 @@ def longest_life(
     if any(concrete(leaf) is None for leaf in jax.tree.leaves((support, load, endurance))):
         raise ValueError("longest_life: searches with numbers, not inside of a traced function; `damage` can be traced")
     both = endurance if isinstance(endurance, tuple) else (endurance, endurance)
+    if not float(jnp.max(load.torques)) > 0:
+        raise ValueError("longest_life: torques are all zero, every flank line lives for ever")
     faces = under_loads(support, load, stations=stations)
     worst = int(np.argmax(np.sum(damage(support, load, both, stations=stations).pitting, axis=0)))
-    if not float(load.torques[worst]) > 0:
-        raise ValueError("longest_life: torques are all zero, every flank line lives for ever")
     start = level_load(support, load.torques[worst], hollow=hollow, stations=stations)
     point = np.array([float(start.slope), float(start.crowning)])
     bounds = [(None, None), (None if hollow else 0.0, None)]

@@ -11,13 +11,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+import equinox as eqx
 import numpy as np
+from jaxtyping import Array, Float
 
 from ..contact import Mesh
 from ..geometry import path_of_contact
 from ..metrics import Quantity
 from ..microgeometry import AbstractCurve, AbstractModification, ProfileCrowning, TipRelief
-from ..numerics import Callback, check
+from ..numerics import Callback, check, real
 from ..sizing import long_relief_length
 from ..sweeps import SweepTable, VariantList, sweep
 
@@ -115,17 +117,9 @@ def vary_profiles(
         check("vary_profiles", name, np.asarray(amounts, float), "um", low=0.0)
         if not len(amounts):
             raise ValueError(f"vary_profiles: {name} must not be empty")
-    along = long_relief_length(mesh.pair) if length is None else length
-    shape = {} if curve is None else {"curve": curve}
-
-    def profile(amount) -> AbstractModification:
-        return TipRelief(amount, along, **shape) if kind == "tip_relief" else ProfileCrowning(amount)
-
-    def design(variant):
-        both = zip(flank_lines, (variant[name] for name in _NAMES))
-        pinion, wheel = (line + profile(amount) for line, amount in both)
-        return pinion, wheel
-
+    design = _Crossed(
+        flank_lines, _Profile(kind, real(long_relief_length(mesh.pair) if length is None else length), curve)
+    )
     rows = [(0.0, 0.0), *((first, second) for first in pinion_amounts for second in wheel_amounts)]
     wanted = (*RESULTS, *(one for one in results if one not in RESULTS))
     plan = VariantList(_NAMES, rows)
@@ -143,7 +137,31 @@ def vary_profiles(
     theoretical = float(path_of_contact(mesh.pair).contact_ratio)
     best = _best(table, theoretical)
     first, second = rows[best]
-    return ProfileLayout(kind, table, best, theoretical, (profile(first), profile(second)))
+    return ProfileLayout(kind, table, best, theoretical, (design.profile(real(first)), design.profile(real(second))))
+
+
+class _Profile(eqx.Module):
+    """A profile modification of an amount."""
+
+    kind: Kind = eqx.field(static=True)
+    length: Float[Array, ""]
+    curve: AbstractCurve | None
+
+    def __call__(self, amount) -> AbstractModification:
+        if self.kind == "profile_crowning":
+            return ProfileCrowning(amount)
+        return TipRelief(amount, self.length) if self.curve is None else TipRelief(amount, self.length, self.curve)
+
+
+class _Crossed(eqx.Module):
+    """The design of the sweep; a module, so that one compiled program serves all layouts of a size."""
+
+    flank_lines: tuple[AbstractModification, AbstractModification]
+    profile: _Profile
+
+    def __call__(self, variant):
+        pinion, wheel = (line + self.profile(variant[name]) for line, name in zip(self.flank_lines, _NAMES))
+        return pinion, wheel
 
 
 def _best(table: SweepTable, theoretical: float) -> int:

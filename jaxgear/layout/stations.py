@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import GearPair
 from ..numerics import check, concrete, optional_real, program, real, result, whole
-from ..shafts import AbstractSupport, ShaftSupport
+from ..shafts import AbstractSupport, ShaftSupport, TabulatedSupport
 from ..shafts.mesh_support import even_coordinates
 
 Slices = Float[Array, " slices"]
@@ -18,41 +18,46 @@ STATIONS = 41  # over the face, as many as `annex_e` has
 class Stations(AbstractSupport):
     """A support as numbers at evenly spaced stations, under one torque; made by `at_stations`.
 
+    With as many stations as slices it stands for the support in `prepare`, and programs compiled for one gearbox serve
+    every other.
+
     Attributes:
-        gears: the pair.
-        torque: on the pinion.
-        matrix: gap per force between the stations.
-        opening: gap by everything else than the force of the mesh.
+        table: what it does over the face.
+        load: torque on the pinion under which it does that.
     """
 
-    gears: GearPair
-    torque: Scalar = result("N m")
-    matrix: Float[Array, "slices slices"] = result("um/N")
-    opening: Slices = result("um")
+    table: TabulatedSupport
+    load: Scalar = result("N m")
 
     @property
     def pair(self) -> GearPair:
-        """`gears`."""
-        return self.gears
+        """The gears of the mesh."""
+        return self.table.gears
+
+    @property
+    def torque(self) -> Scalar:
+        """`load`."""
+        return self.load
 
     @property
     def count(self) -> int:
         """Number of stations."""
-        return self.opening.shape[-1]
+        return self.table.matrix.shape[-1]
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
-        """`matrix`; the face coordinates must be those of the stations."""
-        self._check(y)
-        return self.matrix
+        """That of the table; the face coordinates must be those of the stations."""
+        return self.table.influence(y)
 
     def gap(self, y: Slices) -> Slices:
-        """`opening`; the face coordinates must be those of the stations."""
-        self._check(y)
-        return self.opening
+        """That of the table; the face coordinates must be those of the stations."""
+        return self.table.gap(y)
 
-    def _check(self, y: Slices) -> None:
-        if len(y) != self.count:
-            raise ValueError(f"Stations: {len(y)} face coordinates must be the {self.count} stations")
+    @property
+    def bent(self) -> Slices:
+        """Gap that an even load of the torque would leave [um]."""
+        force = 1e3 * self.torque / self.pair.pinion.base_radius / self.count
+        influence, gap = self.table.matrix, self.table.opening
+        return jnp.sum(influence, axis=-1) * force + (0.0 if gap is None else gap)
 
 
 def at_torque(support: ShaftSupport, torque) -> ShaftSupport:
@@ -99,11 +104,11 @@ def at_stations(support: AbstractSupport, torque=None, *, stations: int = STATIO
         ValueError: for a support without couplings and without a torque, or a torque out of range.
     """
     if isinstance(support, Stations):
-        return support if torque is None else eqx.tree_at(lambda it: it.torque, support, real(torque))
+        return support if torque is None else eqx.tree_at(lambda it: it.load, support, real(torque))
     if not isinstance(support, ShaftSupport) and torque is None:
         raise ValueError("at_stations: torque must be given: no coupling tells it")
     check("at_stations", "torque", torque, "N m", low=0.0)
-    return _at_stations(support, optional_real(torque), whole("at_stations", "stations", stations, 3, 1001))
+    return _at_stations(support, optional_real(torque), whole("at_stations", "stations", stations, 2, 1001))
 
 
 @program
@@ -114,4 +119,4 @@ def _at_stations(support: AbstractSupport, torque: Scalar | None, stations: int)
         torque = support.torque
     assert torque is not None
     gap = jnp.broadcast_to(support.gap(y), y.shape)
-    return Stations(support.pair, torque, support.influence(y), gap)
+    return Stations(TabulatedSupport(support.pair, support.influence(y), gap), torque)

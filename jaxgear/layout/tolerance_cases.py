@@ -206,7 +206,7 @@ def _worst_excess(crowning, given):
 @program
 def _off_the_edges(face: Stations, tolerance: FlankLineTolerance, line: FlankLine, share, stiffness) -> Scalar:
     given = face, tolerance, line, share, stiffness
-    bent = face.opening + face.matrix @ jnp.full_like(face.opening, _force(face) / face.count)
+    bent = face.bent
     size = tolerance.helix_slope + tolerance.misalignment + jnp.max(bent) - jnp.min(bent)
     size = jax.lax.stop_gradient(_MOST * (size + jnp.abs(line.slope) + jnp.abs(line.crowning)))
     zero = jnp.zeros_like(size)
@@ -215,12 +215,12 @@ def _off_the_edges(face: Stations, tolerance: FlankLineTolerance, line: FlankLin
     return jnp.where(needed, jnp.where(enough, found, jnp.nan), 0.0)
 
 
-def _force(face: Stations) -> Scalar:
-    return 1e3 * face.torque / face.pair.pinion.base_radius
-
-
 def _excess(line_load: Float[Array, "... slices"], share) -> Float[Array, "..."]:
     """Larger load of both ends less a share of the largest in between, over the mean."""
+    if line_load.shape[-1] < 3:
+        raise ValueError(
+            f"tolerance_cases: {line_load.shape[-1]} stations must be at least 3, two of them are the edges"
+        )
     ends = jnp.maximum(line_load[..., 0], line_load[..., -1])
     inner, mean = maximum(line_load[..., 1:-1], axis=-1), jnp.mean(line_load, axis=-1)
     return (ends - share * inner) / jnp.where(mean > 0, mean, 1.0)

@@ -22,7 +22,13 @@ from .spline import relief_start as relief_start
 from .spline import wheel_spline as wheel_spline
 from .tooth_space import SpaceFlank as SpaceFlank
 from .tooth_space import space_flank as space_flank
+from .tooth_thickness import allowance_of_balls as allowance_of_balls
+from .tooth_thickness import allowance_of_span as allowance_of_span
+from .tooth_thickness import over_balls as over_balls
+from .tooth_thickness import span as span
+from .tooth_thickness import teeth_spanned as teeth_spanned
 from .volume import ReferenceVolumes as ReferenceVolumes
+from .volume import ground_area as ground_area
 from .volume import ground_volume as ground_volume
 from .volume import reference_volumes as reference_volumes
 from .volume import relative_volume as relative_volume

@@ -14,7 +14,7 @@ from ..contact import Side
 from ..geometry import diameter, roll_angle
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
-from ..numerics import Checked, program, result, spread
+from ..numerics import Checked, check, concrete, program, result, spread, whole
 from ..tolerance import ToleranceClass, iso_rounded
 from .spline import relief_start
 
@@ -23,6 +23,7 @@ Points = Float[Array, " points"]
 
 _POINTS = 101
 _ROUNDING = 16  # of the last place
+_SAME_PLACE = 1e-3  # mm; a micrometre along a flank changes nothing that a machine resolves
 _EVALUATED = 0.95  # of the profile from the start of the active profile on (ISO 1328-1:2013, L_alpha)
 _END = 0.05  # of the face width, left out at either end, or a module where that is less (ISO 1328-1:2013, L_beta)
 
@@ -102,7 +103,6 @@ def start_of_relief(side: Side, modification: AbstractModification) -> FlankPlac
     return flank_place(side, relief_start(side, modification))
 
 
-@program
 def profile_trace(
     side: Side,
     modification: AbstractModification,
@@ -121,19 +121,17 @@ def profile_trace(
         face_coordinate: of the trace [mm].
         roll_length: where, shape (points,) [mm]; None for evenly spaced points.
         points: their number.
+
+    Raises:
+        ValueError: for less than 2 points.
     """
     if roll_length is None:
+        whole("profile_trace", "points", points, 2)
         roll_length = jnp.linspace(side.start_roll_length, side.tip_roll_length, points)
-    face = jnp.full_like(roll_length, face_coordinate)
-    low, high = profile_range(side)
-    inside = _between(roll_length, low, high)
-    removed = removed_at(side, modification, roll_length, face[:1])[0]
-    return _trace(
-        "profile", side, roll_length, face, removed, inside, None if tolerance is None else tolerance.profile_total
-    )
+    dtype = side.start_roll_length.dtype
+    return _profile(side, modification, tolerance, jnp.asarray(face_coordinate, dtype), jnp.asarray(roll_length, dtype))
 
 
-@program
 def helix_trace(
     side: Side,
     modification: AbstractModification,
@@ -152,17 +150,33 @@ def helix_trace(
         roll_length: of the trace [mm]; None for the pitch point.
         face_coordinate: where, shape (points,) [mm]; None for evenly spaced points.
         points: their number.
+
+    Raises:
+        ValueError: for less than 2 points, or a roll length that is negative.
     """
-    roll = side.pitch_roll_length if roll_length is None else roll_length
+    dtype = side.start_roll_length.dtype
+    check("helix_trace", "roll_length", roll_length, "mm", low=0.0)
+    roll = side.pitch_roll_length if roll_length is None else jnp.asarray(roll_length, dtype)
     if face_coordinate is None:
-        face_coordinate = jnp.linspace(-0.5, 0.5, points, dtype=side.face_width.dtype) * side.face_width
-    along = jnp.full_like(face_coordinate, roll)
-    low, high = helix_range(side)
-    inside = _between(face_coordinate, low, high)
-    removed = removed_at(side, modification, along[:1], face_coordinate)[:, 0]
-    return _trace(
-        "helix", side, along, face_coordinate, removed, inside, None if tolerance is None else tolerance.helix_total
-    )
+        whole("helix_trace", "points", points, 2)
+        face_coordinate = jnp.linspace(-0.5, 0.5, points, dtype=dtype) * side.face_width
+    return _helix(side, modification, tolerance, roll, jnp.asarray(face_coordinate, dtype))
+
+
+@program
+def _profile(side: Side, modification, tolerance: ToleranceClass | None, face: Scalar, roll: Points) -> Trace:
+    inside = _between(roll, *profile_range(side))
+    removed = removed_at(side, modification, roll, face[None])[0]
+    total = None if tolerance is None else tolerance.profile_total
+    return _trace("profile", side, roll, jnp.full_like(roll, face), removed, inside, total)
+
+
+@program
+def _helix(side: Side, modification, tolerance: ToleranceClass | None, roll: Scalar, face: Points) -> Trace:
+    inside = _between(face, *helix_range(side))
+    removed = removed_at(side, modification, roll[None], face)[:, 0]
+    total = None if tolerance is None else tolerance.helix_total
+    return _trace("helix", side, jnp.full_like(face, roll), face, removed, inside, total)
 
 
 def table_traces(
@@ -190,7 +204,7 @@ def flank_deviations(side: Side, design: Trace, measured: Trace) -> FlankDeviati
     The mean line is that of least squares over the points in the evaluation range.
 
     Raises:
-        ValueError: for traces of other kinds or places.
+        ValueError: for traces of other kinds or places, or with less than 2 points in the evaluation range.
     """
     if design.kind != measured.kind or design.design.shape != measured.design.shape:
         raise ValueError(
@@ -198,7 +212,13 @@ def flank_deviations(side: Side, design: Trace, measured: Trace) -> FlankDeviati
             f"{design.kind} trace of {design.design.shape[0]} points like the design"
         )
     place = design.roll_length if design.kind == "profile" else design.face_coordinate
+    other = measured.roll_length if design.kind == "profile" else measured.face_coordinate
     low, high = profile_range(side) if design.kind == "profile" else helix_range(side)
+    apart, inside = concrete(jnp.max(jnp.abs(place - other))), concrete(jnp.sum(_between(place, low, high)))
+    if apart is not None and not apart <= _SAME_PLACE:
+        raise ValueError(f"flank_deviations: measured is {apart:.3g} mm off the places of the design, must be at them")
+    if inside is not None and inside < 2:
+        raise ValueError(f"flank_deviations: {inside} points lie in the evaluation range, must be at least 2")
     return _deviations(place, measured.design - design.design, low, high)
 
 

@@ -2,12 +2,12 @@
 
 import jax.numpy as jnp
 
-from ..contact import MeshCycle
+from ..contact import MeshCycle, Side
 from ..metrics import Quantity, gear_volume, quantities
 from ..microgeometry import NoModification
 from ..numerics.reductions import Max
 from .spline import wheel_spline
-from .volume import relative_volume
+from .volume import ground_area, relative_volume
 
 _DEGREES = {2: "quadratic", 3: "cubic"}
 
@@ -26,6 +26,10 @@ def _deviation(degree):
     return lambda side, modification: jnp.abs(wheel_spline(side, modification, degree=degree).deviation)
 
 
+def _area(side: Side, _):
+    return ground_area(side)
+
+
 def _relative(parabolic: bool):
     return lambda side, modification: relative_volume(side, modification, parabolic=parabolic)
 
@@ -41,6 +45,9 @@ for _index, _gear in enumerate(("pinion", "wheel")):
                 Max(),
             )
             for _degree, _name in _DEGREES.items()
+        ),
+        Quantity(
+            f"{_gear}_ground_area", _of_gear(_index, _area), "mm2", f"area of the flanks that are ground, {_gear}"
         ),
         Quantity(f"{_gear}_removed_volume", _of_gear(_index, gear_volume), "mm3", f"material ground off, {_gear}"),
         *(

@@ -14,8 +14,17 @@ from jaxtyping import Array, Float
 
 from ..contact import Side
 from ..metrics import removed_at
-from ..microgeometry import AbstractModification, EndRelief, LeadCrowning, LeadSlope, Scaled, TipRelief, terms
-from ..numerics import Checked, maximum, program, result
+from ..microgeometry import (
+    AbstractModification,
+    EndRelief,
+    LeadCrowning,
+    LeadSlope,
+    Scaled,
+    TabulatedProfile,
+    TipRelief,
+    terms,
+)
+from ..numerics import Checked, check, concrete, maximum, program, result
 from ..numerics.fits import Criterion, fit
 from .tooth_space import space_point
 
@@ -27,6 +36,7 @@ _BELOW, _BEYOND = 65, 129  # points below the node and beyond it
 _SEARCHED = 257  # points among which the start of the relief is looked for
 _NODES = 65  # among which the best one is looked for
 START = 0.01  # um; a relief starts where more than this is removed, a tenth of what measuring machines resolve
+_ROUNDING = 1e-6
 _SHORTEST = 0.05  # of the active profile; a polynomial over less is none
 
 
@@ -38,6 +48,7 @@ class WheelSpline(Checked):
         node_x, node_y: the node in the frame of the wheel [mm].
         coefficients: c_k [mm^(1 - k)], k = 1 ... degree: x = node_x + sum_k c_k (y - node_y)^k.
         roll_length: where the deviation is given, from the start of the active profile to the tip [mm].
+        removed: by the design [um].
         deviation: normal to the flank [um], positive where the spline removes more than the design.
         radial_deviation: the same along the height y of the wheel [um], the vertical difference of the publication;
             larger than the normal one by 1 / sin(inclination of the flank).
@@ -48,6 +59,7 @@ class WheelSpline(Checked):
     node_y: Scalar = result("mm")
     coefficients: Float[Array, " degree"] = result("mm^(1-k)")
     roll_length: Profile = result("mm")
+    removed: Profile = result("um")
     deviation: Profile = result("um")
     radial_deviation: Profile = result("um")
 
@@ -56,20 +68,35 @@ class WheelSpline(Checked):
         """Largest deviation normal to the flank, of either sign [um]."""
         return maximum(jnp.abs(self.deviation), -1)
 
+    @property
+    def ground(self) -> TabulatedProfile:
+        """The flank that the wheel grinds, for the mesh: the design and the deviation."""
+        # the node ends the involute and starts the polynomial: it stands there twice
+        roll, ground = (jnp.delete(values, _BELOW) for values in (self.roll_length, self.removed + self.deviation))
+        return TabulatedProfile(roll, ground)
+
     def x(self, y: Float[Array, "..."]) -> Float[Array, "..."]:
         """Half width of the wheel [mm] at heights [mm] beyond the node."""
         steps = [c * (y - self.node_y) ** k for k, c in enumerate(self.coefficients, start=1)]
         return self.node_x + sum(steps)
 
 
-@program
-def relief_start(side: Side, modification: AbstractModification, threshold: float = START) -> Scalar:
+def relief_start(side: Side, modification: AbstractModification, threshold=START) -> Scalar:
     """Roll length at which the relief of the tip starts [mm]; differentiable.
 
     Of a single `TipRelief`, beside modifications along the face, it is the start by definition. Of anything else it is
     where, in the middle of the face, from there on up to the tip, more than a threshold [um] is removed: the start of
     the active profile where all of it is modified, and the tip where nothing is.
+
+    Raises:
+        ValueError: for a negative threshold.
     """
+    check("relief_start", "threshold", threshold, "um", low=0.0)
+    return _relief_start(side, modification, jnp.asarray(threshold, side.start_roll_length.dtype))
+
+
+@program
+def _relief_start(side: Side, modification: AbstractModification, threshold: Scalar) -> Scalar:
     length = _relief_length(modification)
     if length is not None:
         return jnp.maximum(side.tip_roll_length - length, side.start_roll_length)
@@ -103,14 +130,19 @@ def wheel_spline(
         modification: of the flank, taken in the middle of the face.
         degree: of the polynomial, 2 or 3.
         criterion: what is made small: "least_squares", or "minimax" for the largest deviation.
-        node: roll length of the node [mm]; None for the start of the relief (`relief_start`).
+        node: roll length of the node [mm], within the first 95 % of the active profile; None for the start of the
+            relief (`relief_start`), or the end of these 95 % where that is earlier.
         tangent: the polynomial starts in the direction of the involute. Without it a kink is allowed, as at the start
             of a linear relief.
 
     Raises:
-        ValueError: for another degree or criterion.
+        ValueError: for another degree or criterion, or a node elsewhere.
     """
     _check(degree, criterion)
+    start, tip = concrete(side.start_roll_length), concrete(side.tip_roll_length)
+    if start is not None and tip is not None:
+        last = float(tip - _SHORTEST * (tip - start))
+        check("wheel_spline", "node", node, "mm", low=float(start) * (1 - _ROUNDING), high=last * (1 + _ROUNDING))
     node = None if node is None else jnp.asarray(node, side.start_roll_length.dtype)
     return _fitted(side, modification, node, degree, criterion, tangent)
 
@@ -123,13 +155,31 @@ def best_wheel_spline(
     criterion: Criterion = "minimax",
     tangent: bool = False,
 ) -> WheelSpline:
-    """`wheel_spline` with the node, of 65 along the active profile, that makes the largest deviation least."""
+    """`wheel_spline` with the node that makes the largest deviation least.
+
+    Of 65 nodes along the active profile, of as many about the best of them, and of the start of the relief. The search
+    compares: follow the gradient of `wheel_spline`.
+    """
     _check(degree, criterion)
-    length = side.tip_roll_length - side.start_roll_length
-    nodes = side.start_roll_length + jnp.linspace(0.0, 1 - _SHORTEST, _NODES, dtype=length.dtype) * length
-    splines = jax.vmap(lambda node: _fitted(side, modification, node, degree, criterion, tangent))(nodes)
-    best = jnp.argmin(splines.largest)
-    return jax.tree.map(lambda leaf: leaf[best], splines)
+    first = side.start_roll_length
+    length = (1 - _SHORTEST) * (side.tip_roll_length - first)
+    share = jnp.linspace(0.0, 1.0, _NODES, dtype=length.dtype)
+
+    def deviations(nodes):
+        return _largest_at(side, modification, nodes, degree, criterion, tangent)
+
+    start = relief_start(side, modification)[None]
+    coarse = jnp.concatenate([first + share * length, start])
+    around = coarse[jnp.argmin(deviations(coarse))] + (2 * share - 1) * length / (_NODES - 1)
+    fine = jnp.concatenate([around, start])
+    node = fine[jnp.argmin(deviations(fine))]
+    return _fitted(side, modification, node, degree, criterion, tangent)
+
+
+@program
+def _largest_at(side: Side, modification, nodes: Profile, degree: int, criterion: Criterion, tangent: bool) -> Profile:
+    """Largest deviation with each of several nodes."""
+    return jax.vmap(lambda node: _fitted(side, modification, node, degree, criterion, tangent).largest)(nodes)
 
 
 def _check(degree, criterion) -> None:
@@ -174,6 +224,7 @@ def _fitted(side: Side, modification, node, degree: int, criterion: Criterion, t
         node_y=node_y - side.gear.root_circle_radius,
         coefficients=scaled / height ** jnp.arange(1, degree + 1, dtype=height.dtype),
         roll_length=roll,
+        removed=removed,
         deviation=deviation,
         radial_deviation=deviation / jnp.sin(angle),
     )

@@ -16,7 +16,7 @@ from ..geometry import outline
 from ..geometry.involute import load_angle
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification
-from ..numerics import program
+from ..numerics import program, whole
 
 Profile = Float[Array, " points"]
 
@@ -41,7 +41,6 @@ class SpaceFlank(NamedTuple):
     removed: Profile
 
 
-@program
 def space_flank(
     side: Side, modification: AbstractModification, roll_length: Profile | None = None, *, points: int = _POINTS
 ) -> SpaceFlank:
@@ -52,7 +51,15 @@ def space_flank(
         modification: of this flank; the other one is its mirror image where both are alike.
         roll_length: where [mm], shape (points,); None for evenly spaced points from the form circle to the tip.
         points: their number.
+
+    Raises:
+        ValueError: for less than 2 points.
     """
+    return _space_flank(side, modification, roll_length, whole("space_flank", "points", points, 2))
+
+
+@program
+def _space_flank(side: Side, modification, roll_length: Profile | None, points: int) -> SpaceFlank:
     if roll_length is None:
         roll_length = jnp.linspace(outline(side.gear).form_roll_length, side.tip_roll_length, points)
     removed = removed_at(side, modification, roll_length)

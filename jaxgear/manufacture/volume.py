@@ -14,7 +14,7 @@ from ..contact import Side
 from ..geometry import outline
 from ..metrics import gear_volume, removed_at
 from ..microgeometry import AbstractCurve, AbstractModification, Linear, Quadratic, TipRelief
-from ..numerics import program, real, safe_divide
+from ..numerics import check, program, real, safe_divide
 
 Scalar = Float[Array, ""]
 
@@ -33,14 +33,22 @@ class ReferenceVolumes(NamedTuple):
     parabolic_from_single: Scalar
 
 
-@program
 def reference_volumes(side: Side, amount) -> ReferenceVolumes:
     """Volumes of the reference reliefs of a gear.
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
         amount: at the tip [um].
+
+    Raises:
+        ValueError: for a negative amount.
     """
+    check("reference_volumes", "amount", amount, "um", low=0.0)
+    return _reference_volumes(side, jnp.asarray(amount, side.start_roll_length.dtype))
+
+
+@program
+def _reference_volumes(side: Side, amount: Scalar) -> ReferenceVolumes:
     pitch = _addendum(side)
     # the next pair touches at the start of the active profile, one base pitch below
     single = side.tip_roll_length - side.start_roll_length - side.gear.base_pitch
@@ -55,10 +63,21 @@ def ground_volume(side: Side, modification: AbstractModification, *, stock=0.0) 
         side: the gear's side of the contact, of `mesh.sides`.
         modification: of both flanks of every tooth.
         stock: machining allowance normal to the flank [um], from the form circle to the tip and over the common face.
+
+    Raises:
+        ValueError: for a negative stock.
+    """
+    check("ground_volume", "stock", stock, "um", low=0.0)
+    return gear_volume(side, modification) + 1e-3 * stock * ground_area(side)
+
+
+def ground_area(side: Side) -> Scalar:
+    """Area of all flanks of one gear from the form circle to the tip, over the common face [mm^2].
+
+    2 z b (L_tip^2 - L_form^2) / (2 r_b): the volume of any grinding stock is its thickness times this.
     """
     form, tip = outline(side.gear).form_roll_length, side.tip_roll_length
-    arc = (tip**2 - form**2) / (2 * side.base_radius)
-    return gear_volume(side, modification) + 2 * side.gear.teeth * side.face_width * arc * 1e-3 * stock
+    return 2 * side.gear.teeth * side.face_width * (tip**2 - form**2) / (2 * side.base_radius)
 
 
 def relative_volume(side: Side, modification: AbstractModification, *, parabolic: bool = False) -> Scalar:

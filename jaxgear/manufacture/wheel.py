@@ -8,13 +8,12 @@ middle plane, x along its axis, y towards its axis; the wheel reaches down to th
 from typing import NamedTuple
 
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import Side
 from ..geometry import outline
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, minimum, number, program, result
+from ..numerics import Checked, check, concrete, minimum, number, program, result
 from .tooth_space import space_flank
 
 Scalar = Float[Array, ""]
@@ -66,8 +65,8 @@ class GrindingWheel(Checked):
     flange_radius: Scalar = number("mm", low=0.0, default=0.0)
 
     def check_together(self) -> None:
-        radius, flange = np.asarray(self.radius), np.asarray(self.flange_radius)
-        if not (flange < radius).all():
+        radius, flange = concrete(self.radius), concrete(self.flange_radius)
+        if radius is not None and flange is not None and not flange < radius:
             raise ValueError(f"GrindingWheel: flange_radius = {flange:g} mm must be less than radius = {radius:g} mm")
 
 
@@ -95,7 +94,12 @@ def grinding_margins(side: Side, modification: AbstractModification) -> Grinding
 
 
 def smallest_wheel_radius(side: Side, flange_radius) -> Scalar:
-    """Least outer radius [mm] that keeps flanges of a radius [mm] off the tip circle at full depth."""
+    """Least outer radius [mm] that keeps flanges of a radius [mm] off the tip circle at full depth.
+
+    Raises:
+        ValueError: for a negative radius.
+    """
+    check("smallest_wheel_radius", "flange_radius", flange_radius, "mm", low=0.0)
     return _depth(side) + flange_radius
 
 
@@ -103,13 +107,23 @@ def run_out(side: Side, radius) -> Scalar:
     """How far the axis of a wheel of a radius [mm] travels beyond the face until it has left the tooth space [mm].
 
     A chord of the wheel at full depth t: sqrt(t (2 R - t)). A shoulder beside the gear must be farther away.
+
+    Raises:
+        ValueError: for a wheel that is smaller than the teeth are high.
     """
     depth = _depth(side)
+    known = concrete(depth)
+    check("run_out", "radius", radius, "mm", low=None if known is None else float(known), open_low=True)
     return jnp.sqrt(depth * (2 * radius - depth))
 
 
 def largest_wheel_radius(side: Side, gap) -> Scalar:
-    """Largest outer radius [mm] whose `run_out` stays within a gap to a shoulder [mm] that is as high as the teeth."""
+    """Largest outer radius [mm] whose `run_out` stays within a gap to a shoulder [mm] that is as high as the teeth.
+
+    Raises:
+        ValueError: for a gap that is not positive.
+    """
+    check("largest_wheel_radius", "gap", gap, "mm", low=0.0, open_low=True)
     depth = _depth(side)
     return (gap**2 + depth**2) / (2 * depth)
 

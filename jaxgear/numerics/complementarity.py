@@ -19,26 +19,29 @@ division: compilers store those, but evaluate cheaper expressions again in every
 """
 
 from dataclasses import replace
-from functools import partial, reduce
-from operator import itemgetter
+from functools import partial
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from .contact_problem import ContactProblem, ContactSolution
+from .contact_state import active_of, carried_by, laws_of, secants_under, slopes_under
 from .contact_system import (
+    correction,
     eliminable,
     eliminate,
     given_approach,
     given_load,
     load_per_approach,
     opening,
+    step,
     total,
     without_gap,
 )
-from .spring import LOAD_FLOOR, AbstractSpring
+from .coupled_elimination import CoupledFactors
+from .spring import LOAD_FLOOR
 from .stored import unit
 from .tangents import jvp_of_given
 
@@ -82,13 +85,13 @@ def solve_contact(problem: ContactProblem, *, steps: int, tolerance: float | Non
     if problem.approach is not None:
         problem = eqx.tree_at(lambda p: p.approach, problem, problem.approach - common)
     v, approach, residual = _solve(steps, tolerance, problem, common)
-    load = _carried(v)
+    load = carried_by(v)
     return ContactSolution(
         line_load=jnp.stack(load),
         approach=approach + common,
         load=total(problem, load),
         opening=jnp.stack(opening(problem, load, approach)),
-        in_contact=jnp.stack(_active(problem, v)),
+        in_contact=jnp.stack(active_of(problem, v)),
         residual=residual,
         solved=residual < tolerance,
     )
@@ -97,7 +100,7 @@ def solve_contact(problem: ContactProblem, *, steps: int, tolerance: float | Non
 def tangent_stiffness(problem: ContactProblem, solution: ContactSolution) -> Curve:
     """d load / d approach at the solution, for the springs in contact."""
     load = list(solution.line_load)
-    slope = _slopes(problem, load, _secants(problem, load))
+    slope = slopes_under(problem, load, secants_under(problem, load))
     return load_per_approach(problem, eliminate(eliminable(problem), list(solution.in_contact), slope))
 
 
@@ -116,21 +119,21 @@ def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
     shared = problem if problem.start_law is None else replace(problem, law=problem.start_law)
     v, start, secant = _start(shared)
     start = [jnp.maximum(q, LOAD_FLOOR) for q in start]
-    rate = [jnp.clip(k - c, -_STEEPEST * c, _STEEPEST * c) for k, c in zip(_slopes(shared, start, secant), secant)]
+    rate = [jnp.clip(k - c, -_STEEPEST * c, _STEEPEST * c) for k, c in zip(slopes_under(shared, start, secant), secant)]
 
     def with_secants(_, state):
         return _newton(problem, state[0], secant, secant)
 
     def with_logarithms(_, state):
-        grown = [jnp.log(jnp.clip(q / q0, _LEAST, _MOST)) for q, q0 in zip(_carried(state[0]), start)]
+        grown = [jnp.log(jnp.clip(q / q0, _LEAST, _MOST)) for q, q0 in zip(carried_by(state[0]), start)]
         followed = [c + k * x for c, k, x in zip(secant, rate, grown)]
         return _newton(problem, state[0], followed, [c + k for c, k in zip(followed, rate)])
 
     state = jax.lax.fori_loop(0, _SECANT_STEPS, with_secants, (v, jnp.zeros_like(problem.lever[0])))
     v, _ = jax.lax.fori_loop(0, _LOGARITHM_STEPS, with_logarithms, state)
-    load = _carried(v)
-    exact = _secants(problem, load)
-    return _newton(problem, v, exact, _slopes(problem, load, exact))
+    load = carried_by(v)
+    exact = secants_under(problem, load)
+    return _newton(problem, v, exact, slopes_under(problem, load, exact))
 
 
 def _iterate(
@@ -145,19 +148,22 @@ def _iterate(
     dtype = common.dtype
 
     def evaluated(v, approach):
-        secant = _secants(problem, _carried(v))
+        secant = secants_under(problem, carried_by(v))
         return v, approach, secant, _residual(problem, v, approach, secant, common)
 
     def advance(state):
-        step, (v, _, secant, _) = state
-        load32, secant32 = _cast((_carried(v), secant), jnp.float32)
-        share = [slope / c for slope, c in zip(_slopes(single, load32, secant32), secant32)]
+        count, (v, approach, secant, _) = state
+        load32, secant32 = _cast((carried_by(v), secant), jnp.float32)
+        if problem.coupling is not None:
+            slope32 = slopes_under(single, load32, secant32)
+            return count + 1, evaluated(*_corrected(problem, single, v, approach, secant, slope32))
+        share = [slope / c for slope, c in zip(slopes_under(single, load32, secant32), secant32)]
         slope = [part * c for part, c in zip(_cast(share, dtype), secant)]
-        return step + 1, evaluated(*_newton(problem, v, secant, slope))
+        return count + 1, evaluated(*_newton(problem, v, secant, slope))
 
     def unfinished(state):
-        step, (*_, residual) = state
-        return (step < steps) & ~jnp.all(residual < tolerance)
+        count, (*_, residual) = state
+        return (count < steps) & ~jnp.all(residual < tolerance)
 
     _, (v, approach, _, residual) = jax.lax.while_loop(unfinished, advance, (0, evaluated(v, approach)))
     return v, approach, residual
@@ -171,16 +177,16 @@ def _cast(tree, dtype):
 def _solve_jvp(steps, tolerance, primals, tangents):
     (problem, common), (problem_dot, _) = primals, tangents
     v, approach, residual = _solve(steps, tolerance, problem, common)
-    load = _carried(v)
+    load = carried_by(v)
 
     def conditions(data):
         d = approach if data.approach is None else data.approach
-        mismatch = [y + law.deflection(q) for y, law, q in zip(without_gap(data, load, d), _laws(data), load)]
+        mismatch = [y + law.deflection(q) for y, law, q in zip(without_gap(data, load, d), laws_of(data), load)]
         return jnp.stack(mismatch) + data.gap, d if data.load is None else total(data, load) - data.load
 
     _, (mismatch_dot, last_dot) = jvp_of_given(conditions, problem, problem_dot)
-    slope = _slopes(problem, load, _secants(problem, load))
-    factors = eliminate(eliminable(problem), _active(problem, v), slope)
+    slope = slopes_under(problem, load, secants_under(problem, load))
+    factors = eliminate(eliminable(problem), active_of(problem, v), slope)
     # the sum and the division keep the loops of reverse mode apart: its rows are stored before they are put together
     place = jnp.arange(len(v))[:, None, None]
     known = [-jnp.sum(jnp.where(place == i, mismatch_dot, 0.0), axis=0) / unit(row) for i, row in enumerate(v)]
@@ -200,7 +206,7 @@ def _start(problem: ContactProblem) -> tuple[Rows, Slopes, Slopes]:
         return _start_at(problem)
     even = problem.load / jnp.sum(problem.weight)
     loads = [jnp.broadcast_to(even, lever[None].shape) for lever in problem.lever]
-    secant = _secants(problem, loads)
+    secant = secants_under(problem, loads)
     # gaps wider than the approach of any one spring that bears the load alone stay open
     alone = [
         jnp.max(gap + (c + problem.compliance[i, i][None]) * even, axis=0) / lever
@@ -215,53 +221,37 @@ def _start_at(problem: ContactProblem) -> tuple[Rows, Slopes, Slopes]:
     closed = [(lever * problem.approach)[None] - gap for lever, gap in zip(problem.lever, problem.gap)]
     load = [jnp.ones_like(row) for row in closed]
     for _ in range(_OWN_STEPS):
-        secant = _secants(problem, load)
+        secant = secants_under(problem, load)
         load = [row / (c + problem.compliance[i, i][None]) for i, (row, c) in enumerate(zip(closed, secant))]
-    return closed, load, _secants(problem, load)
-
-
-def _active(problem: ContactProblem, v: Rows) -> list[Bool[Array, "slices positions"]]:
-    """Where the iterate is not negative; if it is everywhere, the largest must bear the load."""
-    if problem.load is None:
-        return [row >= 0 for row in v]
-    floor = jnp.minimum(reduce(jnp.maximum, [jnp.max(row, axis=0) for row in v]), 0.0)
-    return [row >= floor[None] for row in v]
-
-
-def _carried(v: Rows) -> Rows:
-    """Line loads of an iterate; differentiable at zero, where a spring in contact carries no load yet."""
-    return [jnp.where(row >= 0, row, 0.0) for row in v]
-
-
-def _laws(problem: ContactProblem) -> list[AbstractSpring]:
-    """The law of every spring."""
-    return [jax.tree.map(itemgetter(i), problem.law) for i in range(problem.lever.shape[0])]
-
-
-def _secants(problem: ContactProblem, load: Rows) -> Slopes:
-    return [law.secant(jnp.maximum(q, LOAD_FLOOR)) for law, q in zip(_laws(problem), load)]
-
-
-def _slopes(problem: ContactProblem, load: Rows, secant: Slopes) -> Slopes:
-    return [
-        jnp.where(q > LOAD_FLOOR, law.slope(jnp.maximum(q, LOAD_FLOOR), c), c)
-        for law, q, c in zip(_laws(problem), load, secant)
-    ]
+    return closed, load, secants_under(problem, load)
 
 
 def _newton(problem: ContactProblem, v: Rows, secant: Slopes, slope: Slopes) -> tuple[Rows, Curve]:
     """One Newton step on the active set; `secant` and `slope` belong to the loads of v."""
-    active, carried = _active(problem, v), _carried(v)
+    active, carried = active_of(problem, v), carried_by(v)
     factors = eliminate(problem, active, slope)
     known = [-gap - (c - s) * q for gap, c, s, q in zip(problem.gap, secant, slope, carried)]
-    if problem.approach is not None:
-        load, approach = given_approach(problem, factors, known, problem.approach), problem.approach
-    else:
-        load, approach = given_load(problem, factors, known, problem.load)
-    left = opening(problem, load, approach)
+    load, approach, left = step(problem, factors, known)
     return [
         jnp.where(flag, q, -y * inverse) for flag, q, y, inverse in zip(active, load, left, factors.per_slope)
     ], approach
+
+
+def _corrected(
+    problem: ContactProblem, single: ContactProblem, v: Rows, approach: Curve, secant: Slopes, slope: Slopes
+) -> tuple[Rows, Curve]:
+    """One Newton step of coupled slices, as a correction of what is left of the conditions in single precision."""
+    active, carried = active_of(problem, v), carried_by(v)
+    left = opening(problem, carried, approach)
+    missing = None if problem.load is None else problem.load - total(problem, carried)
+    rest = _cast(([-(y + c * q) for y, c, q in zip(left, secant, carried)], left, missing), jnp.float32)
+    factors = eliminate(single, active, slope)
+    assert isinstance(factors, CoupledFactors)
+    added, more, left = _cast(correction(single, factors, *rest), approach.dtype)
+    return [
+        jnp.where(flag, q + x, -y * inverse)
+        for flag, q, x, y, inverse in zip(active, carried, added, left, _cast(factors.per_slope, approach.dtype))
+    ], approach + more
 
 
 def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Slopes, common: Curve) -> Curve:
@@ -270,7 +260,7 @@ def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Slopes,
     Vanishing approach and load are not measured against zero, but against the rounding errors of `common` and of the
     load below which springs are linear.
     """
-    load = _carried(v)
+    load = carried_by(v)
     worst, scale, softest = jnp.zeros_like(approach), jnp.abs(common), jnp.zeros_like(approach)
     for i, (q, y, c, lever) in enumerate(zip(load, opening(problem, load, approach), secant, problem.lever)):
         mismatch = y + c * q

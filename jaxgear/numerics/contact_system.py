@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from .contact_problem import ContactProblem
-from .coupled_elimination import CoupledFactors, couple, respond, stiffness
+from .coupled_elimination import CoupledFactors, Response, couple, respond, stiffness
 from .coupling import with_inverses
 from .elimination import Curve, Factors, Rows, Slopes, at_approach, balance, factorize, product
 
@@ -42,6 +42,44 @@ def given_approach(problem: ContactProblem, factors: Factors | CoupledFactors, k
     if isinstance(factors, CoupledFactors):
         return respond(problem.weight, factors, known, approach=approach).load
     return at_approach(factors, known, approach)
+
+
+def step(problem: ContactProblem, factors: Factors | CoupledFactors, known: Rows) -> tuple[Rows, Curve, Rows]:
+    """Line loads of the active springs, approach and `opening` for what the problem prescribes."""
+    if not isinstance(factors, CoupledFactors):
+        if problem.approach is not None:
+            load, approach = at_approach(factors, known, problem.approach), problem.approach
+        else:
+            load, approach = balance(problem.weight, factors, known, problem.load)
+        return load, approach, opening(problem, load, approach)
+    found = respond(problem.weight, factors, known, load=problem.load, approach=problem.approach)
+    return found.load, found.approach, _left(factors, found, list(problem.gap))
+
+
+def correction(
+    problem: ContactProblem, factors: CoupledFactors, known: Rows, left: Rows, missing: Curve | None
+) -> tuple[Rows, Curve, Rows]:
+    """What a step adds to line loads and approach, and `opening` after it, of coupled slices.
+
+    Args:
+        problem: the data.
+        factors: of the active springs.
+        known: by which the active springs still overlap.
+        left: `opening` before.
+        missing: load that is still missing; None where the approach is prescribed.
+    """
+    approach = None if missing is not None else jnp.zeros_like(problem.lever[0])
+    found = respond(problem.weight, factors, known, load=missing, approach=approach)
+    return found.load, found.approach, _left(factors, found, left)
+
+
+def _left(factors: CoupledFactors, found: Response, gap: Rows) -> Rows:
+    held = factors.coupling.held
+    assert held is not None  # whoever eliminates gives the inverses
+    return [
+        sum(c[None] * q for c, q in zip(row, found.load)) + start - pressed
+        for row, start, pressed in zip(held.local, gap, found.pressed)
+    ]
 
 
 def load_per_approach(problem: ContactProblem, factors: Factors | CoupledFactors) -> Curve:

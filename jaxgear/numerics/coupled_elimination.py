@@ -8,7 +8,8 @@ springs obey
 
 X being the levers times the support's modes. So p follows from the symmetric, positive definite matrix
 C^-1 x M^-1 + V^T A^-1 V, a few unknowns at every position, and what is left are the equations of the support. What
-several loops read ends with a division, for compilers to store it.
+several loops read ends with a division, for compilers to store it; the divisor is of the factors, because a derivative
+in reverse mode is linear in what a response is to.
 """
 
 from functools import reduce
@@ -20,7 +21,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .coupling import Coupling, along, onto
-from .elimination import Curve, Factors, Rows, Slopes, factorize, forward
+from .elimination import Curve, Factors, Rows, Slopes, inverse_of, small_inverse
 from .stored import unit
 
 Levers = Float[Array, "pairs positions"]
@@ -81,7 +82,7 @@ def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
         lever: what a spring closes per unit of common approach.
         own: elimination of every slice with the local compliance and the slopes of the springs.
     """
-    inverse = _inverse(own)
+    inverse = inverse_of(own)
     modal = _products(coupling.modes, inverse)
     blocks = _eliminated(coupling, modal)
     right, force = _of_support(coupling, lever, inverse, modal)
@@ -90,21 +91,7 @@ def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
     return CoupledFactors(coupling, lever, inverse, blocks, bent, force, own.per_slope)
 
 
-def _inverse(own: Factors) -> Inverse:
-    count = len(own.active)
-    none = jnp.zeros_like(own.active[0])
-    ahead = [
-        forward(own.rows, own.inverse, [own.active[j] if i == j else none for i in range(count)]) for j in range(count)
-    ]
-    half = {}
-    for i in range(count):
-        for j in range(i + 1):
-            value = sum(ahead[i][k] * ahead[j][k] * own.inverse[k] for k in range(i, count))
-            half[i, j] = half[j, i] = value / unit(value)
-    return [[half[i, j] for j in range(count)] for i in range(count)]
-
-
-def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "modes pairs pairs positions"]]:
+def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "_ pairs pairs positions"]]:
     """V^T rows V: of every mode with itself and those after it, by mode."""
     count = modes.shape[1]
     weight = jnp.concatenate([modes[:, k : k + 1] * modes[:, k:] for k in range(count)], axis=1)
@@ -117,33 +104,26 @@ def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[
     return jnp.split(jnp.stack(whole, axis=1), ends[:-1])
 
 
-def _eliminated(coupling: Coupling, modal: list[Float[Array, "modes pairs pairs positions"]]) -> list[_Block]:
+def _eliminated(coupling: Coupling, modal: list[Float[Array, "_ pairs pairs positions"]]) -> list[_Block]:
     held = coupling.held
     blocks: list[_Block] = []
     assert held is not None  # whoever eliminates gives the inverses
     for mode in range(len(modal)):
-        scaled = modal[mode] + held.share_inverse[mode:, mode, None, None, None] * held.inverse
+        scaled = modal[mode] + held.share_inverse[mode:, mode, None, None, None] * held.inverse[None]
         for before, block in enumerate(blocks):
             ahead = mode - before
             scaled = scaled - _times(block.lower[ahead:], jnp.swapaxes(block.scaled[ahead], 0, 1))
         scaled = scaled / unit(scaled)
-        inverse = _small_inverse(scaled[0])
+        inverse = small_inverse(scaled[0])
         lower = _times(scaled, inverse)
         blocks.append(_Block(scaled, lower / unit(lower), inverse))
     return blocks
 
 
-def _times(first: Float[Array, "... pairs pairs positions"], second: Float[Array, "pairs pairs positions"]):
+def _times(first: Float[Array, "... rows pairs positions"], second: Float[Array, "pairs pairs positions"]):
     """Products of small matrices at every position."""
-    return sum(first[..., k, None, :] * second[k] for k in range(len(second)))
-
-
-def _small_inverse(matrix: Float[Array, "pairs pairs positions"]) -> Float[Array, "pairs pairs positions"]:
-    """Of a symmetric, positive definite matrix."""
-    none, all_of = jnp.zeros_like(matrix[0, 0])[None], jnp.ones_like(matrix[0, 0])[None]
-    count = len(matrix)
-    inverse = _inverse(factorize(matrix, matrix[0], [all_of] * count, [none] * count))
-    return jnp.stack([jnp.concatenate(row) for row in inverse])
+    wide = second.reshape(-1, *[1] * (first.ndim - 2), *second.shape[1:])
+    return sum(first[..., k, None, :] * wide[k] for k in range(len(second)))
 
 
 def _of_support(
@@ -152,10 +132,10 @@ def _of_support(
     """V^T A^-1 X by mode, and X^T A^-1 X."""
     if coupling.support_modes is None:
         # what the common approach presses is the first mode
-        even = jnp.sum(modal[0] * lever, axis=-2)
+        even = jnp.sum(modal[0] * lever[None, None], axis=-2)
         return list(even[:, None]), jnp.sum(even[0] * lever, axis=0)[None, None]
     shapes = coupling.support_modes
-    pressed = jnp.stack([sum(x * height for x, height in zip(row, lever)) for row in inverse])
+    pressed = jnp.stack([sum(x * height[None] for x, height in zip(row, lever)) for row in inverse])
     right = [onto(mode[:, None] * shapes, pressed) for mode in coupling.modes.T]
     force = jnp.sum(pressed * lever[:, None], axis=0)
     return right, jnp.stack([onto(shape[:, None] * shapes, force) for shape in shapes.T])
@@ -168,15 +148,17 @@ def _ahead(blocks: list[_Block], right: list[Sides]) -> tuple[list[Sides], list[
     for mode, value in enumerate(right):
         for before, block in enumerate(blocks[:mode]):
             value = value - _times(divided[before][:, None], jnp.swapaxes(block.scaled[mode - before], 0, 1))[:, 0]
-        value = value / unit(value)
+        value = value / unit(blocks[mode].inverse[0])[None]
         # the first rows of L are one; D^-1 is symmetric
         found = _times(value[:, None], blocks[mode].inverse)[:, 0]
         whole.append(value)
-        divided.append(found / unit(found))
+        divided.append(found / unit(blocks[mode].inverse[0])[None])
     return whole, divided
 
 
-def _joined(first: list[Sides], second: list[Sides]) -> Float[Array, "sides sides positions"]:
+def _joined(
+    first: list[Sides], second: list[Float[Array, "others pairs positions"]]
+) -> Float[Array, "sides others positions"]:
     """Sum over modes and springs."""
     return reduce(add, [jnp.sum(a[:, None] * b[None], axis=2) for a, b in zip(first, second)])
 
@@ -190,7 +172,7 @@ def _back(
         value = divided[mode]
         for later in range(mode + 1, len(blocks)):
             value = value - jnp.sum(blocks[mode].lower[later - mode] * found[later][:, None], axis=0)
-        found[mode] = value / unit(value)
+        found[mode] = value / unit(blocks[mode].inverse[0])
     return [found[mode] for mode in range(len(blocks))]
 
 
@@ -200,7 +182,7 @@ def respond(
     """Solves for a load or for an approach; see the top."""
     coupling, count = factors.coupling, len(weight)
     inside = [sum(x * row for x, row in zip(rows, known)) for rows in factors.inverse]  # A^-1 known
-    inside = [row / unit(row) for row in inside]
+    inside = [row / unit(rows[0]) for row, rows in zip(inside, factors.inverse)]
     _, divided = _ahead(factors.blocks, list(onto(coupling.modes, jnp.stack(inside))[:, None]))
     force = sum(height[None] * row for height, row in zip(factors.lever, inside))
     constant = jnp.full((count, 1), count**-0.5, force.dtype)
@@ -210,7 +192,8 @@ def respond(
     eliminated = [a[0] + jnp.sum(b * bends[:, None], axis=0) for a, b in zip(divided, factors.bent[1])]
     deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
     even = along(shapes, bends)
-    pressed = [height * even - deflected[:, i] for i, height in enumerate(factors.lever)]
+    pressed = [height[None] * even - deflected[:, i] for i, height in enumerate(factors.lever)]
+    pressed = [row / unit(rows[0]) for row, rows in zip(pressed, factors.inverse)]
     loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(inside, factors.inverse)]
     return Response(loads, approach, pressed)
 
@@ -237,8 +220,11 @@ def _yielding(factors: CoupledFactors, carried: Bends) -> tuple[Bends, Bends]:
     first = jnp.zeros_like(carried).at[0].set(1.0)
     if support is None:
         return jnp.zeros_like(carried), first
-    sides = jnp.stack([-jnp.tensordot(support, carried, 1), first], axis=1)
     matrix = jnp.eye(len(support), dtype=carried.dtype)[..., None] + jnp.tensordot(support, factors.force, 1)
-    found = jnp.linalg.solve(jnp.moveaxis(matrix, -1, 0), jnp.moveaxis(sides, -1, 0))
-    found = jnp.moveaxis(found, 0, -1)
-    return found[:, 0], found[:, 1]
+    matrix = jnp.moveaxis(matrix, -1, 0)
+
+    def solved(side):
+        return jnp.linalg.solve(matrix, side.T[..., None])[..., 0].T
+
+    # one after the other: reverse mode is linear in the first alone
+    return solved(-jnp.tensordot(support, carried, 1)), solved(first)

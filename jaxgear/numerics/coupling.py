@@ -17,6 +17,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .elimination import small_inverse
+from .stored import unit
+
 Rows = list[Float[Array, "slices positions"]]
 Springs = Float[Array, "pairs pairs positions"]
 
@@ -57,8 +60,11 @@ class Coupling(eqx.Module):
     def deflection(self, compliance: Springs, lever: Float[Array, "pairs positions"], load: Rows) -> Rows:
         """y under line loads."""
         uniform = jnp.stack([sum(c[None] * q for c, q in zip(row, load)) for row in compliance])
-        modal = along(self.modes, along(self.share, onto(self.modes, uniform)))
+        uniform = uniform / unit(uniform)
+        modal = along(self.share, onto(self.modes, uniform))
+        modal = along(self.modes, modal / unit(modal))
         result = [self.rest * row + modal[:, i] for i, row in enumerate(uniform)]
+        result = [row / unit(row) for row in result]
         if self.support is None or self.support_modes is None:
             return result
         force = sum(height[None] * q for height, q in zip(lever, load))
@@ -68,8 +74,8 @@ class Coupling(eqx.Module):
 
 def with_inverses(coupling: Coupling, compliance: Springs) -> Coupling:
     """The coupling ready for eliminations; C has to be positive definite."""
-    inverse = jnp.moveaxis(jnp.linalg.inv(jnp.moveaxis(compliance, -1, 0)), 0, -1)
-    held = Held(coupling.rest * compliance, inverse, jnp.linalg.inv(coupling.share))
+    share = small_inverse(coupling.share[..., None])[..., 0]
+    held = Held(coupling.rest * compliance, small_inverse(compliance), share)
     return eqx.tree_at(lambda c: c.held, coupling, held, is_leaf=lambda leaf: leaf is None)
 
 
@@ -91,4 +97,4 @@ def along(
 
 
 def _outer(weight: Float[Array, " modes"], row: Float[Array, "... positions"]) -> Float[Array, "modes ... positions"]:
-    return weight.reshape(-1, *[1] * row.ndim) * row
+    return weight.reshape(-1, *[1] * row.ndim) * row[None]

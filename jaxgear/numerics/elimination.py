@@ -5,6 +5,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .stored import unit
+
 Rows = list[Float[Array, "slices positions"]]
 Slopes = list[Float[Array, "#slices positions"]]  # one row where a slope is the same in every slice
 Curve = Float[Array, " positions"]
@@ -73,6 +75,30 @@ def forward(rows: list[Rows], inverse: Slopes, right: Rows) -> Rows:
             value = value - rows[i][j] * inverse[j] * result[j]
         result.append(value)
     return result
+
+
+def inverse_of(factors: Factors) -> list[Rows]:
+    """Inverses of the active systems, zero where springs are apart, by springs."""
+    springs = range(len(factors.active))
+    none = jnp.zeros_like(factors.active[0])
+    ahead = [
+        forward(factors.rows, factors.inverse, [factors.active[j] if i == j else none for i in springs])
+        for j in springs
+    ]
+    half = {}
+    for i in springs:
+        for j in range(i + 1):
+            value = sum(ahead[i][k] * ahead[j][k] * factors.inverse[k] for k in springs[i:])
+            half[i, j] = half[j, i] = value / unit(value)
+    return [[half[i, j] for j in springs] for i in springs]
+
+
+def small_inverse(matrix: Float[Array, "pairs pairs positions"]) -> Float[Array, "pairs pairs positions"]:
+    """Of a symmetric, positive definite matrix at every position."""
+    count = len(matrix)
+    none = jnp.zeros_like(matrix[0, 0])[None]
+    factors = factorize(matrix, matrix[0], [none == none] * count, [none] * count)
+    return jnp.stack([jnp.concatenate(row) for row in inverse_of(factors)])
 
 
 def product(weight: Float[Array, " slices"], factors: Factors, first: Rows, second: Rows) -> Curve:

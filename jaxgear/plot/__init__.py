@@ -24,9 +24,10 @@ from .iterations import iterations_transmission_error as iterations_transmission
 from .k_chart import k_chart as k_chart
 from .lead_chart import lead_chart as lead_chart
 from .load_sharing import load_sharing as load_sharing
-from .mesh_orders import mesh_orders as mesh_orders
+from .meshing import meshing_diagram as meshing_diagram
 from .optimizer_comparison import optimizer_comparison as optimizer_comparison
 from .optimum_front import optimum_front as optimum_front
+from .orders import transmission_error_orders as transmission_error_orders
 from .parallel_coordinates import parallel_coordinates as parallel_coordinates
 from .pareto import pareto as pareto
 from .pressure import pressure as pressure
@@ -35,6 +36,7 @@ from .pressure_map import pressure_map as pressure_map
 from .radar import radar as radar
 from .response_surface import response_surface as response_surface
 from .shaft import shaft_deflection as shaft_deflection
+from .stiffness import mesh_stiffness as mesh_stiffness
 from .tolerance_cases import face_load_factors as face_load_factors
 from .tolerance_cases import tolerance_line_load as tolerance_line_load
 from .topography import topography as topography
@@ -43,3 +45,5 @@ from .torque import harris_map as harris_map
 from .torque import ppte_over_torque as ppte_over_torque
 from .transmission_error import transmission_error as transmission_error
 from .variants import label as label
+from .wear import lives as lives
+from .wear import worn_flank as worn_flank

@@ -10,7 +10,7 @@ from .contents import Figure
 CAPTIONS = {
     "transmission_error": "Loaded transmission error over two base pitches at the design torque, with its peak-to-peak "
     "value (PPTE).",
-    "mesh_orders": "Amplitudes of the transmission error at the orders of the mesh frequency.",
+    "transmission_error_orders": "Amplitudes of the transmission error at the orders of the mesh frequency.",
     "load_sharing": "Share of the load that one tooth pair carries on its way along the path of contact.",
     "pressure": "Largest flank pressure of one tooth pair along the path of contact.",
     "pressure_map": "Pressure over path of contact and face width.",
@@ -37,6 +37,10 @@ CAPTIONS = {
     "branches": "Stable and unstable periodic motions of the unmodified design.",
     "tolerance_cases": "Load over the face under the combinations of deviations within the tolerances.",
     "face_load_factors": "Face load factor under the combinations of deviations within the tolerances.",
+    "worn_pinion": "Flank of the pinion at several lives.",
+    "worn_wheel": "Flank of the wheel at several lives.",
+    "ppte_over_life": "PPTE over the life.",
+    "depth_over_life": "Depth of wear over the life.",
     "pareto": "Results of the variants against each other, with the Pareto front.",
     "parallel_coordinates": "Variables and results of the variants, one line per variant.",
     "radar": "Results of chosen variants side by side.",

@@ -11,6 +11,7 @@ _UNITS = {
     "kg_per_m^3": "kg/m^3",
     "N_per_mm": "N/mm",
     "percent": "%",
+    "mm3": "mm3",
     "mm": "mm",
     "um": "um",
     "deg": "deg",

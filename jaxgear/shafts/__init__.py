@@ -27,6 +27,7 @@ from .iso_method_c import method_c as method_c
 from .mesh_support import AbstractSupport as AbstractSupport
 from .mesh_support import RigidSupport as RigidSupport
 from .mesh_support import ShaftSupport as ShaftSupport
+from .mesh_support import TabulatedSupport as TabulatedSupport
 from .mesh_support import support as support
 from .misalignment import Misalignment as Misalignment
 from .misalignment import axis_tolerance as axis_tolerance

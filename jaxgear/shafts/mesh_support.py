@@ -8,16 +8,20 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import GearPair
-from ..numerics import Checked, program, real, whole
+from ..numerics import Checked, concrete, number, program, real, whole
 from .beam import twist
 from .equilibrium import solve
 from .gearbox import Gearbox
 from .loads import acting, load_pattern, mesh_patterns, side_by_side, torques_on
+from .matrices import check_symmetric, symmetric
 from .misalignment import Misalignment
 from .operating_point import system_under_load
 
 Slices = Float[Array, " slices"]
 Scalar = Float[Array, ""]
+
+# Smallest eigenvalue over the largest one that may be a rounding error of a semidefinite matrix.
+_ROUNDING = 1e-9
 
 
 class AbstractSupport(Checked):
@@ -27,6 +31,11 @@ class AbstractSupport(Checked):
     @abstractmethod
     def pair(self) -> GearPair:
         """The gears of the mesh."""
+
+    @property
+    def torque(self) -> Scalar | None:
+        """On the pinion [N m], where influence and gap belong to one; None where they hold at every torque."""
+        return None
 
     @abstractmethod
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
@@ -60,6 +69,63 @@ class RigidSupport(AbstractSupport):
     def gap(self, y: Slices) -> Slices:
         """That of the misalignment [um]."""
         return self.misalignment.over_face(self.pair) * real(y) / self.pair.face_width
+
+
+class TabulatedSupport(AbstractSupport):
+    """What another program, or a measurement, tells about the face; it holds at every torque.
+
+    Attributes:
+        gears: the pair.
+        matrix: influence, gap that opens in a slice under a unit force between the flanks of another, over slices of
+            equal width.
+        opening: gap by everything else than the force of this mesh, in every slice; None for none.
+
+    Raises:
+        ValueError: for a matrix that is not square and symmetric, and other numbers of slices.
+    """
+
+    gears: GearPair
+    matrix: Float[Array, "slices slices"] = number("um/N", shape=("slices", "slices"))
+    opening: Slices | None = number("um", shape=("slices",), optional=True, default=None)
+
+    def check_together(self) -> None:
+        known = concrete(self.matrix)
+        if known is not None:
+            if known.shape[0] != known.shape[1]:
+                raise ValueError(f"TabulatedSupport: matrix is {known.shape[0]} x {known.shape[1]}, must be square")
+            check_symmetric("TabulatedSupport", "matrix", known)
+            values = np.linalg.eigvalsh(symmetric(known))
+            if values[0] < -_ROUNDING * values[-1]:
+                raise ValueError(
+                    f"TabulatedSupport: matrix has the eigenvalue {values[0]:.6g} um/N, must not be negative: a "
+                    "support gives way under a force"
+                )
+        if self.opening is not None and len(self.opening) != len(self.matrix):
+            raise ValueError(
+                f"TabulatedSupport: opening has {len(self.opening)} slices, must have the {len(self.matrix)} of matrix"
+            )
+
+    @property
+    def pair(self) -> GearPair:
+        """`gears`."""
+        return self.gears
+
+    def influence(self, y: Slices) -> Float[Array, "slices slices"]:
+        """`matrix`, its symmetric part.
+
+        Raises:
+            ValueError: for another number of slices.
+        """
+        if len(y) != len(self.matrix):
+            raise ValueError(
+                f"TabulatedSupport: matrix has {len(self.matrix)} slices, the mesh has {len(y)}: "
+                f"Resolution(slices={len(self.matrix)})"
+            )
+        return symmetric(self.matrix)
+
+    def gap(self, y: Slices) -> Slices:
+        """`opening`."""
+        return jnp.zeros(len(y)) if self.opening is None else self.opening
 
 
 class ShaftSupport(AbstractSupport):

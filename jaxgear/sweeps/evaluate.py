@@ -13,12 +13,14 @@ from jax.sharding import Mesh as DeviceMesh
 from ..conditions import Variants, joined, solve_case, solved
 from ..conditions.batches import divided, everywhere, local_devices, over_devices, padded, side_by_side
 from ..metrics import Quantity
-from ..numerics import AbstractMeasure, kernel
+from ..numerics import AbstractMeasure, kernel, program
 from .columns import CONVERGED, result_columns
 
 # A loop of one step is unrolled by the compiler and rounds differently: with two or more, the rows do not depend on how
 # many devices share them.
 _LEAST_STEPS = 2
+# Contact analyses up to which a program that is compiled in a third of the time, to run half as fast, is done sooner.
+FEW = 256
 
 
 class _Task(NamedTuple):
@@ -46,6 +48,7 @@ class Evaluator:
         results: Sequence[Quantity],
         measures: Sequence[AbstractMeasure],
         rows: int,
+        few: bool = False,
     ):
         """Prepares the evaluation on all local devices.
 
@@ -55,6 +58,7 @@ class Evaluator:
             results: the quantities wanted.
             measures: by which the cases of a variant are joined; none for a single case.
             rows: largest number of variants of a call.
+            few: whether compiling takes longer than all evaluations.
 
         Raises:
             ValueError: for no or repeated results, and for whatever the variants or a result refuse.
@@ -67,6 +71,7 @@ class Evaluator:
         steps = max(-(-rows // (batch * self._devices.size)), _LEAST_STEPS)
         self.capacity = steps * batch * self._devices.size
         arrays, rest = eqx.partition((variants, tuple(measures)), eqx.is_array)
+        self._evaluate = _evaluate_few if few else _evaluate
         self._task = _Task(rest, tuple(results), batch, self._devices)
         self._data = everywhere(arrays, self._devices)
         self._dtype = np.dtype(mesh.slice_width.dtype)
@@ -79,7 +84,7 @@ class Evaluator:
             what waits for the result columns and the flag; the numbers of failed variants are NaN.
         """
         placed = divided(padded(rows.astype(self._dtype), self.capacity), self._devices)
-        values, converged = _evaluate(self._task, placed, self._data)
+        values, converged = self._evaluate(self._task, placed, self._data)
 
         def finished() -> dict[str, np.ndarray]:
             count = len(rows)
@@ -95,6 +100,11 @@ class Evaluator:
 
 @kernel
 def _evaluate(task: _Task, rows, data):
+    return over_devices(partial(_numbers, task), rows, data, batch=task.batch, devices=task.devices)
+
+
+@program
+def _evaluate_few(task: _Task, rows, data):
     return over_devices(partial(_numbers, task), rows, data, batch=task.batch, devices=task.devices)
 
 

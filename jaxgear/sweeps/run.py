@@ -21,7 +21,7 @@ from ..metrics import Quantity, quantities, quantity_of
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
 from ..tolerance import Tolerance
 from .columns import CONVERGED, VARIANT, Column, parameter_columns
-from .evaluate import Evaluator
+from .evaluate import FEW, Evaluator
 from .plan import AbstractPlan
 from .store import MANIFEST, Manifest, Store
 from .table import SweepTable, in_memory, open_sweep
@@ -111,7 +111,9 @@ def sweep(
     check_used("sweep", plan.names, used)
     wanted = [quantity_of(of, "sweep") for of in results]
     joins = _measures(made.conditions, measures)
-    evaluator = Evaluator(made, example, results=wanted, measures=joins, rows=min(part_rows, plan.size))
+    few = plan.size * made.conditions.count <= FEW
+    rows = min(part_rows, plan.size)
+    evaluator = Evaluator(made, example, results=wanted, measures=joins, rows=rows, few=few)
     columns = _columns(plan, units or {}, evaluator)
     settings = {
         **_settings(made, example, _design_digest(traced), plan, wanted),

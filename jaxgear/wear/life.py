@@ -6,36 +6,19 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..conditions import LoadSpectrum
-from ..contact import Mesh, MeshCycle, Operation, removed_material, solve_removed
-from ..contact.operation import operation_of
-from ..contact.solve import check_mesh, flanks_of
-from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
-from ..numerics import Checked, check, kernel, maximum, real, result, whole
-from .archard import worn
-from .coefficient import wear_law
-from .deposit import PARTS, Deposit, deposit
-from .march import BLOCKS_OF_A_PAIR, march
+from ..contact import Mesh, MeshCycle
+from ..geometry import Gear
+from ..microgeometry import AbstractModification
+from ..numerics import Checked, check, maximum, program, real, result, whole
+from .case import Case, case_of, marched, tables
+from .deposit import arcs, grid
+from .march import BLOCKS_OF_A_PAIR, March
 
 Scalar = Float[Array, ""]
 Lives = Float[Array, " lives"]
 Depths = Float[Array, "lives slices points"]
 
 BLOCKS = 20
-# what a cycle holds that differs from flank to flank
-_FOUND = (
-    "transmission_error",
-    "unloaded_transmission_error",
-    "line_load",
-    "pair_force",
-    "opening",
-    "gap",
-    "shift",
-    "bend",
-    "tangent_stiffness",
-    "residual",
-    "converged",
-)
 
 
 class WearLife(Checked):
@@ -75,6 +58,14 @@ class WearLife(Checked):
         """Worn off the wheel in all [um], shape (lives, slices, points)."""
         return jnp.sum(self.depth[..., 1, :, :, :], axis=-3)
 
+    @property
+    def gears(self) -> tuple[Gear, Gear]:
+        """Pinion and wheel."""
+        pair = self.cycles.kinematics.pair
+        first = (0,) * self.cycles.batch_ndim  # of all lives the same
+        pinion, wheel = jax.tree.map(lambda leaf: leaf[first], (pair.pinion, pair.wheel))
+        return pinion, wheel
+
     def flanks(self, life: int = -1) -> tuple[AbstractModification, AbstractModification]:
         """What is worn off pinion and wheel, as modifications: `TabulatedProfile`, or `TabulatedFlank` over slices.
 
@@ -84,18 +75,6 @@ class WearLife(Checked):
             life: which of the lives; the last one by default.
         """
         return tables(self.roll_length, self.face_coordinate, self.depth[life])
-
-
-def tables(roll_length, face_coordinate, depth) -> tuple[AbstractModification, AbstractModification]:
-    """Worn material (gears, parts, slices, points) as modifications of pinion and wheel."""
-    total = jnp.sum(depth, axis=1)
-
-    def of(gear: int) -> AbstractModification:
-        if len(face_coordinate) == 1:
-            return TabulatedProfile(roll_length[gear], total[gear, 0])
-        return TabulatedFlank(roll_length[gear], face_coordinate, total[gear].T)
-
-    return of(0), of(1)
 
 
 def wear(
@@ -142,19 +121,13 @@ def wear(
         ValueError: for numbers out of their range, an odd number of blocks, a coefficient that is a function where
             there is no speed, and whatever `solve` refuses.
     """
-    check_mesh("wear", mesh)
-    pinion, wheel = flanks_of("wear", mesh, pinion, wheel)
-    dtype = mesh.slice_width.dtype
-    loads, weights = _loads(torque, dtype)
-    revolutions = real(revolutions).astype(dtype)
-    if revolutions.ndim:
-        raise ValueError(f"wear: revolutions has shape {revolutions.shape}, must be a single number")
-    check("wear", "revolutions", revolutions, "", low=0.0, open_low=True)
     check_blocks("wear", blocks)
-    points = mesh.resolution.positions // 2 + 1 if points is None else whole("wear", "points", points, low=3)
-    law = wear_law(coefficient, loads, dtype)
-    other = jnp.zeros((), dtype) if deviation is None else real(deviation).astype(dtype)
-    return _wear(mesh, loads, weights, revolutions, law, pinion, wheel, other, blocks, points)
+    flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
+    case = case_of("wear", mesh, torque, coefficient=coefficient, points=points, **flanks)
+    revolutions = checked_revolutions("wear", revolutions, mesh)
+    pairs = blocks // BLOCKS_OF_A_PAIR
+    found = marched(case, case.start(), jnp.full((pairs,), 1.0 / blocks, revolutions.dtype) * revolutions)
+    return life_of(case, found, jnp.arange(blocks + 1, dtype=revolutions.dtype) / blocks * revolutions)
 
 
 def check_blocks(owner: str, blocks: int) -> None:
@@ -163,73 +136,33 @@ def check_blocks(owner: str, blocks: int) -> None:
         raise ValueError(f"{owner}: blocks = {blocks} must be even: two and two are compared with one of double length")
 
 
-def _loads(torque: Any, dtype) -> tuple[Operation, Float[Array, " torques"] | None]:
-    """Operations with a leading axis (torques,), and the shares of a spectrum; None for a single load."""
-    if not isinstance(torque, LoadSpectrum):
-        single = operation_of("wear", torque, dtype)
-        return jax.tree.map(lambda number: number[None], single), None
-    load = jax.tree.map(lambda number: number.astype(dtype), torque)
-    friction = None if load.friction is None else jnp.broadcast_to(load.friction, load.torques.shape)
+def checked_revolutions(owner: str, revolutions: Any, mesh: Mesh) -> Scalar:
+    """A number of revolutions in the precision of a mesh.
 
-    def each(torque, speed, friction):
-        return Operation(torque, speed, friction)
+    Raises:
+        ValueError: for something else than one number greater than zero.
+    """
+    revolutions = real(revolutions).astype(mesh.slice_width.dtype)
+    if revolutions.ndim:
+        raise ValueError(f"{owner}: revolutions has shape {revolutions.shape}, must be a single number")
+    check(owner, "revolutions", revolutions, "", low=0.0, open_low=True)
+    return revolutions
 
-    return jax.vmap(each)(load.torques, load.speeds, friction), load.weights
 
-
-@kernel
-def _wear(
-    mesh: Mesh, loads: Operation, weights, revolutions, law, pinion, wheel, deviation, blocks: int, points: int
-) -> WearLife:
-    sizes, dtype = mesh.resolution, mesh.slice_width.dtype
-    places = jax.vmap(lambda load: deposit(mesh, load.torque, points))(loads)
-    roll_length, face = places.roll_length[0], mesh.face_coordinate
-    shares = jnp.ones((1,), dtype) if weights is None else weights
-    passages = jnp.stack([jnp.ones((), dtype), mesh.pair.pinion.teeth / mesh.pair.wheel.teeth])
-
-    def cycle_on(depth, load: Operation) -> MeshCycle:
-        tabled = tables(roll_length, face, depth)
-        now = {"pinion": pinion + tabled[0], "wheel": wheel + tabled[1]}
-        return solve_removed(mesh, load, removed_material(mesh, load, **now) + deviation, **now)
-
-    def rate(depth):
-        def under(load: Operation, place: Deposit):
-            cycle = cycle_on(depth, load)
-            return worn(cycle.line_load, law(cycle), place), {name: getattr(cycle, name) for name in _FOUND}
-
-        found, seen = jax.vmap(under)(loads, places)
-        return jnp.tensordot(shares, found, 1) * passages[:, None, None, None], seen
-
-    def rebuilt(depth, load: Operation, found) -> MeshCycle:
-        first, second = tables(roll_length, face, depth)
-        return MeshCycle(
-            kinematics=mesh.kinematics,
-            margins=mesh.margins,
-            operation=load,
-            pinion=pinion + first,
-            wheel=wheel + second,
-            **found,
-        )
-
-    start = jnp.zeros((2, len(PARTS), sizes.slices, points), dtype)
-    length = jnp.full((blocks // BLOCKS_OF_A_PAIR,), 1.0 / blocks, dtype) * revolutions
-    found = march(rate, start, length)
-    cycles = jax.vmap(lambda depth, seen: jax.vmap(lambda load, of: rebuilt(depth, load, of))(loads, seen))(
-        found.depth, found.seen
-    )
-    if weights is None:
-        cycles = jax.tree.map(lambda leaf: leaf[:, 0], cycles)
-    done = jnp.arange(blocks + 1, dtype=dtype) / blocks * revolutions
+@program
+def life_of(case: Case, found: March, revolutions: Lives) -> WearLife:
+    """The life of a march; `revolutions` at its lives."""
+    roll_length = grid(case.mesh, case.points)
     return WearLife(
-        revolutions=done,
+        revolutions=revolutions,
         roll_length=roll_length,
-        arc=places.arc[0],
-        face_coordinate=face,
-        slice_width=mesh.slice_width,
+        arc=jnp.stack([arcs(knots, side.base_radius) for knots, side in zip(roll_length, case.mesh.sides)]),
+        face_coordinate=case.mesh.face_coordinate,
+        slice_width=case.mesh.slice_width,
         depth=found.depth,
         error=_total_error(found.error),
-        cycles=cycles,
-        weights=weights,
+        cycles=case.cycles(roll_length, found),
+        weights=case.weights,
     )
 
 

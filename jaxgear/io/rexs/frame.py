@@ -15,6 +15,7 @@ from ...geometry import Gear, GearPair, path_of_contact
 from ...microgeometry import AbstractModification, Flank
 
 _SAME = 1e-9  # mm: what a diameter in 12 digits leaves open
+_ROUNDING = 1e-12  # of the squares of radii
 _POINTS = 1024  # evaluated at a time: one shape is compiled once
 
 
@@ -48,8 +49,9 @@ class Frame:
 
     def roll_length(self, diameter):
         """Roll length at a diameter; NaN below the base circle."""
-        with np.errstate(invalid="ignore"):
-            return np.sqrt((0.5 * np.asarray(diameter)) ** 2 - self.base_radius**2)
+        square = (0.5 * np.asarray(diameter)) ** 2 - self.base_radius**2
+        below = square < -_ROUNDING * self.base_radius**2
+        return np.where(below, np.nan, np.sqrt(np.maximum(square, 0.0)))
 
     def place(self, face: str, length: float) -> float:
         """Face coordinate at a distance from the middle towards the "datum_face" or the "non_datum_face"."""

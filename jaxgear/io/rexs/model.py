@@ -5,8 +5,6 @@ what they have to do with each other. A file holds one model. Whatever is wrong 
 names component and attribute.
 """
 
-import base64
-import binascii
 import math
 import re
 from collections.abc import Iterable
@@ -16,15 +14,16 @@ from typing import Any
 
 import numpy as np
 
+from ...numerics import Number
 from ..errors import DesignFileError
+from ..ranges import outside
+from .values import kind_of, written
 
-CUSTOM = (
-    "custom_jaxgear_"  # of attributes that REXS does not know; it leaves names that begin with "custom_" to programs
-)
+CUSTOM = "custom_jaxgear_"  # of attributes that REXS does not know: it leaves "custom_..." to programs
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # what earlier versions call a unit of the current one
 _ALSO = {"deg": ("\u00b0",), "MPa": ("N / mm^2",), "none": ("",)}
-# names until REXS 1.7, by the type of the component
+# names in versions before 2, by the type of the component
 _EARLIER = {
     "rack_shaped_tool": {
         "tip_radius": "tip_corner_radius_reference_profile",
@@ -36,7 +35,14 @@ _EARLIER = {
         "thermal_contact_coefficient_agma_925_a03": "thermal_contact_coefficient_agma_925_2003",
     },
 }
-_CODES = {"float64": "<f8", "float32": "<f4", "int32": "<i4"}
+# the library's names of units of REXS, by the shift between them
+_OWN = {
+    ("mm", 3): "um",
+    ("1 / min", 0): "rpm",
+    ("kg / dm^3", 3): "kg/m^3",
+    ("N / (mm s^0.5 K)", 3): "N/(m s^0.5 K)",
+    ("none", 0): "",
+}
 
 
 @dataclass(frozen=True)
@@ -46,10 +52,12 @@ class Attribute:
     Attributes:
         value: text of a scalar, texts of an array, None for a matrix or another nested value.
         unit: None where the file names none.
+        kind: type of the value by its name in REXS, "" where the file does not say.
     """
 
     value: str | tuple[str, ...] | None
     unit: str | None = None
+    kind: str = ""
 
 
 @dataclass
@@ -76,7 +84,7 @@ class Component:
             return None
         if not isinstance(value, str):
             raise self.refuse(attribute, "must be a number, not an array")
-        return self._float(attribute, value, shift)
+        return self._float(attribute, value, unit, shift)
 
     def needed(self, attribute: str, unit: str) -> float:
         """A number that has to be there."""
@@ -92,7 +100,7 @@ class Component:
             raise self.refuse(attribute, "missing")
         if isinstance(value, str):
             raise self.refuse(attribute, "must be an array, not a single value")
-        return np.array([self._float(attribute, item, shift) for item in value])
+        return np.array([self._float(attribute, item, unit, shift) for item in value])
 
     def choice(self, attribute: str, default: str | None, allowed: Iterable[str]) -> str:
         """One of several words, which has to be there where there is no default."""
@@ -123,10 +131,13 @@ class Component:
             raise self.refuse(attribute, "must be a single value or an array, not a matrix")
         return held.value or None  # an empty element says nothing
 
-    def _float(self, attribute: str, text: str, shift: int) -> float:
+    def _float(self, attribute: str, text: str, unit: str, shift: int) -> float:
         if not _NUMBER.fullmatch(text) or not math.isfinite(value := float(text)):
             raise self.refuse(attribute, f'"{text[:40]}" is not a finite number')
-        return float(Decimal(text).scaleb(shift)) if value else 0.0
+        value = float(Decimal(text).scaleb(shift)) if value else 0.0
+        if problem := outside(Number(_OWN.get((unit, shift), unit)), value):
+            raise self.refuse(attribute, problem)
+        return value
 
 
 @dataclass(frozen=True)
@@ -160,6 +171,18 @@ class Model:
             raise DesignFileError("", f"a relation names component {number}, which is missing")
         return self.components[number]
 
+    def put(self, component: Component) -> None:
+        """Takes up a component of a file."""
+        if component.id in self.components:
+            raise DesignFileError(component.where(), "stands twice in the file")
+        self.components[component.id] = component
+
+    def put_case(self, number: int, said: Iterable[Component]) -> None:
+        """Takes up a load case of a file."""
+        if number in self.cases:
+            raise DesignFileError(f"load_case {number}", "stands twice in the file")
+        self.cases[number] = {component.id: component for component in said}
+
     def related(self, kind: str, role: str, number: int, wanted: str) -> list[Component]:
         """The components with a wanted role in the relations of a kind in which a component has a role."""
         found = [
@@ -191,42 +214,5 @@ def current(kind: str, attribute: str) -> str:
 
 def attributes_of(values: dict[str, tuple[Any, str]]) -> dict[str, Attribute]:
     """Attributes from (value, unit); those of None are left out."""
-    return {name: Attribute(written(value), unit) for name, (value, unit) in values.items() if value is not None}
-
-
-def written(value: Any) -> str | tuple[str, ...]:
-    """A value as text: numbers by the shortest digits that read back as the same number."""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, bool):
-        return str(value).lower()
-    array = np.asarray(value)
-    return tuple(str(item) for item in array) if array.ndim else str(array[()])
-
-
-def shifted(value: Any, shift: int) -> str | tuple[str, ...]:
-    """Numbers times 10^shift as text; the shift is of the decimal digits, so that it is exact."""
-    text = written(value)
-    if isinstance(text, tuple):
-        return tuple(_shift(item, shift) for item in text)
-    return _shift(text, shift)
-
-
-def _shift(text: str, shift: int) -> str:
-    number = Decimal(text)
-    return str(number.scaleb(shift).normalize()) if number else "0.0"
-
-
-def decoded(text: str, code: str) -> tuple[str, ...]:
-    """The numbers of an array in base64, little-endian (REXS 1.4).
-
-    Raises:
-        ValueError: where it is none.
-    """
-    if code not in _CODES:
-        raise ValueError(f'code "{code}" is not known, must be one of {", ".join(_CODES)}')
-    try:
-        content = base64.b64decode("".join(text.split()), validate=True)
-        return tuple(str(item) for item in np.frombuffer(content, _CODES[code]))
-    except (binascii.Error, ValueError):
-        raise ValueError(f"is not an array of {code} in base64") from None
+    given = {name: pair for name, pair in values.items() if pair[0] is not None}
+    return {name: Attribute(written(value), unit, kind_of(name, value, unit)) for name, (value, unit) in given.items()}

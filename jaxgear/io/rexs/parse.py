@@ -1,18 +1,18 @@
-"""From the bytes of a REXS file to a `Model`.
+"""From the bytes of a REXS file in XML to a `Model`.
 
 A file comes from anywhere, so it is read without a document type: Expat reports the start of one before anything that
 it declares is looked at, and the file is refused there. Without declarations there are no entities to expand, inside
 the file or from elsewhere. REXS has a schema (XSD) and no document type, so that no proper file is lost.
 """
 
-import re
 from collections.abc import Iterator
 from typing import Any
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from ..errors import DesignFileError
-from .model import Attribute, Component, Model, Relation, current, decoded
+from .model import Attribute, Component, Model, Relation, current
+from .values import checked_version, decoded, whole
 
 _DEEPEST = 16  # twice the depth of the schema
 
@@ -26,22 +26,13 @@ def parse(content: bytes) -> Model:
     root = _tree(content)
     if root.tag != "model":
         raise DesignFileError("", f"<{root.tag}> is not the <model> of a REXS file")
-    version = root.get("version", "")
-    if not re.fullmatch(r"\d+(\.\d+){1,2}", version):
-        raise DesignFileError("model: version", f'"{version}" is not a version of REXS')
-    model = Model(version)
+    model = Model(checked_version(root.get("version", "")))
     for element in root.iterfind("components/component"):
-        component = _component(element)
-        if component.id in model.components:
-            raise DesignFileError(component.where(), "stands twice in the file")
-        model.components[component.id] = component
+        model.put(_component(element))
     model.relations = [_relation(element) for element in root.iterfind("relations/relation")]
     for case in root.iterfind("load_spectrum/load_case"):
-        number = _integer(case, "id", "load_case")
-        if number in model.cases:
-            raise DesignFileError(f"load_case {number}", "stands twice in the file")
         said = [_component(element) for element in case.iterfind("component")]
-        model.cases[number] = {component.id: component for component in said}
+        model.put_case(whole(case.get("id", ""), "load_case: id"), said)
     return model
 
 
@@ -82,7 +73,9 @@ def _tree(content: bytes) -> Element:
 
 
 def _component(element: Element) -> Component:
-    component = Component(_integer(element, "id", "component"), element.get("type", ""), element.get("name", ""))
+    component = Component(
+        whole(element.get("id", ""), "component: id"), element.get("type", ""), element.get("name", "")
+    )
     for item in element.iterfind("attribute"):
         name = item.get("id", "")
         try:
@@ -103,17 +96,10 @@ def _value(element: Element) -> str | tuple[str, ...] | None:
 
 def _relation(element: Element) -> Relation:
     kind = element.get("type", "")
-    order = _integer(element, "order", "relation") if "order" in element.keys() else None
+    order = whole(element.get("order"), "relation: order") if "order" in element.keys() else None
     return Relation(kind, tuple(_refs(element, kind)), order)
 
 
 def _refs(element: Element, kind: str) -> Iterator[tuple[str, int]]:
     for ref in element.iterfind("ref"):
-        yield ref.get("role", ""), _integer(ref, "id", f"relation {element.get('id', '')} ({kind}): ref")
-
-
-def _integer(element: Element, name: str, where: str) -> int:
-    text = element.get(name, "")
-    if not re.fullmatch(r"\s*[+-]?\d{1,9}\s*", text, re.ASCII):
-        raise DesignFileError(f"{where}: {name}", f'"{text[:40]}" is not a whole number')
-    return int(text)
+        yield ref.get("role", ""), whole(ref.get("id", ""), f"relation {element.get('id', '')} ({kind}): ref: id")

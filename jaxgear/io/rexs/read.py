@@ -1,5 +1,6 @@
 """Reads a gear pair with its modifications and its load from a REXS file."""
 
+from codecs import BOM_UTF8
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
@@ -14,6 +15,7 @@ from ..errors import DesignFileError, naming, refused
 from ..toml import content
 from .frame import Frame, frames
 from .gears import check_spur, read_gear
+from .json_form import parse_json
 from .model import Component, Model
 from .parse import parse
 from .read_flank import read_modification
@@ -56,7 +58,7 @@ def read_rexs(
     flank: Literal["left", "right"] | None = None,
     load_case: int | None = None,
 ) -> RexsPair:
-    """Reads an external spur pair from a REXS file of version 1.4 or later.
+    """Reads an external spur pair from a REXS file of version 1.4 or later, in XML or JSON.
 
     Both gears are taken as centred on each other. A gear without a material is of steel, and one without an inner
     diameter has the bore that `Gear` gives it. A modification that is given at other places than the ends of the
@@ -75,7 +77,9 @@ def read_rexs(
     """
     file = Path(path)
     with naming(file):
-        return _read(parse(content(file)), stage, flank, load_case)
+        held = content(file)
+        model = parse_json(held) if held.removeprefix(BOM_UTF8).lstrip()[:1] == b"{" else parse(held)
+        return _read(model, stage, flank, load_case)
 
 
 def _read(model: Model, stage: int | None, flank: str | None, load_case: int | None) -> RexsPair:

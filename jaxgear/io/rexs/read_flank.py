@@ -21,6 +21,7 @@ from ...microgeometry import (
     TipRelief,
 )
 from ...numerics import real
+from ..errors import DesignFileError, problem
 from .frame import Frame, same
 from .model import Component
 from .topography import flank_of
@@ -37,7 +38,12 @@ def read_modification(component: Component, frame: Frame) -> Iterator[AbstractMo
     read = _READERS.get(component.type)
     if read is None:
         raise component.refuse("", "is no modification that this library has")
-    yield from read(component, frame)
+    try:
+        yield from read(component, frame)
+    except DesignFileError:
+        raise
+    except (ValueError, OverflowError) as error:  # numbers that together make no modification
+        raise component.refuse("", problem(error)) from None
 
 
 def _tip_relief(part: Component, frame: Frame) -> Iterator[AbstractModification]:

@@ -52,25 +52,30 @@ def plain_terms(modification: AbstractModification, factor=None) -> Iterator[Abs
         yield from plain_terms(modification.modification, _product(factor, modification.factor))
     elif factor is None:
         yield modification
-    elif isinstance(modification, _PROPORTIONAL):
+    elif isinstance(modification, _PROPORTIONAL) and type(modification) in _PROPORTIONAL:
         yield eqx.tree_at(lambda of: of.amount, modification, factor * modification.amount)
     else:
         yield Scaled(factor, modification)
 
 
 def powers(curve: AbstractCurve) -> dict[int, float] | None:
-    """Coefficients of a curve that is b1 d + b2 d^2, by their powers; None for any other."""
-    if isinstance(curve, Linear):
-        return {1: 1.0}
-    if isinstance(curve, Parabolic):
-        return {1: 0.44, 2: 0.56}
-    if isinstance(curve, Power):
-        return {int(curve.exponent): 1.0} if float(curve.exponent) in (1.0, 2.0) else None
-    if isinstance(curve, ParabolicLinear):
-        return {2: 1.0} if float(curve.node) == 1.0 else None
-    if isinstance(curve, Quadratic):
-        return _of_coefficients([curve.b0, curve.b1, curve.b2])
-    return _of_coefficients(curve.coefficients) if isinstance(curve, Polynomial) else None
+    """Coefficients of a curve that is b1 d + b2 d^2, by their powers; None for any other, a user's own too."""
+    if not type(curve).__module__.startswith(AbstractCurve.__module__):
+        return None
+    match curve:
+        case Linear():
+            return {1: 1.0}
+        case Parabolic():
+            return {1: 0.44, 2: 0.56}
+        case Power():
+            return {int(curve.exponent): 1.0} if float(curve.exponent) in (1.0, 2.0) else None
+        case ParabolicLinear():
+            return {2: 1.0} if float(curve.node) == 1.0 else None
+        case Quadratic():
+            return _of_coefficients([curve.b0, curve.b1, curve.b2])
+        case Polynomial():
+            return _of_coefficients(curve.coefficients)
+    return None
 
 
 def _of_coefficients(coefficients) -> dict[int, float] | None:

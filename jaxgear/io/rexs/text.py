@@ -1,4 +1,4 @@
-"""From a `Model` to the text of a REXS file."""
+"""From a `Model` to the text of a REXS file in XML."""
 
 from collections.abc import Iterable
 from datetime import UTC, datetime
@@ -11,13 +11,7 @@ _CASES = "1"  # id of the one load spectrum
 
 def xml(model: Model) -> bytes:
     """The file: UTF-8 with a byte order mark, as REXS has it."""
-    root = Element(
-        "model",
-        version=model.version,
-        applicationId="jaxgear",
-        applicationVersion=_own_version(),
-        date=datetime.now(UTC).isoformat(timespec="seconds"),
-    )
+    root = Element("model", origin(model))
     relations = SubElement(root, "relations")
     for number, relation in enumerate(model.relations, 1):
         order = {} if relation.order is None else {"order": str(relation.order)}
@@ -46,6 +40,16 @@ def _components(parent: Element, components: Iterable[Component]) -> None:
                     SubElement(array, "c").text = value
             else:
                 item.text = held.value
+
+
+def origin(model: Model) -> dict[str, str]:
+    """Version of REXS, program and time."""
+    return {
+        "version": model.version,
+        "applicationId": "jaxgear",
+        "applicationVersion": _own_version(),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
 
 
 def _own_version() -> str:

@@ -64,7 +64,8 @@ def flank_of(component: Component, frame: Frame) -> AbstractModification:
         raise component.refuse(_POINTS, f"must be one per point, with its coordinate and diameter, not {given}")
     diameters, row = np.unique(diameter, return_inverse=True)
     coordinates, column = np.unique(coordinate, return_inverse=True)
-    if min(diameters[0], diameters[-1]) < 2 * frame.base_radius * (1 - 1e-12):
+    roll = frame.roll_length(diameters)
+    if np.isnan(roll).any():
         below = f"{diameters[0]:.9g} mm must be at least {2 * frame.base_radius:.9g} mm, the base diameter"
         raise component.refuse("diameters_of_topographical_modification", below)
     grid = np.full((len(diameters), len(coordinates)), np.nan)
@@ -72,10 +73,9 @@ def flank_of(component: Component, frame: Frame) -> AbstractModification:
     if len(amount) != grid.size or np.isnan(grid).any() or len(diameters) < 2:
         wanted = "must be a full grid of at least 2 diameters, every point once"
         raise component.refuse(_POINTS, f"{wanted}: {len(amount)} points, {len(diameters)} x {len(coordinates)}")
-    roll = real(np.sqrt(np.maximum((0.5 * diameters) ** 2 - frame.base_radius**2, 0.0)))
     if (grid == grid[:, :1]).all():
-        return TabulatedProfile(roll, real(grid[:, 0]))
-    return TabulatedFlank(roll, real(coordinates), real(grid))
+        return TabulatedProfile(real(roll), real(grid[:, 0]))
+    return TabulatedFlank(real(roll), real(coordinates), real(grid))
 
 
 def _knots(modification: AbstractModification, frame: Frame) -> tuple[list[float], list[float]]:

@@ -14,12 +14,14 @@ from ...numerics.durable import write_durably
 from ..folder import writing
 from .frame import frames
 from .gears import write_gear
+from .json_form import to_json
 from .model import Model
 from .results import write_results
 from .text import xml
 from .write_flank import Writer
 
 _VERSION = "2.0.0"
+_JSON = (".rexsj", ".json")
 _CASE = 1
 
 
@@ -43,7 +45,7 @@ def write_rexs(
     tip edges, goes into attributes of the name `custom_jaxgear_...`, which REXS leaves to programs.
 
     Args:
-        path: of the file.
+        path: of the file, in JSON where it ends in .rexsj or .json, else in XML.
         pair: gear pair; the pinion is gear 1 of the stage.
         pinion, wheel: modifications of the flanks.
         torque: on the pinion [N m].
@@ -89,8 +91,9 @@ def write_rexs(
         model.under_load(_CASE, gears[0], rotational_speed=(np.asarray(speed), "1 / min"))
     if cycle is not None:
         write_results(model, data[0], cycle, case=_CASE, speed=speed, friction=friction)
+    text = to_json(model) if Path(path).suffix in _JSON else xml(model)
     with writing(path):
-        write_durably(Path(path), lambda file: file.write(xml(model)))
+        write_durably(Path(path), lambda file: file.write(text))
 
 
 def _of_cycle(pair, cycle: MeshCycle, pinion, wheel, torque, speed, friction):

@@ -22,9 +22,10 @@ from ...microgeometry import (
 )
 from ..errors import DesignFileError
 from .frame import Frame
-from .model import Component, Model, shifted
+from .model import Component, Model
 from .terms import plain_terms, powers
 from .topography import points
+from .values import shifted
 
 _SHAPES = {1: "linear", 2: "parabolic"}  # of a relief, by the power of its depth
 

@@ -1,0 +1,203 @@
+"""What `jaxgear wear` says, writes and draws."""
+
+import csv
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from ..io import DesignFile, WearRequest, describe
+from ..metrics import quantity_of
+from ..microgeometry import AbstractModification
+from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, wear_depth, worn_volume
+from . import report
+from .document import Found
+from .geometry import geometry
+from .written import versions
+
+_QUANTITIES = (
+    "ppte",
+    "mean_te",
+    "te_harmonic_1",
+    "te_harmonic_2",
+    "te_harmonic_3",
+    "min_tangent_stiffness",
+    "max_tangent_stiffness",
+    "effective_contact_ratio",
+    "max_flank_pressure",
+    "max_corner_pressure",
+)
+# of the depth: what the blocks leave uncertain and nobody asks about
+_WORTH_A_WORD = 0.01
+_PANEL, _HEIGHT = 80.0, 84.0  # [mm]
+
+_ASSUMED = (
+    "Wear follows Archard: depth is the coefficient times pressure and sliding distance, at the torque of the file."
+)
+
+
+@dataclass(frozen=True)
+class Study:
+    """The lives of all designs.
+
+    Attributes:
+        design: the design file.
+        request: what it asks for.
+        designs: their modifications (pinion, wheel) by name.
+        lives: by name.
+    """
+
+    design: DesignFile
+    request: WearRequest
+    designs: Mapping[str, tuple[AbstractModification, AbstractModification]]
+    lives: Mapping[str, WearLife]
+
+
+def _numbers(study: Study, life: WearLife) -> dict[str, float]:
+    """What a life comes to."""
+    ppte, settings = np.asarray(over_life(life, "ppte")), study.request.settings
+    volume = np.asarray(worn_volume(life))[-1]
+    found = {
+        "pinion_wear_depth_um": wear_depth(life, "pinion")[-1],
+        "wheel_wear_depth_um": wear_depth(life, "wheel")[-1],
+        "new_ppte_um": ppte[0],
+        "max_ppte_over_life_um": ppte.max(),
+        "worn_ppte_um": ppte[-1],
+        "mean_ppte_over_life_um": mean_over_life(life, "ppte"),
+        "pinion_worn_volume_per_flank_mm3": volume[0].sum(),
+        "wheel_worn_volume_per_flank_mm3": volume[1].sum(),
+        "volume_by_tip_corners_share": volume[:, 1].sum() / max(volume.sum(), np.finfo(float).tiny),
+        "depth_error_um": life.error[-1],
+    }
+    if settings.depth_limit is not None:
+        found["life_to_depth_revolutions"] = life_to_depth(life, settings.depth_limit)
+    if settings.ppte_limit is not None:
+        found["life_to_ppte_revolutions"] = life_to(life, "ppte", settings.ppte_limit)
+    return {name: float(value) for name, value in found.items()}
+
+
+def table(study: Study) -> Table:
+    """One row per design."""
+    settings = study.request.settings
+    title = f"{study.design.title}: {float(settings.revolutions):.3g} revolutions at {study.design.torque:g} N m"
+    result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
+    result.add_column("design", no_wrap=True)
+    columns = {
+        "pinion_wear_depth_um": "pinion [um]",
+        "wheel_wear_depth_um": "wheel [um]",
+        "new_ppte_um": "PPTE new",
+        "max_ppte_over_life_um": "worst",
+        "worn_ppte_um": "worn",
+        "mean_ppte_over_life_um": "mean [um]",
+    }
+    limits = {
+        "life_to_depth_revolutions": (settings.depth_limit, "{:g} um deep"),
+        "life_to_ppte_revolutions": (settings.ppte_limit, "PPTE {:g} um"),
+    }
+    columns |= {key: text.format(float(limit)) for key, (limit, text) in limits.items() if limit is not None}
+    for heading in columns.values():
+        result.add_column(heading, justify="right", no_wrap=True)
+    for name, life in study.lives.items():
+        numbers = _numbers(study, life)
+        result.add_row(name, *(_cell(key, numbers[key]) for key in columns))
+    return result
+
+
+def _cell(key: str, value: float) -> str:
+    if not key.endswith("revolutions"):
+        return f"{value:.3f}"
+    return f"{value:.3g}" if np.isfinite(value) else "never"
+
+
+def verdict(study: Study) -> Iterator[str]:
+    """The best on the mean over the life, and how sure the depths are."""
+    means = {name: float(mean_over_life(life, "ppte")) for name, life in study.lives.items()}
+    best = min(means, key=lambda name: means[name])
+    yield f"least mean PPTE over the life: {best}, {means[best]:.3f} um"
+    for name, life in study.lives.items():
+        error, deepest = float(life.error[-1]), float(wear_depth(life)[-1])
+        if error > _WORTH_A_WORD * deepest:
+            yield f"{name}: the depth is uncertain by {error:.3g} um, take more blocks"
+
+
+def failures(study: Study) -> Iterator[str]:
+    """A line for every design whose contact was not found at some life."""
+    for name, life in study.lives.items():
+        lost = ~np.asarray(life.cycles.converged).all(axis=-1)
+        if lost.any():
+            first = float(life.revolutions[int(lost.argmax())])
+            yield (
+                f"NOT CONVERGED: {name} from {first:.3g} revolutions on; its numbers are not to be trusted. "
+                "Take more blocks, or raise resolution.newton_steps or resolution.pairs."
+            )
+
+
+def found(study: Study, figures: Sequence[Path]) -> Found:
+    """What a report shows beside `summary`."""
+    lines, warnings = list(verdict(study)), list(failures(study))
+    return Found(lines, warnings, tables=[table(study)], figures=figures, assumptions=[_ASSUMED])
+
+
+def summary(study: Study) -> dict[str, Any]:
+    """Contents of `summary.json`."""
+    settings = study.request.settings
+    given = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
+    designs = {
+        name: {
+            **_numbers(study, life),
+            "blocks": len(life.revolutions) - 1,
+            "pinion_modification": describe(study.designs[name][0]),
+            "wheel_modification": describe(study.designs[name][1]),
+        }
+        for name, life in study.lives.items()
+    }
+    return {
+        "title": study.design.title,
+        "design_file": study.design.path.name,
+        "torque_Nm": study.design.torque,
+        "settings": {name: value for name, value in given.items() if value is not None},
+        "largest_increment_um": study.request.largest_increment,
+        "designs": designs,
+        "geometry": geometry(study.design.pair()),
+        "versions": versions(),
+    }
+
+
+def write_lives(path: Path, study: Study) -> None:
+    """Every life of every design as CSV."""
+    known = [quantity_of(name) for name in _QUANTITIES]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        depths = "pinion_wear_depth_um", "wheel_wear_depth_um", "depth_error_um"
+        writer.writerow(["design", "revolutions", *depths, *(quantity.key for quantity in known)])
+        for name, life in study.lives.items():
+            columns = [life.revolutions, wear_depth(life, "pinion"), wear_depth(life, "wheel"), life.error]
+            columns += [over_life(life, quantity) for quantity in known]
+            for row in zip(*map(np.asarray, columns)):
+                writer.writerow([name, *(f"{value:.7g}" for value in row)])
+
+
+def write_figures(folder: Path, study: Study) -> list[Path]:
+    """Flanks at several lives, and PPTE and depth over the life; gives the files."""
+    import matplotlib
+
+    matplotlib.use("Agg")  # the command line never shows a window
+    from .. import plot
+
+    shown = list(dict.fromkeys((next(iter(study.lives)), list(study.lives)[-1])))
+    size: dict[str, Any] = {"columns": len(shown), "width": _PANEL * len(shown), "height": _HEIGHT}
+    axes: dict[str, Any] = {}
+    for gear in ("pinion", "wheel"):
+        with plot.figure.report_axes(None, **size) as panels:
+            for number, (panel, name) in enumerate(zip(np.ravel(panels), shown)):
+                plot.worn_flank(study.lives[name], gear, panel, title=name)
+                panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
+        axes[f"worn_{gear}"] = panels
+    axes["ppte_over_life"] = plot.lives(study.lives, "ppte")
+    axes["depth_over_life"] = plot.lives(study.lives, "wear_depth")
+    return report.save_figures(folder, axes)

@@ -1,0 +1,60 @@
+"""What the table [wear] of a design file asks for, and the quantities that need it."""
+
+import dataclasses
+
+from ..metrics import Quantity
+from ..wear import WEAR_QUANTITIES, Wear
+from .design_file import DesignFile
+from .errors import DesignFileError, naming
+from .template import part_of
+
+_QUICK_BLOCKS = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class WearRequest:
+    """A study of wear over the life, checked.
+
+    Attributes:
+        settings: revolutions and coefficients.
+        largest_increment: depth that a block wears off [um]; None for blocks of equal length.
+    """
+
+    settings: Wear
+    largest_increment: float | None
+
+
+def wear_request(design: DesignFile, *, quick: bool = False) -> WearRequest:
+    """Checks what a design file says about its wear.
+
+    Args:
+        design: the design file.
+        quick: few blocks, for a first look.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
+    """
+    with naming(design.path):
+        section = design.wear
+        if section is None:
+            raise DesignFileError("wear", "missing, nothing says for how long the pair runs and how it wears")
+        if section.largest_increment is not None and section.blocks is not None:
+            raise DesignFileError("wear.blocks", "has no effect beside wear.largest_increment")
+        settings = part_of("wear", section, Wear).build({})
+        if quick:
+            return WearRequest(dataclasses.replace(settings, blocks=_QUICK_BLOCKS), None)
+        return WearRequest(settings, section.largest_increment)
+
+
+def wear_quantity(design: DesignFile, key: str, name: str) -> Quantity:
+    """A quantity of worn flanks with the settings of the table [wear].
+
+    Raises:
+        DesignFileError: without the table, or the limit that the quantity needs.
+    """
+    if design.wear is None:
+        raise DesignFileError(key, f'"{name}" needs the table [wear]')
+    needs = WEAR_QUANTITIES[name].needs
+    if needs is not None and getattr(design.wear, needs) is None:
+        raise DesignFileError(key, f'"{name}" needs wear.{needs}')
+    return part_of("wear", design.wear, Wear).build({}).quantity(name)

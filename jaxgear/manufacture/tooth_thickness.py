@@ -1,0 +1,143 @@
+"""Tooth thickness as drawings give it: over several teeth, over balls, or as an allowance (ISO 21771, spur gears).
+
+The numbers are those of unmodified flanks: a relief may not reach where the anvils or balls touch.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..geometry import Gear
+from ..geometry.involute import involute
+from ..numerics import bracketed_root, check, concrete, whole
+
+Scalar = Float[Array, ""]
+
+_WIDEST = 3.0  # tan(pressure angle) at the ball centre, about 72 degrees
+
+
+def teeth_spanned(gear: Gear) -> int:
+    """Number of teeth k over which a span is measured, of a concrete gear.
+
+    The anvils then touch nearest to the diameter d + 2 x m, where tan(alpha_v) = sqrt((d + 2 x m)^2 - d_b^2) / d_b:
+    k = z / pi (tan(alpha_v) - inv(alpha)) - 2 x tan(alpha) / pi + 0.5, rounded, and at least 2.
+    """
+    tangent = np.tan(np.deg2rad(float(gear.pressure_angle)))
+    diameter = 2 * float(gear.pitch_radius) + 2 * float(gear.profile_shift) * float(gear.module)
+    base = 2 * float(gear.base_radius)
+    touched = np.sqrt(max(diameter**2 - base**2, 0.0)) / base
+    exact = float(gear.teeth) / np.pi * (touched - (tangent - np.arctan(tangent)))
+    return max(round(exact - 2 * float(gear.profile_shift) * tangent / np.pi + 0.5), 2)
+
+
+def span(gear: Gear, teeth: int) -> Scalar:
+    """Base tangent length W_k [mm] over a number of teeth k: (k - 1) p_b + s_b.
+
+    W_k = m cos(alpha) (pi (k - 0.5) + z inv(alpha)) + 2 x m sin(alpha) + E_sns cos(alpha).
+
+    Args:
+        gear: the gear, with its tooth thickness allowance.
+        teeth: k, see `teeth_spanned`.
+
+    Raises:
+        ValueError: unless k is a whole number from 1 to the number of teeth.
+    """
+    most = concrete(gear.teeth)
+    whole("span", "teeth", teeth, 1, float("inf") if most is None else float(most))
+    alpha = jnp.deg2rad(gear.pressure_angle)
+    nominal = jnp.pi * (teeth - 0.5) + gear.teeth * involute(jnp.tan(alpha))
+    shifted = 2 * gear.profile_shift * gear.module * jnp.sin(alpha)
+    return jnp.cos(alpha) * (gear.module * nominal + 1e-3 * gear.tooth_thickness_allowance) + shifted
+
+
+def over_balls(gear: Gear, ball) -> Scalar:
+    """Dimension over two balls M_dK [mm], or over pins, which is the same for spur gears.
+
+    inv(alpha_K) = inv(alpha) + D_M / (z m cos(alpha)) - pi / (2 z) + 2 x tan(alpha) / z + E_sns / (m z); the centres of
+    the balls lie on d_K = d_b / cos(alpha_K). M_dK = d_K + D_M for an even number of teeth; for an odd one the balls
+    are half a pitch off the diameter, M_dK = d_K cos(pi / (2 z)) + D_M.
+
+    Args:
+        gear: the gear, with its tooth thickness allowance.
+        ball: diameter D_M [mm], about 1.7 modules, so that the balls touch the flanks and stand out of the tip circle.
+
+    Raises:
+        ValueError: for a ball that falls onto the root circle or does not stand out of the spaces.
+    """
+    check("over_balls", "ball", ball, "mm", low=0.0, open_low=True)
+    alpha = jnp.deg2rad(gear.pressure_angle)
+    wanted = _thick(gear, ball, 1e-3 * gear.tooth_thickness_allowance)
+    tangent = bracketed_root(_missing, jnp.full_like(alpha, 1e-6), jnp.full_like(alpha, _WIDEST), wanted)
+    radius = gear.base_radius * jnp.sqrt(1 + tangent**2)
+    _check_ball(gear, ball, wanted, radius)
+    return 2 * radius * _offset(gear) + ball
+
+
+def allowance_of_span(gear: Gear, teeth: int, measured) -> Scalar:
+    """Tooth thickness allowance E_sns [um] of a base tangent length W_k [mm] over k teeth; the inverse of `span`.
+
+    Args:
+        gear: the gear; its own allowance does not count.
+        teeth: k.
+        measured: W_k [mm].
+
+    Raises:
+        ValueError: for a length that is not within a base pitch of that of the gear without allowance.
+    """
+    alpha = jnp.deg2rad(gear.pressure_angle)
+    nominal = span(gear, teeth) - 1e-3 * gear.tooth_thickness_allowance * jnp.cos(alpha)
+    _check_near("allowance_of_span", "measured", measured, nominal, gear)
+    return 1e3 * (measured - nominal) / jnp.cos(alpha)
+
+
+def allowance_of_balls(gear: Gear, ball, measured) -> Scalar:
+    """Tooth thickness allowance E_sns [um] of a dimension over balls M_dK [mm]; the inverse of `over_balls`.
+
+    Args:
+        gear: the gear; its own allowance does not count.
+        ball: diameter D_M [mm].
+        measured: M_dK [mm].
+
+    Raises:
+        ValueError: for a dimension that puts the balls inside the base circle.
+    """
+    check("allowance_of_balls", "ball", ball, "mm", low=0.0, open_low=True)
+    ratio = (measured - ball) / (2 * gear.base_radius * _offset(gear))
+    least = concrete(2 * gear.base_radius * _offset(gear) + ball)
+    check("allowance_of_balls", "measured", measured, "mm", low=None if least is None else float(least), open_low=True)
+    tangent = jnp.sqrt(ratio**2 - 1)
+    return 1e3 * gear.module * gear.teeth * (involute(tangent) - _thick(gear, ball, 0.0))
+
+
+def _thick(gear: Gear, ball, allowance) -> Scalar:
+    """inv(alpha_K) of a ball between the flanks of a gear with an allowance [mm]."""
+    tangent = jnp.tan(jnp.deg2rad(gear.pressure_angle))
+    space = (jnp.pi / 2 - 2 * gear.profile_shift * tangent - allowance / gear.module) / gear.teeth
+    return involute(tangent) + ball / (2 * gear.base_radius) - space
+
+
+def _missing(tangent: Scalar, wanted: Scalar) -> Scalar:
+    return involute(tangent) - wanted
+
+
+def _offset(gear: Gear) -> Scalar:
+    """What brings the two balls together where the number of teeth is odd."""
+    odd = jnp.mod(jnp.round(gear.teeth), 2) == 1
+    return jnp.where(odd, jnp.cos(jnp.pi / (2 * gear.teeth)), 1.0)
+
+
+def _check_ball(gear: Gear, ball, wanted: Scalar, radius: Scalar) -> None:
+    known = [concrete(value) for value in (ball, wanted, radius, gear.root_circle_radius, gear.tip_radius)]
+    if any(value is None for value in known):
+        return
+    size, room, centre, root, tip = (float(value) for value in known if value is not None)
+    if room <= 0 or centre - size / 2 < root:
+        raise ValueError(f"over_balls: ball = {size:g} mm touches no flanks above the root circle, must be larger")
+    if centre + size / 2 < tip:
+        raise ValueError(f"over_balls: ball = {size:g} mm does not stand out of the tip circle, must be larger")
+
+
+def _check_near(owner: str, name: str, value, nominal: Scalar, gear: Gear) -> None:
+    middle, pitch = concrete(nominal), concrete(gear.base_pitch)
+    if middle is not None and pitch is not None:
+        check(owner, name, value, "mm", low=float(middle - pitch), high=float(middle + pitch))

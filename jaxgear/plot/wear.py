@@ -1,0 +1,75 @@
+"""Worn flanks, and what they make of the mesh over the life."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..geometry import roll_angle
+from ..metrics import quantity_of
+from ..wear import WearLife, over_life, wear_depth
+from .figure import legend_above, line_style, marker_style, report_axes
+
+_GEARS = "pinion", "wheel"
+_SHOWN = 4  # lives
+
+
+def worn_flank(life: WearLife, gear: str, ax: Axes | None = None, *, title: str = "") -> Axes:
+    """Wear depth [um] of one gear over its roll angle [deg] at several lives, in the line that is worn deepest.
+
+    Material removed goes down, as in the K-chart.
+
+    Args:
+        life: of the pair.
+        gear: "pinion" or "wheel".
+        ax: Axes to draw into; None for a new figure.
+        title: of the Axes.
+
+    Raises:
+        ValueError: for another gear.
+    """
+    if gear not in _GEARS:
+        raise ValueError(f'worn_flank: gear = {gear!r} must be "pinion" or "wheel"')
+    number = _GEARS.index(gear)
+    depths = np.asarray((life.pinion_depth, life.wheel_depth)[number])
+    line = int(depths[-1].max(axis=-1).argmax())
+    angle = np.asarray(roll_angle(life.gears[number], life.roll_length[number]))
+    shown = np.unique(np.linspace(1, len(depths) - 1, _SHOWN).round().astype(int))
+    with report_axes(ax) as ax:
+        for index, each in enumerate(shown):
+            label = f"{float(life.revolutions[each]):.3g} revolutions"
+            ax.plot(angle, depths[each, line], label=label, **line_style(index))
+        if not ax.yaxis_inverted():  # panels share it
+            ax.invert_yaxis()
+        ax.set(xlabel=f"roll angle of the {gear} [deg]", ylabel="wear depth [µm]", title=title)
+        legend_above(ax) if not title else ax.legend(frameon=False, loc="lower right")
+    return ax
+
+
+def lives(of: Mapping[str, WearLife], quantity="ppte", ax: Axes | None = None) -> Axes:
+    """A quantity of several designs over the revolutions of the pinion.
+
+    Args:
+        of: lives by the name of the design; up to eight differ in style.
+        quantity: "wear_depth" for the deepest wear of both gears, a name of the vocabulary, a `Quantity`, or a
+            function of a cycle.
+        ax: Axes to draw into; None for a new figure.
+    """
+    with report_axes(ax) as ax:
+        for index, (name, life) in enumerate(of.items()):
+            values = wear_depth(life) if quantity == "wear_depth" else over_life(life, quantity)
+            done = np.asarray(life.revolutions)
+            every = max(1, len(done) // 10)
+            ax.plot(done, np.asarray(values), label=name, markevery=every, **marker_style(index))
+        ax.set(xlabel="revolutions of the pinion", ylabel=_label(quantity))
+        ax.set_xlim(left=0)
+        legend_above(ax)
+    return ax
+
+
+def _label(quantity) -> str:
+    if quantity == "wear_depth":
+        return "largest wear depth [µm]"
+    known = quantity_of(quantity, "lives")
+    unit = known.unit.replace("um", "µm")
+    return f"{known.meaning or known.name}" + (f" [{unit}]" if unit else "")

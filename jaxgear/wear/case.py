@@ -1,0 +1,158 @@
+"""A mesh that wears: what its flanks are made of, how fast they wear, and the cycles on them."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..conditions import LoadSpectrum
+from ..contact import Mesh, MeshCycle, Operation, removed_material, solve_removed
+from ..contact.operation import operation_of
+from ..contact.solve import check_mesh, flanks_of
+from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
+from ..numerics import kernel, real, whole
+from .archard import worn
+from .coefficient import Constant, OfLubrication, wear_law
+from .deposit import PARTS, Deposit, deposit
+from .march import Depth, March, march
+
+# what a cycle holds that differs from flank to flank
+_FOUND = (
+    "transmission_error",
+    "unloaded_transmission_error",
+    "line_load",
+    "pair_force",
+    "opening",
+    "gap",
+    "shift",
+    "bend",
+    "tangent_stiffness",
+    "residual",
+    "converged",
+)
+
+
+class Case(eqx.Module):
+    """What wears, and under what.
+
+    Attributes:
+        mesh: prepared mesh.
+        loads: with a leading axis (torques,).
+        weights: shares of the revolutions, shape (torques,); None under one torque.
+        law: coefficient of wear of both gears at the contacts of a cycle.
+        pinion, wheel: modifications of the new flanks.
+        deviation: material that manufacturing deviations remove besides [um].
+        points: of the grid on each flank.
+    """
+
+    mesh: Mesh
+    loads: Operation
+    weights: Float[Array, " torques"] | None
+    law: Constant | OfLubrication
+    pinion: AbstractModification
+    wheel: AbstractModification
+    deviation: Float[Array, "*shape"]
+    points: int = eqx.field(static=True)
+
+    def start(self) -> Depth:
+        """Flanks without wear."""
+        gears, slices = len(self.mesh.sides), self.mesh.resolution.slices
+        return jnp.zeros((gears, len(PARTS), slices, self.points), self.mesh.slice_width.dtype)
+
+    def places(self) -> Deposit:
+        """Where every load wears the flanks, leading axis (torques,)."""
+        return jax.vmap(lambda load: deposit(self.mesh, load.torque, self.points))(self.loads)
+
+    def cycle(self, roll_length, depth: Depth, load: Operation) -> MeshCycle:
+        """The mesh on worn flanks."""
+        flanks = self.flanks(roll_length, depth)
+        removed = removed_material(self.mesh, load, **flanks) + self.deviation
+        return solve_removed(self.mesh, load, removed, **flanks)
+
+    def flanks(self, roll_length, depth: Depth) -> dict[str, AbstractModification]:
+        """Both flanks with what is worn off them."""
+        pinion, wheel = tables(roll_length, self.mesh.face_coordinate, depth)
+        return {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
+
+    def cycles(self, roll_length, marched: March) -> MeshCycle:
+        """The mesh on all flanks of a march, leading axis (lives,); (lives, torques) under a load spectrum."""
+
+        def under(flanks, load: Operation, found) -> MeshCycle:
+            return MeshCycle(
+                kinematics=self.mesh.kinematics, margins=self.mesh.margins, operation=load, **flanks, **found
+            )
+
+        def on(depth, found) -> MeshCycle:
+            flanks = self.flanks(roll_length, depth)
+            return jax.vmap(lambda load, of: under(flanks, load, of))(self.loads, found)
+
+        cycles = jax.vmap(on)(marched.depth, marched.seen)
+        return jax.tree.map(lambda leaf: leaf[:, 0], cycles) if self.weights is None else cycles
+
+
+def tables(roll_length, face_coordinate, depth) -> tuple[AbstractModification, AbstractModification]:
+    """Worn material (gears, parts, slices, points) as modifications of pinion and wheel."""
+    total = jnp.sum(depth, axis=1)
+
+    def of(gear: int) -> AbstractModification:
+        if len(face_coordinate) == 1:
+            return TabulatedProfile(roll_length[gear], total[gear, 0])
+        return TabulatedFlank(roll_length[gear], face_coordinate, total[gear].T)
+
+    return of(0), of(1)
+
+
+@kernel
+def marched(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> March:
+    """Wear of a case over pairs of blocks, see `march`."""
+    places, mesh = case.places(), case.mesh
+    shares = jnp.ones((1,), start.dtype) if case.weights is None else case.weights
+    passages = jnp.stack([jnp.ones((), start.dtype), mesh.pair.pinion.teeth / mesh.pair.wheel.teeth])
+
+    def rate(depth):
+        def under(load: Operation, place: Deposit):
+            cycle = case.cycle(place.roll_length, depth, load)
+            return worn(cycle.line_load, case.law(cycle), place), {name: getattr(cycle, name) for name in _FOUND}
+
+        found, seen = jax.vmap(under)(case.loads, places)
+        return jnp.tensordot(shares, found, 1) * passages[:, None, None, None], seen
+
+    return march(rate, start, revolutions)
+
+
+def case_of(
+    owner: str,
+    mesh: Mesh,
+    torque: Any,
+    *,
+    coefficient: Any,
+    pinion: AbstractModification | None,
+    wheel: AbstractModification | None,
+    deviation: Any,
+    points: int | None,
+) -> Case:
+    """Checks and collects what wears; arguments and errors as `wear`."""
+    check_mesh(owner, mesh)
+    pinion, wheel = flanks_of(owner, mesh, pinion, wheel)
+    dtype = mesh.slice_width.dtype
+    loads, weights = _loads(owner, torque, dtype)
+    law = wear_law(coefficient, loads, dtype)
+    points = mesh.resolution.positions // 2 + 1 if points is None else whole(owner, "points", points, low=3)
+    other = jnp.zeros((), dtype) if deviation is None else real(deviation).astype(dtype)
+    return Case(mesh, loads, weights, law, pinion, wheel, other, points)
+
+
+def _loads(owner: str, torque: Any, dtype) -> tuple[Operation, Float[Array, " torques"] | None]:
+    """Operations with a leading axis (torques,), and the shares of a spectrum; None for a single load."""
+    if not isinstance(torque, LoadSpectrum):
+        single = operation_of(owner, torque, dtype)
+        return jax.tree.map(lambda number: number[None], single), None
+    load = jax.tree.map(lambda number: number.astype(dtype), torque)
+    friction = None if load.friction is None else jnp.broadcast_to(load.friction, load.torques.shape)
+
+    def each(torque, speed, friction):
+        return Operation(torque, speed, friction)
+
+    return jax.vmap(each)(load.torques, load.speeds, friction), load.weights

@@ -1,0 +1,332 @@
+"""Slices that feel each other, and what holds the gears: kernel, contact problem, limits, symmetry, derivatives."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from contact_problems import random_problem
+from test_shafts import two_stages
+
+import jaxgear as jg
+from jaxgear.compliance import face_kernel, few_modes
+from jaxgear.numerics import Coupling, solve_contact, tangent_stiffness
+from jaxgear.shafts import Misalignment, RigidSupport, TabulatedSupport, support
+
+WIDTH, CHORD = 18.0, 8.189371
+SLICES, TORQUE = 8, 50.0
+SLOPE = jg.LeadSlope(20.0)
+
+
+def pair_of(width=WIDTH, bore=20.0):
+    gears = jg.Gear(19, 3.0, face_width=width, bore_diameter=bore), jg.Gear(48, 3.0, face_width=width, bore_diameter=40)
+    return jg.GearPair(*gears)
+
+
+def mesh_of(slices=SLICES, given=None, pair=None, **sizes):
+    resolution = jg.Resolution(positions=8, slices=slices, pairs=3, slide_steps=0, patch_nodes=1, **sizes)
+    return jg.prepare(pair_of() if pair is None else pair, resolution=resolution, support=given)
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return mesh_of()
+
+
+@pytest.fixture(scope="module")
+def sloped(mesh):
+    return jg.solve(mesh, TORQUE, pinion=SLOPE)
+
+
+def kernel(slices, width=WIDTH, chord=CHORD):
+    return np.asarray(face_kernel(jnp.asarray(width), jnp.asarray(chord), slices))
+
+
+def test_kernel_has_its_published_values():
+    found = kernel(5)
+    expected = [
+        [0.467862, 0.263222, 0.143675, 0.082932, 0.042309],
+        [0.263222, 0.315249, 0.209815, 0.128782, 0.082932],
+        [0.143675, 0.209815, 0.293020, 0.209815, 0.143675],
+    ]
+    np.testing.assert_allclose(found[:3], expected, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.eigvalsh(found), [0.049302, 0.089688, 0.197920, 0.522332, 1.0], atol=1e-6)
+
+
+@pytest.mark.parametrize("width", [3.0, 18.0, 60.0])
+@pytest.mark.parametrize("slices", [2, 7, 24])
+def test_kernel_is_a_stiffness_of_equal_rows(width, slices):
+    found = kernel(slices, width)
+    np.testing.assert_allclose(found.sum(axis=1), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(found, found.T, atol=1e-15)
+    np.testing.assert_allclose(found, found[::-1, ::-1], atol=1e-14)
+    values = np.linalg.eigvalsh(found)
+    assert values[0] > 0 and values[-1] <= 1 + 1e-12
+
+
+def test_teeth_far_wider_than_thick_do_not_couple_and_thick_ones_are_rigid():
+    np.testing.assert_allclose(kernel(5, 1e6), np.eye(5), atol=1e-4)
+    np.testing.assert_allclose(kernel(5, 1e-3), np.full((5, 5), 0.2), atol=1e-4)
+
+
+@pytest.mark.parametrize("width", [18.0, 60.0])
+@pytest.mark.parametrize("slices", [8, 11, 24])
+@pytest.mark.parametrize("count", [3, 5])
+def test_few_modes_are_about_as_near_as_any(slices, width, count):
+    """The rest replaced by one number cannot be nearer than that of the eigenvectors, but for the spectrum's tail."""
+    whole = kernel(slices, width)
+    modes, share, rest = map(np.asarray, few_modes(jnp.asarray(whole), count))
+    found = rest * np.eye(slices) + modes @ share @ modes.T
+    np.testing.assert_allclose(modes.T @ modes, np.eye(count), atol=1e-13)
+    np.testing.assert_allclose(found.sum(axis=1), 1.0, rtol=1e-12)
+    assert np.linalg.eigvalsh(share)[0] > 0
+    values, vectors = np.linalg.eigh(whole)
+    others = values[:-count].mean()
+    best = others * np.eye(slices) + (vectors[:, -count:] * (values[-count:] - others)) @ vectors[:, -count:].T
+    assert np.linalg.norm(found - whole) < 1.05 * np.linalg.norm(best - whole)
+
+
+def test_as_many_modes_as_slices_are_the_kernel():
+    modes, share, rest = map(np.asarray, few_modes(jnp.asarray(kernel(6)), 9))
+    assert rest == 0
+    np.testing.assert_allclose(modes @ share @ modes.T, kernel(6), atol=1e-14)
+
+
+@pytest.mark.parametrize("argument", [0, 1])
+def test_few_modes_follow_width_and_chord(argument):
+    weight = np.random.default_rng(0).normal(size=(7, 7))
+
+    def number(*given):
+        modes, share, rest = few_modes(face_kernel(*given, 7), 4)
+        return jnp.sum(jnp.asarray(weight) * (rest * jnp.eye(7) + modes @ share @ modes.T))
+
+    at, step = [jnp.asarray(WIDTH), jnp.asarray(CHORD)], 1e-4
+    ends = [[x + sign * step * (i == argument) for i, x in enumerate(at)] for sign in (1, -1)]
+    central = (number(*ends[0]) - number(*ends[1])) / (2 * step)
+    np.testing.assert_allclose(jax.grad(number, argument)(*at), central, rtol=1e-6)
+
+
+def coupled_problem(seed, springs, slices, count, bends=0):
+    """A random contact problem with its coupling, whose loads touch some of the slices only."""
+    rng = np.random.default_rng(seed)
+    shapes = held = None
+    if bends:
+        root = rng.normal(size=(bends, bends))
+        shapes, held = np.linalg.qr(np.vander(np.linspace(-1, 1, slices), bends, increasing=True))[0], root @ root.T
+        shapes[:, 0], held = slices**-0.5, jnp.asarray(0.01 * held)
+        shapes = jnp.asarray(shapes)
+    coupling = Coupling(*few_modes(jnp.asarray(kernel(slices)), count), shapes, held)
+    problem = random_problem(seed, springs, slices, 6)
+    return replace(problem, coupling=coupling, weight=jnp.full(slices, WIDTH / slices), load=jnp.asarray(2000.0))
+
+
+def dense(problem):
+    """Influence of every load on every deflection, shape (positions, springs, slices, springs, slices)."""
+    c = problem.coupling
+    face = c.rest * np.eye(len(c.modes)) + c.modes @ c.share @ c.modes.T
+    found = np.einsum("ijx,st->xisjt", problem.compliance, face)
+    if c.support is not None:
+        held = c.support_modes @ c.support @ c.support_modes.T
+        found = found + np.einsum("ix,jx,st->xisjt", problem.lever, problem.lever, held)
+    return found
+
+
+@pytest.mark.parametrize(("springs", "slices", "count", "bends"), [(2, 6, 6, 0), (3, 8, 4, 0), (2, 7, 3, 4)])
+def test_solution_meets_the_conditions_of_the_dense_problem(springs, slices, count, bends):
+    """Deflections by the whole matrix in NumPy: no overlap, no pull, closed where loaded, the load as given."""
+    problem = coupled_problem(3, springs, slices, count, bends)
+    found = solve_contact(problem, steps=20)
+    assert bool(found.solved.all())
+    load, law = np.asarray(found.line_load), problem.law
+    own = np.stack(
+        [jax.tree.map(lambda leaf, i=i: leaf[i], law).secant(jnp.maximum(load[i], 1e-9)) for i in range(springs)]
+    )
+    spread = np.einsum("xisjt,jtx->isx", dense(problem), load)
+    left = spread + np.asarray(problem.gap) - (np.asarray(problem.lever) * np.asarray(found.approach))[:, None]
+    total = left + own * load
+    scale = 1e-9 * np.abs(found.approach).max()
+    assert (load >= 0).all() and 0.1 < (load > 0).mean() < 0.9
+    np.testing.assert_allclose(total[load > 0], 0.0, atol=scale)
+    assert total[load == 0].min() > -scale
+    np.testing.assert_allclose(found.opening, left, atol=scale)
+    carried = np.einsum("ix,s,isx->x", problem.lever, problem.weight, load)
+    np.testing.assert_allclose(carried, 2000.0, rtol=1e-10)
+
+
+@pytest.mark.parametrize("bends", [0, 3])
+def test_approach_of_a_load_brings_that_load_and_its_stiffness(bends):
+    given = coupled_problem(5, 2, 6, 4, bends)
+    found = solve_contact(given, steps=20)
+    pressed = replace(given, load=None, approach=found.approach)
+    again = solve_contact(pressed, steps=20)
+    np.testing.assert_allclose(again.line_load, found.line_load, rtol=1e-8, atol=1e-8)
+    step = 1e-4 * found.approach
+    more, less = (solve_contact(replace(pressed, approach=found.approach + x), steps=20) for x in (step, -step))
+    central = (more.load - less.load) / (2 * step)
+    np.testing.assert_allclose(tangent_stiffness(given, found), central, rtol=1e-5)
+
+
+def test_uniform_flanks_are_one_slice(mesh):
+    """Rows of the kernel sum to one."""
+    many, one = jg.solve(mesh, TORQUE), jg.solve(mesh_of(1), TORQUE)
+    assert bool(many.converged.all())
+    np.testing.assert_allclose(many.transmission_error, one.transmission_error, rtol=1e-12)
+    np.testing.assert_allclose(many.line_load, np.repeat(one.line_load, SLICES, axis=1), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(many.tangent_stiffness, one.tangent_stiffness, rtol=1e-9)
+
+
+def test_slope_is_mirrored_and_loads_the_end_more_than_slices_of_their_own(mesh, sloped):
+    other = jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(-20.0))
+    np.testing.assert_allclose(other.line_load, sloped.line_load[:, ::-1], rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(other.transmission_error, sloped.transmission_error, rtol=1e-10)
+    alone = jg.solve(mesh_of(coupled_slices=False), TORQUE, pinion=SLOPE)
+    # three-dimensional finite elements: 292 instead of 241 N/mm
+    assert 1.15 < float(sloped.line_load.max() / alone.line_load.max()) < 1.40
+
+
+def test_without_coupling_nothing_of_it_is_there():
+    off = mesh_of(coupled_slices=False)
+    assert off.coupling is None and mesh_of(1).coupling is None
+    assert not off.resolution.is_coupled and not mesh_of(1).resolution.is_coupled
+
+
+def test_misalignment_is_a_slope_of_the_flank_and_no_support_is_none(mesh, sloped):
+    rigid = mesh_of(given=RigidSupport(mesh.pair, Misalignment(direct=20.0)))
+    found = jg.solve(rigid, TORQUE)
+    np.testing.assert_allclose(found.line_load, sloped.line_load, rtol=1e-6, atol=1e-5)
+    np.testing.assert_allclose(found.transmission_error, sloped.transmission_error, rtol=1e-7)
+    level = mesh_of(given=RigidSupport(mesh.pair))
+    none, bare = jg.solve(level, TORQUE, pinion=SLOPE), sloped
+    np.testing.assert_allclose(none.transmission_error, bare.transmission_error, rtol=1e-12)
+    np.testing.assert_allclose(none.line_load, bare.line_load, rtol=1e-10, atol=1e-10)
+
+
+def table_of(pair, scale=1e-3):
+    """A support that tilts, bends and gives way as a whole [um/N]."""
+    y = np.linspace(-1, 1, SLICES)
+    matrix = scale * (2.0 + np.outer(y, y) + 0.3 * np.outer(y**2, y**2))
+    return TabulatedSupport(pair, matrix, 3.0 * y + 2.0)
+
+
+def test_support_is_that_of_the_dense_matrix(mesh):
+    """The constant part of the support is an approach of its own, what tilts levels the load."""
+    given = table_of(mesh.pair)
+    found = jg.solve(mesh_of(given=given), TORQUE, pinion=SLOPE)
+    width = np.asarray(mesh.slice_width)
+    bent = np.einsum("st,itx->isx", given.matrix, np.asarray(found.line_load) * width[None, :, None])
+    removed = jg.contact.removed_material(mesh, TORQUE, pinion=SLOPE).amount
+    # what the support has opened, taken as material removed of gears on rigid shafts
+    lever = np.asarray(mesh.lever)
+    own = np.einsum("sx->sx", bent.sum(axis=0)) + np.asarray(given.opening)[:, None]
+    opened = removed + lever[:, None] * own[None]
+    again = jg.solve_removed(mesh, TORQUE, opened)
+    np.testing.assert_allclose(again.transmission_error, found.transmission_error, rtol=1e-3)
+    np.testing.assert_allclose(again.line_load, found.line_load, rtol=2e-2, atol=1.0)
+
+
+def test_a_support_that_gives_way_as_a_whole_adds_to_the_transmission_error(mesh, sloped):
+    flat = TabulatedSupport(mesh.pair, np.full((SLICES, SLICES), 2e-3))
+    found = jg.solve(mesh_of(given=flat), TORQUE, pinion=SLOPE)
+    np.testing.assert_allclose(
+        found.transmission_error - sloped.transmission_error, 2e-3 * float(sloped.force), rtol=1e-9
+    )
+    np.testing.assert_allclose(found.line_load, sloped.line_load, rtol=1e-8, atol=1e-8)
+    stiffness = 1 / (1 / sloped.tangent_stiffness + 2e-3)
+    np.testing.assert_allclose(found.tangent_stiffness, stiffness, rtol=1e-8)
+
+
+def test_no_load_leaves_finite_numbers_and_derivatives(mesh):
+    found = jg.solve(mesh, 0.0, pinion=SLOPE)
+    np.testing.assert_allclose(found.line_load, 0.0, atol=1e-6)
+    slope = jax.grad(lambda t: jnp.mean(jg.solve(mesh, t, pinion=SLOPE).transmission_error))(0.0)
+    assert np.isfinite(slope)
+
+
+def peak(width, bore, slope, crowning, matrix):
+    pair = pair_of(width, bore)
+    given = TabulatedSupport(pair, matrix)
+    cycle = jg.solve(mesh_of(given=given, pair=pair), TORQUE, pinion=jg.LeadSlope(slope) + jg.LeadCrowning(crowning))
+    return jnp.max(cycle.line_load)
+
+
+def test_peak_line_load_has_the_derivatives_of_central_differences():
+    at = [jnp.asarray(x) for x in (WIDTH, 20.0, 12.0, 4.0)] + [table_of(pair_of()).matrix]
+    run = jax.jit(peak)
+    found = jax.jit(jax.grad(peak, argnums=(0, 1, 2, 3, 4)))(*at)
+    for place, step in enumerate((1e-3, 1e-3, 1e-3, 1e-3)):
+        ends = [[x + sign * step * (i == place) for i, x in enumerate(at[:4])] + at[4:] for sign in (1.0, -1.0)]
+        central = (run(*ends[0]) - run(*ends[1])) / (2 * step)
+        np.testing.assert_allclose(found[place], central, rtol=1e-5)
+    way = np.zeros((SLICES, SLICES))
+    way[0, 0], way[1, 0], way[0, 1] = 1.0, 0.5, 0.5
+    central = (run(*at[:4], at[4] + 1e-6 * way) - run(*at[:4], at[4] - 1e-6 * way)) / 2e-6
+    np.testing.assert_allclose(jnp.sum(found[4] * way), central, rtol=1e-5)
+
+
+def test_many_at_once_and_single_precision(mesh, sloped):
+    slopes = jnp.asarray([-20.0, 0.0, 20.0])
+    many = jax.vmap(lambda slope: jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(slope)))(slopes)
+    assert bool(many.converged.all())
+    np.testing.assert_allclose(many.line_load[2], sloped.line_load, rtol=1e-8, atol=1e-8)
+    single = jax.tree.map(lambda leaf: leaf.astype("float32") if eqx.is_inexact_array(leaf) else leaf, mesh)
+    found = jg.solve(single, TORQUE, pinion=SLOPE)
+    assert bool(found.converged.all()) and found.line_load.dtype == jnp.float32
+    np.testing.assert_allclose(found.line_load, sloped.line_load, rtol=2e-3, atol=0.05)
+
+
+def test_shafts_of_a_gearbox_hold_at_its_torque():
+    """Two stages: the force that bends the shafts is the one that the contact finds."""
+    held = support(two_stages(), 0)
+    prepared = mesh_of(given=held, pair=held.pair)
+    found = jg.solve(prepared, held.torque)
+    assert bool(found.converged.all())
+    even = jg.solve(mesh_of(pair=held.pair), held.torque)
+    assert found.line_load.max() > 1.02 * even.line_load.max()
+    with pytest.raises(ValueError, match="torque = 80 N m, but the gearbox"):
+        jg.solve(prepared, 80.0)
+    with pytest.raises(ValueError, match="solve_at: torque = 80 N m"):
+        jg.contact.solve_at(prepared, 5.0, torque=80.0)
+
+
+def test_what_cannot_be_held_is_refused(mesh):
+    level = RigidSupport(mesh.pair)
+    with pytest.raises(ValueError, match="mesh of 1 slice"):
+        mesh_of(1, given=level)
+    with pytest.raises(ValueError, match="coupled_slices=True"):
+        mesh_of(given=level, coupled_slices=False)
+    with pytest.raises(ValueError, match="another pair"):
+        mesh_of(given=RigidSupport(pair_of(20.0)))
+    with pytest.raises(TypeError, match="support is a str"):
+        mesh_of(given="stiff")
+    with pytest.raises(ValueError, match="matrix has 3 slices, the mesh has 8"):
+        mesh_of(given=TabulatedSupport(mesh.pair, np.eye(3)))
+    with pytest.raises(ValueError, match="symmetric"):
+        TabulatedSupport(mesh.pair, [[1.0, 0.5], [0.0, 1.0]])
+    with pytest.raises(ValueError, match="eigenvalue -1"):
+        TabulatedSupport(mesh.pair, [[1.0, 2.0], [2.0, 1.0]])
+    with pytest.raises(ValueError, match="2 x 3, must be square"):
+        TabulatedSupport(mesh.pair, np.ones((2, 3)))
+    with pytest.raises(ValueError, match="opening has 3 slices"):
+        TabulatedSupport(mesh.pair, np.eye(2), np.zeros(3))
+    with pytest.raises(ValueError, match="face_modes = 1"):
+        jg.Resolution(face_modes=1)
+    with pytest.raises(ValueError, match="coupled_slices"):
+        jg.Resolution(coupled_slices=1.5)
+
+
+@pytest.mark.slow
+def test_finer_slices_and_all_modes_agree():
+    flanks = jg.LeadCrowning(10.0) + SLOPE
+
+    def factor(slices, **sizes):
+        load = np.asarray(jg.solve(mesh_of(slices, **sizes), TORQUE, pinion=flanks).line_load)
+        return load
+
+    few, whole = factor(12), factor(12, face_modes=12)
+    assert np.abs(few - whole).max() < 0.004 * whole.max()
+    pooled = {n: factor(n).reshape(3, 4, n // 4, 8).mean(axis=2) for n in (8, 24)}
+    pooled[12] = few.reshape(3, 4, 3, 8).mean(axis=2)
+    for n in (8, 12):
+        assert np.abs(pooled[n] - pooled[24]).max() < 0.02 * pooled[24].max()

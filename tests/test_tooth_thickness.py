@@ -1,0 +1,97 @@
+"""Tooth thickness over teeth and balls: geometry of the flanks, known limits, and the way back to an allowance."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import COARSE, gear_pair, kahraman_gear
+
+import jaxgear as jg
+from jaxgear.contact.kinematics import kinematics
+from jaxgear.manufacture import allowance_of_balls, allowance_of_span, over_balls, space_flank, span, teeth_spanned
+
+GEARS = {
+    "plain": jg.Gear(20, 3.0, face_width=20.0),
+    "shifted": jg.Gear(19, 3.0, profile_shift=0.3, face_width=20.0),
+    "thin": jg.Gear(48, 2.5, profile_shift=-0.1, face_width=20.0, tooth_thickness_allowance=-120.0),
+}
+EVERY = pytest.mark.parametrize("name", GEARS)
+
+
+@EVERY
+def test_span_is_base_pitches_and_a_tooth_on_the_base_circle(name):
+    gear = GEARS[name]
+    teeth = teeth_spanned(gear)
+    on_base = float(jg.geometry.tooth_thickness(gear, 2 * gear.base_radius))
+    assert float(span(gear, teeth)) == pytest.approx((teeth - 1) * float(gear.base_pitch) + on_base, rel=1e-13)
+
+
+def test_span_of_the_tables():
+    """The usual table of W_k / m for 20 deg: z = 20, k = 3: 7.6604; z = 50, k = 6: 16.9370."""
+    assert float(span(jg.Gear(20, 1.0, face_width=20.0), 3)) == pytest.approx(7.6604, abs=5e-5)
+    assert float(span(jg.Gear(50, 1.0, face_width=20.0), 6)) == pytest.approx(16.9370, abs=5e-5)
+    assert [teeth_spanned(jg.Gear(z, 1.0, face_width=20.0)) for z in (20, 50)] == [3, 6]
+
+
+@EVERY
+def test_a_ball_touches_both_flanks(name):
+    """The nearest points of the tooth space are half its diameter off a centre on the centreline."""
+    gear = GEARS[name]
+    mate = jg.Gear(50, gear.module, face_width=20.0)
+    side = kinematics(jg.GearPair(gear, mate), jnp.asarray(0.0), COARSE, "strain").sides[0]
+    ball = 1.7 * float(gear.module)
+    dimension = float(over_balls(gear, ball)) - ball
+    odd = int(gear.teeth) % 2
+    centre = dimension / 2 / (np.cos(np.pi / (2 * float(gear.teeth))) if odd else 1.0)
+    roll = jnp.linspace(0.0, gear.tip_roll_length, 20_001)
+    flank = space_flank(side, jg.NoModification(), roll)
+    distance = np.hypot(flank.x, np.asarray(flank.y) - centre)
+    assert distance.min() == pytest.approx(ball / 2, abs=1e-6)
+    assert 0 < distance.argmin() < 20_000
+
+
+@EVERY
+def test_allowances_come_back(name):
+    gear = GEARS[name]
+    wanted = float(gear.tooth_thickness_allowance)
+    teeth, ball = teeth_spanned(gear), 1.75 * float(gear.module)
+    assert float(allowance_of_span(gear, teeth, span(gear, teeth))) == pytest.approx(wanted, abs=1e-8)
+    assert float(allowance_of_balls(gear, ball, over_balls(gear, ball))) == pytest.approx(wanted, abs=1e-6)
+
+
+def test_backlash_of_a_drawing():
+    """What a thinner span of both gears leaves of play on the line of action is its sum: W_k lies on base tangents."""
+    gear = kahraman_gear()
+    teeth = teeth_spanned(gear)
+    allowance = allowance_of_span(gear, teeth, span(gear, teeth) - 0.068)
+    thin = kahraman_gear(tooth_thickness_allowance=allowance)
+    assert float(jg.GearPair(thin, thin).backlash) == pytest.approx(2 * 68.0, rel=1e-9)
+    assert float(jg.GearPair(thin, gear).backlash) == pytest.approx(68.0, rel=1e-9)
+
+
+def test_derivatives():
+    """dW_k / dE = cos(alpha); M_dK against central differences."""
+    gear = lambda allowance: jg.Gear(20, 3.0, face_width=20.0, tooth_thickness_allowance=allowance)  # noqa: E731
+    assert float(jax.grad(lambda e: span(gear(e), 3))(-50.0)) == pytest.approx(1e-3 * np.cos(np.deg2rad(20)), rel=1e-12)
+    over = lambda e: over_balls(gear(e), 5.25)  # noqa: E731
+    central = float(over(-49.0) - over(-51.0)) / 2
+    assert float(jax.grad(over)(-50.0)) == pytest.approx(central, rel=1e-6)
+
+
+def test_what_no_measurement_gives():
+    gear = GEARS["plain"]
+    with pytest.raises(ValueError, match=r"over_balls: ball = 0 mm must be greater than 0 mm"):
+        over_balls(gear, 0.0)
+    with pytest.raises(ValueError, match=r"over_balls: ball = 2 mm touches no flanks above the root circle"):
+        over_balls(gear, 2.0)
+    with pytest.raises(
+        ValueError, match=r"allowance_of_span: measured = 45 mm must be at least 14.* mm and at most 31"
+    ):
+        allowance_of_span(gear, 3, 45.0)
+    with pytest.raises(ValueError, match=r"allowance_of_balls: measured = 50 mm must be greater than 61.* mm"):
+        allowance_of_balls(gear, 5.25, 50.0)
+    tall = jg.Gear(20, 3.0, face_width=20.0, profile_shift=0.6, addendum=1.25, dedendum=1.25)
+    with pytest.raises(ValueError, match="does not stand out of the tip circle"):
+        over_balls(tall, 4.2)
+    # the gears of `gear_pair` stand for traced ones: nothing is refused while tracing
+    assert np.isfinite(float(jax.jit(lambda g: over_balls(g, 5.25))(gear_pair().pinion)))

@@ -1,0 +1,198 @@
+"""The command `jaxgear wear` and the table [wear]: what it writes and says, and one line for what is wrong."""
+
+import csv
+import json
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from report_page import check_report
+from test_cli import call
+
+import jaxgear as jg
+from jaxgear import plot
+from jaxgear.cli.kept import Kept, Marches
+from jaxgear.io import DesignFileError, load_design, read_worn, sweep_request, wear_request, write_worn
+from jaxgear.io.folder import RESULT_FILES
+from jaxgear.wear import March, over_life, wear_in_steps
+
+GEAR = """
+teeth = 30
+module = 2.0
+face_width = 20.0
+bore_diameter = 12.6
+"""
+PAIR = f"""
+[pinion]{GEAR}
+[wheel]{GEAR}
+[load]
+torque = 150.0
+[resolution]
+positions = 16
+pairs = 2
+slide_steps = 0
+"""
+TABLE = """
+[wear]
+revolutions = 2e7
+coefficient = 1e-18
+depth_limit = 5.0
+blocks = 4
+"""
+SWEEP = """
+[sweep]
+samples = 4
+results = ["ppte", "{name}"]
+[variables]
+height = {{ low = 0.0, high = 8.0, unit = "um" }}
+[[pinion.modification]]
+type = "tip_relief"
+amount = "height"
+length = 3.0
+"""
+
+
+@pytest.fixture(autouse=True)
+def no_cache(monkeypatch):
+    """The tests keep their own compilation cache."""
+    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
+
+
+@pytest.fixture
+def file(tmp_path):
+    def written(text):
+        path = tmp_path / "pair.toml"
+        path.write_text(text)
+        return path
+
+    return written
+
+
+def test_the_command_writes_what_it_says(file, tmp_path):
+    path, folder = file(PAIR + TABLE), tmp_path / "out"
+    done = call("wear", str(path), "--output", str(folder), "--report")
+    assert done.code == 0, done.err
+    figures = "worn_pinion", "worn_wheel", "ppte_over_life", "depth_over_life"
+    expected = {"summary.json", "report.html", "life.csv", "worn_flanks.csv", *(f"{name}.png" for name in figures)}
+    assert {entry.name for entry in folder.iterdir()} == expected <= RESULT_FILES
+    assert not list(tmp_path.glob(".out*"))  # what was kept is no longer needed
+    summary = json.loads((folder / "summary.json").read_text())
+    with (folder / "life.csv").open() as lines:
+        rows = list(csv.DictReader(lines))
+    assert len(rows) == 2 * 5  # unmodified and rule-based, new and after four blocks
+    last = rows[4]
+    unmodified = summary["designs"]["unmodified"]
+    assert float(last["ppte_um"]) == pytest.approx(unmodified["worn_ppte_um"], rel=1e-6)
+    assert float(last["pinion_wear_depth_um"]) == pytest.approx(unmodified["pinion_wear_depth_um"], rel=1e-6)
+    assert unmodified["worn_ppte_um"] < unmodified["new_ppte_um"]
+    assert 0 < unmodified["volume_by_tip_corners_share"] < 0.5
+    assert unmodified["life_to_depth_revolutions"] == pytest.approx(2e7 * 5 / unmodified["pinion_wear_depth_um"], 0.15)
+    assert f"{unmodified['worn_ppte_um']:.3f}" in done.out and "5 um deep" in done.out
+    check_flanks(path, folder, rows)
+    check_report(folder, path, "wear", path, "--output", folder, "--report")
+
+
+def check_flanks(path, folder, rows):
+    """The flanks of the file give the numbers of the file."""
+    design = load_design(path)
+    pinion, wheel = read_worn(folder / "worn_flanks.csv")["unmodified", 2e7]
+    cycle = jg.solve(design.mesh(), design.torque, pinion=pinion, wheel=wheel)
+    assert float(jg.peak_to_peak(cycle.transmission_error)) == pytest.approx(float(rows[4]["ppte_um"]), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("", "wear: missing, nothing says for how long the pair runs and how it wears"),
+        ("[wear]\n", "wear.revolutions: missing"),
+        (TABLE.replace("2e7", "-1.0"), "wear.revolutions: -1 must be greater than 0"),
+        (TABLE.replace("1e-18", "-1e-18"), "wear.coefficient: -1e-18 m2/N must be at least 0 m2/N"),
+        (TABLE.replace("blocks = 4", "blocks = 5"), "wear.blocks: 5 must be even"),
+        (TABLE + "largest_increment = 1.0\n", "wear.blocks: has no effect beside wear.largest_increment"),
+        (TABLE.replace("depth_limit = 5.0", "depth_limit = 0.0"), "wear.depth_limit: 0 um must be greater than 0 um"),
+        (TABLE + "coeficient = 1.0\n", "wear.coeficient: unknown key"),
+    ],
+)
+def test_what_is_wrong_with_the_table_is_one_line(file, tmp_path, text, message):
+    done = call("wear", str(file(PAIR + text)), "--output", str(tmp_path / "out"))
+    lines = done.err.strip().splitlines()
+    assert done.code == 2 and done.out == ""
+    assert message in lines[-1] and lines[-1].startswith("jaxgear: error: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_design_file_binds_names_to_its_settings(file):
+    """The settings of the table, and a refusal in one line without them."""
+    text = PAIR + SWEEP.format(name="worn_ppte")
+    results = sweep_request(load_design(file(text + TABLE))).results
+    settings = wear_request(load_design(file(text + TABLE))).settings
+    assert results == ("ppte", settings.quantity("worn_ppte"))
+    with pytest.raises(DesignFileError, match=r'sweep.results\[1\]: "worn_ppte" needs the table \[wear\]'):
+        sweep_request(load_design(file(text)))
+    with pytest.raises(DesignFileError, match='"life_to_ppte" needs wear.ppte_limit'):
+        sweep_request(load_design(file(PAIR + SWEEP.format(name="life_to_ppte") + TABLE)))
+
+
+def test_a_quick_run_has_few_blocks(file):
+    request = wear_request(load_design(file(PAIR + TABLE.replace("blocks = 4", "largest_increment = 0.1"))), quick=True)
+    assert request.settings.blocks == 4 and request.largest_increment is None
+
+
+def test_kept_blocks_are_not_worn_again(tmp_path, file):
+    """After Ctrl-C the command goes on, and what comes out is what would have."""
+    mesh = load_design(file(PAIR)).mesh()
+    options = {"coefficient": 1e-18, "blocks": 4}
+
+    class Stop(Exception):
+        pass
+
+    def stopped(done, total):
+        raise Stop
+
+    with pytest.raises(Stop):
+        wear_in_steps(mesh, 150.0, 2e7, keep=Kept(tmp_path / ".runs", Marches()), callback=stopped, **options)
+    made = []
+
+    def counted(made_of, make):
+        def making():
+            made.append(1)
+            return make()
+
+        return Kept(tmp_path / ".runs", Marches())(made_of, making)
+
+    again = wear_in_steps(mesh, 150.0, 2e7, keep=counted, **options)
+    assert len(made) == 1  # of two pairs of blocks
+    whole = wear_in_steps(mesh, 150.0, 2e7, **options)
+    np.testing.assert_array_equal(again.depth, whole.depth)
+    np.testing.assert_array_equal(over_life(again, "ppte"), over_life(whole, "ppte"))
+
+
+def test_blocks_on_the_disk_are_the_blocks(tmp_path):
+    march = March(jnp.arange(3.0), jnp.ones(2), {"converged": jnp.array([True, False])})
+    found = Marches().result(dict(Marches().arrays(march)))
+    assert found.seen["converged"].dtype == bool and (found.depth == march.depth).all()
+
+
+def test_flanks_over_the_face_are_read_back(tmp_path, file):
+    mesh = load_design(file(PAIR.replace("pairs = 2", "pairs = 2\nslices = 2"))).mesh()
+    life = wear_in_steps(mesh, 150.0, 2e7, coefficient=1e-18, blocks=2, pinion=jg.LeadSlope(5.0))
+    write_worn(tmp_path / "flanks.csv", {"skewed": life})
+    read = read_worn(tmp_path / "flanks.csv")["skewed", 2e7]
+    for ours, theirs in zip(read, life.flanks()):
+        np.testing.assert_array_equal(ours.amount, theirs.amount)
+        np.testing.assert_array_equal(ours.roll_length, theirs.roll_length)
+
+
+def test_other_files_are_refused_in_one_line(tmp_path):
+    with pytest.raises(ValueError, match="none.csv: cannot be read: No such file") as refused:
+        read_worn(tmp_path / "none.csv")
+    assert "\n" not in str(refused.value)
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(ValueError, match="other.csv: holds no worn flanks as jaxgear writes them"):
+        read_worn(tmp_path / "other.csv")
+
+
+def test_pictures_of_other_gears_are_refused_in_one_line():
+    with pytest.raises(ValueError, match='worn_flank: gear = \'rack\' must be "pinion" or "wheel"') as refused:
+        plot.worn_flank(None, "rack")
+    assert "\n" not in str(refused.value)
