@@ -102,6 +102,7 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     names = {entry.name for entry in folder.iterdir()}
     figures = {"tolerance_cases.png", "face_load_factors.png", "radar.png"}
     assert names == {"summary.json", "flanks.csv", "profiles.csv", "report.html", *figures} and names <= RESULT_FILES
+    check_report(folder, path, "layout", path, "--output", folder, "--report")
     found = json.loads((folder / "summary.json").read_text())
     housed, rigid = found["layouts"]["housing"], found["layouts"]["rigid seats"]
     assert housed["face_load_factor"]["unmodified"] > 1.3 and housed["face_load_factor"]["step_1"] < 1.1
@@ -122,7 +123,6 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     assert profile["best"]["ppte_um"] == pytest.approx(other["best"]["ppte_um"], rel=0.05)  # both are level
     assert profile["variants"] == 5 and profile["torque_Nm"] == pytest.approx(135.0)
     assert profile["best"]["ppte_um"] < profile["unmodified"]["ppte_um"]
-    check_report(folder, path, "layout", path, "--output", folder, "--report")
     kinds = [one["type"] for one in found["designs"]["layout"]["wheel_modification"]]
     assert kinds == ["lead_slope", "lead_crowning", "tip_relief"]
 

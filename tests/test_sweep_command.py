@@ -111,7 +111,7 @@ def test_pictures_show_every_variant_or_an_even_share(folder, tmp_path, monkeypa
         "transmission_error",
         "transmission_error_orders",
         "k_chart",
-    } < names  # of the best variants, for the report
+    } < names  # of the best, for the report
     monkeypatch.setattr(sweep_figures, "_DRAWN", 20)
     drawn = {}
     monkeypatch.setattr("jaxgear.plot.pareto", lambda table, *names, **_: drawn.update(table) or plt.subplots()[1])

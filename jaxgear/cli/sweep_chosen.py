@@ -13,7 +13,7 @@ from ..microgeometry import NoModification
 from ..sweeps import SweepTable
 from . import report
 from .progress import Stages
-from .run import torques_of
+from .run import Modifications, torques_of
 from .study import evaluate
 
 CHOSEN = 3  # variants
@@ -61,7 +61,8 @@ def evaluate_best(
     with Stages() as stages:
         stages.begin("evaluating the best variants")
         mesh, torques = jax.block_until_ready(design.mesh(size)), torques_of(design, quick=quick)
-        modifications = {"unmodified": (NoModification(), NoModification())}
+        involute = NoModification()
+        modifications: dict[str, Modifications] = {"unmodified": (involute, involute)}
         first = best.take(range(min(CHOSEN, len(best))))
         for number, parameters in reversed([*zip(first.column("variant"), first.designs())]):
             modifications[f"variant {number}"] = design.design(parameters)
