@@ -100,7 +100,7 @@ def test_the_best_are_printed_and_written(folder):
     assert f"table in {folder / 'out' / 'table'}{os.sep}" in result.out and "60 variants, " in result.out
     read = read_variants(folder / "out" / "best.csv", {"height": (0.0, 20.0)}, {"height": "um"})
     np.testing.assert_array_equal(read.rows(0, 5)[:, 0], best.column("height"))
-    assert "jaxgear: 60 of 60 variants" in result.err.splitlines()[-1]
+    assert "jaxgear: 60 of 60 variants" in result.err
 
 
 def test_pictures_show_every_variant_or_an_even_share(folder, tmp_path, monkeypatch):
