@@ -68,7 +68,7 @@ def test_layers_import_only_earlier_ones(path):
 # imported where they are used, so that the library starts fast and without what it does not need
 HEAVY = {"evosax", "importlib", "matplotlib", "optax", "pyarrow", "xarray", "jaxgear.plot"}
 # so do the commands, and their help without any of the library
-COMMANDS = {"jaxgear.cli.commands", "jaxgear.cli.dynamics", "jaxgear.cli.devices", "jaxgear.cli.sweep"}
+COMMANDS = {f"jaxgear.cli.{name}" for name in ("commands", "dynamics", "devices", "layout", "sweep")}
 
 
 def hidden(path: Path):
