@@ -70,15 +70,8 @@ def test_layers_import_only_earlier_ones(path):
 # imported where they are used, so that the library starts fast and without what it does not need
 HEAVY = {"evosax", "ezdxf", "importlib", "matplotlib", "optax", "pyarrow", "xarray", "jaxgear.plot"}
 # so do the commands, and their help without any of the library
-COMMANDS = {
-    "jaxgear.cli.commands",
-    "jaxgear.cli.convert",
-    "jaxgear.cli.dynamics",
-    "jaxgear.cli.devices",
-    "jaxgear.cli.layout",
-    "jaxgear.cli.sweep",
-    "jaxgear.cli.wear",
-}
+_NAMES = "commands", "convert", "devices", "dynamics", "layout", "sweep", "wear"
+COMMANDS = {f"jaxgear.cli.{name}" for name in _NAMES}
 
 
 def hidden(path: Path):
