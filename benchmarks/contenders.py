@@ -179,7 +179,11 @@ def _make(contender: Contender, positions: int, problem: Problem | None):
         from .baselines.jax_kernel import JaxKernel
 
         kernel = JaxKernel(
-            positions=positions, slices=contender.slices, batch=contender.batch, gradient=contender.gradient
+            positions=positions,
+            slices=contender.slices,
+            batch=contender.batch,
+            gradient=contender.gradient,
+            coupled=contender.coupled,
         )
         return kernel, versions | {"JAX": jax.__version__, "jaxlib": jaxlib.__version__}
     if contender.kind == "C":
