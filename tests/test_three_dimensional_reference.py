@@ -48,8 +48,10 @@ def test_aligned_pair_is_even(found):
 
 @pytest.mark.slow
 def test_finer_slices_agree():
-    """12 and 24 slices, whose line loads are averaged in pairs. With 24, the K of a slope is 5.6 % too large at 50 N m, and
-    3.0 % at 150 N m."""
+    """12 and 24 slices, whose line loads are averaged in pairs.
+
+    With 24, the K of a slope is 5.6 % too large at 50 N m, and 3.0 % at 150 N m.
+    """
     coarse, fine = face.run("b18"), face.run("b18", slices=24)
     for case, error in face.errors(fine).items():
         if kind(case) in ("slope", "crown"):
