@@ -29,6 +29,7 @@ class Contender:
         precision: "float64" or "float32".
         gradient: whether the derivatives by the four parameters are computed too.
         batch: variants per batch of jaxgear or NumPy; zero where there is none.
+        coupled: whether slices feel each other, which those of the baselines do not.
     """
 
     kind: str
@@ -38,11 +39,17 @@ class Contender:
     precision: str = "float64"
     gradient: bool = False
     batch: int = 0
+    coupled: bool = False
 
     @property
     def name(self) -> str:
         """What the table calls it."""
-        return f"{self.kind} {self.precision}" + (" + gradient" if self.gradient else "")
+        return f"{self.kind} {self.precision}" + " coupled" * self.coupled + " + gradient" * self.gradient
+
+    @property
+    def physics(self) -> tuple[int, bool]:
+        """What has to be equal for two contenders to agree."""
+        return self.slices, self.coupled
 
 
 @dataclass(frozen=True)
@@ -172,7 +179,11 @@ def _make(contender: Contender, positions: int, problem: Problem | None):
         from .baselines.jax_kernel import JaxKernel
 
         kernel = JaxKernel(
-            positions=positions, slices=contender.slices, batch=contender.batch, gradient=contender.gradient
+            positions=positions,
+            slices=contender.slices,
+            batch=contender.batch,
+            gradient=contender.gradient,
+            coupled=contender.coupled,
         )
         return kernel, versions | {"JAX": jax.__version__, "jaxlib": jaxlib.__version__}
     if contender.kind == "C":

@@ -63,11 +63,12 @@ class Row:
 
 
 def contenders(cores: int, batch: int, *, quick: bool) -> list[Contender]:
-    """Everyone who takes part; jaxgear in float64 comes first of its number of slices, since it is the reference."""
+    """Everyone who takes part; jaxgear in float64 comes first of its physics, since it is the reference."""
     chunk = {1: 4096 if quick else 16384, _SLICES: 2048}
 
-    def jaxgear(slices, precision="float64", gradient=False):
-        return Contender("jaxgear", chunk[slices], slices, cores, precision, gradient, max(batch // slices, 1))
+    def jaxgear(slices, precision="float64", gradient=False, coupled=False):
+        size = max(batch // slices, 1)
+        return Contender("jaxgear", chunk[slices], slices, cores, precision, gradient, size, coupled)
 
     def numpy(slices):
         size = 64 if slices == 1 else 6
@@ -83,6 +84,7 @@ def contenders(cores: int, batch: int, *, quick: bool) -> list[Contender]:
     chosen += [numpy(1), Contender("SciPy", 2)]
     if not quick:
         chosen += [jaxgear(_SLICES, precision, gradient) for precision in _TOLERANCE for gradient in (False, True)]
+        chosen += [jaxgear(_SLICES, coupled=True)]
         if find_compiler():
             chosen += [Contender("C", 1000, _SLICES, threads=cores)]
         chosen += [numpy(_SLICES)]
@@ -95,7 +97,7 @@ def compare(
     """Starts all contenders one after the other, checks their results, then measures them in turns.
 
     Args:
-        chosen: contenders; jaxgear in float64 first of its number of slices, with gradient second.
+        chosen: contenders; jaxgear in float64 first of its physics, with gradient second.
         positions: mesh positions.
         checked: random variants on which all have to agree; SciPy answers for the first tenth of them.
         repetitions: measurements per contender.
@@ -107,25 +109,25 @@ def compare(
     rows: list[Row] = []
     versions: dict[str, str] = {}
     variants = random_variants(checked)
-    references: dict[int, Process] = {}
-    gradients: dict[int, np.ndarray] = {}
+    references: dict[tuple[int, bool], Process] = {}
+    gradients: dict[tuple[int, bool], np.ndarray] = {}
     with ExitStack() as stack:
         processes = []
         for contender in chosen:
             print(f"  starting {contender.name}, slices: {contender.slices}", file=sys.stderr, flush=True)
-            reference = references.get(contender.slices)
+            reference = references.get(contender.physics)
             problem = reference.start.problem if reference and contender.kind != "jaxgear" else None
             process = stack.enter_context(Process(contender, positions, problem))
             processes.append(process)
-            references.setdefault(contender.slices, process)
+            references.setdefault(contender.physics, process)
             versions |= process.start.versions
             row = Row(contender, process.start.cold, process.start.compiled)
             count = max(checked // 10, 1) if contender.kind == "SciPy" else checked
             ppte, gradient = process.results(variants[:count])
-            expected, _ = references[contender.slices].results(variants[:count])
+            expected, _ = references[contender.physics].results(variants[:count])
             row.difference = float(np.abs(ppte - expected).max())
             if gradient is not None:
-                difference = np.abs(gradient - gradients.setdefault(contender.slices, gradient))
+                difference = np.abs(gradient - gradients.setdefault(contender.physics, gradient))
                 row.gradient_difference = float(difference.max())
             rows.append(row)
         for repetition in range(repetitions):

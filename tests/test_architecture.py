@@ -82,15 +82,8 @@ HEAVY = {
     "jaxgear.plot",
 }
 # so do the commands, and their help without any of the library
-COMMANDS = {
-    "jaxgear.cli.commands",
-    "jaxgear.cli.convert",
-    "jaxgear.cli.dynamics",
-    "jaxgear.cli.devices",
-    "jaxgear.cli.layout",
-    "jaxgear.cli.sweep",
-    "jaxgear.cli.wear",
-}
+_NAMES = "commands", "convert", "devices", "dynamics", "layout", "sweep", "wear"
+COMMANDS = {f"jaxgear.cli.{name}" for name in _NAMES}
 
 
 def hidden(path: Path):

@@ -94,6 +94,7 @@ def test_what_a_baseline_cannot_do_is_refused(mesh, problem):
 def test_contenders_take_turns_and_agree(capsys):
     chosen = [
         Contender("jaxgear", 64, slices=3, threads=2, batch=8),
+        Contender("jaxgear", 64, slices=3, threads=2, batch=8, coupled=True),
         Contender("NumPy", 16, slices=3, batch=16),
     ]
     if find_compiler():
@@ -104,6 +105,7 @@ def test_contenders_take_turns_and_agree(capsys):
     print_rates(rows, machine(2), has_compiler=False)
     printed = capsys.readouterr().out
     assert "No C compiler" in printed and all(row.contender.kind in printed for row in rows)
+    assert "coupled" in printed
     assert rows[1].agrees
     rows[1].difference = float("nan")
     assert not rows[1].agrees

@@ -83,6 +83,7 @@ def test_derivative_is_a_central_difference(mesh):
     np.testing.assert_allclose(jax.grad(factor)(at), difference, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_many_cycles_at_once(mesh, cycle):
     many = jax.vmap(lambda slope: jg.solve(mesh, 50.0, pinion=jg.LeadSlope(slope)))(jnp.array([0.0, 10.0]))
     found = {name: quantities[name](many) for name in NAMES}

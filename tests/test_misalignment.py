@@ -78,6 +78,7 @@ def test_design_files_take_it_and_enough_slices(load):
         load_design(file.path)
 
 
+@pytest.mark.slow
 def test_design_file_gives_the_mesh_of_the_library(load):
     file = load("skew = 40.0\nbearing_span = 120.0")
     mesh = file.mesh(SIZES)

@@ -96,6 +96,7 @@ def test_a_mirrored_gearbox_mirrors_the_load(carried):
     np.testing.assert_allclose(turned.line_load[:, ::-1], carried.line_load, rtol=1e-7, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("crowning", [5.0, 30.0])
 def test_one_pair_of_constant_stiffness_is_the_one_dimensional_analysis(crowning):
     """Teeth that do not pass their load on over the face, under a linear law, at the pitch point: that is what the

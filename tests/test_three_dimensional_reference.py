@@ -11,11 +11,11 @@ from benchmarks import face
 
 # K [%]: slope of a face of 6 and of 20 modules, crowning with and without it, end relief; line loads rms [%]
 FACTOR = {"slope": {"b18": 5.0, "b60": 10.0}, "crown": {"b18": 3.0, "b60": 3.0}, "endrelief": {"b18": 20.0}}
-RMS = {"slope": 5.0, "crown": 5.0, "endrelief": 10.0}
+RMS = 5.0
 SHIFT, RIPPLE = 0.25, 0.3  # um
 
 
-@pytest.fixture(scope="module", params=["b18", "b60"])
+@pytest.fixture(scope="module", params=["b18", pytest.param("b60", marks=pytest.mark.slow)])
 def found(request):
     return face.run(request.param)
 
@@ -28,7 +28,7 @@ def test_load_factors_and_line_loads(found):
     for case, error in face.errors(found).items():
         if kind(case) != "aligned":
             assert abs(error.factor) <= FACTOR[kind(case)][case.pair], case
-            assert error.rms <= RMS[kind(case)], case
+            assert error.rms <= RMS, case
 
 
 def test_change_of_the_transmission_error(found):
@@ -48,11 +48,14 @@ def test_aligned_pair_is_even(found):
 
 @pytest.mark.slow
 def test_finer_slices_agree():
-    """12 and 24 slices, whose line loads are averaged in pairs."""
+    """12 and 24 slices, whose line loads are averaged in pairs.
+
+    With 24, the K of a slope is 5.6 % too large at 50 N m, and 3.0 % at 150 N m.
+    """
     coarse, fine = face.run("b18"), face.run("b18", slices=24)
     for case, error in face.errors(fine).items():
         if kind(case) in ("slope", "crown"):
-            assert error.rms <= RMS[kind(case)], case
+            assert error.rms <= RMS, case
         means = fine[case].line_load.reshape(4, 12, 2, -1).mean(axis=2)
         difference = np.linalg.norm(means - coarse[case].line_load) / np.linalg.norm(means)
         assert difference < (0.05 if kind(case) == "endrelief" else 0.02), case

@@ -8,7 +8,9 @@ from .problem import CROWNING, TORQUE, Problem, plain, prepare
 class JaxKernel:
     """Chunks of `batch` variants that stay in the cache, one after the other on each core."""
 
-    def __init__(self, *, positions: int = 64, slices: int = 1, batch: int = 64, gradient: bool = False):
+    def __init__(
+        self, *, positions: int = 64, slices: int = 1, batch: int = 64, gradient: bool = False, coupled: bool = False
+    ):
         """Prepares the mesh; compiles nothing of the solution yet."""
         import jax
         import jax.numpy as jnp
@@ -35,7 +37,7 @@ class JaxKernel:
         self._run = jax.jit(
             jax.shard_map(chunked, mesh=devices, in_specs=(same, split), out_specs=split, check_vma=False)
         )
-        self._mesh = prepare(positions, slices)
+        self._mesh = prepare(positions, slices, coupled=coupled)
         self._dtype = jnp.result_type(float)
         self._multiple = batch * jax.device_count()
         self._gradient = gradient

@@ -6,8 +6,8 @@ to 9 % too small, and the loaded width leaves 2.5 % at worst.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -56,4 +56,5 @@ def loaded_material(
 
 def unlabelled(mesh: Mesh) -> Mesh:
     """The mesh for programs that read its prepared arrays alone: without its own models one serves them all."""
-    return replace(mesh, compliance=default_compliance(), support=None)
+    without = eqx.tree_at(lambda mesh: mesh.compliance, mesh, default_compliance())
+    return without if mesh.support is None else eqx.tree_at(lambda mesh: mesh.support, without, None)

@@ -59,12 +59,12 @@ def write_wheel_drawing(path: str | Path, left: WheelProfile, right: WheelProfil
         ModuleNotFoundError: without the package ezdxf, which the extra `cad` installs.
     """
     try:
-        import ezdxf
+        from ezdxf.filemanagement import new
     except ModuleNotFoundError:
         raise ModuleNotFoundError(
             "write_wheel_drawing: DXF files need the package ezdxf: pip install jaxgear[cad]"
         ) from None
-    drawing = ezdxf.new("R2010", units=_MILLIMETRES)
+    drawing = new("R2010", units=_MILLIMETRES)
     drawing.linetypes.add("CENTER", [2.0, 1.25, -0.25, 0.25, -0.25])
     drawing.layers.add(_LAYER)
     drawing.layers.add(_AXIS, linetype="CENTER")

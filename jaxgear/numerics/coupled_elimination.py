@@ -8,8 +8,7 @@ springs obey
 
 X being the levers times the support's modes. So p follows from the symmetric, positive definite matrix
 C^-1 x M^-1 + V^T A^-1 V, a few unknowns at every position, and what is left are the equations of the support. What
-several loops read ends with a division, for compilers to store it; the divisor is of the factors, because a derivative
-in reverse mode is linear in what a response is to.
+several loops read ends with a division, for compilers to store it.
 """
 
 from functools import reduce
@@ -54,6 +53,7 @@ class CoupledFactors(NamedTuple):
         blocks: of the modal system.
         bent: L^-1 V^T A^-1 X by mode, and D^-1 times it.
         force: z under unit b, symmetric.
+        yielding: b under unit H z, and under unit approach in its first column; see `_yielding`.
         per_slope: load per opening of every spring, about.
     """
 
@@ -63,6 +63,7 @@ class CoupledFactors(NamedTuple):
     blocks: list[_Block]
     bent: tuple[list[Sides], list[Sides]]
     force: Float[Array, "bends bends positions"]
+    yielding: Float[Array, "bends bends positions"]
     per_slope: Slopes
 
 
@@ -88,7 +89,8 @@ def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
     right, force = _of_support(coupling, lever, inverse, modal)
     bent = _ahead(blocks, right)
     force = force - _joined(bent[0], bent[1])
-    return CoupledFactors(coupling, lever, inverse, blocks, bent, force, own.per_slope)
+    yielding = _yielding(coupling.support, force)
+    return CoupledFactors(coupling, lever, inverse, blocks, bent, force, yielding, own.per_slope)
 
 
 def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "_ pairs pairs positions"]]:
@@ -148,11 +150,10 @@ def _ahead(blocks: list[_Block], right: list[Sides]) -> tuple[list[Sides], list[
     for mode, value in enumerate(right):
         for before, block in enumerate(blocks[:mode]):
             value = value - _times(divided[before][:, None], jnp.swapaxes(block.scaled[mode - before], 0, 1))[:, 0]
-        value = value / unit(blocks[mode].inverse[0])[None]
-        # the first rows of L are one; D^-1 is symmetric
-        found = _times(value[:, None], blocks[mode].inverse)[:, 0]
-        whole.append(value)
-        divided.append(found / unit(blocks[mode].inverse[0])[None])
+        # right sides may be tangents: what makes a compiler store them must not depend on them
+        kept = unit(blocks[mode].inverse[0])[None]
+        whole.append(value / kept)
+        divided.append(_times(whole[-1][:, None], blocks[mode].inverse)[:, 0] / kept)
     return whole, divided
 
 
@@ -182,7 +183,8 @@ def respond(
     """Solves for a load or for an approach; see the top."""
     coupling, count = factors.coupling, len(weight)
     inside = [sum(x * row for x, row in zip(rows, known)) for rows in factors.inverse]  # A^-1 known
-    inside = [row / unit(rows[0]) for row, rows in zip(inside, factors.inverse)]
+    kept = unit(factors.inverse[0][0])
+    inside = [row / kept for row in inside]
     _, divided = _ahead(factors.blocks, list(onto(coupling.modes, jnp.stack(inside))[:, None]))
     force = sum(height[None] * row for height, row in zip(factors.lever, inside))
     constant = jnp.full((count, 1), count**-0.5, force.dtype)
@@ -193,38 +195,38 @@ def respond(
     deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
     even = along(shapes, bends)
     pressed = [height[None] * even - deflected[:, i] for i, height in enumerate(factors.lever)]
-    pressed = [row / unit(rows[0]) for row, rows in zip(pressed, factors.inverse)]
+    pressed = [row / kept for row in pressed]
     loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(inside, factors.inverse)]
     return Response(loads, approach, pressed)
 
 
 def stiffness(weight: Float[Array, " slices"], factors: CoupledFactors) -> Curve:
     """Load per unit of approach."""
-    _, rise = _yielding(factors, jnp.zeros_like(factors.force[0]))
-    return jnp.sum(weight) * jnp.sum(factors.force[0] * rise, axis=0)
+    return jnp.sum(weight) * jnp.sum(factors.force[0] * factors.yielding[:, 0], axis=0)
 
 
 def _bends(factors: CoupledFactors, carried: Bends, total, approach: Curve | None) -> tuple[Bends, Curve]:
     """b and the approach, for that or for a total of the line loads; `carried` is z at b = 0."""
     root = factors.coupling.modes.shape[0] ** 0.5
-    still, rise = _yielding(factors, carried)
+    still, rise = _still(factors, carried), factors.yielding[:, 0]
     if approach is None:
         missing = total / root - carried[0] - jnp.sum(factors.force[0] * still, axis=0)
         approach = missing / (root * jnp.sum(factors.force[0] * rise, axis=0))
     return still + root * approach[None] * rise, approach
 
 
-def _yielding(factors: CoupledFactors, carried: Bends) -> tuple[Bends, Bends]:
-    """b without approach, and what it gains with it: (1 + H force) b = -H carried and e_1."""
+def _still(factors: CoupledFactors, carried: Bends) -> Bends:
+    """b without approach: (1 + H force) b = -H carried."""
     support = factors.coupling.support
-    first = jnp.zeros_like(carried).at[0].set(1.0)
     if support is None:
-        return jnp.zeros_like(carried), first
-    matrix = jnp.eye(len(support), dtype=carried.dtype)[..., None] + jnp.tensordot(support, factors.force, 1)
-    matrix = jnp.moveaxis(matrix, -1, 0)
+        return jnp.zeros_like(carried)
+    bent = jnp.tensordot(support, carried, 1)
+    return -jnp.sum(factors.yielding * bent[None], axis=1)
 
-    def solved(side):
-        return jnp.linalg.solve(matrix, side.T[..., None])[..., 0].T
 
-    # one after the other: reverse mode is linear in the first alone
-    return solved(-jnp.tensordot(support, carried, 1)), solved(first)
+def _yielding(support: Float[Array, "bends bends"] | None, force: Float[Array, "bends bends positions"]):
+    """Inverse of 1 + H force, which is not symmetric, at every position."""
+    if support is None:
+        return jnp.ones_like(force)
+    matrix = jnp.eye(len(support), dtype=force.dtype)[..., None] + jnp.tensordot(support, force, 1)
+    return jnp.moveaxis(jnp.linalg.inv(jnp.moveaxis(matrix, -1, 0)), 0, -1)

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .elimination import small_inverse
-from .stored import unit
+from .stored import stored
 
 Rows = list[Float[Array, "slices positions"]]
 Springs = Float[Array, "pairs pairs positions"]
@@ -60,11 +60,11 @@ class Coupling(eqx.Module):
     def deflection(self, compliance: Springs, lever: Float[Array, "pairs positions"], load: Rows) -> Rows:
         """y under line loads."""
         uniform = jnp.stack([sum(c[None] * q for c, q in zip(row, load)) for row in compliance])
-        uniform = uniform / unit(uniform)
+        uniform = stored(uniform)
         modal = along(self.share, onto(self.modes, uniform))
-        modal = along(self.modes, modal / unit(modal))
+        modal = along(self.modes, stored(modal))
         result = [self.rest * row + modal[:, i] for i, row in enumerate(uniform)]
-        result = [row / unit(row) for row in result]
+        result = [stored(row) for row in result]
         if self.support is None or self.support_modes is None:
             return result
         force = sum(height[None] * q for height, q in zip(lever, load))
