@@ -18,6 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..numerics import real
+
 Scalar = Float[Array, ""]
 Kernel = Float[Array, "slices slices"]
 
@@ -27,7 +29,7 @@ _END_DECAY = 0.30
 _END_SOFTNESS = 0.10  # share of the uniform compliance
 
 
-def face_kernel(face_width: Scalar, root_chord: Scalar, slices: int) -> Kernel:
+def face_kernel(face_width, root_chord, slices: int) -> Kernel:
     """F: deflection of a slice under the line load of another, over that of a load uniform over the face.
 
     Symmetric, positive definite, its rows sum to one.
@@ -37,6 +39,7 @@ def face_kernel(face_width: Scalar, root_chord: Scalar, slices: int) -> Kernel:
         root_chord: S of the teeth, mean of both gears [mm].
         slices: of equal width over the face.
     """
+    face_width, root_chord = real(face_width), real(root_chord)
     dtype = jnp.result_type(face_width)
     waves, cosines = jnp.arange(slices, dtype=dtype), jnp.asarray(face_waves(slices), dtype)
     falling = 1 / (1 + (jnp.pi * waves * _DECAY * root_chord / face_width) ** 2)

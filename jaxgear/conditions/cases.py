@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import Mesh, Operation
+from ..contact.face_coupling import check_torque
 from ..contact.operation import operation_of
 from ..numerics import Checked, program, real, result, whole
 from ..tolerance import Deviation, Tolerance, sample_deviations
@@ -40,6 +41,7 @@ class Conditions(Checked):
 
     def on(self, mesh: Mesh) -> "Cases":
         """The cases on a mesh; traceable, where every design has a mesh of its own."""
+        check_torque("load", mesh.support_torque, self.load.torques)
         load = jax.tree.map(lambda numbers: numbers.astype(mesh.slice_width.dtype), self.load)
         removed = None if self.deviations is None else _removed(mesh, load.torques, self.deviations)
         return Cases(load.torques, load.speeds, load.friction, load.weights, removed)

@@ -4,18 +4,19 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..compliance import face_kernel, few_modes
 from ..geometry import GearPair
 from ..geometry.outline import Outline
 from ..numerics import Coupling, concrete
-from ..shafts import AbstractSupport
+from ..shafts import AbstractSupport, TabulatedSupport
 from .kinematics import Kinematics
 from .resolution import Resolution
 
 _SAME = 1e-6  # relative difference of numbers that single precision keeps apart
 _SAME_TORQUE = 1e-4
+_MOST_MISSED = 0.05
 
 
 def coupling_of(
@@ -73,24 +74,57 @@ def check_support(support: AbstractSupport | None, pair: GearPair, resolution: R
         )
     if not resolution.coupled_slices:
         raise ValueError("prepare: support needs slices that feel each other: Resolution(coupled_slices=True)")
-    given, own = map(jax.tree.leaves, (support.pair, pair))
-    for one, other in zip(given, own):
-        here, there = concrete(one), concrete(other)
+    # numbers that one pair has and the other leaves to its defaults cannot be compared one by one
+    given, own = (jax.tree.leaves(each, is_leaf=lambda leaf: leaf is None) for each in (support.pair, pair))
+    for one, other in zip(given, own, strict=True):
+        here, there = (None if leaf is None else concrete(leaf) for leaf in (one, other))
         if here is not None and there is not None and not np.allclose(here, there, rtol=_SAME):
             raise ValueError("prepare: support holds another pair than the one to prepare: take support.pair")
 
 
-def check_torque(owner: str, support: AbstractSupport | None, torque: Float[Array, ""]) -> None:
-    """Refuses a torque at which the support does not hold, as far as both are known.
+def check_modes(support: AbstractSupport | None, resolution: Resolution) -> None:
+    """Refuses a tabulated support that the polynomials of the resolution cannot follow, as far as it is known.
 
     Raises:
-        ValueError: for another torque than that of the gearbox whose shafts are the support.
+        ValueError: where they miss more than a twentieth of the matrix.
     """
-    wanted = None if support is None else support.torque
-    given, known = concrete(torque), None if wanted is None else concrete(wanted)
-    if given is None or known is None or np.isclose(given, known, rtol=_SAME_TORQUE, atol=0.0):
+    matrix = concrete(support.matrix) if isinstance(support, TabulatedSupport) else None
+    if matrix is None or not matrix.any():
         return
-    raise ValueError(
-        f"{owner}: torque = {float(given):g} N m, but the gearbox that holds the gears has {float(known):g} N m on "
-        "this pinion: prepare with the gearbox at that torque"
-    )
+    bends = _polynomials(resolution.slices, min(resolution.face_modes, resolution.slices))
+    kept = bends @ (bends.T @ matrix @ bends) @ bends.T
+    missed = np.linalg.norm(matrix - kept) / np.linalg.norm(matrix)
+    if missed > _MOST_MISSED:
+        raise ValueError(
+            f"prepare: support: {resolution.face_modes} polynomials over the face miss {missed:.0%} of matrix, must "
+            f"miss at most {_MOST_MISSED:.0%}: Resolution(face_modes={resolution.slices}) takes all of it"
+        )
+
+
+def holds_at(wanted: Float[Array, ""] | None, torque: Float[Array, ""]) -> Bool[Array, ""]:
+    """Whether a support that belongs to one torque holds at another; `check_torque` refuses it where both are known."""
+    if wanted is None:
+        return jnp.ones((), bool)
+    return jnp.abs(torque - wanted) <= _SAME_TORQUE * jnp.abs(wanted)
+
+
+def check_torque(owner: str, wanted: Float[Array, ""] | None, torque: Float[Array, "*loads"]) -> None:
+    """Refuses torques at which a support that belongs to one does not hold, as far as all are known.
+
+    Args:
+        owner: the function that is asked, for messages.
+        wanted: torque of the gearbox whose shafts are the support [N m]; None where there is no such support.
+        torque: on the pinion [N m].
+
+    Raises:
+        ValueError: for another torque than that of the gearbox.
+    """
+    given, known = (None if number is None else concrete(number) for number in (torque, wanted))
+    if given is None or known is None:
+        return
+    others = np.atleast_1d(given)[~np.isclose(np.atleast_1d(given), known, rtol=_SAME_TORQUE, atol=0.0)]
+    if len(others):
+        raise ValueError(
+            f"{owner}: torque = {float(others[0]):g} N m, but the gearbox that holds the gears has {float(known):g} "
+            "N m on this pinion: prepare with the gearbox at that torque"
+        )

@@ -16,7 +16,7 @@ from ..geometry import GearPair, Margins, PathOfContact, margins_between, outlin
 from ..microgeometry import Flank
 from ..numerics import AbstractSpring, Coupling, concrete, on_both, program
 from ..shafts import AbstractSupport
-from .face_coupling import check_support, coupling_of
+from .face_coupling import check_modes, check_support, coupling_of
 from .kinematics import Contacts, Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution, reach
 
@@ -53,6 +53,7 @@ class Mesh(eqx.Module):
         coupling: how the slices feel each other; None where they do not.
         support: what holds the gears; None for rigid, parallel shafts.
         support_gap: by which it opens the flanks without the force of this mesh [um], shape (slices,); None without.
+        support_torque: at which the support holds [N m]; None where it does at every torque.
         automatic: whether the number of pairs was left to `prepare`: `solve` takes more where they are too few.
     """
 
@@ -73,6 +74,7 @@ class Mesh(eqx.Module):
     coupling: Coupling | None = None
     support: AbstractSupport | None = None
     support_gap: Float[Array, " slices"] | None = None
+    support_torque: Scalar | None = None
     automatic: bool = eqx.field(static=True, default=False)
 
     def __repr__(self) -> str:
@@ -117,6 +119,11 @@ class Mesh(eqx.Module):
         """A gap of the flanks [um] as what holds the gears leaves it."""
         return gap if self.support_gap is None else gap + self.lever[:, None] * self.support_gap[None, :, None]
 
+    def given_way(self, line_load: Float[Array, "pairs slices positions"]) -> Float[Array, " positions"]:
+        """Transmission error by which the support gives way to all pairs alike under line loads [N/mm], in um."""
+        bent = None if self.coupling is None else self.coupling.support_deflection(self.lever, list(line_load))
+        return jnp.zeros_like(line_load[0, 0]) if bent is None else jnp.min(bent, axis=0)
+
     def flanks(self, offset=0.0) -> tuple[Flank, Flank]:
         """Points of pinion and wheel that face each other at a distance from the centre of contact.
 
@@ -154,8 +161,9 @@ def prepare(
             [um]; None for 16 um per mm of module, at which root stresses are beyond 1000 MPa. Gears that are traced
             take four pairs.
         support: what shafts, bearings, housing and misalignment do to the gap over the face, as `support` of a gearbox
-            gives it; None for rigid, parallel shafts. It needs slices that feel each other. That of a gearbox holds at
-            the gearbox's torque, which `solve` and the like then ask for.
+            gives it; None for rigid, parallel shafts. It needs slices that feel each other, and bends over the face in
+            as many polynomials as the resolution has `face_modes`. That of a gearbox holds at the gearbox's torque,
+            which `solve` and the like then ask for. Transmission error and stiffness contain what it gives way.
 
     Returns:
         the mesh, to be shared by any number of modifications and torques.
@@ -173,6 +181,7 @@ def prepare(
     check_support(support, pair, resolution)
     mesh = prepare_from(np.zeros(()), pair, compliance, resolution, support)
     _check_cover(mesh.path_of_contact, resolution)
+    check_modes(support, resolution)
     return replace(mesh, automatic=True) if automatic else mesh
 
 
@@ -225,6 +234,7 @@ def prepare_from(
         coupling=coupling_of(moving, outlines, support),
         support=support,
         support_gap=None if support is None else support.gap(moving.face_coordinate).astype(moving.slice_width.dtype),
+        support_torque=None if support is None else support.torque,
     )
 
 

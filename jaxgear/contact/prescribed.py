@@ -89,7 +89,7 @@ def solve_at(
         )
     check("solve_at", "transmission_error", error, "um")
     torque = operation_of("solve_at", torque, mesh.slice_width.dtype).torque
-    check_torque("solve_at", mesh.support, torque)
+    check_torque("solve_at", mesh.support_torque, torque)
     flanks, prepared = flanks_of("solve_at", mesh, pinion, wheel), unlabelled(mesh)
     error = jnp.broadcast_to(error.astype(torque.dtype), (positions,))
 
@@ -120,6 +120,7 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
     pair_force = mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1)
     force = jnp.sum(pair_force, axis=0)
     error = approach if shared is None else approach - shared * force
+    teeth = error - mesh.given_way(solution.line_load)
     return PrescribedContact(
         transmission_error=error,
         force=force,
@@ -127,7 +128,7 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
         line_load=solution.line_load,
         tangent_stiffness=tangent_stiffness(problem, solution),
         residual=solution.residual,
-        converged=solution.solved & mesh.margins.valid & (error < outermost(mesh, removed)),
+        converged=solution.solved & mesh.margins.valid & (teeth < outermost(mesh, removed)),
     )
 
 

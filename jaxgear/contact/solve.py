@@ -15,7 +15,7 @@ from ..numerics import ContactProblem, concrete, minimum, program, solve_contact
 from ..numerics.programs import begin
 from ..shafts import AbstractSupport
 from .cycle import MeshCycle
-from .face_coupling import check_torque
+from .face_coupling import check_torque, holds_at
 from .loaded_width import loaded_material, unlabelled
 from .mesh import Mesh, prepare, prepare_from
 from .operation import Operation, operation_of
@@ -56,7 +56,7 @@ def solve(
     """
     check_mesh("solve", mesh)
     operation = operation_of("solve", torque, mesh.slice_width.dtype)
-    check_torque("solve", mesh.support, operation.torque)
+    check_torque("solve", mesh.support_torque, operation.torque)
     pinion, wheel = flanks_of("solve", mesh, pinion, wheel)
     # two programs: that of the contact, by far the longer one to compile, serves every kind of modification
     removed = _material(mesh, operation.torque, pinion, wheel)
@@ -89,7 +89,7 @@ def solve_removed(
     """
     check_mesh("solve_removed", mesh)
     operation = operation_of("solve_removed", torque, mesh.slice_width.dtype)
-    check_torque("solve_removed", mesh.support, operation.torque)
+    check_torque("solve_removed", mesh.support_torque, operation.torque)
     shape = jnp.shape(removed.amount if isinstance(removed, RemovedMaterial) else removed)
     wanted = (mesh.resolution.pairs, mesh.resolution.slices, mesh.resolution.positions)
     if shape != wanted:
@@ -217,7 +217,7 @@ def _wider(mesh: Mesh, cycle: MeshCycle) -> Mesh | None:
 def _beyond(mesh: Mesh, cycle: MeshCycle) -> Bool[Array, " positions"]:
     removed = RemovedMaterial(cycle.gap - mesh.corner_gap[:, None], cycle.shift, cycle.bend)
     windup = mesh.hub * cycle.force / mesh.pair.face_width
-    return cycle.transmission_error - windup >= outermost(mesh, removed)
+    return cycle.transmission_error - windup - mesh.given_way(cycle.line_load) >= outermost(mesh, removed)
 
 
 def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
@@ -262,6 +262,8 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
     windup = mesh.hub * force / mesh.pair.face_width
     contact_stiffness = tangent_stiffness(problem, solution)
     unloaded = minimum(held / mesh.lever[:, None], axis=(0, 1))
+    valid = mesh.margins.valid & holds_at(mesh.support_torque, torque)
+    teeth = solution.approach - mesh.given_way(solution.line_load)  # what closes the gaps of pairs that are not there
     return {
         "transmission_error": solution.approach + windup,
         "unloaded_transmission_error": unloaded,
@@ -273,7 +275,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
         "bend": removed.bend,
         "tangent_stiffness": 1 / (1 / contact_stiffness + mesh.hub / mesh.pair.face_width),
         "residual": solution.residual,
-        "converged": solution.solved & (solution.approach < outermost(mesh, removed)) & mesh.margins.valid,
+        "converged": solution.solved & (teeth < outermost(mesh, removed)) & valid,
     }
 
 

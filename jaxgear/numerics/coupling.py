@@ -65,11 +65,17 @@ class Coupling(eqx.Module):
         modal = along(self.modes, stored(modal))
         result = [self.rest * row + modal[:, i] for i, row in enumerate(uniform)]
         result = [stored(row) for row in result]
+        bent = self.support_deflection(lever, load)
+        return result if bent is None else [row + height[None] * bent for row, height in zip(result, lever)]
+
+    def support_deflection(
+        self, lever: Float[Array, "pairs positions"], load: Rows
+    ) -> Float[Array, "slices positions"] | None:
+        """By how much the support gives way under line loads, per unit of lever; None without a support."""
         if self.support is None or self.support_modes is None:
-            return result
+            return None
         force = sum(height[None] * q for height, q in zip(lever, load))
-        bent = along(self.support_modes, along(self.support, onto(self.support_modes, force)))
-        return [row + height[None] * bent for row, height in zip(result, lever)]
+        return along(self.support_modes, along(self.support, onto(self.support_modes, force)))
 
 
 def with_inverses(coupling: Coupling, compliance: Springs) -> Coupling:

@@ -66,4 +66,5 @@ def _with_positions(mesh: Mesh, positions: int) -> Mesh:
     """The same mesh at other positions."""
     if positions == mesh.resolution.positions:
         return mesh
-    return prepare(mesh.pair, compliance=mesh.compliance, resolution=replace(mesh.resolution, positions=positions))
+    sizes = replace(mesh.resolution, positions=positions)
+    return prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes, support=mesh.support)

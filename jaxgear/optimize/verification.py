@@ -71,7 +71,7 @@ def verification(mesh: Mesh, compliance: TabulatedCompliance, problem: Problem |
         compliance: tables of its gears, see `structure_for`.
         problem: whose objectives are compared besides the PPTE.
     """
-    other = prepare(mesh.pair, compliance=compliance, resolution=mesh.resolution)
+    other = prepare(mesh.pair, compliance=compliance, resolution=mesh.resolution, support=mesh.support)
     other = replace(other, automatic=mesh.automatic)
     return Verification(other, None if problem is None else problem.on(other))
 

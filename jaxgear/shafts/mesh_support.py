@@ -77,7 +77,7 @@ class TabulatedSupport(AbstractSupport):
     Attributes:
         gears: the pair.
         matrix: influence, gap that opens in a slice under a unit force between the flanks of another, over slices of
-            equal width.
+            equal width. A mesh takes of it what its `face_modes` polynomials over the face can follow.
         opening: gap by everything else than the force of this mesh, in every slice; None for none.
 
     Raises:
