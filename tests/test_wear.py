@@ -177,6 +177,15 @@ def relieved(mesh):
     return life_of(mesh, pinion=RELIEF)
 
 
+def test_hours_become_shares_of_the_revolutions_by_the_speed(mesh):
+    """The slow load turns the pinion a tenth as often as the fast one."""
+    hours = jg.LoadSpectrum.from_hours([50.0, 150.0], [10.0, 10.0], [3000.0, 300.0])
+    turns = jg.LoadSpectrum([50.0, 150.0], [10.0, 1.0])
+    lives = [life_of(mesh, load, blocks=2) for load in (hours, turns)]
+    np.testing.assert_allclose(lives[0].weights, turns.weights, rtol=1e-12)
+    np.testing.assert_allclose(lives[0].depth, lives[1].depth, rtol=1e-9)
+
+
 def test_the_flanks_of_a_life_give_its_mesh_again(mesh, relieved):
     pinion, wheel = relieved.flanks()
     assert isinstance(pinion, jg.TabulatedProfile)
@@ -262,6 +271,11 @@ def test_a_contact_that_was_not_found_is_no_number(life):
     lost = eqx.tree_at(lambda life: life.cycles.converged, life, life.cycles.converged.at[2, 0].set(False))
     assert np.isnan(over_life(lost, "ppte")).tolist() == [life == 2 for life in range(BLOCKS + 1)]
     assert np.isnan(life_to(lost, "ppte", 1e3))
+    # it has worn the flanks of all lives after it
+    for values in (wear_depth(lost), worn_volume(lost)[:, 0, 0]):
+        assert np.isnan(values).tolist() == [life > 2 for life in range(BLOCKS + 1)]
+    assert np.isnan(life_to_depth(lost, wear_depth(life)[-2]))
+    np.testing.assert_array_equal(life_to_depth(lost, wear_depth(life)[1]), life_to_depth(life, wear_depth(life)[1]))
 
 
 def test_a_function_of_the_lubrication(mesh, life):
@@ -294,6 +308,7 @@ def test_no_load_wears_nothing(mesh):
         ({"coefficient": -1e-18}, "wear: coefficient = -1e-18 m2/N must be at least 0 m2/N"),
         ({"coefficient": [1e-18] * 3}, r"wear: coefficient has shape \(3,\), must be one number or a pair"),
         ({"coefficient": lambda *_: 1e-18}, "wear: coefficient is a function, which needs a speed"),
+        ({"torque": jg.LoadSpectrum([1.0, 2.0], duration=3.0)}, "wear: a load spectrum with a duration needs speeds"),
         ({"torque": -1.0}, "wear: torque = -1 N m must be at least 0 N m"),
         ({"pinion": jg.LeadCrowning(5.0)}, "varies along the face, which a mesh of 1 slice cannot show"),
     ],

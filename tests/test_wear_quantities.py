@@ -34,11 +34,22 @@ def test_quantities_are_those_of_the_life(mesh):
         "pinion_wear_depth": wear_depth(life, "pinion")[-1],
         "wheel_wear_depth": wear_depth(life, "wheel")[-1],
         "life_to_depth": life_to_depth(life, 2.0),
-        "life_to_ppte": life_to(life, "ppte", 6.0),
+        "life_to_ppte": jnp.minimum(life_to(life, "ppte", 6.0), 4e7),
     }
     assert {*expected, *found} == {*WEAR_QUANTITIES}
     for name, number in expected.items():
         np.testing.assert_allclose(WEAR_QUANTITIES[name].of(life, SETTINGS), number, rtol=1e-12)
+
+
+def test_a_limit_that_is_never_reached_is_no_failure(mesh):
+    """Not finite values are those of failed contacts, which count as the worst of all."""
+    life = SETTINGS.life(mesh, TORQUE)
+    assert np.isinf(life_to(life, "ppte", 1e3))
+    far = Wear(4e7, 1e-18, ppte_limit=1e3, depth_limit=1e6)
+    assert float(WEAR_QUANTITIES["life_to_ppte"].of(life, far)) == 4e7
+    idle = SETTINGS.life(mesh, 0.0)
+    assert np.isinf(life_to_depth(idle, 1.0))
+    assert 4e7 < float(WEAR_QUANTITIES["life_to_depth"].of(idle, far)) < np.inf
 
 
 def test_equal_settings_make_equal_quantities():

@@ -117,8 +117,10 @@ def _cell(key: str, value: float) -> str:
 def verdict(study: Study) -> Iterator[str]:
     """The best on the mean over the life, and how sure the depths are."""
     means = {name: float(mean_over_life(life, "ppte")) for name, life in study.lives.items()}
-    best = min(means, key=lambda name: means[name])
-    yield f"least mean PPTE over the life: {best}, {means[best]:.3f} um"
+    found = {name: mean for name, mean in means.items() if np.isfinite(mean)}
+    if found:
+        best = min(found, key=lambda name: found[name])
+        yield f"least mean PPTE over the life: {best}, {found[best]:.3f} um"
     for name, life in study.lives.items():
         error, deepest = float(life.error[-1]), float(wear_depth(life)[-1])
         if error > _WORTH_A_WORD * deepest:

@@ -167,13 +167,13 @@ def summed(
     bent = mean * root_face_load_factor(jnp.maximum(factor, 1.0), pair.face_width, tooth_height(pair))
     hours, speeds = load.hours, load.speeds
     turns = load.weights if hours is None or speeds is None else _MINUTES * hours * speeds
-    pitting, bending = [], []
+    pitting, bending, loaded = [], [], largest > 0
     for turned, share, bears in zip((turns, turns / pair.gear_ratio), root, endurance):
         lines = bears.pitting, bears.bending
         # by the square of the stress, whose root has no derivative at zero load
-        pitting.append(
-            turned / lines[0].cycles * (largest * contact / lines[0].endurance ** 2) ** (0.5 * lines[0].exponent)
-        )
+        square = jnp.where(loaded, largest * contact / lines[0].endurance ** 2, 1.0)
+        power = jnp.where(loaded, square ** (0.5 * lines[0].exponent), 0.0)
+        pitting.append(turned / lines[0].cycles * power)
         bending.append(turned / lines[1].cycles * (bent * share / lines[1].endurance) ** lines[1].exponent)
     stress = jnp.where(largest > 0, jnp.sqrt(jnp.where(largest > 0, largest * contact, 1.0)), 0.0)
     return Damage(

@@ -56,7 +56,7 @@ def longest_life(
     if any(concrete(leaf) is None for leaf in jax.tree.leaves((support, load, endurance))):
         raise ValueError("longest_life: searches with numbers, not inside of a traced function; `damage` can be traced")
     both = endurance if isinstance(endurance, tuple) else (endurance, endurance)
-    if not float(jnp.max(load.torques)) > 0:
+    if not float(jnp.max(jnp.where(load.weights > 0, load.torques, 0.0))) > 0:
         raise ValueError("longest_life: torques are all zero, every flank line lives for ever")
     faces = under_loads(support, load, stations=stations)
     worst = int(np.argmax(np.sum(damage(support, load, both, stations=stations).pitting, axis=0)))

@@ -2,6 +2,7 @@
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import GearPair
@@ -13,6 +14,7 @@ Slices = Float[Array, " slices"]
 Scalar = Float[Array, ""]
 
 STATIONS = 41  # over the face, as many as `annex_e` has
+_SAME_TORQUE = 1e-6  # relative; single precision
 
 
 class Stations(AbstractSupport):
@@ -101,14 +103,27 @@ def at_stations(support: AbstractSupport, torque=None, *, stations: int = STATIO
         stations: over the face.
 
     Raises:
-        ValueError: for a support without couplings and without a torque, or a torque out of range.
+        ValueError: for a support without couplings and without a torque, a torque out of range, or another one than
+            that under which `Stations` were worked out.
     """
     if isinstance(support, Stations):
-        return support if torque is None else eqx.tree_at(lambda it: it.load, support, real(torque))
+        _check_load(support, torque)
+        return support
     if not isinstance(support, ShaftSupport) and torque is None:
         raise ValueError("at_stations: torque must be given: no coupling tells it")
     check("at_stations", "torque", torque, "N m", low=0.0)
     return _at_stations(support, optional_real(torque), whole("at_stations", "stations", stations, 2, 1001))
+
+
+def _check_load(face: Stations, torque) -> None:
+    if torque is None:
+        return
+    given, known = concrete(real(torque)), concrete(face.load)
+    if given is None or known is None or not np.isclose(given, known, rtol=_SAME_TORQUE):
+        raise ValueError(
+            "at_stations: torque must be that under which the stations were worked out: other meshes and loads open "
+            "other gaps at another one, give the support itself"
+        )
 
 
 @program

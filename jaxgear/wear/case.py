@@ -9,10 +9,11 @@ from jaxtyping import Array, Float
 
 from ..conditions import LoadSpectrum
 from ..contact import Mesh, MeshCycle, Operation, removed_material, solve_removed
+from ..contact.face_coupling import check_torque
 from ..contact.operation import operation_of
 from ..contact.solve import check_mesh, flanks_of
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
-from ..numerics import kernel, real, whole
+from ..numerics import check, kernel, real, whole
 from .archard import worn
 from .coefficient import Constant, OfLubrication, wear_law
 from .deposit import PARTS, Deposit, deposit
@@ -138,6 +139,7 @@ def case_of(
     pinion, wheel = flanks_of(owner, mesh, pinion, wheel)
     dtype = mesh.slice_width.dtype
     loads, weights = _loads(owner, torque, dtype)
+    check_torque(owner, mesh.support_torque, loads.torque)
     law = wear_law(coefficient, loads, dtype)
     points = mesh.resolution.positions // 2 + 1 if points is None else whole(owner, "points", points, low=3)
     other = jnp.zeros((), dtype) if deviation is None else real(deviation).astype(dtype)
@@ -149,10 +151,18 @@ def _loads(owner: str, torque: Any, dtype) -> tuple[Operation, Float[Array, " to
     if not isinstance(torque, LoadSpectrum):
         single = operation_of(owner, torque, dtype)
         return jax.tree.map(lambda number: number[None], single), None
+    if torque.duration is not None and torque.speeds is None:
+        raise ValueError(f"{owner}: a load spectrum with a duration needs speeds, for the shares of the revolutions")
     load = jax.tree.map(lambda number: number.astype(dtype), torque)
     friction = None if load.friction is None else jnp.broadcast_to(load.friction, load.torques.shape)
 
     def each(torque, speed, friction):
         return Operation(torque, speed, friction)
 
-    return jax.vmap(each)(load.torques, load.speeds, friction), load.weights
+    weights = load.weights
+    if load.duration is not None and load.speeds is not None:
+        # shares of the hours: a load turns the pinion by hours times speed
+        turns = weights * load.speeds
+        check(owner, "sum of hours times speeds", jnp.sum(turns), "", low=0.0, open_low=True)
+        weights = turns / jnp.sum(turns)
+    return jax.vmap(each)(load.torques, load.speeds, friction), weights

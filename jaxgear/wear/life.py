@@ -35,7 +35,7 @@ class WearLife(Checked):
         error: estimate of the error of that depth by the length of the blocks, largest of all points [um], shape
             (lives,).
         cycles: the mesh on these flanks, leading axis (lives,); (lives, torques) under a load spectrum.
-        weights: of the torques of a load spectrum, shape (torques,); None under one torque.
+        weights: of the torques of a load spectrum in the revolutions, shape (torques,); None under one torque.
     """
 
     revolutions: Lives = result()
@@ -99,7 +99,8 @@ def wear(
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m], an `Operation`, or a `LoadSpectrum` whose weights are shares of the revolutions.
+        torque: on the pinion [N m], an `Operation`, or a `LoadSpectrum`. Its weights are shares of the revolutions;
+            those of one with a duration, `LoadSpectrum.from_hours`, are shares of the hours and count times the speeds.
         revolutions: of the pinion, all together.
         coefficient: of wear [m2/N] of both gears, or a pair of numbers, (pinion, wheel); from 1e-18 for good films to
             5e-16 for mild wear of mixed lubrication. Or a function of the state of lubrication at every contact, of
@@ -119,7 +120,8 @@ def wear(
     Raises:
         TypeError: for something else than a prepared mesh or a modification.
         ValueError: for numbers out of their range, an odd number of blocks, a coefficient that is a function where
-            there is no speed, and whatever `solve` refuses.
+            there is no speed, a load spectrum with hours without speeds, a torque that is not that of the gearbox which
+            holds the gears, and whatever `solve` refuses.
     """
     check_blocks("wear", blocks)
     flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}

@@ -3,7 +3,7 @@
 from typing import Any, Literal
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..conditions import joined, solved
 from ..metrics import Quantity, quantity_of
@@ -43,6 +43,8 @@ def mean_over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMe
 def wear_depth(life: WearLife, gear: Worn = "both") -> Lives:
     """Largest wear depth of the flank of a gear, or of both, at every life [um], shape (lives,).
 
+    NaN after a life whose contact was not found.
+
     Raises:
         ValueError: for another gear than "pinion", "wheel" or "both".
     """
@@ -53,15 +55,24 @@ def wear_depth(life: WearLife, gear: Worn = "both") -> Lives:
     }
     if gear not in depths:
         raise ValueError(f'wear_depth: gear = {gear!r} must be "pinion", "wheel" or "both"')
-    return maximum(jnp.stack(depths[gear]), axis=(0, 2, 3))
+    return jnp.where(_known(life), maximum(jnp.stack(depths[gear]), axis=(0, 2, 3)), jnp.nan)
+
+
+def _known(life: WearLife) -> Bool[Array, " lives"]:
+    """Whether the contact was found at all lives before, which have worn the flank."""
+    found = solved(life.cycles)
+    found = found if life.weights is None else jnp.all(found, axis=-1)
+    return jnp.concatenate([jnp.ones_like(found[:1]), jnp.cumsum(~found)[:-1] == 0])
 
 
 def worn_volume(life: WearLife) -> Float[Array, "lives gears parts"]:
     """Volume worn off one flank of every tooth of pinion and wheel, on the flank and at tip corners [mm3].
 
     Where a gear wears at tip corners, its tip edge and its flank at the mate's tip corners count alike.
+    NaN after a life whose contact was not found.
     """
-    return 1e-3 * jnp.einsum("lgpsk,gk,s->lgp", life.depth, life.arc, life.slice_width)
+    volume = 1e-3 * jnp.einsum("lgpsk,gk,s->lgp", life.depth, life.arc, life.slice_width)
+    return jnp.where(_known(life)[:, None, None], volume, jnp.nan)
 
 
 def life_to_depth(life: WearLife, limit: Any, gear: Worn = "both") -> Scalar:

@@ -36,6 +36,15 @@ class Kind(NamedTuple):
     needs: str | None = None
 
 
+# A limit that is never reached is no failure, which not finite values of a quantity are. Nothing is known of the
+# transmission error beyond the life that was looked at; the depth goes on, but so far nobody extrapolates.
+_LONGEST = 1000.0
+
+
+def _at_most(longest, life):
+    return jnp.where(life > longest, longest, life)
+
+
 WEAR_QUANTITIES: Mapping[str, Kind] = {
     "worn_ppte": Kind(lambda life, _: over_life(life, "ppte")[-1], "um", "peak-to-peak transmission error when worn"),
     "mean_ppte_over_life": Kind(
@@ -51,16 +60,16 @@ WEAR_QUANTITIES: Mapping[str, Kind] = {
     "pinion_wear_depth": Kind(lambda life, _: wear_depth(life, "pinion")[-1], "um", "largest wear depth, pinion"),
     "wheel_wear_depth": Kind(lambda life, _: wear_depth(life, "wheel")[-1], "um", "largest wear depth, wheel"),
     "life_to_depth": Kind(
-        lambda life, settings: life_to_depth(life, settings.depth_limit),
+        lambda life, settings: _at_most(_LONGEST * settings.revolutions, life_to_depth(life, settings.depth_limit)),
         "revolutions",
-        "life to the limit of the wear depth",
+        "life to the limit of the wear depth, at most a thousand of those looked at",
         "larger",
         "depth_limit",
     ),
     "life_to_ppte": Kind(
-        lambda life, settings: life_to(life, "ppte", settings.ppte_limit),
+        lambda life, settings: _at_most(settings.revolutions, life_to(life, "ppte", settings.ppte_limit)),
         "revolutions",
-        "life to the limit of peak-to-peak transmission error",
+        "life to the limit of peak-to-peak transmission error, at most the life looked at",
         "larger",
         "ppte_limit",
     ),
