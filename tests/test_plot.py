@@ -116,7 +116,6 @@ def test_a_given_ax_is_used_and_its_figure_gains_no_other(draw, name):
 
 LEGENDS = (
     "transmission_error",
-    "mesh_orders",
     "load_sharing",
     "pressure",
     "ppte_over_torque",
