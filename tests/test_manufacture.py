@@ -300,7 +300,7 @@ def compilations():
         (lambda s: manufacture.run_out(s, 3.0), "run_out: radius = 3 mm must be greater than 6.0.* mm"),
         (
             lambda s: manufacture.largest_wheel_radius(s, 0.0),
-            "gap = 0 mm must be greater than 0 mm",
+            "gap = 0 mm must be greater than 6.03545 mm",
         ),
         (lambda s: manufacture.smallest_wheel_radius(s, -1.0), "flange_radius = -1 mm must be at least 0 mm"),
         (lambda s: manufacture.reference_volumes(s, -6.0), "reference_volumes: amount = -6 um must be at least 0 um"),

@@ -73,7 +73,8 @@ def test_drawing_of_the_wheel_holds_the_points(profile, tmp_path):
 
 
 def test_a_drawing_without_its_package_says_what_to_install(profile, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "ezdxf.filemanagement", None)
+    for module in ("ezdxf", "ezdxf.filemanagement"):  # which a test before may have imported
+        monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(ModuleNotFoundError, match=r"write_wheel_drawing: .* ezdxf: pip install jaxgear\[cad\]"):
         io.write_wheel_drawing(tmp_path / "wheel.dxf", profile)
     assert not list(tmp_path.iterdir())

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..manufacture import Trace
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
-from ..numerics import real
+from ..numerics import check, real
 from . import schema, template
 from .errors import DesignFileError, naming
 from .folder import writing
@@ -96,8 +96,10 @@ def read_flank(
         method: of interpolation along the profile.
 
     Raises:
+        ValueError: for a base radius that is not positive.
         DesignFileError: when the file cannot be read or is no flank; the message is one line.
     """
+    check("read_flank", "base_radius", base_radius, "mm", low=0.0, open_low=True)
     with naming(path):
         rows = _chosen(_read(Path(path)), {"gear": gear, "design": design})
         amount = next((name for name in _AMOUNTS if name in rows[0]), None)
@@ -108,10 +110,19 @@ def read_flank(
         if not profile:
             raise DesignFileError("", "holds a helix alone, must hold a profile")
         roll, face, removed = _grid(profile, amount, base_radius)
-        if len(face) == 1 and helix:
+        if len(face) > 1 and helix:
+            raise DesignFileError(
+                "", f"has a helix beside profiles at {len(face)} face coordinates, must be one profile"
+            )
+        if helix:
             along, across, line = _grid(helix, amount, base_radius)
             if len(along) > 1:
                 raise DesignFileError("", f"has a helix at {len(along)} roll lengths, must be one")
+            if len(across) < 2:
+                raise DesignFileError("", "has a helix of 1 point, must have at least 2")
+            if not across[0] <= face[0] <= across[-1]:
+                at = f"{_ACROSS} = {face[0]:g} mm"
+                raise DesignFileError("", f"has a profile at {at}, must be within the helix")
             face, removed = across, removed + line - np.interp(face, across, line[0])
         if len(roll) < 2:
             raise DesignFileError("", "has 1 place along the profile, must have at least 2")
@@ -140,16 +151,36 @@ def _read(path: Path) -> Rows:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
-            rows = [{(name or "").strip(): value for name, value in row.items()} for row in reader]
+            names = [name.strip() for name in reader.fieldnames or ()]
+            reader.fieldnames = names
+            rows = list(reader)
     except UnicodeDecodeError:
         raise DesignFileError("", "is not text in UTF-8") from None
     except OSError as error:
         raise DesignFileError("", error.strerror or str(error)) from None
+    except ValueError as error:  # a name that no file can have
+        raise DesignFileError("", error) from None
     except csv.Error as error:
         raise DesignFileError("", f"is no CSV file: {error}") from None
     if not rows:
         raise DesignFileError("", "holds no points")
+    _check_table(names, rows)
     return rows
+
+
+def _check_table(names: list[str], rows: Rows) -> None:
+    """Refuses what the headings do not fit: decimal commas would be columns of their own."""
+    if len(names) == 1 and ";" in names[0]:
+        raise DesignFileError("", "separates its columns by semicolons, must have commas, and points in its numbers")
+    twice = [name for name in dict.fromkeys(names) if name and names.count(name) > 1]
+    if twice:
+        raise DesignFileError("", f"has several columns {twice[0]}, must have one")
+    for number, row in enumerate(rows, 1):
+        further = row.get(None)  # type: ignore[call-overload]
+        if further and any(map(str.strip, further)):
+            fields = len(names) + len(further)
+            problem = f"point {number} has {fields} fields, the headings {len(names)}: numbers must have no commas"
+            raise DesignFileError("", problem)
 
 
 def _chosen(rows: Rows, wanted: Mapping[str, str | None]) -> Rows:
@@ -182,7 +213,10 @@ def _grid(rows: Rows, amount: str, base_radius: float | None) -> tuple[np.ndarra
 
 def _along(rows: Rows, base_radius: float | None) -> np.ndarray:
     if _ALONG in rows[0]:
-        return _numbers(rows, _ALONG)
+        found = _numbers(rows, _ALONG)
+        if (found < 0).any():
+            raise DesignFileError("", f"{_ALONG} = {found.min():g} mm must be at least 0 mm (base circle)")
+        return found
     if base_radius is None:
         raise DesignFileError("", f"has no column {_ALONG}, must have one where no base radius is given")
     if "roll_angle_deg" in rows[0]:

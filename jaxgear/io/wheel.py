@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..manufacture import GrindingWheel, WheelProfile
+from ..numerics import check
 from .folder import writing
 
 _COLUMNS = ("flank", "x_mm", "y_mm", "gear_diameter_mm", "roll_length_mm", "modification_um")
@@ -30,8 +31,11 @@ def write_wheel_points(
         the path.
 
     Raises:
-        ValueError: when the file cannot be written.
+        ValueError: when the file cannot be written, or for a wheel whose axis the profile would reach.
     """
+    if wheel is not None:
+        deepest = max(float(np.max(profile.y)) for _, _, profile in _sides(left, right))
+        check("write_wheel_points", "radius of wheel", wheel.radius, "mm", low=deepest, open_low=True)
     columns = _COLUMNS if wheel is None else (*_COLUMNS, "wheel_radius_mm")
     with writing(path), Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

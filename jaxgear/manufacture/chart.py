@@ -123,8 +123,10 @@ def profile_trace(
         points: their number.
 
     Raises:
-        ValueError: for less than 2 points.
+        ValueError: for less than 2 points, a face coordinate that is not finite, or a roll length that is negative.
     """
+    check("profile_trace", "face_coordinate", face_coordinate, "mm")
+    check("profile_trace", "roll_length", roll_length, "mm", low=0.0)
     if roll_length is None:
         whole("profile_trace", "points", points, 2)
         roll_length = jnp.linspace(side.start_roll_length, side.tip_roll_length, points)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import Gear
+from ..geometry import Gear, outline
 from ..geometry.involute import involute
 from ..numerics import bracketed_root, check, concrete, whole
 
@@ -40,10 +40,16 @@ def span(gear: Gear, teeth: int) -> Scalar:
         teeth: k, see `teeth_spanned`.
 
     Raises:
-        ValueError: unless k is a whole number from 1 to the number of teeth.
+        ValueError: unless k is a whole number from 1 to the number of teeth, or where the anvils miss the involute.
     """
     most = concrete(gear.teeth)
     whole("span", "teeth", teeth, 1, float("inf") if most is None else float(most))
+    found = _span(gear, teeth)
+    _check_touched("span", "teeth", teeth, "", 0.5 * found, gear)
+    return found
+
+
+def _span(gear: Gear, teeth: int) -> Scalar:
     alpha = jnp.deg2rad(gear.pressure_angle)
     nominal = jnp.pi * (teeth - 0.5) + gear.teeth * involute(jnp.tan(alpha))
     shifted = 2 * gear.profile_shift * gear.module * jnp.sin(alpha)
@@ -62,7 +68,7 @@ def over_balls(gear: Gear, ball) -> Scalar:
         ball: diameter D_M [mm], about 1.7 modules, so that the balls touch the flanks and stand out of the tip circle.
 
     Raises:
-        ValueError: for a ball that falls onto the root circle or does not stand out of the spaces.
+        ValueError: for a ball that falls onto the root circle, does not stand out of the spaces or misses the involute.
     """
     check("over_balls", "ball", ball, "mm", low=0.0, open_low=True)
     alpha = jnp.deg2rad(gear.pressure_angle)
@@ -70,6 +76,8 @@ def over_balls(gear: Gear, ball) -> Scalar:
     tangent = bracketed_root(_missing, jnp.full_like(alpha, 1e-6), jnp.full_like(alpha, _WIDEST), wanted)
     radius = gear.base_radius * jnp.sqrt(1 + tangent**2)
     _check_ball(gear, ball, wanted, radius)
+    # the ball's centre lies on the normal of the involute where it touches
+    _check_touched("over_balls", "ball", ball, " mm", gear.base_radius * tangent - 0.5 * ball, gear)
     return 2 * radius * _offset(gear) + ball
 
 
@@ -99,14 +107,20 @@ def allowance_of_balls(gear: Gear, ball, measured) -> Scalar:
         measured: M_dK [mm].
 
     Raises:
-        ValueError: for a dimension that puts the balls inside the base circle.
+        ValueError: for a dimension that puts the balls inside the base circle, or makes the tooth thicker or thinner by
+            more than a base pitch.
     """
     check("allowance_of_balls", "ball", ball, "mm", low=0.0, open_low=True)
     ratio = (measured - ball) / (2 * gear.base_radius * _offset(gear))
     least = concrete(2 * gear.base_radius * _offset(gear) + ball)
     check("allowance_of_balls", "measured", measured, "mm", low=None if least is None else float(least), open_low=True)
     tangent = jnp.sqrt(ratio**2 - 1)
-    return 1e3 * gear.module * gear.teeth * (involute(tangent) - _thick(gear, ball, 0.0))
+    thicker = gear.module * gear.teeth * (involute(tangent) - _thick(gear, ball, 0.0))
+    found, pitch = concrete(thicker), concrete(gear.base_pitch)
+    if found is not None and pitch is not None and abs(float(found)) > float(pitch):
+        given = f"allowance_of_balls: measured = {float(measured):g} mm"
+        raise ValueError(f"{given} makes the tooth {float(found):.3g} mm thicker, must be within {float(pitch):.3g} mm")
+    return 1e3 * thicker
 
 
 def _thick(gear: Gear, ball, allowance) -> Scalar:
@@ -135,6 +149,17 @@ def _check_ball(gear: Gear, ball, wanted: Scalar, radius: Scalar) -> None:
         raise ValueError(f"over_balls: ball = {size:g} mm touches no flanks above the root circle, must be larger")
     if centre + size / 2 < tip:
         raise ValueError(f"over_balls: ball = {size:g} mm does not stand out of the tip circle, must be larger")
+
+
+def _check_touched(owner: str, name: str, value, unit: str, touched: Scalar, gear: Gear) -> None:
+    """Refuses anvils or balls that would touch at a roll length [mm] where there is no involute."""
+    known = [concrete(each) for each in (touched, outline(gear).form_roll_length, gear.tip_roll_length)]
+    if any(each is None for each in known):
+        return
+    at, form, tip = (float(each) for each in known if each is not None)
+    if not form <= at <= tip:
+        place = f"would touch the flank at a roll length of {at:.4g} mm"
+        raise ValueError(f"{owner}: {name} = {value:g}{unit} {place}, must be within {form:.4g} and {tip:.4g} mm")
 
 
 def _check_near(owner: str, name: str, value, nominal: Scalar, gear: Gear) -> None:

@@ -121,10 +121,11 @@ def largest_wheel_radius(side: Side, gap) -> Scalar:
     """Largest outer radius [mm] whose `run_out` stays within a gap to a shoulder [mm] that is as high as the teeth.
 
     Raises:
-        ValueError: for a gap that is not positive.
+        ValueError: for a gap that is smaller than the teeth are high: so is the radius of any wheel for it.
     """
-    check("largest_wheel_radius", "gap", gap, "mm", low=0.0, open_low=True)
     depth = _depth(side)
+    known = concrete(depth)
+    check("largest_wheel_radius", "gap", gap, "mm", low=None if known is None else float(known), open_low=True)
     return (gap**2 + depth**2) / (2 * depth)
 
 

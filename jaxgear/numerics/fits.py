@@ -2,6 +2,9 @@
 
 Columns times coefficients stand for the values: the columns of a polynomial are the powers of its argument. Both fits
 are differentiable by columns and values.
+
+The columns are few and are orthogonalized here. Those of many fits side by side would go to LAPACK in shares that wait
+for threads of one pool: as many such calls at once as the pool has threads wait for each other for ever.
 """
 
 from typing import Literal
@@ -14,6 +17,7 @@ from jaxtyping import Array, Float, Int
 Columns = Float[Array, "points columns"]
 Values = Float[Array, " points"]
 Coefficients = Float[Array, " columns"]
+Triangle = list[list[Float[Array, ""]]]
 Criterion = Literal["least_squares", "minimax"]
 
 _EXCHANGES = 40  # of one point each; a few columns need about ten
@@ -30,9 +34,37 @@ def fit(columns: Columns, values: Values, criterion: Criterion) -> Coefficients:
             time; its derivative is that of the points that bear the largest residual.
     """
     # an orthonormal basis of the columns: powers are nearly dependent, and single precision would feel it
-    basis, triangle = jnp.linalg.qr(columns)
-    inner = basis.T @ values if criterion == "least_squares" else _minimax(basis, values)
-    return jax.lax.linalg.triangular_solve(triangle, inner[:, None], left_side=True, lower=False)[:, 0]
+    basis, triangle = _orthonormal(columns)
+    return _backward(triangle, basis.T @ values if criterion == "least_squares" else _minimax(basis, values))
+
+
+def _orthonormal(columns: Columns) -> tuple[Columns, Triangle]:
+    """Q and the columns of R of columns = Q R, by Gram and Schmidt's process.
+
+    Every column goes through it twice, after which Q is orthonormal to rounding ("twice is enough": Parlett, The
+    Symmetric Eigenvalue Problem, 1980, section 6-9).
+    """
+    basis: list[Values] = []
+    triangle: Triangle = []
+    for place in range(columns.shape[1]):
+        rest, shares = columns[:, place], [jnp.zeros_like(columns[0, 0])] * place
+        for _ in range(2):
+            for index, direction in enumerate(basis):
+                share = jnp.sum(direction * rest)
+                rest, shares[index] = rest - share * direction, shares[index] + share
+        length = jnp.sqrt(jnp.sum(rest**2))
+        basis.append(rest / length)
+        triangle.append([*shares, length])
+    return jnp.stack(basis, axis=1), triangle
+
+
+def _backward(triangle: Triangle, right: Float[Array, " columns"]) -> Coefficients:
+    """x of R x = right."""
+    rest, found = list(right), []
+    for place in reversed(range(len(triangle))):
+        found.append(rest[place] / triangle[place][place])
+        rest = [value - triangle[place][row] * found[-1] for row, value in enumerate(rest[:place])]
+    return jnp.stack(found[::-1])
 
 
 def _minimax(basis: Columns, values: Values) -> Coefficients:
@@ -49,7 +81,7 @@ def _levelled(reference: Int[Array, " borne"], basis: Columns, values: Values) -
     """Coefficients that leave residuals of one size and alternating sign at the reference, and that residual."""
     signs = _signs(reference.shape[0], basis.dtype)
     matrix = jnp.concatenate([basis[reference], signs[:, None]], axis=1)
-    return jnp.linalg.solve(matrix, values[reference])
+    return fit(matrix, values[reference], "least_squares")  # as many points as columns: it passes through all of them
 
 
 def _exchanged(reference: Int[Array, " borne"], basis: Columns, values: Values) -> Int[Array, " borne"]:

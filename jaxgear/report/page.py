@@ -1,6 +1,7 @@
 """The report as an HTML page."""
 
 from pathlib import Path
+from unicodedata import category
 
 from ..numerics.durable import write_durably
 from .contents import Report
@@ -32,7 +33,9 @@ def write_report(path: Path, report: Report) -> None:
     )
     page = environment.get_template("report.html").render(report=report, upright=_UPRIGHT)
     # the name of a file may hold bytes that are no text; neither these nor controls can stand in a page
-    allowed = "".join(sign if sign.isprintable() or sign in "\n\t" or sign.isspace() else "\ufffd" for sign in page)
+    allowed = "".join(
+        sign if sign.isprintable() or sign in "\n\t\r" or category(sign) == "Zs" else "\ufffd" for sign in page
+    )
     held = allowed.encode("utf-8", "replace")
     try:
         write_durably(path, lambda file: file.write(held))
