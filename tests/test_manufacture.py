@@ -118,6 +118,15 @@ def test_minimax_fit_is_that_of_a_linear_program(degree):
         assert np.abs(residual).max() == pytest.approx(best.fun, rel=1e-7)
 
 
+def test_a_wheel_without_an_involute_grinds_a_flank_too(side):
+    """All of the profile is relieved: the node is the start of the active profile."""
+    relief = jg.TipRelief(6.0, 100.0)
+    spline = wheel_spline(side, relief)
+    assert float(spline.node_roll_length) == float(side.start_roll_length)
+    flank = side.flank(spline.roll_length, jnp.asarray(0.0))
+    np.testing.assert_allclose(spline.ground(flank), relief(flank) + spline.deviation, atol=1e-9)
+
+
 def test_least_squares_fit_and_exact_fits():
     t, columns = columns_of(40, 3)
     values = jnp.asarray(np.cos(5 * t))

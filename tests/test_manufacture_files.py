@@ -198,6 +198,10 @@ HEAD = "roll_length_mm,face_coordinate_mm,measured_um\n"
         (HEAD + "20,0,1\n21,0,2\n20,5,2\n", "has 3 points at 2 roll lengths and 2 face coordinates, must be a grid"),
         (HEAD + "20,0,1\n", "has 1 place along the profile, must have at least 2"),
         ("trace," + HEAD + "helix,20,0,1\nhelix,20,1,1\n", "holds a helix alone, must hold a profile"),
+        ("roll_length_mm,measured_um\n10,5,0,3\n", "point 1 has 4 fields, the headings 2: numbers must have no commas"),
+        ("roll_length_mm;measured_um\n10,5;0,3\n", "separates its columns by semicolons, must have commas"),
+        (HEAD.replace("measured_um", "measured_um,measured_um") + "20,0,1,2\n", "has several columns measured_um"),
+        (HEAD + "-1,0,1\n20,0,2\n", "roll_length_mm = -1 mm must be at least 0 mm (base circle)"),
         ("face_coordinate_mm,measured_um\n0,1\n", "has no column roll_length_mm, must have one where no base radius"),
     ],
 )

@@ -136,6 +136,8 @@ def test_places_that_do_not_match_and_too_few_points_are_refused(side):
         flank_deviations(side, tip, tip)
     with pytest.raises(ValueError, match="profile_trace: points = 1 must be a whole number of at least 2"):
         profile_trace(side, jg.NoModification(), points=1)
+    with pytest.raises(ValueError, match="profile_trace: face_coordinate = nan mm"):
+        profile_trace(side, jg.NoModification(), face_coordinate=np.nan)
     with pytest.raises(ValueError, match="helix_trace: roll_length = -1 mm must be at least 0 mm"):
         helix_trace(side, jg.NoModification(), roll_length=-1.0)
 

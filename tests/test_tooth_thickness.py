@@ -95,3 +95,13 @@ def test_what_no_measurement_gives():
         over_balls(tall, 4.2)
     # the gears of `gear_pair` stand for traced ones: nothing is refused while tracing
     assert np.isfinite(float(jax.jit(lambda g: over_balls(g, 5.25))(gear_pair().pinion)))
+
+
+def test_anvils_and_balls_that_miss_the_involute_are_refused():
+    gear = GEARS["plain"]
+    with pytest.raises(ValueError, match=r"span: teeth = 15 would touch the flank at a roll length of 64.6.* mm"):
+        span(gear, 15)
+    with pytest.raises(ValueError, match=r"over_balls: ball = 40 mm would touch the flank at a roll length of .* mm"):
+        over_balls(gear, 40.0)
+    with pytest.raises(ValueError, match=r"measured = 200 mm makes the tooth .* mm thicker, must be within 8.86 mm"):
+        allowance_of_balls(gear, 5.1, 200.0)

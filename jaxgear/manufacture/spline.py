@@ -10,6 +10,7 @@ from typing import Literal
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import Side
@@ -73,6 +74,10 @@ class WheelSpline(Checked):
         """The flank that the wheel grinds, for the mesh: the design and the deviation."""
         # the node ends the involute and starts the polynomial: it stands there twice
         roll, ground = (jnp.delete(values, _BELOW) for values in (self.roll_length, self.removed + self.deviation))
+        known = concrete(roll)
+        if known is not None:  # a node at the start of the active profile leaves no involute: its places are one
+            places = np.flatnonzero(np.diff(np.maximum.accumulate(known), prepend=-np.inf) > 0)
+            roll, ground = roll[places], ground[places]
         return TabulatedProfile(roll, ground)
 
     def x(self, y: Float[Array, "..."]) -> Float[Array, "..."]:
