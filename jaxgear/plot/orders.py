@@ -8,6 +8,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..contact import MeshCycle
 from ..metrics import harmonics
+from ..numerics import program
 from .figure import legend_above, line_style, report_axes
 
 _GROUP = 0.8  # of the distance between two orders, which the bars of all designs share
@@ -28,7 +29,7 @@ def transmission_error_orders(cycles: Mapping[str, MeshCycle], ax: Axes | None =
     orders = np.arange(1, count + 1)
     with report_axes(ax) as ax:
         for index, (name, cycle) in enumerate(cycles.items()):
-            amplitude = np.asarray(harmonics(cycle.transmission_error, count).amplitude)
+            amplitude = np.asarray(_amplitudes(cycle.transmission_error, count))
             place = orders + (index - (len(cycles) - 1) / 2) * width
             ax.bar(
                 place, amplitude, width, label=name, color=line_style(index)["color"], edgecolor="white", linewidth=0.3
@@ -38,3 +39,8 @@ def transmission_error_orders(cycles: Mapping[str, MeshCycle], ax: Axes | None =
         ax.set(xlim=(0.4, count + 0.6), xlabel="mesh order [-]", ylabel="amplitude [µm]")
         legend_above(ax)
     return ax
+
+
+@program
+def _amplitudes(error, count: int):
+    return harmonics(error, count).amplitude
