@@ -1,8 +1,6 @@
 """The command `jaxgear dynamics`: from a design file to the vibration of its designs over the speed."""
 
-import os
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,67 +9,26 @@ import numpy as np
 
 from ..contact import Mesh
 from ..dynamics import Dynamics, Oscillator, steps_for
-from ..io import (
-    DesignFile,
-    DynamicsRequest,
-    dynamics_request,
-    result_folder,
-    write_summary,
-)
-from . import dynamics_figures, dynamics_report, interrupt, report
-from .commands import import_ahead
+from ..io import DesignFile, DynamicsRequest, dynamics_request
+from . import dynamics_figures, dynamics_report
 from .compared import Modifications, compared, search_of
-from .devices import compile_quickly
-from .document import document
 from .dynamics_branches import branches_of
 from .dynamics_report import Study, next_to_design
 from .kept import Kept, SpeedResponses
 from .progress import Stages
-from .run import default_folder, opened
+from .study_command import Make, StudyCommand
 
 
-def run_dynamics(
-    file: Path,
-    output: Path | None,
-    *,
-    quick: bool,
-    figures: bool,
-    cache: bool,
-    command: Sequence[str] | None = None,
-) -> bool:
-    """The command with its options; False when a contact was not found."""
-    asked = document(command, file)
-    compile_quickly()
-    with Stages() as stages:
-        design = opened(file, cache=cache)
-        request = dynamics_request(design, quick=quick)
-        search = search_of(design, quick=quick)
-        target = output or default_folder(file, "dynamics", quick=quick)
-        with ExitStack() as putting_in_place, result_folder(target) as folder:
-            if figures:
-                import_ahead("matplotlib.pyplot")
-            torque = max(design.torque, *request.torques)
-            mesh, designs = compared(design, torque, search, stages, quick=quick)
-            kept = Kept(target.with_name(f".{target.name}.runs"), SpeedResponses(), _count(designs, request))
-            study = _study(design, request, mesh, designs, kept, stages)
-            stages.begin("writing the results")
-            data = {**dynamics_report.summary(study), "quick": quick}
-            write_summary(folder / "summary.json", data)
-            dynamics_report.write_responses(folder / "responses.csv", study)
-            files = dynamics_figures.write_figures(folder, study) if figures else []
-            if asked is not None:
-                asked.write(folder, design, data, dynamics_report.found(study, files))
-            putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
-            putting_in_place.callback(kept.remove)
-    report.console().print(dynamics_report.table(study))
-    report.say(*dynamics_report.verdict(study))
-    if quick:
-        report.say("quick run: coarse positions and few speeds, not a result to build on")
-    report.say(f"results in {target}{os.sep}, {stages.elapsed:.1f} s")
-    failures = list(dynamics_report.failures(study))
-    for line in failures:
-        report.warn(line)
-    return not failures
+def _plan(design: DesignFile, quick: bool) -> Make[Study]:
+    request = dynamics_request(design, quick=quick)
+    search = search_of(design, quick=quick)
+
+    def make(target: Path, stages: Stages):
+        mesh, designs = compared(design, max(design.torque, *request.torques), search, stages, quick=quick)
+        kept = Kept(target.with_name(f".{target.name}.runs"), SpeedResponses(), _count(designs, request))
+        return _study(design, request, mesh, designs, kept, stages), kept.remove
+
+    return make
 
 
 def _count(designs: Mapping[str, Any], request: DynamicsRequest) -> int:
@@ -119,3 +76,17 @@ def _steps(settings: Dynamics, oscillators: Mapping[str, Mapping[float, Oscillat
         return (settings.steps,) * len(settings.mesh_frequencies)
     each = [steps_for(one, settings.mesh_frequencies) for several in oscillators.values() for one in several.values()]
     return tuple(int(count) for count in np.max(each, axis=0))
+
+
+run_dynamics = StudyCommand(
+    "dynamics",
+    "coarse positions and few speeds",
+    _plan,
+    dynamics_report.summary,
+    lambda folder, study: dynamics_report.write_responses(folder / "responses.csv", study),
+    dynamics_figures.write_figures,
+    lambda study: [dynamics_report.table(study)],
+    dynamics_report.verdict,
+    dynamics_report.failures,
+    (dynamics_report.ASSUMED,),
+)

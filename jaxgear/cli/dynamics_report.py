@@ -2,7 +2,7 @@
 
 import csv
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,6 @@ from ..contact import Mesh
 from ..dynamics import Branch, Oscillator, SpeedResponse
 from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
-from .document import Found
 from .geometry import geometry
 from .written import model, versions
 
@@ -32,7 +31,7 @@ _COLUMNS = {
 }
 
 
-_ASSUMED = "Both gears are rigid masses that vibrate on the force of this contact, with the damping and bearings given."
+ASSUMED = "Both gears are rigid masses that vibrate on the force of this contact, with the damping and bearings given."
 
 
 @dataclass(frozen=True)
@@ -130,12 +129,6 @@ def failures(study: Study) -> Iterator[str]:
                 f"MESH FORCE NOT CONVERGED: {name} at {', '.join(bad)} N m; its numbers are not to be trusted. "
                 "Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
             )
-
-
-def found(study: Study, figures: Sequence[Path]) -> Found:
-    """What a report shows beside `summary`."""
-    lines, warnings = list(verdict(study)), list(failures(study))
-    return Found(lines, warnings, tables=[table(study)], figures=figures, assumptions=[_ASSUMED])
 
 
 def summary(study: Study) -> dict[str, Any]:

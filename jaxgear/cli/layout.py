@@ -1,65 +1,29 @@
 """What the command `layout` does, with its options."""
 
-import os
-from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 
 import jax
 
 from ..contact import Mesh
-from ..io import DesignFile, LayoutRequest, layout_request, result_folder, write_flanks, write_summary
+from ..io import DesignFile, LayoutRequest, layout_request, write_flanks
 from ..io.schema_shafts import ProfileSection
 from ..layout import FlankLine, FlankLineLayout, ProfileLayout, at_stations, layout_flank_lines, vary_profiles
-from . import interrupt, layout_report, report
-from .commands import import_ahead
-from .devices import compile_quickly
-from .document import document
+from . import layout_report
 from .layout_report import Study
 from .progress import Stages
-from .run import coarse, default_folder, opened
+from .run import coarse
+from .study_command import Make, StudyCommand
 
 
-def run_layout(
-    file: Path,
-    output: Path | None,
-    *,
-    quick: bool,
-    figures: bool,
-    cache: bool,
-    command: Sequence[str] | None = None,
-) -> bool:
-    """The command with its options; False when a contact was not found or an edge is touched."""
-    asked = document(command, file)
-    compile_quickly()
-    with Stages() as stages:
-        design = opened(file, cache=cache)
-        request = layout_request(design, quick=quick)
-        target = output or default_folder(file, "layout", quick=quick)
-        with ExitStack() as putting_in_place, result_folder(target) as folder:
-            if figures:
-                import_ahead("matplotlib.pyplot")
-            study = _study(design, request, stages, quick=quick)
-            stages.begin("writing the results")
-            data = {**layout_report.summary(study), "quick": quick}
-            write_summary(folder / "summary.json", data)
-            if study.profile is not None:
-                write_flanks(folder / "flanks.csv", next(iter(study.meshes.values())), layout_report.designs(study))
-                study.profile.table.to_csv(folder / "profiles.csv")
-            files = layout_report.write_figures(folder, study) if figures else []
-            if asked is not None:
-                asked.write(folder, design, data, layout_report.found(study, files))
-            putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
-    for table in layout_report.tables(study):
-        report.console().print(table)
-    report.say(*layout_report.verdict(study))
-    if quick:
-        report.say("quick run: few stations and variants, not a result to build on")
-    report.say(f"results in {target}{os.sep}, {stages.elapsed:.1f} s")
-    failures = list(layout_report.failures(study))
-    for line in failures:
-        report.warn(line)
-    return not failures
+def _plan(design: DesignFile, quick: bool) -> Make[Study]:
+    request = layout_request(design, quick=quick)
+    return lambda target, stages: (_study(design, request, stages, quick=quick), lambda: None)
+
+
+def _write(folder: Path, study: Study) -> None:
+    if study.profile is not None:
+        write_flanks(folder / "flanks.csv", next(iter(study.meshes.values())), layout_report.designs(study))
+        study.profile.table.to_csv(folder / "profiles.csv")
 
 
 def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick: bool) -> Study:
@@ -99,3 +63,16 @@ def _profile(
         length=wanted.length,
         callback=lambda done, total, _: stages.count(done, total, "variants"),
     )
+
+
+run_layout = StudyCommand(
+    "layout",
+    "few stations and variants",
+    _plan,
+    layout_report.summary,
+    _write,
+    layout_report.write_figures,
+    layout_report.tables,
+    layout_report.verdict,
+    layout_report.failures,
+)

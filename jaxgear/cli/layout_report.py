@@ -1,6 +1,6 @@
 """What `jaxgear layout` says, writes and draws."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,6 @@ from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, Tolerance
 from ..microgeometry import AbstractModification
 from ..shafts import bearing_reactions
 from . import report
-from .document import Found
 from .geometry import geometry
 from .written import versions
 
@@ -167,11 +166,6 @@ def failures(study: Study) -> Iterator[str]:
             yield f"NOT CONVERGED: {failed} of {total} profile modifications; raise resolution.newton_steps"
         if not profile.without_shock[profile.best]:
             yield "every profile modification has contact shock: larger amounts are needed"
-
-
-def found(study: Study, figures: Sequence[Path]) -> Found:
-    """What a report shows beside `summary`."""
-    return Found(list(verdict(study)), list(failures(study)), tables=list(tables(study)), figures=figures)
 
 
 def summary(study: Study) -> dict[str, Any]:

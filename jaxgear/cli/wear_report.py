@@ -2,7 +2,7 @@
 
 import csv
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,6 @@ from ..metrics import quantity_of
 from ..microgeometry import AbstractModification
 from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, wear_depth, worn_volume
 from . import report
-from .document import Found
 from .geometry import geometry
 from .written import versions
 
@@ -36,7 +35,7 @@ _QUANTITIES = (
 _WORTH_A_WORD = 0.01
 _PANEL, _HEIGHT = 80.0, 84.0  # [mm]
 
-_ASSUMED = (
+ASSUMED = (
     "Wear follows Archard: depth is the coefficient times pressure and sliding distance, at the torque of the file."
 )
 
@@ -137,12 +136,6 @@ def failures(study: Study) -> Iterator[str]:
                 f"NOT CONVERGED: {name} from {first:.3g} revolutions on; its numbers are not to be trusted. "
                 "Take more blocks, or raise resolution.newton_steps or resolution.pairs."
             )
-
-
-def found(study: Study, figures: Sequence[Path]) -> Found:
-    """What a report shows beside `summary`."""
-    lines, warnings = list(verdict(study)), list(failures(study))
-    return Found(lines, warnings, tables=[table(study)], figures=figures, assumptions=[_ASSUMED])
 
 
 def summary(study: Study) -> dict[str, Any]:

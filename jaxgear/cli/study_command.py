@@ -1,0 +1,94 @@
+"""A command that makes a study of a design file: asked for, worked out, put in place, printed."""
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import rich.table
+
+from ..io import DesignFile, result_folder, write_summary
+from . import interrupt, report
+from .commands import import_ahead
+from .devices import compile_quickly
+from .document import Found, document
+from .progress import Stages
+from .run import default_folder, opened
+
+S = TypeVar("S")
+# Works the study out: result folder, stages -> study, and what is to be done when its results are in place.
+Make = Callable[[Path, Stages], tuple[S, Callable[[], None]]]
+
+
+@dataclass(frozen=True)
+class StudyCommand(Generic[S]):
+    """What a command has of its own.
+
+    Attributes:
+        name: of the command.
+        coarse: what a quick run has too few of.
+        plan: checks what a design file asks for, quick or not, before anything is worked out or written.
+        summary: contents of `summary.json`, without whether the run was quick.
+        write: writes the other files into a folder.
+        draw: writes the figures into a folder.
+        tables: printed first.
+        verdict: the results in words.
+        failures: a line for everything that is not to be trusted; the command fails where there is one.
+        assumptions: of the study, for a report.
+    """
+
+    name: str
+    coarse: str
+    plan: Callable[[DesignFile, bool], Make[S]]
+    summary: Callable[[S], dict[str, Any]]
+    write: Callable[[Path, S], None]
+    draw: Callable[[Path, S], list[Path]]
+    tables: Callable[[S], Iterable[rich.table.Table]]
+    verdict: Callable[[S], Iterable[str]]
+    failures: Callable[[S], Iterable[str]]
+    assumptions: tuple[str, ...] = ()
+
+    def __call__(
+        self,
+        file: Path,
+        output: Path | None,
+        *,
+        quick: bool,
+        figures: bool,
+        cache: bool,
+        command: Sequence[str] | None = None,
+    ) -> bool:
+        """The command with its options; False when there are failures."""
+        asked = document(command, file)
+        compile_quickly()
+        with Stages() as stages:
+            design = opened(file, cache=cache)
+            make = self.plan(design, quick)
+            target = output or default_folder(file, self.name, quick=quick)
+            with ExitStack() as putting_in_place, result_folder(target) as folder:
+                if figures:
+                    import_ahead("matplotlib.pyplot")
+                study, finish = make(target, stages)
+                stages.begin("writing the results")
+                data = {**self.summary(study), "quick": quick}
+                write_summary(folder / "summary.json", data)
+                self.write(folder, study)
+                files = self.draw(folder, study) if figures else []
+                tables, lines = list(self.tables(study)), list(self.verdict(study))
+                failures = list(self.failures(study))
+                if asked is not None:
+                    found = Found(lines, failures, tables=tables, figures=files, assumptions=self.assumptions)
+                    asked.write(folder, design, data, found)
+                putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
+                putting_in_place.callback(finish)
+        for table in tables:
+            report.console().print(table)
+        report.say(*lines)
+        if quick:
+            report.say(f"quick run: {self.coarse}, not a result to build on")
+        report.say(f"results in {target}{os.sep}, {stages.elapsed:.1f} s")
+        for line in failures:
+            report.warn(line)
+        return not failures
