@@ -68,6 +68,24 @@ def _forget_compiled_programs():
 
 
 @pytest.fixture
+def no_cache(monkeypatch):
+    """Commands leave the compilation cache of the tests alone."""
+    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
+
+
+@pytest.fixture
+def file(tmp_path):
+    """Writes the text of a design file and gives its path."""
+
+    def written(text):
+        path = tmp_path / "pair.toml"
+        path.write_text(text)
+        return path
+
+    return written
+
+
+@pytest.fixture
 def clean_figures():
     """Closes the figures of a test, which must not have changed anybody's settings."""
     import matplotlib

@@ -29,6 +29,8 @@ from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
 from jaxgear.metrics import Doubt
 from jaxgear.metrics.plausibility import Limit
 
+pytestmark = pytest.mark.usefixtures("no_cache")
+
 FIXED = """
 title = "a [small] pair"
 [pinion]
@@ -68,12 +70,6 @@ steps = 100
 
 STAGES = "finite-element tables", "searching", "verifying"  # in this order
 EARLIER = '{"versions": {"jaxgear": "0.1.0"}}'  # the summary of an earlier run
-
-
-@pytest.fixture(autouse=True)
-def no_cache(monkeypatch):
-    """The tests keep their own compilation cache."""
-    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
 
 
 def call(*arguments):

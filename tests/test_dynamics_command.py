@@ -14,6 +14,8 @@ from jaxgear.dynamics import Oscillator, RectangularStiffness, speed_sweep
 from jaxgear.io import DesignFileError, dynamics_request, load_design, sweep_request
 from jaxgear.io.folder import RESULT_FILES
 
+pytestmark = pytest.mark.usefixtures("no_cache")
+
 GEAR = """
 teeth = 50
 module = 3.0
@@ -42,22 +44,6 @@ steps = 64
 torque_factors = [1.0]
 """
 FIGURES = "dynamic_factor", "approach_rms", "waterfall", "bifurcation", "phase_portrait", "branches"
-
-
-@pytest.fixture(autouse=True)
-def no_cache(monkeypatch):
-    """The tests keep their own compilation cache."""
-    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
-
-
-@pytest.fixture
-def file(tmp_path):
-    def written(text):
-        path = tmp_path / "pair.toml"
-        path.write_text(text)
-        return path
-
-    return written
 
 
 def test_the_command_writes_what_it_says(file, tmp_path):

@@ -13,6 +13,8 @@ from test_cli import FIXED, call
 
 from jaxgear.cli import interrupt, launcher, run
 
+pytestmark = pytest.mark.usefixtures("no_cache")
+
 NOTHING = "jaxgear: interrupted, nothing was written\n"
 # raises the signal when a module is asked for
 AT_IMPORT = """
@@ -25,12 +27,6 @@ sys.meta_path.insert(0, Finder())
 sys.argv = ["jaxgear", "analyze", "gear.toml"]
 runpy.run_path({launcher!r}, run_name="__main__")
 """
-
-
-@pytest.fixture(autouse=True)
-def no_cache(monkeypatch):
-    """The tests keep their own compilation cache."""
-    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
 
 
 @pytest.fixture

@@ -11,6 +11,8 @@ from jaxgear.io import layout_request, load_design
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.layout import layout_flank_lines
 
+pytestmark = pytest.mark.usefixtures("no_cache")
+
 FILE = """
 [pinion]
 teeth = 19
@@ -77,19 +79,11 @@ D.x, 0, 0, 0, 8e-3
 """
 
 
-@pytest.fixture(autouse=True)
-def no_cache(monkeypatch):
-    """The tests keep their own compilation cache."""
-    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
-
-
 @pytest.fixture
-def file(tmp_path):
+def file(file, tmp_path):
     def written(text, housing=HOUSING):
         (tmp_path / "housing.csv").write_text(housing)
-        path = tmp_path / "pair.toml"
-        path.write_text(text)
-        return path
+        return file(text)
 
     return written
 

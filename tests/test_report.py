@@ -23,14 +23,10 @@ from jaxgear.io.folder import RESULT_FILES
 from jaxgear.sweeps.columns import Column
 from jaxgear.sweeps.table import in_memory
 
+pytestmark = pytest.mark.usefixtures("no_cache")
+
 HOSTILE = '<script>alert("1")</script> & \'<img src="http://example.com/x.png">\' </pre></style>'
 FACTS = [("design file", "pair.toml")]
-
-
-@pytest.fixture(autouse=True)
-def no_cache(monkeypatch):
-    """The tests keep their own compilation cache."""
-    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
 
 
 @pytest.fixture

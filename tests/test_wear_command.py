@@ -16,6 +16,8 @@ from jaxgear.io import DesignFileError, load_design, read_worn, sweep_request, w
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.wear import March, over_life, wear_in_steps
 
+pytestmark = pytest.mark.usefixtures("no_cache")
+
 GEAR = """
 teeth = 30
 module = 2.0
@@ -50,22 +52,6 @@ type = "tip_relief"
 amount = "height"
 length = 3.0
 """
-
-
-@pytest.fixture(autouse=True)
-def no_cache(monkeypatch):
-    """The tests keep their own compilation cache."""
-    monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
-
-
-@pytest.fixture
-def file(tmp_path):
-    def written(text):
-        path = tmp_path / "pair.toml"
-        path.write_text(text)
-        return path
-
-    return written
 
 
 def test_the_command_writes_what_it_says(file, tmp_path):
