@@ -141,7 +141,8 @@ SECOND = Quantity(
 @pytest.fixture
 def known(monkeypatch):
     """The vocabulary with a quantity more, until the end of the test."""
-    monkeypatch.setattr(quantities, "_known", dict(quantities._known))
+    list(quantities)  # all packages have added theirs
+    monkeypatch.setattr(quantities, "_by_package", dict(quantities._by_package))
     quantities.add(SECOND)
 
 

@@ -1,5 +1,8 @@
 """One vocabulary of quantities: names and objects, reductions exact, soft and in pieces."""
 
+import subprocess
+import sys
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -60,6 +63,16 @@ def test_both_spellings_and_the_nearest_name():
         quantity_of("ppet", "sweep")
     with pytest.raises(ValueError, match="there already"):
         quantities.add(Quantity("ppte", lambda cycle: cycle.transmission_error))
+
+
+def test_the_vocabulary_is_the_same_whatever_was_imported_first():
+    """A name of a package that nobody has imported is known, and tables and guides list all in one order."""
+    code = (
+        "from jaxgear.metrics import quantity_of, quantities; print(quantity_of('wear_depth').unit);"
+        "import jaxgear.manufacture; print(*quantities)"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=100)
+    assert told.stdout.split() == ["um", *quantities]
 
 
 def test_a_quantity_of_your_own_is_as_good_as_one_of_the_vocabulary(cycle):

@@ -96,5 +96,6 @@ def _quantity(name: str, of: Callable[[MeshCycle], Any]) -> Quantity:
 
 
 quantities.add(
-    *(_quantity(name, WithoutSettings(name, "jaxgear.dynamics.Dynamics", "dynamics")) for name in DYNAMIC_QUANTITIES)
+    *(_quantity(name, WithoutSettings(name, "jaxgear.dynamics.Dynamics", "dynamics")) for name in DYNAMIC_QUANTITIES),
+    package=__package__,
 )

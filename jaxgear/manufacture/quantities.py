@@ -59,4 +59,5 @@ for _index, _gear in enumerate(("pinion", "wheel")):
             )
             for _parabolic, _name in ((False, "linear"), (True, "parabolic"))
         ),
+        package=__package__,
     )

@@ -1,6 +1,7 @@
 """Named quantities of a mesh cycle: one open vocabulary for tables, objectives, limits, reports and design files."""
 
 import difflib
+import importlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -79,35 +80,72 @@ class Quantity:
 
 
 class Vocabulary(Mapping[str, Quantity]):
-    """Quantities by name. Packages add theirs; names are looked up in both spellings, "ppte" and "ppte_um"."""
+    """Quantities by name. Packages add theirs; names are looked up in both spellings, "ppte" and "ppte_um".
 
-    def __init__(self) -> None:
-        self._known: dict[str, Quantity] = {}
+    Which of the packages a program has imported, and in which order, changes neither what is known nor its order.
+    """
 
-    def add(self, *quantities: Quantity) -> None:
+    def __init__(self, packages: tuple[str, ...] = ()) -> None:
+        """Holds nothing yet.
+
+        Args:
+            packages: those whose import adds quantities, in reading order; imported when a name is not found without.
+        """
+        self._by_package: dict[str, dict[str, Quantity]] = {package: {} for package in packages}
+        self._unread = [*reversed(packages)]
+
+    def add(self, *quantities: Quantity, package: str = "") -> None:
         """Adds quantities.
+
+        Args:
+            quantities: the quantities.
+            package: that they come with.
 
         Raises:
             ValueError: for a name that is taken.
         """
+        own = self._by_package.setdefault(package, {})
+        if not package:
+            self._read_all()  # what the packages call theirs is taken
         for quantity in quantities:
-            if quantity.name in self:
+            if self._find(quantity.name) is not None:
                 raise ValueError(f'quantities: "{quantity.name}" is there already')
-            self._known[quantity.name] = quantity
+            own[quantity.name] = quantity
 
     def __getitem__(self, name: str) -> Quantity:
-        if name in self._known:
-            return self._known[name]
-        return {quantity.key: quantity for quantity in self._known.values()}[name]
+        if self._find(name) is None:
+            self._read_all()
+        found = self._find(name)
+        if found is None:
+            raise KeyError(name)
+        return found
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._known)
+        self._read_all()
+        return iter([name for known in self._by_package.values() for name in known])
 
     def __len__(self) -> int:
-        return len(self._known)
+        self._read_all()
+        return sum(map(len, self._by_package.values()))
+
+    def _find(self, name: str) -> Quantity | None:
+        for known in self._by_package.values():
+            if name in known:
+                return known[name]
+            for quantity in known.values():
+                if quantity.key == name:
+                    return quantity
+        return None
+
+    def _read_all(self) -> None:
+        while self._unread:  # popped first: a package looks names up while it is being imported
+            importlib.import_module(self._unread.pop())
 
 
-quantities = Vocabulary()
+# later layers, so they are not imported here but when one of their names is asked for
+quantities = Vocabulary(
+    ("jaxgear.metrics", "jaxgear.dynamics", "jaxgear.wear", "jaxgear.manufacture"),
+)
 
 
 def quantity_of(of: str | Quantity | Callable[[MeshCycle], Any], owner: str = "quantity") -> Quantity:

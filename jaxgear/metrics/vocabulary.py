@@ -141,4 +141,5 @@ quantities.add(
     Quantity("max_relief", _of_flanks(max_relief), "um", "largest material removed from a flank"),
     Quantity("relief_reversal", _of_flanks(relief_reversal), "um", "by how much removal fails to be monotone"),
     Quantity("removed_volume", _of_flanks(removed_volume), "mm3", "material ground off all flanks"),
+    package=__package__,
 )

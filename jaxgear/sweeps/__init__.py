@@ -1,6 +1,5 @@
 """Many variants, loads or manufactured gears: tables of plans in a resumable store, and the scatter of one design."""
 
-from .. import manufacture as _manufacture  # noqa: F401 - its quantities belong to the vocabulary
 from .monte_carlo import Scatter as Scatter
 from .monte_carlo import monte_carlo as monte_carlo
 from .plan import AbstractPlan as AbstractPlan

@@ -112,4 +112,7 @@ def _quantity(name: str, of: Callable[[MeshCycle], Any]) -> Quantity:
     return Quantity(name, of, kind.unit, kind.meaning, better=kind.better)
 
 
-quantities.add(*(_quantity(name, WithoutSettings(name, "jaxgear.wear.Wear", "wear")) for name in WEAR_QUANTITIES))
+quantities.add(
+    *(_quantity(name, WithoutSettings(name, "jaxgear.wear.Wear", "wear")) for name in WEAR_QUANTITIES),
+    package=__package__,
+)
