@@ -289,6 +289,10 @@ def test_hours_are_weights_with_a_duration():
         (lambda: level_load(rigid()), "at_stations: torque must be given: no coupling tells it"),
         (lambda: level_load(SUPPORT, -1.0), "at_stations: torque = -1 N m must be at least 0 N m"),
         (lambda: level_load(at_stations(SUPPORT, stations=5), 10.0), "at_stations: torque must be that under which"),
+        (
+            lambda: level_load(at_stations(SUPPORT, stations=5), stations=7),
+            "at_stations: stations = 7 must be 5, which",
+        ),
         (lambda: at_torque(support(two_stages_idle(), 0), 5.0), "at_torque: the couplings bring no torque to the mesh"),
         (lambda: FlankLineTolerance(-1.0), "FlankLineTolerance: helix_slope = -1 um must be at least 0 um"),
         (lambda: flank_line_tolerance(PAIR, 6, kind="usual"), "flank_line_tolerance: kind = 'usual' must be"),

@@ -15,7 +15,7 @@ from ..microgeometry import AbstractModification, LeadCrowning, LeadSlope
 from ..numerics import Checked, implicit_root, number, program
 from ..shafts import AbstractSupport, annex_e
 from ..shafts.mesh_support import even_coordinates
-from .stations import STATIONS, Stations, at_stations
+from .stations import Stations, at_stations
 
 Scalar = Float[Array, ""]
 GearName = Literal["pinion", "wheel"]
@@ -43,7 +43,7 @@ class FlankLine(Checked):
 
 
 def level_load(
-    support: AbstractSupport, torque=None, *, hollow: bool = False, stiffness=None, stations: int = STATIONS
+    support: AbstractSupport, torque=None, *, hollow: bool = False, stiffness=None, stations: int | None = None
 ) -> FlankLine:
     """The flank line with the most even load over the face at a torque, by least squares of the line load.
 
@@ -58,7 +58,7 @@ def level_load(
         hollow: whether the crowning may be negative; otherwise it is 0 where that would be best, and the slope is the
             best without it.
         stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1, see `mesh_stiffness`.
-        stations: over the face.
+        stations: over the face; None for 41, or those that `Stations` have.
 
     Raises:
         ValueError: for a torque that is missing or out of range.

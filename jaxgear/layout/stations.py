@@ -94,25 +94,31 @@ def at_torque(support: ShaftSupport, torque) -> ShaftSupport:
     return eqx.tree_at(torques, support, [factor * each for each in torques(support)])
 
 
-def at_stations(support: AbstractSupport, torque=None, *, stations: int = STATIONS) -> Stations:
+def at_stations(support: AbstractSupport, torque=None, *, stations: int | None = None) -> Stations:
     """A support at the stations of the one-dimensional analysis.
 
     Args:
         support: shafts at the mesh, or `RigidSupport`.
         torque: on the pinion [N m]; None for that of the couplings. For another one they are scaled, see `at_torque`.
-        stations: over the face.
+        stations: over the face; None for 41, or those that `Stations` have.
 
     Raises:
         ValueError: for a support without couplings and without a torque, a torque out of range, or another one than
-            that under which `Stations` were worked out.
+            that under which `Stations` were worked out; for another number of stations than they have.
     """
     if isinstance(support, Stations):
         _check_load(support, torque)
+        if stations not in (None, support.count):
+            raise ValueError(
+                f"at_stations: stations = {stations} must be {support.count}, which were worked out; give the support "
+                "itself for others"
+            )
         return support
     if not isinstance(support, ShaftSupport) and torque is None:
         raise ValueError("at_stations: torque must be given: no coupling tells it")
     check("at_stations", "torque", torque, "N m", low=0.0)
-    return _at_stations(support, optional_real(torque), whole("at_stations", "stations", stations, 2, 1001))
+    count = whole("at_stations", "stations", STATIONS if stations is None else stations, 2, 1001)
+    return _at_stations(support, optional_real(torque), count)
 
 
 def _check_load(face: Stations, torque) -> None:

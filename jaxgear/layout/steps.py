@@ -146,10 +146,10 @@ def layout_flank_lines(
         raise ValueError("layout_flank_lines: tolerances must not be empty")
     face = at_stations(support, torque, stations=stations)
     if duty_cycle is None or endurance is None:
-        line = level_load(face, hollow=hollow, stations=stations)
+        line = level_load(face, hollow=hollow)
     else:
         line = longest_life(support, duty_cycle, endurance, hollow=hollow, stations=stations)
-    each = [crowning_off_the_edges(face, one, line=line, share=share, stations=stations) for one in several.values()]
+    each = [crowning_off_the_edges(face, one, line=line, share=share) for one in several.values()]
     needed = jnp.max(jnp.stack(each))
     if not bool(jnp.isfinite(needed)):
         raise ValueError("layout_flank_lines: no crowning keeps the load off the edges: the shafts are too soft")
@@ -162,15 +162,12 @@ def layout_flank_lines(
         needed=needed,
         factors=jnp.stack(
             [
-                annex_e(face, torque=face.torque, wheel=one.modification, stations=stations).face_load_factor
+                annex_e(face, torque=face.torque, wheel=one.modification, stations=face.count).face_load_factor
                 for one in (FlankLine(), line)
             ]
         ),
-        before={name: tolerance_cases(face, one, wheel=line, stations=stations) for name, one in several.items()},
-        after={
-            name: tolerance_cases(face, one, wheel=line.crowned(jnp.sum(added)), stations=stations)
-            for name, one in several.items()
-        },
+        before={name: tolerance_cases(face, one, wheel=line) for name, one in several.items()},
+        after={name: tolerance_cases(face, one, wheel=line.crowned(jnp.sum(added))) for name, one in several.items()},
     )
     if duty_cycle is None or endurance is None:
         return layout

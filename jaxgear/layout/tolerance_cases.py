@@ -18,7 +18,7 @@ from ..numerics import Checked, bracketed_root, check, maximum, number, program,
 from ..shafts import AbstractSupport, FaceLoad, annex_e, axis_tolerance, face_load_factor
 from ..tolerance import ToleranceClass
 from .flank_line import FlankLine
-from .stations import STATIONS, Stations, at_stations
+from .stations import Stations, at_stations
 
 Scalar = Float[Array, ""]
 Cases = Float[Array, " cases"]
@@ -137,7 +137,7 @@ def tolerance_cases(
     wheel: FlankLine | None = None,
     torque=None,
     stiffness=None,
-    stations: int = STATIONS,
+    stations: int | None = None,
 ) -> ToleranceCases:
     """Load over the face without deviations and in the four combinations of the largest ones.
 
@@ -147,7 +147,7 @@ def tolerance_cases(
         pinion, wheel: flank lines; None for none.
         torque: on the pinion [N m]; None for that of the couplings, which are scaled for another one.
         stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1.
-        stations: over the face.
+        stations: over the face; None for 41, or those that `Stations` have.
     """
     face = at_stations(support, torque, stations=stations)
     return _cases(face, tolerance, pinion or FlankLine(), wheel or FlankLine(), stiffness)
@@ -171,7 +171,7 @@ def crowning_off_the_edges(
     torque=None,
     share: float = 1.0,
     stiffness=None,
-    stations: int = STATIONS,
+    stations: int | None = None,
 ) -> Scalar:
     """Smallest further crowning, of both gears together, with which no case touches an edge [um].
 
@@ -186,7 +186,7 @@ def crowning_off_the_edges(
         torque: on the pinion [N m]; None for that of the couplings.
         share: of the largest load inside, up to which an end may be loaded.
         stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1.
-        stations: over the face.
+        stations: over the face; None for 41, or those that `Stations` have.
 
     Returns:
         the crowning, 0 where none is needed; NaN where 16 times the sum of all deviations and of the opening by bent
