@@ -46,7 +46,8 @@ def test_points_of_the_wheel(side, profile, tmp_path):
     np.testing.assert_allclose(x[21:], profile.x, atol=5.1e-7)
     np.testing.assert_allclose(np.hypot(x, y + float(side.gear.root_circle_radius)), size / 2, atol=1e-6)
     np.testing.assert_allclose(radius + y, 150.0, atol=1e-9)
-    assert removed[20] == 6.0 and roll[20] == pytest.approx(float(side.tip_roll_length), abs=1e-6)
+    assert removed[20] == 6.0 and roll[20] == pytest.approx(float(side.tip_roll_length) + 0.006, abs=1e-6)
+    assert size[20] == pytest.approx(154.5709, abs=1e-6), "up to the tip circle"
 
 
 def test_flanks_that_differ(side, profile, tmp_path):
