@@ -86,7 +86,7 @@ class FlankFileSection(Section):
 
     Attributes:
         file: CSV file, beside the design file.
-        gear: of a file with flanks of both gears.
+        gear: of a file with flanks of both gears; the one that the table stands at where the key is left out.
         design: of a file with several designs.
         method: of interpolation along the profile.
     """
