@@ -161,5 +161,7 @@ if __name__ == "__main__":
     print(f"linear and parabolic from the pitch point {PUBLISHED_LINEAR} and {PUBLISHED_PARABOLIC} times as much;")
     parabola = found["reference_parabolic_from_fewest_pairs_mm3"]
     ratios = [found[f"reference_{name}_from_pitch_mm3"] / parabola for name in ("linear", "parabolic")]
-    print(f"of a parabola from the end of single contact, {parabola:.2f} mm3, they are {ratios[0]:.2f} and {ratios[1]:.2f}")
+    print(
+        f"of a parabola from the end of single contact, {parabola:.2f} mm3, {ratios[0]:.2f} and {ratios[1]:.2f} times"
+    )
     draw(results)

@@ -212,8 +212,6 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     tolerance = None
     if top.tolerance is not None:
         tolerance = decode("tolerance", top.tolerance, schema_sweep.ToleranceSection)
-        if top.sweep is None and optimize.manufactured is None:
-            raise DesignFileError("tolerance", "has no effect without [sweep] or optimize.manufactured")
     if top.sweep is not None and not top.variables:
         raise DesignFileError("sweep", "has no effect without [variables]")
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
