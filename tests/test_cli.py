@@ -86,7 +86,7 @@ def call(*arguments):
 def folder(tmp_path_factory):
     """Design files, and the results of one run of each command."""
     folder = tmp_path_factory.mktemp("cli")
-    (folder / "fixed.toml").write_text(FIXED)
+    (folder / "fixed.toml").write_text(FIXED + "[tolerance]\nquality_class = 5\nsamples = 8\n")
     (folder / "free.toml").write_text(FREE)
     return folder
 
@@ -134,6 +134,22 @@ def test_analyze_gives_what_the_library_gives(folder, analyzed):
         float(jg.peak_to_peak(jg.solve(mesh, 60.0, pinion=pinion, wheel=wheel).transmission_error))
     )
     assert table["unmodified_um"] == sorted(table["unmodified_um"])  # without relief PPTE grows with the torque
+
+
+def test_designs_of_a_file_with_tolerances_are_manufactured(folder, analyzed):
+    """All of them by the same random gears: the numbers are those of the library."""
+    file = load_design(folder / "fixed.toml")
+    pinion, wheel = file.design({})
+    tolerance = jg.Tolerance.from_class(file.pair(), 5).without_lead()
+    scatter = jg.monte_carlo(file.mesh(), 50.0, tolerance=tolerance, pinion=pinion, wheel=wheel, samples=8)
+    found = analyzed.summary["designs"]["modified"]["manufactured"]
+    assert found["pairs"] == 8 and found["failed"] == 0
+    assert found["nominal_ppte_um"] == pytest.approx(analyzed.summary["designs"]["modified"]["ppte_um"], rel=1e-6)
+    wanted = [float(value) for value in (scatter.mean, scatter.std, scatter.ppte_quantile95)]
+    assert [found[f"{name}_ppte_um"] for name in ("mean", "std", "q95")] == pytest.approx(wanted)
+    assert found["mean_ppte_um"] > found["nominal_ppte_um"], "deviations spoil a relief that fits"
+    line = f"8 manufactured pairs of quality class 5: PPTE {wanted[0]:.3f} um on average, 95 % below {wanted[2]:.3f} um"
+    assert line in analyzed.out
 
 
 def test_the_summary_says_what_was_computed(analyzed):
@@ -189,6 +205,10 @@ def test_the_reports_hold_what_was_found(folder, analyzed, optimized):
         folder / "analyzed", file, "analyze", file, "-o", folder / "analyzed", "--no-figures", "--report"
     )
     assert "img" not in page.tags
+    (made,) = {page.rows.index(row) for row in page.rows if row[:1] == ["95 % quantile [um]"]}
+    told = [design["manufactured"]["q95_ppte_um"] for design in analyzed.summary["designs"].values()]
+    assert page.rows[made] == ["95 % quantile [um]", *(f"{value:.3f}" for value in told)]
+    assert ["tolerances / quality class", "5"] in page.rows
     file = folder / "free.toml"
     page = check_report(folder / "optimized", file, "optimize", file, "--output", folder / "optimized", "--report")
     printed = [row for row in page.rows if row[0] == "PPTE [um]"]
@@ -199,7 +219,8 @@ def test_the_reports_hold_what_was_found(folder, analyzed, optimized):
 
 
 def test_all_result_files_are_there(folder, analyzed, optimized):
-    of_others = {"front.csv", "front.png", "iterations_relief.png", "iterations_transmission_error.png"}
+    of_others = {"ppte_distribution.png"}  # no tolerances
+    of_others |= {"front.csv", "front.png", "iterations_relief.png", "iterations_transmission_error.png"}
     # one slice shows nothing over the face
     of_others |= {"lead_chart.png", "pressure_map.png", "contact_pattern.png"}
     of_others |= {"line_load.png", "face_gap.png", "face_load_over_torque.png"}

@@ -478,10 +478,6 @@ MALFORMED = {
         "wheel.tip_diameter: tip diameter = 30 mm must be greater than",
     ),
     "bore of the file": (text(wheel="bore_diameter = 140.0"), "wheel.bore_diameter: 140 mm must be less than 136.5"),
-    "tolerance of nothing": (
-        text(tail="[tolerance]\nquality_class = 5"),
-        "tolerance: has no effect without [sweep] or optimize.manufactured",
-    ),
     "nested absurdly": ("a = " + "[" * 100_000, "tables or lists are nested too deeply"),
     "number beyond all bounds": (text().replace("module = 3.0", "module = 1" + "0" * 400), "pinion.module: "),
     "empty": ("", "pinion: missing, this key is required"),

@@ -202,15 +202,19 @@ def test_the_optimum_of_a_curve_is_ground_within_a_micrometre(made):
     assert made["curve_ground_ppte_2_um"] == pytest.approx(made["curve_ppte_um"], abs=0.05)
 
 
-def test_a_micrometre_is_much_for_the_flanks_of_free_form(made):
-    """The iterated flank is ground within a micrometre too, as published, and yet loses what it gained."""
-    assert 0.5 < made["iterated_deviation_2_um"] < 1.0
-    assert made["iterated_deviation_3_um"] < made["iterated_deviation_2_um"]
-    assert made["iterated_ground_ppte_2_um"] > 2 * made["iterated_ppte_um"]
+def test_both_types_of_the_study_are_ground_by_a_parabola_within_a_micrometre(made):
+    """As published; along the radius of the wheel, over which a flank rises more steeply, it is more. Neither is small
+    beside the transmission error that the relief leaves."""
+    assert 0.5 < made["type_1_deviation_2_um"] < 1.0 and 0.2 < made["type_2_deviation_2_um"] < 1.0
+    for name in ("type_1", "type_2"):
+        assert made[f"{name}_deviation_3_um"] < made[f"{name}_deviation_2_um"]
+        lean = made[f"{name}_radial_deviation_2_um"] / made[f"{name}_deviation_2_um"]
+        assert 2.2 < lean < 2.9, "1 / sin of 20 to 27 degrees between flank and centreline"
+    assert made["type_1_ground_ppte_2_um"] > 2 * made["type_1_ppte_um"]
 
 
 def test_reference_volumes_of_the_study(made):
-    parabola = made["reference_parabolic_from_single_mm3"]
+    parabola = made["reference_parabolic_from_fewest_pairs_mm3"]
     assert made["reference_linear_from_pitch_mm3"] / parabola == pytest.approx(2.67, abs=0.01)
     assert made["reference_parabolic_from_pitch_mm3"] / parabola == pytest.approx(1.81, abs=0.01)
 

@@ -1,6 +1,7 @@
 """The form-grinding wheel against closed forms of the involute, its splines against independent fits, volumes."""
 
 from contextlib import contextmanager
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -46,7 +47,7 @@ def side(moving):
 def lengths(moving):
     """Of the relief [mm]: from the pitch point and from the outer point of single contact."""
     contact = moving.path_of_contact
-    return {"pitch": float(contact.end), "single": float(contact.end - contact.outer_single)}
+    return {"pitch": float(contact.end), "fewest_pairs": float(contact.end - contact.outer_single)}
 
 
 def test_tooth_space_of_the_nominal_gear(side):
@@ -66,6 +67,17 @@ def test_space_and_tooth_fill_the_circle():
         size = 2 * np.hypot(space.x, space.y)
         tooth = np.asarray(jg.geometry.tooth_thickness(side.gear, size)) / size
         np.testing.assert_allclose(np.arctan2(space.x, space.y) + tooth, np.pi / float(side.gear.teeth), rtol=1e-9)
+
+
+@pytest.mark.parametrize("amount", [40.0, 6.0, 0.0, -5.0])
+def test_the_wheel_covers_the_flank_up_to_the_tip_circle(side, amount):
+    """Whatever is removed or left at the tip."""
+    relief = jg.TipRelief(amount, 3.0, LINEAR)
+    profile = wheel_profile(side, relief, points=51)
+    assert float(profile.diameter[-1]) == pytest.approx(154.5709, rel=1e-9)
+    assert (np.diff(profile.diameter) > 0).all() and float(profile.removed[-1]) == pytest.approx(amount, rel=1e-2)
+    slope = jax.grad(lambda a: wheel_profile(side, jg.TipRelief(a, 3.0, LINEAR), points=5).x[-1])(amount)
+    assert np.isfinite(float(slope))
 
 
 def test_a_relief_widens_the_space_along_the_normal(side):
@@ -141,10 +153,10 @@ def test_least_squares_fit_and_exact_fits():
 @pytest.mark.parametrize("tangent", [False, True])
 def test_spline_and_its_deviation_are_those_of_the_wheel(side, lengths, criterion, tangent):
     """The distance of the polynomial from the wheel profile, found anew on a dense profile."""
-    relief = jg.TipRelief(6.0, lengths["single"], jg.Power(3.0))
+    relief = jg.TipRelief(6.0, lengths["fewest_pairs"], jg.Power(3.0))
     spline = wheel_spline(side, relief, criterion=criterion, tangent=tangent)
     start = float(spline.node_roll_length)
-    assert start == pytest.approx(float(side.tip_roll_length) - lengths["single"], rel=1e-12)
+    assert start == pytest.approx(float(side.tip_roll_length) - lengths["fewest_pairs"], rel=1e-12)
     roll = jnp.linspace(start, side.tip_roll_length, 2000)
     space = manufacture.space_flank(side, relief, roll)
     x, y = np.asarray(space.x), np.asarray(space.y) - float(side.gear.root_circle_radius)
@@ -163,7 +175,7 @@ def test_spline_and_its_deviation_are_those_of_the_wheel(side, lengths, criterio
 def test_minimax_is_never_worse_than_least_squares(side, lengths):
     """And a cubic, or a polynomial that may kink, is never worse than what it contains."""
     for exponent in (1.0, 2.0, 3.0):
-        relief = jg.TipRelief(6.0, lengths["single"], jg.Power(exponent))
+        relief = jg.TipRelief(6.0, lengths["fewest_pairs"], jg.Power(exponent))
         largest = {
             (degree, criterion, tangent): float(
                 wheel_spline(side, relief, degree=degree, criterion=criterion, tangent=tangent).largest
@@ -186,7 +198,7 @@ def test_reliefs_of_the_study_are_ground_by_a_quadratic_within_a_micrometre(side
             spline = wheel_spline(side, jg.TipRelief(6.0, length, curve))
             assert float(spline.largest) < 0.2
             assert np.abs(spline.radial_deviation).max() < 1.0
-    sharp = jg.TipRelief(20.0, lengths["single"], jg.Power(8.0))
+    sharp = jg.TipRelief(20.0, lengths["fewest_pairs"], jg.Power(8.0))
     assert float(wheel_spline(side, sharp).largest) > 1.0, "and there are reliefs that are not"
 
 
@@ -198,7 +210,7 @@ def test_the_involute_itself_needs_no_polynomial(side):
 
 
 def test_the_best_node_is_no_worse_and_explicit_nodes_are_taken(side, lengths):
-    relief = jg.TipRelief(6.0, lengths["single"], jg.Power(4.0))
+    relief = jg.TipRelief(6.0, lengths["fewest_pairs"], jg.Power(4.0))
     given, best = wheel_spline(side, relief), best_wheel_spline(side, relief)
     assert float(best.largest) < float(given.largest)
     again = wheel_spline(side, relief, node=best.node_roll_length)
@@ -209,7 +221,7 @@ def test_the_best_node_is_no_worse_and_explicit_nodes_are_taken(side, lengths):
 
 def test_what_the_wheel_grinds_is_the_design_and_the_deviation(side, lengths):
     """A table for the mesh: at the places of the spline, and in between on its polynomial."""
-    relief = jg.TipRelief(6.0, lengths["single"], jg.Power(4.0))
+    relief = jg.TipRelief(6.0, lengths["fewest_pairs"], jg.Power(4.0))
     spline = wheel_spline(side, relief)
     flank = side.flank(spline.roll_length, jnp.zeros_like(spline.roll_length))
     np.testing.assert_allclose(spline.ground(flank), relief(flank) + spline.deviation, atol=1e-12)
@@ -239,7 +251,7 @@ def test_deviation_of_the_wheel_is_differentiable(side, lengths, criterion):
         return wheel_spline(side, jg.TabulatedProfile(roll, amounts, method="cubic2"), criterion=criterion).largest
 
     amounts = 6.0 * jnp.linspace(0.0, 1.0, 9) ** 3
-    given = {"least_squares": (of_relief, jnp.asarray([6.0, lengths["single"]])), "minimax": (of_table, amounts)}
+    given = {"least_squares": (of_relief, jnp.asarray([6.0, lengths["fewest_pairs"]])), "minimax": (of_table, amounts)}
     function, x = given[criterion]
     direction = jnp.asarray(np.random.default_rng(0).normal(size=x.size))
     value, forward = jax.jit(lambda x: jax.jvp(function, (x,), (direction,)))(x)
@@ -384,8 +396,8 @@ def test_spaces_that_no_wheel_grinds(side):
 VOLUMES = {
     ("pitch", "linear"): (LINEAR, 15.337),
     ("pitch", "parabolic"): (PARABOLA, 10.399),
-    ("single", "parabolic"): (PARABOLA, 5.747),
-    ("single", "linear"): (LINEAR, 8.544),
+    ("fewest_pairs", "parabolic"): (PARABOLA, 5.747),
+    ("fewest_pairs", "linear"): (LINEAR, 8.544),
 }
 
 
@@ -397,13 +409,31 @@ def test_reference_volumes_of_6_um(side, lengths):
         assert float(found[f"{shape}_from_{start}"]) == pytest.approx(volume, rel=1e-3)
         relief = jg.TipRelief(6.0, lengths[start], curve)
         assert float(manufacture.ground_volume(side, relief)) == pytest.approx(volume, rel=1e-3)
-    parabola = found["parabolic_from_single"]
+    parabola = found["parabolic_from_fewest_pairs"]
     assert float(found["linear_from_pitch"] / parabola) == pytest.approx(2.67, abs=0.005)
     assert float(found["parabolic_from_pitch"] / parabola) == pytest.approx(1.81, abs=0.005)
 
 
+def test_reference_volumes_at_high_contact_ratio():
+    """Between 2 and 3 two pairs are the fewest, and a third one touches over the fraction; V of a line of length D to
+    the tip is 2 z b h / r_b (L D / 2 + D^2 / 3) from the roll length L. A contact ratio below 1 is no mesh."""
+    gear = jg.Gear(60, 2.0, pressure_angle=17.0, addendum=1.35, dedendum=1.6, root_radius=0.2, face_width=20.0)
+    high = kinematics(jg.GearPair(gear, gear), jnp.asarray(0.0), COARSE, "strain")
+    ratio, side = float(high.path_of_contact.contact_ratio), high.sides[0]
+    assert 2.0 < ratio < 3.0
+    length = (ratio - 2) * float(gear.base_pitch)
+    start = float(side.tip_roll_length) - length
+    line = 2 * 60 * 20.0 * 6e-3 / float(gear.base_radius) * (start * length / 2 + length**2 / 3)
+    found = manufacture.reference_volumes(side, 6.0)
+    assert float(found.linear_from_fewest_pairs) == pytest.approx(line, rel=1e-3)
+    assert float(found.parabolic_from_fewest_pairs) < float(found.linear_from_fewest_pairs)
+    short = replace(side, start_roll_length=side.tip_roll_length - 0.9 * gear.base_pitch)
+    with pytest.raises(ValueError, match="reference_volumes: contact ratio = 0.9 must be at least 1"):
+        manufacture.reference_volumes(short, 6.0)
+
+
 def test_relative_volume(side, lengths):
-    relief = jg.TipRelief(3.0, lengths["single"], PARABOLA)
+    relief = jg.TipRelief(3.0, lengths["fewest_pairs"], PARABOLA)
     assert float(manufacture.relative_volume(side, relief)) == pytest.approx(5.747 / 15.337, rel=1e-3)
     assert float(manufacture.relative_volume(side, relief, parabolic=True)) == pytest.approx(5.747 / 10.399, rel=1e-3)
     assert float(manufacture.relative_volume(side, jg.NoModification())) == 0.0

@@ -46,7 +46,8 @@ def test_points_of_the_wheel(side, profile, tmp_path):
     np.testing.assert_allclose(x[21:], profile.x, atol=5.1e-7)
     np.testing.assert_allclose(np.hypot(x, y + float(side.gear.root_circle_radius)), size / 2, atol=1e-6)
     np.testing.assert_allclose(radius + y, 150.0, atol=1e-9)
-    assert removed[20] == 6.0 and roll[20] == pytest.approx(float(side.tip_roll_length), abs=1e-6)
+    assert removed[20] == 6.0 and roll[20] == pytest.approx(float(side.tip_roll_length) + 0.006, abs=1e-6)
+    assert size[20] == pytest.approx(154.5709, abs=1e-6), "up to the tip circle"
 
 
 def test_flanks_that_differ(side, profile, tmp_path):
@@ -211,6 +212,65 @@ def test_what_is_no_flank_is_refused_in_one_line(tmp_path, text, problem):
         io.read_flank(path)
     assert str(caught.value).startswith(f"{path}: ") and problem in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+# active profile of the pinion from 19.585 to 31.718 mm, face of 20 mm
+@pytest.mark.parametrize(
+    ("rolls", "faces", "problem"),
+    [
+        ((19.6, 31.8), (-10.0, 10.0), None),
+        ((21.0, 30.0), (-8.0, 8.0), None),
+        ((20.0, 33.0), (0.0,), "reaches roll length 33 mm, must be at most 31.7181 mm (the tip of the gear)"),
+        ((25.0, 31.7), (0.0,), "starts at roll length 25 mm, must be at most 22.0115 mm (the active profile runs from"),
+        ((12.0, 25.0), (0.0,), "ends at roll length 25 mm, must be at least 29.2915 mm (the active profile runs from"),
+        ((20.0, 31.7), (15.0,), "reaches face coordinate 15 mm, must be within +-10 mm (the face is 20 mm wide)"),
+        ((20.0, 31.7), (-15.0, 15.0), "reaches face coordinate 15 mm, must be within +-10 mm"),
+        ((20.0, 31.7), (-3.0, 10.0), "ends at face coordinate -3 mm, must be beyond +-6 mm (the face is 20 mm wide)"),
+    ],
+)
+def test_a_flank_of_another_gear_or_place_is_refused(side, tmp_path, rolls, faces, problem):
+    """By the reader that is told the side, and by a design file with the gear that the file stands at."""
+    lines = [f"{roll},{face},0.5" for face in faces for roll in rolls]
+    path = written(tmp_path, HEAD + "\n".join(lines))
+    design = written(tmp_path, DESIGN.format(file=path.name, more=""), "design.toml")
+    assert io.read_flank(path) is not None, "no gear, no question"
+    if problem is None:
+        assert type(io.read_flank(path, side=side)) is type(io.load_design(design).design({})[0])
+        return
+    for call, start in (
+        (lambda: io.read_flank(path, side=side), f"{path}: "),
+        (lambda: io.load_design(design), f"{design}: pinion.modification[0].file: measured.csv: "),
+    ):
+        with pytest.raises(io.DesignFileError) as caught:
+            call()
+        assert str(caught.value).startswith(start + problem) and "\n" not in str(caught.value)
+
+
+def test_a_design_file_takes_the_flank_of_the_gear_that_it_stands_at(tmp_path):
+    """Of a file with both; that of the other gear only when it is named."""
+    row = "{gear},0,20,{0}\n{gear},0,31.7,{1}\n"
+    both = "gear,face_coordinate_mm,roll_length_mm,modification_um\n"
+    both += row.format(1, 2, gear="pinion") + row.format(3, 4, gear="wheel")
+    written(tmp_path, both)
+
+    def amounts(more):
+        path = written(tmp_path, DESIGN.format(file="measured.csv", more=more), "design.toml")
+        return io.load_design(path).design({})[0].amount.tolist()
+
+    assert amounts("") == amounts('gear = "pinion"') == [1.0, 2.0] and amounts('gear = "wheel"') == [3.0, 4.0]
+    written(tmp_path, "\n".join(line for line in both.splitlines() if "pinion" not in line))
+    with pytest.raises(io.DesignFileError, match='file: measured.csv: gear = "pinion" is not there, must be one of wh'):
+        amounts("")
+    assert amounts('gear = "wheel"') == [3.0, 4.0]
+
+
+def test_a_side_brings_its_base_radius(side, tmp_path):
+    trace = manufacture.profile_trace(side, jg.TipRelief(6.0, 3.0), points=5)
+    lines = [f"{angle},{design}" for angle, design in zip(trace.roll_angle, trace.design)]
+    path = written(tmp_path, "\n".join(["roll_angle_deg,design_um", *lines]))
+    np.testing.assert_allclose(io.read_flank(path, side=side).position, trace.roll_length, rtol=1e-9)
+    with pytest.raises(ValueError, match="read_flank: base_radius = 70 mm has no effect beside side"):
+        io.read_flank(path, side=side, base_radius=70.0)
 
 
 def test_a_file_that_is_not_there_or_no_text(tmp_path):

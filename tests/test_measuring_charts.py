@@ -88,7 +88,7 @@ def test_face_ends_of_a_wide_gear_are_a_module(side):
 
 def test_deviations_of_known_errors(side):
     """A slope of 10 um over the active profile is 9.5 um over its evaluation range, without any form; a wave of 2 um
-    has the form of twice its amplitude; both add up, and nothing beyond the range counts."""
+    has the form of twice its amplitude; both add up, and nothing that is missing beyond the range counts."""
     design = jg.TipRelief(6.0, 3.0)
     nominal = profile_trace(side, design, points=1001)
     sloped = flank_deviations(side, nominal, profile_trace(side, design + jg.ProfileSlope(10.0), points=1001))
@@ -102,6 +102,23 @@ def test_deviations_of_known_errors(side):
     assert float(waved.form) == pytest.approx(4.0, rel=5e-2)
     chamfer = jg.TipRelief(50.0, 0.04 * (roll[-1] - roll[0]))
     assert float(flank_deviations(side, nominal, profile_trace(side, design + chamfer, points=1001)).total) < 1e-9
+
+
+def test_excess_material_at_the_tip_counts(side):
+    """A lip of 3 um over the last 4 % of the profile, beyond the evaluation range: the slope does not see it, form and
+    total do; on a slope the lip stands on the extended mean line. A trace that runs over the tip ends there."""
+    nominal = profile_trace(side, jg.NoModification(), points=1001)
+    active = nominal.roll_length[-1] - nominal.roll_length[0]
+    lip = jg.TabulatedProfile(nominal.roll_length[-1] - active * jnp.asarray([0.04, 0.03]), [0.0, -3.0])
+    found = flank_deviations(side, nominal, profile_trace(side, lip, points=1001))
+    assert float(found.slope) == pytest.approx(0.0, abs=1e-9)
+    assert float(found.form) == pytest.approx(3.0) == float(found.total)
+    sloped = flank_deviations(side, nominal, profile_trace(side, lip + jg.ProfileSlope(-10.0), points=1001))
+    assert float(sloped.slope) == pytest.approx(9.5) and float(sloped.form) == pytest.approx(3.0)
+    assert float(sloped.total) == pytest.approx(13.0), "from the start to the lip"
+    over = nominal.roll_length + 0.08 * active
+    beyond = [profile_trace(side, each, roll_length=over) for each in (jg.NoModification(), jg.ProfileSlope(-10.0))]
+    assert float(flank_deviations(side, *beyond).slope) == pytest.approx(9.5)
 
 
 def test_deviations_of_the_helix(side):

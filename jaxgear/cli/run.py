@@ -23,6 +23,8 @@ from ..io import (
     write_front,
     write_summary,
 )
+from ..io.cases import tolerance_of
+from ..io.errors import naming
 from ..microgeometry import AbstractModification
 from ..optimize import (
     Front,
@@ -35,7 +37,7 @@ from ..optimize import (
     structure_for,
     verification,
 )
-from . import interrupt, optimum_report, report, written
+from . import interrupt, manufactured, optimum_report, report, written
 from .cache import enable_cache
 from .document import Document, Found
 from .progress import Stages
@@ -71,6 +73,8 @@ class Run:
             verify: whether the designs are evaluated with the finite-element structure too; None where that goes.
         """
         self._stages.begin("preparing the mesh")
+        with naming(self.design.path):
+            self._tolerance = tolerance_of(self.design)
         self._quick = quick
         size = self.design.resolution()
         if finer is not None:
@@ -138,6 +142,10 @@ class Run:
 
     def write(self, *, figures: bool, document: Document | None = None) -> None:
         """Writes the result files, with a report where there is a document."""
+        if self._tolerance is not None:
+            self._stages.begin("manufacturing the designs within their tolerances")
+            of = self.design, self._mesh, self._evaluations
+            self._evaluations = manufactured.scattered(*of, self._tolerance, quick=self._quick)
         self._stages.begin("writing the results")
         self._doubts = report.doubts(self.design, self._mesh, self._evaluations)
         data = written.summary(self.design, self._mesh, self._evaluations, self._torques, self._doubts)
@@ -150,11 +158,13 @@ class Run:
             write_front(self._folder / "front.csv", self._front)
         files = self._draw() if figures else []
         if document is not None:
-            found = Found(list(self._lines()), self._failures(), list(self._doubt_lines()), [self._table()], files)
+            said = list(self._lines()), self._failures(), list(self._doubt_lines()), [self._table()]
+            found = Found(*said, files, manufactured.pages(self.design, self._evaluations))
             document.write(self._folder, self.design, data, found)
 
     def _draw(self) -> list[Path]:
         files = report.write_figures(self._folder, self.design, self._mesh, self._evaluations, self._torques)
+        files += manufactured.write_figures(self._folder, self._evaluations)
         if self._optimum is not None:
             of = self._mesh, self.design.torque, self._optimum, self._front
             files += optimum_report.write_figures(self._folder, *of)
@@ -180,6 +190,7 @@ class Run:
             yield from optimum_report.verdict(self.design, *found, searched_at=self._searched_at)
         if self._front is not None:
             yield from optimum_report.front_lines(self._front)
+        yield from manufactured.lines(self.design, self._evaluations)
         if self._quick:
             yield "quick run: coarse positions and a short search, not a result to build on"
         if self._unverified:
@@ -191,7 +202,7 @@ class Run:
 
     def _failures(self) -> list[str]:
         """What is not to be trusted, or not reached."""
-        failures = list(report.failures(self._evaluations))
+        failures = [*report.failures(self._evaluations), *manufactured.failures(self._evaluations)]
         if self._optimum is not None and not self._optimum.feasible:
             failures.append("constraints are not met")
         return failures

@@ -14,7 +14,7 @@ from ..metrics import face_load_factor, flash_temperature, summary
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..optimize import Verified
-from ..sweeps import over_torques
+from ..sweeps import Scatter, over_torques
 
 _SURFACE_REACH, _SURFACE_TORQUES = 2.0, 21
 
@@ -34,6 +34,7 @@ class Evaluation:
         seconds: what finding and evaluating it took, without compilation of the latter [s].
         verified: what it is worth with the finite-element structure; None where nobody asked.
         face_load: face load factor over the torques; empty on one slice.
+        scatter: over manufactured gears; None where the file has no tolerances.
     """
 
     pinion: AbstractModification
@@ -47,6 +48,7 @@ class Evaluation:
     objectives: dict[str, float] = field(default_factory=dict)
     verified: Verified | None = None
     face_load: np.ndarray = field(default_factory=lambda: np.empty(0))
+    scatter: Scatter | None = None
 
 
 def evaluate(

@@ -16,6 +16,7 @@ from ..metrics import Doubt
 from ..numerics import fields_of
 from ..optimize import Verified
 from ..shafts import RigidSupport
+from . import manufactured
 from .geometry import geometry
 from .report import Evaluations, diameters, reduction
 from .study import Evaluation
@@ -40,6 +41,7 @@ def summary(
         "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
         "center_distance_mm": _center_distance(mesh),
         **_misalignment(mesh),
+        **manufactured.tolerances(file),
         "model": model(mesh),
         "designs": {
             name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
@@ -61,6 +63,7 @@ def _design(evaluation: Evaluation) -> dict[str, Any]:
         **evaluation.metrics,
         **({"objectives": evaluation.objectives} if evaluation.objectives else {}),
         **({"verified": _verified(evaluation.verified)} if evaluation.verified else {}),
+        **manufactured.summary(evaluation),
         "failed_torques_Nm": evaluation.failed_torques,
         "pinion_modification": describe(evaluation.pinion),
         "wheel_modification": describe(evaluation.wheel),

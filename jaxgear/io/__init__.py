@@ -6,7 +6,6 @@ from .dynamics_request import DynamicsRequest as DynamicsRequest
 from .dynamics_request import dynamics_request as dynamics_request
 from .errors import DesignFileError as DesignFileError
 from .flanks import read_flank as read_flank
-from .flanks import write_traces as write_traces
 from .folder import result_folder as result_folder
 from .folder import writing as writing
 from .layout_request import LayoutRequest as LayoutRequest
@@ -24,6 +23,7 @@ from .rexs import read_rexs as read_rexs
 from .rexs import write_rexs as write_rexs
 from .sweep_request import SweepRequest as SweepRequest
 from .sweep_request import sweep_request as sweep_request
+from .traces import write_traces as write_traces
 from .variants import read_variants as read_variants
 from .wear_request import WearRequest as WearRequest
 from .wear_request import wear_request as wear_request

@@ -18,7 +18,7 @@ from ..sizing import iso_stiffness
 from . import schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, template
 from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refuse_given, refused
-from .flanks import flank_part
+from .flanks import check_files, flank_part
 from .gearbox import support_of
 from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
@@ -200,6 +200,8 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
     usual_pair = pair.build(middle)
+    if not pair.free():
+        check_files({"pinion": pinion_flank, "wheel": wheel_flank}, usual_pair)
     built = {part.key: [part.build(end) for end in ends] for part in flanks}
     built[axes.key] = [axes.build(end) for end in ends]
     uneven = [key for key, both in built.items() if any(one.varies_along_face for one in both)]
@@ -210,8 +212,6 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     tolerance = None
     if top.tolerance is not None:
         tolerance = decode("tolerance", top.tolerance, schema_sweep.ToleranceSection)
-        if top.sweep is None and optimize.manufactured is None:
-            raise DesignFileError("tolerance", "has no effect without [sweep] or optimize.manufactured")
     if top.sweep is not None and not top.variables:
         raise DesignFileError("sweep", "has no effect without [variables]")
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]

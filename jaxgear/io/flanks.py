@@ -1,4 +1,4 @@
-"""Flanks as CSV: charts for a measuring machine out, measured or computed flanks in.
+"""Measured or computed flanks from CSV.
 
 Columns end in their unit. `design_um` and `measured_um` have the sign of the machines, positive for excess material;
 `modification_um`, as in `flanks.csv`, is the material removed.
@@ -6,71 +6,28 @@ Columns end in their unit. `design_um` and `measured_um` have the sign of the ma
 
 import csv
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from ..manufacture import Trace
+from ..contact import Side
+from ..geometry import GearPair
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
 from ..numerics import check, real
 from . import schema, template
 from .errors import DesignFileError, naming
-from .folder import writing
+from .flank_range import FlankRange, starts
 from .toml import decode
+from .traces import MEASURED
 
-_PLACE = {
-    "face_coordinate_mm": "face_coordinate",
-    "roll_angle_deg": "roll_angle",
-    "roll_length_mm": "roll_length",
-    "diameter_mm": "diameter",
-    "design_um": "design",
-    "upper_um": "upper",
-    "lower_um": "lower",
-}
-_MEASURED, _REMOVED, _DESIGN = "measured_um", "modification_um", "design_um"
-_AMOUNTS = {_MEASURED: -1.0, _REMOVED: 1.0, _DESIGN: -1.0}  # what makes material removed of the first of them
-_ALONG, _ACROSS = "roll_length_mm", "face_coordinate_mm"
-_SAME_PLACE = 1e-3  # mm, of a measured and a designed point
-_DIGITS = 9  # behind the decimal point: what is read and written again does not drift
+_REMOVED, _DESIGN = "modification_um", "design_um"
+_AMOUNTS = {MEASURED: -1.0, _REMOVED: 1.0, _DESIGN: -1.0}  # what makes material removed of the first of them
+_ALONG, _ACROSS, _GEAR = "roll_length_mm", "face_coordinate_mm", "gear"
 
 Rows = list[dict[str, str]]
-
-
-def write_traces(path: str | Path, traces: Sequence[Trace], measured: Sequence[Trace] | None = None) -> Path:
-    """Writes traces of a flank as CSV, one row per point, as measuring machines and their operators read them.
-
-    Columns: trace, face_coordinate_mm, roll_angle_deg, roll_length_mm, diameter_mm, design_um, upper_um, lower_um and,
-    with `measured`, measured_um. Limits are empty outside the evaluation range.
-
-    Args:
-        path: file to write.
-        traces: of one flank, of `profile_trace` and `helix_trace`.
-        measured: of the same places, trace by trace; None for the design alone.
-
-    Returns:
-        the path.
-
-    Raises:
-        ValueError: when the file cannot be written, or measured traces have other places.
-    """
-    columns = {name: [np.asarray(getattr(trace, field)) for trace in traces] for name, field in _PLACE.items()}
-    if measured is not None:
-        shapes = [[np.shape(trace.design) for trace in many] for many in (traces, measured)]
-        if shapes[0] != shapes[1]:
-            raise ValueError(f"write_traces: measured has traces of {shapes[1]} points, must be {shapes[0]}")
-        for number, (one, other) in enumerate(zip(traces, measured)):
-            for field in ("roll_length", "face_coordinate"):
-                if not np.allclose(getattr(one, field), getattr(other, field), rtol=0, atol=_SAME_PLACE):
-                    raise ValueError(f"write_traces: {field} of measured trace {number} is not that of the design")
-        columns[_MEASURED] = [np.asarray(trace.design) for trace in measured]
-    with writing(path), Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["trace", *columns])
-        for number, trace in enumerate(traces):
-            for row in zip(*(values[number] for values in columns.values())):
-                writer.writerow([trace.kind, *map(_text, row)])
-    return Path(path)
+Method = Literal["linear", "cubic2", "monotonic"]
 
 
 def read_flank(
@@ -78,73 +35,120 @@ def read_flank(
     *,
     gear: str | None = None,
     design: str | None = None,
+    side: Side | None = None,
     base_radius: float | None = None,
-    method: Literal["linear", "cubic2", "monotonic"] = "linear",
+    method: Method = "linear",
 ) -> TabulatedProfile | TabulatedFlank:
     """A flank from a CSV file: a measured one, a chart of `write_traces`, or a flank of `flanks.csv`.
 
     The material is that of measured_um, where there is no such column of modification_um, then of design_um. Places
-    are roll_length_mm, or roll_angle_deg or diameter_mm with a base radius, and face_coordinate_mm. One profile gives a
-    `TabulatedProfile`; profiles at the same places on several lines of the face give a `TabulatedFlank`; so do a
-    profile and a helix (column trace), where every profile is the given one moved by the helix.
+    are roll_length_mm, or roll_angle_deg or diameter_mm with a side or a base radius, and face_coordinate_mm. One
+    profile gives a `TabulatedProfile`; profiles at the same places on several lines of the face give a
+    `TabulatedFlank`; so do a profile and a helix (column trace), where every profile is the given one moved by the
+    helix.
 
     Args:
         path: CSV file in UTF-8 with a line of headings.
         gear: of a file with flanks of both gears, "pinion" or "wheel".
         design: of a file with several designs.
-        base_radius: of the gear [mm], for files without roll lengths.
+        side: the gear's side of the contact, of `mesh.sides`: a table that is not on its flank is refused. It may reach
+            5 % of active profile and face over their ends, and leave out 20 % at each. None takes any table.
+        base_radius: of the gear [mm], for files without roll lengths where no side is given.
         method: of interpolation along the profile.
 
     Raises:
-        ValueError: for a base radius that is not positive.
-        DesignFileError: when the file cannot be read or is no flank; the message is one line.
+        ValueError: for a base radius that is not positive, or beside a side.
+        DesignFileError: when the file cannot be read, is no flank or not one of the side; the message is one line.
     """
     check("read_flank", "base_radius", base_radius, "mm", low=0.0, open_low=True)
+    if side is not None and base_radius is not None:
+        raise ValueError(f"read_flank: base_radius = {base_radius:g} mm has no effect beside side")
     with naming(path):
         rows = _chosen(_read(Path(path)), {"gear": gear, "design": design})
-        amount = next((name for name in _AMOUNTS if name in rows[0]), None)
-        if amount is None:
-            raise DesignFileError("", f"has no column {', '.join(_AMOUNTS)}, must have one")
-        helix = [row for row in rows if row.get("trace") == "helix"]
-        profile = [row for row in rows if row.get("trace") != "helix"]
-        if not profile:
-            raise DesignFileError("", "holds a helix alone, must hold a profile")
-        roll, face, removed = _grid(profile, amount, base_radius)
-        if len(face) > 1 and helix:
-            raise DesignFileError(
-                "", f"has a helix beside profiles at {len(face)} face coordinates, must be one profile"
-            )
-        if helix:
-            along, across, line = _grid(helix, amount, base_radius)
-            if len(along) > 1:
-                raise DesignFileError("", f"has a helix at {len(along)} roll lengths, must be one")
-            if len(across) < 2:
-                raise DesignFileError("", "has a helix of 1 point, must have at least 2")
-            if not across[0] <= face[0] <= across[-1]:
-                at = f"{_ACROSS} = {face[0]:g} mm"
-                raise DesignFileError("", f"has a profile at {at}, must be within the helix")
-            face, removed = across, removed + line - np.interp(face, across, line[0])
-        if len(roll) < 2:
-            raise DesignFileError("", "has 1 place along the profile, must have at least 2")
-        if len(face) == 1:
-            return TabulatedProfile(real(roll), real(removed[:, 0]), method=method)
-        return TabulatedFlank(real(roll), real(face), real(removed), method=method)
+        flank, reach = _table(rows, base_radius if side is None else float(side.base_radius), method)
+        if side is not None:
+            reach.check_on(side.gear, side.start_roll_length, side.face_width)
+        return flank
 
 
 def flank_part(key: str, table: Mapping[str, Any], folder: Path) -> template.Part:
     """The modification of a gear that a table of a design file takes from a CSV file in the folder."""
     given = {name: value for name, value in table.items() if name != "type"}
-    section = decode(key, given, schema.FlankFileSection).given()
-    path = folder / section.pop("file")
+    section = decode(key, given, schema.FlankFileSection)
+    path = folder / section.file
     try:
-        flank = read_flank(path, **section)
+        rows = _read(path)
+        gear = section.gear
+        if gear is None and _GEAR in rows[0]:
+            gear = key.partition(".")[0]
+        flank, reach = _table(_chosen(rows, {_GEAR: gear, "design": section.design}), None, section.method)
     except DesignFileError as error:
         raise DesignFileError(f"{key}.file", f"{path.name}: {error.problem}") from None
-    return template.Part(_as_it_is, {"flank": flank}, key)
+    return template.Part(_FromFile(path.name, reach), {"flank": flank}, key)
 
 
-def _as_it_is(flank: AbstractModification) -> AbstractModification:
-    return flank
+def check_files(parts: Mapping[str, Sequence[template.Part]], pair: GearPair) -> None:
+    """Refuses tables from files that are not on the flank of the gear, of the given name, that they stand at.
+
+    Raises:
+        DesignFileError: in one line that names the key and the file.
+    """
+    for name, several in parts.items():
+        for part in several:
+            if isinstance(part.make, _FromFile):
+                start = starts(pair)[name]
+                try:
+                    part.make.reach.check_on(getattr(pair, name), start, pair.face_width)
+                except DesignFileError as error:
+                    raise DesignFileError(f"{part.key}.file", f"{part.make.name}: {error.problem}") from None
+
+
+@dataclass(frozen=True)
+class _FromFile:
+    """Makes the modification of a part whose flank comes from a file: the flank as it is.
+
+    Attributes:
+        name: of the file.
+        reach: of its table.
+    """
+
+    name: str
+    reach: FlankRange
+
+    def __call__(self, flank: AbstractModification) -> AbstractModification:
+        return flank
+
+
+def _table(
+    rows: Rows, base_radius: float | None, method: Method
+) -> tuple[TabulatedProfile | TabulatedFlank, FlankRange]:
+    """The flank of the rows, and where they are."""
+    amount = next((name for name in _AMOUNTS if name in rows[0]), None)
+    if amount is None:
+        raise DesignFileError("", f"has no column {', '.join(_AMOUNTS)}, must have one")
+    helix = [row for row in rows if row.get("trace") == "helix"]
+    profile = [row for row in rows if row.get("trace") != "helix"]
+    if not profile:
+        raise DesignFileError("", "holds a helix alone, must hold a profile")
+    roll, face, removed = _grid(profile, amount, base_radius)
+    if len(face) > 1 and helix:
+        raise DesignFileError("", f"has a helix beside profiles at {len(face)} face coordinates, must be one profile")
+    if helix:
+        along, across, line = _grid(helix, amount, base_radius)
+        if len(along) > 1:
+            raise DesignFileError("", f"has a helix at {len(along)} roll lengths, must be one")
+        if len(across) < 2:
+            raise DesignFileError("", "has a helix of 1 point, must have at least 2")
+        if not across[0] <= face[0] <= across[-1]:
+            at = f"{_ACROSS} = {face[0]:g} mm"
+            raise DesignFileError("", f"has a profile at {at}, must be within the helix")
+        face, removed = across, removed + line - np.interp(face, across, line[0])
+    if len(roll) < 2:
+        raise DesignFileError("", "has 1 place along the profile, must have at least 2")
+    reach = FlankRange((float(roll[0]), float(roll[-1])), (float(face[0]), float(face[-1])))
+    if len(face) == 1:
+        return TabulatedProfile(real(roll), real(removed[:, 0]), method=method), reach
+    return TabulatedFlank(real(roll), real(face), real(removed), method=method), reach
 
 
 def _read(path: Path) -> Rows:
@@ -240,8 +244,3 @@ def _numbers(rows: Rows, column: str) -> np.ndarray:
         if not np.isfinite(found[index]):
             raise DesignFileError("", f'{column} of point {index + 1} is "{row[column] or ""}", must be a number')
     return found
-
-
-def _text(value: float) -> str:
-    """The shortest text of a number, nothing for NaN."""
-    return "" if np.isnan(value) else repr(round(float(value), _DIGITS) + 0.0)

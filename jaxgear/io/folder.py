@@ -25,6 +25,7 @@ RESULT_FILES = frozenset(
         "load_sharing.png",
         "pressure.png",
         "ppte_over_torque.png",
+        "ppte_distribution.png",
         "harris_map.png",
         "k_chart.png",
         "lead_chart.png",

@@ -41,7 +41,7 @@ class FileSection(Section):
         variables: numbers left open, with their bounds.
         optimize: what `jaxgear optimize` does.
         sweep: what `jaxgear sweep` does.
-        tolerance: of manufactured gears, for a sweep or `optimize.manufactured`.
+        tolerance: of manufactured gears: their scatter, and what a sweep or `optimize.manufactured` judges by.
         dynamics: at which speeds the pair runs, and what vibrates.
         wear: how long the pair runs, and how fast it wears.
         shafts: that carry the gears, for `jaxgear layout`.
@@ -86,7 +86,7 @@ class FlankFileSection(Section):
 
     Attributes:
         file: CSV file, beside the design file.
-        gear: of a file with flanks of both gears.
+        gear: of a file with flanks of both gears; the one that the table stands at where the key is left out.
         design: of a file with several designs.
         method: of interpolation along the profile.
     """

@@ -45,11 +45,11 @@ _CLASS = real(Number(whole=True))
 
 
 class ToleranceSection(section_of(Tolerance, ("pinion", "wheel", "distribution"), open=False)):  # type: ignore[misc]
-    """Deviations of manufactured gears after ISO 1328-1.
+    """Deviations of manufactured gears after ISO 1328-1: the scatter of all designs of analyze and optimize.
 
     Attributes:
         quality_class: of both gears, or of pinion and wheel.
-        samples: manufactured pairs per variant of a sweep.
+        samples: manufactured pairs per design, or variant of a sweep.
         seed: of their deviations.
     """
 

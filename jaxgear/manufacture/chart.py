@@ -14,7 +14,7 @@ from ..contact import Side
 from ..geometry import diameter, roll_angle
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
-from ..numerics import Checked, check, concrete, program, result, spread, whole
+from ..numerics import Checked, check, concrete, maximum, minimum, program, result, whole
 from ..tolerance import ToleranceClass, iso_rounded
 from .spline import relief_start
 
@@ -69,11 +69,20 @@ class FlankPlace(NamedTuple):
 class FlankDeviations(NamedTuple):
     """Deviations of a measured trace from the design trace within the evaluation range (ISO 1328-1) [um].
 
+    Excess material between the evaluation range of a profile and the tip counts for form and total, missing material
+    there, a chamfer, does not; at the ends of the face nothing counts.
+
     Attributes:
-        slope: f_Halpha or f_Hbeta, rise of the mean line over the evaluation range; positive for excess material
-            towards the tip, or towards positive face coordinates.
+        slope: f_Halpha or f_Hbeta, rise of the mean line between the ends of the evaluation range, `profile_range` or
+            `helix_range`; positive for excess material towards the tip, or towards positive face coordinates. Machines
+            that extend the mean line over the whole active profile or face tell more in the ratio of the lengths,
+            1 / 0.95 for a profile.
         form: f_falpha or f_fbeta, width of the band about the mean line.
         total: F_alpha or F_beta, width of the band about the design.
+
+    References:
+        https://stein-sw.de/profil-formabweichung: regression within the evaluation range, and the excess material at
+        the tip that the 2013 edition (DIN ISO 1328-1:2018) takes in.
     """
 
     slope: Scalar
@@ -221,19 +230,20 @@ def flank_deviations(side: Side, design: Trace, measured: Trace) -> FlankDeviati
         raise ValueError(f"flank_deviations: measured is {apart:.3g} mm off the places of the design, must be at them")
     if inside is not None and inside < 2:
         raise ValueError(f"flank_deviations: {inside} points lie in the evaluation range, must be at least 2")
-    return _deviations(place, measured.design - design.design, low, high)
+    end = side.tip_roll_length if design.kind == "profile" else high
+    return _deviations(place, measured.design - design.design, low, high, end)
 
 
 @program
-def _deviations(place: Points, deviation: Points, low: Scalar, high: Scalar) -> FlankDeviations:
-    inside = _between(place, low, high)
+def _deviations(place: Points, deviation: Points, low: Scalar, high: Scalar, end: Scalar) -> FlankDeviations:
+    inside, counted = _between(place, low, high), _between(place, low, end)
     weight = inside.astype(deviation.dtype)
     count = jnp.sum(weight)
     centre, mean = jnp.sum(weight * place) / count, jnp.sum(weight * deviation) / count
     arm = weight * (place - centre)
     rate = jnp.sum(arm * deviation) / jnp.sum(arm * (place - centre))
     rest = deviation - mean - rate * (place - centre)
-    return FlankDeviations(rate * (high - low), _within(rest, inside), _within(deviation, inside))
+    return FlankDeviations(rate * (high - low), _band(rest, inside, counted), _band(deviation, inside, counted))
 
 
 def _between(place: Points, low: Scalar, high: Scalar) -> Bool[Array, " points"]:
@@ -242,10 +252,10 @@ def _between(place: Points, low: Scalar, high: Scalar) -> Bool[Array, " points"]
     return (place >= low - slack) & (place <= high + slack)
 
 
-def _within(values: Points, inside) -> Scalar:
-    """Spread of the values inside."""
+def _band(values: Points, inside, counted) -> Scalar:
+    """From the least of the values inside to the largest of those counted, which holds the ones inside."""
     first = values[jnp.argmax(inside)]
-    return spread(jnp.where(inside, values, first))
+    return maximum(jnp.where(counted, values, first)) - minimum(jnp.where(inside, values, first))
 
 
 def _trace(kind, side: Side, roll: Points, face: Points, removed: Points, inside, total: Scalar | None) -> Trace:

@@ -14,7 +14,7 @@ from ..contact import Side
 from ..geometry import outline
 from ..metrics import gear_volume, removed_at
 from ..microgeometry import AbstractCurve, AbstractModification, Linear, Quadratic, TipRelief
-from ..numerics import check, program, real, safe_divide
+from ..numerics import check, concrete, program, real, safe_divide
 
 Scalar = Float[Array, ""]
 
@@ -24,36 +24,45 @@ class ReferenceVolumes(NamedTuple):
 
     Attributes:
         linear_from_pitch, parabolic_from_pitch: that start at the pitch point.
-        linear_from_single, parabolic_from_single: that start where single contact ends towards the tip.
+        linear_from_fewest_pairs, parabolic_from_fewest_pairs: that start where the contact of the fewest pairs ends
+            towards the tip: single contact below a contact ratio of 2, double contact from there to 3.
     """
 
     linear_from_pitch: Scalar
     parabolic_from_pitch: Scalar
-    linear_from_single: Scalar
-    parabolic_from_single: Scalar
+    linear_from_fewest_pairs: Scalar
+    parabolic_from_fewest_pairs: Scalar
 
 
 def reference_volumes(side: Side, amount) -> ReferenceVolumes:
     """Volumes of the reference reliefs of a gear.
+
+    At a contact ratio of n and a fraction, n pairs are the fewest, and the next pair joins them over the fraction of a
+    base pitch before a tooth leaves at its tip: the length of the reliefs from there. At a whole contact ratio as many
+    pairs touch everywhere and these reliefs are none.
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
         amount: at the tip [um].
 
     Raises:
-        ValueError: for a negative amount.
+        ValueError: for a negative amount, or a contact ratio below 1.
     """
     check("reference_volumes", "amount", amount, "um", low=0.0)
+    check("reference_volumes", "contact ratio", concrete(_contact_ratio(side)), "", low=1.0)
     return _reference_volumes(side, jnp.asarray(amount, side.start_roll_length.dtype))
 
 
 @program
 def _reference_volumes(side: Side, amount: Scalar) -> ReferenceVolumes:
-    pitch = _addendum(side)
-    # the next pair touches at the start of the active profile, one base pitch below
-    single = side.tip_roll_length - side.start_roll_length - side.gear.base_pitch
-    volumes = [_relieved(side, amount, length, curve) for length in (pitch, single) for curve in _curves()]
+    ratio = _contact_ratio(side)
+    joined = (ratio - jnp.floor(ratio)) * side.gear.base_pitch
+    volumes = [_relieved(side, amount, length, curve) for length in (_addendum(side), joined) for curve in _curves()]
     return ReferenceVolumes(*volumes)
+
+
+def _contact_ratio(side: Side) -> Scalar:
+    return (side.tip_roll_length - side.start_roll_length) / side.gear.base_pitch
 
 
 def ground_volume(side: Side, modification: AbstractModification, *, stock=0.0) -> Scalar:

@@ -12,22 +12,25 @@ from jaxtyping import Array, Float
 
 from ..contact import Side
 from ..geometry import outline
+from ..metrics import removed_at
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, check, concrete, minimum, number, program, result
+from ..numerics import Checked, check, concrete, minimum, number, program, result, whole
 from .tooth_space import space_flank
 
 Scalar = Float[Array, ""]
 Profile = Float[Array, " points"]
 
+_SUBSTITUTIONS = 3  # each makes the error smaller by the slope of the flank, 0.01 at most
+
 
 class WheelProfile(NamedTuple):
-    """Active profile of the wheel for one flank, from the form circle to the tip of the gear.
+    """Active profile of the wheel for one flank, from the form circle to the tip circle of the gear.
 
     Attributes:
         x: from the middle plane of the wheel [mm], shape (points,).
         y: from the wheel's outer diameter towards its axis [mm].
         diameter: of the gear, on which the point grinds [mm].
-        roll_length: of the unmodified flank [mm].
+        roll_length: of the unmodified flank [mm]; the last is longer than that of the tip by what is removed there.
         removed: by the modification [um].
     """
 
@@ -77,9 +80,14 @@ def wheel_profile(side: Side, modification: AbstractModification, *, points: int
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
         modification: of the flank, taken in the middle of the face; what varies along the face comes from the feed.
-        points: evenly spaced in roll length from the form circle to the tip.
+        points: evenly spaced in roll length from the form circle to where the modified flank meets the tip circle.
+
+    Raises:
+        ValueError: for less than 2 points.
     """
-    flank = space_flank(side, modification, points=points)
+    whole("wheel_profile", "points", points, 2)
+    roll = jnp.linspace(outline(side.gear).form_roll_length, _end(side, modification), points)
+    flank = space_flank(side, modification, roll)
     y = flank.y - side.gear.root_circle_radius
     return WheelProfile(flank.x, y, 2 * jnp.hypot(flank.x, flank.y), flank.roll_length, flank.removed)
 
@@ -143,6 +151,17 @@ def grinding_faults(wheel: GrindingWheel, side: Side, modification: AbstractModi
     if float(wheel.radius) < least:
         faults.append(f"GrindingWheel: radius = {float(wheel.radius):g} mm must be at least {least:.6g} mm")
     return tuple(faults)
+
+
+def _end(side: Side, modification: AbstractModification) -> Scalar:
+    """Roll length whose point of the modified flank lies on the tip circle [mm].
+
+    Where a relief h moves the tip of the nominal flank inwards, the flank goes on to L - h(L) = L_tip, by substitution.
+    """
+    end = tip = side.tip_roll_length
+    for _ in range(_SUBSTITUTIONS):
+        end = tip + 1e-3 * removed_at(side, modification, end[None])[0]
+    return end
 
 
 def _depth(side: Side) -> Scalar:

@@ -22,6 +22,7 @@ CAPTIONS = {
     "lead_chart": "Modification across the face, at the pitch point. A shaded band is the total helix tolerance of the "
     "quality class.",
     "ppte_over_torque": "PPTE over the torque.",
+    "ppte_distribution": "Share of the manufactured pairs whose PPTE stays below a value.",
     "harris_map": "Harris map: transmission error over two base pitches at several torques.",
     "response_surface": "Transmission error over phase and torque.",
     "face_load_over_torque": "Face load factor over the torque.",
