@@ -134,10 +134,10 @@ class Lubricant(Checked):
 
 def _check_less(lubricant: Lubricant, name: str, other: str, unit: str) -> None:
     """Refuses a number that is not less than another one; tracers pass."""
-    low, high = getattr(lubricant, name), getattr(lubricant, other)
-    if low is None or high is None or concrete(low) is None or concrete(high) is None:
+    values = getattr(lubricant, name), getattr(lubricant, other)
+    known = [concrete(value) for value in values if value is not None]
+    if len(known) < len(values) or known[0] is None or known[1] is None:
         return
+    low, high = (float(value) for value in known)
     if low >= high:
-        raise ValueError(
-            f"Lubricant: {name} = {float(low):g} {unit} must be less than {other} = {float(high):g} {unit}"
-        )
+        raise ValueError(f"Lubricant: {name} = {low:g} {unit} must be less than {other} = {high:g} {unit}")
