@@ -17,6 +17,7 @@ from .quantity import Quantity
 from .settings import with_settings
 
 Real = Float[Array, "..."]
+Given = Real | float
 Scalar = Float[Array, ""]
 Base = Literal["mineral", "pao", "pag"]
 FrictionLaw = Literal["schlenk", "iso_6336_20", "iso_6336_22"]
@@ -94,23 +95,23 @@ class Lubricant(Checked):
             return self.friction_factor
         return jnp.full_like(self.viscosity_40, BASES[self.base].friction_factor)
 
-    def kinematic_viscosity(self, temperature: Real) -> Real:
+    def kinematic_viscosity(self, temperature: Given) -> Real:
         """nu [mm2/s] at a temperature [degC]: log log (nu + 0.7) is linear in the logarithm of the absolute one."""
         cold, hot = (jnp.log(jnp.log(nu + _WALTHER)) for nu in (self.viscosity_40, self.viscosity_100))
         span = jnp.log((_HIGH + _KELVIN) / (_LOW + _KELVIN))
         way = jnp.log((temperature + _KELVIN) / (_LOW + _KELVIN)) / span
         return jnp.exp(jnp.exp(cold + (hot - cold) * way)) - _WALTHER
 
-    def density_at(self, temperature: Real) -> Real:
+    def density_at(self, temperature: Given) -> Real:
         """[kg/m^3] at a temperature [degC], 0.7 kg/m^3 less per kelvin."""
         at_15 = 43.37 * jnp.log10(self.viscosity_40) + 805.5 if self.density is None else self.density
         return at_15 - _DENSITY_SLOPE * (temperature + _ISO_KELVIN - _DENSITY_REFERENCE)
 
-    def viscosity(self, temperature: Real) -> Real:
+    def viscosity(self, temperature: Given) -> Real:
         """Dynamic viscosity eta [Pa s] at a temperature [degC]."""
         return 1e-6 * self.kinematic_viscosity(temperature) * self.density_at(temperature)
 
-    def pressure_viscosity(self, temperature: Real) -> Real:
+    def pressure_viscosity(self, temperature: Given) -> Real:
         """alpha [1/Pa] at a temperature [degC]: alpha_38 (1 + 516 (1 / T - 1 / 311)), T absolute; from 510 degC on
         negative: the oil is none any more."""
         base = BASES[self.base]

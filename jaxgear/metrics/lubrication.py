@@ -164,7 +164,7 @@ def _mean_over_path(cycle: MeshCycle, field: Load) -> Scalar:
     """Mean of a field over the path of contact, where it is not zero, and over the face."""
     kinematics = cycle.kinematics
     width = kinematics.slice_width
-    over_face = jnp.sum(field * width[:, None], axis=1) / jnp.sum(width)
+    over_face = jnp.einsum("psn,s->pn", field, width) / jnp.sum(width)
     # every position stands for as much of the path as there are pairs on it
     return safe_divide(jnp.sum(jnp.mean(over_face, axis=-1)), kinematics.path_of_contact.contact_ratio)
 
