@@ -60,10 +60,9 @@ def evaluate(
     curves = np.asarray([cycle.transmission_error for cycle in cycles])
     converged = np.asarray([cycle.converged for cycle in cycles]) & np.isfinite(curves)
     # without the flanks: one program serves every kind of them
-    bare = replace(cycles[0], pinion=None, wheel=None)
-    running = replace(bare, operation=Operation(file.torque, file.speed, file.friction))
-    rated = tuple(quantities_of_tables(file))
-    metrics = jax.tree.map(np.asarray, _numbers(bare) | (_rated(running, rated) if rated else {}))
+    running = Operation(file.torque, file.speed, file.friction)
+    bare = replace(cycles[0], pinion=None, wheel=None, operation=running)
+    metrics = jax.tree.map(np.asarray, _numbers(bare, tuple(quantities_of_tables(file))))
     return Evaluation(
         pinion=pinion,
         wheel=wheel,
@@ -101,11 +100,6 @@ def _factor(cycle: MeshCycle):
 
 
 @program
-def _numbers(cycle: MeshCycle):
-    return summary(cycle)
-
-
-@program
-def _rated(cycle: MeshCycle, quantities: tuple[Quantity, ...]):
-    """Numbers of a cycle that need more than it, by name and unit."""
-    return {quantity.key: quantity(cycle) for quantity in quantities}
+def _numbers(cycle: MeshCycle, further: tuple[Quantity, ...]):
+    """The numbers of a cycle, and some quantities, by name and unit."""
+    return summary(cycle) | {quantity.key: quantity(cycle) for quantity in further}

@@ -15,7 +15,7 @@ from ..contact import Operation, Resolution
 from ..dynamics import Dynamics
 from ..geometry import Gear, GearPair, Material
 from ..layout import WoehlerLine
-from ..metrics import quantities
+from ..metrics import Lubricant, Strength, quantities
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from ..shafts import Misalignment

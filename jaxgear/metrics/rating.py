@@ -21,7 +21,7 @@ from .lubrication import (
     mesh_efficiency,
     specific_film_thickness,
 )
-from .quantity import Quantity, quantities
+from .quantity import Quantity
 from .safety import micropitting_safety, pitting_safety, pressure_safety, root_safety, scuffing_safety
 from .settings import WithoutSettings
 
@@ -49,7 +49,7 @@ def _borne(name: str, of: Any, meaning: str, needs: str, **options: Any) -> Quan
 
 _LEAST: dict[str, Any] = {"reduction": Min(), "better": "larger"}
 
-_LUBRICATED = (
+LUBRICATED = (
     _oiled(
         "max_flash_temperature",
         lubricated_flash_temperature,
@@ -107,7 +107,7 @@ _LUBRICATED = (
         **_LEAST,
     ),
 )
-_RATED = (
+RATED = (
     *(
         _borne(f"{gear}_pitting_safety", of, f"S_H, pitting strength over nominal contact stress, {gear}", "pitting")
         for gear, of in (
@@ -138,6 +138,5 @@ _RATED = (
         local=True,
     ),
 )
-LUBRICANT_QUANTITIES = tuple(quantity.name for quantity in _LUBRICATED)
-STRENGTH_QUANTITIES = tuple(quantity.name for quantity in _RATED)
-quantities.add(*_LUBRICATED, *_RATED, package=__package__)
+LUBRICANT_QUANTITIES = tuple(quantity.name for quantity in LUBRICATED)
+STRENGTH_QUANTITIES = tuple(quantity.name for quantity in RATED)

@@ -13,6 +13,7 @@ from .flank import max_relief, relief_reversal, removed_volume
 from .load import contact_shock, corner_force, effective_contact_ratio
 from .loss import loss_factor
 from .quantity import Quantity, quantities
+from .rating import LUBRICATED, RATED
 from .root_stress import root_stress
 
 Scalar = Float[Array, ""]
@@ -150,5 +151,7 @@ quantities.add(
     Quantity("max_relief", _of_flanks(max_relief), "um", "largest material removed from a flank"),
     Quantity("relief_reversal", _of_flanks(relief_reversal), "um", "by how much removal fails to be monotone"),
     Quantity("removed_volume", _of_flanks(removed_volume), "mm3", "material ground off all flanks"),
+    *LUBRICATED,
+    *RATED,
     package=__package__,
 )
