@@ -14,7 +14,7 @@ from scipy.stats.mstats import hdquantiles
 
 import jaxgear as jg
 from jaxgear.dynamics import DYNAMIC_QUANTITIES
-from jaxgear.metrics import quantities
+from jaxgear.metrics import LUBRICANT_QUANTITIES, STRENGTH_QUANTITIES, quantities
 from jaxgear.sweeps.selection import front, smallest
 from jaxgear.sweeps.store import Store, load_manifest
 from jaxgear.wear import WEAR_QUANTITIES
@@ -22,7 +22,7 @@ from jaxgear.wear import WEAR_QUANTITIES
 BOUNDS = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.5)}
 # without those that need a speed, several slices or settings
 SLICED = "face_load_factor", "root_face_load_factor", "edge_load_factor"
-OTHERS = ("max_flash_temperature", *SLICED, *DYNAMIC_QUANTITIES, *WEAR_QUANTITIES)
+OTHERS = (*LUBRICANT_QUANTITIES, *STRENGTH_QUANTITIES, *SLICED, *DYNAMIC_QUANTITIES, *WEAR_QUANTITIES)
 NAMES = tuple(name for name in quantities if name not in OTHERS)
 FEW = ("ppte", "max_flank_pressure", "effective_contact_ratio")
 PLAN = jg.Sobol(BOUNDS, 40, seed=5)

@@ -38,6 +38,8 @@ _INPUTS = (
     "torque_range_Nm",
     "speed_rpm",
     "friction",
+    "lubricant",
+    "strength",
     "mesh_frequencies_Hz",
     "speeds",
     "settings",

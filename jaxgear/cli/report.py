@@ -23,7 +23,9 @@ Evaluations = Mapping[str, Evaluation]
 # metric -> label and format; a metric without contact outside the path is 0 and says so
 _ROWS = {
     "ppte_um": ("PPTE [um]", ".3f"),
+    "relative_ppte": ("PPTE over mean transmission error", ".4f"),
     "mean_te_um": ("mean transmission error [um]", ".3f"),
+    "force_excitation_N": ("force excitation, peak to peak [N]", ".1f"),
     "max_flank_pressure_MPa": ("max flank pressure [MPa]", ".0f"),
     "max_corner_pressure_MPa": ("max corner pressure [MPa]", ".0f"),
     "contact_ratio": ("contact ratio", ".3f"),
@@ -32,7 +34,21 @@ _ROWS = {
     "wheel_root_stress_MPa": ("wheel root stress [MPa]", ".1f"),
     "face_load_factor": ("face load factor K_Hbeta", ".3f"),
     "mesh_loss_factor": ("mesh loss factor", ".4f"),
+    "friction_coefficient": ("mean coefficient of friction", ".4f"),
+    "loss_power_W": ("power loss of the flanks [W]", ".4g"),
+    "mesh_efficiency": ("efficiency of the mesh", ".5f"),
     "max_flash_temperature_K": ("max flash temperature [K]", ".1f"),
+    "bulk_temperature_degC": ("bulk temperature [degC]", ".1f"),
+    "max_contact_temperature_degC": ("max contact temperature [degC]", ".1f"),
+    "min_film_thickness_um": ("min film thickness [um]", ".3f"),
+    "min_specific_film_thickness": ("min specific film thickness", ".3f"),
+    "pinion_pitting_safety": ("pinion pitting safety S_H", ".2f"),
+    "wheel_pitting_safety": ("wheel pitting safety S_H", ".2f"),
+    "pinion_root_safety": ("pinion root safety S_F", ".2f"),
+    "wheel_root_safety": ("wheel root safety S_F", ".2f"),
+    "pressure_safety": ("pressure safety p_lim / p_max", ".2f"),
+    "micropitting_safety": ("micropitting safety S_lambda", ".2f"),
+    "scuffing_safety": ("scuffing safety S_B", ".2f"),
 }
 _BY_FINITE_ELEMENTS = "  by finite elements"
 _HARRIS_CURVES = 7

@@ -5,12 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from ..contact import Mesh, MeshCycle
-from ..io import DesignFile
-from ..metrics import face_load_factor, flash_temperature, summary
+from ..contact import Mesh, MeshCycle, Operation
+from ..io import DesignFile, quantities_of_tables
+from ..metrics import Quantity, face_load_factor, summary
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..optimize import Verified
@@ -63,8 +62,9 @@ def evaluate(
     curves = np.asarray([cycle.transmission_error for cycle in cycles])
     converged = np.asarray([cycle.converged for cycle in cycles]) & np.isfinite(curves)
     # without the flanks: one program serves every kind of them
-    heat = (None if value is None else jnp.asarray(value) for value in (file.speed, file.friction))
-    metrics = jax.tree.map(np.asarray, _numbers(replace(cycles[0], pinion=None, wheel=None), *heat))
+    running = Operation(file.torque, file.speed, file.friction)
+    bare = replace(cycles[0], pinion=None, wheel=None, operation=running)
+    metrics = jax.tree.map(np.asarray, _numbers(bare, tuple(quantities_of_tables(file))))
     return Evaluation(
         pinion=pinion,
         wheel=wheel,
@@ -102,10 +102,6 @@ def _factor(cycle: MeshCycle):
 
 
 @program
-def _numbers(cycle: MeshCycle, speed, friction):
-    """The numbers of a cycle, with the flash temperature where there is a speed [rpm]."""
-    values = summary(cycle)
-    if speed is not None:
-        options = {} if friction is None else {"friction": friction}
-        values["max_flash_temperature_K"] = jnp.max(flash_temperature(cycle, speed, **options))
-    return values
+def _numbers(cycle: MeshCycle, further: tuple[Quantity, ...]):
+    """The numbers of a cycle, and some quantities, by name and unit."""
+    return summary(cycle) | {quantity.key: quantity(cycle) for quantity in further}

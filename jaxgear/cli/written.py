@@ -13,7 +13,7 @@ from ..contact import Mesh, Resolution
 from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..metrics import Doubt
-from ..numerics import fields_of
+from ..numerics import Number, fields_of
 from ..optimize import Verified
 from ..shafts import RigidSupport
 from . import manufactured
@@ -42,6 +42,7 @@ def summary(
         "center_distance_mm": _center_distance(mesh),
         **_misalignment(mesh),
         **manufactured.tolerances(file),
+        **{name: _numbers(part) for name in ("lubricant", "strength") if (part := getattr(file, name)) is not None},
         "model": model(mesh),
         "designs": {
             name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
@@ -82,11 +83,25 @@ def _gear(gear: Gear) -> dict[str, Any]:
     data: dict[str, Any] = {}
     for part in (gear, gear.material):
         for name, field in fields_of(type(part)).items():
-            unit = "" if field.unit == "x module" else field.unit.replace(" ", "").replace("/", "_per_")
-            value = derived.get(name, getattr(part, name))
-            data[f"{name}_{unit}" if unit else name] = np.asarray(value)
+            data[_key(name, field)] = np.asarray(derived.get(name, getattr(part, name)))
     data["bore_given"] = gear.bore_diameter is not None
     return data
+
+
+def _numbers(part: eqx.Module) -> dict[str, Any]:
+    """Numbers and choices that a part has, by name and unit."""
+    given = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+    numbers = fields_of(type(part))
+    return {
+        _key(name, numbers[name]) if name in numbers else name: value
+        for name, value in given.items()
+        if value is not None
+    }
+
+
+def _key(name: str, field: Number) -> str:
+    unit = "" if field.unit == "x module" else field.unit.replace(" ", "").replace("/", "_per_")
+    return f"{name}_{unit}" if unit else name
 
 
 def _center_distance(mesh: Mesh) -> float:

@@ -78,6 +78,11 @@ class Cases(Checked):
         return len(self.torque) * self.samples
 
     @property
+    def first(self) -> Operation:
+        """The first load."""
+        return Operation(self.torque[0], None if self.speed is None else self.speed[0], self.friction)
+
+    @property
     def weights(self) -> Float[Array, " cases"]:
         """Weight of every case, torques first; sum 1."""
         return _repeated(self.weight, self.samples)

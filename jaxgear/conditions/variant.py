@@ -101,10 +101,10 @@ class Variants(Checked):
         def made(values, mesh):
             whole = self if mesh is None else eqx.tree_at(lambda tree: tree.mesh, self, mesh)
             variant = whole(values)
-            torque = variant.cases.torque[0]
-            removed = removed_material(variant.mesh, torque, pinion=variant.pinion, wheel=variant.wheel)
+            first = variant.cases.first
+            removed = removed_material(variant.mesh, first.torque, pinion=variant.pinion, wheel=variant.wheel)
             own = None if mesh is not None else (variant.mesh, variant.cases)
-            return removed, torque, eqx.filter(own, eqx.is_array)
+            return removed, first, eqx.filter(own, eqx.is_array)
 
         mesh = self.mesh if isinstance(self.mesh, Mesh) else None
         closed, _, _ = eqx.filter_make_jaxpr(made)(tuple(values), mesh)

@@ -10,6 +10,7 @@ from .folder import result_folder as result_folder
 from .folder import writing as writing
 from .layout_request import LayoutRequest as LayoutRequest
 from .layout_request import layout_request as layout_request
+from .named import quantities_of_tables as quantities_of_tables
 from .optimize_request import OptimizeRequest as OptimizeRequest
 from .optimize_request import optimize_request as optimize_request
 from .reference import reference as reference

@@ -11,11 +11,12 @@ from jaxtyping import Array, Float
 from ..compliance import AbstractCompliance
 from ..contact import Mesh, Operation, Resolution, begin_contact, fewest_pairs, prepare
 from ..geometry import Gear, GearPair
+from ..metrics import Lubricant, Strength
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
-from . import schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, template
+from . import rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, template
 from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refuse_given, refused
 from .flanks import check_files, flank_part
@@ -55,6 +56,8 @@ class DesignFile:
         tolerance: likewise, see `sweep_request`.
         dynamics: likewise, see `dynamics_request`.
         wear: likewise, see `wear_request`.
+        lubricant: the oil; None if the file has none.
+        strength: what the gears bear; None if the file does not say.
         layout: likewise, see `layout_request`.
         support: the mesh on its shafts; None without them.
         design: makes the modifications of pinion and wheel from the free parameters.
@@ -74,6 +77,8 @@ class DesignFile:
     tolerance: schema_sweep.ToleranceSection | None
     dynamics: schema_dynamics.DynamicsSection | None
     wear: schema_wear.WearSection | None
+    lubricant: Lubricant | None
+    strength: Strength | None
     layout: schema_shafts.LayoutSection | None
     support: ShaftSupport | None
     design: FileDesign
@@ -237,6 +242,8 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         tolerance=tolerance,
         dynamics=None if top.dynamics is None else decode("dynamics", top.dynamics, schema_dynamics.DynamicsSection),
         wear=None if top.wear is None else decode("wear", top.wear, schema_wear.WearSection),
+        lubricant=rating.lubricant_of(top.lubricant, load, file.parent),
+        strength=rating.strength_of(top.strength, file.parent),
         layout=layout,
         support=support_of(top, layout, usual_pair, torque, file.parent),
         design=FileDesign(tuple(bounds), pinion_flank, wheel_flank),

@@ -1,11 +1,14 @@
 """What the names of quantities in a design file mean."""
 
+from collections.abc import Iterator
+
 from ..dynamics import DYNAMIC_QUANTITIES
 from ..metrics import Quantity, quantities
+from ..metrics.settings import WithoutSettings, without_settings
 from ..wear import WEAR_QUANTITIES
 from .design_file import DesignFile
 from .dynamics_request import dynamic_quantity
-from .errors import check_known
+from .errors import DesignFileError, check_known
 from .wear_request import wear_quantity
 
 
@@ -24,4 +27,37 @@ def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
     plain = quantities[name].name
     if plain in DYNAMIC_QUANTITIES:
         return dynamic_quantity(design, key, plain)
-    return wear_quantity(design, key, plain) if plain in WEAR_QUANTITIES else name
+    if plain in WEAR_QUANTITIES:
+        return wear_quantity(design, key, plain)
+    stands = without_settings(quantities[plain])
+    if stands is None:
+        return name
+    missing = _missing(design, stands)
+    if missing:
+        raise DesignFileError(key, f'"{plain}" needs {missing}')
+    settings = getattr(design, stands.table)
+    return name if settings is None else settings.quantity(plain)
+
+
+def quantities_of_tables(design: DesignFile) -> Iterator[Quantity]:
+    """All quantities that need a speed, a lubricant or strengths, as far as a design file tells what they need."""
+    for name, quantity in quantities.items():
+        stands = without_settings(quantity)
+        if stands is None or stands.of is None or _missing(design, stands):
+            continue
+        settings = getattr(design, stands.table)
+        yield quantity if settings is None else settings.quantity(name)
+
+
+def _missing(design: DesignFile, stands: WithoutSettings) -> str:
+    """What a design file lacks for a quantity of the tables [lubricant] and [strength]; "" for nothing."""
+    settings = getattr(design, stands.table)
+    if settings is not None:
+        unset = stands.needs is not None and getattr(settings, stands.needs) is None
+        return f"{stands.table}.{stands.needs}" if unset else ""
+    if stands.otherwise is None:
+        return f"the table [{stands.table}]"
+    for name in stands.operation:
+        if getattr(design, name) is None:
+            return f"load.{name}" + (f" or the table [{stands.table}]" if name != "speed" else "")
+    return ""

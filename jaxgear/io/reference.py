@@ -15,13 +15,13 @@ from ..contact import Operation, Resolution
 from ..dynamics import Dynamics
 from ..geometry import Gear, GearPair, Material
 from ..layout import WoehlerLine
-from ..metrics import quantities
+from ..metrics import Lubricant, Strength, quantities
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from ..shafts import Misalignment
 from ..tolerance import Tolerance
 from ..wear import Wear
-from . import schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear
+from . import rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear
 from .layout import Section, family, meanings, section_of, snake, summary
 from .ranges import allowed
 
@@ -71,6 +71,8 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     yield "[tolerance]", schema_sweep.ToleranceSection, Tolerance
     yield "[dynamics]", schema_dynamics.DynamicsSection, Dynamics
     yield "[wear]", schema_wear.WearSection, Wear
+    yield "[lubricant]", rating.LubricantSection, Lubricant
+    yield "[strength]", rating.StrengthSection, Strength
     yield from _gearbox_tables()
 
 

@@ -44,6 +44,8 @@ class FileSection(Section):
         tolerance: of manufactured gears: their scatter, and what a sweep or `optimize.manufactured` judges by.
         dynamics: at which speeds the pair runs, and what vibrates.
         wear: how long the pair runs, and how fast it wears.
+        lubricant: the oil that they run in.
+        strength: what the gears bear.
         shafts: that carry the gears, for `jaxgear layout`.
         meshes: of their gears; that of pinion and wheel alone without it.
         housing: that holds their bearings; rigid seats without it.
@@ -64,6 +66,8 @@ class FileSection(Section):
     tolerance: Annotated[Tables | None, table()] = None
     dynamics: Annotated[Tables | None, table()] = None
     wear: Annotated[Tables | None, table()] = None
+    lubricant: Annotated[Tables | None, table()] = None
+    strength: Annotated[Tables | None, table()] = None
     shafts: Annotated[list[Tables], _TABLES] = []
     meshes: Annotated[list[Tables], _TABLES] = []
     housing: Annotated[Tables | None, table()] = None
@@ -107,8 +111,8 @@ class LoadSection(section_of(Operation)):  # type: ignore[misc]
     Attributes:
         torque: design torque on the pinion.
         torque_range: lowest and highest torque of interest; half and twice the design torque without it.
-        speed: of the pinion, for the flash temperature.
-        friction: mean coefficient of friction, used with a speed only.
+        speed: of the pinion, for temperatures, film and loss.
+        friction: mean coefficient of friction, used with a speed only; in place of the law of [lubricant].
     """
 
     torque: Annotated[Any, real(Number("N m", low=0.0, open_low=True), open=True)]

@@ -9,6 +9,7 @@ from .quantity import quantities
 
 _SUMMARY = (
     "ppte",
+    "relative_ppte",
     "mean_te",
     "unloaded_ppte",
     "max_flank_pressure",
@@ -20,7 +21,10 @@ _SUMMARY = (
     "corner_force",
     "pinion_root_stress",
     "wheel_root_stress",
+    "pinion_contact_stress",
+    "wheel_contact_stress",
     "mesh_loss_factor",
+    "force_excitation",
 )
 
 _OVER_FACE = ("face_load_factor", "root_face_load_factor", "edge_load_factor")  # of several slices

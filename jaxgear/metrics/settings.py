@@ -4,8 +4,11 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+import jax
+
 from ..contact import MeshCycle
 from ..numerics import Checked, concrete
+from .quantity import Quantity, quantities
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,17 +56,66 @@ class WithoutSettings:
         name: of the quantity.
         settings: class that gives it, as it is written.
         table: of a design file that holds them.
+        of: computes it from a cycle and the settings; None where the class does it by itself.
+        needs: field of the settings that must be given.
+        otherwise: computes it from a cycle alone; None where nothing can.
+        operation: what the load must say for that: fields of an `Operation`.
     """
 
     name: str
     settings: str
     table: str
+    of: Callable[[MeshCycle, Any], Any] | None = None
+    needs: str | None = None
+    otherwise: Callable[[MeshCycle], Any] | None = None
+    operation: tuple[str, ...] = ()
 
     def __call__(self, cycle: MeshCycle) -> Any:
+        if self.otherwise is not None:
+            return self.otherwise(cycle)
         raise ValueError(
             f'{self.name}: needs settings, give {self.settings}(...).quantity("{self.name}"), or a design '
             f"file with the table [{self.table}]"
         )
+
+
+def with_settings(name: str, settings: Checked) -> Quantity:
+    """A quantity of the vocabulary with the settings that it needs; equal settings make equal quantities.
+
+    Args:
+        name: of a quantity that the class of the settings gives.
+        settings: of concrete numbers.
+
+    Raises:
+        ValueError: for another name, settings that are being traced, or a field that must be given and is not.
+    """
+    owner = type(settings).__name__
+    stands = _given_by(owner, quantities.get(name))
+    if stands is None:
+        known = ", ".join(each.name for each in quantities.values() if _given_by(owner, each))
+        raise ValueError(f'{owner}: quantity "{name}" is not known, must be one of {known}')
+    if stands.needs is not None and getattr(settings, stands.needs) is None:
+        raise ValueError(f'{owner}: quantity "{name}" needs {stands.needs}')
+    return dataclasses.replace(quantities[name], of=settled(name, settings, _by_settings))
+
+
+def without_settings(quantity: Quantity) -> WithoutSettings | None:
+    """What stands in the vocabulary for a quantity of settings; None for any other one."""
+    return quantity.of if isinstance(quantity.of, WithoutSettings) else None
+
+
+def _given_by(owner: str, quantity: Quantity | None) -> WithoutSettings | None:
+    """What stands for a quantity that `with_settings` gives for a class of settings; None for any other one."""
+    stands = None if quantity is None else without_settings(quantity)
+    return stands if stands and stands.of and stands.settings.rpartition(".")[2] == owner else None
+
+
+def _by_settings(given: WithSettings, cycle: MeshCycle) -> Any:
+    stands = without_settings(quantities[given.name])
+    assert stands is not None and stands.of is not None  # `with_settings` has looked
+    dtype = cycle.transmission_error.dtype
+    settings = jax.tree.map(lambda number: number.astype(dtype), given.settings)
+    return stands.of(cycle, settings)
 
 
 def _hashable(owner: str, name: str, value: Any) -> Any:

@@ -6,12 +6,14 @@ from jaxtyping import Array, Float
 from ..contact import MeshCycle
 from ..geometry import margins
 from ..numerics.reductions import Average, Harmonic, Max, Min, Range, Rms
+from .contact_stress import nominal_contact_stress
+from .excitation import force_excitation, relative_transmission_error
 from .face_load import edge_load_factor, face_load_factor, root_face_load_factor
 from .flank import max_relief, relief_reversal, removed_volume
-from .flash import flash_temperature
 from .load import contact_shock, corner_force, effective_contact_ratio
 from .loss import loss_factor
 from .quantity import Quantity, quantities
+from .rating import LUBRICATED, RATED
 from .root_stress import root_stress
 
 Scalar = Float[Array, ""]
@@ -43,14 +45,6 @@ def mean_removed_material(cycle: MeshCycle) -> Scalar:
     return jnp.sum(removed) / jnp.sum(inside.astype(removed.dtype))
 
 
-def _flash(cycle: MeshCycle) -> Load:
-    operation = cycle.operation
-    if operation.speed is None:
-        raise ValueError("max_flash_temperature: needs a speed, solve with Operation(torque, speed)")
-    options = {} if operation.friction is None else {"friction": operation.friction}
-    return flash_temperature(cycle, operation.speed, **options)
-
-
 def _margin(name: str):
     return lambda cycle: getattr(margins(cycle.kinematics.pair), name)
 
@@ -61,6 +55,12 @@ def _of_flanks(function):
 
 quantities.add(
     Quantity("ppte", _te, "um", "peak-to-peak transmission error", Range(), local=True),
+    Quantity(
+        "relative_ppte",
+        relative_transmission_error,
+        meaning="peak-to-peak over mean transmission error",
+        reduction=Range(),
+    ),
     Quantity("mean_te", _te, "um", "mean transmission error", Average(), local=True),
     Quantity("te_rms", _te, "um", "rms of the transmission error about its mean", Rms(), local=True),
     Quantity(
@@ -112,7 +112,10 @@ quantities.add(
     Quantity(
         "wheel_root_stress", lambda c: root_stress(c).wheel, "MPa", "largest root stress, wheel", Max(), local=True
     ),
-    Quantity("max_flash_temperature", _flash, "K", "largest rise of the flank temperature", Max(), local=True),
+    Quantity(
+        "pinion_contact_stress", lambda c: nominal_contact_stress(c).pinion, "MPa", "nominal contact stress, pinion"
+    ),
+    Quantity("wheel_contact_stress", lambda c: nominal_contact_stress(c).wheel, "MPa", "nominal contact stress, wheel"),
     *(
         Quantity(f"{gear}_{name}", _margin(f"{gear}_{name}"), "mm", f"{meaning}, {gear}", better="larger")
         for gear in ("pinion", "wheel")
@@ -125,6 +128,13 @@ quantities.add(
     ),
     Quantity("backlash", _margin("backlash"), "um", "play on the line of action", better="larger"),
     Quantity("mesh_loss_factor", loss_factor, meaning="loss power per input power and coefficient of friction"),
+    Quantity(
+        "force_excitation",
+        force_excitation,
+        "N",
+        "peak to peak of stiffness times transmission error about its mean",
+        Range(),
+    ),
     Quantity(
         "min_tangent_stiffness",
         lambda c: c.tangent_stiffness,
@@ -141,5 +151,7 @@ quantities.add(
     Quantity("max_relief", _of_flanks(max_relief), "um", "largest material removed from a flank"),
     Quantity("relief_reversal", _of_flanks(relief_reversal), "um", "by how much removal fails to be monotone"),
     Quantity("removed_volume", _of_flanks(removed_volume), "mm3", "material ground off all flanks"),
+    *LUBRICATED,
+    *RATED,
     package=__package__,
 )

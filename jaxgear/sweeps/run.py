@@ -218,6 +218,7 @@ def _settings(made: Variants, example: np.ndarray, identity: str, plan: Abstract
         "plan": plan.describe(),
         "torques_Nm": None if made.torque is not None else np.asarray(load.torques).tolist(),
         "speeds_rpm": None if load.speeds is None else np.asarray(load.speeds).tolist(),
+        "friction": None if load.friction is None else float(load.friction),
         "weights": np.asarray(load.weights).tolist(),
         "results": [of.key for of in results],
         "quantities": _own_digest(made, example, results),
@@ -254,8 +255,8 @@ def _own_digest(made: Variants, example: np.ndarray, results: Sequence[Quantity]
 
     def cycle(values):
         variant = made(values)
-        torque = variant.cases.torque[0]
-        return solve(variant.mesh, torque, pinion=variant.pinion, wheel=variant.wheel).on(variant.mesh)
+        first = variant.cases.first
+        return solve(variant.mesh, first, pinion=variant.pinion, wheel=variant.wheel).on(variant.mesh)
 
     shape = eqx.filter_eval_shape(cycle, jnp.asarray(example))
     traced, _, _ = eqx.filter_make_jaxpr(lambda cycle: [of(cycle) for of in own])(shape)

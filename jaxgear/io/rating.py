@@ -1,0 +1,90 @@
+"""The tables [lubricant] and [strength], which may stand in files of their own."""
+
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from ..metrics import Lubricant, Strength
+from .errors import DesignFileError, naming
+from .kinds import text
+from .layout import Section, section_of
+from .schema import LoadSection, Tables
+from .template import part_of
+from .toml import decode, join, read
+
+S = TypeVar("S", bound=Section)
+
+_FILE = "file"
+
+
+class FileKey(Section):
+    """Where the rest of a table stands.
+
+    Attributes:
+        file: TOML file beside the design file, with any of the other keys; no key stands in both.
+    """
+
+    file: Annotated[str | None, text()] = None
+
+
+class LubricantSection(FileKey, section_of(Lubricant, open=False)):  # type: ignore[misc]
+    """The oil, for friction, temperatures, film and scuffing; needs load.speed."""
+
+
+class StrengthSection(FileKey, section_of(Strength, open=False)):  # type: ignore[misc]
+    """What the gears bear, for the safety factors."""
+
+
+def lubricant_of(table: Tables | None, load: LoadSection, folder: Path) -> Lubricant | None:
+    """The lubricant of a design file; None without the table.
+
+    Args:
+        table: as it was read.
+        load: under which the oil is used.
+        folder: of the design file.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it, or without a speed.
+    """
+    if table is None:
+        return None
+    section = _whole("lubricant", table, LubricantSection, folder)
+    if load.speed is None:
+        raise DesignFileError("lubricant", "has no effect without load.speed")
+    if load.friction is not None:
+        for name in ("friction", "friction_factor"):
+            if getattr(section, name) is not None:
+                raise DesignFileError(f"lubricant.{name}", "has no effect beside load.friction")
+    return part_of("lubricant", section, Lubricant).build({})
+
+
+def strength_of(table: Tables | None, folder: Path) -> Strength | None:
+    """The strengths of a design file; None without the table.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it.
+    """
+    if table is None:
+        return None
+    section = _whole("strength", table, StrengthSection, folder)
+    if not section.given().keys() - {_FILE}:
+        raise DesignFileError("strength", "is empty, nothing says what the gears bear")
+    return part_of("strength", section, Strength).build({})
+
+
+def _whole(key: str, table: Tables, section: type[S], folder: Path) -> S:
+    """A table with what stands in its file."""
+    name = decode(key, {_FILE: table[_FILE]} if _FILE in table else {}, FileKey).file
+    if name is None:
+        return decode(key, table, section)
+    path = folder / name
+    with naming(path):
+        held: dict[str, Any] = read(path)
+    for twice in held.keys() & table.keys():
+        raise DesignFileError(join(key, twice), f"stands in {name} too")
+    try:
+        return decode(key, {**held, **table}, section)
+    except DesignFileError as error:
+        own = error.key.removeprefix(f"{key}.")
+        if own.partition("[")[0] in held:
+            raise DesignFileError(own, error.problem, path) from None
+        raise

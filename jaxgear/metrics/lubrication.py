@@ -1,0 +1,192 @@
+"""Friction, heat and film of a lubricated mesh, at the line loads of its contact analysis.
+
+Loads, pressures and sliding are those of the cycle; what the standards work out at a few points of the path of contact
+with shares of the load and factors for its distribution, stands here at every contact point.
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..compliance.plane import combined_modulus
+from ..contact import MeshCycle
+from ..geometry import reduced_radius
+from ..numerics import check, over_batch, safe_divide, safe_power
+from .flash import flash_temperature
+from .loss import loss_factor
+from .lubricant import Lubricant
+
+Scalar = Float[Array, ""]
+Load = Float[Array, "pairs slices positions"]
+
+# leading constants of the laws of friction
+_SCHLENK, _ISO_20, _ISO_22 = 0.048, 0.060, 0.045
+_ISO_22_ROUGHNESS = 2.2
+_FLASH_SHARE = 0.47  # of the mean flash temperature that the teeth take on (ISO/TS 6336-20)
+# rise of the bulk temperature [K] with kW per mm2 of centre distance times face width; 1.2 for spray (ISO/TS 6336-22)
+_LOSS_RISE, _LOSS_EXPONENT, _SPRAY = 7400.0, 0.72, 1.2
+_FILM = 1.6  # film thickness over radius (Dowson and Higginson, as in ISO/TS 6336-22)
+_THICKEST = 1000.0  # um, of the film where the flanks are apart or touch with a tip edge
+
+
+@over_batch
+def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
+    """Mean coefficient of friction of the mesh; zero without load.
+
+        mu = c (w / (v rho))^0.2 eta^-0.05 X_R X_L
+
+    with the line load w = F_bt / b [N/mm], the sum of both rolling speeds v [m/s] and the reduced radius rho [mm] at
+    the pitch point, and the viscosity eta [mPa s] at the temperature of the oil. By `lubricant.friction`,
+
+        "schlenk"      c = 0.048, X_R = Ra^0.25
+        "iso_6336_20"  c = 0.060, X_R = Ra^0.25
+        "iso_6336_22"  c = 0.045, X_R = 2.2 (Ra / rho)^0.25
+
+    A coefficient that the cycle was solved with (`Operation.friction`) counts in its place.
+
+    Raises:
+        ValueError: for a cycle without a speed, or of speed 0.
+
+    References:
+        L. Schlenk, Untersuchungen zur Fresstragfaehigkeit von Grosszahnraedern, TU Muenchen 1994; ISO/TR 13989-1
+        (ISO/TS 6336-20); ISO/TR 15144-1 (ISO/TS 6336-22).
+    """
+    if cycle.operation.friction is not None:
+        return cycle.operation.friction
+    speed = _running("friction_coefficient", cycle)
+    check("friction_coefficient", "speed", speed, "rpm", low=0.0, open_low=True)
+    contact = cycle.kinematics.path_of_contact
+    radius = contact.reduced_radius(0.0)
+    rolling = sum(contact.rolling_speeds(0.0, speed))
+    line_load = cycle.force / cycle.kinematics.pair.face_width
+    viscosity = 1e3 * lubricant.viscosity(lubricant.temperature)
+    match lubricant.friction:
+        case "iso_6336_22":
+            surface = _ISO_22 * _ISO_22_ROUGHNESS * (lubricant.roughness / radius) ** 0.25
+        case "iso_6336_20":
+            surface = _ISO_20 * lubricant.roughness**0.25
+        case _:
+            surface = _SCHLENK * lubricant.roughness**0.25
+    return surface * safe_power(line_load / (rolling * radius), 0.2) * viscosity**-0.05 * lubricant.slipperiness
+
+
+@over_batch
+def loss_power(cycle: MeshCycle, lubricant: Lubricant | None = None) -> Scalar:
+    """Power that friction of the flanks takes [W]: input power * coefficient of friction * loss factor H_VL.
+
+    Args:
+        cycle: solved mesh cycle, with a speed.
+        lubricant: that tells the coefficient; None where the cycle was solved with one.
+
+    Raises:
+        ValueError: for a cycle without a speed, and without both lubricant and coefficient.
+    """
+    input_power = cycle.torque * _running("loss_power", cycle) * jnp.pi / 30
+    return input_power * _friction("loss_power", cycle, lubricant) * loss_factor(cycle)
+
+
+@over_batch
+def mesh_efficiency(cycle: MeshCycle, lubricant: Lubricant | None = None) -> Scalar:
+    """Share of the input power that the flanks pass on, 1 - mu H_VL; arguments and errors as `loss_power`.
+
+    What seals, bearings and churned oil take is not in it.
+    """
+    return 1 - _friction("mesh_efficiency", cycle, lubricant) * loss_factor(cycle)
+
+
+@over_batch
+def lubricated_flash_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Load:
+    """`flash_temperature` [K] with the coefficient of friction of a lubricant."""
+    speed = _running("flash_temperature", cycle)
+    return flash_temperature(cycle, speed, friction=friction_coefficient(cycle, lubricant))
+
+
+@over_batch
+def bulk_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
+    """Temperature of the teeth between two contacts [degC]: that of the oil and a rise, by `lubricant.bulk`
+
+    "flash"  0.47 X_S T_flm, T_flm the flash temperature as a mean over path of contact and face (ISO/TS 6336-20)
+    "loss"   7400 (P / (a b))^0.72 X_S / 1.2 with the loss power P [kW], centre distance and face width [mm]
+             (ISO/TS 6336-22); what tip relief spares is in the loss of the contact analysis.
+    """
+    if lubricant.bulk == "loss":
+        area = _center_distance(cycle) * cycle.kinematics.pair.face_width
+        rise = _LOSS_RISE * safe_power(1e-3 * loss_power(cycle, lubricant) / area, _LOSS_EXPONENT) / _SPRAY
+    else:
+        rise = _FLASH_SHARE * _mean_over_path(cycle, lubricated_flash_temperature(cycle, lubricant))
+    return lubricant.temperature + lubricant.cooling_factor * rise
+
+
+@over_batch
+def contact_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Load:
+    """Temperature in the contact [degC], bulk and flash temperature; that of the bulk where the flanks are apart."""
+    return bulk_temperature(cycle, lubricant) + lubricated_flash_temperature(cycle, lubricant)
+
+
+@over_batch
+def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
+    """Thickness of the oil film in the contact [um]; 1000 where the flanks are apart or touch with a tip edge.
+
+        h = 1600 rho G^0.6 U^0.7 W^-0.13 S^0.22,      E_r = 2 E*
+        G = alpha E_r,  U = eta v / (2 E_r rho),  W = 2 pi p^2 / E_r^2,  S = (alpha eta at the contact) / (alpha eta)
+
+    with the reduced radius rho [mm] of the involutes, the sum v of the rolling speeds, the pressure p of the cycle;
+    viscosity eta and its pressure coefficient alpha at the bulk temperature, in S also at the contact temperature.
+    Where the contact is hotter than any oil (510 degC) there is no film.
+
+    References:
+        D. Dowson, G. R. Higginson, Elasto-hydrodynamic Lubrication, 1966; ISO/TS 6336-22 (ISO/TR 15144-1), method A.
+    """
+    kinematics, (pinion, wheel) = cycle.kinematics, cycle.sides
+    speed = _running("film_thickness", cycle)
+    rolling = sum(kinematics.path_of_contact.rolling_speeds(kinematics.path, speed))[:, None]
+    radius = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)[:, None]
+    pair = kinematics.pair
+    modulus = 2e6 * combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)  # E_r [Pa]
+    bulk, hot = bulk_temperature(cycle, lubricant), contact_temperature(cycle, lubricant)
+    viscosity, coefficient = lubricant.viscosity(bulk), lubricant.pressure_viscosity(bulk)
+    material = safe_power(coefficient * modulus, 0.6)
+    speeds = safe_power(viscosity * rolling / (2e-3 * modulus * radius), 0.7)
+    pressure = 1e6 * cycle.contact_pressure
+    touching = pressure > 0
+    load = (2 * jnp.pi * (jnp.where(touching, pressure, 1.0) / modulus) ** 2) ** -0.13
+    thinning = lubricant.pressure_viscosity(hot) * lubricant.viscosity(hot) / (coefficient * viscosity)
+    film = 1e3 * _FILM * radius * material * speeds * load * safe_power(thinning, 0.22)
+    return jnp.where(touching, jnp.minimum(film, _THICKEST), _THICKEST)
+
+
+@over_batch
+def specific_film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
+    """lambda = h / Ra, the film over the mean roughness of both flanks; below 1 the flanks touch."""
+    return film_thickness(cycle, lubricant) / lubricant.roughness
+
+
+def _mean_over_path(cycle: MeshCycle, field: Load) -> Scalar:
+    """Mean of a field over the path of contact, where it is not zero, and over the face."""
+    kinematics = cycle.kinematics
+    width = kinematics.slice_width
+    over_face = jnp.einsum("psn,s->pn", field, width) / jnp.sum(width)
+    # every position stands for as much of the path as there are pairs on it
+    return safe_divide(jnp.sum(jnp.mean(over_face, axis=-1)), kinematics.path_of_contact.contact_ratio)
+
+
+def _center_distance(cycle: MeshCycle) -> Scalar:
+    """Sum of the working pitch radii [mm]."""
+    contact = cycle.kinematics.path_of_contact
+    pinion = jnp.hypot(contact.pinion_base_radius, contact.pinion_pitch_roll_length)
+    return pinion + jnp.hypot(contact.wheel_base_radius, contact.wheel_pitch_roll_length)
+
+
+def _friction(owner: str, cycle: MeshCycle, lubricant: Lubricant | None) -> Scalar:
+    if cycle.operation.friction is not None:
+        return cycle.operation.friction
+    if lubricant is None:
+        raise ValueError(f"{owner}: needs a coefficient of friction, solve with Operation(torque, speed, friction)")
+    return friction_coefficient(cycle, lubricant)
+
+
+def _running(owner: str, cycle: MeshCycle) -> Scalar:
+    """Speed of the pinion [rpm]."""
+    speed = cycle.operation.speed
+    if speed is None:
+        raise ValueError(f"{owner}: needs a speed, solve with Operation(torque, speed)")
+    return speed

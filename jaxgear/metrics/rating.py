@@ -1,0 +1,142 @@
+"""The quantities of this package that need a lubricant or strengths, or know more with them.
+
+A name alone does not say which: `Lubricant.quantity` and `Strength.quantity` give the quantities, and a design file has
+the tables [lubricant] and [strength].
+"""
+
+from typing import Any
+
+from jaxtyping import Array, Float
+
+from ..contact import MeshCycle
+from ..numerics.reductions import Max, Min
+from .flash import flash_temperature
+from .lubrication import (
+    bulk_temperature,
+    contact_temperature,
+    film_thickness,
+    friction_coefficient,
+    loss_power,
+    lubricated_flash_temperature,
+    mesh_efficiency,
+    specific_film_thickness,
+)
+from .quantity import Quantity
+from .safety import micropitting_safety, pitting_safety, pressure_safety, root_safety, scuffing_safety
+from .settings import WithoutSettings
+
+Load = Float[Array, "pairs slices positions"]
+
+
+def _flash(cycle: MeshCycle) -> Load:
+    operation = cycle.operation
+    if operation.speed is None:
+        raise ValueError("max_flash_temperature: needs a speed, solve with Operation(torque, speed)")
+    options = {} if operation.friction is None else {"friction": operation.friction}
+    return flash_temperature(cycle, operation.speed, **options)
+
+
+def _oiled(name: str, of: Any, unit: str, meaning: str, needs: str | None = None, **options: Any) -> Quantity:
+    alone = {key: options.pop(key) for key in ("otherwise", "operation") if key in options}
+    stands = WithoutSettings(name, "jaxgear.Lubricant", "lubricant", of, needs, **alone)
+    return Quantity(name, stands, unit, meaning, **options)
+
+
+def _borne(name: str, of: Any, meaning: str, needs: str, **options: Any) -> Quantity:
+    stands = WithoutSettings(name, "jaxgear.Strength", "strength", of, needs)
+    return Quantity(name, stands, meaning=meaning, better="larger", **options)
+
+
+_LEAST: dict[str, Any] = {"reduction": Min(), "better": "larger"}
+
+LUBRICATED = (
+    _oiled(
+        "max_flash_temperature",
+        lubricated_flash_temperature,
+        "K",
+        "largest rise of the flank temperature",
+        reduction=Max(),
+        local=True,
+        otherwise=_flash,
+        operation=("speed",),
+    ),
+    _oiled("friction_coefficient", friction_coefficient, "", "mean coefficient of friction"),
+    _oiled(
+        "loss_power",
+        loss_power,
+        "W",
+        "power that friction of the flanks takes",
+        otherwise=loss_power,
+        operation=("speed", "friction"),
+    ),
+    _oiled(
+        "mesh_efficiency",
+        mesh_efficiency,
+        "",
+        "share of the power that the flanks pass on",
+        better="larger",
+        otherwise=mesh_efficiency,
+        operation=("friction",),
+    ),
+    _oiled("bulk_temperature", bulk_temperature, "degC", "of the teeth between two contacts"),
+    _oiled(
+        "max_contact_temperature", contact_temperature, "degC", "largest temperature in the contact", reduction=Max()
+    ),
+    _oiled("min_film_thickness", film_thickness, "um", "smallest thickness of the oil film, at most 1000", **_LEAST),
+    _oiled(
+        "min_specific_film_thickness",
+        specific_film_thickness,
+        "",
+        "lambda, smallest thickness of the oil film over roughness",
+        **_LEAST,
+    ),
+    _oiled(
+        "micropitting_safety",
+        micropitting_safety,
+        "",
+        "S_lambda, specific over permissible film thickness",
+        "permissible_film",
+        **_LEAST,
+    ),
+    _oiled(
+        "scuffing_safety",
+        scuffing_safety,
+        "",
+        "S_B, rise to the scuffing temperature over that to the contact temperature",
+        "scuffing_temperature",
+        **_LEAST,
+    ),
+)
+RATED = (
+    *(
+        _borne(f"{gear}_pitting_safety", of, f"S_H, pitting strength over nominal contact stress, {gear}", "pitting")
+        for gear, of in (
+            ("pinion", lambda cycle, strength: pitting_safety(cycle, strength)[0]),
+            ("wheel", lambda cycle, strength: pitting_safety(cycle, strength)[1]),
+        )
+    ),
+    *(
+        _borne(
+            f"{gear}_root_safety",
+            of,
+            f"S_F, bending strength over root stress, {gear}",
+            "bending",
+            reduction=Min(),
+            local=True,
+        )
+        for gear, of in (
+            ("pinion", lambda cycle, strength: root_safety(cycle, strength)[0]),
+            ("wheel", lambda cycle, strength: root_safety(cycle, strength)[1]),
+        )
+    ),
+    _borne(
+        "pressure_safety",
+        pressure_safety,
+        "pressure that is borne over the largest of flanks and tip edges",
+        "pressure",
+        reduction=Min(),
+        local=True,
+    ),
+)
+LUBRICANT_QUANTITIES = tuple(quantity.name for quantity in LUBRICATED)
+STRENGTH_QUANTITIES = tuple(quantity.name for quantity in RATED)

@@ -1,0 +1,125 @@
+"""Safety factors: what material and oil bear over what the mesh does to them."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..contact import MeshCycle
+from ..numerics import Checked, number, over_batch
+from .contact_stress import nominal_contact_stress
+from .lubricant import Lubricant
+from .lubrication import contact_temperature, specific_film_thickness
+from .quantity import Quantity
+from .root_stress import root_stress
+from .settings import with_settings
+
+Real = Float[Array, "..."]
+Scalar = Float[Array, ""]
+Load = Float[Array, "pairs slices positions"]
+
+# A stress that is not there is borne as often as one likes, which is no failure, as numbers that are not finite are.
+LARGEST_SAFETY = 1000.0
+
+
+class Strength(Checked):
+    """Stresses that the gears bear under what they are to be safe from: factors of life, surface, size are in them.
+
+    Attributes:
+        pitting: nominal contact stress that the pinion bears, and the wheel where it has none of its own: sigma_HG
+            of ISO 6336-2.
+        wheel_pitting: the same of the wheel; None for that of the pinion.
+        bending: nominal stress in the tooth root that the pinion bears, with its notch, and the wheel where it has
+            none of its own: sigma_FG of ISO 6336-3.
+        wheel_bending: the same of the wheel; None for that of the pinion.
+        pressure: largest pressure of the contact analysis that the flanks bear, tip edges included.
+    """
+
+    pitting: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
+    wheel_pitting: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
+    bending: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
+    wheel_bending: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
+    pressure: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
+
+    def check_together(self) -> None:
+        for name in ("pitting", "bending"):
+            if getattr(self, name) is None and getattr(self, f"wheel_{name}") is not None:
+                raise ValueError(f"Strength: {name} must be given where wheel_{name} is")
+
+    def quantity(self, name: str) -> Quantity:
+        """A safety factor for objectives, constraints, sweeps and tables, with these strengths.
+
+        Args:
+            name: "pinion_pitting_safety", "wheel_pitting_safety" (need `pitting`), "pinion_root_safety",
+                "wheel_root_safety" (need `bending`) or "pressure_safety" (needs `pressure`).
+
+        Raises:
+            ValueError: for another name, and for a strength that is missing.
+        """
+        return with_settings(name, self)
+
+
+def safety_factor(borne: Real, reached: Real) -> Real:
+    """What is borne over what is reached, at most 1000."""
+    return borne / jnp.maximum(reached, borne / LARGEST_SAFETY)
+
+
+@over_batch
+def pitting_safety(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
+    """S_H of pinion and wheel: pitting strength over the nominal contact stress."""
+    stress = nominal_contact_stress(cycle)
+    limits = _of_gears("pitting_safety", strength, "pitting")
+    return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
+
+
+@over_batch
+def root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Load, Load]:
+    """S_F of pinion and wheel: bending strength over the root stress at every contact."""
+    stress = root_stress(cycle)
+    limits = _of_gears("root_safety", strength, "bending")
+    return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
+
+
+@over_batch
+def pressure_safety(cycle: MeshCycle, strength: Strength) -> Load:
+    """p_lim / p at every contact, on the flanks and at the tip edges."""
+    limit = _given("pressure_safety", strength, "pressure")
+    return safety_factor(limit, cycle.contact_pressure + cycle.corner_pressure)
+
+
+@over_batch
+def micropitting_safety(cycle: MeshCycle, lubricant: Lubricant) -> Load:
+    """S_lambda at every contact: specific film thickness h / Ra over the permissible one (ISO/TS 6336-22).
+
+    Raises:
+        ValueError: for a lubricant without `permissible_film`.
+    """
+    limit = _given("micropitting_safety", lubricant, "permissible_film")
+    return jnp.minimum(specific_film_thickness(cycle, lubricant) / limit, LARGEST_SAFETY)
+
+
+@over_batch
+def scuffing_safety(cycle: MeshCycle, lubricant: Lubricant) -> Load:
+    """S_B at every contact: rise from the oil to the temperature of scuffing over that to the contact temperature.
+
+        S_B = (T_S - T_oil) / (T_B - T_oil)
+
+    Raises:
+        ValueError: for a lubricant without `scuffing_temperature`.
+
+    References:
+        ISO/TS 6336-20 (ISO/TR 13989-1), flash temperature method.
+    """
+    limit = _given("scuffing_safety", lubricant, "scuffing_temperature")
+    oil = lubricant.temperature
+    return safety_factor(limit - oil, contact_temperature(cycle, lubricant) - oil)
+
+
+def _of_gears(owner: str, strength: Strength, name: str) -> tuple[Scalar, Scalar]:
+    pinion, wheel = _given(owner, strength, name), getattr(strength, f"wheel_{name}")
+    return pinion, pinion if wheel is None else wheel
+
+
+def _given(owner: str, settings: Checked, name: str) -> Scalar:
+    value = getattr(settings, name)
+    if value is None:
+        raise ValueError(f"{owner}: needs {type(settings).__name__}.{name}")
+    return value
