@@ -23,7 +23,9 @@ PINION = jg.Gear(
     bore_diameter=24.0,
     tip_diameter=63.7,
     tip_edge_radius=0.07,
+    tip_form_diameter=63.4,
     tooth_thickness_allowance=-41.3,
+    tooth_thickness_tolerance=27.1,
     material=jg.Material(elastic_modulus=210_000.0, density=7812.5, thermal_contact_coefficient=13_456.7),
 )
 WHEEL = jg.Gear(teeth=48, module=3.0, face_width=18.0, addendum=0.98, dedendum=1.2, root_radius=0.3, tip_diameter=149.5)
@@ -100,18 +102,21 @@ def difference(frame, first, second):
 
 
 def test_a_pair_comes_back_as_it_was(tmp_path):
-    found = again(tmp_path / "pair.rexs", torque=51.7, speed=2987.3, title='a <pair> & "more"\n')
+    given = {"torque": 51.7, "speed": 2987.3, "quality_classes": (6, 11), "title": 'a <pair> & "more"\n'}
+    found = again(tmp_path / "pair.rexs", **given)
     assert jax.tree.structure(found.pair) == jax.tree.structure(PAIR)
     for name in ("teeth", "module", "pressure_angle", "profile_shift", "face_width", "addendum", "dedendum"):
         for gear in ("pinion", "wheel"):
             assert getattr(getattr(found.pair, gear), name) == getattr(getattr(PAIR, gear), name)
-    for name in ("root_radius", "tip_diameter", "bore_diameter", "tip_edge_radius"):
+    for name in ("root_radius", "tip_diameter", "tip_form_diameter", "bore_diameter", "tip_edge_radius"):
         assert getattr(found.pair.pinion, name) == getattr(PINION, name)
     for name in ("elastic_modulus", "poisson_ratio", "density", "thermal_contact_coefficient"):
         assert getattr(found.pair.pinion.material, name) == getattr(PINION.material, name)
     np.testing.assert_allclose(found.pair.pinion.tooth_thickness_allowance, -41.3, rtol=1e-12)
+    np.testing.assert_allclose(found.pair.pinion.tooth_thickness_tolerance, 27.1, rtol=1e-12)
     assert found.pair.center_distance == 101.2 and found.pair.wheel.bore_diameter is None
     assert (found.torque, found.speed, found.title) == (51.7, 2987.3, 'a <pair> & "more"')
+    assert found.quality_classes == (6, 11)
 
 
 def test_what_a_pair_leaves_open_comes_back_as_the_number_it_means(tmp_path):
@@ -251,7 +256,7 @@ def everything():
 
 def test_files_are_of_the_data_model(tmp_path, results):
     path = tmp_path / "all.rexs"
-    write_rexs(path, PAIR, pinion=everything(), wheel=everything(), torque=1.0, speed=2.0, title="x")
+    write_rexs(path, PAIR, pinion=everything(), torque=1.0, speed=2.0, quality_classes=(1, 10), title="x")
     assert faults(path.read_bytes()) == []
     assert faults(results.read_bytes()) == []
 

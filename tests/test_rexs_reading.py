@@ -5,6 +5,7 @@ import contextlib
 import io
 import random
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import equinox as eqx
@@ -15,6 +16,7 @@ import jaxgear as jg
 from jaxgear.cli import main
 from jaxgear.io import DesignFileError, load_design, read_rexs, write_rexs
 from jaxgear.io.rexs.frame import frames
+from jaxgear.manufacture import over_balls, span
 
 PAIR = jg.GearPair(
     jg.Gear(teeth=19, module=3.0, face_width=20.0, bore_diameter=24.0),
@@ -277,6 +279,38 @@ def test_arrays_may_be_in_base64(written):
     np.testing.assert_array_equal(found.amount, [1.0, -2.0, 4.0])
 
 
+def gear_with(written, *attributes):
+    """The pinion of the file with attributes beside its own."""
+    text = written.text.replace(TEETH, "".join(attribute(*each) for each in attributes) + TEETH, 1)
+    written.path.write_text(text)
+    return read_rexs(written.path).pair.pinion
+
+
+def test_tooth_thickness_by_every_measure_of_a_drawing(written):
+    """Deviations of chord, span and dimension over balls that one tooth has are read as that tooth."""
+    thick, thin = (replace(PAIR.pinion, tooth_thickness_allowance=np.asarray(each)) for each in (-60.0, -100.0))
+    spans = [1e3 * float(span(each, 3) - span(PAIR.pinion, 3)) for each in (thick, thin)]
+    balls = [float(over_balls(each, 5.5) - over_balls(PAIR.pinion, 5.5)) for each in (thick, thin)]
+    ways = {
+        "referenced_to_span": ("mum", spans, ()),
+        "balls_or_pins": ("mm", balls, (("diameter_of_measuring_ball_or_pin", "5.5"),)),
+    }
+    for name, (unit, limits, more) in ways.items():
+        names = [f"{end}_backlash_allowance_{name}" for end in ("upper", "lower")]
+        found = gear_with(written, *((each, repr(limit), unit) for each, limit in zip(names, limits)), *more)
+        assert float(found.tooth_thickness_allowance) == pytest.approx(-60.0, abs=1e-6), name
+        assert float(found.tooth_thickness_tolerance) == pytest.approx(40.0, abs=1e-6), name
+
+
+def test_a_chamfered_tip_by_its_diameter_or_its_height(written):
+    assert float(gear_with(written, ("tip_form_diameter", "62.5")).tip_form_diameter) == 62.5
+    assert gear_with(written, ("tip_form_diameter", "63.0")).tip_form_diameter is None
+    name = "addendum_modification_coefficient"
+    height = attribute("tooth_tip_chamfer", "0.25")
+    written.path.write_text(written.text.replace(f'<attribute id="{name}"', f'{height}<attribute id="{name}"'))
+    assert float(read_rexs(written.path).pair.pinion.tip_form_diameter) == pytest.approx(62.5, abs=1e-12)
+
+
 TEETH = '<attribute id="number_of_teeth" unit="none">19<'
 HELIX = '<attribute id="helix_angle_reference_diameter" unit="deg">0.0<'
 SHAPE = '<attribute id="shape_of_relief" unit="none">linear<'
@@ -289,12 +323,19 @@ REFUSED = {
     "ring gear": ('type="cylindrical_gear"', 'type="ring_gear"', "ring_gear 3: is an internal gear"),
     "protuberance": (RACK, RACK + attribute("protuberance_amount", "0.1"), "protuberance_amount: 0.1 must be 0"),
     "chamfer": (TEETH, attribute("chamfer_at_tooth_end", "0.5") + TEETH, "chamfer_at_tooth_end: 0.5 must be 0"),
-    "tip chamfer": (TEETH, attribute("tip_form_diameter", "62.5") + TEETH, "62.5 mm must be the tip diameter, 63 mm"),
+    "no tip form": (TEETH, attribute("tip_form_diameter", "63.5") + TEETH, "tip_form_diameter = 63.5 mm must be"),
+    "no class": (TEETH, attribute("global_tolerance_class_iso_1328_2013", "12", "none") + TEETH,
+                 'global_tolerance_class_iso_1328_2013: "12" is not supported, must be one of 1, 2,'),
+    "no ball": (TEETH, attribute("upper_backlash_allowance_balls_or_pins", "-0.1") + TEETH,
+                "diameter_of_measuring_ball_or_pin: missing"),
+    "reversed": (TEETH, attribute("upper_backlash_allowance_referenced_to_span", "-90", "mum")
+                 + attribute("lower_backlash_allowance_referenced_to_span", "-60", "mum") + TEETH,
+                 "lower_backlash_allowance_referenced_to_span: -60 must be at most the upper one, -90"),
     "not a length": (WIDTH, WIDTH.replace("20.0", "1e7"), "face_width: 1e+07 mm must be at least"),
     "length alone": ('id="tip_relief_datum_diameter"', 'id="tip_relief_datum_length"', "datum_diameter: missing"),
     "no module": ('id="normal_module" unit="mm">3.0', 'id="normal_module" unit="mm">0', "0 mm must be greater than 0"),
     "thicker tooth": (TEETH, attribute("chordal_tooth_thickness_upper_deviation", "0.05") + TEETH,
-                      "0.05 mm is the middle of the allowances, must be greater than -4.712 mm and at most 0 mm"),
+                      "upper_deviation: 0.05 makes the tooth 50.17 um thicker, must be at most 0"),
     "no corner radius": (RACK, "", "tip_corner_radius_factor_reference_profile: missing"),
     "no tool": ('type="manufacturing_step"', 'type="step"', "must be made by one rack_shaped_tool"),
     "another tool": ('type="rack_shaped_tool"', 'type="profile_tool"', "makes a flank, must be a rack_shaped_tool"),

@@ -246,7 +246,7 @@ def test_an_interrupted_sweep_says_how_to_go_on_and_does(tmp_path):
         ('"latin_hypercube"\nsamples = 60', '"list"\nfile = "other.csv"', ["other.csv: has no column height"]),
         ('"latin_hypercube"\nsamples = 60', '"list"\nfile = "empty.csv"', ["empty.csv: holds no variants"]),
         ('"latin_hypercube"\nsamples = 60', '"list"\nfile = "bad.parquet"', ["bad.parquet: "]),
-        ("[sweep]", "[tolerance]\nquality_class = 99\n[sweep]", ["tolerance: ", "99"]),
+        ("[sweep]", "[tolerance]\nquality_class = 99\n[sweep]", ["tolerance.quality_class: ", "99"]),
         ("[sweep]", "[tolerance]\nquality_class = 5\nmisalignment = 3.0\n[sweep]", ["tolerance.misalignment: needs"]),
     ],
 )

@@ -11,7 +11,7 @@ from ..io.toml import read
 from . import interrupt, report
 
 _REXS, _DESIGN = (".rexs", ".xml", ".rexsj", ".json"), (".toml",)
-_TAKEN = {"title", "pinion", "wheel", "pair", "load"}  # tables of a design file that REXS has a place for
+_TAKEN = {"title", "materials", "pinion", "wheel", "pair", "load"}  # tables of a design file that REXS has a place for
 
 
 def convert(
@@ -40,6 +40,7 @@ def convert(
                 pinion=found.pinion,
                 wheel=found.wheel,
                 speed=found.speed,
+                quality_classes=found.quality_classes,
                 title=found.title,
             )
         _say(target, found.pair)
@@ -67,6 +68,7 @@ def _to_rexs(source: Path, target: Path) -> None:
             wheel=wheel,
             torque=design.torque,
             speed=design.speed,
+            quality_classes=design.quality_classes,
             title=design.title,
         )
     _say(target, design.pair())

@@ -20,6 +20,7 @@ _GEAR = (
     "pitch_circle_diameter_mm",
     "base_diameter_mm",
     "tip_diameter_mm",
+    "tip_form_diameter_mm",
     "root_diameter_mm",
     "root_form_diameter_mm",
     "active_root_diameter_mm",
@@ -27,6 +28,7 @@ _GEAR = (
     "tip_land_mm",
     "tip_clearance_mm",
     "tooth_thickness_allowance_um",
+    "tooth_thickness_tolerance_um",
 )
 _PAIR = (
     "center_distance_mm",
@@ -41,6 +43,8 @@ _PAIR = (
     "path_of_contact_D_mm",
     "path_of_contact_E_mm",
     "backlash_on_line_of_action_um",
+    "least_backlash_on_line_of_action_um",
+    "largest_backlash_on_line_of_action_um",
 )
 
 Scalar = Float[Array, ""]
@@ -49,8 +53,9 @@ Scalar = Float[Array, ""]
 def geometry(pair: GearPair) -> dict[str, dict[str, Any]]:
     """Numbers of both gears and of the pair, by name and unit.
 
-    Points of the path of contact are positions from the pitch point C, positive towards the tip of the pinion. The root
-    form diameter is where the usable involute starts, the active root diameter where the mate's tip touches it.
+    Points of the path of contact are positions from the pitch point C, positive towards the tip of the pinion. The
+    usable involute runs from the root form diameter to the tip form diameter, and the mate's tip touches it from the
+    active root diameter on.
     """
     pinion, wheel, together = jax.tree.map(np.asarray, _numbers(pair))
     return {
@@ -84,6 +89,7 @@ def _gear(gear: Gear, pitch: Scalar, lowest: Scalar, tip_clearance: Scalar) -> t
         diameter(gear, pitch),
         2 * gear.base_radius,
         2 * gear.tip_radius,
+        2 * gear.tip_form_radius,
         2 * gear.root_circle_radius,
         diameter(gear, outline(gear).form_roll_length),
         diameter(gear, lowest),
@@ -91,6 +97,7 @@ def _gear(gear: Gear, pitch: Scalar, lowest: Scalar, tip_clearance: Scalar) -> t
         gear.tip_land,
         tip_clearance,
         gear.tooth_thickness_allowance,
+        gear.tooth_thickness_tolerance,
     )
 
 
@@ -109,4 +116,5 @@ def _together(pair: GearPair, contact: PathOfContact, backlash: Scalar) -> tuple
         contact.outer_single,
         contact.end,
         backlash,
+        *pair.backlash_limits,
     )

@@ -16,7 +16,8 @@ soften it:
    apex it gives way by q / E' K ln(r), K = sin^2 b / (b + sin(2b)/2) + cos^2 b / (b - sin(2b)/2), against 2 / pi for
    the half plane (Flamant). The excess acts between the distance of the load from the corner and the size of the tooth
    tip. Its mean is taken over a semi-ellipse on the patch: the square-root singularity of the truncated half planes
-   does not exist at the corner of a wedge, and would overstate the excess.
+   does not exist at the corner of a wedge, and would overstate the excess. Where the tip is chamfered, the wedge is the
+   blunt one between flank and chamfer up to the chamfer's length, and that of the tip beyond.
 
 References:
     K. L. Johnson, Contact Mechanics, 1985, sections 2.7 and 5.1 (wedge, integral equations of plane contact).
@@ -47,6 +48,9 @@ WEDGE_REACH = 0.25
 APEX_DISTANCE = 1.82
 # Distances from the corner below this one [mm] count as this one: no contact is as small.
 _SHORTEST = 1e-6
+# between the chamfer of a tip and its top land, as drawings give chamfers without another angle; a rounding begins
+# blunter still
+_CHAMFER_ANGLE = np.pi / 4
 _FULL_TERMS = 12  # of a polynomial that is exact to 1e-8
 
 
@@ -59,12 +63,26 @@ class Edge(eqx.Module):
         side: +1 where the corner is that of the pinion, -1 where it is that of the wheel.
         wedge: excess apex compliance of the tip wedge over the half plane, (K - 2 / pi) / E' [um per N/mm].
         reach: distance from the corner at which that excess ends [mm].
+        chamfer: what the chamfer behind the corner changes; None where neither tip has one.
     """
 
     distance: Float[Array, "pairs anyslices positions"]
     side: Field
     wedge: Field
     reach: Field
+    chamfer: "Chamfer | None" = None
+
+
+class Chamfer(NamedTuple):
+    """The wedge between flank and chamfer, which is blunter than that of the tip; up to the chamfer's length.
+
+    Attributes:
+        wedge: its excess apex compliance over that of the tip wedge [um per N/mm], negative.
+        share: length of the chamfer over the reach of the tip wedge, at most 1.
+    """
+
+    wedge: Field
+    share: Field
 
 
 def edge(
@@ -80,12 +98,14 @@ def edge(
 
     first, second = on_both(lambda given: _corner(*given, outside), (pinion, geometry.pinion), (wheel, geometry.wheel))
     pinion_near = first.inside < second.inside
+    chamfered = any(load.outline.gear.tip_form_diameter is not None for load in (pinion, wheel))
     near = jax.tree.map(lambda *fields: jnp.where(pinion_near, *fields), first, second)
     return Edge(
         distance=(near.inside + near.beyond)[:, None],
         side=jnp.where(pinion_near, 1.0, -1.0).astype(near.inside.dtype)[:, None],
         wedge=near.wedge[:, None],
         reach=near.reach[:, None],
+        chamfer=Chamfer(near.chamfer_wedge[:, None], near.chamfer_share[:, None]) if chamfered else None,
     )
 
 
@@ -96,29 +116,41 @@ class _Corner(NamedTuple):
         inside: distance of the contact on the path from the corner along the flank [mm].
         beyond: what being outside the path adds to it [mm], negative.
         wedge, reach: as in `Edge`.
+        chamfer_wedge, chamfer_share: as in `Chamfer`.
     """
 
     inside: Real
     beyond: Real
     wedge: Real
     reach: Real
+    chamfer_wedge: Real
+    chamfer_share: Real
 
 
 def _corner(load: ToothLoad, side: ContactSide, outside: Real) -> _Corner:
     drawn = load.outline.curves.over(outside.shape)
     tip, base = drawn.tip_roll_length, drawn.base_radius
+    sharp, blunt = _wedge_excess(load, 0.0), _wedge_excess(load, _CHAMFER_ANGLE)
+    reach = WEDGE_REACH * side.depth[:, 0]
+    length = load.outline.gear.tip_chamfer / np.cos(_CHAMFER_ANGLE)
     return _Corner(
         inside=(tip**2 - load.roll_length**2) / (2 * base),
         beyond=-(2 * tip + outside) * outside / (2 * base),
-        wedge=1e3 * _wedge_excess(load) / side.modulus[:, 0],
-        reach=WEDGE_REACH * side.depth[:, 0],
+        wedge=1e3 * sharp / side.modulus[:, 0],
+        reach=reach,
+        chamfer_wedge=1e3 * (blunt - sharp) / side.modulus[:, 0],
+        chamfer_share=jnp.clip(length / reach, 0.0, 1.0),
     )
 
 
-def _wedge_excess(load: ToothLoad) -> Float[Array, ""]:
-    """K - 2 / pi of the wedge between flank and top land, loaded normal to the flank."""
+def _wedge_excess(load: ToothLoad, chamfer: float) -> Float[Array, ""]:
+    """K - 2 / pi of the wedge between flank and top land or a chamfer [rad against it], loaded normal to the flank.
+
+    From a half plane on nothing is left of it.
+    """
     drawn = load.outline.curves
-    b = 0.5 * (jnp.pi / 2 + jnp.arctan(drawn.tip_roll_length / drawn.base_radius))
+    interior = jnp.pi / 2 + chamfer + jnp.arctan(drawn.tip_roll_length / drawn.base_radius)
+    b = 0.5 * jnp.minimum(interior, jnp.pi)
     twin = 0.5 * jnp.sin(2 * b)
     return jnp.sin(b) ** 2 / (b + twin) + jnp.cos(b) ** 2 / (b - twin) - 2 / jnp.pi
 
@@ -144,7 +176,10 @@ class EdgeLaw(AbstractSpring):
         # Phi's logarithm replaces the half width by half the extent of the patch
         flank = self.flank.cut_secant(load, self._cut(squared, patch))
         # ln(span) where it is positive, with a smooth onset: ln(1 + span^4) / 4
-        softer = self.edge.wedge * 0.25 * log(1 + self._span(patch) ** 4)
+        span, chamfer = self._span(patch), self.edge.chamfer
+        softer = self.edge.wedge * 0.25 * log(1 + span**4)
+        if chamfer is not None:
+            softer = softer + chamfer.wedge * 0.25 * log(1 + (chamfer.share * span) ** 4)
         # the division at the end is what a compiler stores, instead of evaluating all of this wherever it is used
         return ((flank + softer) * squared + self.truncation * patch.bending) / squared
 
@@ -152,8 +187,11 @@ class EdgeLaw(AbstractSpring):
         squared = self.width_factor * load
         patch = cut_off(self.edge.distance, squared)
         change = self.flank.cut_change(load, self._cut(squared, patch))
-        share = 1 / (1 + self._span(patch) ** 4) - 1  # -d (softer) / d ln(mean distance), over the wedge's compliance
-        change = change + self.edge.wedge * share * patch.mean_slope * squared * (1 / patch.mean_distance)
+        span, chamfer = self._span(patch), self.edge.chamfer
+        stiffer = self.edge.wedge * _falling(span)
+        if chamfer is not None:
+            stiffer = stiffer + chamfer.wedge * _falling(chamfer.share * span)
+        change = change + stiffer * patch.mean_slope * squared * (1 / patch.mean_distance)
         bending = self.truncation * (patch.bending_slope * squared - patch.bending)
         return ((secant + change) * squared + bending) / squared
 
@@ -166,6 +204,11 @@ class EdgeLaw(AbstractSpring):
 
     def _span(self, patch: "Patch") -> Real:
         return self.edge.reach / APEX_DISTANCE * (1 / patch.mean_distance)
+
+
+def _falling(span: Real) -> Real:
+    """d (ln(1 + span^4) / 4) / d ln(distance), as the span falls with the distance."""
+    return 1 / (1 + span**4) - 1
 
 
 class Patch(NamedTuple):

@@ -11,6 +11,7 @@ Coordinates and signs used everywhere:
 """
 
 from . import material as _material
+from .backlash import pair_with_backlash as pair_with_backlash
 from .gear import Gear as Gear
 from .involute import diameter as diameter
 from .involute import roll_angle as roll_angle

@@ -17,6 +17,8 @@ Real = Float[Array, "*gears"]  # one number of each gear, where `jax.vmap` made 
 # these limits, which also hold every basic rack in use (ISO 53, AGMA fine pitch, stub and high-contact-ratio racks).
 _PRESSURE_ANGLES = 10.0, 35.0
 _RACK_HEIGHTS = 0.5, 2.0
+# by how much the tip form circle may lie outside the tip circle [mm], which a drawing rounds
+CHAMFER_ACCURACY = 1e-3
 
 
 class Gear(Checked):
@@ -33,17 +35,23 @@ class Gear(Checked):
         bore_diameter: diameter at which the body is rigidly held [mm]; None for half the root diameter, which `str`
             prints. An integral shaft has no bore: give the shaft's diameter beside the gear. The body is a plane ring,
             which cannot pass its torque on along the axis, so without a held circle its wind-up has no limit.
-        tip_edge_radius: radius of the edge between flank and tip cylinder [mm], used for the pressure of corner contact
-            only.
-        tooth_thickness_allowance: E_sns (ISO 21771), by which the tooth is thicker than the rack makes it, as an arc on
-            the reference cylinder [um]: negative for backlash, half of it on either flank. Both flanks are turned
-            towards the tooth centreline with their fillets, as by a tool with wider teeth at the same depth: the root
-            circle stays, and the thinner tooth is softer. Tables of finite elements hold the tooth without it.
+        tip_form_diameter: d_Fa, where chamfer or rounding of the tip begins and the active flank ends [mm] (ISO 21771);
+            None for a flank up to the tip diameter. The path of contact ends there, the corner that touches beyond it
+            is the edge there, and tip reliefs count from it. A chamfer is taken to lie at 45 degrees.
+        tip_edge_radius: radius of the edge between flank and tip cylinder or chamfer [mm], used for the pressure of
+            corner contact only.
+        tooth_thickness_allowance: E_sns, upper allowance of the tooth thickness (ISO 21771), by which the tooth is
+            thicker than the rack makes it, as an arc on the reference cylinder [um]: negative for backlash, half of it
+            on either flank. Both flanks are turned towards the tooth centreline with their fillets, as by a tool with
+            wider teeth at the same depth: the root circle stays, and the thinner tooth is softer.
+        tooth_thickness_tolerance: T_sn, from the upper down to the lower allowance E_sni = E_sns - T_sn [um]; the tooth
+            is that in the middle of both.
         material: elastic constants.
 
     Raises:
-        ValueError: for a number outside its range or an array of numbers, a pointed tooth, a tip inside the base circle
-            or a bore that reaches the root circle; the message names the parameter, its value and what is allowed.
+        ValueError: for a number outside its range or an array of numbers, a pointed tooth, a tip inside the base
+            circle, a tip form circle outside the tip circle or inside the base circle, or a bore that reaches the root
+            circle; the message names the parameter, its value and what is allowed.
             While being traced only shapes are checked: `margins` of the pair tell then.
     """
 
@@ -56,9 +64,11 @@ class Gear(Checked):
     dedendum: Scalar = number("x module", low=_RACK_HEIGHTS[0], high=_RACK_HEIGHTS[1], default=1.25, kw_only=True)
     root_radius: Scalar = number("x module", low=0.0, default=0.38, kw_only=True)
     tip_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
+    tip_form_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     bore_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     tip_edge_radius: Scalar = number("mm", low=0.0, open_low=True, default=0.1, kw_only=True)
     tooth_thickness_allowance: Scalar = number("um", high=0.0, default=0.0, kw_only=True)
+    tooth_thickness_tolerance: Scalar = number("um", low=0.0, default=0.0, kw_only=True)
     material: Material = eqx.field(default_factory=Material, kw_only=True)
 
     def check_together(self) -> None:
@@ -70,6 +80,7 @@ class Gear(Checked):
         text = super().__repr__()
         for name, radius, meaning in (
             ("tip_diameter", self.tip_radius, "of the rack"),
+            ("tip_form_diameter", self.tip_radius, "the tip"),
             ("bore_diameter", self.bore_radius, "half the root diameter"),
         ):
             known = concrete(2 * radius)
@@ -110,19 +121,35 @@ class Gear(Checked):
         return 0.5 * self.root_circle_radius if self.bore_diameter is None else 0.5 * self.bore_diameter
 
     @property
+    def mean_tooth_thickness_allowance(self) -> Real:
+        """Middle of upper and lower allowance, (E_sns + E_sni) / 2 [um]: that of the tooth that is analysed."""
+        return self.tooth_thickness_allowance - 0.5 * self.tooth_thickness_tolerance
+
+    @property
     def thickness_angle(self) -> Real:
-        """What the tooth thickness allowance adds to half the angle of the tooth [rad]."""
-        return 1e-3 * self.tooth_thickness_allowance / (2 * self.pitch_radius)
+        """What the mean tooth thickness allowance adds to half the angle of the tooth [rad]."""
+        return 1e-3 * self.mean_tooth_thickness_allowance / (2 * self.pitch_radius)
+
+    @property
+    def tip_form_radius(self) -> Real:
+        """Where the active flank ends [mm]: at the tip circle, or where its chamfer or rounding begins."""
+        return self.tip_radius if self.tip_form_diameter is None else 0.5 * self.tip_form_diameter
+
+    @property
+    def tip_chamfer(self) -> Real:
+        """Radial height of the tip's chamfer or rounding [mm], h_K."""
+        return self.tip_radius - self.tip_form_radius
 
     @property
     def tip_roll_length(self) -> Real:
-        """Roll length at the tip [mm]; 0 for a traced gear whose tip lies inside the base circle."""
-        return safe_sqrt(self.tip_radius**2 - self.base_radius**2)
+        """Roll length where the active flank ends at the tip [mm]; 0 for a traced gear's inside the base circle."""
+        return safe_sqrt(self.tip_form_radius**2 - self.base_radius**2)
 
     @property
     def tip_land(self) -> Real:
-        """Thickness of the tooth at the tip as an arc [mm]; not positive where the tooth is pointed."""
-        return 2 * self.tip_radius * half_tooth_angle(self, self.tip_roll_length)
+        """Thickness of the tooth at the tip as an arc [mm], before it is chamfered; not positive if it is pointed."""
+        rho = safe_sqrt(self.tip_radius**2 - self.base_radius**2)
+        return 2 * self.tip_radius * half_tooth_angle(self, rho)
 
     @property
     def tip_height(self) -> Real:
@@ -140,7 +167,7 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
     shape = _shape(gear)
     if any(isinstance(number, jax.core.Tracer) for number in shape):
         return ()
-    height, land, rim, tip, base, root, bore = (float(number) for number in shape)
+    height, land, rim, chamfer, tip, form, base, root, bore = (float(number) for number in shape)
     name = "addendum" if gear.tip_diameter is None else "tip_diameter"
     faults = []
     if not height > 0:
@@ -150,6 +177,10 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
             f"Gear: {name}: tip diameter = {tip:.6g} mm makes the tooth pointed: the tip land is {land:.3g} mm, must "
             "be greater than 0 mm"
         )
+    if not chamfer >= -CHAMFER_ACCURACY:
+        faults.append(f"Gear: tip_form_diameter = {form:.6g} mm must be at most {tip:.6g} mm, the tip diameter")
+    elif height > 0 and not form > max(base, root):
+        faults.append(f"Gear: tip_form_diameter = {form:g} mm must be greater than {max(base, root):g} mm")
     if not rim > 0:
         faults.append(f"Gear: bore_diameter = {bore:g} mm must be less than {root:g} mm")
     return tuple(faults)
@@ -157,9 +188,9 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
 
 @program
 def _shape(gear: Gear) -> tuple[Scalar, ...]:
-    """Margins of the shape, then the diameters of tip, base circle, root circle and bore [mm]."""
-    radii = (gear.tip_radius, gear.base_radius, gear.root_circle_radius, gear.bore_radius)
-    return gear.tip_height, gear.tip_land, gear.rim_thickness, *(2 * radius for radius in radii)
+    """Margins of the shape, then the diameters of tip, tip form, base and root circle and bore [mm]."""
+    radii = (gear.tip_radius, gear.tip_form_radius, gear.base_radius, gear.root_circle_radius, gear.bore_radius)
+    return gear.tip_height, gear.tip_land, gear.rim_thickness, gear.tip_chamfer, *(2 * radius for radius in radii)
 
 
 def _rack_radius_limit(gear: Gear) -> float | None:

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..numerics import Checked, result, safe_sqrt
-from .gear import Gear, shape_faults
+from .gear import CHAMFER_ACCURACY, Gear, shape_faults
 from .involute import diameter, involute
 from .outline import Outline, outline
 from .path import PathOfContact, backlash_free_involute, pressure_angle_of
@@ -54,6 +54,8 @@ class Margins(Checked):
             allowances; without a given centre distance that of the allowances alone.
         base_circle_clearance: centre distance minus both base radii [mm].
         base_pitch_difference: between pinion and wheel, relative. No margin: it must vanish.
+        tip_overrun: by how much a tip form circle lies outside its tip circle, the larger of both gears [mm]. No
+            margin: it must not be positive, and is zero without chamfers.
         accuracy: by how much clearances of the form circles and backlash may lie below zero.
     """
 
@@ -71,6 +73,7 @@ class Margins(Checked):
     backlash: Scalar = result("um")
     base_circle_clearance: Scalar = result("mm")
     base_pitch_difference: Scalar = eqx.field(repr=False)
+    tip_overrun: Scalar = eqx.field(repr=False)
     accuracy: Accuracy = eqx.field(repr=False)
 
     @property
@@ -82,6 +85,7 @@ class Margins(Checked):
             for name in ("tip_height", "tip_land", "rim_thickness")
         }
         return shape | {
+            "tip_overrun": self.tip_overrun <= CHAMFER_ACCURACY,
             "base_pitch_difference": self.base_pitch_difference <= _DISTANCE_ACCURACY,
             "base_circle_clearance": self.base_circle_clearance > 0,
             "backlash": self.backlash >= -self.accuracy.backlash,
@@ -105,9 +109,6 @@ def margins_between(pinion: Outline, wheel: Outline, path: PathOfContact, center
     tangent = path.pinion_pitch_roll_length / path.pinion_base_radius
     secant = jnp.sqrt(1 + tangent**2)
     distance = both * secant if center_distance is None else center_distance
-    # p_b - s_1 - s_2 with the thicknesses at the base circles: 2 (r_b1 + r_b2) (inv(alpha_w) - inv(alpha_w,free))
-    play = 2e3 * both * (involute(tangent) - backlash_free_involute(first, second))
-    play = (jnp.zeros_like(play) if center_distance is None else play) - thickening(first, second)
     return Margins(
         pinion_tip_land=first.tip_land,
         wheel_tip_land=second.tip_land,
@@ -120,9 +121,10 @@ def margins_between(pinion: Outline, wheel: Outline, path: PathOfContact, center
         pinion_tip_clearance=distance - first.tip_radius - second.root_circle_radius,
         wheel_tip_clearance=distance - second.tip_radius - first.root_circle_radius,
         contact_ratio_margin=path.contact_ratio - 1,
-        backlash=play,
+        backlash=play_between(first, second, None if center_distance is None else tangent),
         base_circle_clearance=distance - both,
         base_pitch_difference=jnp.abs(first.base_pitch - second.base_pitch) / first.base_pitch,
+        tip_overrun=-jnp.minimum(first.tip_chamfer, second.tip_chamfer),
         accuracy=Accuracy(
             pinion_form=_form_accuracy(pinion),
             wheel_form=_form_accuracy(wheel),
@@ -130,6 +132,17 @@ def margins_between(pinion: Outline, wheel: Outline, path: PathOfContact, center
             backlash=2e3 * _DISTANCE_ACCURACY * both * tangent,
         ),
     )
+
+
+def play_between(pinion: Gear, wheel: Gear, tangent: Scalar | None) -> Scalar:
+    """Play on the line of action [um] at the tangent of a working pressure angle, or where that is backlash-free.
+
+    p_b - s_1 - s_2 with the thicknesses at the base circles: 2 (r_b1 + r_b2) (inv(alpha_w) - inv(alpha_w,free)).
+    """
+    if tangent is None:
+        return -thickening(pinion, wheel)
+    free = involute(tangent) - backlash_free_involute(pinion, wheel)
+    return 2e3 * (pinion.base_radius + wheel.base_radius) * free - thickening(pinion, wheel)
 
 
 def thickening(pinion: Gear, wheel: Gear) -> Scalar:

@@ -57,9 +57,16 @@ class GearPair(Checked):
     @property
     def backlash(self) -> Scalar:
         """Play between the unloaded, unmodified flanks on the line of action [um]: that of the centre distance, and
-        cos(pressure angle) times what the tooth thickness allowances take off both teeth.
+        cos(pressure angle) times what the mean tooth thickness allowances take off both teeth.
         """
         return margins(self).backlash
+
+    @property
+    def backlash_limits(self) -> Float[Array, "*pairs 2"]:
+        """Least and largest backlash within the tolerances of the tooth thickness [um], shape (2,)."""
+        tolerances = self.pinion.tooth_thickness_tolerance + self.wheel.tooth_thickness_tolerance
+        half = 0.5 * jnp.cos(jnp.deg2rad(self.pinion.pressure_angle)) * tolerances
+        return jnp.stack([self.backlash - half, self.backlash + half], axis=-1)
 
     @property
     def face_width(self) -> Real:

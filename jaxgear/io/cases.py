@@ -21,12 +21,10 @@ def load_of(design: DesignFile, table: str, section: OptimizeSection | SweepSect
 
 
 def quality_classes(design: DesignFile) -> tuple[ToleranceClass, ToleranceClass] | None:
-    """The classes of pinion and wheel in the table [tolerance] if there is one."""
-    section = design.tolerance
-    if section is None:
+    """The flank tolerances of pinion and wheel where the file names their classes."""
+    if design.quality_classes is None:
         return None
-    both = section.quality_class
-    first, second = both if isinstance(both, list) else (both, both)
+    first, second = design.quality_classes
     pair = design.pair()
     return ToleranceClass.of(pair.pinion, first), ToleranceClass.of(pair.wheel, second)
 

@@ -10,17 +10,17 @@ from jaxtyping import Array, Float
 
 from ..compliance import AbstractCompliance
 from ..contact import Mesh, Operation, Resolution, begin_contact, fewest_pairs, prepare
-from ..geometry import Gear, GearPair
+from ..geometry import GearPair
 from ..metrics import Lubricant, Strength
-from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
 from . import rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, template
 from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refuse_given, refused
-from .flanks import check_files, flank_part
+from .flanks import check_files
 from .gearbox import support_of
+from .gears import gear_of, materials_of, pair_of, quality_of, with_quality
 from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
 from .variables import increasing, read_variables
@@ -49,6 +49,7 @@ class DesignFile:
         torque_range: lowest and highest torque of interest [N m].
         speed: of the pinion [rpm], None if the file names none; the middle of its bounds where it is a variable.
         friction: mean coefficient of friction; used with a speed only, None for the library's default.
+        quality_classes: flank tolerance classes of pinion and wheel, of the gears or of [tolerance]; None without.
         bounds: (low, high) of every free parameter, in its unit.
         units: unit of every free parameter, "" for a pure number.
         optimize: the table of that name; `optimize_request` makes sense of it.
@@ -70,6 +71,7 @@ class DesignFile:
     torque_range: tuple[float, float]
     speed: float | None
     friction: float | None
+    quality_classes: tuple[int, int] | None
     bounds: dict[str, tuple[float, float]]
     units: dict[str, str]
     optimize: schema.OptimizeSection
@@ -182,11 +184,12 @@ def load_design(path: str | Path) -> DesignFile:
 
 
 def _checked(file: Path, top: schema.FileSection) -> DesignFile:
-    pinion, pinion_flank = _gear("pinion", top.pinion, file.parent)
-    wheel, wheel_flank = _gear("wheel", top.wheel, file.parent)
+    materials = materials_of(top)
+    (pinion_says, pinion, pinion_flank), (wheel_says, wheel, wheel_flank) = (
+        gear_of(name, getattr(top, name), materials, file.parent) for name in ("pinion", "wheel")
+    )
     flanks = [*pinion_flank, *wheel_flank]
-    mounting = template.part_of("pair", decode("pair", top.pair or {}, schema.PairSection), GearPair)
-    pair = replace(mounting, fields={"pinion": pinion, "wheel": wheel, **mounting.fields})
+    pair, quality = pair_of(top, pinion, wheel), quality_of(pinion_says, wheel_says)
     load = _load(top.load)
     operation = template.part_of("load", load, Operation)
     stiffness = decode("model", top.model or {}, schema.ModelSection)
@@ -217,17 +220,21 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     tolerance = None
     if top.tolerance is not None:
         tolerance = decode("tolerance", top.tolerance, schema_sweep.ToleranceSection)
+        tolerance = with_quality("tolerance", tolerance, quality)
     if top.sweep is not None and not top.variables:
         raise DesignFileError("sweep", "has no effect without [variables]")
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
     sweep = None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection)
-    layout = None if top.layout is None else decode("layout", top.layout, schema_shafts.LayoutSection)
+    layout = None
+    if top.layout is not None:
+        layout = with_quality("layout", decode("layout", top.layout, schema_shafts.LayoutSection), quality)
     if layout is not None and axes.fields:
         raise DesignFileError("misalignment", "has no effect with [layout], which takes that of [[meshes]]")
     if layout is not None and layout.profile is not None:
         uneven.append("the flank lines of layout.profile")
     resolution = _resolution(top.resolution or {}, uneven)
     model = with_tables(model, stiffness, file.parent, pair, usual_pair)  # last, as it takes longer than all the rest
+    classes = quality if tolerance is None else tolerance.quality_class
     return DesignFile(
         path=file,
         title=top.title or file.stem,
@@ -235,6 +242,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         torque_range=(low, high),
         speed=None if usual.speed is None else float(usual.speed),
         friction=None if usual.friction is None else float(usual.friction),
+        quality_classes=None if classes is None else _both(classes),
         bounds=bounds,
         units=units,
         optimize=optimize,
@@ -245,7 +253,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         lubricant=rating.lubricant_of(top.lubricant, load, file.parent),
         strength=rating.strength_of(top.strength, file.parent),
         layout=layout,
-        support=support_of(top, layout, usual_pair, torque, file.parent),
+        support=support_of(top, layout, usual_pair, torque, file.parent, materials),
         design=FileDesign(tuple(bounds), pinion_flank, wheel_flank),
         open_case=tuple(open_case),
         _pair=pair,
@@ -259,15 +267,9 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     )
 
 
-def _gear(name: str, table: schema.Tables, folder: Path) -> tuple[template.Part, list[template.Part]]:
-    """A gear and its modifications; paths begin in the folder."""
-    section = decode(name, table, schema.GearSection)
-    flank = []
-    for index, each in enumerate(section.modification):
-        key = f"{name}.modification[{index}]"
-        read = each.get("type") == "file"
-        flank.append(flank_part(key, each, folder) if read else template.parse(key, each, AbstractModification))
-    return template.part_of(name, section, Gear), flank
+def _both(classes: int | list[int]) -> tuple[int, int]:
+    first, second = classes if isinstance(classes, list) else (classes, classes)
+    return first, second
 
 
 def _load(table: schema.Tables) -> schema.LoadSection:

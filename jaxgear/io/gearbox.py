@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry import Gear, GearPair
+from ..geometry import GearPair
 from ..shafts import (
     Bearing,
     Coupling,
@@ -26,6 +26,7 @@ from ..shafts import (
 from ..shafts import Section as ShaftPart
 from . import schema_shafts as schema
 from .errors import DesignFileError, refuse_given, refused
+from .gears import Materials, fixed_gear
 from .layout import section_of
 from .schema import FileSection
 from .template import part_of
@@ -36,7 +37,12 @@ _SAME_TORQUE = 1e-3  # relative; what is left is rounding of ratios written by h
 
 
 def support_of(
-    top: FileSection, layout: schema.LayoutSection | None, pair: GearPair, torque: float, folder: Path
+    top: FileSection,
+    layout: schema.LayoutSection | None,
+    pair: GearPair,
+    torque: float,
+    folder: Path,
+    materials: Materials,
 ) -> ShaftSupport | None:
     """The mesh of pinion and wheel on its shafts; None for a file without a layout.
 
@@ -46,6 +52,7 @@ def support_of(
         pair: of the file.
         torque: of the file, on the pinion [N m].
         folder: of the design file.
+        materials: of the file.
 
     Raises:
         DesignFileError: for tables that do not make a gearbox with pinion and wheel in it, or whose couplings bring
@@ -56,7 +63,7 @@ def support_of(
         return None
     if not top.shafts:
         raise DesignFileError("layout", "has no effect without [[shafts]]")
-    made = [_shaft(f"shafts[{i}]", each, pair) for i, each in enumerate(top.shafts)]
+    made = [_shaft(f"shafts[{i}]", each, pair, materials) for i, each in enumerate(top.shafts)]
     names = [gear.name for shaft in made for gear in shaft.gears]
     for name in _OWN:
         if name not in names:
@@ -77,7 +84,7 @@ def support_of(
     return support(box, own[0])
 
 
-def _shaft(key: str, table: Mapping[str, Any], pair: GearPair) -> Shaft:
+def _shaft(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materials) -> Shaft:
     section = decode(key, table, schema.ShaftSection)
 
     def each(name, make):
@@ -89,7 +96,7 @@ def _shaft(key: str, table: Mapping[str, Any], pair: GearPair) -> Shaft:
         section.name,
         each("sections", lambda at, item: _plain(at, item, ShaftPart)),
         each("bearings", lambda at, item: _plain(at, item, MatrixBearing if "stiffness" in item else Bearing)),
-        each("gears", lambda at, item: _gear(at, item, pair)),
+        each("gears", lambda at, item: _gear(at, item, pair, materials)),
         each("couplings", lambda at, item: _plain(at, item, Coupling)),
         each("loads", lambda at, item: _plain(at, item, ShaftLoad)),
     )
@@ -100,7 +107,7 @@ def _plain(key: str, table: Mapping[str, Any], cls):
     return part_of(key, decode(key, table, section_of(cls, open=False)), cls).build({})
 
 
-def _gear(key: str, table: Mapping[str, Any], pair: GearPair) -> MountedGear:
+def _gear(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materials) -> MountedGear:
     section = decode(key, table, schema.MountedGearSection)
     if section.name in _OWN:
         if section.gear is not None:
@@ -109,7 +116,7 @@ def _gear(key: str, table: Mapping[str, Any], pair: GearPair) -> MountedGear:
     elif section.gear is None:
         raise DesignFileError(f"{key}.gear", f'missing, "{section.name}" is not the pinion or wheel of the file')
     else:
-        gear = _plain(f"{key}.gear", section.gear, Gear)
+        gear = fixed_gear(f"{key}.gear", section.gear, materials)
     if section.integral and section.body_diameter is not None:
         raise DesignFileError(f"{key}.body_diameter", "has no effect on an integral gear")
     body = integral_diameter(gear) if section.integral else section.body_diameter

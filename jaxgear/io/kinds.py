@@ -10,7 +10,8 @@ from typing import Any
 
 from pydantic_core import CoreSchema, core_schema
 
-from ..numerics import Number
+from ..numerics import Number, fields_of
+from ..tolerance import ToleranceClass
 from .errors import not_known
 from .ranges import outside
 
@@ -169,4 +170,6 @@ def _kind(value: Any) -> str:
 
 SEED = count(0, 2**31 - 1)  # what every generator of random numbers takes
 LEVEL = count(2, 10_000)
+QUALITY_CLASS = real(fields_of(ToleranceClass)["quality_class"])
+QUALITY_CLASSES = either(QUALITY_CLASS, list_of(QUALITY_CLASS, length=2), "a whole number, or a list of two")
 WEIGHTS = list_of(real(Number(low=0.0)))

@@ -133,6 +133,8 @@ def _number(number: Number, open: bool) -> Kind | None:
     if not number.checked:
         return None
     kind = real(number, open=open and not (number.static or number.whole))
+    if number.limits:
+        return either(kind, list_of(kind, length=2), f"{kind.words}, or a list of both limits")
     for _ in number.shape:
         kind = list_of(kind)
     return kind

@@ -56,6 +56,6 @@ def allowed(number: Number) -> str:
     if number.low is not None:
         parts.append(f"{'greater than' if number.open_low else 'at least'} {number.low:g}{unit}")
     if number.high is not None:
-        high = str(number.high) if number.whole else f"{number.high:g}"
+        high = str(int(number.high)) if number.whole else f"{number.high:g}"
         parts.append(f"{'less than' if number.open_high else 'at most'} {high}{unit}")
     return " and ".join(parts)

@@ -48,7 +48,7 @@ def reference() -> str:
 def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     yield "The top level", schema.FileSection, None
     yield "[pinion] and [wheel]", schema.GearSection, Gear
-    yield "[pinion.material] and [wheel.material]", section_of(Material), Material
+    yield "[materials.NAME], [pinion.material] and [wheel.material]", section_of(Material), Material
     yield "[pair]", schema.PairSection, GearPair
     for name, cls in family(AbstractModification, users=False).items():
         yield f'[[pinion.modification]] with type = "{name}"', section_of(cls), cls

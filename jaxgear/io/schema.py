@@ -11,10 +11,25 @@ from pydantic import create_model
 from ..compliance import Compliance
 from ..contact import Operation, Resolution
 from ..geometry import Gear, GearPair
+from ..manufacture import ToothThickness
 from ..numerics import Number
 from ..optimize import METHODS, Pareto
 from ..shafts import Misalignment
-from .kinds import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, switch, table, text
+from .kinds import (
+    LEVEL,
+    QUALITY_CLASS,
+    SEED,
+    WEIGHTS,
+    choice,
+    count,
+    either,
+    list_of,
+    positive,
+    real,
+    switch,
+    table,
+    text,
+)
 from .layout import Section, section_of
 
 Tables = dict[str, Any]
@@ -34,6 +49,7 @@ class FileSection(Section):
         wheel: the driven gear.
         load: torque and speed.
         title: free text; the name of the file without it.
+        materials: of the gears, by names of the file's own; "STEEL" is known without it.
         pair: how the gears are mounted.
         model: the stiffness model; the library's default without it.
         misalignment: of the axes; parallel ones without it.
@@ -56,6 +72,7 @@ class FileSection(Section):
     wheel: Annotated[Tables, table()]
     load: Annotated[Tables, table()]
     title: Annotated[str | None, text()] = None
+    materials: Annotated[Tables | None, table(table())] = None
     pair: Annotated[Tables | None, table()] = None
     model: Annotated[Tables | None, table()] = None
     misalignment: Annotated[Tables | None, table()] = None
@@ -74,13 +91,30 @@ class FileSection(Section):
     layout: Annotated[Tables | None, table()] = None
 
 
-class GearSection(section_of(Gear)):  # type: ignore[misc]
+_ThicknessKeys = section_of(ToothThickness, most=(("teeth_spanned", 1000),))
+_GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance"))
+
+
+class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
     """A gear and what is taken off its flanks.
 
+    The tooth thickness stands in one of three ways: as the allowance E_sns, with the tolerance T_sn down to E_sni where
+    there is one; as the span W_k over so many teeth; as the dimension over balls. A list of two is lower and upper
+    limit, between which the tooth is in the middle.
+
     Attributes:
+        tooth_thickness_allowance: E_sns on the reference cylinder, negative for backlash, or [E_sni, E_sns].
+        span: base tangent length W_k over `teeth_spanned` teeth, or its limits.
+        teeth_spanned: k.
+        over_balls: dimension M_dK over two balls or pins of `ball_diameter`, or its limits.
+        ball_diameter: D_M.
+        material: name in [materials], "STEEL", or elastic constants.
+        quality_class: flank tolerance class of ISO 1328-1, of [tolerance], [layout] and the charts.
         modification: what is taken off the flank; several add up.
     """
 
+    material: Annotated[Any, either(text(), table(), "the name of a material, or a table")] = None
+    quality_class: Annotated[int | None, QUALITY_CLASS] = None
     modification: Annotated[list[Tables], _TABLES] = []
 
 
@@ -101,7 +135,17 @@ class FlankFileSection(Section):
     method: Annotated[str, choice("linear", "cubic2", "monotonic")] = "linear"
 
 
-PairSection = section_of(GearPair, ("pinion", "wheel"))
+class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[misc]
+    """Pinion (driving) and wheel (driven) on their centre distance.
+
+    Attributes:
+        backlash: play on the line of action; by the tooth thickness of the gears that say nothing of their own, or by
+            the centre distance where both do.
+    """
+
+    backlash: Annotated[Any, real(Number("um", low=0.0), open=True)] = None
+
+
 MisalignmentSection = section_of(Misalignment)
 
 

@@ -6,14 +6,13 @@ from ..layout import WoehlerLine
 from ..numerics import Number
 from ..shafts import Bearing, Coupling, GearMesh, MatrixBearing, Misalignment, MountedGear, ShaftLoad
 from ..shafts import Section as ShaftPart
-from .kinds import choice, count, either, list_of, positive, real, switch, table, text
+from .kinds import QUALITY_CLASSES, choice, count, list_of, positive, real, switch, table, text
 from .layout import Section, section_of
 
 Tables = dict[str, Any]
 
 _ROWS, _ROWS_OR_NONE = list_of(table()), list_of(table(), empty=True)
 _AMOUNTS = list_of(real(Number("um", low=0.0)))
-_CLASS = real(Number(low=1.0, high=11.0, whole=True))
 _HOURS = list_of(real(Number("h", low=0.0)))
 
 PartSection = section_of(ShaftPart, open=False)
@@ -88,7 +87,8 @@ class LayoutSection(Section):
     """What `jaxgear layout` does.
 
     Attributes:
-        quality_class: flank tolerance class of ISO 1328-1, of both gears or of pinion and wheel.
+        quality_class: flank tolerance class of ISO 1328-1, of both gears or of pinion and wheel; that of the gears
+            without it.
         bearing_span: over which the deviations of the axes are measured; parallel axes without it.
         gear: whose flank line levels the load.
         direction: in which the first shaft turns, seen against z.
@@ -105,9 +105,7 @@ class LayoutSection(Section):
         profile: profile modifications to be tried in step 3; none without it.
     """
 
-    quality_class: Annotated[
-        int | list[int], either(_CLASS, list_of(_CLASS, length=2), "a whole number, or a list of two")
-    ]
+    quality_class: Annotated[int | list[int] | None, QUALITY_CLASSES] = None
     bearing_span: Annotated[float | None, positive("mm")] = None
     gear: Annotated[str, choice("pinion", "wheel")] = "wheel"
     direction: Annotated[str, choice("counterclockwise", "clockwise")] = "counterclockwise"

@@ -2,9 +2,8 @@
 
 from typing import Annotated
 
-from ..numerics import Number
 from ..tolerance import Tolerance
-from .kinds import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, table, text
+from .kinds import LEVEL, QUALITY_CLASSES, SEED, WEIGHTS, choice, count, either, list_of, positive, real, table, text
 from .layout import Section, section_of
 
 
@@ -41,20 +40,15 @@ class SweepSection(Section):
     part_rows: Annotated[int | None, count(1, 2**24)] = None
 
 
-_CLASS = real(Number(whole=True))
-
-
 class ToleranceSection(section_of(Tolerance, ("pinion", "wheel", "distribution"), open=False)):  # type: ignore[misc]
     """Deviations of manufactured gears after ISO 1328-1: the scatter of all designs of analyze and optimize.
 
     Attributes:
-        quality_class: of both gears, or of pinion and wheel.
+        quality_class: of both gears, or of pinion and wheel; that of the gears without it.
         samples: manufactured pairs per design, or variant of a sweep.
         seed: of their deviations.
     """
 
-    quality_class: Annotated[
-        int | list[int], either(_CLASS, list_of(_CLASS, length=2), "a whole number, or a list of two")
-    ]
+    quality_class: Annotated[int | list[int] | None, QUALITY_CLASSES] = None
     samples: Annotated[int, count(2, 100_000)] = 64
     seed: Annotated[int, SEED] = 0

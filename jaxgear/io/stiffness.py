@@ -14,6 +14,7 @@ _FREE = {
     "face_width",
     "center_distance",
     "tip_edge_radius",
+    "tip_form_diameter",
     "elastic_modulus",
     "density",
     "thermal_contact_coefficient",

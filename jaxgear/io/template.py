@@ -94,25 +94,27 @@ def parse(key: str, table: Mapping[str, Any] | str, cls: type[eqx.Module]) -> Pa
     return part_of(key, decode(key, table, section_of(cls)), cls)
 
 
-def part_of(key: str, section: Section, cls: type[eqx.Module]) -> Part:
-    """An object from its decoded table."""
+def part_of(key: str, section: Section, cls: type[eqx.Module], *, without: tuple[str, ...] = ()) -> Part:
+    """An object from its decoded table, `without` some of its keys."""
     numbers, modules = fields_of(cls), modules_of(cls)
     fields: dict[str, Any] = {}
     for name, value in section.given().items():
         here = join(key, name)
+        if name in without:
+            continue
         if name in modules:
             fields[name] = parse(here, value, modules[name])
         elif name in numbers:
-            fields[name] = _opened(value, here, numbers[name])
+            fields[name] = opened(value, here, numbers[name])
         elif name in section_of(cls).model_fields:
             fields[name] = value
     return Part(cls, fields, key)
 
 
-def _opened(value, key: str, number: Number):
+def opened(value, key: str, number: Number):
     """A value of a file, with `Free` in place of the names of variables."""
     if isinstance(value, list):
-        return [_opened(item, f"{key}[{i}]", number) for i, item in enumerate(value)]
+        return [opened(item, f"{key}[{i}]", number) for i, item in enumerate(value)]
     if isinstance(value, str):
         return Free(value, key, number)
     # an amount of zero is known to do nothing only as long as nobody traces it

@@ -23,6 +23,7 @@ def write_design(
     pinion: AbstractModification,
     wheel: AbstractModification,
     speed: float | None = None,
+    quality_classes: tuple[int, int] | None = None,
     title: str = "",
 ) -> None:
     """Writes a design file. It appears as a whole or not at all, in place of an earlier one.
@@ -33,6 +34,7 @@ def write_design(
         torque: on the pinion [N m].
         pinion, wheel: modifications of the flanks, of the library's classes and their sums.
         speed: of the pinion [rpm].
+        quality_classes: flank tolerance classes of pinion and wheel (ISO 1328-1:2013).
         title: free text.
 
     Raises:
@@ -40,8 +42,9 @@ def write_design(
     """
     check("write_design", "torque", torque, "N m", low=0.0, open_low=True)
     lines = [f"title = {_text(title)}", ""] if title else []
-    for name, gear in (("pinion", pair.pinion), ("wheel", pair.wheel)):
-        lines += [f"[{name}]", *_gear(gear), ""]
+    for name, quality in zip(("pinion", "wheel"), quality_classes or (None, None)):
+        classes = [] if quality is None else [f"quality_class = {quality}  # ISO 1328-1"]
+        lines += [f"[{name}]", *_gear(getattr(pair, name)), *classes, ""]
     if pair.center_distance is not None:
         lines += ["[pair]", f"center_distance = {_value(pair.center_distance)}  # mm", ""]
     lines += ["[load]", f"torque = {_value(torque)}  # N m, on the pinion"]

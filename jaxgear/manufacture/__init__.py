@@ -1,7 +1,8 @@
 """How flanks are made and measured: form-grinding wheel, volumes ground off, charts of the measuring machine.
 
-Functions take one gear's side of the contact, of `mesh.sides`, and the modification of its flanks. Importing adds
-`pinion_quadratic_deviation`, `pinion_removed_volume` and others to the vocabulary of quantities.
+`drawn_gear` makes a gear from the tooth thickness on its drawing. Functions of flanks take one gear's side of the
+contact, of `mesh.sides`, and the modification. Importing adds `pinion_quadratic_deviation`, `pinion_removed_volume` and
+others to the vocabulary of quantities.
 """
 
 from . import quantities as _quantities  # noqa: F401 - adds to the vocabulary
@@ -16,6 +17,9 @@ from .chart import profile_range as profile_range
 from .chart import profile_trace as profile_trace
 from .chart import start_of_relief as start_of_relief
 from .chart import table_traces as table_traces
+from .drawn import ToothThickness as ToothThickness
+from .drawn import drawn_gear as drawn_gear
+from .drawn import with_thickness as with_thickness
 from .spline import WheelSpline as WheelSpline
 from .spline import best_wheel_spline as best_wheel_spline
 from .spline import relief_start as relief_start

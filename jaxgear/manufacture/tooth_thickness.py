@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import Gear, outline
 from ..geometry.involute import involute
-from ..numerics import bracketed_root, check, concrete, whole
+from ..numerics import bracketed_root, check, concrete, real, whole
 
 Scalar = Float[Array, ""]
 
@@ -53,7 +53,7 @@ def _span(gear: Gear, teeth: int) -> Scalar:
     alpha = jnp.deg2rad(gear.pressure_angle)
     nominal = jnp.pi * (teeth - 0.5) + gear.teeth * involute(jnp.tan(alpha))
     shifted = 2 * gear.profile_shift * gear.module * jnp.sin(alpha)
-    return jnp.cos(alpha) * (gear.module * nominal + 1e-3 * gear.tooth_thickness_allowance) + shifted
+    return jnp.cos(alpha) * (gear.module * nominal + 1e-3 * gear.mean_tooth_thickness_allowance) + shifted
 
 
 def over_balls(gear: Gear, ball) -> Scalar:
@@ -72,7 +72,7 @@ def over_balls(gear: Gear, ball) -> Scalar:
     """
     check("over_balls", "ball", ball, "mm", low=0.0, open_low=True)
     alpha = jnp.deg2rad(gear.pressure_angle)
-    wanted = _thick(gear, ball, 1e-3 * gear.tooth_thickness_allowance)
+    wanted = _thick(gear, ball, 1e-3 * gear.mean_tooth_thickness_allowance)
     tangent = bracketed_root(_missing, jnp.full_like(alpha, 1e-6), jnp.full_like(alpha, _WIDEST), wanted)
     radius = gear.base_radius * jnp.sqrt(1 + tangent**2)
     _check_ball(gear, ball, wanted, radius)
@@ -81,45 +81,49 @@ def over_balls(gear: Gear, ball) -> Scalar:
     return 2 * radius * _offset(gear) + ball
 
 
-def allowance_of_span(gear: Gear, teeth: int, measured) -> Scalar:
+def allowance_of_span(gear: Gear, teeth: int, measured) -> Float[Array, "..."]:
     """Tooth thickness allowance E_sns [um] of a base tangent length W_k [mm] over k teeth; the inverse of `span`.
 
     Args:
         gear: the gear; its own allowance does not count.
         teeth: k.
-        measured: W_k [mm].
+        measured: W_k [mm], of any shape.
 
     Raises:
         ValueError: for a length that is not within a base pitch of that of the gear without allowance.
     """
     alpha = jnp.deg2rad(gear.pressure_angle)
-    nominal = span(gear, teeth) - 1e-3 * gear.tooth_thickness_allowance * jnp.cos(alpha)
+    nominal = span(gear, teeth) - 1e-3 * gear.mean_tooth_thickness_allowance * jnp.cos(alpha)
+    measured = real(measured)
     _check_near("allowance_of_span", "measured", measured, nominal, gear)
     return 1e3 * (measured - nominal) / jnp.cos(alpha)
 
 
-def allowance_of_balls(gear: Gear, ball, measured) -> Scalar:
+def allowance_of_balls(gear: Gear, ball, measured) -> Float[Array, "..."]:
     """Tooth thickness allowance E_sns [um] of a dimension over balls M_dK [mm]; the inverse of `over_balls`.
 
     Args:
         gear: the gear; its own allowance does not count.
         ball: diameter D_M [mm].
-        measured: M_dK [mm].
+        measured: M_dK [mm], of any shape.
 
     Raises:
         ValueError: for a dimension that puts the balls inside the base circle, or makes the tooth thicker or thinner by
             more than a base pitch.
     """
     check("allowance_of_balls", "ball", ball, "mm", low=0.0, open_low=True)
+    measured = real(measured)
     ratio = (measured - ball) / (2 * gear.base_radius * _offset(gear))
     least = concrete(2 * gear.base_radius * _offset(gear) + ball)
     check("allowance_of_balls", "measured", measured, "mm", low=None if least is None else float(least), open_low=True)
     tangent = jnp.sqrt(ratio**2 - 1)
     thicker = gear.module * gear.teeth * (involute(tangent) - _thick(gear, ball, 0.0))
     found, pitch = concrete(thicker), concrete(gear.base_pitch)
-    if found is not None and pitch is not None and abs(float(found)) > float(pitch):
-        given = f"allowance_of_balls: measured = {float(measured):g} mm"
-        raise ValueError(f"{given} makes the tooth {float(found):.3g} mm thicker, must be within {float(pitch):.3g} mm")
+    if found is not None and pitch is not None and np.abs(found).max() > float(pitch):
+        worst = np.argmax(np.abs(found))
+        given = f"allowance_of_balls: measured = {float(np.ravel(measured)[worst]):g} mm"
+        thicker_by = float(np.ravel(found)[worst])
+        raise ValueError(f"{given} makes the tooth {thicker_by:.3g} mm thicker, must be within {float(pitch):.3g} mm")
     return 1e3 * thicker
 
 

@@ -44,6 +44,7 @@ LIMITS = {
     "face width in modules, plane stress": Limit(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
     "face width in modules": Limit(2.0, 48.0, "", "as compared with finite elements; narrower contacts are softer"),
     "tip edge radius in modules": Limit(0.0, 0.2, "", "an edge is broken by 0.01 to 0.1 modules"),
+    "least backlash": Limit(-0.1, np.inf, "um", "the thickest teeth that the tolerances allow jam"),
     "coefficient of friction": Limit(0.0, 0.5, "", "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"),
     "pitch line velocity": Limit(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
     "depth of the modification": Limit(0.1, np.inf, "um", "less than flanks can be measured to: is it in mm?"),
@@ -108,8 +109,11 @@ def plausibility(
     # without the flanks: one program serves every kind of them
     gears, results, sides = _numbers(replace(cycle, pinion=None, wheel=None))
     numbers = [*(_doubt(*each) for each in gears), *_of_flanks(sides, flanks), *(_doubt(*each) for each in results)]
+    pair = cycle.kinematics.pair
+    if any(float(gear.tooth_thickness_tolerance) for gear in (pair.pinion, pair.wheel)):
+        numbers.append(_doubt("least backlash", "", pair.backlash_limits[0]))
     if rpm is not None:
-        velocity = float(rpm) * 2 * np.pi / 60 * float(cycle.kinematics.pair.pinion.pitch_radius) * 1e-3
+        velocity = float(rpm) * 2 * np.pi / 60 * float(pair.pinion.pitch_radius) * 1e-3
         numbers.append(_doubt("pitch line velocity", "", velocity))
     if coefficient is not None:
         numbers.append(_doubt("coefficient of friction", "", coefficient))

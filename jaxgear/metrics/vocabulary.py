@@ -49,6 +49,10 @@ def _margin(name: str):
     return lambda cycle: getattr(margins(cycle.kinematics.pair), name)
 
 
+def _backlash_limit(end: int):
+    return lambda cycle: cycle.kinematics.pair.backlash_limits[..., end]
+
+
 def _of_flanks(function):
     return lambda cycle: function(cycle.kinematics, pinion=cycle.pinion, wheel=cycle.wheel)
 
@@ -127,6 +131,10 @@ quantities.add(
         )
     ),
     Quantity("backlash", _margin("backlash"), "um", "play on the line of action", better="larger"),
+    Quantity(
+        "min_backlash", _backlash_limit(0), "um", "least backlash, of the thickest teeth allowed", better="larger"
+    ),
+    Quantity("max_backlash", _backlash_limit(1), "um", "largest backlash, of the thinnest teeth allowed"),
     Quantity("mesh_loss_factor", loss_factor, meaning="loss power per input power and coefficient of friction"),
     Quantity(
         "force_excitation",

@@ -31,6 +31,7 @@ class Number:
         optional: None is allowed.
         shape: names of the axes, () for a single number.
         fewest: smallest length of an axis.
+        limits: lower and upper limit, shape (2,), may stand for a single number.
         static: a Python number that is part of the structure, not a leaf.
         checked: False for a result, which may hold anything, NaN included.
     """
@@ -44,6 +45,7 @@ class Number:
     optional: bool = False
     shape: tuple[str, ...] = ()
     fewest: int = 1
+    limits: bool = False
     static: bool = False
     checked: bool = True
 
@@ -215,6 +217,10 @@ def _check_number(owner: str, name: str, value, kind: Number) -> None:
     else:
         _check_shape(owner, name, value.shape, kind)
     check(owner, name, value, kind.unit, low=kind.low, high=kind.high, open_low=kind.open_low, open_high=kind.open_high)
+    if kind.limits and (known := concrete(value)) is not None and known.ndim and not known[0] <= known[1]:
+        unit = f" {kind.unit}" if kind.unit else ""
+        limits = f"{float(known[1]):g}{unit} must be at least the lower one, {float(known[0]):g}{unit}"
+        raise ValueError(f"{owner}: {name}: upper limit {limits}")
     known = concrete(value) if kind.whole else None
     if known is not None and (known != known.round()).any():
         shown = float(known[known != known.round()].flat[0])
@@ -224,6 +230,10 @@ def _check_number(owner: str, name: str, value, kind: Number) -> None:
 def _check_shape(owner: str, name: str, shape: tuple[int, ...], kind: Number) -> None:
     if len(shape) == len(kind.shape) and all(length >= kind.fewest for length in shape):
         return
+    if kind.limits:
+        if shape == (2,):
+            return
+        raise ValueError(f"{owner}: {name} has shape {shape}, must be a single number, or lower and upper limit")
     if not kind.shape:
         raise ValueError(f"{owner}: {name} has shape {shape}, must be a single number; make many with jax.vmap")
     least = f"at least {kind.fewest} " if kind.fewest > 1 else ""

@@ -20,13 +20,21 @@ Points = Float[Array, " points"]
 # A gear is that of its table up to here, relative: single precision, and a table's own rounding.
 _ALIKE = 3e-6
 # numbers of a gear on which its table depends in a way that the table does not know
-_HELD = ("teeth", "pressure_angle", "profile_shift", "dedendum", "root_radius", "tooth_thickness_allowance")
+_HELD = (
+    "teeth",
+    "pressure_angle",
+    "profile_shift",
+    "dedendum",
+    "root_radius",
+    "tooth_thickness_allowance",
+    "tooth_thickness_tolerance",
+)
 
 _WORDS = {
     "tip_ratio": "tip_diameter over 2 module",
     "bore_ratio": "bore_diameter over 2 module",
     "poisson": "Poisson's ratio of the plane problem",
-    "allowance": "tooth_thickness_allowance over module",
+    "allowance": "mean tooth_thickness_allowance over module",
 }
 
 
@@ -114,7 +122,7 @@ def shape_of(gear: Gear, plane: Plane) -> Float[Array, " numbers"]:
             gear.tip_radius / gear.module,
             gear.bore_radius / gear.module,
             plane_poisson(gear.material, plane),
-            1e-3 * gear.tooth_thickness_allowance / gear.module,
+            1e-3 * gear.mean_tooth_thickness_allowance / gear.module,
         ]
     )
 

@@ -1,10 +1,13 @@
 """A gear of the library and the components of REXS that describe it: gear, flanks, tool and material."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ...geometry import Gear, Material
+from ...manufacture import allowance_of_balls, over_balls
 from ...numerics import real
 from ..errors import refused
 from .model import CUSTOM, Component, Model
@@ -14,10 +17,12 @@ _EDGE = f"{CUSTOM}tip_edge_radius"
 _THERMAL = "thermal_contact_coefficient_agma_925_2003"
 _SHIFT = "addendum_modification_coefficient"
 _ALLOWANCES = "chordal_tooth_thickness_upper_deviation", "chordal_tooth_thickness_lower_deviation"
+_SPANS = "upper_backlash_allowance_referenced_to_span", "lower_backlash_allowance_referenced_to_span"
+_BALLS = "upper_backlash_allowance_balls_or_pins", "lower_backlash_allowance_balls_or_pins"
+_QUALITY = "global_tolerance_class_iso_1328_2013"
 # What a gear of the library has not: it must be absent or zero. (component, attribute, unit)
 _NOT_HERE = (
     ("cylindrical_gear", "chamfer_at_tooth_end", "mm"),
-    ("cylindrical_gear_flank", "tooth_tip_chamfer", "mm"),
     ("rack_shaped_tool", "protuberance_amount", "mm"),
     ("rack_shaped_tool", "protuberance_amount_factor", "none"),
     ("rack_shaped_tool", "protuberance_height", "mm"),
@@ -27,6 +32,7 @@ _NOT_HERE = (
     ("cylindrical_gear_manufacturing_settings", "machining_allowance", "mm"),
 )
 _CLOSE = 1e-9  # relative difference of numbers that mean the same
+_ALIKE = 2e-3  # mm, by which diameters on a drawing are rounded
 
 
 def check_spur(gear: Component) -> None:
@@ -41,12 +47,20 @@ def check_spur(gear: Component) -> None:
             raise gear.refuse(name, f"{angle:g} deg must be 0 deg, a spur gear")
 
 
-def _check_tip(gear: Component) -> None:
-    """Refuses a tooth whose involute ends below its tip."""
+def _tip_form(gear: Component, flank: Component) -> float | None:
+    """Tip form diameter [mm], from itself or from the height of the tip's chamfer; None without a chamfer."""
     tip, form = gear.number("tip_diameter", "mm"), gear.number("tip_form_diameter", "mm")
-    if tip is not None and form is not None and form < tip * (1 - _CLOSE):
-        problem = f"{form:g} mm must be the tip diameter, {tip:g} mm: the library has no chamfered tooth"
-        raise gear.refuse("tip_form_diameter", problem)
+    height = flank.number("tooth_tip_chamfer", "mm")
+    if height and tip is None:
+        raise gear.refuse("tip_diameter", "missing, the chamfer of the tip begins below it")
+    chamfered = None if not height or tip is None else tip - 2 * height
+    if form is None or chamfered is None:
+        known = chamfered if form is None else form
+        return None if known is None or (tip is not None and abs(known - tip) <= _CLOSE * tip) else known
+    if abs(form - chamfered) > _ALIKE:
+        problem = f"{height:g} mm must be {0.5 * ((tip or 0.0) - form):g} mm, down to the tip form diameter, or absent"
+        raise flank.refuse("tooth_tip_chamfer", problem)
+    return form
 
 
 def read_gear(model: Model, gear: Component, flank: Component) -> Gear:
@@ -56,7 +70,6 @@ def read_gear(model: Model, gear: Component, flank: Component) -> Gear:
         DesignFileError: for what is missing or not of the library.
     """
     tool, settings = _manufacturing(model, flank)
-    _check_tip(gear)
     for part in (gear, flank, tool, settings):
         for kind, name, unit in _NOT_HERE:
             if part.type == kind and (value := part.number(name, unit)):
@@ -76,6 +89,7 @@ def read_gear(model: Model, gear: Component, flank: Component) -> Gear:
         raise settings.refuse("generated_addendum_modification_coefficient", problem)
     options = {
         "tip_diameter": gear.number("tip_diameter", "mm"),
+        "tip_form_diameter": _tip_form(gear, flank),
         "bore_diameter": gear.number("inner_diameter", "mm"),
         "addendum": flank.number("addendum_coefficient_basic_profile", "none"),
         "tip_edge_radius": gear.number(_EDGE, "mm"),
@@ -102,12 +116,20 @@ def read_gear(model: Model, gear: Component, flank: Component) -> Gear:
         material=_material(model, gear),
         **{name: value for name, value in options.items() if value is not None},
     )
-    return refused(gear.where(), replace, made, tooth_thickness_allowance=real(_allowance(gear, made)))
+    return refused(gear.where(), replace, made, **_thickness(gear, made))
 
 
-def write_gear(model: Model, gear: Gear, name: str) -> tuple[Component, list[Component]]:
+def read_quality(gear: Component) -> int | None:
+    """Flank tolerance class of ISO 1328-1:2013, None where it names none."""
+    if _QUALITY not in gear.attributes:
+        return None
+    return int(gear.choice(_QUALITY, None, [str(number) for number in range(1, 12)]))
+
+
+def write_gear(model: Model, gear: Gear, name: str, quality: int | None) -> tuple[Component, list[Component]]:
     """Writes a gear; returns its component and those of its left and right flank."""
-    allowance = _chordal(gear)
+    upper, tolerance = float(gear.tooth_thickness_allowance), float(gear.tooth_thickness_tolerance)
+    limits = (upper, upper - tolerance) if upper or tolerance else (None, None)
     part = model.add(
         "cylindrical_gear",
         name,
@@ -116,10 +138,12 @@ def write_gear(model: Model, gear: Gear, name: str) -> tuple[Component, list[Com
         helix_angle_reference_diameter=(0.0, "deg"),
         face_width=(gear.face_width, "mm"),
         tip_diameter=(2 * gear.tip_radius if gear.tip_diameter is None else gear.tip_diameter, "mm"),
+        tip_form_diameter=(gear.tip_form_diameter, "mm"),
         root_diameter=(2 * gear.root_circle_radius, "mm"),
         inner_diameter=(gear.bore_diameter, "mm"),
         datum_face_orientation=("negative", "none"),
-        **{name: (allowance, "mm") for name in _ALLOWANCES},
+        **{_QUALITY: (None if quality is None else str(quality), "none")},
+        **{name: (_chordal(gear, limit), "mm") for name, limit in zip(_ALLOWANCES, limits)},
         **{_THERMAL: (shifted(gear.material.thermal_contact_coefficient, -3), "N / (mm s^0.5 K)")},
         **{_EDGE: (gear.tip_edge_radius, "mm")},
     )
@@ -206,27 +230,48 @@ def _nominal(gear: Gear) -> tuple[float, float]:
     return 2 * float(gear.pitch_radius), float(module * (0.5 * np.pi + 2 * shift * np.tan(angle)))
 
 
-def _chordal(gear: Gear) -> float | None:
-    """The tooth thickness allowance on the chord of the reference circle [mm]; None where there is none."""
-    allowance = 1e-3 * float(gear.tooth_thickness_allowance)
-    if not allowance:
+def _chordal(gear: Gear, limit: float | None) -> float | None:
+    """A tooth thickness allowance [um] on the chord of the reference circle [mm]; None where there is none."""
+    if limit is None:
         return None
+    allowance = 1e-3 * limit
     diameter, arc = _nominal(gear)
     # d (sin((s + E) / d) - sin(s / d)), without the difference of two near numbers
     return float(2 * diameter * np.cos((arc + 0.5 * allowance) / diameter) * np.sin(0.5 * allowance / diameter))
 
 
-def _allowance(part: Component, gear: Gear) -> float:
-    """Middle of the allowances on the arc of the reference circle [um], from those on the chord."""
-    given = [part.number(name, "mm") for name in _ALLOWANCES]
-    chords = [deviation for deviation in given if deviation is not None]
-    chord = sum(chords) / len(chords) if chords else 0.0
-    diameter, arc = _nominal(gear)
-    if not -arc < chord <= 0:
-        limits = f"must be greater than {-arc:.4g} mm and at most 0 mm"
-        raise part.refuse(_ALLOWANCES[0], f"{chord:g} mm is the middle of the allowances, {limits}")
-    if not chord:
-        return 0.0
+def _thickness(gear: Component, made: Gear) -> dict[str, Any]:
+    """Upper allowance of the tooth thickness and its tolerance [um], from deviations of chord, span or over balls.
+
+    Of several the first is taken, as they say the same; a single limit is both.
+    """
+    for names, limits, allowance in _deviations(gear, made):
+        given = [limit for limit in limits if limit is not None]
+        if not given:
+            continue
+        high, low = (refused(gear.where(names[0]), allowance, limit) for limit in (given[0], given[-1]))
+        if low > high:
+            raise gear.refuse(names[1], f"{given[-1]:g} must be at most the upper one, {given[0]:g}")
+        if high > 0:
+            raise gear.refuse(names[0], f"{given[0]:g} makes the tooth {high:.4g} um thicker, must be at most 0")
+        return {"tooth_thickness_allowance": real(high), "tooth_thickness_tolerance": real(high - low)}
+    return {}
+
+
+def _deviations(gear: Component, made: Gear) -> Iterator[tuple[tuple[str, str], list[float | None], Callable]]:
+    """Names of the limits, upper one first, what they say [mm], and the allowance on the arc [um] for one of them."""
+    yield _ALLOWANCES, [gear.number(name, "mm") for name in _ALLOWANCES], lambda chord: _of_chord(made, chord)
+    cosine = float(np.cos(np.deg2rad(made.pressure_angle)))
+    yield _SPANS, [gear.number(name, "mum") for name in _SPANS], lambda span: span / cosine
+    balls = [gear.number(name, "mm") for name in _BALLS]
+    ball = gear.needed("diameter_of_measuring_ball_or_pin", "mm") if balls != [None, None] else 0.0
+    yield _BALLS, balls, lambda by: float(allowance_of_balls(made, ball, float(over_balls(made, ball)) + by))
+
+
+def _of_chord(made: Gear, chord: float) -> float:
+    """The allowance on the arc of the reference circle [um] of one on the chord [mm]."""
+    diameter, arc = _nominal(made)
+    if not -arc < chord < arc:
+        raise ValueError(f"{chord:g} mm must be greater than {-arc:.4g} mm and at most 0 mm")
     # E from sin(s/d + E/d) = sin(s/d) + A/d
-    thinned = np.arcsin(np.sin(arc / diameter) + chord / diameter)
-    return float(1e3 * diameter * (thinned - arc / diameter))
+    return float(1e3 * diameter * (np.arcsin(np.sin(arc / diameter) + chord / diameter) - arc / diameter)) + 0.0

@@ -22,7 +22,7 @@ from .values import kind_of, written
 CUSTOM = "custom_jaxgear_"  # of attributes that REXS does not know: it leaves "custom_..." to programs
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # what earlier versions call a unit of the current one
-_ALSO = {"deg": ("\u00b0",), "MPa": ("N / mm^2",), "none": ("",)}
+_ALSO = {"deg": ("\u00b0",), "MPa": ("N / mm^2",), "none": ("",), "mum": ("\u00b5m", "\u03bcm", "um")}
 # names in versions before 2, by the type of the component
 _EARLIER = {
     "rack_shaped_tool": {
@@ -38,6 +38,7 @@ _EARLIER = {
 # the library's names of units of REXS, by the shift between them
 _OWN = {
     ("mm", 3): "um",
+    ("mum", 0): "um",
     ("1 / min", 0): "rpm",
     ("kg / dm^3", 3): "kg/m^3",
     ("N / (mm s^0.5 K)", 3): "N/(m s^0.5 K)",

@@ -14,7 +14,7 @@ from ...microgeometry import AbstractModification, NoModification
 from ..errors import DesignFileError, naming, refused
 from ..toml import content
 from .frame import Frame, frames
-from .gears import check_spur, read_gear
+from .gears import check_spur, read_gear, read_quality
 from .json_form import parse_json
 from .model import Component, Model
 from .parse import parse
@@ -41,6 +41,7 @@ class RexsPair:
         pinion, wheel: modifications of the flanks.
         torque: on the pinion [N m], None where the file names none.
         speed: of the pinion [rpm], likewise.
+        quality_classes: flank tolerance classes of pinion and wheel (ISO 1328-1:2013), None where a gear has none.
     """
 
     title: str
@@ -49,6 +50,7 @@ class RexsPair:
     wheel: AbstractModification
     torque: float | None
     speed: float | None
+    quality_classes: tuple[int, int] | None
 
 
 def read_rexs(
@@ -103,7 +105,9 @@ def _read(model: Model, stage: int | None, flank: str | None, load_case: int | N
     torque, speed = _load(model, chosen, gears[0], load_case)
     units = [part for part in model.components.values() if part.type == "gear_unit"]
     title = units[0].text("model_name") if units else ""
-    return RexsPair(title, pair, on_pinion, on_wheel, torque, speed)
+    first, second = (read_quality(gear) for gear in gears)
+    classes = None if first is None or second is None else (first, second)
+    return RexsPair(title, pair, on_pinion, on_wheel, torque, speed, classes)
 
 
 def _stage(model: Model, wanted: int | None) -> Component:

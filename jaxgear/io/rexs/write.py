@@ -35,6 +35,7 @@ def write_rexs(
     speed: float | None = None,
     cycle: MeshCycle | None = None,
     friction: float | None = None,
+    quality_classes: tuple[int, int] | None = None,
     title: str = "",
     error: float = 0.01,
 ) -> None:
@@ -53,6 +54,7 @@ def write_rexs(
         cycle: solved mesh cycle of the pair, whose line load and Hertzian stress are written, with a speed also sliding
             velocity and flash temperature; its modifications, torque and speed are those of the file.
         friction: mean coefficient of friction for the flash temperature; None for that of the cycle, or the library's.
+        quality_classes: flank tolerance classes of pinion and wheel (ISO 1328-1:2013).
         title: free text.
         error: by how much the points that stand for a curve unknown to REXS may be off it [um].
 
@@ -75,7 +77,12 @@ def write_rexs(
         common_face_width=(pair.face_width, "mm"),
     )
     model.relate("assembly", assembly=unit, part=stage)
-    gears, flanks = zip(*(write_gear(model, getattr(pair, name), name) for name in ("pinion", "wheel")))
+    gears, flanks = zip(
+        *(
+            write_gear(model, getattr(pair, name), name, quality)
+            for name, quality in zip(("pinion", "wheel"), quality_classes or (None, None))
+        )
+    )
     model.relate("stage", stage=stage, gear_1=gears[0], gear_2=gears[1])
     data = [model.add("cylindrical_stage_gear_data", is_driving_gear=(first, "none")) for first in (True, False)]
     for gear, part in zip(gears, data):

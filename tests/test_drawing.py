@@ -1,0 +1,318 @@
+"""What a drawing says: tooth thickness by its measures, backlash, chamfered tips, materials and classes by name."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import gear_pair
+
+import jaxgear as jg
+from jaxgear.compliance.assembly import with_edge
+from jaxgear.compliance.edge import _wedge_excess
+from jaxgear.compliance.hertz import contact_geometry
+from jaxgear.compliance.toothload import tooth_load
+from jaxgear.geometry import outline, pair_with_backlash
+from jaxgear.io import DesignFileError, load_design
+from jaxgear.io.cases import quality_classes
+from jaxgear.manufacture import drawn_gear, over_balls, span
+
+PINION = {"teeth": 19, "module": 3.0, "face_width": 20.0, "profile_shift": 0.1}
+COSINE = np.cos(np.deg2rad(20.0))
+
+
+def gear(**changes):
+    return jg.Gear(**{**PINION, **changes})
+
+
+def measures(upper, tolerance):
+    """What the same tooth measures in every way: (lower, upper) of the allowance, over teeth and over balls."""
+    limits = [gear(tooth_thickness_allowance=upper - each) for each in (tolerance, 0.0)]
+    return {
+        "tooth_thickness_allowance": [upper - tolerance, upper],
+        "span": [float(span(each, 3)) for each in limits],
+        "over_balls": [float(over_balls(each, 5.5)) for each in limits],
+    }
+
+
+EXTRA = {"span": {"teeth_spanned": 3}, "over_balls": {"ball_diameter": 5.5}, "tooth_thickness_allowance": {}}
+
+
+@pytest.mark.parametrize("way", EXTRA)
+def test_every_measure_of_a_tooth_makes_the_same_gear(way):
+    found = drawn_gear(**PINION, **{way: measures(-60.0, 40.0)[way]}, **EXTRA[way])
+    assert float(found.tooth_thickness_allowance) == pytest.approx(-60.0, abs=1e-6)
+    assert float(found.tooth_thickness_tolerance) == pytest.approx(40.0, abs=1e-6)
+    middle = gear(tooth_thickness_allowance=-80.0)  # the tooth is that in the middle of the limits
+    assert float(found.thickness_angle) == pytest.approx(float(middle.thickness_angle), rel=1e-9)
+    assert float(span(found, 3)) == pytest.approx(np.mean(measures(-60.0, 40.0)["span"]), abs=1e-9)
+
+
+def test_a_measure_alone_has_no_tolerance_and_may_be_rounded():
+    found = drawn_gear(**PINION, span=measures(-60.0, 0.0)["span"][0], teeth_spanned=3)
+    assert float(found.tooth_thickness_tolerance) == 0.0
+    nominal = float(span(gear(), 3))
+    assert float(drawn_gear(**PINION, span=nominal + 5e-4, teeth_spanned=3).tooth_thickness_allowance) == 0.0
+
+
+@pytest.mark.parametrize("by", ["both", "pinion", "wheel", "center_distance"])
+def test_a_pair_has_the_backlash_that_it_is_made_for(by):
+    pinion, wheel = (
+        gear(tooth_thickness_allowance=-30.0, tooth_thickness_tolerance=20.0),
+        jg.Gear(48, 3.0, face_width=18.0),
+    )
+    pair = pair_with_backlash(pinion, wheel, 150.0, by=by)
+    assert float(pair.backlash) == pytest.approx(150.0, abs=1e-8)
+    np.testing.assert_allclose(pair.backlash_limits, 150.0 + 10.0 * COSINE * np.array([-1.0, 1.0]), atol=1e-8)
+    changed = {
+        name: float(now.tooth_thickness_allowance - before.tooth_thickness_allowance)
+        for name, now, before in (("pinion", pair.pinion, pinion), ("wheel", pair.wheel, wheel))
+    }
+    whole = -(150.0 / COSINE - 40.0)  # of the mean allowances, -40 um and 0
+    wanted = {"both": (whole / 2, whole / 2), "pinion": (whole, 0.0), "wheel": (0.0, whole), "center_distance": (0, 0)}
+    np.testing.assert_allclose(list(changed.values()), wanted[by], atol=1e-9)
+
+
+def test_backlash_on_a_centre_distance_has_its_derivatives():
+    """Thinner by as much as the backlash grows, and by 2 tan(alpha_w)-fold what the axes come closer."""
+
+    def allowance(backlash, distance):
+        pinion, wheel = gear(profile_shift=0.0), jg.Gear(48, 3.0, face_width=18.0)
+        pair = pair_with_backlash(pinion, wheel, backlash, center_distance=distance, by="wheel")
+        return pair.wheel.tooth_thickness_allowance
+
+    slopes = jax.jit(jax.grad(allowance, argnums=(0, 1)))(200.0, 100.6)
+    sine = np.sqrt(1 - (100.5 * COSINE / 100.6) ** 2)
+    np.testing.assert_allclose(slopes, [-1 / COSINE, 2e3 * sine / COSINE], rtol=1e-9)
+
+
+def test_a_chamfer_ends_the_flank_and_leaves_the_tip():
+    plain, cut = gear(), gear(tip_form_diameter=62.9)
+    assert float(cut.tip_roll_length) == pytest.approx(np.sqrt(31.45**2 - float(cut.base_radius) ** 2), rel=1e-12)
+    assert float(cut.tip_land) == float(plain.tip_land) and float(cut.tip_chamfer) == pytest.approx(0.35, rel=1e-12)
+    wheel = jg.Gear(48, 3.0, face_width=18.0)
+    pairs = [jg.GearPair(each, wheel) for each in (plain, cut)]
+    paths = [jg.path_of_contact(pair) for pair in pairs]
+    lost = (plain.tip_roll_length - cut.tip_roll_length) / plain.base_pitch
+    assert float(paths[0].contact_ratio - paths[1].contact_ratio) == pytest.approx(float(lost), rel=1e-12)
+    assert float(paths[0].start) == float(paths[1].start)
+    clearances = [float(jg.margins(pair).pinion_tip_clearance) for pair in pairs]
+    assert clearances[0] == clearances[1], "the chamfered tip reaches as deep into the space"
+
+
+def test_a_traced_tip_form_circle_outside_the_tip_is_flagged():
+    wheel = jg.Gear(48, 3.0, face_width=18.0)
+    held = jax.jit(lambda form: jg.margins(jg.GearPair(gear(tip_form_diameter=form), wheel)).held)
+    assert bool(held(63.5)["tip_overrun"]) and not bool(held(63.7)["tip_overrun"])
+
+
+def corner_law(tip, form):
+    """Contacts near a pinion's tip with the wedge of its corner, where the flank ends at one place; and their load."""
+    pair = gear_pair(tips=(tip, None))
+    pinion_gear = replace(pair.pinion, tip_form_diameter=None if form is None else jnp.asarray(form))
+    end = pinion_gear.tip_roll_length
+    pinion = tooth_load(outline(pinion_gear), (end - jnp.asarray([0.0, 0.02, 0.1, 2.0]))[None])
+    wheel = tooth_load(outline(pair.wheel), jnp.full((1, 4), 12.0))
+    geometry = contact_geometry(pinion, wheel, "strain", pair.face_width)
+    law = with_edge(jg.compliance.DepthReferenced().prepare(geometry), geometry, pinion, wheel, jnp.zeros((1, 4)))
+    return law, pinion
+
+
+LOAD = jnp.full((1, 1, 4), 250.0)
+
+
+def test_the_corner_of_a_chamfer_is_stiffer_than_that_of_a_cut_tip():
+    cut, _ = corner_law(62.4, None)
+    chamfered, load = corner_law(63.0, 62.4)
+    without = eqx.tree_at(lambda law: law.edge.wedge, cut, jnp.zeros_like(cut.edge.wedge))
+    tip, chamfer, bare = (law.secant(LOAD)[0, 0] for law in (cut, chamfered, without))
+    assert bool(jnp.all(chamfer <= tip)) and bool(jnp.all(chamfer >= bare))
+    assert float(chamfer[0]) < 0.97 * float(tip[0]), "right at the corner there is more material behind it"
+    # far from the corner nothing of it is left, chamfered or not
+    np.testing.assert_allclose(chamfer[3], tip[3], rtol=1e-3)
+    # 45 degrees more than between flank and top land: nearly a half plane
+    assert 0 <= float(_wedge_excess(load, np.pi / 4)) < 0.1 * float(_wedge_excess(load, 0.0))
+
+
+def test_no_chamfer_is_the_limit_of_a_small_one():
+    plain, _ = corner_law(63.0, None)
+    limit, _ = corner_law(63.0, 63.0)
+    np.testing.assert_allclose(limit.secant(LOAD), plain.secant(LOAD), rtol=1e-13)
+    small, _ = corner_law(63.0, 63.0 - 1e-4)
+    np.testing.assert_allclose(small.secant(LOAD), plain.secant(LOAD), rtol=2e-3)
+
+
+def test_the_slope_of_a_chamfered_corner_is_that_of_its_deflection():
+    law, _ = corner_law(63.0, 62.4)
+    value, slope = jax.jvp(law.deflection, (LOAD,), (jnp.ones_like(LOAD),))
+    np.testing.assert_allclose(law.slope(LOAD, value / LOAD), slope, rtol=1e-10)
+
+
+HEAD = """
+[pinion]
+teeth = 19
+module = 3.0
+face_width = 20.0
+profile_shift = 0.1
+{pinion}
+[wheel]
+teeth = 48
+module = 3.0
+face_width = 18.0
+{wheel}
+[load]
+torque = 50.0
+"""
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Loads a design file of these lines in the tables of the gears and behind them."""
+
+    def write_and_load(pinion="", wheel="", tail=""):
+        path = tmp_path / "gear.toml"
+        path.write_text(HEAD.format(pinion=pinion, wheel=wheel) + tail)
+        return load_design(path)
+
+    return write_and_load
+
+
+@pytest.mark.parametrize("way", EXTRA)
+def test_every_measure_can_stand_in_a_design_file(load, way):
+    extra = "".join(f"{name} = {value}\n" for name, value in EXTRA[way].items())
+    found = load(f"{way} = {measures(-60.0, 40.0)[way]}\n{extra}").pair().pinion
+    assert float(found.tooth_thickness_allowance) == pytest.approx(-60.0, abs=1e-6)
+    assert float(found.tooth_thickness_tolerance) == pytest.approx(40.0, abs=1e-6)
+
+
+def test_measures_and_backlash_may_be_variables(load):
+    variables = (
+        "[variables]\nw = { low = 23.05, high = 23.08, unit = 'mm' }\nj = { low = 200.0, high = 300.0, unit = 'um' }\n"
+    )
+    design = load('span = ["w", 23.09]\nteeth_spanned = 3', tail='[pair]\nbacklash = "j"\n' + variables)
+
+    @jax.jit
+    def numbers(w, j):
+        pair = design.pair({"w": w, "j": j})
+        return pair.pinion.tooth_thickness_tolerance, pair.backlash, pair.wheel.tooth_thickness_tolerance
+
+    tolerance, backlash, wheel = numbers(23.06, 240.0)
+    assert float(tolerance) == pytest.approx(30.0 / COSINE, abs=1e-6)
+    assert float(backlash) == pytest.approx(240.0, abs=1e-8) and float(wheel) == 0.0
+    slope = jax.grad(lambda w: numbers(w, 240.0)[0])(23.06)
+    assert float(slope) == pytest.approx(-1e3 / COSINE, rel=1e-9)
+
+
+def test_backlash_is_made_by_what_the_file_leaves_open(load):
+    thin = "tooth_thickness_allowance = -30.0"
+    tables = {
+        "both": load(tail="[pair]\nbacklash = 120.0"),
+        "wheel": load(thin, tail="[pair]\nbacklash = 120.0"),
+        "distance": load(thin, thin, "[pair]\nbacklash = 120.0"),
+        "given distance": load(thin, tail="[pair]\nbacklash = 120.0\ncenter_distance = 100.85"),
+    }
+    pairs = {name: design.pair() for name, design in tables.items()}
+    for name, pair in pairs.items():
+        assert float(pair.backlash) == pytest.approx(120.0, abs=1e-7), name
+    assert float(pairs["both"].pinion.tooth_thickness_allowance) == pytest.approx(-60.0 / COSINE, abs=1e-9)
+    assert float(pairs["wheel"].pinion.tooth_thickness_allowance) == -30.0
+    assert float(pairs["distance"].wheel.tooth_thickness_allowance) == -30.0
+    assert float(pairs["distance"].center_distance) > float(pairs["both"].working_center_distance)
+
+
+def test_materials_have_names(load):
+    tail = "[materials.bronze]\nelastic_modulus = 110000.0\ndensity = 8800.0\n"
+    pair = load('material = "STEEL"', 'material = "bronze"', tail).pair()
+    assert float(pair.pinion.material.elastic_modulus) == float(jg.STEEL.elastic_modulus)
+    assert (float(pair.wheel.material.elastic_modulus), float(pair.wheel.material.density)) == (110000.0, 8800.0)
+
+
+def test_classes_of_the_gears_are_those_of_tolerance_and_charts(load):
+    classes = "quality_class = {}"
+    bands = quality_classes(load(classes.format(6), classes.format(7)))
+    assert [int(band.quality_class) for band in bands] == [6, 7]
+    variables = "[variables]\nx = { low = 0.0, high = 5.0 }\n[sweep]\nsamples = 4\n[tolerance]\n"
+    relief = '\n[[wheel.modification]]\ntype = "profile_crowning"\namount = "x"\n'
+    design = load(classes.format(6), classes.format(7) + relief, variables)
+    assert design.tolerance.quality_class == [6, 7]
+
+
+SPAN = "span = 23.0\nteeth_spanned = 3"
+REFUSED = {
+    "two measures": (SPAN + "\nover_balls = 64.0\nball_diameter = 5.5", "", "pinion.over_balls: cannot stand beside"),
+    "measure and allowance": (
+        SPAN + "\ntooth_thickness_allowance = -60.0",
+        "",
+        "pinion.tooth_thickness_allowance: cannot stand beside span: either says how thick",
+    ),
+    "no teeth": ("span = 23.0", "", "pinion: teeth_spanned: missing, span needs it"),
+    "no span": ("teeth_spanned = 3", "", "pinion.teeth_spanned: has no effect without span"),
+    "no ball": ("over_balls = 65.0", "", "pinion: ball_diameter: missing, over_balls needs it"),
+    "too long": ("span = 23.5\nteeth_spanned = 3", "", "pinion.span: 23.5 mm must be at most 23.144"),
+    "of another gear": ("span = 35.0\nteeth_spanned = 3", "", "pinion.span: measured = 35 mm must be at least 14"),
+    "missed by the anvils": (
+        "span = 70.0\nteeth_spanned = 9",
+        "",
+        "pinion.span: teeth = 9 would touch the flank at a roll length of",
+    ),
+    "reversed limits": (
+        "span = [23.0, 22.9]\nteeth_spanned = 3",
+        "",
+        "pinion.span: upper limit 22.9 mm must be at least the lower one, 23 mm",
+    ),
+    "three limits": ("span = [22.8, 22.9, 23.0]\nteeth_spanned = 3", "", "pinion.span: must be a list of length 2"),
+    "limits and tolerance": (
+        "tooth_thickness_allowance = [-90.0, -60.0]\ntooth_thickness_tolerance = 20.0",
+        "",
+        "pinion.tooth_thickness_tolerance: has no effect, give lower and upper limit of tooth_thickness_allowance",
+    ),
+    "thicker": (
+        "tooth_thickness_allowance = [-20.0, 10.0]",
+        "",
+        "pinion.tooth_thickness_allowance[1]: 10 um must be at",
+    ),
+    "too little backlash": (
+        "tooth_thickness_allowance = -90.0",
+        "[pair]\nbacklash = 20.0",
+        "pair.backlash: 20 um must be at least 84.5723 um, which centre distance and tooth thicknesses leave",
+    ),
+    "backlash twice": (
+        SPAN,
+        "[wheel_says]\n[pair]\nbacklash = 200.0\ncenter_distance = 101.0",
+        "pair.backlash: has no effect, centre distance and tooth thickness of both gears are given",
+    ),
+    "unknown material": ('material = "STEAL"', "", 'pinion.material: "STEAL" is not known, did you mean "STEEL"?'),
+    "material of nothing": (
+        "",
+        "[materials.cast]\nyoung = 1.0",
+        "materials.cast.young: unknown key, must be one of density",
+    ),
+    "another steel": ("", "[materials.STEEL]\ndensity = 7800.0", "materials.STEEL: is a material of the library"),
+    "class of one gear": ("quality_class = 6", "", "wheel.quality_class: missing, the other gear has one"),
+    "no such class": ("quality_class = 14", "", "pinion.quality_class: 14 must be at least 1 and at most 11"),
+    "form circle outside": ("tip_form_diameter = 65.0", "", "pinion.tip_form_diameter: 65 mm must be at most 63.6 mm"),
+    "form circle inside": ("tip_form_diameter = 50.0", "", "pinion.tip_form_diameter: 50 mm must be greater than 53."),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_a_drawing_cannot_say_is_refused_in_one_line(load, case):
+    pinion, tail, expected = REFUSED[case]
+    wheel = "tooth_thickness_allowance = -30.0" if tail.startswith("[wheel_says]") else ""
+    with pytest.raises(DesignFileError) as caught:
+        load(pinion, wheel, tail.removeprefix("[wheel_says]"))
+    message = str(caught.value)
+    assert "\n" not in message and message.partition("gear.toml: ")[2].startswith(expected), message
+
+
+def test_classes_stand_in_one_place(load):
+    tail = (
+        "[variables]\nx = { low = 0.0, high = 5.0 }\n[sweep]\nsamples = 4\n[tolerance]\nquality_class = 5\n"
+        '[[pinion.modification]]\ntype = "profile_crowning"\namount = "x"\n'
+    )
+    with pytest.raises(DesignFileError, match="tolerance.quality_class: has no effect, the gears have classes of"):
+        load("quality_class = 5", "quality_class = 5", tail)
+    with pytest.raises(DesignFileError, match="tolerance.quality_class: missing, this key is required where the gears"):
+        load("", "", tail.replace("quality_class = 5\n", ""))
