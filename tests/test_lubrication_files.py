@@ -166,6 +166,8 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
     for row in table:
         expected = solved(jnp.asarray(row["amount"]))
         np.testing.assert_allclose([row["scuffing_safety"], row["pinion_root_safety"]], expected, rtol=1e-9)
+    with pytest.raises(ValueError, match=r"holds a sweep of other settings \(.*friction"):
+        sweep_table(file(PAIR + "friction = 0.05" + OIL + STRENGTH + RELIEF), tmp_path)
     fixed = RELIEF.partition("[variables]")[0].replace('"amount"', "6.0")
     assert commands.analyze(file(PAIR + OIL + STRENGTH + fixed), tmp_path / "out", figures=False, cache=False)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
@@ -177,6 +179,17 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
     for label in ("scuffing safety S_B", "pinion root safety S_F", "power loss of the flanks [W]"):
         assert label in shown
     assert "micropitting" not in shown
+
+
+@pytest.mark.slow
+def test_a_sweep_over_the_speed(load, file, tmp_path):
+    variable = RELIEF.replace("[variables]", '[variables]\nn = { low = 500.0, high = 5000.0, unit = "rpm" }')
+    text = PAIR.replace("speed = 3000.0", 'speed = "n"') + OIL + STRENGTH + variable
+    design = load(text)
+    mesh, quantity = design.mesh(), design.lubricant.quantity("loss_power")
+    for row in sweep_table(file(text), tmp_path):
+        cycle = jg.solve(mesh, Operation(50.0, row["n"]), pinion=jg.TipRelief(row["amount"], 4.0))
+        assert row["loss_power_W"] == pytest.approx(float(quantity(cycle)), rel=1e-9)
 
 
 def sweep_table(path, folder):

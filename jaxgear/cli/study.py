@@ -11,7 +11,7 @@ from ..contact import Mesh, MeshCycle, Operation
 from ..io import DesignFile, quantities_of_tables
 from ..metrics import Quantity, face_load_factor, summary
 from ..microgeometry import AbstractModification
-from ..numerics import program
+from ..numerics import optional_real, program, real
 from ..optimize import Verified
 from ..sweeps import Scatter, over_torques
 
@@ -62,7 +62,7 @@ def evaluate(
     curves = np.asarray([cycle.transmission_error for cycle in cycles])
     converged = np.asarray([cycle.converged for cycle in cycles]) & np.isfinite(curves)
     # without the flanks: one program serves every kind of them
-    running = Operation(file.torque, file.speed, file.friction)
+    running = Operation(real(file.torque), optional_real(file.speed), optional_real(file.friction))
     bare = replace(cycles[0], pinion=None, wheel=None, operation=running)
     metrics = jax.tree.map(np.asarray, _numbers(bare, tuple(quantities_of_tables(file))))
     return Evaluation(

@@ -135,10 +135,10 @@ class Lubricant(Checked):
 
 def _check_less(lubricant: Lubricant, name: str, other: str, unit: str) -> None:
     """Refuses a number that is not less than another one; tracers pass."""
-    values = getattr(lubricant, name), getattr(lubricant, other)
-    known = [concrete(value) for value in values if value is not None]
-    if len(known) < len(values) or known[0] is None or known[1] is None:
+    given = getattr(lubricant, name), getattr(lubricant, other)
+    known = [concrete(value) for value in given if value is not None]
+    if len(known) < len(given) or any(value is None for value in known):
         return
-    low, high = (float(value) for value in known)
+    low, high = map(float, known)  # type: ignore[arg-type]
     if low >= high:
         raise ValueError(f"Lubricant: {name} = {low:g} {unit} must be less than {other} = {high:g} {unit}")

@@ -138,19 +138,20 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     """
     kinematics, (pinion, wheel) = cycle.kinematics, cycle.sides
     speed = _running("film_thickness", cycle)
-    rolling = sum(kinematics.path_of_contact.rolling_speeds(kinematics.path, speed))[:, None]
+    speeds = kinematics.path_of_contact.rolling_speeds(kinematics.path, speed)
+    rolling = (speeds[0] + speeds[1])[:, None]
     radius = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)[:, None]
     pair = kinematics.pair
     modulus = 2e6 * combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)  # E_r [Pa]
     bulk, hot = bulk_temperature(cycle, lubricant), contact_temperature(cycle, lubricant)
     viscosity, coefficient = lubricant.viscosity(bulk), lubricant.pressure_viscosity(bulk)
     material = safe_power(coefficient * modulus, 0.6)
-    speeds = safe_power(viscosity * rolling / (2e-3 * modulus * radius), 0.7)
+    motion = safe_power(viscosity * rolling / (2e-3 * modulus * radius), 0.7)
     pressure = 1e6 * cycle.contact_pressure
     touching = pressure > 0
     load = (2 * jnp.pi * (jnp.where(touching, pressure, 1.0) / modulus) ** 2) ** -0.13
     thinning = lubricant.pressure_viscosity(hot) * lubricant.viscosity(hot) / (coefficient * viscosity)
-    film = 1e3 * _FILM * radius * material * speeds * load * safe_power(thinning, 0.22)
+    film = 1e3 * _FILM * radius * material * motion * load * safe_power(thinning, 0.22)
     return jnp.where(touching, jnp.minimum(film, _THICKEST), _THICKEST)
 
 
