@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..numerics import real
+from ..numerics.fits import orthonormal
 
 Scalar = Float[Array, ""]
 Kernel = Float[Array, "slices slices"]
@@ -77,7 +78,7 @@ def few_modes(kernel: Kernel, count: int) -> tuple[Float[Array, "slices modes"],
     if count >= slices:
         return waves, waves.T @ kernel @ waves, jnp.zeros((), kernel.dtype)
     # the others are orthogonal to the constant, because rows sum to one
-    others = jnp.linalg.qr(kernel @ waves[:, 1:count])[0]
+    others = orthonormal(kernel @ waves[:, 1:count])[0]
     modes = jnp.concatenate([waves[:, :1], others], axis=1)
     projected = modes.T @ kernel @ modes
     rest = (jnp.trace(kernel) - jnp.trace(projected)) / (slices - count)

@@ -13,9 +13,12 @@ References:
     P. Sainsot, P. Velex, O. Duverger, J. Mech. Des. 126 (2004) 748-752, doi 10.1115/1.1758252.
 """
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+
+from ..numerics import solve_dense
 
 Scalar = Float[Array, ""]
 
@@ -119,18 +122,18 @@ def ring_compliance(thickness_ratio: Scalar, poisson: Scalar, harmonics: int) ->
 
     Four Michell terms per harmonic; the decaying ones are scaled to their value at the bore so that no power overflows.
     """
-    first = _first_harmonic(thickness_ratio, poisson)[None]
+    first = _first_harmonic(thickness_ratio, poisson)
     if harmonics == 1:
         return first
     return jnp.concatenate([first, _higher_harmonics(thickness_ratio, poisson, harmonics)])
 
 
 def _condense(bore, outer_displacement, outer_stress, poisson):
-    """Eliminates the four term amplitudes: u = 0 at the bore, unit stresses outside; trailing axes (2, 4)."""
+    """Eliminates the four term amplitudes: u = 0 at the bore, unit stresses outside; axes (harmonics, 2, 4)."""
     system = jnp.concatenate([bore, outer_stress], axis=-2)
     unit = jnp.zeros((*system.shape[:-1], 2), system.dtype).at[..., 2, 0].set(1.0).at[..., 3, 1].set(1.0)
-    amplitude = jnp.linalg.solve(system, unit)
-    return (1 + poisson) * jnp.einsum("...ij,...jk->...ik", outer_displacement, amplitude)  # 1 / (2 mu) = (1 + nu) / E
+    amplitude = jax.vmap(solve_dense)(system, unit)
+    return (1 + poisson) * (outer_displacement @ amplitude)  # 1 / (2 mu) = (1 + nu) / E
 
 
 def _higher_harmonics(thickness_ratio, poisson, harmonics):
@@ -180,4 +183,4 @@ def _first_harmonic(thickness_ratio, poisson):
 
     outer_displacement, outer_stress = columns(jnp.ones_like(thickness_ratio))
     bore, _ = columns(1 / thickness_ratio)
-    return _condense(bore, outer_displacement, outer_stress, poisson)
+    return _condense(bore[None], outer_displacement[None], outer_stress[None], poisson)

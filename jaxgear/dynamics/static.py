@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import number, program, safe_divide
+from ..numerics import number, program, pseudo_inverse, safe_divide
 from .force import AbstractMeshForce, approach_under
 from .oscillator import Coordinates, Oscillator
 
@@ -14,6 +14,8 @@ Scalar = Float[Array, ""]
 
 # Share of the approach that no spring holds, by mass, above which it is free: rounding of single precision is less.
 _FREE = 1e-5
+# Stiffness against a motion over the largest one, in rounding errors per coordinate, that is more than rounding.
+_SINGULAR = 10.0
 
 
 class Rest(NamedTuple):
@@ -45,7 +47,7 @@ def at_rest(oscillator: Oscillator, phase: Scalar) -> Rest:
         force, slope = _with_slope(mesh_force, phase, approach)
     else:
         ground = oscillator.stiffness / (root_mass[:, None] * root_mass[None])
-        yields = jnp.linalg.pinv((ground + ground.T) / 2, hermitian=True)
+        yields = pseudo_inverse((ground + ground.T) / 2, _SINGULAR * len(ground) * float(jnp.finfo(ground.dtype).eps))
         free = along - ground @ (yields @ along)
         is_free = free @ along > _FREE * (along @ along)
         free = jnp.where(is_free, free, 0.0)

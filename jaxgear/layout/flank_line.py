@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 
 from ..microgeometry import AbstractModification, LeadCrowning, LeadSlope
 from ..numerics import Checked, implicit_root, number, program
+from ..numerics.fits import fit
 from ..shafts import AbstractSupport, annex_e
 from ..shafts.mesh_support import even_coordinates
 from .stations import Stations, at_stations
@@ -87,7 +88,7 @@ def _level(face: Stations, stiffness, hollow: bool) -> FlankLine:
 
     def best(shapes):
         basis = jnp.stack([jnp.ones_like(slope), *shapes], axis=1)
-        return implicit_root(jax.grad(unevenness), -jnp.linalg.lstsq(basis, face.bent)[0][1:])
+        return implicit_root(jax.grad(unevenness), -fit(basis, face.bent, "least_squares")[1:])
 
     both = best((slope, crowning))
     if hollow:

@@ -15,11 +15,13 @@ from functools import reduce
 from operator import add
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from .coupling import Coupling, along, onto
+from .dense import solve_dense
 from .elimination import Curve, Factors, Rows, Slopes, inverse_of, small_inverse
 from .stored import unit
 
@@ -229,4 +231,4 @@ def _yielding(support: Float[Array, "bends bends"] | None, force: Float[Array, "
     if support is None:
         return jnp.ones_like(force)
     matrix = jnp.eye(len(support), dtype=force.dtype)[..., None] + jnp.tensordot(support, force, 1)
-    return jnp.moveaxis(jnp.linalg.inv(jnp.moveaxis(matrix, -1, 0)), 0, -1)
+    return jax.vmap(solve_dense, (-1, None), -1)(matrix, jnp.eye(len(support), dtype=force.dtype))

@@ -34,11 +34,11 @@ def fit(columns: Columns, values: Values, criterion: Criterion) -> Coefficients:
             time; its derivative is that of the points that bear the largest residual.
     """
     # an orthonormal basis of the columns: powers are nearly dependent, and single precision would feel it
-    basis, triangle = _orthonormal(columns)
+    basis, triangle = orthonormal(columns)
     return _backward(triangle, basis.T @ values if criterion == "least_squares" else _minimax(basis, values))
 
 
-def _orthonormal(columns: Columns) -> tuple[Columns, Triangle]:
+def orthonormal(columns: Columns) -> tuple[Columns, Triangle]:
     """Q and the columns of R of columns = Q R, by Gram and Schmidt's process.
 
     Every column goes through it twice, after which Q is orthonormal to rounding ("twice is enough": Parlett, The

@@ -8,6 +8,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from .dense import pseudo_inverse
+
 Vector = Float[Array, " unknowns"]
 Matrix = Float[Array, "unknowns unknowns"]
 Function = Callable[[Vector], Vector]
@@ -103,7 +105,7 @@ def with_jacobian(function: Callable, x: Vector, *, has_aux: bool = False) -> An
 
 def solve(matrix: Matrix, of: Vector) -> Vector:
     """Solution of linear equations; of a singular matrix the shortest of the best."""
-    return jnp.linalg.pinv(matrix, rtol=_SINGULAR * jnp.finfo(of.dtype).eps) @ of
+    return pseudo_inverse(matrix, _SINGULAR * float(jnp.finfo(of.dtype).eps)) @ of
 
 
 def _is_small(step: Vector, x: Vector) -> Bool[Array, ""]:

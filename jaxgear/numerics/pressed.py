@@ -15,6 +15,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from .dense import solve_dense
+
 Vector = Float[Array, " points"]
 
 _TOGETHER = 20  # steps in which all points change sides at once: five or so are enough as a rule
@@ -83,7 +85,7 @@ def _at(active: Bool[Array, " points"], compliance, gap, load):
     inside = on[:, None] * on[None, :] * compliance + jnp.diag((1 - on) * size)
     matrix = jnp.zeros((n + 1, n + 1), gap.dtype).at[:n, :n].set(inside)
     matrix = matrix.at[:n, n].set(-on * size).at[n, :n].set(on * size)
-    found = jnp.linalg.solve(matrix, jnp.append(-on * gap, size * load))
+    found = solve_dense(matrix, jnp.append(-on * gap, size * load))
     force, approach = on * found[:n], size * found[n]
     return force, approach, (1 - on) * (compliance @ force + gap - approach)
 

@@ -61,13 +61,28 @@ def _natural_slopes(positions: Points, values: Table) -> Table:
     flat = 1 / jnp.diff(positions)
     zero, one = jnp.zeros_like(flat[:1]), jnp.ones_like(flat[:1])
     right = jnp.concatenate([3 * secant[:1], pull[:-1] + pull[1:], 3 * secant[-1:]])
-    solution = jax.lax.linalg.tridiagonal_solve(
+    return _tridiagonal(
         jnp.concatenate([zero, flat[:-1], one]),
         jnp.concatenate([2 * one, 2 * (flat[:-1] + flat[1:]), 2 * one]),
         jnp.concatenate([one, flat[1:], zero]),
-        right.reshape(right.shape[0], -1),
+        right,
     )
-    return solution.reshape(right.shape)
+
+
+def _tridiagonal(below: Points, diagonal: Points, above: Points, right: Table) -> Table:
+    """Solution of equations whose diagonal dominates, by elimination (see `dense` for why not by LAPACK)."""
+
+    def forward(before, row):
+        low, middle, high, value = row
+        pivot = middle - low * before[0]
+        return (here := (high / pivot, (value - low * before[1]) / pivot)), here
+
+    def backward(after, row):
+        return (here := row[1] - row[0] * after), here
+
+    rows = below, diagonal, above, right
+    _, eliminated = jax.lax.scan(forward, (jnp.zeros_like(above[0]), jnp.zeros_like(right[0])), rows)
+    return jax.lax.scan(backward, jnp.zeros_like(right[0]), eliminated, reverse=True)[1]
 
 
 def _monotonic_slopes(positions: Points, values: Table) -> Table:

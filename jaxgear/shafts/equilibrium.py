@@ -16,6 +16,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..numerics import solve_dense
 from .beam import DIRECTIONS, flexibility, rigid
 from .gearbox import Gearbox
 
@@ -125,7 +126,7 @@ def solve(of: System, loads: Float[Array, "patterns loads"], *, actual: bool = F
     lower = jnp.concatenate([here.T, jnp.diag(of.loose)], axis=1)
     given = of.play[:, None] * float(actual) - of.bearings @ across
     right = jnp.concatenate([given / size[:, None], -there.T @ loads])
-    found = jnp.linalg.solve(jnp.concatenate([upper, lower]), right)
+    found = solve_dense(jnp.concatenate([upper, lower]), right)
     force, moved = found[:count], found[count:]
     return Equilibrium(
         force,

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, concrete, number
+from ..numerics import Checked, concrete, number, solve_dense
 from .beam import DIRECTIONS
 from .matrices import check_symmetric, symmetric
 
@@ -56,7 +56,7 @@ class Housing(Checked):
     def compliance(self) -> Matrix:
         """Displacement per force in the order of `nodes`."""
         even = symmetric(self.matrix)
-        return even if self.kind == "compliance" else jnp.linalg.inv(even)
+        return even if self.kind == "compliance" else solve_dense(even, jnp.eye(len(even), dtype=even.dtype))
 
     def at(self, bearings: tuple[str, ...]) -> Float[Array, "directions directions"]:
         """Compliance in x, y, z, rx, ry of one bearing seat after the other [um/N, mrad/N, mrad/(N mm)]."""

@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import implicit_root
+from ..numerics import implicit_root, solve_dense
 from .beam import DIRECTIONS
 from .equilibrium import Patterns, System, solve, system
 from .gearbox import Gearbox
@@ -65,10 +65,11 @@ def _state(of: System, clearance: Float[Array, " bearings"]) -> Float[Array, " b
     here, there = of.moving[:count], of.moving[count]
     # without clearance each shaft lies where the linear solution has it; with it, as far farther as the bearings let it
     bent = linear.bearing[:, 0] - linear.seat[:, 0]
-    first = jnp.linalg.lstsq(here, bent + played - across - inner @ linear.force[:, 0])[0]
+    arm = jnp.maximum(jnp.max(jnp.abs(here), axis=0), 1.0)
+    moves = here / arm[None]
+    first = solve_dense(moves.T @ moves, moves.T @ (bent + played - across - inner @ linear.force[:, 0]))
     load = jnp.maximum(jnp.max(jnp.abs(linear.force)), jnp.finfo(first.dtype).tiny)
     length = jnp.maximum(jnp.max(jnp.abs(played)), jnp.max(jnp.abs(bent)))
-    arm = jnp.maximum(jnp.max(jnp.abs(here), axis=0), 1.0)
 
     def displaced(x):
         force, moves = load * x[:count], length / arm * x[count:]
@@ -81,7 +82,7 @@ def _state(of: System, clearance: Float[Array, " bearings"]) -> Float[Array, " b
         balance = (here.T @ force + there) / (load * arm) + of.loose * x[count:]
         return jnp.concatenate([(force + resisted) / (load * stiff), balance])
 
-    start = jnp.concatenate([linear.force[:, 0] / load, first * arm / length])
+    start = jnp.concatenate([linear.force[:, 0] / load, first / length])
     root = implicit_root(conditions, start)
     missed = jnp.max(jnp.abs(conditions(root))) > _SOLVED * jnp.sqrt(jnp.finfo(start.dtype).eps)
     return jnp.where(missed, jnp.nan, displaced(root))
