@@ -236,6 +236,16 @@ def test_pareto_counts_many_variants_in_hexagons():
     assert len(ax.lines[0].get_xdata()) == 0  # no dot per variant
 
 
+def test_the_distribution_tells_the_quantile_of_the_scatter(scatter):
+    """The same number as the scatter, and none where it lies among failed gears, which stay below no value."""
+    ax = plot.ppte_distribution({"good": np.asarray(scatter.ppte), "bad": np.asarray(failing(scatter, 40).ppte)})
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    quantile = float(scatter.joined("ppte", jg.Quantile(0.95)))
+    assert texts == [f"good, 95 % below {quantile:.2f} µm", "bad"]
+    good, bad = (line.get_ydata()[-1] for line in ax.lines[:2])
+    assert good == 100.0 and bad < 95.0
+
+
 def test_fan_bands_hold_the_quantiles(scatter):
     ax = plot.fan(scatter)
     texts = [text.get_text() for text in ax.get_legend().get_texts()]

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import rich.table
 
 from ..contact import Mesh
@@ -108,7 +109,7 @@ def write_figures(folder: Path, evaluations: Evaluations) -> list[Path]:
         return []
     from .. import plot
 
-    samples = {name: scatter.ppte for name, scatter in scatters.items()}
+    samples = {name: np.asarray(scatter.ppte) for name, scatter in scatters.items()}
     return report.save_figures(folder, {"ppte_distribution": plot.ppte_distribution(samples)})
 
 

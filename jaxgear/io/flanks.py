@@ -81,7 +81,8 @@ def flank_part(key: str, table: Mapping[str, Any], folder: Path) -> template.Par
         gear = section.gear
         if gear is None and _GEAR in rows[0]:
             gear = key.partition(".")[0]
-        flank, reach = _table(_chosen(rows, {_GEAR: gear, "design": section.design}), None, section.method)
+        method: Any = section.method
+        flank, reach = _table(_chosen(rows, {_GEAR: gear, "design": section.design}), None, method)
     except DesignFileError as error:
         raise DesignFileError(f"{key}.file", f"{path.name}: {error.problem}") from None
     return template.Part(_FromFile(path.name, reach), {"flank": flank}, key)

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..conditions import ranked
+from ..numerics import Quantile
 from ..sweeps import Scatter
 from .figure import GREY, legend_above, line_style, report_axes
 from .history import PHASE_LABEL, two_pitches
@@ -84,16 +86,16 @@ def ppte_distribution(samples: Mapping[str, np.ndarray], ax: Axes | None = None,
     Args:
         samples: PPTE of every sample [um] by the name of the design; those that failed, NaN, stay below no value.
         ax: Axes to draw into; None for a new figure.
-        level: share that a line marks, with each design's quantile in the legend.
+        level: share that a line marks; the legend has each design's quantile, as `Quantile` takes it.
     """
     with report_axes(ax) as ax:
         for index, (name, values) in enumerate(samples.items()):
             values = np.asarray(values)
             ordered = np.sort(values[np.isfinite(values)])
             share = 100 * np.arange(1, ordered.size + 1) / values.size
-            place = int(np.searchsorted(share, 100 * level))
-            reached = f", {100 * level:g} % below {ordered[place]:.2f} µm" if place < ordered.size else ""
-            ax.plot(ordered, share, label=f"{name}{reached}", **line_style(index))
+            reached = float(ranked(Quantile(level), values))
+            below = f", {100 * level:g} % below {reached:.2f} µm" if np.isfinite(reached) else ""
+            ax.plot(ordered, share, label=f"{name}{below}", **line_style(index))
         ax.axhline(100 * level, color=GREY, linewidth=0.8, zorder=0.5)
         ax.set_xlim(left=0)
         ax.set_ylim(0, 100)
