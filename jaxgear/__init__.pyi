@@ -39,9 +39,7 @@ from .geometry import Material as Material
 from .geometry import explain as explain
 from .geometry import margins as margins
 from .geometry import path_of_contact as path_of_contact
-from .metrics import Lubricant as Lubricant
 from .metrics import Quantity as Quantity
-from .metrics import Strength as Strength
 from .metrics import effective_contact_ratio as effective_contact_ratio
 from .metrics import harmonics as harmonics
 from .metrics import load_sharing as load_sharing

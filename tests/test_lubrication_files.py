@@ -70,9 +70,9 @@ def test_an_oil_may_stand_in_a_file_of_its_own(load):
     assert (
         repr(design.lubricant)
         == repr(whole.lubricant)
-        == repr(jg.Lubricant(100.0, 11.0, 80.0, 0.5, scuffing_temperature=250.0))
+        == repr(jg.metrics.Lubricant(100.0, 11.0, 80.0, 0.5, scuffing_temperature=250.0))
     )
-    assert repr(design.strength) == repr(jg.Strength(1500.0, bending=900.0))
+    assert repr(design.strength) == repr(jg.metrics.Strength(1500.0, bending=900.0))
     assert load(PAIR).lubricant is None and load(PAIR).strength is None
 
 

@@ -38,12 +38,12 @@ def _flash(cycle: MeshCycle) -> Load:
 
 def _oiled(name: str, of: Any, unit: str, meaning: str, needs: str | None = None, **options: Any) -> Quantity:
     alone = {key: options.pop(key) for key in ("otherwise", "operation") if key in options}
-    stands = WithoutSettings(name, "jaxgear.Lubricant", "lubricant", of, needs, **alone)
+    stands = WithoutSettings(name, "jaxgear.metrics.Lubricant", "lubricant", of, needs, **alone)
     return Quantity(name, stands, unit, meaning, **options)
 
 
 def _borne(name: str, of: Any, meaning: str, needs: str, **options: Any) -> Quantity:
-    stands = WithoutSettings(name, "jaxgear.Strength", "strength", of, needs)
+    stands = WithoutSettings(name, "jaxgear.metrics.Strength", "strength", of, needs)
     return Quantity(name, stands, meaning=meaning, better="larger", **options)
 
 
