@@ -65,7 +65,7 @@ function colouring() {
 
 function drawParallel() {
   const dimensions = shown.map((column) => ({ label: column.label, values: column.values, tickformat: ".4~g" }));
-  const trace = { type: "parcoords", dimensions, line: colouring(), labelangle: -15, labelside: "top",
+  const trace = { type: "parcoords", dimensions, line: colouring(), unselected: { line: { color: "#EEEEEE", opacity: 0.4 } }, labelangle: -15, labelside: "top",
                   labelfont: FONT, tickfont: FONT, rangefont: { size: 1, color: "#fff" } };
   const layout = { font: FONT, margin: { l: 70, r: 60, t: 110, b: 25 } };
   return Plotly.newPlot("parallel", [trace], layout, { ...CONFIG, displayModeBar: false });
@@ -88,14 +88,15 @@ function points(rows, [x, y], more) {
 function drawPareto() {
   const both = axes(), front = paretoFront(kept, ...both), inside = new Set(kept);
   const out = [...Array(count).keys()].filter((row) => !inside.has(row));
+  // all by one kind of drawing: another kind would lie beneath these dots, whatever the order
   const dots = (size, color) => ({ mode: "markers", type: "scattergl", marker: { size, color } });
   const traces = [
     points(out, both, { ...dots(4, PALE), name: "out of range" }),
     points(kept, both, { ...dots(5, GREY), name: `${kept.length} variants` }),
-    points(front, both, { mode: "lines+markers", type: "scatter", name: `Pareto front, ${front.length}`,
+    points(front, both, { mode: "lines+markers", type: "scattergl", name: `Pareto front, ${front.length}`,
                           line: { shape: both[0].better === "larger" ? "vh" : "hv", width: 1.5, color: "#000" },
                           marker: { size: 7, color: "#000" } }),
-    ...chosen.map((row, place) => points([row], both, { mode: "markers", type: "scatter", name: name(row),
+    ...chosen.map((row, place) => points([row], both, { mode: "markers", type: "scattergl", name: name(row),
       marker: { size: 15, symbol: MARKS[place], color: COLOURS[place], line: { color: "#fff", width: 1 } } })),
   ];
   const axis = (column) => ({ title: { text: `${column.label}${column.better ? `, ${column.better} is better` : ""}` },
@@ -118,7 +119,7 @@ function drawRadar() {
   const few = results.length < 3 ? "A radar chart needs three results; the values stand below." : "";
   const note = few || (chosen.length ? "" : "No variant is chosen.");
   const layout = { font: FONT, margin: { l: 90, r: 90, t: 45, b: 45 }, legend: { orientation: "h", y: -0.12 }, showlegend: !note,
-    polar: { radialaxis: { range: [0, 1], tickvals: [0, 0.5, 1], ticktext: ["0", "50 %", "100 %"], angle: 90 - 180 / results.length },
+    polar: { radialaxis: { range: [0, 1], tickvals: [0, 0.5, 1], ticktext: ["", "50 %", ""], angle: 90, tickangle: 0 },
              angularaxis: { direction: "clockwise", rotation: 90 }, gridshape: "linear" },
     annotations: note ? [{ text: note, showarrow: false, x: 0.5, y: 0.5, xref: "paper", yref: "paper" }] : [] };
   if (note) { delete layout.polar; layout.xaxis = { visible: false }; layout.yaxis = { visible: false }; }
