@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import gear_pair
+from catalogue import TWO_PAIRS, gear_pair
 
 import jaxgear as jg
 from jaxgear.compliance.assembly import with_edge
@@ -148,6 +148,26 @@ def test_the_slope_of_a_chamfered_corner_is_that_of_its_deflection():
     law, _ = corner_law(63.0, 62.4)
     value, slope = jax.jvp(law.deflection, (LOAD,), (jnp.ones_like(LOAD),))
     np.testing.assert_allclose(law.slope(LOAD, value / LOAD), slope, rtol=1e-10)
+
+
+@pytest.mark.slow
+def test_a_chamfered_pair_runs_as_one_of_tips_cut_there():
+    """The path is that of tips cut at the form circle; only the corner is stiffer, which is little of the mesh."""
+
+    @jax.jit
+    def cycle(tips, form):
+        pair = gear_pair(tips=tips)
+        if form is not None:
+            gears = [replace(each, tip_form_diameter=end) for each, end in zip((pair.pinion, pair.wheel), form)]
+            pair = jg.GearPair(*gears)
+        found = jg.solve(jg.prepare(pair, resolution=TWO_PAIRS), 50.0)
+        return jnp.mean(found.transmission_error), jg.peak_to_peak(found.transmission_error), found.converged.all()
+
+    ends = jnp.asarray([62.5, 149.4])
+    (mean, ppte, fine), (cut_mean, cut_ppte, _) = cycle(jnp.asarray([63.0, 150.0]), ends), cycle(ends, None)
+    assert bool(fine)
+    assert 0.98 * cut_mean < mean < cut_mean
+    assert float(ppte) == pytest.approx(float(cut_ppte), rel=0.05)
 
 
 HEAD = """
