@@ -225,6 +225,17 @@ def test_measures_and_backlash_may_be_variables(load):
     assert float(slope) == pytest.approx(-1e3 / COSINE, rel=1e-9)
 
 
+def test_traced_limits_the_wrong_way_round_make_no_gear():
+    """A sweep over one limit may pass the other, where concrete numbers are refused."""
+
+    @jax.jit
+    def valid(lower):
+        gear = drawn_gear(**PINION, span=[lower, 23.09], teeth_spanned=3)
+        return jg.margins(jg.GearPair(gear, jg.Gear(48, 3.0, face_width=18.0))).valid
+
+    assert bool(valid(23.06)) and not bool(valid(23.10))
+
+
 def test_backlash_is_made_by_what_the_file_leaves_open(load):
     thin = "tooth_thickness_allowance = -30.0"
     tables = {
