@@ -76,6 +76,7 @@ HEAVY = {
     "jinja2",
     "matplotlib",
     "optax",
+    "plotly",
     "pyarrow",
     "xarray",
     "xlsxwriter",

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import gear_pair
+from catalogue import TWO_PAIRS, gear_pair
 
 import jaxgear as jg
 from jaxgear.compliance.assembly import with_edge
@@ -150,6 +150,26 @@ def test_the_slope_of_a_chamfered_corner_is_that_of_its_deflection():
     np.testing.assert_allclose(law.slope(LOAD, value / LOAD), slope, rtol=1e-10)
 
 
+@pytest.mark.slow
+def test_a_chamfered_pair_runs_as_one_of_tips_cut_there():
+    """The path is that of tips cut at the form circle; only the corner is stiffer, which is little of the mesh."""
+
+    @jax.jit
+    def cycle(tips, form):
+        pair = gear_pair(tips=tips)
+        if form is not None:
+            gears = [replace(each, tip_form_diameter=end) for each, end in zip((pair.pinion, pair.wheel), form)]
+            pair = jg.GearPair(*gears)
+        found = jg.solve(jg.prepare(pair, resolution=TWO_PAIRS), 50.0)
+        return jnp.mean(found.transmission_error), jg.peak_to_peak(found.transmission_error), found.converged.all()
+
+    ends = jnp.asarray([62.5, 149.4])
+    (mean, ppte, fine), (cut_mean, cut_ppte, _) = cycle(jnp.asarray([63.0, 150.0]), ends), cycle(ends, None)
+    assert bool(fine)
+    assert 0.98 * cut_mean < mean < cut_mean
+    assert float(ppte) == pytest.approx(float(cut_ppte), rel=0.05)
+
+
 HEAD = """
 [pinion]
 teeth = 19
@@ -203,6 +223,17 @@ def test_measures_and_backlash_may_be_variables(load):
     assert float(backlash) == pytest.approx(240.0, abs=1e-8) and float(wheel) == 0.0
     slope = jax.grad(lambda w: numbers(w, 240.0)[0])(23.06)
     assert float(slope) == pytest.approx(-1e3 / COSINE, rel=1e-9)
+
+
+def test_traced_limits_the_wrong_way_round_make_no_gear():
+    """A sweep over one limit may pass the other, where concrete numbers are refused."""
+
+    @jax.jit
+    def valid(lower):
+        gear = drawn_gear(**PINION, span=[lower, 23.09], teeth_spanned=3)
+        return jg.margins(jg.GearPair(gear, jg.Gear(48, 3.0, face_width=18.0))).valid
+
+    assert bool(valid(23.06)) and not bool(valid(23.10))
 
 
 def test_backlash_is_made_by_what_the_file_leaves_open(load):

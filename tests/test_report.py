@@ -189,7 +189,8 @@ def test_the_workbook_holds_the_table(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "command, library", [("analyze", "jinja2"), ("optimize", "jinja2"), ("sweep", "jinja2"), ("sweep", "xlsxwriter")]
+    "command, library",
+    [("analyze", "jinja2"), ("optimize", "jinja2"), ("sweep", "jinja2"), ("sweep", "xlsxwriter"), ("sweep", "plotly")],
 )
 def test_without_the_libraries_nothing_begins(tmp_path, without, command, library):
     file = tmp_path / "pair.toml"

@@ -571,6 +571,28 @@ def test_the_command_converts_both_ways(tmp_path):
     np.testing.assert_allclose(removed(last.pinion, *points), removed(first.pinion, *points), atol=1e-12)
 
 
+def test_what_a_drawing_says_is_converted_both_ways(tmp_path):
+    """Limits of the tooth thickness, backlash, tip form diameter, material and class."""
+    drawn, rexs, again = tmp_path / "drawn.toml", tmp_path / "drawn.rexs", tmp_path / "again.toml"
+    drawn.write_text(
+        "[materials.bronze]\nelastic_modulus = 110000.0\n"
+        "[pinion]\nteeth = 19\nmodule = 3.0\nface_width = 20.0\nspan = [22.85, 22.88]\nteeth_spanned = 3\n"
+        'tip_form_diameter = 62.6\nquality_class = 6\nmaterial = "STEEL"\n'
+        '[wheel]\nteeth = 48\nmodule = 3.0\nface_width = 18.0\nquality_class = 7\nmaterial = "bronze"\n'
+        "[pair]\nbacklash = 250.0\n[load]\ntorque = 50.0\n"
+    )
+    done = call("convert", drawn, rexs)
+    assert done.code == 0 and "left out" not in done.out
+    assert call("convert", rexs, again).code == 0
+    first, last = load_design(drawn), load_design(again)
+    assert last.quality_classes == first.quality_classes == (6, 7)
+    assert float(last.pair().pinion.tip_form_diameter) == 62.6
+    assert float(last.pair().wheel.material.elastic_modulus) == 110_000.0
+    np.testing.assert_allclose(last.pair().backlash_limits, first.pair().backlash_limits, atol=1e-6)
+    tolerances = [float(each.pair().pinion.tooth_thickness_tolerance) for each in (first, last)]
+    assert tolerances[0] == pytest.approx(30.0 / np.cos(np.deg2rad(20)), rel=1e-9) == pytest.approx(tolerances[1])
+
+
 def test_the_command_refuses_in_one_line_and_writes_nothing(tmp_path):
     rexs, free, there = tmp_path / "pair.rexs", tmp_path / "free.toml", tmp_path / "there.toml"
     write_rexs(rexs, PAIR)

@@ -19,8 +19,8 @@ _NOTHING = "-"
 _SIDE_BY_SIDE = 5  # columns of a table
 _GEOMETRY_NOTE = (
     "Positions on the path of contact count from the pitch point C, positive towards the tip of the pinion: A start of "
-    "contact, B and D inner and outer point of single contact, E end of contact. The usable involute starts at the "
-    "root form diameter, the mate's tip touches it down to the active root diameter."
+    "contact, B and D inner and outer point of single contact, E end of contact. The usable involute runs from the "
+    "root form diameter to the tip form diameter, the mate's tip touches it down to the active root diameter."
 )
 _ASSUMED = (
     "External involute spur gears of one common face width.",

@@ -125,14 +125,14 @@ def bores(file: DesignFile) -> str:
     texts = []
     for name, gear in gears:
         guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
-        texts.append(f"{name} {float(diameters(gear)[1]):.4g} mm{guess}")
+        texts.append(f"{name} {float(diameters(gear)[-1]):.4g} mm{guess}")
     return f"bores: {', '.join(texts)}"
 
 
 @program
 def diameters(gear: Gear):
-    """Diameters of tip and bore [mm]."""
-    return 2 * gear.tip_radius, 2 * gear.bore_radius
+    """Diameters of tip, tip form circle and bore [mm]."""
+    return 2 * gear.tip_radius, 2 * gear.tip_form_radius, 2 * gear.bore_radius
 
 
 def objectives(evaluations: Evaluations) -> list[str]:

@@ -35,7 +35,7 @@ def run_sweep(
     command: Sequence[str] | None = None,
 ) -> bool:
     """The command with its options; False when a variant failed."""
-    asked = document(command, file, "xlsxwriter")
+    asked = document(command, file, "xlsxwriter", "plotly")
     design = opened(file, cache=cache)
     request = sweep_request(design, samples=samples, most=_QUICK_SAMPLES if quick else None)
     asked_size = design.resolution(request.highest_torque)
@@ -68,7 +68,9 @@ def run_sweep(
     files = write_figures(target, table, request.results) if figures and len(chosen) else []
     if asked is not None:
         closer = evaluate_best(target, design, chosen, size, quick=quick, figures=figures)
-        sweep_document.write(target, asked, design, table, chosen, closer, files, size=size, quick=quick)
+        sweep_document.write(
+            target, asked, design, table, chosen, closer, files, request.results, size=size, quick=quick
+        )
     interrupt.note(f"all results are in {target}{os.sep}")
     return _show(table, chosen, target, meter, quick=quick)
 

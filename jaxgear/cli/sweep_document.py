@@ -8,14 +8,16 @@ import numpy as np
 
 from ..contact import Resolution
 from ..io import DesignFile
-from ..report import Section, Table, figure, text, write_workbook
+from ..metrics import Quantity
+from ..report import Section, Table, figure, text, write_variants, write_workbook
 from ..sweeps import SweepTable
 from .document import Document, Found
 from .geometry import geometry
 from .sweep_chosen import CHOSEN, Chosen
+from .sweep_figures import head_columns, labels_of
 from .written import sizes, versions
 
-WORKBOOK = "variants.xlsx"
+WORKBOOK, PAGE = "variants.xlsx", "variants.html"
 _TABLE = 6  # side by side on one page
 
 
@@ -27,11 +29,12 @@ def write(
     best: SweepTable,
     chosen: Chosen,
     figures: Sequence[Path],
+    results: Sequence[str | Quantity],
     *,
     size: Resolution,
     quick: bool,
 ) -> None:
-    """Writes the workbook and the report.
+    """Writes the workbook, the page of variants and the report.
 
     Args:
         folder: of the results.
@@ -41,15 +44,20 @@ def write(
         best: the best of them, best first.
         chosen: what was found of the first of them.
         figures: files of the pictures of the sweep.
+        results: that the sweep was asked for.
         size: array sizes of a mesh.
         quick: whether the run was a quick one.
     """
     release = versions()
-    write_workbook(folder / WORKBOOK, [*asked.facts, *release.items()], best, table)
+    facts = [*asked.facts, *release.items()]
+    write_workbook(folder / WORKBOOK, facts, best, table)
     failed = table.failures()
+    if failed < len(table):
+        main = head_columns(table, results)
+        write_variants(folder / PAGE, design.title, facts, table, labels=labels_of(table), main=main)
     lines = [
         f"{len(table)} variants, ranked by {table.results[0]}; the best {len(best)} and the table are in {WORKBOOK}, "
-        "with units and filters.",
+        f"with units and filters; {PAGE} is for looking around among them.",
         *chosen.lines,
     ]
     warnings = [*chosen.failures, *([f"{failed} variants failed and have no results"] if failed else [])]

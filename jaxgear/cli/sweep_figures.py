@@ -21,11 +21,9 @@ def write_figures(folder: Path, table: SweepTable, results: Sequence[str | Quant
     matplotlib.use("Agg")  # the command line never shows a window
     from .. import plot
 
-    # of a load spectrum or a tolerance, the first column of every result: its mean
-    heads = [next(name for name in table.results if name.startswith(quantity_of(result).key)) for result in results]
+    heads = head_columns(table, results)
     maximize = [column.name for column in table.columns if column.better == "larger"]
-    units = {**table.units, **{name: "µm" for name, unit in table.units.items() if unit == "um"}}
-    labels = {name: f"{name.replace('_', ' ')} [{units[name] or '-'}]" for name in table.parameters}
+    labels = parameter_labels(table)
     options: dict[str, Any] = {"labels": labels, "maximize": maximize}
     size = len(table)
     step = -(-size // _DRAWN)
@@ -53,6 +51,24 @@ def write_figures(folder: Path, table: SweepTable, results: Sequence[str | Quant
             axis = np.ravel(axes[name])[0]
             axis.set_title(note, loc="left", pad=32, fontsize=axis.xaxis.label.get_fontsize())
     return report.save_figures(folder, axes)
+
+
+def head_columns(table: SweepTable, results: Sequence[str | Quantity]) -> list[str]:
+    """One column of every result: the first, which of a load spectrum or a tolerance is its mean."""
+    return [next(name for name in table.results if name.startswith(quantity_of(result).key)) for result in results]
+
+
+def parameter_labels(table: SweepTable) -> dict[str, str]:
+    """Labels of the parameters with their units."""
+    units = {**table.units, **{name: "µm" for name, unit in table.units.items() if unit == "um"}}
+    return {name: f"{name.replace('_', ' ')} [{units[name] or '-'}]" for name in table.parameters}
+
+
+def labels_of(table: SweepTable) -> dict[str, str]:
+    """Labels of parameters and results with their units."""
+    from .. import plot
+
+    return {**{name: plot.label(name) for name in table.results}, **parameter_labels(table)}
 
 
 def _columns(table: SweepTable, names: Sequence[str]) -> dict[str, np.ndarray]:

@@ -79,7 +79,7 @@ def _verified(found: Verified) -> dict[str, Any]:
 
 def _gear(gear: Gear) -> dict[str, Any]:
     """Every number of a gear, with those that follow from others where the file gives none."""
-    derived = dict(zip(("tip_diameter", "bore_diameter"), diameters(gear)))
+    derived = dict(zip(("tip_diameter", "tip_form_diameter", "bore_diameter"), diameters(gear)))
     data: dict[str, Any] = {}
     for part in (gear, gear.material):
         for name, field in fields_of(type(part)).items():

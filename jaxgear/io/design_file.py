@@ -20,7 +20,7 @@ from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refuse_given, refused
 from .flanks import check_files
 from .gearbox import support_of
-from .gears import gear_of, materials_of, pair_of, quality_of, with_quality
+from .gears import both_classes, gear_of, materials_of, pair_of, quality_of, with_quality
 from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
 from .variables import increasing, read_variables
@@ -242,7 +242,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         torque_range=(low, high),
         speed=None if usual.speed is None else float(usual.speed),
         friction=None if usual.friction is None else float(usual.friction),
-        quality_classes=None if classes is None else _both(classes),
+        quality_classes=None if classes is None else both_classes(classes),
         bounds=bounds,
         units=units,
         optimize=optimize,
@@ -265,11 +265,6 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         _load=operation,
         _resolution=resolution,
     )
-
-
-def _both(classes: int | list[int]) -> tuple[int, int]:
-    first, second = classes if isinstance(classes, list) else (classes, classes)
-    return first, second
 
 
 def _load(table: schema.Tables) -> schema.LoadSection:

@@ -106,3 +106,10 @@ def with_quality(key: str, section: Any, own: list[int] | None) -> Any:
     if own is not None:
         raise DesignFileError(f"{key}.quality_class", "has no effect, the gears have classes of their own")
     return section
+
+
+def both_classes(given: int | list[int] | None) -> tuple[int, int]:
+    """Classes of pinion and wheel of a table that has them, from itself or `with_quality`."""
+    assert given is not None
+    first, second = given if isinstance(given, list) else (given, given)
+    return first, second

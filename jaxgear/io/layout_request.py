@@ -14,6 +14,7 @@ from ..layout import (
 from ..shafts import ShaftSupport
 from .design_file import DesignFile
 from .errors import DesignFileError, naming, refuse_given, refused
+from .gears import both_classes
 from .schema_shafts import LayoutSection, ProfileSection, WoehlerSection
 from .template import part_of
 from .toml import decode
@@ -56,7 +57,7 @@ def layout_request(design: DesignFile, *, quick: bool = False) -> LayoutRequest:
             raise DesignFileError("layout", "missing, nothing says which tolerances the flank lines have to bear")
         _check_open(design)
         pair = support.pair
-        classes = section.quality_class if isinstance(section.quality_class, int) else tuple(section.quality_class)
+        classes = both_classes(section.quality_class)
         tolerances = {
             kind: refused("layout.quality_class", flank_line_tolerance, pair, classes, section.bearing_span, kind=kind)
             for kind in ("statistical", "maximum")

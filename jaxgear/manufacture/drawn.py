@@ -100,7 +100,9 @@ def with_thickness(gear: Gear, thickness: ToothThickness) -> Gear:
     """
     allowance = thickness.allowance(gear)
     low, high = (allowance[0], allowance[1]) if allowance.ndim else (allowance, allowance)
-    return replace(gear, tooth_thickness_allowance=high, tooth_thickness_tolerance=high - low)
+    # limits that were traced may be the wrong way round: such a gear is none, and nothing made with it converges
+    tolerance = jnp.where(high >= low, high - low, jnp.nan)
+    return replace(gear, tooth_thickness_allowance=high, tooth_thickness_tolerance=tolerance)
 
 
 _THICKNESS = ("span", "teeth_spanned", "over_balls", "ball_diameter", "tooth_thickness_allowance")

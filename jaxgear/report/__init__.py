@@ -1,4 +1,4 @@
-"""The report of a command: one HTML file that needs nothing else, and a workbook of variants.
+"""The report of a command: one HTML file that needs nothing else, and a workbook and a page of variants.
 
 It shows what it is handed, tables, lines and pictures, and computes nothing. Needs the extra `report`.
 """
@@ -13,6 +13,7 @@ from .figures import CAPTIONS as CAPTIONS
 from .figures import figure as figure
 from .needed import needed as needed
 from .page import write_report as write_report
+from .variants import write_variants as write_variants
 from .words import heading as heading
 from .words import numbers as numbers
 from .words import text as text

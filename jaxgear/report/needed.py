@@ -7,7 +7,7 @@ def needed(*modules: str) -> None:
     """Asks for libraries before long work begins.
 
     Args:
-        modules: "jinja2" for a report, "xlsxwriter" for a workbook.
+        modules: "jinja2" for a report, "xlsxwriter" for a workbook, "plotly" for a page of variants.
 
     Raises:
         ValueError: for the first that is not installed.

@@ -1,6 +1,7 @@
 """The report as an HTML page."""
 
 from pathlib import Path
+from typing import Any
 from unicodedata import category
 
 from ..numerics.durable import write_durably
@@ -22,6 +23,16 @@ def write_report(path: Path, report: Report) -> None:
         ValueError: without the library jinja2, or when the file cannot be written.
     """
     needed("jinja2")
+    page = template("report.html").render(report=report, upright=_UPRIGHT)
+    held = printable(page).encode("utf-8", "replace")
+    try:
+        write_durably(path, lambda file: file.write(held))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def template(name: str) -> Any:
+    """A template of the pages."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -31,13 +42,11 @@ def write_report(path: Path, report: Report) -> None:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page = environment.get_template("report.html").render(report=report, upright=_UPRIGHT)
-    # the name of a file may hold bytes that are no text; neither these nor controls can stand in a page
-    allowed = "".join(
-        sign if sign.isprintable() or sign in "\n\t\r" or category(sign) == "Zs" else "\ufffd" for sign in page
+    return environment.get_template(name)
+
+
+def printable(text: str) -> str:
+    """A text without what cannot stand in a page: the name of a file may hold bytes that are no text, or controls."""
+    return "".join(
+        sign if sign.isprintable() or sign in "\n\t\r" or category(sign) == "Zs" else "\ufffd" for sign in text
     )
-    held = allowed.encode("utf-8", "replace")
-    try:
-        write_durably(path, lambda file: file.write(held))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None

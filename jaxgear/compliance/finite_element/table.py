@@ -34,7 +34,7 @@ _WORDS = {
     "tip_ratio": "tip_diameter over 2 module",
     "bore_ratio": "bore_diameter over 2 module",
     "poisson": "Poisson's ratio of the plane problem",
-    "allowance": "mean tooth_thickness_allowance over module",
+    "allowance": "tooth_thickness_allowance over module",
 }
 
 

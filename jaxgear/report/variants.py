@@ -1,0 +1,99 @@
+"""Variants of a sweep as a page to look around in: parallel coordinates, Pareto front and radar, linked."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..numerics.durable import write_durably
+from ..sweeps import SweepTable
+from .needed import needed
+from .page import printable, template
+from .workbook import MOST_ROWS
+
+_DIGITS = 6  # of a number: the axes resolve four
+_CHOSEN = 3  # variants, to begin with
+
+
+def write_variants(
+    path: Path,
+    title: str,
+    facts: Sequence[tuple[str, str]],
+    table: SweepTable,
+    *,
+    labels: Mapping[str, str],
+    main: Sequence[str],
+) -> None:
+    """Writes a page that holds everything in itself, the library that draws it included, and refers to nothing.
+
+    Of more than `MOST_ROWS` variants the best by the first result, the Pareto front of the first two and an even share
+    of the others are in it. Failed variants are not.
+
+    Args:
+        path: file to write.
+        title: of the sweep.
+        facts: name and text of what identifies it.
+        table: all variants.
+        labels: of its columns, with units.
+        main: results that have an axis of their own; the others can be chosen for the Pareto front.
+
+    Raises:
+        ValueError: without the libraries jinja2 and plotly, or when the file cannot be written.
+    """
+    needed("jinja2", "plotly")
+    from plotly.offline import get_plotlyjs
+
+    shown = _shown(table, main)
+    data, count = _data(shown, labels, main)
+    failed = table.failures()
+    words = (
+        f"{count} of {len(table)} variants, {failed} failed" if failed or count < len(table) else f"{count} variants"
+    )
+    page = template("variants.html").render(
+        title=printable(title),
+        facts=[(name, printable(text)) for name, text in facts],
+        shown=f"{words}. ",
+        # no text of a table can end the element that holds it
+        data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
+        library=get_plotlyjs(),
+    )
+    try:
+        write_durably(path, lambda file: file.write(page.encode("utf-8", "replace")))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def _shown(table: SweepTable, main: Sequence[str]) -> SweepTable:
+    size = len(table)
+    if size <= MOST_ROWS:
+        return table
+    # every so many-th, with the best of all for a third of the rows, and the front, whatever it takes
+    share = np.arange(0, size, -(-3 * size // (2 * MOST_ROWS)))
+    kept = [share, table.best(MOST_ROWS // 3).column("variant")]
+    if len(main) > 1:
+        kept.append(table.pareto(main[:2]).column("variant"))
+    return table.take(np.unique(np.concatenate(kept)))
+
+
+def _data(table: SweepTable, labels: Mapping[str, str], main: Sequence[str]) -> tuple[dict[str, Any], int]:
+    """What the page knows, of variants that did not fail, and how many these are."""
+    names = [*table.parameters, *main, *(name for name in table.results if name not in main)]
+    values = np.stack([np.asarray(table.column(name), float) for name in names])
+    fine = np.isfinite(values).all(axis=0)
+    values, numbers = values[:, fine], table.column("variant")[fine]
+    better = [table.find(name).better for name in names]
+    first = values[names.index(main[0])] * (-1 if table.find(main[0]).better == "larger" else 1)
+    columns = [
+        {
+            "label": printable(labels.get(name, name)),
+            "kind": "parameter" if name in table.parameters else "result",
+            "main": name in table.parameters or name in main,
+            "better": better[place],
+            "values": [float(f"{value:.{_DIGITS}g}") for value in values[place].tolist()],
+        }
+        for place, name in enumerate(names)
+    ]
+    chosen = np.argsort(first, kind="stable")[:_CHOSEN].tolist()
+    return {"columns": columns, "variants": numbers.tolist(), "chosen": chosen}, len(numbers)
