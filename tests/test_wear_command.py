@@ -6,13 +6,14 @@ import json
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from pyarrow import parquet
 from report_page import check_report
 from test_cli import call
 
 import jaxgear as jg
 from jaxgear import plot
 from jaxgear.cli.kept import Kept, Marches
-from jaxgear.io import DesignFileError, load_design, read_worn, sweep_request, wear_request, write_worn
+from jaxgear.io import DesignFileError, load_design, read_flank, read_worn, sweep_request, wear_request, write_worn
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.wear import March, over_life, wear_in_steps
 
@@ -59,7 +60,8 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     done = call("wear", str(path), "--output", str(folder), "--report")
     assert done.code == 0, done.err
     figures = "worn_pinion", "worn_wheel", "ppte_over_life", "depth_over_life"
-    expected = {"summary.json", "report.html", "life.csv", "worn_flanks.csv", *(f"{name}.png" for name in figures)}
+    expected = {"summary.json", "report.html", "life.csv", "worn_flanks.csv", "worn_flanks.parquet"}
+    expected |= {f"{name}.png" for name in figures}
     assert {entry.name for entry in folder.iterdir()} == expected <= RESULT_FILES
     assert not list(tmp_path.glob(".out*"))  # what was kept is no longer needed
     summary = json.loads((folder / "summary.json").read_text())
@@ -69,6 +71,9 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     last = rows[4]
     unmodified = summary["designs"]["unmodified"]
     assert float(last["ppte_um"]) == pytest.approx(unmodified["worn_ppte_um"], rel=1e-6)
+    assert 0 < unmodified["wear_depth_error_um"] < 0.05 * unmodified["pinion_wear_depth_um"]
+    assert f"{unmodified['wear_depth_error_um']:.3f}" in done.out
+    assert float(last["wear_depth_error_um"]) == pytest.approx(unmodified["wear_depth_error_um"], rel=1e-6)
     assert float(last["pinion_wear_depth_um"]) == pytest.approx(unmodified["pinion_wear_depth_um"], rel=1e-6)
     assert unmodified["worn_ppte_um"] < unmodified["new_ppte_um"]
     assert 0 < unmodified["volume_by_tip_corners_share"] < 0.5
@@ -154,24 +159,66 @@ def test_kept_blocks_are_not_worn_again(tmp_path, file):
 
 
 def test_blocks_on_the_disk_are_the_blocks(tmp_path):
-    march = March(jnp.arange(3.0), jnp.ones(2), {"converged": jnp.array([True, False])})
+    march = March(jnp.arange(3.0), jnp.ones(2), jnp.array([True, False]), {"converged": jnp.array([True, False])})
     found = Marches().result(dict(Marches().arrays(march)))
+    assert (found.known == march.known).all()
     assert found.seen["converged"].dtype == bool and (found.depth == march.depth).all()
 
 
-def test_flanks_over_the_face_are_read_back(tmp_path, file):
-    mesh = load_design(file(PAIR.replace("pairs = 2", "pairs = 2\nslices = 2"))).mesh()
-    life = wear_in_steps(mesh, 150.0, 2e7, coefficient=1e-18, blocks=2, pinion=jg.LeadSlope(5.0))
-    write_worn(tmp_path / "flanks.csv", {"skewed": life})
-    read = read_worn(tmp_path / "flanks.csv")["skewed", 2e7]
-    for ours, theirs in zip(read, life.flanks()):
-        np.testing.assert_array_equal(ours.amount, theirs.amount)
-        np.testing.assert_array_equal(ours.roll_length, theirs.roll_length)
+@pytest.fixture(scope="module")
+def skewed(tmp_path_factory):
+    """A life of flanks that wear unevenly over the face."""
+    path = tmp_path_factory.mktemp("skewed") / "design.toml"
+    path.write_text(PAIR.replace("pairs = 2", "pairs = 2\nslices = 2"))
+    mesh = load_design(path).mesh()
+    return wear_in_steps(mesh, 150.0, 2e7, coefficient=1e-18, blocks=2, pinion=jg.LeadSlope(5.0))
+
+
+@pytest.mark.parametrize("name", ["flanks.csv", "flanks.parquet"])
+def test_flanks_over_the_face_are_read_back(tmp_path, skewed, name):
+    path = tmp_path / name
+    write_worn(path, {"skewed": skewed, "once more": skewed})
+    worn = read_worn(path)
+    assert list(worn) == [(design, done) for design in ("skewed", "once more") for done in (0.0, 1e7, 2e7)]
+    for gear, ours in zip(("pinion", "wheel"), skewed.flanks()):
+        one = read_flank(path, gear=gear, design="skewed", revolutions=2e7)
+        for theirs in (worn["skewed", 2e7][gear == "wheel"], one):
+            np.testing.assert_array_equal(ours.amount, theirs.amount)
+            np.testing.assert_array_equal(ours.roll_length, theirs.roll_length)
+            np.testing.assert_array_equal(ours.face_coordinate, theirs.face_coordinate)
+    assert np.ptp(skewed.flanks()[0].amount[0]) > 0.1
+    for options, message in (
+        ({}, "holds several: revolutions must be one of 0, 1e.07, 2e.07"),
+        ({"revolutions": 3e7}, "revolutions = 3e.07 is not there, revolutions must be one of 0, "),
+    ):
+        with pytest.raises(DesignFileError, match=f"{name}: {message}"):
+            read_flank(path, gear="pinion", design="skewed", **options)
+
+
+def test_both_files_hold_the_same_numbers(tmp_path, skewed):
+    paths = [tmp_path / name for name in ("flanks.csv", "flanks.parquet")]
+    for path in paths:
+        write_worn(path, {"skewed": skewed})
+    with paths[0].open() as lines:
+        rows = list(csv.DictReader(lines))
+    columns = parquet.read_table(paths[1]).to_pydict()
+    assert {name: [type(values[0])(row[name]) for row in rows] for name, values in columns.items()} == columns
+
+
+def test_a_worn_flank_stands_in_a_design_file(file, tmp_path, skewed):
+    write_worn(tmp_path / "worn.parquet", {"skewed": skewed})
+    table = '[[pinion.modification]]\ntype = "file"\nfile = "worn.parquet"\ngear = "pinion"\nrevolutions = 2e7\n'
+    pinion, _ = load_design(file(PAIR.replace("pairs = 2", "pairs = 2\nslices = 2") + table)).design({})
+    np.testing.assert_array_equal(pinion.amount, skewed.flanks()[0].amount)
 
 
 def test_other_files_are_refused_in_one_line(tmp_path):
-    with pytest.raises(ValueError, match="none.csv: cannot be read: No such file") as refused:
+    with pytest.raises(ValueError, match="none.csv: No such file") as refused:
         read_worn(tmp_path / "none.csv")
+    assert "\n" not in str(refused.value)
+    (tmp_path / "other.parquet").write_text("a,b\n1,2\n")
+    with pytest.raises(ValueError, match="other.parquet: is no Parquet file: ") as refused:
+        read_worn(tmp_path / "other.parquet")
     assert "\n" not in str(refused.value)
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(ValueError, match="other.csv: holds no worn flanks as jaxgear writes them"):

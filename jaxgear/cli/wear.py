@@ -27,7 +27,8 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
 
 def _write(folder: Path, study: Study) -> None:
     wear_report.write_lives(folder / "life.csv", study)
-    write_worn(folder / "worn_flanks.csv", study.lives)
+    for name in ("worn_flanks.csv", "worn_flanks.parquet"):
+        write_worn(folder / name, study.lives)
 
 
 def _life(design: DesignFile, request: WearRequest, mesh, name: str, flanks, kept: Kept, stages: Stages) -> WearLife:
