@@ -24,8 +24,8 @@ from jaxgear.wear import (
 )
 from jaxgear.wear import wear as worn_flanks
 from jaxgear.wear.archard import worn
-from jaxgear.wear.deposit import deposit
 from jaxgear.wear.case import case_of, marched
+from jaxgear.wear.deposit import deposit
 from jaxgear.wear.life import life_of as life_from
 from jaxgear.wear.march import Analysis, march
 

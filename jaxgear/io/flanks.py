@@ -30,7 +30,8 @@ _PLACE = {
     "lower_um": "lower",
 }
 _MEASURED, _REMOVED, _WORN, _DESIGN = "measured_um", "modification_um", "wear_depth_um", "design_um"
-_AMOUNTS = {_MEASURED: -1.0, _REMOVED: 1.0, _WORN: 1.0, _DESIGN: -1.0}  # what makes material removed of the first of them
+# what makes material removed of the first of them
+_AMOUNTS = {_MEASURED: -1.0, _REMOVED: 1.0, _WORN: 1.0, _DESIGN: -1.0}
 _ALONG, _ACROSS, _LIFE = "roll_length_mm", "face_coordinate_mm", "revolutions"
 _SAME_LIFE = 1e-6  # relative: lives are asked for as they are printed
 _SAME_PLACE = 1e-3  # mm, of a measured and a designed point
@@ -85,9 +86,10 @@ def read_flank(
     """A flank from a file: a measured one, a chart of `write_traces`, or one of `flanks.csv` or `worn_flanks.parquet`.
 
     The material is that of measured_um, where there is no such column of modification_um, then of wear_depth_um, then
-    of design_um. Places are roll_length_mm, or roll_angle_deg or diameter_mm with a base radius, and face_coordinate_mm. One profile gives a
-    `TabulatedProfile`; profiles at the same places on several lines of the face give a `TabulatedFlank`; so do a
-    profile and a helix (column trace), where every profile is the given one moved by the helix.
+    of design_um. Places are roll_length_mm, or roll_angle_deg or diameter_mm with a base radius, and
+    face_coordinate_mm. One profile gives a `TabulatedProfile`; profiles at the same places on several lines of the face
+    give a `TabulatedFlank`; so do a profile and a helix (column trace), where every profile is the given one moved by
+    the helix.
 
     Args:
         path: CSV file in UTF-8 with a line of headings, or a Parquet file, whose name ends in .parquet.

@@ -42,7 +42,7 @@ class OfLubrication(eqx.Module):
             jnp.broadcast_to(jnp.abs(sliding)[:, None], shape),
             flash_temperature(cycle, speed, **friction),
         )
-        # without load nothing wears, whatever a power of no pressure may be; its derivative must not be asked for either
+        # without load nothing wears, and the slope of a power of no pressure may be infinite
         loaded = cycle.line_load > 0
         found = self.of(*(jnp.where(loaded, field, 1.0) for field in given))
         both = found if isinstance(found, tuple | list) else (found, found)

@@ -38,7 +38,7 @@ _SHARE = 2 / (8 - 2)
 
 
 class Analysis(NamedTuple):
-    """The contact on a flank: how fast it wears [um per revolution of the pinion], what else it gives, if it was found."""
+    """The contact on a flank: how fast it wears [um per revolution], what else it gives, and whether it was found."""
 
     rate: Depth
     seen: Any
