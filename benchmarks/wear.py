@@ -90,9 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     console = Console(width=120)
     host = machine(len(os.sched_getaffinity(0)))
     console.print(", ".join(f"{key} {value}" for key, value in host.items()), markup=False, highlight=False)
-    console.print(
-        f"Lives of a 30/30 pair, {POSITIONS} positions: five contact analyses in two blocks"
-    )
+    console.print(f"Lives of a 30/30 pair, {POSITIONS} positions: five contact analyses in two blocks")
     console.print(table)
     for line in missed:
         console.print(f"MISSED: {line}", markup=False)

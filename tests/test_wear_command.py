@@ -13,7 +13,16 @@ from test_cli import call
 import jaxgear as jg
 from jaxgear import plot
 from jaxgear.cli.kept import Kept, Marches
-from jaxgear.io import DesignFileError, load_design, read_flank, read_worn, sweep_request, wear_request, write_worn
+from jaxgear.io import (
+    DesignFileError,
+    load_design,
+    optimize_request,
+    read_flank,
+    read_worn,
+    sweep_request,
+    wear_request,
+    write_worn,
+)
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.wear import March, over_life, wear_in_steps
 
@@ -127,6 +136,44 @@ def test_a_design_file_binds_names_to_its_settings(file):
 def test_a_quick_run_has_few_blocks(file):
     request = wear_request(load_design(file(PAIR + TABLE.replace("blocks = 4", "largest_increment = 0.1"))), quick=True)
     assert request.settings.blocks == 4 and request.largest_increment is None
+
+
+VARIABLES = """
+[variables]
+amount = { low = 0.0, high = 25.0, unit = "um" }
+length = { low = 1.0, high = 3.8, unit = "mm" }
+""" + "".join(
+    f"""
+[[{gear}.modification]]
+type = "tip_relief"
+amount = "amount"
+length = "length"
+"""
+    for gear in ("pinion", "wheel")
+)
+
+
+@pytest.mark.slow
+def test_the_command_seeks_the_relief_that_lasts(file, tmp_path):
+    done = call("wear", str(file(PAIR + TABLE + VARIABLES)), "--quick", "--output", str(tmp_path / "out"))
+    assert done.code == 0, done.err
+    designs = json.loads((tmp_path / "out" / "summary.json").read_text())["designs"]
+    assert list(designs) == ["unmodified", "rule-based", "optimum", "optimum over life"]
+    new, lasting = designs["optimum"], designs["optimum over life"]
+    assert new["new_ppte_um"] < lasting["new_ppte_um"]
+    assert lasting["mean_ppte_over_life_um"] < 0.9 * new["mean_ppte_over_life_um"]
+    assert "least mean PPTE over the life: optimum over life" in done.out
+
+
+def test_a_search_that_is_for_the_life_already_has_no_other(file):
+    def search(text):
+        design = load_design(file(PAIR + TABLE + VARIABLES + text))
+        return optimize_request(design).over_life(wear_request(design).settings)
+
+    assert search("") is not None and search('[optimize]\nmethod = "genetic"\n') is not None
+    assert search('[optimize]\nobjective = "worn_ppte"\n') is None
+    assert search('[optimize]\nmethod = "free_form"\n') is None
+    assert search('[optimize]\nmethod = "pareto"\n') is None
 
 
 def test_kept_blocks_are_not_worn_again(tmp_path, file):
