@@ -10,6 +10,7 @@ import pytest
 from catalogue import gear_pair, prepare
 
 import jaxgear as jg
+from jaxgear.conditions import solved
 from jaxgear.wear import (
     life_to,
     life_to_depth,
@@ -23,8 +24,10 @@ from jaxgear.wear import (
 )
 from jaxgear.wear import wear as worn_flanks
 from jaxgear.wear.archard import worn
+from jaxgear.wear.case import case_of, marched
 from jaxgear.wear.deposit import deposit
-from jaxgear.wear.march import march
+from jaxgear.wear.life import life_of as life_from
+from jaxgear.wear.march import Analysis, march
 
 # contacts that stay at their nominal places: sliding down a kinked flank they see rounding, by up to 1e-3 um
 SIZES = jg.Resolution(positions=16, pairs=2, slide_steps=0)
@@ -140,6 +143,22 @@ def test_depth_does_not_depend_on_the_number_of_positions():
     assert np.abs(depth(64) - fine).max() < 0.001 * fine.max()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("amount", [0.0, 5.0])
+def test_worn_flanks_do_not_depend_on_the_number_of_positions(amount):
+    """With contacts that are solved: 0.3 % of the depth from 32 positions on, 0.1 % of the volume."""
+
+    def worn_by(positions):
+        mesh = prepare(pair_of(20, 30), resolution=jg.Resolution(positions=positions, pairs=2))
+        relief = jg.TipRelief(amount, 2.0)
+        life = life_of(mesh, blocks=2, points=9, pinion=relief, wheel=relief)
+        return np.stack([life.pinion_depth[-1, 0], life.wheel_depth[-1, 0]]), worn_volume(life)[-1].sum(axis=-1)
+
+    (coarse, volume), (fine, fine_volume) = worn_by(32), worn_by(128)
+    assert np.abs(coarse - fine).max() < 0.01 * fine.max()
+    np.testing.assert_allclose(volume, fine_volume, rtol=0.002)
+
+
 def test_equal_gears_wear_as_mirror_images(equal):
     life = life_of(equal)
     assert wear_depth(life)[-1] > 1.0
@@ -204,12 +223,18 @@ def test_slices_of_an_even_load_wear_alike_and_crowning_wears_in_the_middle(mesh
     assert depth[1] > 1.1 * depth[0] and depth[0] == pytest.approx(depth[2], rel=1e-6)
 
 
-def test_blocks_are_of_second_order_and_tell_their_error():
-    """d y / d n = 1 - y from y = 0."""
+def levelling(depth):
+    """d y / d n = 1 - y: wear levels the load."""
+    return Analysis(1 - depth, depth, jnp.array(True))
 
+
+NEW = jnp.zeros((1, 1, 1, 1))
+
+
+def test_blocks_are_of_second_order_and_tell_their_error():
     def end(pairs):
-        found = march(lambda y: (1 - y, y), jnp.zeros((1, 1, 1, 1)), jnp.full(pairs, 0.5 / pairs))
-        assert found.depth.shape[0] == 2 * pairs + 1 and (found.depth == found.seen).all()
+        found = march(levelling, NEW, jnp.full(pairs, 0.5 / pairs))
+        assert found.depth.shape[0] == 2 * pairs + 1 and (found.depth == found.seen).all() and found.known.all()
         return float(found.depth[-1].sum()), float(found.error.sum())
 
     exact = 1 - np.exp(-1)
@@ -223,9 +248,32 @@ def test_an_overlong_block_overshoots():
     """Beyond twice what the load deflects a step of wear grows what it should level."""
 
     def end(length):
-        return float(march(lambda y: (1 - y, y), jnp.zeros((1, 1, 1, 1)), jnp.full(20, length)).depth[-1].sum())
+        return float(march(levelling, NEW, jnp.full(20, length)).depth[-1].sum())
 
     assert end(1.9) == pytest.approx(1, abs=0.05) and abs(end(2.1) - 1) > 1
+
+
+@pytest.mark.parametrize(
+    "limit, known, said",
+    # depths at the ends of four blocks of 0.25: 0.219, 0.390, 0.523, 0.628; Euler sees 0.25, 0.414, 0.542, 0.643 there,
+    # and 0.5, 0.695 at the ends of the double blocks
+    [
+        (1.0, [True] * 5, [True, True]),
+        (0.67, [True] * 5, [True, False]),
+        (0.635, [True] * 4 + [False], [True, False]),
+        (0.45, [True] * 3 + [False] * 2, [False, False]),
+        (0.4, [True] * 2 + [False] * 3, [False, False]),
+        (0.23, [True] + [False] * 4, [False, False]),
+    ],
+)
+def test_a_contact_that_is_lost_within_a_block_is_told(limit, known, said):
+    def analyze(depth):
+        return levelling(depth)._replace(found=jnp.all(depth < limit))
+
+    found = march(analyze, NEW, jnp.full(2, 0.25))
+    assert found.known.tolist() == known
+    # where the double block alone is lost, the depth is known and its error is not
+    assert np.isfinite(np.asarray(found.error)).ravel().tolist() == said
 
 
 def test_halving_the_blocks_changes_the_flank_by_what_was_said(mesh, life):
@@ -268,14 +316,27 @@ def test_the_life_to_a_limit_of_a_quantity(life):
 
 
 def test_a_contact_that_was_not_found_is_no_number(life):
+    """One at the start of a block."""
     lost = eqx.tree_at(lambda life: life.cycles.converged, life, life.cycles.converged.at[2, 0].set(False))
     assert np.isnan(over_life(lost, "ppte")).tolist() == [life == 2 for life in range(BLOCKS + 1)]
     assert np.isnan(life_to(lost, "ppte", 1e3))
-    # it has worn the flanks of all lives after it
-    for values in (wear_depth(lost), worn_volume(lost)[:, 0, 0]):
-        assert np.isnan(values).tolist() == [life > 2 for life in range(BLOCKS + 1)]
+
+
+def test_flanks_that_a_lost_contact_has_worn_are_not_known(mesh, life):
+    """One within the second block, that no life shows."""
+    options = {"pinion": None, "wheel": None, "deviation": None, "points": None}
+    case = case_of("wear", mesh, TORQUE, coefficient=COEFFICIENT, **options)
+    found = marched(case, case.start(), jnp.full(BLOCKS // 2, REVOLUTIONS / BLOCKS))
+    np.testing.assert_array_equal(life_from(case, found, life.revolutions).depth, life.depth)
+    lost = life_from(case, found._replace(known=jnp.arange(BLOCKS + 1) < 2), life.revolutions)
+    after = [life >= 2 for life in range(BLOCKS + 1)]
+    for values in (over_life(lost, "ppte"), wear_depth(lost), worn_volume(lost)[:, 0, 0]):
+        assert np.isnan(values).tolist() == after
+    assert (~np.asarray(lost.cycles.converged)).all(axis=-1).tolist() == after
+    assert np.isnan(life_to(lost, "ppte", 1e3)) and np.isnan(mean_over_life(lost, "ppte"))
     assert np.isnan(life_to_depth(lost, wear_depth(life)[-2]))
     np.testing.assert_array_equal(life_to_depth(lost, wear_depth(life)[1]), life_to_depth(life, wear_depth(life)[1]))
+    assert not solved(lost.cycles)[-1]  # by which quantities of the life are no numbers
 
 
 def test_a_function_of_the_lubrication(mesh, life):
@@ -290,6 +351,52 @@ def test_a_function_of_the_lubrication(mesh, life):
     only = life_of(mesh, coefficient=(COEFFICIENT, 0.0))
     np.testing.assert_allclose(other.depth, only.depth, rtol=1e-9)
     assert float(wear_depth(only)[-1]) > float(wear_depth(life)[-1])  # the wheel does not level the load
+
+
+class Power(eqx.Module):
+    """Wear that grows with a power of the pressure, and half as fast on the wheel."""
+
+    exponent: jax.Array
+
+    def __call__(self, pressure, sliding, temperature):
+        grown = COEFFICIENT * (pressure / 1000.0) ** self.exponent
+        return grown, 0.5 * grown
+
+
+def test_a_function_with_numbers_of_its_own_is_mapped_and_differentiated(mesh, life):
+    """Below 1000 MPa a power slows the wear down; contacts without load have none, and no infinite slope."""
+
+    def depth(exponent):
+        speed = jg.Operation(TORQUE, 1000.0)
+        life = worn_flanks(mesh, speed, REVOLUTIONS, coefficient=Power(exponent), blocks=2)
+        return wear_depth(life, "pinion")[-1], wear_depth(life, "wheel")[-1]
+
+    exponents = jnp.array([0.0, 0.5, 1.0])
+    (pinion, wheel), (slope, _) = jax.jit(jax.vmap(lambda at: jax.jvp(depth, (at,), (1.0,))))(exponents)
+    halved = life_of(mesh, coefficient=(COEFFICIENT, 0.5 * COEFFICIENT), blocks=2)
+    np.testing.assert_allclose(pinion[0], wear_depth(halved, "pinion")[-1], rtol=1e-9)
+    np.testing.assert_allclose(wheel[0], wear_depth(halved, "wheel")[-1], rtol=1e-9)
+    assert (np.diff(pinion) < 0).all() and (np.asarray(slope) < 0).all()
+    # Simpson's rule takes the slopes back to the depths
+    risen = (slope[0] + 4 * slope[1] + slope[2]) / 6
+    assert float(risen) == pytest.approx(float(pinion[2] - pinion[0]), rel=0.01)
+
+
+class WrongAtTheWorst(eqx.Module):
+    """No coefficient at the contact of the largest pressure, which is enough."""
+
+    value: jax.Array
+
+    def __call__(self, pressure, sliding, temperature):
+        return jnp.where(pressure == jnp.max(pressure), self.value, COEFFICIENT)
+
+
+def test_a_function_that_gives_no_coefficient_leaves_no_flank_known(mesh):
+    for value in (jnp.nan, -1e-18):
+        law = WrongAtTheWorst(jnp.asarray(value))
+        life = life_of(mesh, jg.Operation(TORQUE, 1000.0), coefficient=law, blocks=2)
+        assert life.known.tolist() == [True, False, False]
+        assert np.isfinite(over_life(life, "ppte")).tolist() == [True, False, False]
 
 
 def test_no_load_wears_nothing(mesh):

@@ -6,13 +6,23 @@ import json
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from pyarrow import parquet
 from report_page import check_report
 from test_cli import call
 
 import jaxgear as jg
 from jaxgear import plot
 from jaxgear.cli.kept import Kept, Marches
-from jaxgear.io import DesignFileError, load_design, read_worn, sweep_request, wear_request, write_worn
+from jaxgear.io import (
+    DesignFileError,
+    load_design,
+    optimize_request,
+    read_flank,
+    read_worn,
+    sweep_request,
+    wear_request,
+    write_worn,
+)
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.wear import March, over_life, wear_in_steps
 
@@ -59,7 +69,8 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     done = call("wear", str(path), "--output", str(folder), "--report")
     assert done.code == 0, done.err
     figures = "worn_pinion", "worn_wheel", "ppte_over_life", "depth_over_life"
-    expected = {"summary.json", "report.html", "life.csv", "worn_flanks.csv", *(f"{name}.png" for name in figures)}
+    expected = {"summary.json", "report.html", "life.csv", "worn_flanks.csv", "worn_flanks.parquet"}
+    expected |= {f"{name}.png" for name in figures}
     assert {entry.name for entry in folder.iterdir()} == expected <= RESULT_FILES
     assert not list(tmp_path.glob(".out*"))  # what was kept is no longer needed
     summary = json.loads((folder / "summary.json").read_text())
@@ -69,6 +80,9 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     last = rows[4]
     unmodified = summary["designs"]["unmodified"]
     assert float(last["ppte_um"]) == pytest.approx(unmodified["worn_ppte_um"], rel=1e-6)
+    assert 0 < unmodified["wear_depth_error_um"] < 0.05 * unmodified["pinion_wear_depth_um"]
+    assert f"{unmodified['wear_depth_error_um']:.3f}" in done.out
+    assert float(last["wear_depth_error_um"]) == pytest.approx(unmodified["wear_depth_error_um"], rel=1e-6)
     assert float(last["pinion_wear_depth_um"]) == pytest.approx(unmodified["pinion_wear_depth_um"], rel=1e-6)
     assert unmodified["worn_ppte_um"] < unmodified["new_ppte_um"]
     assert 0 < unmodified["volume_by_tip_corners_share"] < 0.5
@@ -124,6 +138,44 @@ def test_a_quick_run_has_few_blocks(file):
     assert request.settings.blocks == 4 and request.largest_increment is None
 
 
+VARIABLES = """
+[variables]
+amount = { low = 0.0, high = 25.0, unit = "um" }
+length = { low = 1.0, high = 3.8, unit = "mm" }
+""" + "".join(
+    f"""
+[[{gear}.modification]]
+type = "tip_relief"
+amount = "amount"
+length = "length"
+"""
+    for gear in ("pinion", "wheel")
+)
+
+
+@pytest.mark.slow
+def test_the_command_seeks_the_relief_that_lasts(file, tmp_path):
+    done = call("wear", str(file(PAIR + TABLE + VARIABLES)), "--quick", "--output", str(tmp_path / "out"))
+    assert done.code == 0, done.err
+    designs = json.loads((tmp_path / "out" / "summary.json").read_text())["designs"]
+    assert list(designs) == ["unmodified", "rule-based", "optimum", "optimum over life"]
+    new, lasting = designs["optimum"], designs["optimum over life"]
+    assert new["new_ppte_um"] < lasting["new_ppte_um"]
+    assert lasting["mean_ppte_over_life_um"] < 0.9 * new["mean_ppte_over_life_um"]
+    assert "least mean PPTE over the life: optimum over life" in done.out
+
+
+def test_a_search_that_is_for_the_life_already_has_no_other(file):
+    def search(text):
+        design = load_design(file(PAIR + TABLE + VARIABLES + text))
+        return optimize_request(design).over_life(wear_request(design).settings)
+
+    assert search("") is not None and search('[optimize]\nmethod = "genetic"\n') is not None
+    assert search('[optimize]\nobjective = "worn_ppte"\n') is None
+    assert search('[optimize]\nmethod = "free_form"\n') is None
+    assert search('[optimize]\nmethod = "pareto"\n') is None
+
+
 def test_kept_blocks_are_not_worn_again(tmp_path, file):
     """After Ctrl-C the command goes on, and what comes out is what would have."""
     mesh = load_design(file(PAIR)).mesh()
@@ -154,24 +206,66 @@ def test_kept_blocks_are_not_worn_again(tmp_path, file):
 
 
 def test_blocks_on_the_disk_are_the_blocks(tmp_path):
-    march = March(jnp.arange(3.0), jnp.ones(2), {"converged": jnp.array([True, False])})
+    march = March(jnp.arange(3.0), jnp.ones(2), jnp.array([True, False]), {"converged": jnp.array([True, False])})
     found = Marches().result(dict(Marches().arrays(march)))
+    assert (found.known == march.known).all()
     assert found.seen["converged"].dtype == bool and (found.depth == march.depth).all()
 
 
-def test_flanks_over_the_face_are_read_back(tmp_path, file):
-    mesh = load_design(file(PAIR.replace("pairs = 2", "pairs = 2\nslices = 2"))).mesh()
-    life = wear_in_steps(mesh, 150.0, 2e7, coefficient=1e-18, blocks=2, pinion=jg.LeadSlope(5.0))
-    write_worn(tmp_path / "flanks.csv", {"skewed": life})
-    read = read_worn(tmp_path / "flanks.csv")["skewed", 2e7]
-    for ours, theirs in zip(read, life.flanks()):
-        np.testing.assert_array_equal(ours.amount, theirs.amount)
-        np.testing.assert_array_equal(ours.roll_length, theirs.roll_length)
+@pytest.fixture(scope="module")
+def skewed(tmp_path_factory):
+    """A life of flanks that wear unevenly over the face."""
+    path = tmp_path_factory.mktemp("skewed") / "design.toml"
+    path.write_text(PAIR.replace("pairs = 2", "pairs = 2\nslices = 2"))
+    mesh = load_design(path).mesh()
+    return wear_in_steps(mesh, 150.0, 2e7, coefficient=1e-18, blocks=2, pinion=jg.LeadSlope(5.0))
+
+
+@pytest.mark.parametrize("name", ["flanks.csv", "flanks.parquet"])
+def test_flanks_over_the_face_are_read_back(tmp_path, skewed, name):
+    path = tmp_path / name
+    write_worn(path, {"skewed": skewed, "once more": skewed})
+    worn = read_worn(path)
+    assert list(worn) == [(design, done) for design in ("skewed", "once more") for done in (0.0, 1e7, 2e7)]
+    for gear, ours in zip(("pinion", "wheel"), skewed.flanks()):
+        one = read_flank(path, gear=gear, design="skewed", revolutions=2e7)
+        for theirs in (worn["skewed", 2e7][gear == "wheel"], one):
+            np.testing.assert_array_equal(ours.amount, theirs.amount)
+            np.testing.assert_array_equal(ours.roll_length, theirs.roll_length)
+            np.testing.assert_array_equal(ours.face_coordinate, theirs.face_coordinate)
+    assert np.ptp(skewed.flanks()[0].amount[0]) > 0.1
+    for options, message in (
+        ({}, "holds several: revolutions must be one of 0, 1e.07, 2e.07"),
+        ({"revolutions": 3e7}, "revolutions = 3e.07 is not there, revolutions must be one of 0, "),
+    ):
+        with pytest.raises(DesignFileError, match=f"{name}: {message}"):
+            read_flank(path, gear="pinion", design="skewed", **options)
+
+
+def test_both_files_hold_the_same_numbers(tmp_path, skewed):
+    paths = [tmp_path / name for name in ("flanks.csv", "flanks.parquet")]
+    for path in paths:
+        write_worn(path, {"skewed": skewed})
+    with paths[0].open() as lines:
+        rows = list(csv.DictReader(lines))
+    columns = parquet.read_table(paths[1]).to_pydict()
+    assert {name: [type(values[0])(row[name]) for row in rows] for name, values in columns.items()} == columns
+
+
+def test_a_worn_flank_stands_in_a_design_file(file, tmp_path, skewed):
+    write_worn(tmp_path / "worn.parquet", {"skewed": skewed})
+    table = '[[pinion.modification]]\ntype = "file"\nfile = "worn.parquet"\ngear = "pinion"\nrevolutions = 2e7\n'
+    pinion, _ = load_design(file(PAIR.replace("pairs = 2", "pairs = 2\nslices = 2") + table)).design({})
+    np.testing.assert_array_equal(pinion.amount, skewed.flanks()[0].amount)
 
 
 def test_other_files_are_refused_in_one_line(tmp_path):
-    with pytest.raises(ValueError, match="none.csv: cannot be read: No such file") as refused:
+    with pytest.raises(ValueError, match="none.csv: No such file") as refused:
         read_worn(tmp_path / "none.csv")
+    assert "\n" not in str(refused.value)
+    (tmp_path / "other.parquet").write_text("a,b\n1,2\n")
+    with pytest.raises(ValueError, match="other.parquet: is no Parquet file: ") as refused:
+        read_worn(tmp_path / "other.parquet")
     assert "\n" not in str(refused.value)
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(ValueError, match="other.csv: holds no worn flanks as jaxgear writes them"):

@@ -33,6 +33,7 @@ def test_quantities_are_those_of_the_life(mesh):
         "max_pressure_over_life": over_life(life, "max_contact_pressure").max(),
         "pinion_wear_depth": wear_depth(life, "pinion")[-1],
         "wheel_wear_depth": wear_depth(life, "wheel")[-1],
+        "wear_depth_error": life.error[-1],
         "life_to_depth": life_to_depth(life, 2.0),
         "life_to_ppte": jnp.minimum(life_to(life, "ppte", 6.0), 4e7),
     }

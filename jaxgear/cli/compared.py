@@ -21,13 +21,18 @@ def search_of(design: DesignFile, *, quick: bool) -> OptimizeRequest | None:
     return None
 
 
+def first_mesh(design: DesignFile, torque: float, *, quick: bool) -> Mesh:
+    """The mesh on which a search begins, up to a torque [N m]."""
+    size = design.resolution(torque)
+    return jax.block_until_ready(design.mesh(coarse(size) if quick else size))
+
+
 def compared(
     design: DesignFile, torque: float, search: OptimizeRequest | None, stages: Stages, *, quick: bool
 ) -> tuple[Mesh, dict[str, Modifications]]:
     """The designs by their names, and the mesh on which they are compared, up to a torque [N m]."""
     stages.begin("preparing the mesh")
-    size = design.resolution(torque)
-    mesh = jax.block_until_ready(design.mesh(coarse(size) if quick else size))
+    mesh = first_mesh(design, torque, quick=quick)
     involute = NoModification()
     relief = rule_based(design)
     designs: dict[str, Modifications] = {"unmodified": (involute, involute), "rule-based": (relief, relief)}

@@ -117,9 +117,9 @@ class Marches:
 
     def arrays(self, found: March) -> dict[str, Any]:
         """All that they hold."""
-        return {"depth": found.depth, "error": found.error, **found.seen}
+        return {"depth": found.depth, "error": found.error, "known": found.known, **found.seen}
 
     def result(self, arrays: dict[str, Any]) -> March:
         """The blocks."""
         known = {name: jnp.asarray(value) for name, value in arrays.items()}
-        return March(known.pop("depth"), known.pop("error"), known)
+        return March(known.pop("depth"), known.pop("error"), known.pop("known"), known)

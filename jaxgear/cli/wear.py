@@ -3,9 +3,10 @@
 from pathlib import Path
 
 from ..io import DesignFile, WearRequest, wear_request, write_worn
+from ..optimize import Optimum
 from ..wear import WearLife, wear_in_steps
 from . import wear_report
-from .compared import compared, search_of
+from .compared import compared, first_mesh, search_of
 from .kept import Kept, Marches
 from .progress import Stages
 from .study_command import Make, StudyCommand
@@ -15,9 +16,16 @@ from .wear_report import Study
 def _plan(design: DesignFile, quick: bool) -> Make[Study]:
     request = wear_request(design, quick=quick)
     search = search_of(design, quick=quick)
+    lasting = None if search is None else search.over_life(request.settings)
 
     def make(target: Path, stages: Stages):
-        mesh, designs = compared(design, max(design.torque, design.torque_range[1]), search, stages, quick=quick)
+        highest = max(design.torque, design.torque_range[1])
+        mesh, designs = compared(design, highest, search, stages, quick=quick)
+        if lasting is not None:
+            stages.begin("searching the optimum over the life")
+            optimum = lasting(first_mesh(design, highest, quick=quick), stages.step)
+            assert isinstance(optimum, Optimum)  # of one objective
+            designs["optimum over life"] = optimum.pinion, optimum.wheel
         kept = Kept(target.with_name(f".{target.name}.runs"), Marches())
         lives = {name: _life(design, request, mesh, name, flanks, kept, stages) for name, flanks in designs.items()}
         return Study(design, request, designs, lives), kept.remove
@@ -27,7 +35,8 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
 
 def _write(folder: Path, study: Study) -> None:
     wear_report.write_lives(folder / "life.csv", study)
-    write_worn(folder / "worn_flanks.csv", study.lives)
+    for name in ("worn_flanks.csv", "worn_flanks.parquet"):
+        write_worn(folder / name, study.lives)
 
 
 def _life(design: DesignFile, request: WearRequest, mesh, name: str, flanks, kept: Kept, stages: Stages) -> WearLife:

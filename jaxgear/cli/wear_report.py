@@ -71,7 +71,7 @@ def _numbers(study: Study, life: WearLife) -> dict[str, float]:
         "pinion_worn_volume_per_flank_mm3": volume[0].sum(),
         "wheel_worn_volume_per_flank_mm3": volume[1].sum(),
         "volume_by_tip_corners_share": volume[:, 1].sum() / max(volume.sum(), np.finfo(float).tiny),
-        "depth_error_um": life.error[-1],
+        "wear_depth_error_um": life.error[-1],
     }
     if settings.depth_limit is not None:
         found["life_to_depth_revolutions"] = life_to_depth(life, settings.depth_limit)
@@ -89,6 +89,7 @@ def table(study: Study) -> Table:
     columns = {
         "pinion_wear_depth_um": "pinion [um]",
         "wheel_wear_depth_um": "wheel [um]",
+        "wear_depth_error_um": "error [um]",
         "new_ppte_um": "PPTE new",
         "max_ppte_over_life_um": "worst",
         "worn_ppte_um": "worn",
@@ -122,8 +123,9 @@ def verdict(study: Study) -> Iterator[str]:
         yield f"least mean PPTE over the life: {best}, {found[best]:.3f} um"
     for name, life in study.lives.items():
         error, deepest = float(life.error[-1]), float(wear_depth(life)[-1])
-        if error > _WORTH_A_WORD * deepest:
-            yield f"{name}: the depth is uncertain by {error:.3g} um, take more blocks"
+        if np.isfinite(deepest) and not error <= _WORTH_A_WORD * deepest:  # NaN where it could not be told
+            by = f"by {error:.3g} um" if np.isfinite(error) else "by nobody knows how much"
+            yield f"{name}: the depth is uncertain {by}, take more blocks"
 
 
 def failures(study: Study) -> Iterator[str]:
@@ -168,7 +170,7 @@ def write_lives(path: Path, study: Study) -> None:
     known = [quantity_of(name) for name in _QUANTITIES]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        depths = "pinion_wear_depth_um", "wheel_wear_depth_um", "depth_error_um"
+        depths = "pinion_wear_depth_um", "wheel_wear_depth_um", "wear_depth_error_um"
         writer.writerow(["design", "revolutions", *depths, *(quantity.key for quantity in known)])
         for name, life in study.lives.items():
             columns = [life.revolutions, wear_depth(life, "pinion"), wear_depth(life, "wheel"), life.error]

@@ -1,10 +1,9 @@
-"""Measured or computed flanks from CSV.
+"""Measured, computed or worn flanks from CSV or Parquet.
 
 Columns end in their unit. `design_um` and `measured_um` have the sign of the machines, positive for excess material;
-`modification_um`, as in `flanks.csv`, is the material removed.
+`modification_um`, as in `flanks.csv`, and `wear_depth_um` are the material removed.
 """
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,14 +18,16 @@ from ..numerics import check, real
 from . import schema, template
 from .errors import DesignFileError, naming
 from .flank_range import FlankRange, starts
+from .rows import Rows, read_rows
 from .toml import decode
 from .traces import MEASURED
 
-_REMOVED, _DESIGN = "modification_um", "design_um"
-_AMOUNTS = {MEASURED: -1.0, _REMOVED: 1.0, _DESIGN: -1.0}  # what makes material removed of the first of them
-_ALONG, _ACROSS, _GEAR = "roll_length_mm", "face_coordinate_mm", "gear"
+_REMOVED, _WORN, _DESIGN = "modification_um", "wear_depth_um", "design_um"
+# what makes material removed of the first of them
+_AMOUNTS = {MEASURED: -1.0, _REMOVED: 1.0, _WORN: 1.0, _DESIGN: -1.0}
+_ALONG, _ACROSS, _GEAR, _LIFE = "roll_length_mm", "face_coordinate_mm", "gear", "revolutions"
+_SAME_LIFE = 1e-6  # relative: lives are asked for as they are printed
 
-Rows = list[dict[str, str]]
 Method = Literal["linear", "cubic2", "monotonic"]
 
 
@@ -36,23 +37,25 @@ def read_flank(
     gear: str | None = None,
     design: str | None = None,
     side: Side | None = None,
+    revolutions: float | None = None,
     base_radius: float | None = None,
     method: Method = "linear",
 ) -> TabulatedProfile | TabulatedFlank:
-    """A flank from a CSV file: a measured one, a chart of `write_traces`, or a flank of `flanks.csv`.
+    """A flank from a file: a measured one, a chart of `write_traces`, or one of `flanks.csv` or `worn_flanks.parquet`.
 
-    The material is that of measured_um, where there is no such column of modification_um, then of design_um. Places
-    are roll_length_mm, or roll_angle_deg or diameter_mm with a side or a base radius, and face_coordinate_mm. One
-    profile gives a `TabulatedProfile`; profiles at the same places on several lines of the face give a
-    `TabulatedFlank`; so do a profile and a helix (column trace), where every profile is the given one moved by the
-    helix.
+    The material is that of measured_um, where there is no such column of modification_um, then of wear_depth_um, then
+    of design_um. Places are roll_length_mm, or roll_angle_deg or diameter_mm with a side or a base radius, and
+    face_coordinate_mm. One profile gives a `TabulatedProfile`; profiles at the same places on several lines of the face
+    give a `TabulatedFlank`; so do a profile and a helix (column trace), where every profile is the given one moved by
+    the helix.
 
     Args:
-        path: CSV file in UTF-8 with a line of headings.
+        path: CSV file in UTF-8 with a line of headings, or a Parquet file, whose name ends in .parquet.
         gear: of a file with flanks of both gears, "pinion" or "wheel".
         design: of a file with several designs.
         side: the gear's side of the contact, of `mesh.sides`: a table that is not on its flank is refused. It may reach
             5 % of active profile and face over their ends, and leave out 20 % at each. None takes any table.
+        revolutions: of the pinion, of a file with several lives of worn flanks.
         base_radius: of the gear [mm], for files without roll lengths where no side is given.
         method: of interpolation along the profile.
 
@@ -64,7 +67,7 @@ def read_flank(
     if side is not None and base_radius is not None:
         raise ValueError(f"read_flank: base_radius = {base_radius:g} mm has no effect beside side")
     with naming(path):
-        rows = _chosen(_read(Path(path)), {"gear": gear, "design": design})
+        rows = _at_life(_chosen(read_rows(Path(path)), {"gear": gear, "design": design}), revolutions)
         flank, reach = _table(rows, base_radius if side is None else float(side.base_radius), method)
         if side is not None:
             reach.check_on(side.gear, side.start_roll_length, side.face_width)
@@ -72,17 +75,18 @@ def read_flank(
 
 
 def flank_part(key: str, table: Mapping[str, Any], folder: Path) -> template.Part:
-    """The modification of a gear that a table of a design file takes from a CSV file in the folder."""
+    """The modification of a gear that a table of a design file takes from a file in the folder."""
     given = {name: value for name, value in table.items() if name != "type"}
     section = decode(key, given, schema.FlankFileSection)
     path = folder / section.file
     try:
-        rows = _read(path)
+        rows = read_rows(path)
         gear = section.gear
         if gear is None and _GEAR in rows[0]:
             gear = key.partition(".")[0]
         method: Any = section.method
-        flank, reach = _table(_chosen(rows, {_GEAR: gear, "design": section.design}), None, method)
+        rows = _at_life(_chosen(rows, {_GEAR: gear, "design": section.design}), section.revolutions)
+        flank, reach = _table(rows, None, method)
     except DesignFileError as error:
         raise DesignFileError(f"{key}.file", f"{path.name}: {error.problem}") from None
     return template.Part(_FromFile(path.name, reach), {"flank": flank}, key)
@@ -152,42 +156,6 @@ def _table(
     return TabulatedFlank(real(roll), real(face), real(removed), method=method), reach
 
 
-def _read(path: Path) -> Rows:
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            names = [name.strip() for name in reader.fieldnames or ()]
-            reader.fieldnames = names
-            rows = list(reader)
-    except UnicodeDecodeError:
-        raise DesignFileError("", "is not text in UTF-8") from None
-    except OSError as error:
-        raise DesignFileError("", error.strerror or str(error)) from None
-    except ValueError as error:  # a name that no file can have
-        raise DesignFileError("", error) from None
-    except csv.Error as error:
-        raise DesignFileError("", f"is no CSV file: {error}") from None
-    if not rows:
-        raise DesignFileError("", "holds no points")
-    _check_table(names, rows)
-    return rows
-
-
-def _check_table(names: list[str], rows: Rows) -> None:
-    """Refuses what the headings do not fit: decimal commas would be columns of their own."""
-    if len(names) == 1 and ";" in names[0]:
-        raise DesignFileError("", "separates its columns by semicolons, must have commas, and points in its numbers")
-    twice = [name for name in dict.fromkeys(names) if name and names.count(name) > 1]
-    if twice:
-        raise DesignFileError("", f"has several columns {twice[0]}, must have one")
-    for number, row in enumerate(rows, 1):
-        further = row.get(None)  # type: ignore[call-overload]
-        if further and any(map(str.strip, further)):
-            fields = len(names) + len(further)
-            problem = f"point {number} has {fields} fields, the headings {len(names)}: numbers must have no commas"
-            raise DesignFileError("", problem)
-
-
 def _chosen(rows: Rows, wanted: Mapping[str, str | None]) -> Rows:
     """The rows of one gear and design."""
     for name, value in wanted.items():
@@ -199,6 +167,25 @@ def _chosen(rows: Rows, wanted: Mapping[str, str | None]) -> Rows:
             raise DesignFileError("", f'{name} = "{value}" is not there, {held}')
         rows = [row for row in rows if value is None or row[name] == value]
     return rows
+
+
+def _at_life(rows: Rows, revolutions: float | None) -> Rows:
+    """The rows of one life of worn flanks."""
+    if _LIFE not in rows[0]:
+        if revolutions is None:
+            return rows
+        raise DesignFileError("", f"{_LIFE} = {revolutions:g} is not there, there is no column {_LIFE}")
+    lives = _numbers(rows, _LIFE)
+    known = np.unique(lives)
+    if revolutions is None and len(known) == 1:
+        return rows
+    held = f"{_LIFE} must be one of {', '.join(f'{life:g}' for life in known)}"
+    if revolutions is None:
+        raise DesignFileError("", f"holds several: {held}")
+    wanted = np.isclose(lives, revolutions, rtol=_SAME_LIFE, atol=0.0)
+    if not wanted.any():
+        raise DesignFileError("", f"{_LIFE} = {revolutions:g} is not there, {held}")
+    return [row for row, is_wanted in zip(rows, wanted) if is_wanted]
 
 
 def _grid(rows: Rows, amount: str, base_radius: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

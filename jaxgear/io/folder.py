@@ -43,6 +43,7 @@ RESULT_FILES = frozenset(
         "phase_portrait.png",
         "life.csv",
         "worn_flanks.csv",
+        "worn_flanks.parquet",
         "worn_pinion.png",
         "worn_wheel.png",
         "ppte_over_life.png",

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..contact import Mesh
+from ..metrics import Quantity
 from ..numerics import AbstractMeasure, Callback, CVaR, Mean, Quantile, Worst
 from ..optimize import (
     METHODS,
@@ -20,6 +21,7 @@ from ..optimize import (
 )
 from ..optimize.projection import CURVES
 from ..optimize.refine import POSITIONS
+from ..wear import WEAR_QUANTITIES, Wear
 from . import schema
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
@@ -51,6 +53,7 @@ _QUICK: Mapping[str, dict[str, Any]] = {
     "free_form": {"points": 12, "steps": 10},
 }
 _QUICK_GEARS = 4
+_LASTING, _OVER_LIFE = "mean_ppte_over_life", {"starts": 1, "rounds": 1, "steps": 15}  # of the search over the life
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,6 +76,20 @@ class OptimizeRequest:
     def finer(self) -> int | None:
         """Positions of the finer mesh on which it ends; None where it stays on its mesh or chooses later."""
         return self._common.get("positions", POSITIONS) if self.method in METHODS else None
+
+    def over_life(self, settings: Wear) -> "OptimizeRequest | None":
+        """The search of the same variables for the least mean PPTE over the life at the design torque.
+
+        One gradient search, since every step of it wears a life. None where flanks are sought without variables, and
+        where the file asks for a quantity of worn flanks itself.
+        """
+        asked = self._common.get("objective", "ppte")
+        if self.method not in METHODS or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
+            return None
+        kept = {name: value for name, value in self._common.items() if name in ("constraints", "seed")}
+        kept |= {"torque": load_of(self._design, "optimize", schema.OptimizeSection()), "positions": None}
+        kept |= {"objective": settings.quantity(_LASTING), "method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE)}
+        return dataclasses.replace(self, method=_DEFAULT_METHOD, _common=kept)
 
     def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum | Front:
         """Runs it on a prepared mesh."""

@@ -119,19 +119,21 @@ class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
 
 
 class FlankFileSection(Section):
-    """A flank from a CSV file, measured or computed: points on a grid of roll_length_mm and, where it varies over the
-    face, face_coordinate_mm, with measured_um (excess material) or modification_um (material removed).
+    """A flank from a file, measured, computed or worn: points on a grid of roll_length_mm and, where it varies over the
+    face, face_coordinate_mm, with measured_um (excess material), modification_um or wear_depth_um (material removed).
 
     Attributes:
-        file: CSV file, beside the design file.
+        file: CSV or Parquet file, beside the design file.
         gear: of a file with flanks of both gears; the one that the table stands at where the key is left out.
         design: of a file with several designs.
+        revolutions: of the pinion, of a file with several lives.
         method: of interpolation along the profile.
     """
 
     file: Annotated[str, text()]
     gear: Annotated[str | None, choice("pinion", "wheel")] = None
     design: Annotated[str | None, text()] = None
+    revolutions: Annotated[float | None, real(Number("", low=0.0))] = None
     method: Annotated[str, choice("linear", "cubic2", "monotonic")] = "linear"
 
 

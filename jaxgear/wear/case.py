@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..conditions import LoadSpectrum
+from ..conditions import LoadSpectrum, solved
 from ..contact import Mesh, MeshCycle, Operation, removed_material, solve_removed
 from ..contact.face_coupling import check_torque
 from ..contact.operation import operation_of
@@ -17,7 +17,8 @@ from ..numerics import check, kernel, real, whole
 from .archard import worn
 from .coefficient import Constant, OfLubrication, wear_law
 from .deposit import PARTS, Deposit, deposit
-from .march import Depth, March, march
+from .march import Analysis, Depth, March, march
+from .worn_flank import WornFlank
 
 # what a cycle holds that differs from flank to flank
 _FOUND = (
@@ -68,7 +69,9 @@ class Case(eqx.Module):
 
     def cycle(self, roll_length, depth: Depth, load: Operation) -> MeshCycle:
         """The mesh on worn flanks."""
-        flanks = self.flanks(roll_length, depth)
+        total = jnp.sum(depth, axis=1)
+        pinion, wheel = (WornFlank(lengths, amount) for lengths, amount in zip(roll_length, total))
+        flanks = {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
         removed = removed_material(self.mesh, load, **flanks) + self.deviation
         return solve_removed(self.mesh, load, removed, **flanks)
 
@@ -85,11 +88,13 @@ class Case(eqx.Module):
                 kinematics=self.mesh.kinematics, margins=self.mesh.margins, operation=load, **flanks, **found
             )
 
-        def on(depth, found) -> MeshCycle:
+        def on(depth, found, known) -> MeshCycle:
+            # flanks that a contact has worn which was not found are not those of the life
+            found = found | {"converged": found["converged"] & known}
             flanks = self.flanks(roll_length, depth)
             return jax.vmap(lambda load, of: under(flanks, load, of))(self.loads, found)
 
-        cycles = jax.vmap(on)(marched.depth, marched.seen)
+        cycles = jax.vmap(on)(marched.depth, marched.seen, marched.known)
         return jax.tree.map(lambda leaf: leaf[:, 0], cycles) if self.weights is None else cycles
 
 
@@ -112,15 +117,20 @@ def marched(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> Ma
     shares = jnp.ones((1,), start.dtype) if case.weights is None else case.weights
     passages = jnp.stack([jnp.ones((), start.dtype), mesh.pair.pinion.teeth / mesh.pair.wheel.teeth])
 
-    def rate(depth):
+    def analyze(depth) -> Analysis:
         def under(load: Operation, place: Deposit):
             cycle = case.cycle(place.roll_length, depth, load)
-            return worn(cycle.line_load, case.law(cycle), place), {name: getattr(cycle, name) for name in _FOUND}
+            found = {name: getattr(cycle, name) for name in _FOUND}
+            coefficient = case.law(cycle)
+            # a function may give anything: no flank is known that NaN or a negative coefficient has worn
+            usable = solved(cycle) & jnp.all(coefficient >= 0)
+            return worn(cycle.line_load, coefficient, place), found, usable
 
-        found, seen = jax.vmap(under)(case.loads, places)
-        return jnp.tensordot(shares, found, 1) * passages[:, None, None, None], seen
+        rates, seen, found = jax.vmap(under)(case.loads, places)
+        rate = jnp.tensordot(shares, rates, 1) * passages[:, None, None, None]
+        return Analysis(rate, seen, jnp.all(found))
 
-    return march(rate, start, revolutions)
+    return march(analyze, start, revolutions)
 
 
 def case_of(

@@ -25,7 +25,7 @@ class Constant(eqx.Module):
 
 
 class OfLubrication(eqx.Module):
-    """A function of pressure [MPa], sliding speed [m/s] and flash temperature [K] at every contact."""
+    """A function of pressure [MPa], sliding speed [m/s] and flash temperature [K] at every contact that is loaded."""
 
     of: Callable[..., Any]
 
@@ -42,7 +42,9 @@ class OfLubrication(eqx.Module):
             jnp.broadcast_to(jnp.abs(sliding)[:, None], shape),
             flash_temperature(cycle, speed, **friction),
         )
-        found = self.of(*given)
+        # without load nothing wears, and the slope of a power of no pressure may be infinite
+        loaded = cycle.line_load > 0
+        found = self.of(*(jnp.where(loaded, field, 1.0) for field in given))
         both = found if isinstance(found, tuple | list) else (found, found)
         if len(both) != _GEARS:
             raise ValueError(f"wear: coefficient gives {len(both)} values, must give one or a pair: pinion, wheel")
@@ -50,7 +52,7 @@ class OfLubrication(eqx.Module):
         for field in fields:
             if jnp.broadcast_shapes(field.shape, shape) != shape:
                 raise ValueError(f"wear: coefficient gives an array of shape {field.shape}, must be {shape}")
-        return jnp.stack([jnp.broadcast_to(field, shape) for field in fields])
+        return jnp.where(loaded, jnp.stack([jnp.broadcast_to(field, shape) for field in fields]), 0.0)
 
 
 def wear_law(coefficient: Any, loads: Operation, dtype) -> Constant | OfLubrication:

@@ -4,7 +4,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..contact import Mesh, MeshCycle
 from ..geometry import Gear
@@ -33,8 +33,10 @@ class WearLife(Checked):
         depth: worn off pinion and wheel by contact of the flanks and by tip corners [um], shape (lives, gears, parts,
             slices, points).
         error: estimate of the error of that depth by the length of the blocks, largest of all points [um], shape
-            (lives,).
-        cycles: the mesh on these flanks, leading axis (lives,); (lives, torques) under a load spectrum.
+            (lives,); NaN where that of two blocks is not known.
+        known: whether all contacts that have worn these flanks were found, also within blocks, shape (lives,).
+        cycles: the mesh on these flanks, leading axis (lives,); (lives, torques) under a load spectrum. None has
+            converged on flanks that are not known.
         weights: of the torques of a load spectrum in the revolutions, shape (torques,); None under one torque.
     """
 
@@ -45,6 +47,7 @@ class WearLife(Checked):
     slice_width: Float[Array, " slices"] = result("mm")
     depth: Float[Array, "lives gears parts slices points"] = result("um")
     error: Lives = result("um")
+    known: Bool[Array, " lives"] = result()
     cycles: MeshCycle
     weights: Float[Array, " torques"] | None = result()
 
@@ -105,7 +108,9 @@ def wear(
         coefficient: of wear [m2/N] of both gears, or a pair of numbers, (pinion, wheel); from 1e-18 for good films to
             5e-16 for mild wear of mixed lubrication. Or a function of the state of lubrication at every contact, of
             pressure [MPa], sliding speed [m/s] and flash temperature [K], arrays of shape (pairs, slices, positions),
-            to such an array or a pair of them; traced. It needs the speed of an `Operation`.
+            to such an array or a pair of them; traced, and asked where there is load. It needs the speed of an
+            `Operation`. Flanks that NaN or a negative number have worn are not `known`. Where it depends on numbers
+            of its own to differentiate by, they may be fields of an `equinox.Module`.
         pinion, wheel: modifications of the new flanks; None for nominal involutes.
         deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions);
             None for perfect gears.
@@ -163,6 +168,7 @@ def life_of(case: Case, found: March, revolutions: Lives) -> WearLife:
         slice_width=case.mesh.slice_width,
         depth=found.depth,
         error=_total_error(found.error),
+        known=found.known,
         cycles=case.cycles(roll_length, found),
         weights=case.weights,
     )
@@ -171,7 +177,8 @@ def life_of(case: Case, found: March, revolutions: Lives) -> WearLife:
 def _total_error(error: Float[Array, "pairs gears parts slices points"]) -> Lives:
     """Largest error of the depth so far [um]: at the start, and after both blocks of every pair."""
     error = jnp.sum(error, axis=2)
-    before = jnp.cumsum(error, axis=0) - error
+    after = jnp.cumsum(error, axis=0)
+    before = jnp.concatenate([jnp.zeros_like(after[:1]), after[:-1]])
     lives = jnp.stack([before, before + error / 2], axis=1).reshape(-1, *error.shape[1:])
-    lives = jnp.concatenate([lives, jnp.sum(error, axis=0)[None]])
+    lives = jnp.concatenate([lives, after[-1:]])
     return maximum(jnp.abs(lives), axis=(1, 2, 3))

@@ -3,7 +3,7 @@
 from typing import Any, Literal
 
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from ..conditions import joined, solved
 from ..metrics import Quantity, quantity_of
@@ -16,7 +16,7 @@ Worn = Literal["pinion", "wheel", "both"]
 
 
 def over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Lives:
-    """A quantity of the mesh at every life, shape (lives,); NaN where the contact was not found.
+    """A quantity of the mesh at every life, shape (lives,); NaN where a contact was not found, then or before.
 
     Args:
         life: of one pair of flanks.
@@ -55,14 +55,7 @@ def wear_depth(life: WearLife, gear: Worn = "both") -> Lives:
     }
     if gear not in depths:
         raise ValueError(f'wear_depth: gear = {gear!r} must be "pinion", "wheel" or "both"')
-    return jnp.where(_known(life), maximum(jnp.stack(depths[gear]), axis=(0, 2, 3)), jnp.nan)
-
-
-def _known(life: WearLife) -> Bool[Array, " lives"]:
-    """Whether the contact was found at all lives before, which have worn the flank."""
-    found = solved(life.cycles)
-    found = found if life.weights is None else jnp.all(found, axis=-1)
-    return jnp.concatenate([jnp.ones_like(found[:1]), jnp.cumsum(~found)[:-1] == 0])
+    return jnp.where(life.known, maximum(jnp.stack(depths[gear]), axis=(0, 2, 3)), jnp.nan)
 
 
 def worn_volume(life: WearLife) -> Float[Array, "lives gears parts"]:
@@ -72,7 +65,7 @@ def worn_volume(life: WearLife) -> Float[Array, "lives gears parts"]:
     NaN after a life whose contact was not found.
     """
     volume = 1e-3 * jnp.einsum("lgpsk,gk,s->lgp", life.depth, life.arc, life.slice_width)
-    return jnp.where(_known(life)[:, None, None], volume, jnp.nan)
+    return jnp.where(life.known[:, None, None], volume, jnp.nan)
 
 
 def life_to_depth(life: WearLife, limit: Any, gear: Worn = "both") -> Scalar:

@@ -59,6 +59,9 @@ WEAR_QUANTITIES: Mapping[str, Kind] = {
     "wear_depth": Kind(lambda life, _: wear_depth(life)[-1], "um", "largest wear depth of both gears"),
     "pinion_wear_depth": Kind(lambda life, _: wear_depth(life, "pinion")[-1], "um", "largest wear depth, pinion"),
     "wheel_wear_depth": Kind(lambda life, _: wear_depth(life, "wheel")[-1], "um", "largest wear depth, wheel"),
+    "wear_depth_error": Kind(
+        lambda life, _: life.error[-1], "um", "error of the wear depth by the length of the blocks, as estimated"
+    ),
     "life_to_depth": Kind(
         lambda life, settings: _at_most(_LONGEST * settings.revolutions, life_to_depth(life, settings.depth_limit)),
         "revolutions",

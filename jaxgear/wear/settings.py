@@ -64,12 +64,14 @@ class Wear(Checked):
         """A quantity of the life for objectives, constraints, sweeps and Pareto fronts, with these settings.
 
         Every load of a spectrum and every manufactured pair is taken to run the whole life, and the lives are joined
-        as all numbers of such cases are.
+        as all numbers of such cases are. Under a spectrum join them by `Worst()`: that is the life of a pair which
+        runs at one of the loads, while a mean joins numbers of different flanks, of which no pair has all. `wear`
+        itself takes a spectrum, whose loads wear one flank together, each for its share of the revolutions.
 
         Args:
             name: one of `WEAR_QUANTITIES`: "worn_ppte", "mean_ppte_over_life", "max_ppte_over_life",
-                "max_pressure_over_life", "wear_depth", "pinion_wear_depth", "wheel_wear_depth", "life_to_depth" (needs
-                `depth_limit`) or "life_to_ppte" (needs `ppte_limit`).
+                "max_pressure_over_life", "wear_depth", "pinion_wear_depth", "wheel_wear_depth", "wear_depth_error",
+                "life_to_depth" (needs `depth_limit`) or "life_to_ppte" (needs `ppte_limit`).
 
         Raises:
             ValueError: for another name, and for a limit that is missing.

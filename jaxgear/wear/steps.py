@@ -108,5 +108,8 @@ def _together(pairs: list[March]) -> March:
     def joined(*leaves):
         return jnp.concatenate([*(leaf[:-1] for leaf in leaves), leaves[-1][-1:]])
 
-    first = jax.tree.map(joined, *[(pair.depth, pair.seen) for pair in pairs])
-    return March(first[0], jnp.concatenate([pair.error for pair in pairs]), first[1])
+    depth, seen = jax.tree.map(joined, *[(pair.depth, pair.seen) for pair in pairs])
+    # the flank with which a march begins is as well known as that with which the one before has ended
+    known = jnp.concatenate([pairs[0].known[:1], *(pair.known[1:] for pair in pairs)])
+    error = jnp.concatenate([pair.error for pair in pairs])
+    return March(depth, error, jnp.cumsum(~known) == 0, seen)
