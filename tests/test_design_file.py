@@ -707,6 +707,7 @@ def test_examples_load_and_are_what_their_name_says(path):
     file = load_design(path)
     teeth = [int(gear.teeth) for gear in (file.pair().pinion, file.pair().wheel)]
     kinds = {
+        "lubricated": file.lubricant,
         "sweep": file.sweep,
         "dynamics": file.dynamics,
         "robust": file.optimize.manufactured or None,
