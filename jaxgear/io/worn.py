@@ -39,7 +39,7 @@ def write_worn(path: Path, lives: Mapping[str, WearLife]) -> None:
             for number, done in enumerate(np.asarray(life.revolutions)):
                 for gear, name in enumerate(_GEARS):
                     angles = np.asarray(roll_angle(pair[gear], life.roll_length[gear]))
-                    for line, at in enumerate(face):
+                    for line, at in enumerate(face[gear]):
                         corner = depth[number, gear, 1, line]
                         total = depth[number, gear].sum(axis=0)[line]
                         for values in zip(angles, lengths[gear], total, corner):

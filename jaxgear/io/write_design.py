@@ -42,8 +42,12 @@ def write_design(
     lines = [f"title = {_text(title)}", ""] if title else []
     for name, gear in (("pinion", pair.pinion), ("wheel", pair.wheel)):
         lines += [f"[{name}]", *_gear(gear), ""]
+    mounting = []
     if pair.center_distance is not None:
-        lines += ["[pair]", f"center_distance = {_value(pair.center_distance)}  # mm", ""]
+        mounting.append(f"center_distance = {_value(pair.center_distance)}  # mm")
+    if float(pair.axial_offset) != 0:
+        mounting.append(f"axial_offset = {_value(pair.axial_offset)}  # mm")
+    lines += ["[pair]", *mounting, ""] if mounting else []
     lines += ["[load]", f"torque = {_value(torque)}  # N m, on the pinion"]
     lines += [f"speed = {_value(speed)}  # rpm, of the pinion"] if speed is not None else []
     for name, modification in (("pinion", pinion), ("wheel", wheel)):

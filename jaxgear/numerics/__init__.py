@@ -5,6 +5,7 @@ from .complementarity import tangent_stiffness as tangent_stiffness
 from .contact_problem import ContactProblem as ContactProblem
 from .contact_problem import ContactSolution as ContactSolution
 from .coupling import Coupling as Coupling
+from .coupling import Other as Other
 from .extremes import maximum as maximum
 from .extremes import minimum as minimum
 from .extremes import spread as spread
