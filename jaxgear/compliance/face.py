@@ -113,4 +113,5 @@ def few_modes(
     modes = jnp.concatenate([waves[:, :1], others], axis=1)
     projected = modes.T @ kernel @ modes
     rest = (jnp.trace(kernel, axis1=-2, axis2=-1) - jnp.trace(projected, axis1=-2, axis2=-1)) / (slices - count)
-    return modes, projected - rest[..., None, None] * jnp.eye(count, dtype=kernel.dtype), rest
+    shape = (1,) * len(gears) + (count, count)
+    return modes, projected - rest[..., None, None] * jnp.eye(count, dtype=kernel.dtype).reshape(shape), rest

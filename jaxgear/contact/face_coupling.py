@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..compliance import Kernel, few_modes
+from ..compliance import few_modes
 from ..geometry import GearPair
 from ..numerics import Coupling, Other, concrete
 from ..shafts import AbstractSupport, TabulatedSupport
@@ -21,7 +21,10 @@ _MOST_MISSED = 0.05
 
 
 def coupling_of(
-    moving: Kinematics, kernels: Float[Array, "gears slices slices"], wheel: Float[Array, "pairs pairs positions"], support: AbstractSupport | None
+    moving: Kinematics,
+    kernels: Float[Array, "gears slices slices"],
+    wheel: Float[Array, "pairs pairs positions"],
+    support: AbstractSupport | None,
 ) -> Coupling | None:
     """The coupling of the slices; None where they do not feel each other.
 

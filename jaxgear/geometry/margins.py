@@ -104,7 +104,7 @@ class Margins(Checked):
 def margins_between(
     pinion: Outline, wheel: Outline, path: PathOfContact, center_distance: Scalar | None, face_overlap: Scalar
 ) -> Margins:
-    """Margins of two generated gears on their path of contact; `center_distance` and `face_overlap` of the pair [mm]."""
+    """Margins of two generated gears on their path of contact; center distance and overlap as in `GearPair` [mm]."""
     first, second = pinion.gear, wheel.gear
     both = first.base_radius + second.base_radius
     tangent = path.pinion_pitch_roll_length / path.pinion_base_radius

@@ -172,10 +172,7 @@ def layout_flank_lines(
             ]
         ),
         before={name: tolerance_cases(face, one, wheel=on_wheel, stations=stations) for name, one in several.items()},
-        after={
-            name: tolerance_cases(face, one, wheel=crowned, stations=stations)
-            for name, one in several.items()
-        },
+        after={name: tolerance_cases(face, one, wheel=crowned, stations=stations) for name, one in several.items()},
     )
     if duty_cycle is None or endurance is None:
         return layout

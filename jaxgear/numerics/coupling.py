@@ -15,6 +15,7 @@ from operator import add
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -125,13 +126,15 @@ def _blocks(share: Float[Array, "modes modes"], compliance: Springs) -> Blocks:
 
 def _block_inverse(matrix: Blocks) -> Blocks:
     """Of a symmetric, positive definite matrix at every position, swept block by block."""
-    for k in range(len(matrix)):
+
+    def sweep(k, matrix):
         inverse = small_inverse(matrix[k, k])
         row = jnp.einsum("ijn,mjkn->mikn", inverse, matrix[k])
         swept = matrix - jnp.einsum("lijn,mjkn->lmikn", matrix[:, k], row)
         column = jnp.einsum("lijn,jkn->likn", matrix[:, k], inverse)
-        matrix = swept.at[k].set(row).at[:, k].set(column).at[k, k].set(-inverse)
-    return -matrix
+        return swept.at[k].set(row).at[:, k].set(column).at[k, k].set(-inverse)
+
+    return -jax.lax.fori_loop(0, len(matrix), sweep, matrix)
 
 
 # Sums over few terms rather than products of matrices: compilers fuse them, and turn no array around for them.
