@@ -22,19 +22,22 @@ CHORD, TORQUE = 8.189371, 150.0
 
 
 def pair_of(pinion=18.0, wheel=18.0, offset=0.0):
-    gears = jg.Gear(19, 3.0, face_width=pinion, bore_diameter=20.0), jg.Gear(48, 3.0, face_width=wheel, bore_diameter=40)
+    gears = (
+        jg.Gear(19, 3.0, face_width=pinion, bore_diameter=20.0),
+        jg.Gear(48, 3.0, face_width=wheel, bore_diameter=40),
+    )
     return jg.GearPair(*gears, axial_offset=offset)
 
 
-def mesh_of(pair, slices=8, **sizes):
-    sizes = {"positions": 4, "pairs": 3, "patch_nodes": 1} | sizes
-    return jg.prepare(pair, resolution=jg.Resolution(slices=slices, **sizes))
+def mesh_of(pair, slices=6):
+    sizes = jg.Resolution(positions=4, slices=slices, pairs=2, patch_nodes=1, face_modes=3)
+    return jg.prepare(pair, resolution=sizes)
 
 
 def contact(pinion=18.0, wheel=18.0, offset=0.0, *, slope=0.0, crowning=0.0, on_wheel=0.0):
-    """Mean transmission error and line loads; widths are traced, so that overhangs are carried along where they are 0.
+    """Mean transmission error, line loads, whether they converged, and K_Hbeta.
 
-    Slope and crowning are the pinion's, `on_wheel` is the crowning of the wheel.
+    Widths are traced, so that overhangs are carried along where they are 0. Slope and crowning are the pinion's, `on_wheel` is the crowning of the wheel.
     """
     return contact_of(jnp.asarray([pinion, wheel, offset]), jnp.asarray([slope, crowning, on_wheel]))
 
@@ -43,7 +46,7 @@ def contact(pinion=18.0, wheel=18.0, offset=0.0, *, slope=0.0, crowning=0.0, on_
 def contact_of(widths, amounts):
     pinion, wheel = jg.LeadSlope(amounts[0]) + jg.LeadCrowning(amounts[1]), jg.LeadCrowning(amounts[2])
     cycle = jg.solve(mesh_of(pair_of(*widths)), TORQUE, pinion=pinion, wheel=wheel)
-    return jnp.mean(cycle.transmission_error), cycle.line_load, cycle.converged
+    return jnp.mean(cycle.transmission_error), cycle.line_load, cycle.converged, face_load_factor(cycle)
 
 
 def test_kernel_of_a_wider_gear_is_a_part_of_its_whole_one():
@@ -103,7 +106,7 @@ def test_common_face():
 def test_equal_faces_are_the_limit():
     """The form for two gears, at equal widths, is that for one; of one slice it adds nothing to the structure."""
     even = jg.solve(mesh_of(pair_of()), TORQUE, pinion=jg.LeadSlope(20.0))
-    mean, load, _ = contact(slope=20.0)
+    mean, load, *_ = contact(slope=20.0)
     assert float(mean) == pytest.approx(float(jnp.mean(even.transmission_error)), rel=1e-10)
     np.testing.assert_allclose(load, even.line_load, atol=1e-7)
     one, limit = (np.asarray(mesh_of(pair_of(width), 1).structure) for width in (18.0, 18.0 + 1e-9))
@@ -111,14 +114,16 @@ def test_equal_faces_are_the_limit():
 
 
 def test_wider_gears_are_stiffer_and_carry_more_at_the_ends():
-    error, load, converged = contact()
-    np.testing.assert_allclose(load, load[:, :1] * jnp.ones((8, 1)), rtol=1e-9)
+    error, load, converged, factor = contact()
+    np.testing.assert_allclose(load, load[:, :1] * jnp.ones((1, 6, 1)), rtol=1e-9)
+    assert float(factor) == pytest.approx(1.0, abs=1e-9)
     for widths in ((24.0, 18.0), (18.0, 24.0), (24.0, 18.0, -3.0)):
-        wider, ends, fine = contact(*widths)
+        wider, ends, fine, uneven = contact(*widths)
         assert bool(jnp.all(fine & converged)) and 0.85 * float(error) < float(wider) < 0.97 * float(error)
         total, before = jnp.sum(ends, axis=0), jnp.sum(load, axis=0)
-        np.testing.assert_allclose(jnp.mean(total, axis=0), jnp.mean(before, axis=0), rtol=1e-2)
-        assert float(jnp.max(total[0] / before[0])) > 1.05  # beside the overhang
+        assert float(jnp.max(total / before)) == float(jnp.max((total / before)[jnp.asarray([0, -1])])) > 1.04
+        worst = np.unravel_index(np.argmax(ends), ends.shape)
+        assert float(uneven) == pytest.approx(float(ends[worst] / jnp.mean(ends[worst[0], :, worst[2]])), rel=1e-9)
     # what is far away does not count
     assert float(contact(1000.0, 18.0)[0]) == pytest.approx(float(contact(1001.0, 18.0)[0]), rel=2e-4)
 
@@ -135,13 +140,14 @@ def test_gradient_over_widths_and_offset():
     def mean_error(widths):
         return contact_of(widths, amounts)[0]
 
-    gradient = jax.jit(jax.grad(mean_error))
-    slope = gradient(widths)
-    for index in range(3):
-        step = jnp.zeros(3).at[index].set(1e-4)
-        central = (mean_error(widths + step) - mean_error(widths - step)) / 2e-4
-        assert float(slope[index]) == pytest.approx(float(central), rel=2e-6)
-    assert np.all(np.isfinite(gradient(jnp.asarray([18.0, 18.0, 0.0]))))
+    slope = jax.jit(lambda at, direction: jax.jvp(mean_error, (at,), (direction,))[1])
+    for direction in jnp.eye(3):
+        central = (mean_error(widths + 1e-4 * direction) - mean_error(widths - 1e-4 * direction)) / 2e-4
+        assert float(slope(widths, direction)) == pytest.approx(float(central), rel=2e-6)
+        # faces that are just equal have a kink: the mean of both sides
+        even, step = jnp.asarray([18.0, 18.0, 0.0]), 1e-6 * direction
+        central = (mean_error(even + step) - mean_error(even - step)) / 2e-6
+        assert float(slope(even, direction)) == pytest.approx(float(central), abs=1e-3)
 
 
 def test_modifications_count_over_the_face_of_their_gear():
@@ -168,17 +174,6 @@ def test_flank_line_of_the_gap_on_either_gear():
     share = found[0].face_coordinate / pair.face_width
     expected = 12.0 * share + 5.0 * (2 * share) ** 2
     np.testing.assert_allclose(found[0].gap - found[0].gap[5], expected - expected[5], atol=1e-9)
-
-
-def test_factors_over_the_face_are_those_of_the_common_one():
-    mesh = mesh_of(pair_of(24.0, 18.0))
-    cycle = jg.solve(mesh, TORQUE)
-    force = jnp.sum(cycle.line_load * mesh.lever[:, None], axis=(0, 1)) * 18.0 / 8
-    np.testing.assert_allclose(force, 1e3 * TORQUE / mesh.pair.pinion.base_radius, rtol=1e-9)
-    load = np.asarray(cycle.line_load)
-    pair, _, position = np.unravel_index(load.argmax(), load.shape)
-    expected = load.max() / load[pair, :, position].mean()
-    assert float(face_load_factor(cycle)) == pytest.approx(expected, rel=1e-9) and 1.03 < expected < 1.2
 
 
 def test_faces_that_do_not_overlap_are_refused():

@@ -25,7 +25,6 @@ from ..numerics import real
 
 Scalar = Float[Array, ""]
 Kernel = Float[Array, "slices slices"]
-Overhang = tuple[Scalar, Scalar]  # of a gear beyond the negative and the positive end of the load [mm]
 
 # over the root chord: how far a load is felt, and how far from its end a face is softer
 _DECAY = 0.78
@@ -33,7 +32,7 @@ _END_DECAY = 0.30
 _END_SOFTNESS = 0.10  # share of the uniform compliance
 
 
-def face_kernel(face_width, root_chord, slices: int, overhang: Overhang | None = None) -> Kernel:
+def face_kernel(face_width, root_chord, slices: int, overhang: tuple | None = None) -> Kernel:
     """F: deflection of a slice under the line load of another, over that of a load uniform over the whole gear.
 
     Symmetric, positive definite. Its rows sum to one where nothing overhangs, else to less.
@@ -42,7 +41,7 @@ def face_kernel(face_width, root_chord, slices: int, overhang: Overhang | None =
         face_width: over which the load is spread [mm].
         root_chord: S of the teeth, mean of both gears [mm].
         slices: of equal width over the load.
-        overhang: of the gear beyond both ends of the load; None for none.
+        overhang: of the gear beyond the negative and the positive end of the load [mm]; None for none.
     """
     face_width, root_chord = real(face_width), real(root_chord)
     dtype = jnp.result_type(face_width)
@@ -54,10 +53,11 @@ def face_kernel(face_width, root_chord, slices: int, overhang: Overhang | None =
     if overhang is None:
         ends = ends - jnp.mean(ends, axis=0, keepdims=True)
     else:
-        width, far = face_width + overhang[0] + overhang[1], _DECAY * root_chord
-        there = _images(_near_ends(waves, step, far, overhang), width, far)
+        beyond = real(overhang[0]), real(overhang[1])
+        width, far = face_width + beyond[0] + beyond[1], _DECAY * root_chord
+        there = _images(_near_ends(waves, step, far, beyond), width, far)
         mirrored = mirrored + step * (there - _images(_near_ends(waves, step, far), face_width, far))
-        ends = _near_ends(waves, step, decay, overhang) + jnp.expm1(-width / decay) * decay / width
+        ends = _near_ends(waves, step, decay, beyond) + jnp.expm1(-width / decay) * decay / width
     return mirrored + 2 * _END_SOFTNESS * step / decay * ends @ ends.T
 
 

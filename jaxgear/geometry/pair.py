@@ -95,8 +95,13 @@ class GearPair(Checked):
     def overhangs(self) -> tuple[tuple[Real, Real], tuple[Real, Real]]:
         """By how much pinion and wheel are wider than the common face, at its negative and its positive end [mm]."""
         half = 0.5 * self.face_width
-        ends = [(0.5 * gear.face_width - half, middle) for gear, middle in zip(self.gears, self.face_middles)]
-        pinion, wheel = ((jnp.maximum(wider + middle, 0.0), jnp.maximum(wider - middle, 0.0)) for wider, middle in ends)
+
+        def ends(gear: Gear, middle: Real) -> tuple[Real, Real]:
+            wider = 0.5 * gear.face_width - half
+            # only faces that do not overlap come down to the limit: where ends are flush derivatives are of both sides
+            return jnp.maximum(wider + middle, -half), jnp.maximum(wider - middle, -half)
+
+        pinion, wheel = map(ends, self.gears, self.face_middles)
         return pinion, wheel
 
     @property
