@@ -100,7 +100,7 @@ class Table(AbstractCompliance):
 
     def structure(self, pinion, wheel):
         both = (pinion, self.pinion), (wheel, self.wheel)
-        teeth = jnp.stack([jnp.interp(load.roll_length, ROLL_LENGTH, table) for load, table in both])
+        teeth = jnp.stack([jnp.interp(at.roll_length, ROLL_LENGTH, table) for at, table in both])
         return jnp.eye(teeth.shape[1])[None, :, :, None] * teeth[:, None]
 
     def hub(self, pinion, wheel):

@@ -37,7 +37,8 @@ def mesh_of(pair, slices=6):
 def contact(pinion=18.0, wheel=18.0, offset=0.0, *, slope=0.0, crowning=0.0, on_wheel=0.0):
     """Mean transmission error, line loads, whether they converged, and K_Hbeta.
 
-    Widths are traced, so that overhangs are carried along where they are 0. Slope and crowning are the pinion's, `on_wheel` is the crowning of the wheel.
+    Widths are traced, so that overhangs are carried along where they are 0. Slope and crowning are the pinion's,
+    `on_wheel` is the crowning of the wheel.
     """
     return contact_of(jnp.asarray([pinion, wheel, offset]), jnp.asarray([slope, crowning, on_wheel]))
 
