@@ -99,12 +99,12 @@ class Table(AbstractCompliance):
     plane: Plane = eqx.field(static=True, default="strain")
 
     def structure(self, pinion, wheel):
-        teeth = jnp.interp(pinion.roll_length, ROLL_LENGTH, self.pinion)
-        teeth = teeth + jnp.interp(wheel.roll_length, ROLL_LENGTH, self.wheel)
-        return jnp.eye(teeth.shape[0])[:, :, None] * teeth[None]
+        both = (pinion, self.pinion), (wheel, self.wheel)
+        teeth = jnp.stack([jnp.interp(at.roll_length, ROLL_LENGTH, table) for at, table in both])
+        return jnp.eye(teeth.shape[1])[None, :, :, None] * teeth[:, None]
 
     def hub(self, pinion, wheel):
-        return jnp.zeros_like(self.contact)
+        return jnp.zeros(2)
 
     def law(self, geometry: ContactGeometry, pinion, wheel, outside):
         return Spring(jnp.broadcast_to(self.contact, geometry.face_width.shape))

@@ -59,10 +59,10 @@ def pairs_at(pair, compliance, path, torque):
     law = compliance.contact.prepare(contact_geometry(pinion, wheel, compliance.plane, pair.face_width))
     force = 1e3 * torque / pair.pinion.base_radius
     gap = jnp.zeros((path.shape[0], 1, 1))
-    structure = compliance.structure(pinion, wheel)
+    structure = jnp.sum(compliance.structure(pinion, wheel), axis=0)
     problem = ContactProblem(structure, law, gap, jnp.ones_like(path), pair.face_width[None], force)
     solution = solve_contact(problem, steps=8)
-    windup = compliance.hub(pinion, wheel) * force / pair.face_width
+    windup = jnp.sum(compliance.hub(pinion, wheel)) * force / pair.face_width
     return solution.approach[0] + windup, solution.line_load[:, 0, 0] * pair.face_width / force
 
 

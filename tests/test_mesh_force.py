@@ -76,7 +76,7 @@ def test_between_its_grid_the_map_is_within_half_a_percent_of_the_contact_analys
     given, force = case
     random = np.random.default_rng(7)
     for first in random.uniform(0, 1 / 16, 4):
-        aside = prepare_from(first, mesh.pair, mesh.compliance, SIZES, None)
+        aside = prepare_from(first, mesh.pair, mesh.compliance, SIZES, None, mesh.even)
         approach = jnp.asarray(random.uniform(-5.0, 24.0, 80))
         wanted = direct(aside, removed_material(aside, TORQUE, **given), approach)
         phase, approach = (part.ravel() for part in jnp.meshgrid(aside.phase, approach))
@@ -117,7 +117,7 @@ def test_about_its_middle_a_grid_has_both_flanks_at_the_same_places(mesh):
     first, shift, play = _coast_phase(mesh)
     middle = 0.5 * (first + shift / 16)
     steps = jnp.floor(16 * middle)
-    centred = prepare_from(middle - steps / 16, mesh.pair, mesh.compliance, SIZES, None)
+    centred = prepare_from(middle - steps / 16, mesh.pair, mesh.compliance, SIZES, None, mesh.even)
     made = mesh_force(centred, torque=TORQUE, **RELIEFS, positions=16, levels=16)
     mirrored = (2 * int(steps) - np.arange(16)) % 16
     assert not np.allclose(made.node_force[0], made.node_force[0][mirrored], rtol=0.05)

@@ -97,7 +97,7 @@ def _map_error(name, pair, torque, kind, relief, firsts, shares, sizes) -> MapEr
     approach = lowest + (highest - lowest) * shares
     wanted, phase = [], []
     for first in firsts:
-        aside = prepare_from(first, mesh.pair, mesh.compliance, mesh.resolution)
+        aside = prepare_from(first, mesh.pair, mesh.compliance, mesh.resolution, None, mesh.even)
         wanted.append(_direct(aside, removed_material(aside, torque, **both), approach))
         phase.append(aside.phase)
     wanted, phase = jnp.concatenate(wanted, axis=1), jnp.concatenate(phase)

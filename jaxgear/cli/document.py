@@ -23,7 +23,7 @@ _GEOMETRY_NOTE = (
     "root form diameter to the tip form diameter, the mate's tip touches it down to the active root diameter."
 )
 _ASSUMED = (
-    "External involute spur gears of one common face width.",
+    "External involute spur gears; load is where both faces overlap.",
     "The contact is frictionless, quasi-static and linear elastic; bores are held.",
     "Gear bodies are solid: thin rims, webs and spokes are not in the closed forms.",
     "The pressure of a tip corner is an estimate, which depends on the edge radius, and is given apart.",

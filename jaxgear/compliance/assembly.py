@@ -17,6 +17,8 @@ from .laws import AbstractLaw
 from .plane import PlaneState, check_plane_state, plane_stress_share, structure_planes
 from .toothload import ToothLoad
 
+Structures = Float[Array, "gears pairs pairs positions"]
+
 
 class AbstractCompliance(eqx.Module):
     """What a prepared mesh needs to know of the elasticity of both gears: composed of models, or a table.
@@ -33,8 +35,10 @@ class AbstractCompliance(eqx.Module):
     averages_over_loaded_width: ClassVar[bool] = False
 
     @abstractmethod
-    def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "pairs pairs positions"]:
+    def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Structures:
         """Compliance of teeth and bodies between all pairs in contact [um per N/mm], without hub wind-up.
+
+        That of pinion and wheel, each under a load that is uniform over its own face.
 
         Args:
             pinion: load lines of all contacts on the pinion, fields of shape (pairs, positions).
@@ -42,8 +46,8 @@ class AbstractCompliance(eqx.Module):
         """
 
     @abstractmethod
-    def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, ""]:
-        """Wind-up of both gear bodies, in um per N/mm of total line load."""
+    def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
+        """Wind-up of the bodies of pinion and wheel, in um per N/mm of total line load over their own faces."""
 
     @abstractmethod
     def law(
@@ -70,8 +74,8 @@ class Compliance(AbstractCompliance):
         tooth: the tooth alone, root held.
         body: gear body with hub wind-up and coupling of neighbouring teeth.
         contact: approach of the flanks.
-        plane: "auto" for teeth and bodies between plane stress and plane strain, each gear by the common face width
-            over its root chord, and the contact in plane strain; "stress" or "strain" for everything in one of them, as
+        plane: "auto" for teeth and bodies between plane stress and plane strain, each gear by its face width over its
+            root chord, and the contact in plane strain; "stress" or "strain" for everything in one of them, as
             two-dimensional references are.
         edge_softening: soften the contact where a tip corner cuts it off (see `edge`).
     """
@@ -85,16 +89,16 @@ class Compliance(AbstractCompliance):
     def __check_init__(self):
         check_plane_state(self.plane)
 
-    def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "pairs pairs positions"]:
+    def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Structures:
         planes = structure_planes(self.plane)
-        shares = on_both(lambda load: plane_stress_share(load.outline, load.face_width), pinion, wheel)
-        bodies = _sum(shares, self.body.of_both(pinion, wheel, planes))
-        teeth = _sum(shares, on_both(lambda load: self.tooth.in_planes(load, planes), pinion, wheel))
-        own = jnp.eye(teeth.shape[0], dtype=bool)[:, :, None]
-        return jnp.where(own, bodies + teeth[None], bodies)
+        shares = on_both(lambda load: plane_stress_share(load.outline, load.outline.gear.face_width), pinion, wheel)
+        bodies = _mixed(shares, self.body.of_both(pinion, wheel, planes))
+        teeth = _mixed(shares, on_both(lambda load: self.tooth.in_planes(load, planes), pinion, wheel))
+        own = jnp.eye(teeth.shape[1], dtype=bool)[None, :, :, None]
+        return jnp.where(own, bodies + teeth[:, None], bodies)
 
-    def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, ""]:
-        return self.body.hub(pinion.outline) + self.body.hub(wheel.outline)
+    def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
+        return jnp.stack([self.body.hub(pinion.outline), self.body.hub(wheel.outline)])
 
     def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside) -> AbstractSpring:
         law = self.contact.prepare(geometry)
@@ -115,10 +119,9 @@ def with_edge(
     return EdgeLaw(law, geometry.width_factor, truncation, edge(pinion, wheel, outside, geometry))
 
 
-def _sum(shares: tuple[Array, Array], in_planes: tuple[Array, Array]) -> Array:
-    """Sum of both gears' compliances, which have the planes of `structure_planes` on their leading axis."""
-    first, second = (between_planes(share, *planes) for share, planes in zip(shares, in_planes))
-    return first + second
+def _mixed(shares: tuple[Array, Array], in_planes: tuple[Array, Array]) -> Array:
+    """Both gears' compliances, which have the planes of `structure_planes` on their leading axis."""
+    return jnp.stack([between_planes(share, *planes) for share, planes in zip(shares, in_planes)])
 
 
 def between_planes(plane_stress: Array, first: Array, *second: Array) -> Array:

@@ -61,7 +61,7 @@ def plane_stress_share(outline: Outline, face_width: Real) -> Real:
 
     Args:
         outline: tooth of the gear, for its root chord S.
-        face_width: b, over which the load is spread [mm].
+        face_width: b of the gear [mm].
     """
     return _hyperbolic(face_width / (2 * outline.root_chord))
 

@@ -18,8 +18,6 @@ class ToothLoad(Checked):
         angle: between the load line and the normal to the tooth centreline [rad].
         height: y of the crossing of load line and centreline [mm].
         depth: distance from the loaded point to that crossing along the load line [mm].
-        face_width: over which the load is spread [mm], a scalar: the common face width of the pair. Where this gear is
-            wider, what overhangs the load is left out, here as in the compliance, which holds per unit of loaded width.
     """
 
     outline: Outline
@@ -27,19 +25,16 @@ class ToothLoad(Checked):
     angle: Real = result("rad")
     height: Real = result("mm")
     depth: Real = result("mm")
-    face_width: Float[Array, ""] = result("mm")
 
 
-def tooth_load(outline: Outline, roll_length: Real, face_width: Float[Array, ""] | None = None) -> ToothLoad:
+def tooth_load(outline: Outline, roll_length: Real) -> ToothLoad:
     """The load line of every point, which is the normal to the involute there.
 
     Args:
         outline: the tooth.
         roll_length: of the loaded points [mm].
-        face_width: over which the load is spread [mm]; None for that of the gear.
     """
-    width = outline.gear.face_width if face_width is None else face_width
     drawn = outline.curves.over(roll_length.shape)
     angle = jnp.arctan(roll_length / drawn.base_radius) - drawn.half_angle(roll_length)  # as `load_angle`
     x, _ = drawn.involute(roll_length)
-    return ToothLoad(outline, roll_length, angle, drawn.base_radius / jnp.cos(angle), x / jnp.cos(angle), width)
+    return ToothLoad(outline, roll_length, angle, drawn.base_radius / jnp.cos(angle), x / jnp.cos(angle))

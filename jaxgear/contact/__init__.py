@@ -1,11 +1,11 @@
 """Loaded tooth contact: prepared meshes, unloaded gaps and the solution over one mesh cycle."""
 
 from .component import ModifiedMesh as ModifiedMesh
+from .covering import fewest_pairs as fewest_pairs
 from .cycle import MeshCycle as MeshCycle
 from .kinematics import Kinematics as Kinematics
 from .kinematics import Side as Side
 from .mesh import Mesh as Mesh
-from .mesh import fewest_pairs as fewest_pairs
 from .mesh import prepare as prepare
 from .operation import Operation as Operation
 from .prescribed import PrescribedContact as PrescribedContact

@@ -1,15 +1,16 @@
 """How the slices of a mesh feel each other: through teeth and bodies, and through what holds the gears."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..compliance import face_kernel, few_modes
+from ..compliance import few_modes
 from ..geometry import GearPair
-from ..geometry.outline import Outline
-from ..numerics import Coupling, concrete
+from ..numerics import Coupling, Other, concrete
 from ..shafts import AbstractSupport, TabulatedSupport
 from .kinematics import Kinematics
 from .resolution import Resolution
@@ -20,28 +21,32 @@ _MOST_MISSED = 0.05
 
 
 def coupling_of(
-    moving: Kinematics, outlines: tuple[Outline, Outline], support: AbstractSupport | None
+    moving: Kinematics,
+    kernels: Float[Array, "gears slices slices"],
+    wheel: Float[Array, "pairs pairs positions"],
+    support: AbstractSupport | None,
 ) -> Coupling | None:
     """The coupling of the slices; None where they do not feel each other.
 
-    Teeth and bodies share the root chord of their mean (see `face_kernel`). A support bends in polynomials over the
-    face, as many as the resolution has modes.
+    A support bends in polynomials over the face, as many as the resolution has modes.
 
     Args:
         moving: kinematics of the pair.
-        outlines: of both gears.
+        kernels: see `Spreading`.
+        wheel: compliance of the wheel, see `Mesh.structure`.
         support: what holds the gears.
     """
     sizes = moving.resolution
     if not sizes.is_coupled:
         return None
-    root_chord = 0.5 * (outlines[0].root_chord + outlines[1].root_chord)
-    kernel = face_kernel(moving.pair.face_width, root_chord, sizes.slices)
-    coupling = Coupling(*few_modes(kernel, sizes.face_modes))
+    modes, shares, rests = few_modes(kernels, sizes.face_modes)
+    coupling = Coupling(modes, shares[0], rests[0])
+    if len(kernels) > 1:
+        coupling = replace(coupling, other=Other(wheel, shares[1] - shares[0], rests[1] - rests[0]))
     if support is None:
         return coupling
-    bends = jnp.asarray(_polynomials(sizes.slices, min(sizes.face_modes, sizes.slices)), kernel.dtype)
-    influence = support.influence(moving.face_coordinate).astype(kernel.dtype) * moving.slice_width[0]
+    bends = jnp.asarray(_polynomials(sizes.slices, min(sizes.face_modes, sizes.slices)), kernels.dtype)
+    influence = support.influence(moving.face_coordinate).astype(kernels.dtype) * moving.slice_width[0]
     bent = jnp.linalg.multi_dot([bends.T, influence, bends])
     return eqx.tree_at(
         lambda c: (c.support_modes, c.support), coupling, (bends, bent), is_leaf=lambda leaf: leaf is None

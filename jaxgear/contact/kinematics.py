@@ -27,14 +27,14 @@ class Side(Checked):
         start_roll_length, pitch_roll_length: roll lengths at the start of the active profile and at the pitch point
             [mm].
         contact_roll_length: roll length of every contact [mm], shape (pairs, positions).
-        face_width: common face width of the pair [mm].
+        face_middle: middle of the common face of the pair, from the middle of the gear's own face [mm].
     """
 
     gear: Gear
     start_roll_length: Scalar = result("mm")
     pitch_roll_length: Scalar = result("mm")
     contact_roll_length: Field = result("mm")
-    face_width: Scalar = result("mm")
+    face_middle: Scalar = result("mm")
 
     @property
     def base_radius(self) -> Float[Array, "*cycles"]:
@@ -42,12 +42,20 @@ class Side(Checked):
         return self.gear.base_radius
 
     @property
+    def face_width(self) -> Float[Array, "*cycles"]:
+        """Of the gear [mm]."""
+        return self.gear.face_width
+
+    @property
     def tip_roll_length(self) -> Float[Array, "*cycles"]:
         """Roll length at the tip [mm]."""
         return self.gear.tip_roll_length
 
     def flank(self, roll_length: Float[Array, "..."], face_coordinate: Float[Array, "..."]) -> Flank:
-        """Points of the flank, for its modification; roll lengths and face coordinates [mm] broadcast."""
+        """Points of the flank, for its modification; roll lengths and face coordinates [mm] broadcast.
+
+        Face coordinates count from the middle of the gear's own face: those of a mesh lie `face_middle` farther.
+        """
         return Flank(
             roll_length=roll_length,
             tip_roll_length=self.tip_roll_length,
@@ -111,7 +119,7 @@ class Kinematics(Checked):
     @property
     @over_batch
     def face_coordinate(self) -> Float[Array, " slices"]:
-        """Middle of every slice [mm], shape (slices,)."""
+        """Middle of every slice, from the middle of the common face [mm], shape (slices,)."""
         slices = self.resolution.slices
         return ((self._count(slices) + 0.5) / slices - 0.5) * self.pair.face_width
 
@@ -200,20 +208,21 @@ def _corner(x, lengths, reach) -> _Corner:
 
 def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Side, Side]:
     """Pinion and wheel at given contacts."""
+    on_pinion, on_wheel = pair.face_middles
     return (
         Side(
             pair.pinion,
             contact.pinion_roll_length(contact.start),
             contact.pinion_pitch_roll_length,
             points.pinion_roll_length,
-            pair.face_width,
+            on_pinion,
         ),
         Side(
             pair.wheel,
             contact.wheel_roll_length(contact.end),
             contact.wheel_pitch_roll_length,
             points.wheel_roll_length,
-            pair.face_width,
+            on_wheel,
         ),
     )
 

@@ -12,18 +12,15 @@ from ..compliance import AbstractCompliance, default_compliance
 from ..compliance.hertz import contact_geometry
 from ..compliance.plane import contact_plane
 from ..compliance.toothload import tooth_load
-from ..geometry import GearPair, Margins, PathOfContact, margins_between, outline, path_of_contact
+from ..geometry import GearPair, Margins, PathOfContact, is_even, margins_between, outline
 from ..microgeometry import Flank
-from ..numerics import AbstractSpring, Coupling, concrete, on_both, program
+from ..numerics import AbstractSpring, Coupling, on_both, program
 from ..shafts import AbstractSupport
+from .covering import check_cover, closing, pairs_for
 from .face_coupling import check_modes, check_support, coupling_of
-from .kinematics import Contacts, Kinematics, Side, contacts, kinematics, sides
-from .resolution import Resolution, reach
-
-# Deflection that the pairs contain by default [um per mm of module]: root stress and deflection of a tooth grow with
-# its load and shrink with its module, so that 8 um per mm are about 500 MPa; twice that leaves room for deep reliefs.
-_DEFLECTION = 16.0
-_PAIRS_TRACED = 4
+from .face_spreading import spreading_of
+from .kinematics import Kinematics, Side, contacts, kinematics, sides
+from .resolution import Resolution
 
 Scalar = Float[Array, ""]
 Field = Float[Array, "pairs positions"]
@@ -45,16 +42,19 @@ class Mesh(eqx.Module):
         outer_lever: their lever, shape (2, positions).
         outer_steps: by how much farther they touch the mates than the pairs at the edge do, over what those there move
             on within one position, shape (2, positions).
-        structure: compliance of both gears, (pairs, pairs, positions) [um per N/mm].
+        structure: compliance of both gears under a load that is uniform over the common face, the mean over that face,
+            (pairs, pairs, positions) [um per N/mm].
         law: prepared contact law.
         width_factor: squared half width of the contact per line load [mm^2 per N/mm].
-        hub: common wind-up of the gear bodies [um per N/mm].
+        hub: common wind-up of the gear bodies, each over its own face, under a line load over the common one [um per
+            N/mm].
         slice_width: [mm], shape (slices,).
         coupling: how the slices feel each other; None where they do not.
         support: what holds the gears; None for rigid, parallel shafts.
         support_gap: by which it opens the flanks without the force of this mesh [um], shape (slices,); None without.
         support_torque: at which the support holds [N m]; None where it does at every torque.
         automatic: whether the number of pairs was left to `prepare`: `solve` takes more where they are too few.
+        even: whether both faces are known to be one, so that neither gear overhangs the other.
     """
 
     kinematics: Kinematics
@@ -76,6 +76,7 @@ class Mesh(eqx.Module):
     support_gap: Float[Array, " slices"] | None = None
     support_torque: Scalar | None = None
     automatic: bool = eqx.field(static=True, default=False)
+    even: bool = eqx.field(static=True, default=False)
 
     def __repr__(self) -> str:
         return f"Mesh(pair={self.pair!r}, resolution={self.resolution!r})"
@@ -112,7 +113,7 @@ class Mesh(eqx.Module):
 
     @property
     def face_coordinate(self) -> Float[Array, " slices"]:
-        """Middle of every slice [mm], shape (slices,)."""
+        """Middle of every slice, from the middle of the common face [mm], shape (slices,)."""
         return self.kinematics.face_coordinate
 
     def held(self, gap: Float[Array, "pairs slices positions"]) -> Float[Array, "pairs slices positions"]:
@@ -140,7 +141,7 @@ class Mesh(eqx.Module):
         rho = side.contact_roll_length
         # arc length of an involute: ds = rho / r_b d rho
         moved = jnp.maximum(rho + offset * side.base_radius / rho, 0.0)
-        return side.flank(moved[:, None], self.face_coordinate[None, :, None])
+        return side.flank(moved[:, None], (self.face_coordinate + side.face_middle)[None, :, None])
 
 
 def prepare(
@@ -177,19 +178,12 @@ def prepare(
     resolution = Resolution() if resolution is None else resolution
     automatic = resolution.pairs is None
     if automatic:
-        resolution = replace(resolution, pairs=_pairs_for(pair, deflection))
+        resolution = replace(resolution, pairs=pairs_for(pair, deflection))
     check_support(support, pair, resolution)
-    mesh = prepare_from(np.zeros(()), pair, compliance, resolution, support)
-    _check_cover(mesh.path_of_contact, resolution)
+    mesh = prepare_from(np.zeros(()), pair, compliance, resolution, support, is_even(pair))
+    check_cover(mesh.path_of_contact, resolution)
     check_modes(support, resolution)
     return replace(mesh, automatic=True) if automatic else mesh
-
-
-def _pairs_for(pair: GearPair, deflection: float | None) -> int:
-    module = concrete(pair.pinion.module)
-    if module is None or any(concrete(leaf) is None for leaf in jax.tree.leaves(pair)):
-        return _PAIRS_TRACED
-    return fewest_pairs(pair, deflection=_DEFLECTION * float(module) if deflection is None else deflection)
 
 
 @program
@@ -199,26 +193,30 @@ def prepare_from(
     compliance: AbstractCompliance,
     resolution: Resolution,
     support: AbstractSupport | None,
+    even: bool,
 ) -> Mesh:
-    """The mesh over the base pitch that begins with a mesh position [base pitches]."""
+    """The mesh over the base pitch that begins with a mesh position [base pitches]; `even` as of the mesh."""
     plane = contact_plane(compliance.plane)
     moving = kinematics(pair, first_phase, resolution, plane)
     contact = moving.path_of_contact
     points = contacts(pair, contact, moving.path)
     outlines = on_both(outline, pair.pinion, pair.wheel)
     rolls = points.pinion_roll_length, points.wheel_roll_length
-    pinion, wheel = on_both(lambda given: tooth_load(*given, pair.face_width), *zip(outlines, rolls))
+    pinion, wheel = on_both(lambda given: tooth_load(*given), *zip(outlines, rolls))
     geometry = contact_geometry(pinion, wheel, plane, pair.face_width)
     base_pitch = contact.base_pitch
     outer = contacts(pair, contact, jnp.stack([moving.path[-1] - base_pitch, moving.path[0] + base_pitch]))
+    spreading = spreading_of(pair, outlines, resolution, even)
+    structures = spreading.shares[:, None, None, None] * compliance.structure(pinion, wheel)
+    own_widths = jnp.stack([gear.face_width for gear in pair.gears])
     return Mesh(
         kinematics=moving,
         compliance=compliance,
         sides=sides(pair, contact, points),
         corner_gap=points.corner_gap,
         lever=points.lever,
-        margins=margins_between(*outlines, contact, pair.center_distance),
-        outer_gap=_closing(outer),
+        margins=margins_between(*outlines, contact, pair.center_distance, pair.face_overlap),
+        outer_gap=closing(outer),
         outer_lever=outer.lever,
         outer_steps=jnp.stack(
             [
@@ -226,15 +224,16 @@ def prepare_from(
                 _steps(points.wheel_roll_length[0, :-3:-1], outer.wheel_roll_length[1]),
             ]
         ),
-        structure=compliance.structure(pinion, wheel),
+        structure=structures[0] + structures[1],
         law=compliance.law(geometry, pinion, wheel, moving.outside),
         width_factor=geometry.width_factor[:, 0],
-        hub=compliance.hub(pinion, wheel),
+        hub=jnp.sum(compliance.hub(pinion, wheel) * (pair.face_width / own_widths)),
         slice_width=moving.slice_width,
-        coupling=coupling_of(moving, outlines, support),
+        coupling=coupling_of(moving, spreading.kernels, structures[1], support),
         support=support,
         support_gap=None if support is None else support.gap(moving.face_coordinate).astype(moving.slice_width.dtype),
         support_torque=None if support is None else support.torque,
+        even=even,
     )
 
 
@@ -242,58 +241,3 @@ def _steps(edge: Float[Array, "2"], beyond: Float[Array, " positions"]) -> Float
     edge, beyond = jax.lax.stop_gradient((edge, beyond))
     one = jnp.maximum(jnp.abs(edge[0] - edge[1]), 1e-6 * edge[0])
     return jnp.abs(beyond - edge[0]) / one
-
-
-def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
-    """The fewest pairs for `Resolution` that contain every contact up to a deflection; work grows with their square.
-
-    Args:
-        pair: gear pair with concrete numbers.
-        deflection: largest transmission error under load, beyond the unloaded one [um].
-
-    Returns:
-        the number of pairs, at least 2.
-
-    Raises:
-        ValueError: when more than 12 pairs would be needed.
-    """
-    candidates = range(2, 13)
-    reaches = [reach(pairs) for pairs in candidates]
-    gaps = np.asarray(_gaps_at(pair, reaches))
-    for pairs, gap in zip(candidates, gaps):
-        if gap.min() > deflection:
-            return pairs
-    raise ValueError(
-        f"fewest_pairs: 12 pairs do not contain every contact up to deflection = {deflection:g} um: the torque is too "
-        "large for these teeth, or is it not in N m, or the elastic modulus not in MPa?"
-    )
-
-
-@program
-def _gaps_at(pair: GearPair, reaches):
-    contact = path_of_contact(pair)
-    return _closing(_next_pairs(pair, contact, jnp.asarray(reaches, jnp.result_type(contact.start))))
-
-
-def _next_pairs(pair: GearPair, contact: PathOfContact, reach: Float[Array, "windows 2"]) -> Contacts:
-    """The first pairs beyond windows of (behind, ahead) base pitches, where they are nearest; shape (windows, 2)."""
-    return contacts(pair, contact, jnp.stack([-reach[:, 0], reach[:, 1]], axis=1) * contact.base_pitch)
-
-
-def _closing(points: Contacts) -> Float[Array, "..."]:
-    """Transmission error that closes the gaps of unmodified flanks, zero on the path of contact [um]."""
-    return points.corner_gap / points.lever
-
-
-def _check_cover(contact: PathOfContact, resolution: Resolution) -> None:
-    start, end, pitch = map(concrete, (contact.start, contact.end, contact.base_pitch))
-    if start is None or end is None or pitch is None:
-        return
-    start, end = start / pitch, end / pitch
-    behind, ahead = resolution.reach
-    if (end > ahead).any() or (-start > behind).any():
-        needed = max(2 * int(float(end.max()) // 1) + 1, 2 * int(float(-start.min()) // 1) + 2)
-        raise ValueError(
-            f"Resolution: pairs = {resolution.pairs} must be at least {needed}: the path of contact reaches from "
-            f"{float(start.min()):.3g} to {float(end.max()):.3g} base pitches around the pitch point"
-        )

@@ -13,7 +13,7 @@ from .mesh import Mesh, prepare_from
 def half_way(mesh: Mesh) -> Mesh:
     """The same mesh half a position later: both together have twice the positions."""
     first = np.asarray(mesh.kinematics.first_phase) + 0.5 / mesh.resolution.positions
-    moved = prepare_from(first, mesh.pair, mesh.compliance, mesh.resolution, mesh.support)
+    moved = prepare_from(first, mesh.pair, mesh.compliance, mesh.resolution, mesh.support, mesh.even)
     return replace(moved, automatic=mesh.automatic)
 
 

@@ -91,7 +91,7 @@ def _side(mesh: Mesh, side: Side, direction: float) -> PlaceSide:
         number(side.base_radius),
         number(side.tip_roll_length),
         number(side.start_roll_length),
-        mesh.face_coordinate[None, :, None],
+        (mesh.face_coordinate + side.face_middle)[None, :, None],
         number(side.face_width),
     )
 

@@ -13,7 +13,7 @@ class Resolution(Checked):
 
     Attributes:
         positions: mesh positions over one base pitch.
-        slices: slices over the common face width.
+        slices: slices of equal width over the common face.
         pairs: tooth pairs carried along; None for as few as the gears and the load need, see `prepare`. Pair i runs at
             phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two base pitches on either side of the pitch
             point: contact ratios up to 3.

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..compliance import AbstractCompliance
-from ..geometry import GearPair, reduced_radius
+from ..geometry import GearPair, is_even, reduced_radius
 from ..microgeometry import AbstractModification, NoModification, terms
 from ..numerics import ContactProblem, concrete, minimum, program, solve_contact, stored, tangent_stiffness
 from ..numerics.programs import begin
@@ -158,8 +158,9 @@ def begin_contact(
     Who knows that this will be needed, and has something else to do until then, calls it. What prepares the pair at the
     array sizes that are needed `first` goes ahead.
     """
-    begin(prepare_from, np.zeros(()), pair, compliance, first, support)
-    mesh = begin(prepare_from, np.zeros(()), pair, compliance, resolution, support)
+    even = is_even(pair)
+    begin(prepare_from, np.zeros(()), pair, compliance, first, support, even)
+    mesh = begin(prepare_from, np.zeros(()), pair, compliance, resolution, support, even)
     if mesh is not None:
         dtype = mesh.slice_width.dtype
         nothing = jax.eval_shape(lambda: nothing_removed(resolution, dtype))

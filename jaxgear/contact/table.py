@@ -58,4 +58,5 @@ def flank_table(
         roll_length, amount = contact.wheel_roll_length(path)[::-1], amount[::-1]
     if sizes.slices == 1:
         return TabulatedProfile(roll_length, amount[:, 0], method=method)
-    return TabulatedFlank(roll_length, kinematics.face_coordinate, amount, method)
+    middle = kinematics.pair.face_middles[gear == "wheel"]
+    return TabulatedFlank(roll_length, kinematics.face_coordinate + middle, amount, method)

@@ -80,7 +80,7 @@ def coast_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
     """
     pair, sizes = mesh.pair, mesh.resolution
     first, shift, play = _coast_phase(mesh)
-    turned = prepare_from(first, pair, mesh.compliance, sizes, None)
+    turned = prepare_from(first, pair, mesh.compliance, sizes, None, mesh.even)
     pinion, wheel = modification
     removed = removed_material(turned, torque, pinion=pinion, wheel=wheel)
     order = (shift - jnp.arange(sizes.positions)) % sizes.positions

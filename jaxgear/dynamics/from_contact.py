@@ -99,7 +99,7 @@ def _with(mesh: Mesh, **sizes: Any) -> Mesh:
     wanted = replace(mesh.resolution, **sizes)
     if wanted == mesh.resolution:
         return mesh
-    made = prepare_from(mesh.kinematics.first_phase, mesh.pair, mesh.compliance, wanted, mesh.support)
+    made = prepare_from(mesh.kinematics.first_phase, mesh.pair, mesh.compliance, wanted, mesh.support, mesh.even)
     return replace(made, automatic=mesh.automatic)
 
 

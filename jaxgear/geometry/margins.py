@@ -53,6 +53,7 @@ class Margins(Checked):
         backlash: play between the unloaded flanks on the line of action [um], by centre distance and tooth thickness
             allowances; without a given centre distance that of the allowances alone.
         base_circle_clearance: centre distance minus both base radii [mm].
+        face_overlap: width on which the faces overlap along the axis [mm].
         base_pitch_difference: between pinion and wheel, relative. No margin: it must vanish.
         tip_overrun: by how much a tip form circle lies outside its tip circle, the larger of both gears [mm]. No
             margin: it must not be positive, and is zero without chamfers.
@@ -72,6 +73,7 @@ class Margins(Checked):
     contact_ratio_margin: Scalar = result("")
     backlash: Scalar = result("um")
     base_circle_clearance: Scalar = result("mm")
+    face_overlap: Scalar = result("mm")
     base_pitch_difference: Scalar = eqx.field(repr=False)
     tip_overrun: Scalar = eqx.field(repr=False)
     accuracy: Accuracy = eqx.field(repr=False)
@@ -89,6 +91,7 @@ class Margins(Checked):
             "base_pitch_difference": self.base_pitch_difference <= _DISTANCE_ACCURACY,
             "base_circle_clearance": self.base_circle_clearance > 0,
             "backlash": self.backlash >= -self.accuracy.backlash,
+            "face_overlap": self.face_overlap > 0,
             "contact_ratio_margin": self.contact_ratio_margin >= 0,
             "pinion_form_clearance": self.pinion_form_clearance >= -self.accuracy.pinion_form,
             "wheel_form_clearance": self.wheel_form_clearance >= -self.accuracy.wheel_form,
@@ -102,8 +105,10 @@ class Margins(Checked):
         return jnp.all(jnp.stack(list(self.held.values())), axis=0)
 
 
-def margins_between(pinion: Outline, wheel: Outline, path: PathOfContact, center_distance: Scalar | None) -> Margins:
-    """Margins of two generated gears on their path of contact; `center_distance` [mm] as in `GearPair`."""
+def margins_between(
+    pinion: Outline, wheel: Outline, path: PathOfContact, center_distance: Scalar | None, face_overlap: Scalar
+) -> Margins:
+    """Margins of two generated gears on their path of contact; center distance and overlap as in `GearPair` [mm]."""
     first, second = pinion.gear, wheel.gear
     both = first.base_radius + second.base_radius
     tangent = path.pinion_pitch_roll_length / path.pinion_base_radius
@@ -123,6 +128,7 @@ def margins_between(pinion: Outline, wheel: Outline, path: PathOfContact, center
         contact_ratio_margin=path.contact_ratio - 1,
         backlash=play_between(first, second, None if center_distance is None else tangent),
         base_circle_clearance=distance - both,
+        face_overlap=face_overlap,
         base_pitch_difference=jnp.abs(first.base_pitch - second.base_pitch) / first.base_pitch,
         tip_overrun=-jnp.minimum(first.tip_chamfer, second.tip_chamfer),
         accuracy=Accuracy(
@@ -177,6 +183,13 @@ def faults_between(
         faults.append(f"GearPair: center_distance = {distance:g} mm must be greater than {closest:g} mm")
     elif "backlash" in missed:
         faults.append(_backlash_fault(pinion, wheel, center_distance))
+    if "face_overlap" in missed:
+        reach = 0.5 * float(pinion.face_width + wheel.face_width)
+        offset = reach - float(margins.face_overlap)
+        faults.append(
+            f"GearPair: axial_offset of {offset:g} mm in size must be less than {reach:g} mm, half the sum of both "
+            "face widths: the faces do not overlap"
+        )
     if "contact_ratio_margin" in missed:
         faults.append(
             f"GearPair: contact ratio = {float(margins.contact_ratio_margin) + 1:.4g} must be at least 1: raise a "

@@ -2,9 +2,10 @@
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..numerics import Checked, number, on_both, program
+from ..numerics import Checked, concrete, number, on_both, program
 from .gear import Gear
 from .margins import Margins, faults_between, margins_between
 from .outline import outline
@@ -12,6 +13,9 @@ from .path import PathOfContact, path_between, working_pressure_angle
 
 Scalar = Float[Array, ""]
 Real = Float[Array, "*pairs"]  # one number of each pair, where `jax.vmap` made many
+
+# of the narrower face: what counts as common where there is nothing in common, for numbers to stay finite
+_LEAST_OVERLAP = 1e-3
 
 
 class GearPair(Checked):
@@ -22,16 +26,19 @@ class GearPair(Checked):
         wheel: driven gear.
         center_distance: operating centre distance [mm]; None for the backlash-free one of the nominal tooth
             thicknesses, to which tooth thickness allowances add their play.
+        axial_offset: of the middle of the wheel's face from that of the pinion's, positive towards positive face
+            coordinates [mm].
 
     Raises:
         ValueError: for gears that do not share module or pressure angle, an impossible centre distance, a contact ratio
-            below 1, a tip that touches the mate's flank below its form circle or the mate's root circle: the first of
-            what `explain` lists. Pairs made while being traced pass; their `margins` tell.
+            below 1, a tip that touches the mate's flank below its form circle or the mate's root circle, faces that do
+            not overlap: the first of what `explain` lists. Pairs made while being traced pass; their `margins` tell.
     """
 
     pinion: Gear
     wheel: Gear
     center_distance: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
+    axial_offset: Scalar = number("mm", default=0.0)
 
     def check_together(self) -> None:
         for name, gear in (("pinion", self.pinion), ("wheel", self.wheel)):
@@ -70,8 +77,50 @@ class GearPair(Checked):
 
     @property
     def face_width(self) -> Real:
-        """Common face width [mm], the smaller of the two."""
-        return jnp.minimum(self.pinion.face_width, self.wheel.face_width)
+        """Common face width [mm], on which both faces overlap: of gears that are centred the smaller of the two.
+
+        Of faces that do not overlap it is a thousandth of the smaller one, and the pair's `face_overlap` is negative.
+        """
+        low, high = self._common_face
+        least = _LEAST_OVERLAP * jnp.minimum(self.pinion.face_width, self.wheel.face_width)
+        return jnp.maximum(high - low, least)
+
+    @property
+    def face_overlap(self) -> Real:
+        """What the faces share along the axis [mm]; negative where they are apart."""
+        low, high = self._common_face
+        return high - low
+
+    @property
+    def face_middles(self) -> tuple[Real, Real]:
+        """Middle of the common face, from the middle of the pinion's and of the wheel's own face [mm]."""
+        low, high = self._common_face
+        middle = 0.5 * (low + high)
+        return middle, middle - self.axial_offset
+
+    @property
+    def overhangs(self) -> tuple[tuple[Real, Real], tuple[Real, Real]]:
+        """By how much pinion and wheel are wider than the common face, at its negative and its positive end [mm]."""
+        half = 0.5 * self.face_width
+
+        def ends(gear: Gear, middle: Real) -> tuple[Real, Real]:
+            wider = 0.5 * gear.face_width - half
+            # only faces that do not overlap come down to the limit: where ends are flush derivatives are of both sides
+            return jnp.maximum(wider + middle, -half), jnp.maximum(wider - middle, -half)
+
+        pinion, wheel = map(ends, self.gears, self.face_middles)
+        return pinion, wheel
+
+    @property
+    def gears(self) -> tuple[Gear, Gear]:
+        """Pinion and wheel."""
+        return self.pinion, self.wheel
+
+    @property
+    def _common_face(self) -> tuple[Real, Real]:
+        """Its ends from the middle of the pinion's face [mm]."""
+        pinion, wheel, offset = 0.5 * self.pinion.face_width, 0.5 * self.wheel.face_width, self.axial_offset
+        return jnp.maximum(-pinion, offset - wheel), jnp.minimum(pinion, offset + wheel)
 
     @property
     def base_pitch(self) -> Real:
@@ -93,7 +142,7 @@ def path_of_contact(pair: GearPair) -> PathOfContact:
 def margins(pair: GearPair) -> Margins:
     """How far a pair is from what cannot run; finite and differentiable for impossible gears too."""
     outlines = on_both(outline, pair.pinion, pair.wheel)
-    return margins_between(*outlines, path_of_contact(pair), pair.center_distance)
+    return margins_between(*outlines, path_of_contact(pair), pair.center_distance, pair.face_overlap)
 
 
 def explain(pair: GearPair) -> tuple[str, ...]:
@@ -119,6 +168,15 @@ def _faults(pair: GearPair) -> tuple[str, ...]:
     if _traced(known):  # within a trace of something else
         return ()
     return faults_between(pair.pinion, pair.wheel, pair.center_distance, known, held)
+
+
+def is_even(pair: GearPair) -> bool:
+    """Whether both faces are known to be one: gears of equal width without offset, of concrete numbers."""
+    given = [concrete(each) for each in (pair.pinion.face_width, pair.wheel.face_width, pair.axial_offset)]
+    if any(each is None for each in given):
+        return False
+    pinion, wheel, offset = given
+    return bool(np.all(pinion == wheel) and np.all(offset == 0))
 
 
 def _traced(tree) -> bool:

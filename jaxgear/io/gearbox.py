@@ -33,6 +33,7 @@ from .template import part_of
 from .toml import decode
 
 _OWN = "pinion", "wheel"
+_OF_PAIR = "center_distance", "axial_offset"
 _SAME_TORQUE = 1e-3  # relative; what is left is rounding of ratios written by hand
 
 
@@ -69,7 +70,7 @@ def support_of(
         if name not in names:
             raise DesignFileError("shafts", f'no shaft carries the gear "{name}"')
     given = [_mesh(f"meshes[{i}]", each, pair) for i, each in enumerate(top.meshes)]
-    given = given or [GearMesh(*_OWN, center_distance=pair.center_distance)]
+    given = given or [GearMesh(*_OWN, center_distance=pair.center_distance, axial_offset=pair.axial_offset)]
     own = [index for index, mesh in enumerate(given) if (mesh.pinion, mesh.wheel) == _OWN]
     if not own:
         raise DesignFileError("meshes", 'none is that of "pinion" and "wheel"')
@@ -125,11 +126,12 @@ def _gear(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materia
 
 def _mesh(key: str, table: Mapping[str, Any], pair: GearPair) -> GearMesh:
     section = decode(key, table, schema.MeshSection)
-    numbers = {name: value for name, value in section.given().items() if name in ("angle", "center_distance")}
+    numbers = {name: value for name, value in section.given().items() if name in ("angle", *_OF_PAIR)}
     if (section.pinion, section.wheel) == _OWN:
-        if "center_distance" in numbers:
-            raise DesignFileError(f"{key}.center_distance", "has no effect, pair.center_distance is that of the pair")
-        numbers["center_distance"] = pair.center_distance
+        for name in _OF_PAIR:
+            if name in numbers:
+                raise DesignFileError(f"{key}.{name}", f"has no effect, pair.{name} is that of the pair")
+            numbers[name] = getattr(pair, name)
     if section.misalignment is not None:
         numbers["misalignment"] = _plain(f"{key}.misalignment", section.misalignment, Misalignment)
     return refused(key, GearMesh, section.pinion, section.wheel, **numbers)

@@ -13,6 +13,7 @@ _TABLES = "pinion_table", "wheel_table"
 _FREE = {
     "face_width",
     "center_distance",
+    "axial_offset",
     "tip_edge_radius",
     "tip_form_diameter",
     "elastic_modulus",

@@ -67,7 +67,7 @@ def _columns(design: str, life: WearLife) -> dict[str, np.ndarray]:
         "design": all_over(design, 0, 1, 2, 3),
         "revolutions": all_over(np.asarray(life.revolutions, float), 1, 2, 3),
         "gear": all_over(_GEARS, 0, 2, 3),
-        "face_coordinate_mm": all_over(np.asarray(life.face_coordinate, float), 0, 1, 3),
+        "face_coordinate_mm": all_over(np.asarray(life.face_coordinate, float), 0, 3),
         "roll_angle_deg": all_over(angles, 0, 2),
         "roll_length_mm": all_over(lengths, 0, 2),
         "wear_depth_um": total.ravel(),

@@ -45,8 +45,12 @@ def write_design(
     for name, quality in zip(("pinion", "wheel"), quality_classes or (None, None)):
         classes = [] if quality is None else [f"quality_class = {quality}  # ISO 1328-1"]
         lines += [f"[{name}]", *_gear(getattr(pair, name)), *classes, ""]
+    mounting = []
     if pair.center_distance is not None:
-        lines += ["[pair]", f"center_distance = {_value(pair.center_distance)}  # mm", ""]
+        mounting.append(f"center_distance = {_value(pair.center_distance)}  # mm")
+    if float(pair.axial_offset) != 0:
+        mounting.append(f"axial_offset = {_value(pair.axial_offset)}  # mm")
+    lines += ["[pair]", *mounting, ""] if mounting else []
     lines += ["[load]", f"torque = {_value(torque)}  # N m, on the pinion"]
     lines += [f"speed = {_value(speed)}  # rpm, of the pinion"] if speed is not None else []
     for name, modification in (("pinion", pinion), ("wheel", wheel)):

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..geometry import GearPair
 from ..microgeometry import AbstractModification, LeadCrowning, LeadSlope
 from ..numerics import Checked, implicit_root, number, program
 from ..numerics.fits import fit
@@ -23,7 +24,7 @@ GearName = Literal["pinion", "wheel"]
 
 
 class FlankLine(Checked):
-    """Helix slope and crowning of one gear.
+    """Helix slope and crowning of one gear over its own face, or of the gap over the common face of a pair.
 
     Attributes:
         slope: C_H_beta, from end to end, removing material at positive face coordinates.
@@ -38,6 +39,16 @@ class FlankLine(Checked):
         """As a modification of the flank."""
         return LeadSlope(self.slope) + LeadCrowning(self.crowning)
 
+    def on(self, pair: GearPair, gear: GearName) -> "FlankLine":
+        """A flank line of the gap, over the common face, as that of a gear over its own face.
+
+        Both open the common face alike, up to what they take off all of it.
+        """
+        own, common = getattr(pair, gear).face_width, pair.face_width
+        middle = pair.face_middles[gear == "wheel"]
+        slope = self.slope - 8 * self.crowning * middle / common
+        return FlankLine(slope * own / common, self.crowning * (own / common) ** 2)
+
     def crowned(self, further) -> "FlankLine":
         """With so much crowning on top [um]."""
         return FlankLine(self.slope, self.crowning + further)
@@ -51,7 +62,7 @@ def level_load(
     Minimizes the sum of (w / mean w - 1)^2 over the stations of `annex_e`. It starts from the flank line that closes
     the gap which an even load would leave; where the whole face carries, the line load is linear in both amounts and
     Newton's method ends after one step. Differentiable in everything that the support is made of. The gaps of both
-    flanks add up: the line may be ground on either gear, or shared.
+    flanks add up: the line is over the common face and may be ground on either gear (`FlankLine.on`), or shared.
 
     Args:
         support: shafts at the mesh, `support` of a gearbox or `RigidSupport`.
@@ -80,7 +91,11 @@ def _level(face: Stations, stiffness, hollow: bool) -> FlankLine:
     def unevenness(amounts):
         line = FlankLine(amounts[0], amounts[1] if len(amounts) > 1 else jnp.zeros_like(amounts[0]))
         load = annex_e(
-            face, torque=face.torque, wheel=line.modification, stiffness=stiffness, stations=face.count
+            face,
+            torque=face.torque,
+            wheel=line.on(face.pair, "wheel").modification,
+            stiffness=stiffness,
+            stations=face.count,
         ).line_load
         mean = jnp.mean(load)
         # without any load every flank line is as good as another

@@ -48,7 +48,7 @@ def longest_life(
         hollow: whether the crowning may be negative.
 
     Returns:
-        the flank line, of numbers: what it is made of has no derivatives, the damage with it has.
+        the flank line over the common face, of numbers: what it is made of has no derivatives, the damage with it has.
 
     Raises:
         ValueError: as `damage` does, for torques that are all zero, and for numbers that are being traced.
@@ -71,8 +71,10 @@ def longest_life(
 
         point = scipy.optimize.minimize(soft, point, jac=True, method="L-BFGS-B", bounds=bounds).x
 
+    pair = support.pair
+
     def true(at):
-        found = damage_of(faces, load, both, FlankLine(), FlankLine(*at))
+        found = damage_of(faces, load, both, FlankLine(), FlankLine(*at).on(pair, "wheel"))
         return math.log(max(float(found.largest), _NONE))
 
     corners = np.stack([point, point + [_FIRST_STEP, 0.0], point + [0.0, _FIRST_STEP]])
@@ -87,7 +89,7 @@ def _soft_damage(faces: Stations, load: LoadSpectrum, endurance, at: Float[Array
     pair = jax.tree.map(lambda leaf: leaf[0], faces.pair)
 
     def of(at) -> Float[Array, ""]:
-        found = face_loads(faces, FlankLine(), FlankLine(at[0], at[1]))
+        found = face_loads(faces, FlankLine(), FlankLine(at[0], at[1]).on(pair, "wheel"))
         mean = jnp.mean(found.line_load, axis=-1)
         loaded = mean > 0
         share = found.line_load / jnp.where(loaded, mean, 1.0)[:, None]

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..conditions import LoadSpectrum
+from ..geometry import GearPair
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, check, real, result
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
@@ -27,8 +28,9 @@ class FlankLineLayout(Checked):
     Attributes:
         gear: whose flank line levels the load, "pinion" or "wheel".
         torque: of the layout, on the pinion.
-        line: of step 1.
-        further: C_b of step 2 on pinion and wheel, on top of step 1.
+        pair: the gears.
+        line: of step 1, over the common face.
+        further: C_b of step 2 on pinion and wheel, on top of step 1, over the common face.
         needed: C_b of both together, without which a case touches an edge.
         factors: K_Hbeta without modification and after step 1, both without deviations.
         before, after: the five cases with the flank line of step 1 alone, and with those of step 2, by the name of the
@@ -38,6 +40,7 @@ class FlankLineLayout(Checked):
 
     gear: GearName = eqx.field(static=True)
     torque: Scalar = result("N m")
+    pair: GearPair
     line: FlankLine
     further: Float[Array, "2"] = result("um")
     needed: Scalar = result("um")
@@ -48,12 +51,12 @@ class FlankLineLayout(Checked):
 
     @property
     def pinion(self) -> FlankLine:
-        """Flank line of the pinion after step 2."""
+        """Flank line of the pinion after step 2, over its own face."""
         return self._line("pinion", 0)
 
     @property
     def wheel(self) -> FlankLine:
-        """Flank line of the wheel after step 2."""
+        """Flank line of the wheel after step 2, over its own face."""
         return self._line("wheel", 1)
 
     @property
@@ -79,7 +82,7 @@ class FlankLineLayout(Checked):
 
     def _line(self, gear: GearName, index: int) -> FlankLine:
         own = self.line if self.gear == gear else FlankLine()
-        return own.crowned(self.further[index])
+        return own.crowned(self.further[index]).on(self.pair, gear)
 
     def __str__(self) -> str:
         before, after = (f"{float(value):.3f}" for value in self.factors)
@@ -154,24 +157,26 @@ def layout_flank_lines(
     if not bool(jnp.isfinite(needed)):
         raise ValueError("layout_flank_lines: no crowning keeps the load off the edges: the shafts are too soft")
     added = _further(needed, further)
+    on_wheel, crowned = (each.on(face.pair, "wheel") for each in (line, line.crowned(jnp.sum(added))))
     layout = FlankLineLayout(
         gear=gear,
         torque=face.torque,
+        pair=face.pair,
         line=line,
         further=added,
         needed=needed,
         factors=jnp.stack(
             [
                 annex_e(face, torque=face.torque, wheel=one.modification, stations=face.count).face_load_factor
-                for one in (FlankLine(), line)
+                for one in (FlankLine(), on_wheel)
             ]
         ),
-        before={name: tolerance_cases(face, one, wheel=line) for name, one in several.items()},
-        after={name: tolerance_cases(face, one, wheel=line.crowned(jnp.sum(added))) for name, one in several.items()},
+        before={name: tolerance_cases(face, one, wheel=on_wheel) for name, one in several.items()},
+        after={name: tolerance_cases(face, one, wheel=crowned) for name, one in several.items()},
     )
     if duty_cycle is None or endurance is None:
         return layout
-    steps = FlankLine(), line, line.crowned(jnp.sum(added))
+    steps = FlankLine(), on_wheel, crowned
     spent = tuple(damage(support, duty_cycle, endurance, wheel=one, stations=stations) for one in steps)
     return replace(layout, damage=spent)
 

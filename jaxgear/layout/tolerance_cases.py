@@ -13,7 +13,6 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..geometry import GearPair
-from ..microgeometry import LeadSlope
 from ..numerics import Checked, bracketed_root, check, maximum, number, program, real, result
 from ..shafts import AbstractSupport, FaceLoad, annex_e, axis_tolerance, face_load_factor
 from ..tolerance import ToleranceClass
@@ -144,7 +143,7 @@ def tolerance_cases(
     Args:
         support: shafts at the mesh, `support` of a gearbox or `RigidSupport`.
         tolerance: the deviations.
-        pinion, wheel: flank lines; None for none.
+        pinion, wheel: flank lines of the gears; None for none.
         torque: on the pinion [N m]; None for that of the couplings, which are scaled for another one.
         stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1.
         stations: over the face; None for 41, or those that `Stations` have.
@@ -156,7 +155,7 @@ def tolerance_cases(
 @program
 def _cases(face: Stations, tolerance: FlankLineTolerance, pinion: FlankLine, wheel: FlankLine, stiffness):
     def at(slope):
-        deviated = wheel.modification + LeadSlope(slope)
+        deviated = wheel.modification + FlankLine(slope).on(face.pair, "wheel").modification
         given = {"pinion": pinion.modification, "wheel": deviated, "stiffness": stiffness}
         return annex_e(face, torque=face.torque, stations=face.count, **given)
 
@@ -182,7 +181,7 @@ def crowning_off_the_edges(
     Args:
         support: shafts at the mesh.
         tolerance: the deviations.
-        line: flank line of step 1, on either gear; None for none.
+        line: flank line of step 1 over the common face, on either gear; None for none.
         torque: on the pinion [N m]; None for that of the couplings.
         share: of the largest load inside, up to which an end may be loaded.
         stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1.
@@ -199,7 +198,7 @@ def crowning_off_the_edges(
 
 def _worst_excess(crowning, given):
     face, tolerance, line, share, stiffness = given
-    found = _cases(face, tolerance, FlankLine(crowning=crowning), line, stiffness)
+    found = _cases(face, tolerance, FlankLine(), line.crowned(crowning).on(face.pair, "wheel"), stiffness)
     return maximum(_excess(found.load.line_load, share))
 
 

@@ -152,7 +152,7 @@ def helix_trace(
     face_coordinate: Points | None = None,
     points: int = _POINTS,
 ) -> Trace:
-    """The flank line, across the common face width.
+    """The flank line, across the face width of the gear.
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.

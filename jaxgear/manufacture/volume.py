@@ -71,7 +71,7 @@ def ground_volume(side: Side, modification: AbstractModification, *, stock=0.0) 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
         modification: of both flanks of every tooth.
-        stock: machining allowance normal to the flank [um], from the form circle to the tip and over the common face.
+        stock: machining allowance normal to the flank [um], from the form circle to the tip and over the face.
 
     Raises:
         ValueError: for a negative stock.
@@ -81,7 +81,7 @@ def ground_volume(side: Side, modification: AbstractModification, *, stock=0.0) 
 
 
 def ground_area(side: Side) -> Scalar:
-    """Area of all flanks of one gear from the form circle to the tip, over the common face [mm^2].
+    """Area of all flanks of one gear from the form circle to the tip, over its face [mm^2].
 
     2 z b (L_tip^2 - L_form^2) / (2 r_b): the volume of any grinding stock is its thickness times this.
     """

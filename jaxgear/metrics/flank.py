@@ -27,7 +27,7 @@ _PROFILE_CELLS, _FACE_CELLS, _NODES = 64, 16, 4
 
 
 class FlankSurface(NamedTuple):
-    """One gear's active flank, from the start of its active profile to the tip and across the common face width.
+    """One gear's active flank, from the start of its active profile to the tip and across its own face width.
 
     Attributes:
         roll_length: [mm], shape (points,).
@@ -87,9 +87,11 @@ def max_relief(
     wheel: AbstractModification | None = None,
 ) -> Scalar:
     """Largest material removed anywhere on either flank [um]."""
-    face = jnp.linspace(-0.5, 0.5, _FACE_POINTS, dtype=_dtype(mesh)) * mesh.pair.face_width
-    flanks = _flanks(mesh, pinion, wheel)
-    removed = [removed_at(side, flank, _roll_lengths(side, _PROFILE_POINTS), face) for side, flank in flanks]
+    face = jnp.linspace(-0.5, 0.5, _FACE_POINTS, dtype=_dtype(mesh))
+    removed = [
+        removed_at(side, flank, _roll_lengths(side, _PROFILE_POINTS), face * side.face_width)
+        for side, flank in _flanks(mesh, pinion, wheel)
+    ]
     return maximum(jnp.stack(removed))
 
 
@@ -150,8 +152,8 @@ def removed_at(
         side: the gear's side of the contact, of `mesh.sides`.
         modification: of that gear.
         roll_length: shape (points,) [mm].
-        face_coordinate: lines along the profile, from the middle of the face, shape (lines,) [mm]; None for one line in
-            the middle.
+        face_coordinate: lines along the profile, from the middle of the gear's own face, shape (lines,) [mm]; None for
+            one line in the middle.
 
     Returns:
         shape (lines, points), or (points,) without a face coordinate.

@@ -18,8 +18,8 @@ class Flank(Checked):
         tip_roll_length: roll length at the tip.
         start_roll_length: roll length at the start of the active profile.
         base_radius: base radius of the gear.
-        face_coordinate: position along the face, from its middle.
-        face_width: common face width of the pair.
+        face_coordinate: position along the face of the gear, from its middle.
+        face_width: of the gear, which may be wider than its mate.
     """
 
     roll_length: Float[Array, "..."] = result("mm")

@@ -1,4 +1,8 @@
-"""Modifications along the face width. Names of ISO 21771: C_beta, C_H_beta, C_betaI/C_betaII."""
+"""Modifications along the face width. Names of ISO 21771: C_beta, C_H_beta, C_betaI/C_betaII.
+
+Each counts over the face of its own gear, on which it is ground: of a gear that is wider than its mate, the ends of the
+face and what is removed there may lie beyond the contact.
+"""
 
 from typing import Literal
 

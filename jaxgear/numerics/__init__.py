@@ -5,6 +5,7 @@ from .complementarity import tangent_stiffness as tangent_stiffness
 from .contact_problem import ContactProblem as ContactProblem
 from .contact_problem import ContactSolution as ContactSolution
 from .coupling import Coupling as Coupling
+from .coupling import Other as Other
 from .dense import pseudo_inverse as pseudo_inverse
 from .dense import solve_dense as solve_dense
 from .extremes import maximum as maximum

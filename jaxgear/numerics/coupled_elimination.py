@@ -113,7 +113,7 @@ def _eliminated(coupling: Coupling, modal: list[Float[Array, "_ pairs pairs posi
     blocks: list[_Block] = []
     assert held is not None  # whoever eliminates gives the inverses
     for mode in range(len(modal)):
-        scaled = modal[mode] + held.share_inverse[mode:, mode, None, None, None] * held.inverse[None]
+        scaled = modal[mode] + held.column(mode)
         for before, block in enumerate(blocks):
             ahead = mode - before
             scaled = scaled - _times(block.lower[ahead:], jnp.swapaxes(block.scaled[ahead], 0, 1))

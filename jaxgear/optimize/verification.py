@@ -101,7 +101,8 @@ def begin_verification(mesh: Mesh, compliance: TabulatedCompliance, positions: i
         positions: of the mesh on which it ends; None for those of the mesh.
     """
     count = mesh.resolution.positions if positions is None else positions
-    begin(prepare_from, np.zeros(()), mesh.pair, compliance, replace(mesh.resolution, positions=count), mesh.support)
+    sizes = replace(mesh.resolution, positions=count)
+    begin(prepare_from, np.zeros(()), mesh.pair, compliance, sizes, mesh.support, mesh.even)
 
 
 def verify(optimum: Optimum, *, cache: str | Path | bool | None = True) -> Verified:

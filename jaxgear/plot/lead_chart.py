@@ -13,7 +13,7 @@ from ..microgeometry import AbstractModification
 from ..tolerance import ToleranceClass
 from .flank_panels import Design, Tolerances, flank_panels
 
-_POINTS = 201  # across the common face
+_POINTS = 201  # across the face
 
 
 def lead_chart(
@@ -24,7 +24,7 @@ def lead_chart(
     tolerance: Tolerances | None = None,
     about: str | None = None,
 ) -> np.ndarray:
-    """Material removed from pinion and wheel [um] across the common face width [mm], at the pitch point.
+    """Material removed from pinion and wheel [um] across their own face widths [mm], at the pitch point.
 
     Material removed goes down, as in the K-chart, which shows the profile in the middle of the face.
 

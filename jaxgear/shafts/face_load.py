@@ -29,7 +29,7 @@ class FaceLoad(Checked):
     """Load over the face by the one-dimensional analysis.
 
     Attributes:
-        face_coordinate: of the stations, evenly over the common face.
+        face_coordinate: of the stations, evenly over the common face, from its middle.
         line_load: at the stations.
         gap: of the flanks under no load of this mesh: misalignment, modifications, other loads.
         deformation: by which shafts, bearings and housing open the gap under the line load.
@@ -171,19 +171,20 @@ def _annex_e(support, pinion, wheel, torque, stiffness, stations: int) -> FaceLo
 
 
 def pitch_lines(pair: GearPair, y: Slices) -> tuple[Flank, Flank]:
-    """The flanks of pinion and wheel along their pitch lines."""
+    """The flanks of pinion and wheel along their pitch lines, y from the middle of the common face."""
     path = path_of_contact(pair)
     starts = path.pinion_roll_length(path.start), path.wheel_roll_length(path.end)
     rolls = path.pinion_pitch_roll_length, path.wheel_pitch_roll_length
 
-    def line(gear: Gear, roll: Scalar, start: Scalar) -> Flank:
+    def line(gear: Gear, roll: Scalar, start: Scalar, middle: Scalar) -> Flank:
         return Flank(
             roll_length=roll[None],
             tip_roll_length=gear.tip_roll_length[None],
             start_roll_length=start[None],
             base_radius=gear.base_radius[None],
-            face_coordinate=y,
-            face_width=pair.face_width[None],
+            face_coordinate=y + middle,
+            face_width=gear.face_width[None],
         )
 
-    return line(pair.pinion, rolls[0], starts[0]), line(pair.wheel, rolls[1], starts[1])
+    pinion, wheel = (line(*each) for each in zip(pair.gears, rolls, starts, pair.face_middles))
+    return pinion, wheel

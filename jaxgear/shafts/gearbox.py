@@ -18,13 +18,14 @@ Direction = Literal["counterclockwise", "clockwise"]
 
 
 class GearMesh(Checked):
-    """Two gears of a gearbox that mesh, the middles of their faces in one plane.
+    """Two gears of a gearbox that mesh.
 
     Attributes:
         pinion, wheel: names of the driving and the driven gear.
         angle: of the direction from the axis of the pinion to that of the wheel, from x towards y [deg].
         center_distance: [mm]; None for the backlash-free one.
         misalignment: of the axes beyond what loads make of it.
+        axial_offset: of the middle of the wheel's face from that of the pinion's [mm].
     """
 
     pinion: str = eqx.field(static=True)
@@ -32,6 +33,7 @@ class GearMesh(Checked):
     angle: Scalar = number("deg", default=0.0)
     center_distance: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
     misalignment: Misalignment = eqx.field(default_factory=Misalignment)
+    axial_offset: Scalar = number("mm", default=0.0)
 
 
 class Gearbox(Checked):
@@ -115,7 +117,7 @@ class Gearbox(Checked):
         """The gears of a mesh, for `prepare`."""
         given = self.meshes[mesh]
         pinion, wheel = self.place(given.pinion)[1], self.place(given.wheel)[1]
-        return GearPair(pinion.gear, wheel.gear, given.center_distance)
+        return GearPair(pinion.gear, wheel.gear, given.center_distance, given.axial_offset)
 
     def pinion_torques(self) -> Float[Array, " meshes"]:
         """Torque on the pinion of every mesh [N m], by equilibrium from the couplings."""

@@ -22,10 +22,10 @@ class Acting(NamedTuple):
 
     Attributes:
         shafts: of pinion and wheel.
-        positions: of the middles of their faces [mm].
+        positions: of the middle of the common face on both shafts [mm].
         base_radii: [mm].
         normal: from the pinion's flank to the wheel's, along the line of action, in x, y, z, rx, ry.
-        half: half the face width [mm].
+        half: half the common face width [mm].
     """
 
     shafts: tuple[int, int]
@@ -48,7 +48,9 @@ def acting(gearbox: Gearbox, mesh: int) -> Acting:
     forwards = turning * jnp.stack([-jnp.sin(angle), jnp.cos(angle)])
     normal = jnp.concatenate([jnp.cos(alpha) * forwards + jnp.sin(alpha) * away, jnp.zeros(3)])
     radii = pair.pinion.base_radius, pair.wheel.base_radius
-    return Acting((first, second), (pinion.position, wheel.position), radii, normal, 0.5 * pair.face_width)
+    middles = pair.face_middles
+    positions = pinion.position + middles[0], wheel.position + middles[1]
+    return Acting((first, second), positions, radii, normal, 0.5 * pair.face_width)
 
 
 def mesh_patterns(gearbox: Gearbox, mesh: int, y: Slices) -> list[Patterns]:

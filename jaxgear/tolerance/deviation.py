@@ -30,7 +30,7 @@ class GearDeviation(Checked):
         profile_slope: as the amount of `ProfileSlope`, shape (*samples,).
         waviness: coefficients of the profile form deviation, shape (*samples, 2 * HARMONICS); see `Waviness`.
         pitch: displacement of the tooth of every pair, shape (*samples, pairs).
-        helix_slope: as the amount of `LeadSlope`, shape (*samples,).
+        helix_slope: as the amount of `LeadSlope`, over the gear's own face, shape (*samples,).
     """
 
     profile_slope: Real = result("um")
@@ -44,7 +44,7 @@ class Deviation(Checked):
 
     Attributes:
         pinion, wheel: deviations of the two gears.
-        misalignment: lead slope of the contact of all pairs over the face width, shape (*samples,).
+        misalignment: lead slope of the contact of all pairs over the common face width, shape (*samples,).
     """
 
     pinion: GearDeviation
@@ -164,18 +164,21 @@ def flank_basis(mesh: Mesh, torque) -> Float[Array, "terms pairs slices position
         yield jax.vmap(lambda row: removed(side, Waviness(row)))(waves)
 
     profiles = [*terms("pinion"), *terms("wheel")]
-    # one slice stands in the middle of the face, where no slope removes anything
-    several = mesh.resolution.slices > 1
-    lead = removed("pinion", LeadSlope(unit))[None] if several else jnp.zeros_like(profiles[0])
-    return jnp.concatenate([*profiles, lead])
+    if mesh.resolution.slices > 1:
+        leads = [removed(side, LeadSlope(unit)) for side in ("pinion", "wheel")]
+        across = mesh.face_coordinate / mesh.pair.face_width
+        leads.append(jnp.broadcast_to(across[None, :, None], leads[0].shape))
+    else:  # without lead deviations, see `check_slices`
+        leads = [jnp.zeros_like(profiles[0][0])] * 3
+    return jnp.concatenate([*profiles, jnp.stack(leads)])
 
 
 def _coefficients(deviation: Deviation) -> Float[Array, " terms"]:
-    """In the order of `flank_basis`. Helix slopes and misalignment add up to one slope of the contact."""
+    """In the order of `flank_basis`."""
     pinion, wheel = deviation.pinion, deviation.wheel
     profiles = [part for gear in (pinion, wheel) for part in (gear.profile_slope[None], gear.waviness)]
-    lead = pinion.helix_slope + wheel.helix_slope + deviation.misalignment
-    return jnp.concatenate([*profiles, lead[None]])
+    leads = jnp.stack([pinion.helix_slope, wheel.helix_slope, deviation.misalignment])
+    return jnp.concatenate([*profiles, leads])
 
 
 def _gear_deviation(limits: GearTolerance, draw: AbstractDistribution, mesh: Mesh, key) -> GearDeviation:

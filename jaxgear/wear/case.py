@@ -63,6 +63,11 @@ class Case(eqx.Module):
         gears, slices = len(self.mesh.sides), self.mesh.resolution.slices
         return jnp.zeros((gears, len(PARTS), slices, self.points), self.mesh.slice_width.dtype)
 
+    @property
+    def face_coordinate(self) -> Float[Array, "gears slices"]:
+        """Middle of every slice, from the middle of each gear's own face [mm]."""
+        return jnp.stack([self.mesh.face_coordinate + side.face_middle for side in self.mesh.sides])
+
     def places(self) -> Deposit:
         """Where every load wears the flanks, leading axis (torques,)."""
         return jax.vmap(lambda load: deposit(self.mesh, load.torque, self.points))(self.loads)
@@ -77,7 +82,7 @@ class Case(eqx.Module):
 
     def flanks(self, roll_length, depth: Depth) -> dict[str, AbstractModification]:
         """Both flanks with what is worn off them."""
-        pinion, wheel = tables(roll_length, self.mesh.face_coordinate, depth)
+        pinion, wheel = tables(roll_length, self.face_coordinate, depth)
         return {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
 
     def cycles(self, roll_length, marched: March) -> MeshCycle:
@@ -103,9 +108,9 @@ def tables(roll_length, face_coordinate, depth) -> tuple[AbstractModification, A
     total = jnp.sum(depth, axis=1)
 
     def of(gear: int) -> AbstractModification:
-        if len(face_coordinate) == 1:
+        if depth.shape[-2] == 1:
             return TabulatedProfile(roll_length[gear], total[gear, 0])
-        return TabulatedFlank(roll_length[gear], face_coordinate, total[gear].T)
+        return TabulatedFlank(roll_length[gear], face_coordinate[gear], total[gear].T)
 
     return of(0), of(1)
 

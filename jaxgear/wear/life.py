@@ -28,7 +28,8 @@ class WearLife(Checked):
         revolutions: of the pinion, shape (lives,).
         roll_length: of the grid points of pinion and wheel [mm], shape (gears, points).
         arc: of the flank that belongs to every point [mm], shape (gears, points).
-        face_coordinate: of the lines along the profile [mm], shape (slices,).
+        face_coordinate: of the lines along the profile, from the middle of each gear's own face [mm], shape (gears,
+            slices).
         slice_width: of the face that belongs to every line [mm], shape (slices,).
         depth: worn off pinion and wheel by contact of the flanks and by tip corners [um], shape (lives, gears, parts,
             slices, points).
@@ -43,7 +44,7 @@ class WearLife(Checked):
     revolutions: Lives = result()
     roll_length: Float[Array, "gears points"] = result("mm")
     arc: Float[Array, "gears points"] = result("mm")
-    face_coordinate: Float[Array, " slices"] = result("mm")
+    face_coordinate: Float[Array, "gears slices"] = result("mm")
     slice_width: Float[Array, " slices"] = result("mm")
     depth: Float[Array, "lives gears parts slices points"] = result("um")
     error: Lives = result("um")
@@ -164,7 +165,7 @@ def life_of(case: Case, found: March, revolutions: Lives) -> WearLife:
         revolutions=revolutions,
         roll_length=roll_length,
         arc=jnp.stack([arcs(knots, side.base_radius) for knots, side in zip(roll_length, case.mesh.sides)]),
-        face_coordinate=case.mesh.face_coordinate,
+        face_coordinate=case.face_coordinate,
         slice_width=case.mesh.slice_width,
         depth=found.depth,
         error=_total_error(found.error),

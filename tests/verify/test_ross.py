@@ -189,7 +189,7 @@ def test_single_pair(gears, sides, ross):
     geometry = contact_geometry(pinion, wheel, "stress", pair.face_width)
     hertz = np.asarray(model.law(geometry, pinion, wheel, jnp.zeros((1, 7))).deflection(jnp.ones((1, 1, 7))))[0, 0]
     np.testing.assert_allclose(hertz, per_width(first, 1 / mesh.hertzian_stiffness), rtol=1e-9)
-    ours = np.asarray(jax.jit(model.structure)(pinion, wheel))[0, 0] + hertz
+    ours = np.asarray(jax.jit(model.structure)(pinion, wheel)).sum(axis=0)[0, 0] + hertz
     teeth = [1 / first._compute_stiffness(a) + 1 / second._compute_stiffness(b) for a, b in zip(pressure_1, pressure_2)]
     whole = per_width(first, np.add(teeth, 1 / mesh.hertzian_stiffness))
     ratio = ours / whole

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from ...geometry import Gear, GearPair
 from ...numerics import AbstractSpring, Checked, concrete, program
-from ..assembly import AbstractCompliance, between_planes, with_edge
+from ..assembly import AbstractCompliance, Structures, between_planes, with_edge
 from ..hertz import ContactGeometry, DepthReferenced
 from ..plane import (
     Plane,
@@ -60,16 +60,16 @@ class TabulatedCompliance(AbstractCompliance, Checked):
     plane: PlaneState = eqx.field(static=True)
     averages_over_loaded_width: ClassVar[bool] = True
 
-    def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Matrix:
-        return self._of_gear(self.pinion, pinion, False) + self._of_gear(self.wheel, wheel, True)
+    def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Structures:
+        return jnp.stack([self._of_gear(self.pinion, pinion, False), self._of_gear(self.wheel, wheel, True)])
 
-    def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, ""]:
+    def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
         plane = contact_plane(self.plane)
-        first, second = (
+        hubs = [
             Scale.of(tables[0], load.outline.gear, plane).value * tables[0].hub
             for tables, load in ((self.pinion, pinion), (self.wheel, wheel))
-        )
-        return first + second
+        ]
+        return jnp.stack(hubs)
 
     def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside) -> AbstractSpring:
         plane = contact_plane(self.plane)
@@ -92,7 +92,7 @@ class TabulatedCompliance(AbstractCompliance, Checked):
     def _of_gear(self, tables: tuple[GearTable, ...], load: ToothLoad, driven: bool) -> Matrix:
         planes = structure_planes(self.plane)
         found = [_structure(table, load, plane, driven) for table, plane in zip(tables, planes)]
-        return between_planes(plane_stress_share(load.outline, load.face_width), *found)
+        return between_planes(plane_stress_share(load.outline, load.outline.gear.face_width), *found)
 
 
 def _structure(table: GearTable, load: ToothLoad, plane: Plane, driven: bool) -> Matrix:

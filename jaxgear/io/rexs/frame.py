@@ -1,8 +1,7 @@
 """Where something is on a flank: the coordinates of REXS and those of the library.
 
 REXS counts along the profile by diameters, the library by roll lengths. Over the face both count along the axis from
-the middle of the face, REXS over the gear's own face width, the library over the common one of the pair, on which both
-gears are centred. Where REXS speaks of the datum face, its gears say at which end it is.
+the middle of the gear's face. Where REXS speaks of the datum face, its gears say at which end it is.
 """
 
 from dataclasses import dataclass
@@ -26,22 +25,15 @@ class Frame:
     Attributes:
         base_radius: of the gear.
         start, tip: roll lengths at both ends of the active profile.
-        own_width: face width of the gear.
-        width: common face width of the pair.
+        width: face width of the gear.
         datum: -1 where the datum face is at negative face coordinates, 1 at positive ones.
     """
 
     base_radius: float
     start: float
     tip: float
-    own_width: float
     width: float
     datum: int = -1
-
-    @property
-    def margin(self) -> float:
-        """From the end of the gear's face to that of the common face width."""
-        return 0.5 * (self.own_width - self.width)
 
     def diameter(self, roll_length):
         """Diameter at a roll length."""
@@ -84,14 +76,14 @@ class Frame:
 
 def frames(pair: GearPair) -> tuple[Frame, Frame]:
     """The flanks of pinion and wheel."""
-    path, width = path_of_contact(pair), float(pair.face_width)
+    path = path_of_contact(pair)
     starts = path.pinion_roll_length(path.start), path.wheel_roll_length(path.end)
-    pinion, wheel = (_frame(gear, start, width) for gear, start in zip((pair.pinion, pair.wheel), starts))
+    pinion, wheel = (_frame(gear, start) for gear, start in zip(pair.gears, starts))
     return pinion, wheel
 
 
-def _frame(gear: Gear, start, width: float) -> Frame:
-    return Frame(float(gear.base_radius), float(start), float(gear.tip_roll_length), float(gear.face_width), width)
+def _frame(gear: Gear, start) -> Frame:
+    return Frame(float(gear.base_radius), float(start), float(gear.tip_roll_length), float(gear.face_width))
 
 
 def same(first: float, second: float) -> bool:

@@ -74,15 +74,12 @@ def _end_relief(face: str) -> Callable[[Component, Frame], Iterator[AbstractModi
     depth, place = f"end_relief_depth_{face}", f"end_relief_evaluation_reference_{face}"
 
     def read(part: Component, frame: Frame) -> Iterator[AbstractModification]:
-        whole, end = part.needed(f"end_relief_length_{face}", "mm"), 0.5 * frame.own_width
+        length, end = part.needed(f"end_relief_length_{face}", "mm"), 0.5 * frame.width
         coordinate = part.number(place, "mm")
-        # from where the depth is given, and from the end of the common face width, to the start of the relief
-        given = whole if coordinate is None else whole - (end - frame.place(face, coordinate))
-        length = whole - frame.margin
+        # from where the depth is given to the start of the relief
+        given = length if coordinate is None else length - (end - frame.place(face, coordinate))
         if not given > 0:
             raise part.refuse(place, f"{coordinate:g} mm lies outside the relief")
-        if length <= 0:  # it ends beyond the common face width
-            return
         curve, power = _relief_shape(part, _amount(part, depth), given)
         yield EndRelief(real(_at_end(part, depth, length, given, power)), real(length), curve, side=frame.side(face))
 
@@ -123,7 +120,7 @@ def _helix_crowning(part: Component, frame: Frame) -> Iterator[AbstractModificat
     faces, half = ("datum_face", "non_datum_face"), 0.5 * frame.width
     given = [part.number(f"coordinate_where_helix_crowning_is_specified_{face}", "mm") for face in faces]
     # from the middle towards each face
-    ends = [0.5 * frame.own_width if at is None else frame.place(face, at) for face, at in zip(faces, given)]
+    ends = [half if at is None else frame.place(face, at) for face, at in zip(faces, given)]
     highest = part.number("helix_highest_point", "mm")
     top = 0.5 * (ends[0] - ends[1]) if highest is None else frame.place("datum_face", highest)
     if not -ends[1] < top < ends[0]:
@@ -145,7 +142,7 @@ def _helix_slope(part: Component, frame: Frame) -> Iterator[AbstractModification
     start, end = part.number("helix_evaluation_start", "mm"), part.number("helix_evaluation_end", "mm")
     usual = "facewidth" if start is None or end is None else "helix_evaluation_length"
     known = ["facewidth", "helix_evaluation_length"]
-    length = frame.own_width
+    length = frame.width
     if part.choice("helix_evaluation_reference", usual, known) == "helix_evaluation_length":
         if start is None or end is None or not end > start:
             raise part.refuse("helix_evaluation_end", "must be given, and greater than helix_evaluation_start")

@@ -30,7 +30,7 @@ def write_results(
     order = np.argsort(np.asarray(side.contact_roll_length)[pair, position])
     pair, position = pair[order], position[order]
     roll = np.asarray(side.contact_roll_length)[pair, position]
-    face = np.asarray(kinematics.face_coordinate)
+    face = np.asarray(kinematics.face_coordinate + side.face_middle)
 
     def spread(values) -> np.ndarray:
         """One value per slice and position, or per position, as one per point."""

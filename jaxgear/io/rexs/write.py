@@ -68,6 +68,9 @@ def write_rexs(
         pinion, wheel, torque, speed, friction = _of_cycle(pair, cycle, pinion, wheel, torque, speed, friction)
     if any(isinstance(leaf, jax.core.Tracer) or np.ndim(leaf) for leaf in jax.tree.leaves(pair)):
         raise ValueError("write_rexs: pair must be one pair of concrete numbers")
+    if float(pair.axial_offset) != 0:
+        problem = "must be 0 mm: a stage of REXS has no place for it"
+        raise ValueError(f"write_rexs: axial_offset = {float(pair.axial_offset):g} mm {problem}")
     model = Model(_VERSION)
     title = "".join(letter for letter in title if letter.isprintable())
     unit = model.add("gear_unit", model_name=(title or None, "none"))

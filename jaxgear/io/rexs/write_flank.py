@@ -102,7 +102,7 @@ class Writer:
                 if term.side in ("both", side):
                     self._add(f"end_relief_{face}", shape_of_relief=shape, **{
                         f"end_relief_depth_{face}": amount,
-                        f"end_relief_length_{face}": self._mm(frame.margin + float(term.length)),
+                        f"end_relief_length_{face}": self._mm(float(term.length)),
                         f"end_relief_evaluation_reference_{face}": self._mm(frame.place(face, 0.5 * frame.width)),
                     })  # fmt: skip
 

@@ -1,0 +1,84 @@
+"""How many tooth pairs a mesh has to carry along."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..geometry import GearPair, PathOfContact, path_of_contact
+from ..numerics import concrete, program
+from .kinematics import Contacts, contacts
+from .resolution import Resolution, reach
+
+# Deflection that the pairs contain by default [um per mm of module]: root stress and deflection of a tooth grow with
+# its load and shrink with its module, so that 8 um per mm are about 500 MPa; twice that leaves room for deep reliefs.
+_DEFLECTION = 16.0
+_PAIRS_TRACED = 4
+
+
+def pairs_for(pair: GearPair, deflection: float | None) -> int:
+    """Pairs to carry along where a resolution leaves their number open, see `prepare`."""
+    module = concrete(pair.pinion.module)
+    if module is None or any(concrete(leaf) is None for leaf in jax.tree.leaves(pair)):
+        return _PAIRS_TRACED
+    return fewest_pairs(pair, deflection=_DEFLECTION * float(module) if deflection is None else deflection)
+
+
+def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
+    """The fewest pairs for `Resolution` that contain every contact up to a deflection; work grows with their square.
+
+    Args:
+        pair: gear pair with concrete numbers.
+        deflection: largest transmission error under load, beyond the unloaded one [um].
+
+    Returns:
+        the number of pairs, at least 2.
+
+    Raises:
+        ValueError: when more than 12 pairs would be needed.
+    """
+    candidates = range(2, 13)
+    reaches = [reach(pairs) for pairs in candidates]
+    gaps = np.asarray(_gaps_at(pair, reaches))
+    for pairs, gap in zip(candidates, gaps):
+        if gap.min() > deflection:
+            return pairs
+    raise ValueError(
+        f"fewest_pairs: 12 pairs do not contain every contact up to deflection = {deflection:g} um: the torque is too "
+        "large for these teeth, or is it not in N m, or the elastic modulus not in MPa?"
+    )
+
+
+@program
+def _gaps_at(pair: GearPair, reaches):
+    contact = path_of_contact(pair)
+    return closing(_next_pairs(pair, contact, jnp.asarray(reaches, jnp.result_type(contact.start))))
+
+
+def _next_pairs(pair: GearPair, contact: PathOfContact, reach: Float[Array, "windows 2"]) -> Contacts:
+    """The first pairs beyond windows of (behind, ahead) base pitches, where they are nearest; shape (windows, 2)."""
+    return contacts(pair, contact, jnp.stack([-reach[:, 0], reach[:, 1]], axis=1) * contact.base_pitch)
+
+
+def closing(points: Contacts) -> Float[Array, "..."]:
+    """Transmission error that closes the gaps of unmodified flanks, zero on the path of contact [um]."""
+    return points.corner_gap / points.lever
+
+
+def check_cover(contact: PathOfContact, resolution: Resolution) -> None:
+    """Refuses a path of contact that the pairs of a resolution do not cover, as far as it is known.
+
+    Raises:
+        ValueError: naming the number of pairs that does.
+    """
+    start, end, pitch = map(concrete, (contact.start, contact.end, contact.base_pitch))
+    if start is None or end is None or pitch is None:
+        return
+    start, end = start / pitch, end / pitch
+    behind, ahead = resolution.reach
+    if (end > ahead).any() or (-start > behind).any():
+        needed = max(2 * int(float(end.max()) // 1) + 1, 2 * int(float(-start.min()) // 1) + 2)
+        raise ValueError(
+            f"Resolution: pairs = {resolution.pairs} must be at least {needed}: the path of contact reaches from "
+            f"{float(start.min()):.3g} to {float(end.max()):.3g} base pitches around the pitch point"
+        )

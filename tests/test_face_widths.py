@@ -1,0 +1,187 @@
+"""Gears of unequal width, and faces that are set off along the axis: what overhangs the load helps to carry it."""
+
+import csv
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxgear as jg
+from jaxgear.compliance import ElasticRing, face_kernel
+from jaxgear.compliance.plane import plane_stress_share
+from jaxgear.geometry import outline
+from jaxgear.layout import FlankLine
+from jaxgear.metrics import face_load_factor
+from jaxgear.shafts import RigidSupport, annex_e
+
+REFERENCE = Path(__file__).parent.parent / "benchmarks" / "reference" / "face_width.csv"
+CHORD, TORQUE = 8.189371, 150.0
+
+
+def pair_of(pinion=18.0, wheel=18.0, offset=0.0):
+    gears = (
+        jg.Gear(19, 3.0, face_width=pinion, bore_diameter=20.0),
+        jg.Gear(48, 3.0, face_width=wheel, bore_diameter=40),
+    )
+    return jg.GearPair(*gears, axial_offset=offset)
+
+
+def mesh_of(pair, slices=6):
+    sizes = jg.Resolution(positions=4, slices=slices, pairs=2, patch_nodes=1, face_modes=3)
+    return jg.prepare(pair, resolution=sizes)
+
+
+def contact(pinion=18.0, wheel=18.0, offset=0.0, *, slope=0.0, crowning=0.0, on_wheel=0.0):
+    """Mean transmission error, line loads, whether they converged, and K_Hbeta.
+
+    Widths are traced, so that overhangs are carried along where they are 0. Slope and crowning are the pinion's,
+    `on_wheel` is the crowning of the wheel.
+    """
+    return contact_of(jnp.asarray([pinion, wheel, offset]), jnp.asarray([slope, crowning, on_wheel]))
+
+
+@eqx.filter_jit
+def contact_of(widths, amounts):
+    pinion, wheel = jg.LeadSlope(amounts[0]) + jg.LeadCrowning(amounts[1]), jg.LeadCrowning(amounts[2])
+    cycle = jg.solve(mesh_of(pair_of(*widths)), TORQUE, pinion=pinion, wheel=wheel)
+    return jnp.mean(cycle.transmission_error), cycle.line_load, cycle.converged, face_load_factor(cycle)
+
+
+def test_kernel_of_a_wider_gear_is_a_part_of_its_whole_one():
+    """Slices over the whole face, of which the load covers some: the same up to the width of the slices."""
+    errors = []
+    for n in (4, 8, 16):
+        whole = np.asarray(face_kernel(30.0, CHORD, 5 * n))[n : 4 * n, n : 4 * n]
+        part = np.asarray(face_kernel(18.0, CHORD, 3 * n, (6.0, 6.0)))
+        errors.append(np.abs(part.sum(axis=1) - whole.sum(axis=1)).max())
+        assert 3 * n * np.abs(part - whole).max() < 7e-3
+    assert errors[2] < errors[1] / 3 < errors[0] / 9 < 2e-4
+
+
+@pytest.mark.parametrize("overhang", [(0.0, 0.0), (3.0, 0.0), (0.0, 12.0), (100.0, 300.0)])
+def test_kernel_of_a_wider_gear(overhang):
+    """Symmetric and positive definite, mirrored with the overhangs, its mean that of one slice, less than without."""
+    one, other = (np.asarray(face_kernel(18.0, CHORD, 9, given)) for given in (overhang, overhang[::-1]))
+    np.testing.assert_allclose(one, one.T, atol=1e-15)
+    np.testing.assert_allclose(one, other[::-1, ::-1], atol=1e-14)
+    assert np.linalg.eigvalsh(one)[0] > 0.9 * np.linalg.eigvalsh(np.asarray(face_kernel(18.0, CHORD, 9)))[0]
+    mean = float(face_kernel(18.0, CHORD, 1, overhang)[0, 0])
+    assert one.sum() / 9 == pytest.approx(mean, rel=1e-12)
+    assert mean == pytest.approx(1.0, abs=1e-12) if overhang == (0.0, 0.0) else mean < 0.95
+
+
+def test_overhang_against_three_dimensional_finite_elements():
+    """A pinion 24 mm wide under a load over its central 18 mm at the pitch point, wind-up included: 0.02521 um mm/N by
+    three-dimensional elements, 0.02512 by this form of their two-dimensional compliances; 0.03179 without overhang."""
+    with REFERENCE.open(newline="") as file:
+        row = next(row for row in csv.DictReader(file) if row["teeth"] == "19" and row["roll_angle"] == "0.364")
+    strain, stress = float(row["centre_strain"]), float(row["centre_stress"])
+    tooth = outline(pair_of().pinion)
+    hub = float(ElasticRing().hub(tooth))
+
+    def compliance(width, overhang):
+        structure = strain + float(plane_stress_share(tooth, jnp.asarray(width))) * (stress - strain) - hub
+        share = float(face_kernel(18.0, tooth.root_chord, 1, (overhang, overhang))[0, 0])
+        return structure * share + hub * 18.0 / width
+
+    assert compliance(18.0, 0.0) == pytest.approx(0.03179, abs=1e-5)
+    assert compliance(24.0, 3.0) == pytest.approx(0.02512, abs=1e-5)
+
+
+def test_common_face():
+    pair = pair_of(30.0, 20.0, 8.0)  # from -15 to 15 and from -2 to 18
+    assert float(pair.face_width) == 17.0 and float(pair.face_overlap) == 17.0
+    np.testing.assert_allclose(pair.face_middles, [6.5, -1.5])
+    np.testing.assert_allclose(pair.overhangs, [[13.0, 0.0], [0.0, 3.0]], atol=1e-14)
+    mesh = mesh_of(pair, 5)
+    np.testing.assert_allclose(mesh.slice_width, 3.4)
+    np.testing.assert_allclose(mesh.face_coordinate, 3.4 * np.arange(-2, 3), atol=1e-14)
+    inside = pair_of(30.0, 20.0, 5.0)
+    np.testing.assert_allclose(inside.overhangs, [[10.0, 0.0], [0.0, 0.0]], atol=1e-14)
+    assert float(inside.face_width) == 20.0
+
+
+def test_equal_faces_are_the_limit():
+    """The form for two gears, at equal widths, is that for one; of one slice it adds nothing to the structure."""
+    even = jg.solve(mesh_of(pair_of()), TORQUE, pinion=jg.LeadSlope(20.0))
+    mean, load, *_ = contact(slope=20.0)
+    assert float(mean) == pytest.approx(float(jnp.mean(even.transmission_error)), rel=1e-10)
+    np.testing.assert_allclose(load, even.line_load, atol=1e-7)
+    one, limit = (np.asarray(mesh_of(pair_of(width), 1).structure) for width in (18.0, 18.0 + 1e-9))
+    np.testing.assert_allclose(limit, one, rtol=1e-9)
+
+
+def test_wider_gears_are_stiffer_and_carry_more_at_the_ends():
+    error, load, converged, factor = contact()
+    np.testing.assert_allclose(load, load[:, :1] * jnp.ones((1, 6, 1)), rtol=1e-9)
+    assert float(factor) == pytest.approx(1.0, abs=1e-9)
+    for widths in ((24.0, 18.0), (18.0, 24.0), (24.0, 18.0, -3.0)):
+        wider, ends, fine, uneven = contact(*widths)
+        assert bool(jnp.all(fine & converged)) and 0.85 * float(error) < float(wider) < 0.97 * float(error)
+        total, before = jnp.sum(ends, axis=0), jnp.sum(load, axis=0)
+        assert float(jnp.max(total / before)) == float(jnp.max((total / before)[jnp.asarray([0, -1])])) > 1.04
+        worst = np.unravel_index(np.argmax(ends), ends.shape)
+        assert float(uneven) == pytest.approx(float(ends[worst] / jnp.mean(ends[worst[0], :, worst[2]])), rel=1e-9)
+    # what is far away does not count
+    assert float(contact(1000.0, 18.0)[0]) == pytest.approx(float(contact(1001.0, 18.0)[0]), rel=2e-4)
+
+
+def test_offset_is_mirrored():
+    right, left = (contact(24.0, 20.0, offset) for offset in (5.0, -5.0))
+    assert float(right[0]) == pytest.approx(float(left[0]), rel=1e-9)
+    np.testing.assert_allclose(right[1], left[1][:, ::-1], rtol=1e-6)
+
+
+def test_gradient_over_widths_and_offset():
+    widths, amounts = jnp.asarray([25.0, 20.0, 4.0]), jnp.asarray([0.0, 8.0, 0.0])
+
+    def mean_error(widths):
+        return contact_of(widths, amounts)[0]
+
+    slope = jax.jit(lambda at, direction: jax.jvp(mean_error, (at,), (direction,))[1])
+    for direction in jnp.eye(3):
+        central = (mean_error(widths + 1e-4 * direction) - mean_error(widths - 1e-4 * direction)) / 2e-4
+        assert float(slope(widths, direction)) == pytest.approx(float(central), rel=2e-6)
+        # faces that are just equal have a kink: the mean of both sides
+        even, step = jnp.asarray([18.0, 18.0, 0.0]), 1e-6 * direction
+        central = (mean_error(even + step) - mean_error(even - step)) / 2e-6
+        assert float(slope(even, direction)) == pytest.approx(float(central), abs=1e-3)
+
+
+def test_modifications_count_over_the_face_of_their_gear():
+    """Crowning of a wheel that is as wide as the common face, and the part of it that a wider pinion needs for it."""
+    by_wheel, by_pinion = contact(24.0, 18.0, on_wheel=8.0), contact(24.0, 18.0, crowning=8.0 * (24.0 / 18.0) ** 2)
+    np.testing.assert_allclose(by_wheel[1], by_pinion[1], rtol=1e-7)
+    # of an offset gear the middle is elsewhere, and a relief at the end that overhangs the mate misses the contact
+    mesh = mesh_of(pair_of(24.0, 18.0, 3.0))
+    y, (pinion, wheel) = mesh.face_coordinate[:, None], mesh.flanks()
+    np.testing.assert_allclose(jg.LeadCrowning(8.0)(pinion)[0], 8.0 * ((y + 3.0) / 12.0) ** 2, rtol=1e-12)
+    np.testing.assert_allclose(jg.LeadSlope(8.0)(wheel)[0], 8.0 * y / 18.0, rtol=1e-12)
+    ends = {side: np.asarray(jg.EndRelief(15.0, 5.9, side=side)(pinion)) for side in ("negative", "positive")}
+    assert not ends["negative"].any() and ends["positive"][:, -1].min() > 10
+
+
+def test_flank_line_of_the_gap_on_either_gear():
+    """Over the common face one line of slope and crowning is the same gap on a gear of any width and offset."""
+    pair, line = pair_of(30.0, 20.0, 8.0), FlankLine(12.0, 5.0)
+    found = []
+    for gear in ("pinion", "wheel"):
+        on = {gear: line.on(pair, gear).modification}
+        found.append(annex_e(RigidSupport(pair), torque=TORQUE, stations=11, **on))
+    np.testing.assert_allclose(found[0].line_load, found[1].line_load, rtol=1e-9)
+    share = found[0].face_coordinate / pair.face_width
+    expected = 12.0 * share + 5.0 * (2 * share) ** 2
+    np.testing.assert_allclose(found[0].gap - found[0].gap[5], expected - expected[5], atol=1e-9)
+
+
+def test_faces_that_do_not_overlap_are_refused():
+    with pytest.raises(ValueError, match=r"^GearPair: axial_offset of 19 mm in size must be less than 18 mm") as error:
+        pair_of(18.0, 18.0, -19.0)
+    assert "\n" not in str(error.value)
+    # traced numbers pass: the margin tells, and how to find back
+    overlap = jax.jit(jax.value_and_grad(lambda offset: jg.margins(pair_of(offset=offset)).face_overlap))
+    np.testing.assert_allclose(overlap(19.0), (-1.0, -1.0))
+    assert not bool(jnp.any(contact(offset=19.0)[2]))
