@@ -63,7 +63,8 @@ def test_a_pair_has_the_backlash_that_it_is_made_for(by):
         gear(tooth_thickness_allowance=-30.0, tooth_thickness_tolerance=20.0),
         jg.Gear(48, 3.0, face_width=18.0),
     )
-    pair = pair_with_backlash(pinion, wheel, 150.0, by=by)
+    pair = pair_with_backlash(pinion, wheel, 150.0, axial_offset=1.5, by=by)
+    assert float(pair.axial_offset) == 1.5
     assert float(pair.backlash) == pytest.approx(150.0, abs=1e-8)
     np.testing.assert_allclose(pair.backlash_limits, 150.0 + 10.0 * COSINE * np.array([-1.0, 1.0]), atol=1e-8)
     changed = {
@@ -239,7 +240,7 @@ def test_traced_limits_the_wrong_way_round_make_no_gear():
 def test_backlash_is_made_by_what_the_file_leaves_open(load):
     thin = "tooth_thickness_allowance = -30.0"
     tables = {
-        "both": load(tail="[pair]\nbacklash = 120.0"),
+        "both": load(tail="[pair]\nbacklash = 120.0\naxial_offset = 1.5"),
         "wheel": load(thin, tail="[pair]\nbacklash = 120.0"),
         "distance": load(thin, thin, "[pair]\nbacklash = 120.0"),
         "given distance": load(thin, tail="[pair]\nbacklash = 120.0\ncenter_distance = 100.85"),

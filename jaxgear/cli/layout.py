@@ -51,13 +51,12 @@ def _profile(
     request: LayoutRequest, wanted: ProfileSection, mesh: Mesh, layout: FlankLineLayout, stages: Stages
 ) -> ProfileLayout:
     """Step 3 on the flank lines, or on what they leave where they have levelled the load: the further crowning."""
-    pinion, wheel = (FlankLine(crowning=amount) for amount in layout.further)
-    left = pinion.on(layout.pair, "pinion").modification, wheel.on(layout.pair, "wheel").modification
-    pinion, wheel = layout.modifications if wanted.shafts else left
+    for_pinion, for_wheel = (FlankLine(crowning=amount) for amount in layout.further)
+    left = for_pinion.on(layout.pair, "pinion").modification, for_wheel.on(layout.pair, "wheel").modification
     return vary_profiles(
         mesh,
         request.profile_torque,
-        (pinion, wheel),
+        layout.modifications if wanted.shafts else left,
         wanted.pinion_amounts,
         wanted.wheel_amounts or wanted.pinion_amounts,
         kind="profile_crowning" if wanted.type == "profile_crowning" else "tip_relief",

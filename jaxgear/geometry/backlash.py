@@ -20,7 +20,9 @@ _BY = "both", "pinion", "wheel", "center_distance"
 _ROUNDED = 1.0
 
 
-def pair_with_backlash(pinion: Gear, wheel: Gear, backlash, *, center_distance=None, by: By = "both") -> GearPair:
+def pair_with_backlash(
+    pinion: Gear, wheel: Gear, backlash, *, center_distance=None, axial_offset=0.0, by: By = "both"
+) -> GearPair:
     """A pair with a given play between its unloaded, unmodified flanks, in the middle of their tolerances.
 
     On the line of action that is the play of the centre distance, less cos(pressure angle) times both mean tooth
@@ -31,6 +33,7 @@ def pair_with_backlash(pinion: Gear, wheel: Gear, backlash, *, center_distance=N
         wheel: driven gear.
         backlash: normal backlash j_bn, on the line of action [um].
         center_distance: [mm]; None for the backlash-free one of the nominal tooth thicknesses.
+        axial_offset: of the middle of the wheel's face from that of the pinion's [mm].
         by: what makes the backlash: the tooth thickness of "both" gears, thinned alike, that of the "pinion" or the
             "wheel" alone, or the "center_distance" of the gears as they are.
 
@@ -45,7 +48,7 @@ def pair_with_backlash(pinion: Gear, wheel: Gear, backlash, *, center_distance=N
     if by == "center_distance":
         if distance is not None:
             raise ValueError('GearPair: center_distance: cannot be given, by = "center_distance" finds it')
-        return GearPair(pinion, wheel, _distance(pinion, wheel, backlash))
+        return GearPair(pinion, wheel, _distance(pinion, wheel, backlash), axial_offset=real(axial_offset))
     check("GearPair", "center_distance", distance, "mm", low=0.0, open_low=True)
     play = _play(pinion, wheel, distance)
     _check_enough(backlash, play)
@@ -55,7 +58,7 @@ def pair_with_backlash(pinion: Gear, wheel: Gear, backlash, *, center_distance=N
     less = missing / (len(thinned) * jnp.cos(jnp.deg2rad(pinion.pressure_angle)))
     gears = {"pinion": pinion, "wheel": wheel}
     gears |= {name: _thinner(gears[name], less) for name in thinned}
-    return GearPair(**gears, center_distance=distance)
+    return GearPair(gears["pinion"], gears["wheel"], distance, real(axial_offset))
 
 
 def _thinner(gear: Gear, less: Scalar) -> Gear:
