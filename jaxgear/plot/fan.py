@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..conditions import ranked
-from ..numerics import Quantile
+from ..numerics import Quantile, real
 from ..sweeps import Scatter
 from .figure import GREY, legend_above, line_style, report_axes
 from .history import PHASE_LABEL, two_pitches
@@ -93,7 +93,7 @@ def ppte_distribution(samples: Mapping[str, np.ndarray], ax: Axes | None = None,
             values = np.asarray(values)
             ordered = np.sort(values[np.isfinite(values)])
             share = 100 * np.arange(1, ordered.size + 1) / values.size
-            reached = float(ranked(Quantile(level), values))
+            reached = float(ranked(Quantile(real(level)), values))
             below = f", {100 * level:g} % below {reached:.2f} µm" if np.isfinite(reached) else ""
             ax.plot(ordered, share, label=f"{name}{below}", **line_style(index))
         ax.axhline(100 * level, color=GREY, linewidth=0.8, zorder=0.5)
