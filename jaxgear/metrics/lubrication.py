@@ -148,11 +148,11 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     material = safe_power(coefficient * modulus, 0.6)
     motion = safe_power(viscosity * rolling / (2e-3 * modulus * radius), 0.7)
     pressure = 1e6 * cycle.contact_pressure
-    touching = pressure > 0
-    load = (2 * jnp.pi * (jnp.where(touching, pressure, 1.0) / modulus) ** 2) ** -0.13
+    apart = pressure <= 0
+    load = (2 * jnp.pi * (jnp.where(apart, 1.0, pressure) / modulus) ** 2) ** -0.13
     thinning = lubricant.pressure_viscosity(hot) * lubricant.viscosity(hot) / (coefficient * viscosity)
     film = 1e3 * _FILM * radius * material * motion * load * safe_power(thinning, 0.22)
-    return jnp.where(touching, jnp.minimum(film, _THICKEST), _THICKEST)
+    return jnp.where(apart, _THICKEST, jnp.minimum(film, _THICKEST))
 
 
 @over_batch
