@@ -32,7 +32,7 @@ def study(fast=False):
     """By name: the optimum (None for the unmodified pair) and the PPTE [um] of manufactured gears."""
     file = load_design(FILE)
     if fast:
-        file = replace(file, optimize=replace(file.optimize, **FEWER))
+        file = replace(file, optimize=file.optimize.model_copy(update=FEWER))
     mesh = file.mesh()
     tolerance = jg.Tolerance.from_class(mesh.pair, file.tolerance.quality_class).without_lead()
     nominal = jg.minimize(file.design, file.bounds, mesh=mesh, torque=file.torque)

@@ -6,6 +6,9 @@ many. What users put under `jax.vmap` is therefore solved here, by exchange step
 Their error is that of Gaussian elimination (Peters and Wilkinson, On the stability of Gauss-Jordan elimination with
 pivoting, Commun. ACM 18 (1975) 20-24, doi 10.1145/360569.360653). Where a matrix may be singular, rotations make its
 columns orthogonal (Hestenes, J. Soc. Indust. Appl. Math. 6 (1958) 51-90, doi 10.1137/0106005).
+
+LAPACK is left with the eigenvalues and singular values of motions in `dynamics`: of one matrix of a program, or of
+points of a branch, which are found one after the other.
 """
 
 from functools import partial
