@@ -34,7 +34,7 @@ def mesh():
     gear = jg.Gear(
         teeth=50, module=3.0, face_width=20.0, tip_diameter=154.5709, bore_diameter=40.0, tooth_thickness_allowance=PLAY
     )
-    return jg.prepare(jg.GearPair(gear, gear), resolution=jg.Resolution(positions=16, pairs=4))
+    return jg.prepare(jg.GearPair(gear, gear), resolution=jg.Resolution(positions=16, pairs=2))
 
 
 def design(parameters):

@@ -1,11 +1,14 @@
 """Dense linear equations of few unknowns, without LAPACK.
 
 In batches, JAX's calls of LAPACK share their work among the threads of one pool and wait for it there: as many of them
-at once as the pool has threads wait for each other for ever, and two gears, flanks or bearings side by side make as
-many. What users put under `jax.vmap` is therefore solved here, by exchange steps (Gauss and Jordan's method, in place).
+at once as the pool has threads wait for each other for ever, and a design of several parts makes as many. What users
+put under `jax.vmap` is therefore solved here, by exchange steps (Gauss and Jordan's method, in place).
 Their error is that of Gaussian elimination (Peters and Wilkinson, On the stability of Gauss-Jordan elimination with
 pivoting, Commun. ACM 18 (1975) 20-24, doi 10.1145/360569.360653). Where a matrix may be singular, rotations make its
 columns orthogonal (Hestenes, J. Soc. Indust. Appl. Math. 6 (1958) 51-90, doi 10.1137/0106005).
+
+LAPACK is left with the eigenvalues and singular values of motions in `dynamics`: of one matrix of a program, or of
+points of a branch, which are found one after the other.
 """
 
 from functools import partial
