@@ -219,14 +219,14 @@ def test_reference_volumes_of_the_study(made):
     assert made["reference_parabolic_from_pitch_mm3"] / parabola == pytest.approx(1.81, abs=0.01)
 
 
-@pytest.mark.parametrize("pair, lower", [("30_30", 25.0), ("20_30", 10.0)])
+@pytest.mark.parametrize("pair, lower", [("30_30", 25.0), ("20_30", 20.0)])
 def test_the_relief_that_lasts_is_the_better_one_over_the_life(lasting, pair, lower):
     """Judged on half as many positions again and by twice the blocks; when new, the other one is the better."""
     new, over, never = (
         {key: lasting[f"{pair} {name}: {key} PPTE [um]"] for key in ("new", "mean")}
         for name in ("when new", "over life", "unmodified")
     )
-    assert new["new"] < over["new"] < never["new"] and over["mean"] < new["mean"] < never["mean"]
+    assert new["new"] < over["new"] < never["new"] and over["mean"] < min(new["mean"], never["mean"])
     assert lasting[f"{pair} mean PPTE lower by [%]"] >= lower
     for name in ("unmodified", "when new", "over life"):
         assert lasting[f"{pair} {name}: uncertainty of the depth [um]"] < 0.02

@@ -146,15 +146,15 @@ def test_depth_does_not_depend_on_the_number_of_positions():
 @pytest.mark.slow
 @pytest.mark.parametrize("amount", [0.0, 5.0])
 def test_worn_flanks_do_not_depend_on_the_number_of_positions(amount):
-    """With contacts that are solved: 0.3 % of the depth from 32 positions on, 0.1 % of the volume."""
+    """With contacts that are solved, and the grid that is taken where nobody says which."""
 
     def worn_by(positions):
         mesh = prepare(pair_of(20, 30), resolution=jg.Resolution(positions=positions, pairs=2))
         relief = jg.TipRelief(amount, 2.0)
-        life = life_of(mesh, blocks=2, points=9, pinion=relief, wheel=relief)
+        life = life_of(mesh, blocks=2, pinion=relief, wheel=relief)
         return np.stack([life.pinion_depth[-1, 0], life.wheel_depth[-1, 0]]), worn_volume(life)[-1].sum(axis=-1)
 
-    (coarse, volume), (fine, fine_volume) = worn_by(32), worn_by(128)
+    (coarse, volume), (fine, fine_volume) = worn_by(64), worn_by(128)
     assert np.abs(coarse - fine).max() < 0.01 * fine.max()
     np.testing.assert_allclose(volume, fine_volume, rtol=0.002)
 

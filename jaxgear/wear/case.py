@@ -36,6 +36,10 @@ _FOUND = (
 )
 
 
+# On more points than on 64 positions the depth would be that of spikes narrower than a contact, at the tip.
+_MOST_POINTS = 33
+
+
 class Case(eqx.Module):
     """What wears, and under what.
 
@@ -156,9 +160,14 @@ def case_of(
     loads, weights = _loads(owner, torque, dtype)
     check_torque(owner, mesh.support_torque, loads.torque)
     law = wear_law(coefficient, loads, dtype)
-    points = mesh.resolution.positions // 2 + 1 if points is None else whole(owner, "points", points, low=3)
+    points = usual_points(mesh) if points is None else whole(owner, "points", points, low=3)
     other = jnp.zeros((), dtype) if deviation is None else real(deviation).astype(dtype)
     return Case(mesh, loads, weights, law, pinion, wheel, other, points)
+
+
+def usual_points(mesh: Mesh) -> int:
+    """Points of the grid on each flank where nobody says how many."""
+    return min(mesh.resolution.positions // 2 + 1, _MOST_POINTS)
 
 
 def _loads(owner: str, torque: Any, dtype) -> tuple[Operation, Float[Array, " torques"] | None]:

@@ -117,8 +117,8 @@ def wear(
             None for perfect gears.
         blocks: of equal length, even: two and two are compared with one of double length.
         points: of the grid on each flank, evenly spaced from the start of the active profile to the tip; None for half
-            as many as the mesh has positions, and one. Points nearer to each other than the contact is wide show no
-            more, and pile up at the tip what the contact there would wear beyond it.
+            as many as the mesh has positions, and one, at most 33. Points nearer to each other than the contact is wide
+            show no more, and pile up at the tip what the contact there would wear beyond it.
 
     Returns:
         flanks and mesh at the start of every block and after the last one.

@@ -24,7 +24,8 @@ class Wear(Checked):
             5e-16 for mild wear in mixed lubrication.
         wheel_coefficient: of wear of the wheel; None for that of the pinion.
         blocks: contact analyses and steps of wear in turn, of equal length; even.
-        points: of the grid on each flank; None for half as many as the mesh has positions, and one.
+        points: of the grid on each flank; None for half as many as the mesh has positions, and one, at
+            most 33.
         depth_limit: depth to which a life is asked for.
         ppte_limit: peak-to-peak transmission error to which a life is asked for.
     """
