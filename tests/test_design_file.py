@@ -353,6 +353,7 @@ MALFORMED = {
         text().replace("module = 3\n", "module = 4.0\n"),
         "wheel.module: 4 mm must equal the pinion's, 3 mm",
     ),
+    "faces apart": (text(tail="[pair]\naxial_offset = 90.0"), "pair.axial_offset: 90 mm must be greater than"),
     "impossible centre distance": (text(tail="[pair]\ncenter_distance = 90.0"), "pair.center_distance: 90 mm must be"),
     "physical error of a modification": (
         text(pinion=RELIEF.replace('"height"', "1.0").replace("3.4", "-3.4")),

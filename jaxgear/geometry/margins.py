@@ -164,7 +164,12 @@ def _form_accuracy(outline: Outline) -> Scalar:
 
 
 def faults_between(
-    pinion: Gear, wheel: Gear, center_distance: Scalar | None, margins: Margins, held: Mapping[str, Bool[Array, ""]]
+    pinion: Gear,
+    wheel: Gear,
+    center_distance: Scalar | None,
+    axial_offset: Scalar,
+    margins: Margins,
+    held: Mapping[str, Bool[Array, ""]],
 ) -> tuple[str, ...]:
     """The margins that do not hold, in words; all numbers concrete. `held` are those of the margins."""
     faults = [
@@ -185,10 +190,9 @@ def faults_between(
         faults.append(_backlash_fault(pinion, wheel, center_distance))
     if "face_overlap" in missed:
         reach = 0.5 * float(pinion.face_width + wheel.face_width)
-        offset = reach - float(margins.face_overlap)
         faults.append(
-            f"GearPair: axial_offset of {offset:g} mm in size must be less than {reach:g} mm, half the sum of both "
-            "face widths: the faces do not overlap"
+            f"GearPair: axial_offset = {float(axial_offset):g} mm must be greater than {-reach:g} mm and less than "
+            f"{reach:g} mm, half the sum of both face widths: the faces do not overlap"
         )
     if "contact_ratio_margin" in missed:
         faults.append(

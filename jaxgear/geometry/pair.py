@@ -167,7 +167,7 @@ def _faults(pair: GearPair) -> tuple[str, ...]:
     known, held = _held(pair)
     if _traced(known):  # within a trace of something else
         return ()
-    return faults_between(pair.pinion, pair.wheel, pair.center_distance, known, held)
+    return faults_between(pair.pinion, pair.wheel, pair.center_distance, pair.axial_offset, known, held)
 
 
 def is_even(pair: GearPair) -> bool:
