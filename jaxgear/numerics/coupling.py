@@ -59,12 +59,10 @@ class Coupling(eqx.Module):
 
     def deflection(self, compliance: Springs, lever: Float[Array, "pairs positions"], load: Rows) -> Rows:
         """y under line loads."""
-        uniform = jnp.stack([sum(c[None] * q for c, q in zip(row, load)) for row in compliance])
-        uniform = stored(uniform)
-        modal = along(self.share, onto(self.modes, uniform))
-        modal = along(self.modes, stored(modal))
-        result = [self.rest * row + modal[:, i] for i, row in enumerate(uniform)]
-        result = [stored(row) for row in result]
+        uniform = [stored(sum(c[None] * q for c, q in zip(row, load))) for row in compliance]
+        spread = self.modes @ self.share
+        modal = [stored(onto(self.modes, row)) for row in uniform]
+        result = [stored(self.rest * row + along(spread, each)) for row, each in zip(uniform, modal)]
         bent = self.support_deflection(lever, load)
         return result if bent is None else [row + height[None] * bent for row, height in zip(result, lever)]
 
