@@ -264,9 +264,7 @@ def _corrected(
     ], approach + more
 
 
-def _residual(
-    problem: ContactProblem, load: Rows, approach: Curve, secant: Slopes, left: Rows, common: Curve
-) -> Curve:
+def _residual(problem: ContactProblem, load: Rows, approach: Curve, secant: Slopes, left: Rows, common: Curve) -> Curve:
     """Largest violation of any condition, relative to the approach and to the load.
 
     Vanishing approach and load are not measured against zero, but against the rounding errors of `common` and of the

@@ -14,7 +14,6 @@ from operator import add
 from typing import NamedTuple
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .elimination import small_inverse
