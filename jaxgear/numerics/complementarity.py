@@ -57,6 +57,9 @@ _OWN_STEPS = 3
 # Newton steps with secants that follow the logarithm of the load: from where they lead, one step with the laws is down
 # to the rounding of single precision, as a rule, at a third of the cost of another one with the laws.
 _LOGARITHM_STEPS = 2
+# Steps with the laws where slices feel each other: their active sets settle later, and of 400 random tip reliefs on
+# crowned flanks 45 % still need a second step in double precision after one of these, 0.5 % after two.
+_LAW_STEPS_COUPLED = 2
 # A secant follows the logarithm between these multiples of the load at the start, and changes per logarithm by this
 # share of itself at most: slopes stay positive.
 _LEAST, _MOST, _STEEPEST = 1e-3, 5.0, 0.3
@@ -115,7 +118,7 @@ def _solve(steps: int, tolerance: float, problem: ContactProblem, common: Curve)
 
 
 def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
-    """Iterate and approach near the solution, by one evaluation of the laws at its end."""
+    """Iterate and approach near the solution, by evaluations of the laws at its end alone."""
     shared = problem if problem.start_law is None else replace(problem, law=problem.start_law)
     v, start, secant = _start(shared)
     start = [jnp.maximum(q, LOAD_FLOOR) for q in start]
@@ -129,11 +132,16 @@ def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
         followed = [c + k * x for c, k, x in zip(secant, rate, grown)]
         return _newton(problem, state[0], followed, [c + k for c, k in zip(followed, rate)])
 
+    def with_laws(_, state):
+        load = carried_by(state[0])
+        exact = secants_under(problem, load)
+        return _newton(problem, state[0], exact, slopes_under(problem, load, exact))
+
     state = jax.lax.fori_loop(0, _SECANT_STEPS, with_secants, (v, jnp.zeros_like(problem.lever[0])))
-    v, _ = jax.lax.fori_loop(0, _LOGARITHM_STEPS, with_logarithms, state)
-    load = carried_by(v)
-    exact = secants_under(problem, load)
-    return _newton(problem, v, exact, slopes_under(problem, load, exact))
+    state = jax.lax.fori_loop(0, _LOGARITHM_STEPS, with_logarithms, state)
+    if problem.coupling is None:
+        return with_laws(0, state)
+    return jax.lax.fori_loop(0, _LAW_STEPS_COUPLED, with_laws, state)
 
 
 def _iterate(
@@ -148,15 +156,18 @@ def _iterate(
     dtype = common.dtype
 
     def evaluated(v, approach):
-        secant = secants_under(problem, carried_by(v))
-        return v, approach, secant, _residual(problem, v, approach, secant, common)
+        load = carried_by(v)
+        secant, left = secants_under(problem, load), opening(problem, load, approach)
+        residual = _residual(problem, load, approach, secant, left, common)
+        # slices that feel each other are corrected by what is left; others are cheaper to open once more than to keep
+        return v, approach, secant, None if problem.coupling is None else left, residual
 
     def advance(state):
-        count, (v, approach, secant, _) = state
+        count, (v, approach, secant, left, _) = state
         load32, secant32 = _cast((carried_by(v), secant), jnp.float32)
         if problem.coupling is not None:
             slope32 = slopes_under(single, load32, secant32)
-            return count + 1, evaluated(*_corrected(problem, single, v, approach, secant, slope32))
+            return count + 1, evaluated(*_corrected(problem, single, v, approach, secant, left, slope32))
         share = [slope / c for slope, c in zip(slopes_under(single, load32, secant32), secant32)]
         slope = [part * c for part, c in zip(_cast(share, dtype), secant)]
         return count + 1, evaluated(*_newton(problem, v, secant, slope))
@@ -165,7 +176,7 @@ def _iterate(
         count, (*_, residual) = state
         return (count < steps) & ~jnp.all(residual < tolerance)
 
-    _, (v, approach, _, residual) = jax.lax.while_loop(unfinished, advance, (0, evaluated(v, approach)))
+    _, (v, approach, _, _, residual) = jax.lax.while_loop(unfinished, advance, (0, evaluated(v, approach)))
     return v, approach, residual
 
 
@@ -238,11 +249,10 @@ def _newton(problem: ContactProblem, v: Rows, secant: Slopes, slope: Slopes) -> 
 
 
 def _corrected(
-    problem: ContactProblem, single: ContactProblem, v: Rows, approach: Curve, secant: Slopes, slope: Slopes
+    problem: ContactProblem, single: ContactProblem, v: Rows, approach: Curve, secant: Slopes, left: Rows, slope: Slopes
 ) -> tuple[Rows, Curve]:
     """One Newton step of coupled slices, as a correction of what is left of the conditions in single precision."""
     active, carried = active_of(problem, v), carried_by(v)
-    left = opening(problem, carried, approach)
     missing = None if problem.load is None else problem.load - total(problem, carried)
     rest = _cast(([-(y + c * q) for y, c, q in zip(left, secant, carried)], left, missing), jnp.float32)
     factors = eliminate(single, active, slope)
@@ -254,15 +264,14 @@ def _corrected(
     ], approach + more
 
 
-def _residual(problem: ContactProblem, v: Rows, approach: Curve, secant: Slopes, common: Curve) -> Curve:
+def _residual(problem: ContactProblem, load: Rows, approach: Curve, secant: Slopes, left: Rows, common: Curve) -> Curve:
     """Largest violation of any condition, relative to the approach and to the load.
 
     Vanishing approach and load are not measured against zero, but against the rounding errors of `common` and of the
     load below which springs are linear.
     """
-    load = carried_by(v)
     worst, scale, softest = jnp.zeros_like(approach), jnp.abs(common), jnp.zeros_like(approach)
-    for i, (q, y, c, lever) in enumerate(zip(load, opening(problem, load, approach), secant, problem.lever)):
+    for i, (q, y, c, lever) in enumerate(zip(load, left, secant, problem.lever)):
         mismatch = y + c * q
         closing = jnp.abs(mismatch + (lever * approach)[None])
         worst = jnp.maximum(worst, jnp.max(jnp.where(q > 0, jnp.abs(mismatch), -mismatch), axis=0))

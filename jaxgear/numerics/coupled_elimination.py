@@ -97,15 +97,11 @@ def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
 
 def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "_ pairs pairs positions"]]:
     """V^T rows V: of every mode with itself and those after it, by mode."""
-    count = modes.shape[1]
-    weight = jnp.concatenate([modes[:, k : k + 1] * modes[:, k:] for k in range(count)], axis=1)
     springs = range(len(rows))
     half = [(i, j) for i in springs for j in range(i + 1)]
-    found = onto(weight, jnp.stack([rows[i][j] for i, j in half]))
-    place = {pair: index for index, pair in enumerate(half)}
-    whole = [jnp.stack([found[:, place[max(i, j), min(i, j)]] for j in springs], axis=1) for i in springs]
-    ends = np.cumsum(np.arange(count, 0, -1))
-    return jnp.split(jnp.stack(whole, axis=1), ends[:-1])
+    stack = jnp.stack([rows[i][j] for i, j in half])
+    place = np.array([[half.index((max(i, j), min(i, j))) for j in springs] for i in springs])
+    return [onto(mode[:, None] * modes[:, k:], stack)[:, place] for k, mode in enumerate(modes.T)]
 
 
 def _eliminated(coupling: Coupling, modal: list[Float[Array, "_ pairs pairs positions"]]) -> list[_Block]:
@@ -136,8 +132,8 @@ def _of_support(
     """V^T A^-1 X by mode, and X^T A^-1 X."""
     if coupling.support_modes is None:
         # what the common approach presses is the first mode
-        even = jnp.sum(modal[0] * lever[None, None], axis=-2)
-        return list(even[:, None]), jnp.sum(even[0] * lever, axis=0)[None, None]
+        even = reduce(add, [modal[0][:, :, i] * height[None, None] for i, height in enumerate(lever)])
+        return list(even[:, None]), reduce(add, list(even[0] * lever))[None, None]
     shapes = coupling.support_modes
     pressed = jnp.stack([sum(x * height[None] for x, height in zip(row, lever)) for row in inverse])
     right = [onto(mode[:, None] * shapes, pressed) for mode in coupling.modes.T]
@@ -187,7 +183,9 @@ def respond(
     inside = [sum(x * row for x, row in zip(rows, known)) for rows in factors.inverse]  # A^-1 known
     kept = unit(factors.inverse[0][0])
     inside = [row / kept for row in inside]
-    _, divided = _ahead(factors.blocks, list(onto(coupling.modes, jnp.stack(inside))[:, None]))
+    known = jnp.stack(inside)
+    # mode by mode: compilers take a sum for all modes in every loop that reads one of them
+    _, divided = _ahead(factors.blocks, [onto(mode[:, None], known) for mode in coupling.modes.T])
     force = sum(height[None] * row for height, row in zip(factors.lever, inside))
     constant = jnp.full((count, 1), count**-0.5, force.dtype)
     shapes = constant if coupling.support_modes is None else coupling.support_modes
