@@ -15,11 +15,8 @@ from operator import add
 from typing import NamedTuple
 
 import equinox as eqx
-<<<<<<< HEAD
 import jax
 import jax.numpy as jnp
-=======
->>>>>>> throughput
 from jaxtyping import Array, Float
 
 from .elimination import small_inverse
@@ -88,26 +85,18 @@ class Coupling(eqx.Module):
 
     def deflection(self, compliance: Springs, lever: Float[Array, "pairs positions"], load: Rows) -> Rows:
         """y under line loads."""
-<<<<<<< HEAD
         result = self._spread(compliance, self.share, self.rest, load)
         if self.other is not None:
             more = self._spread(self.other.compliance, self.other.share, self.other.rest, load)
             result = [row + added for row, added in zip(result, more)]
-=======
-        uniform = [stored(sum(c[None] * q for c, q in zip(row, load))) for row in compliance]
-        spread = self.modes @ self.share
-        modal = [stored(onto(self.modes, row)) for row in uniform]
-        result = [stored(self.rest * row + along(spread, each)) for row, each in zip(uniform, modal)]
->>>>>>> throughput
         bent = self.support_deflection(lever, load)
         return result if bent is None else [row + height[None] * bent for row, height in zip(result, lever)]
 
     def _spread(self, compliance: Springs, share: Float[Array, "modes modes"], rest, load: Rows) -> Rows:
-        uniform = jnp.stack([sum(c[None] * q for c, q in zip(row, load)) for row in compliance])
-        uniform = stored(uniform)
-        modal = along(share, onto(self.modes, uniform))
-        modal = along(self.modes, stored(modal))
-        return [stored(rest * row + modal[:, i]) for i, row in enumerate(uniform)]
+        uniform = [stored(sum(c[None] * q for c, q in zip(row, load))) for row in compliance]
+        spread = self.modes @ share
+        modal = [stored(onto(self.modes, row)) for row in uniform]
+        return [stored(rest * row + along(spread, each)) for row, each in zip(uniform, modal)]
 
     def support_deflection(
         self, lever: Float[Array, "pairs positions"], load: Rows
