@@ -183,9 +183,9 @@ def respond(
     inside = [sum(x * row for x, row in zip(rows, known)) for rows in factors.inverse]  # A^-1 known
     kept = unit(factors.inverse[0][0])
     inside = [row / kept for row in inside]
-    known = jnp.stack(inside)
+    stacked = jnp.stack(inside)
     # mode by mode: compilers take a sum for all modes in every loop that reads one of them
-    _, divided = _ahead(factors.blocks, [onto(mode[:, None], known) for mode in coupling.modes.T])
+    _, divided = _ahead(factors.blocks, [onto(mode[:, None], stacked) for mode in coupling.modes.T])
     force = sum(height[None] * row for height, row in zip(factors.lever, inside))
     constant = jnp.full((count, 1), count**-0.5, force.dtype)
     shapes = constant if coupling.support_modes is None else coupling.support_modes
