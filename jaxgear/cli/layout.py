@@ -51,8 +51,8 @@ def _profile(
     request: LayoutRequest, wanted: ProfileSection, mesh: Mesh, layout: FlankLineLayout, stages: Stages
 ) -> ProfileLayout:
     """Step 3 on the flank lines, or on what they leave where they have levelled the load: the further crowning."""
-    pinion, wheel = (FlankLine(crowning=amount) for amount in layout.further)
-    left = pinion.on(layout.pair, "pinion").modification, wheel.on(layout.pair, "wheel").modification
+    first, second = (FlankLine(crowning=amount) for amount in layout.further)
+    left = first.on(layout.pair, "pinion").modification, second.on(layout.pair, "wheel").modification
     pinion, wheel = layout.modifications if wanted.shafts else left
     return vary_profiles(
         mesh,
