@@ -91,6 +91,14 @@ def test_pseudo_inverse_meets_penroses_conditions(size, rank):
     np.testing.assert_allclose(found @ matrix, (found @ matrix).T, atol=bound)
 
 
+@pytest.mark.parametrize("scale", [1e-25, 1e25])
+def test_pseudo_inverse_knows_no_units(scale):
+    """In single precision too, whose squares end at 1e38."""
+    matrix = np.random.default_rng(1).normal(size=(4, 4))
+    given = jnp.asarray(scale * matrix, jnp.float32)
+    np.testing.assert_allclose(scale * np.asarray(INVERSE(given, 1e-6), float), np.linalg.inv(matrix), rtol=1e-3)
+
+
 def test_pseudo_inverse_follows_a_matrix_of_its_rank():
     """Central differences of NumPy's along matrices that all have rank 3."""
     left, right, turn = random(6, 3), random(3, 6), random(3, 3)

@@ -2,6 +2,7 @@
 
 import csv
 import sys
+from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -228,7 +229,17 @@ def test_what_is_no_flank_is_refused_in_one_line(tmp_path, text, problem):
         ((12.0, 25.0), (0.0,), "ends at roll length 25 mm, must be at least 29.2915 mm (the active profile runs from"),
         ((20.0, 31.7), (15.0,), "reaches face coordinate 15 mm, must be within +-10 mm (the face is 20 mm wide)"),
         ((20.0, 31.7), (-15.0, 15.0), "reaches face coordinate 15 mm, must be within +-10 mm"),
-        ((20.0, 31.7), (-3.0, 10.0), "ends at face coordinate -3 mm, must be beyond +-6 mm (the face is 20 mm wide)"),
+        ((20.0, 31.7), (-5.0, 5.0), None),  # middles of two slices
+        (
+            (20.0, 31.7),
+            (-3.0, 10.0),
+            "begins at face coordinate -3 mm, must be at most -6 mm (the mate meets the face from",
+        ),
+        (
+            (20.0, 31.7),
+            (-10.0, 4.0),
+            "ends at face coordinate 4 mm, must be at least 6 mm (the mate meets the face from",
+        ),
     ],
 )
 def test_a_flank_of_another_gear_or_place_is_refused(side, tmp_path, rolls, faces, problem):
@@ -247,6 +258,20 @@ def test_a_flank_of_another_gear_or_place_is_refused(side, tmp_path, rolls, face
         with pytest.raises(io.DesignFileError) as caught:
             call()
         assert str(caught.value).startswith(start + problem) and "\n" not in str(caught.value)
+
+
+def test_flanks_are_told_where_the_mate_meets_the_face(tmp_path):
+    """Gears of other widths: a table over the common face is a flank, one over the middle of the wider gear is none."""
+    pair = jg.GearPair(kahraman_gear(), replace(kahraman_gear(), face_width=40.0), axial_offset=9.0)
+    wheel = kinematics(pair, jnp.asarray(0.0), COARSE, "strain").sides[1]
+    start, tip = float(wheel.start_roll_length), float(wheel.gear.tip_roll_length)
+    for faces, fine in (((-19.0, 1.0), True), ((-5.0, 15.0), False)):
+        path = written(tmp_path, HEAD + "\n".join(f"{roll},{face},0.5" for face in faces for roll in (start, tip)))
+        if fine:
+            io.read_flank(path, side=wheel)
+            continue
+        with pytest.raises(io.DesignFileError, match="begins at face coordinate -5 mm, must be at most -15 mm"):
+            io.read_flank(path, side=wheel)
 
 
 def test_a_design_file_takes_the_flank_of_the_gear_that_it_stands_at(tmp_path):

@@ -28,6 +28,7 @@ class Side(Checked):
             [mm].
         contact_roll_length: roll length of every contact [mm], shape (pairs, positions).
         face_middle: middle of the common face of the pair, from the middle of the gear's own face [mm].
+        common_width: of that face, over which both gears overlap [mm].
     """
 
     gear: Gear
@@ -35,6 +36,7 @@ class Side(Checked):
     pitch_roll_length: Scalar = result("mm")
     contact_roll_length: Field = result("mm")
     face_middle: Scalar = result("mm")
+    common_width: Scalar = result("mm")
 
     @property
     def base_radius(self) -> Float[Array, "*cycles"]:
@@ -216,6 +218,7 @@ def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Sid
             contact.pinion_pitch_roll_length,
             points.pinion_roll_length,
             on_pinion,
+            pair.face_width,
         ),
         Side(
             pair.wheel,
@@ -223,6 +226,7 @@ def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Sid
             contact.wheel_pitch_roll_length,
             points.wheel_roll_length,
             on_wheel,
+            pair.face_width,
         ),
     )
 

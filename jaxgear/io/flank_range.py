@@ -21,19 +21,22 @@ class FlankRange:
 
     Attributes:
         roll_length: first and last [mm].
-        face_coordinate: first and last [mm], the same for a profile alone.
+        face_coordinate: first and last, from the middle of the gear's face [mm]; the same for a profile alone.
+        step: from one to the next [mm]: lines may stand in the middles of slices.
     """
 
     roll_length: tuple[float, float]
     face_coordinate: tuple[float, float]
+    step: float = 0.0
 
-    def check_on(self, gear: Gear, start_roll_length, common_width) -> None:
+    def check_on(self, gear: Gear, start_roll_length, common_width, common_middle) -> None:
         """Refuses a gear whose flank this is not.
 
         Args:
             gear: of concrete numbers.
             start_roll_length: at the start of its active profile [mm].
-            common_width: of its face and the mate's [mm].
+            common_width: over which its face and the mate's overlap [mm].
+            common_middle: of that from the middle of the gear's face [mm].
 
         Raises:
             DesignFileError: in one line.
@@ -48,20 +51,26 @@ class FlankRange:
         if self.roll_length[1] < tip - _LEFT_OUT * active:
             least = tip - _LEFT_OUT * active
             raise _refusal("ends at roll length", self.roll_length[1], "at least", least, _profile(start, tip))
-        self._check_face(0.5 * float(gear.face_width), 0.5 * float(common_width))
+        self._check_face(float(gear.face_width), float(common_width), float(common_middle))
 
-    def _check_face(self, half: float, common: float) -> None:
-        face = f"the face is {2 * half:g} mm wide"
+    def _check_face(self, width: float, common: float, middle: float) -> None:
         low, high = self.face_coordinate
-        furthest = high if high >= -low else low
-        if abs(furthest) > half * (1 + 2 * _BEYOND):
+        furthest, half = high if high >= -low else low, 0.5 * width
+        if abs(furthest) > half + _BEYOND * width:
+            face = f"the face is {width:g} mm wide"
             raise _refusal("reaches face coordinate", furthest, "within", half, face, sign="+-")
         if low == high:
             return
-        covered = common * (1 - 2 * _LEFT_OUT)
-        if low > -covered or high < covered:
-            nearest = low if low > -covered else high
-            raise _refusal("ends at face coordinate", nearest, "beyond", covered, face, sign="+-")
+        ends = middle - 0.5 * common, middle + 0.5 * common
+        face = f"the mate meets the face from {ends[0]:g} to {ends[1]:g} mm"
+        least, most = ends[0] + _LEFT_OUT * common, ends[1] - _LEFT_OUT * common
+        outside = _BEYOND * common
+        if low - 0.5 * self.step >= ends[0] - outside and high + 0.5 * self.step <= ends[1] + outside:
+            low, high = low - 0.5 * self.step, high + 0.5 * self.step  # ends of slices
+        if low > least:
+            raise _refusal("begins at face coordinate", low, "at most", least, face)
+        if high < most:
+            raise _refusal("ends at face coordinate", high, "at least", most, face)
 
 
 def starts(pair: GearPair) -> dict[str, Float[Array, ""]]:

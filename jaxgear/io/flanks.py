@@ -26,7 +26,7 @@ _REMOVED, _WORN, _DESIGN = "modification_um", "wear_depth_um", "design_um"
 # what makes material removed of the first of them
 _AMOUNTS = {MEASURED: -1.0, _REMOVED: 1.0, _WORN: 1.0, _DESIGN: -1.0}
 _ALONG, _ACROSS, _GEAR, _LIFE = "roll_length_mm", "face_coordinate_mm", "gear", "revolutions"
-_SAME_LIFE = 1e-6  # relative: lives are asked for as they are printed
+_SAME_LIFE = 1e-5  # relative: lives are asked for as they are printed, with six digits
 
 Method = Literal["linear", "cubic2", "monotonic"]
 
@@ -70,7 +70,7 @@ def read_flank(
         rows = _at_life(_chosen(read_rows(Path(path)), {"gear": gear, "design": design}), revolutions)
         flank, reach = _table(rows, base_radius if side is None else float(side.base_radius), method)
         if side is not None:
-            reach.check_on(side.gear, side.start_roll_length, side.face_width)
+            reach.check_on(side.gear, side.start_roll_length, side.common_width, side.face_middle)
         return flank
 
 
@@ -101,9 +101,9 @@ def check_files(parts: Mapping[str, Sequence[template.Part]], pair: GearPair) ->
     for name, several in parts.items():
         for part in several:
             if isinstance(part.make, _FromFile):
-                start = starts(pair)[name]
+                start, middle = starts(pair)[name], dict(zip(("pinion", "wheel"), pair.face_middles))[name]
                 try:
-                    part.make.reach.check_on(getattr(pair, name), start, pair.face_width)
+                    part.make.reach.check_on(getattr(pair, name), start, pair.face_width, middle)
                 except DesignFileError as error:
                     raise DesignFileError(f"{part.key}.file", f"{part.make.name}: {error.problem}") from None
 
@@ -150,7 +150,8 @@ def _table(
         face, removed = across, removed + line - np.interp(face, across, line[0])
     if len(roll) < 2:
         raise DesignFileError("", "has 1 place along the profile, must have at least 2")
-    reach = FlankRange((float(roll[0]), float(roll[-1])), (float(face[0]), float(face[-1])))
+    step = float(np.max(np.diff(face), initial=0.0))
+    reach = FlankRange((float(roll[0]), float(roll[-1])), (float(face[0]), float(face[-1])), step)
     if len(face) == 1:
         return TabulatedProfile(real(roll), real(removed[:, 0]), method=method), reach
     return TabulatedFlank(real(roll), real(face), real(removed), method=method), reach

@@ -30,9 +30,11 @@ def write_worn(path: str | Path, lives: Mapping[str, WearLife]) -> None:
         lives: by the name of the design.
 
     Raises:
-        ValueError: when the file cannot be written.
+        ValueError: for no lives, and when the file cannot be written.
     """
     path = Path(path)
+    if not lives:
+        raise ValueError("write_worn: lives must not be empty")
     tables = [_columns(design, life) for design, life in lives.items()]
     columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
     with writing(path):

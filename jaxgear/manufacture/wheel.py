@@ -24,7 +24,9 @@ _SUBSTITUTIONS = 3  # each makes the error smaller by the slope of the flank, 0.
 
 
 class WheelProfile(NamedTuple):
-    """Active profile of the wheel for one flank, from the form circle to the tip circle of the gear.
+    """Active profile of the wheel for one flank, from the form circle to the tip form circle of the gear.
+
+    A chamfer is not ground: without one the tip form circle is the tip circle.
 
     Attributes:
         x: from the middle plane of the wheel [mm], shape (points,).
@@ -80,7 +82,7 @@ def wheel_profile(side: Side, modification: AbstractModification, *, points: int
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
         modification: of the flank, taken in the middle of the face; what varies along the face comes from the feed.
-        points: evenly spaced in roll length from the form circle to where the modified flank meets the tip circle.
+        points: evenly spaced in roll length from the form circle to where the modified flank meets the tip form circle.
 
     Raises:
         ValueError: for less than 2 points.
@@ -154,7 +156,7 @@ def grinding_faults(wheel: GrindingWheel, side: Side, modification: AbstractModi
 
 
 def _end(side: Side, modification: AbstractModification) -> Scalar:
-    """Roll length whose point of the modified flank lies on the tip circle [mm].
+    """Roll length whose point of the modified flank lies on the tip form circle [mm].
 
     Where a relief h moves the tip of the nominal flank inwards, the flank goes on to L - h(L) = L_tip, by substitution.
     """

@@ -103,10 +103,12 @@ def pseudo_inverse(matrix: Matrix, least: float) -> Matrix:
         matrix: of any rank; its derivatives hold where that does not change.
         least: singular value that counts, over the largest one.
     """
-    columns, turned = _orthogonal(matrix)
+    largest = jnp.max(jnp.abs(matrix))
+    scale = jnp.where(largest > 0, largest, 1)  # squares of single precision end at 1e19
+    columns, turned = _orthogonal(matrix / scale)
     square = jnp.sum(columns**2, axis=0, keepdims=True)
     lost = square <= least**2 * jnp.max(square)
-    return turned @ jnp.where(lost, 0.0, columns / jnp.where(lost, 1.0, square)).T
+    return turned @ jnp.where(lost, 0, columns / jnp.where(lost, 1, square)).T / scale
 
 
 @pseudo_inverse.defjvp

@@ -64,7 +64,8 @@ function colouring() {
 }
 
 function drawParallel() {
-  const dimensions = shown.map((column) => ({ label: column.label, values: column.values, tickformat: ".4~g" }));
+  const dimensions = shown.map((column, place) => (
+    { name: String(place), label: column.label, values: column.values, tickformat: ".4~g" }));
   const trace = { type: "parcoords", dimensions, line: colouring(), unselected: { line: { color: "#EEEEEE", opacity: 0.4 } }, labelangle: -15, labelside: "top",
                   labelfont: FONT, tickfont: FONT, rangefont: { size: 1, color: "#fff" } };
   const layout = { font: FONT, margin: { l: 70, r: 60, t: 110, b: 25 } };
@@ -73,10 +74,11 @@ function drawParallel() {
 
 // rows within every range that is drawn on an axis
 function brushed() {
-  const ranges = pick("parallel").data[0].dimensions.map((each) => each.constraintrange);
+  // an axis that is moved changes its place among the dimensions, not its name
+  const drawn = pick("parallel").data[0].dimensions.filter((each) => each.constraintrange);
   const within = (value, range) => !range || (Array.isArray(range[0]) ? range : [range])
     .some(([low, high]) => low <= value && value <= high);
-  const places = ranges.map((range, place) => [range, shown[place]]).filter(([range]) => range);
+  const places = drawn.map((each) => [each.constraintrange, shown[Number(each.name)]]);
   return [...Array(count).keys()].filter((row) => places.every(([range, column]) => within(column.values[row], range)));
 }
 
@@ -94,7 +96,7 @@ function drawPareto() {
     points(out, both, { ...dots(4, PALE), name: "out of range" }),
     points(kept, both, { ...dots(5, GREY), name: `${kept.length} variants` }),
     points(front, both, { mode: "lines+markers", type: "scattergl", name: `Pareto front, ${front.length}`,
-                          line: { shape: both[0].better === "larger" ? "vh" : "hv", width: 1.5, color: "#000" },
+                          line: { shape: "hv", width: 1.5, color: "#000" },
                           marker: { size: 7, color: "#000" } }),
     ...chosen.map((row, place) => points([row], both, { mode: "markers", type: "scattergl", name: name(row),
       marker: { size: 15, symbol: MARKS[place], color: COLOURS[place], line: { color: "#fff", width: 1 } } })),
