@@ -25,15 +25,34 @@ SHARE = 0.95  # of the gears that stay below the quantile
 NAMES = ("unmodified", "nominal", "robust")
 
 
+def robust_optimum(file, mesh, tolerance, fast=False):
+    """As the file asks; in fast mode of half as many gears, and without the search on a finer mesh."""
+    if not fast:
+        return optimize_request(file)(mesh)
+    asked = file.optimize
+    return jg.minimize(
+        file.design,
+        file.bounds,
+        mesh=mesh,
+        torque=jg.LoadSpectrum(asked.torques),
+        measure=jg.CVaR(asked.level),
+        tolerance=tolerance,
+        samples=asked.manufactured // 2,
+        seed=asked.seed,
+        method=jg.optimize.Minimax(starts=asked.starts, steps=asked.steps),
+        positions=None,
+    )
+
+
 def study(fast=False):
     """By name: the optimum (None for the unmodified pair) and the PPTE [um] of manufactured gears."""
     file = load_design(FILE)
     mesh = file.mesh()
     tolerance = jg.Tolerance.from_class(mesh.pair, file.tolerance.quality_class).without_lead()
     nominal = jg.minimize(file.design, file.bounds, mesh=mesh, torque=file.torque)
-    robust = optimize_request(file)(mesh)
-    nothing = jg.NoModification()
-    designs = {"unmodified": (nothing, nothing)}
+    robust = robust_optimum(file, mesh, tolerance, fast)
+    # reliefs of amount zero: gears without any are judged by the program of the others
+    designs = {"unmodified": file.design({name: low for name, (low, _) in file.bounds.items()})}
     designs |= {name: (best.pinion, best.wheel) for name, best in (("nominal", nominal), ("robust", robust))}
 
     def judged(pinion, wheel):
