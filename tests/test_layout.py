@@ -126,6 +126,25 @@ def test_tolerances_are_those_of_the_standards():
     np.testing.assert_allclose(helix_slope_limits(PAIR, (6, 7)), slopes, rtol=1e-12)
 
 
+@pytest.mark.parametrize("own", [24.0, 60.0])
+def test_limits_of_a_wider_gear_count_over_its_own_face(own):
+    """The rule grinds f_HbetaT over the gear's face, and a wide gear lets axes deviate as its slope over its width."""
+    wide = eqx.tree_at(lambda gear: gear.face_width, PINION, jnp.asarray(own))
+    pair = jg.GearPair(wide, WHEEL)
+    limits = ToleranceClass.of(wide, 6), ToleranceClass.of(WHEEL, 6)
+    further = helix_slope_limits(pair, 6)
+    for each, name, limit in zip(further, ("pinion", "wheel"), limits):
+        ground = FlankLine(0.0, each).on(pair, name)
+        np.testing.assert_allclose(ground.crowning, limit.helix_slope, rtol=1e-12)
+    found = flank_line_tolerance(pair, 6, 120.0, kind="maximum")
+    slopes = np.array([limit.helix_slope for limit in limits])
+    np.testing.assert_allclose(found.helix_slope, slopes[0] * WIDTH / own + slopes[1], rtol=1e-12)
+    # f_Sigma_beta / L = 0.5 F_beta / b of the gear whose helix deviates more per width, here the narrow one
+    angle, total = np.deg2rad(20.0), float(limits[1].helix_total)
+    assert total / WIDTH > float(limits[0].helix_total) / own
+    np.testing.assert_allclose(found.misalignment, 0.5 * total * (np.cos(angle) + 2 * np.sin(angle)), rtol=1e-12)
+
+
 def test_cases_of_a_level_rigid_pair_are_straight_lines():
     """K = 1 + c f / 2 w at the end, less half a station; opposite deviations are mirror images."""
     found = tolerance_cases(rigid(), FlankLineTolerance(4.0, 2.0), torque=TORQUE, stiffness=16.0, stations=STATIONS)

@@ -117,8 +117,9 @@ def layout_flank_lines(
 
     Step 1 levels the load at the torque (`level_load`), or finds the longest life under a duty cycle (`longest_life`).
     Step 2 adds crowning to both gears so that the largest load of none of the five cases is at an edge: the given
-    amounts, C_b = f_HbetaT of either gear after equation 1 of the study and ISO 6336-1 Annex B (`helix_slope_limits`),
-    and more in proportion where they do not suffice; without any, as little as it takes, half of it on either gear.
+    amounts, C_b = f_HbetaT of either gear over its own face after equation 1 of the study and ISO 6336-1 Annex B
+    (`helix_slope_limits`), and more in proportion where they do not suffice; without any, as little as it takes, half
+    of it on either gear.
 
     Args:
         support: shafts at the mesh, `support` of a gearbox or `RigidSupport`.
@@ -127,7 +128,7 @@ def layout_flank_lines(
         duty_cycle: torques with their hours, for step 1; None to level the load.
         endurance: of the gears under it.
         gear: whose flank line levels the load.
-        further: C_b of pinion and wheel [um]; None for as little as it takes.
+        further: C_b of pinion and wheel over the common face [um]; None for as little as it takes.
         share: of the largest load inside, up to which an end may be loaded.
         hollow: whether the crowning of step 1 may be negative.
         stations: over the face.

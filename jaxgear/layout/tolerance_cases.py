@@ -53,6 +53,7 @@ def flank_line_tolerance(
 
     "maximum" adds the limits: f_HbetaT1 + f_HbetaT2, and f_ma = (f_Sigma_beta cos(alpha_wt) + f_Sigma_delta
     sin(alpha_wt)) b / L (equation 2 of the study, which leaves out the scaling from the bearing span to the face).
+    Helix deviations count over a gear's own face: of a wider gear the common face has them in the ratio of the widths.
     "statistical" takes the root of the sum of the squares: where every deviation is normal and 97 % of it lie within
     its limits, 97 % of the independent sum lie within that.
 
@@ -78,17 +79,25 @@ def flank_line_tolerance(
         parts = [jnp.zeros(())]
     else:
         angle = pair.working_pressure_angle
-        axes = axis_tolerance(jnp.maximum(*(limit.helix_total for limit in limits)), pair.face_width, bearing_span)
+        # F_beta counts over the gear's own face, as the slope does
+        totals = [limit.helix_total * pair.face_width / gear.face_width for limit, gear in zip(limits, gears)]
+        axes = axis_tolerance(jnp.maximum(*totals), pair.face_width, bearing_span)
         share = pair.face_width / real(bearing_span)
         parts = [share * axes.skew * jnp.cos(angle), share * axes.inclination * jnp.sin(angle)]
     return FlankLineTolerance(_together(slopes, kind), _together(parts, kind))
 
 
 def helix_slope_limits(pair: GearPair, quality_class) -> Float[Array, "2"]:
-    """f_HbetaT of pinion and wheel [um], which equation 1 of the study takes for the further crowning C_b of each."""
+    """Further crowning C_b of pinion and wheel over the common face [um], that of equation 1 of the study.
+
+    Ground over its own face each has C_b = f_HbetaT; of a wider gear the common face has (common / own)^2 of that.
+    """
     classes = quality_class if isinstance(quality_class, tuple | list) else (quality_class, quality_class)
     return jnp.stack(
-        [ToleranceClass.of(gear, each).helix_slope for gear, each in zip((pair.pinion, pair.wheel), classes)]
+        [
+            ToleranceClass.of(gear, each).helix_slope * (pair.face_width / gear.face_width) ** 2
+            for gear, each in zip((pair.pinion, pair.wheel), classes)
+        ]
     )
 
 
