@@ -94,6 +94,14 @@ def test_tables_bring_the_quantities_that_they_tell_of(load):
     "text, message",
     [
         (PAIR.replace("speed = 3000.0", "") + OIL, "pair.toml: lubricant: has no effect without load.speed"),
+        (
+            PAIR.replace("3000.0", "0.0") + OIL,
+            "pair.toml: load.speed: 0 rpm must be greater than 0 rpm with [lubricant]",
+        ),
+        (
+            PAIR.replace("3000.0", '"n"') + OIL + "[variables]\nn = { low = 0.0, high = 3000.0 }",
+            "pair.toml: variables.n.low: 0 rpm must be greater than 0 rpm with [lubricant]",
+        ),
         (PAIR + OIL + 'friction = "xu"', 'lubricant.friction: "xu" is not known'),
         (PAIR + "friction = 0.05" + OIL + 'friction = "schlenk"', "lubricant.friction: has no effect beside load.fric"),
         (

@@ -250,7 +250,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         tolerance=tolerance,
         dynamics=None if top.dynamics is None else decode("dynamics", top.dynamics, schema_dynamics.DynamicsSection),
         wear=None if top.wear is None else decode("wear", top.wear, schema_wear.WearSection),
-        lubricant=rating.lubricant_of(top.lubricant, load, file.parent),
+        lubricant=rating.lubricant_of(top.lubricant, load, bounds, file.parent),
         strength=rating.strength_of(top.strength, file.parent),
         layout=layout,
         support=support_of(top, layout, usual_pair, torque, file.parent, materials),
