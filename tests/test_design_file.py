@@ -340,7 +340,6 @@ MALFORMED = {
         text(load="torque_range = [80.0, 20.0]"),
         "load.torque_range[1]: 20 N m must be greater than 80 N m",
     ),
-    "friction without speed": (text(load="friction = 0.06"), "load.friction: has no effect without load.speed"),
     "physical error of a gear": (
         text().replace("face_width = 20.0", "face_width = -20.0"),
         "pinion.face_width: -20 mm must be greater than 0 mm",

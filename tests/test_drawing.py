@@ -15,6 +15,7 @@ from jaxgear.compliance.edge import _wedge_excess
 from jaxgear.compliance.hertz import contact_geometry
 from jaxgear.compliance.toothload import tooth_load
 from jaxgear.geometry import outline, pair_with_backlash
+from jaxgear.geometry.involute import half_tooth_angle
 from jaxgear.io import DesignFileError, load_design
 from jaxgear.io.cases import quality_classes
 from jaxgear.manufacture import drawn_gear, over_balls, span
@@ -101,6 +102,21 @@ def test_a_chamfer_ends_the_flank_and_leaves_the_tip():
     assert float(paths[0].start) == float(paths[1].start)
     clearances = [float(jg.margins(pair).pinion_tip_clearance) for pair in pairs]
     assert clearances[0] == clearances[1], "the chamfered tip reaches as deep into the space"
+
+
+def test_chamfers_that_meet_leave_no_tip():
+    """Lines of 45 degrees from both ends of the form circle's chord meet as high above it as half of it is long."""
+    for form, fits in ((60.0, True), (58.0, False)):
+        flank = gear(tip_form_diameter=63.5)
+        rho = jnp.sqrt(0.25 * form**2 - flank.base_radius**2)
+        half = float(half_tooth_angle(flank, rho))
+        top = 0.5 * form * (np.cos(half) + np.sin(half))
+        assert (top > float(flank.tip_radius)) == fits
+        if fits:
+            assert float(gear(tip_form_diameter=form).tip_form_radius) == 0.5 * form
+        else:
+            with pytest.raises(ValueError, match="tip_form_diameter = 58 mm leaves no tip land"):
+                gear(tip_form_diameter=form)
 
 
 def test_a_traced_tip_form_circle_outside_the_tip_is_flagged():
@@ -281,6 +297,21 @@ REFUSED = {
     ),
     "no teeth": ("span = 23.0", "", "pinion: teeth_spanned: missing, span needs it"),
     "no span": ("teeth_spanned = 3", "", "pinion.teeth_spanned: has no effect without span"),
+    "no span, with a tolerance": (
+        "teeth_spanned = 3\ntooth_thickness_tolerance = 20.0",
+        "",
+        "pinion.teeth_spanned: has no effect without span",
+    ),
+    "no span, with allowance and tolerance": (
+        "teeth_spanned = 3\ntooth_thickness_allowance = -50.0\ntooth_thickness_tolerance = 20.0",
+        "",
+        "pinion.teeth_spanned: has no effect without span",
+    ),
+    "no balls, with a tolerance": (
+        "ball_diameter = 5.5\ntooth_thickness_tolerance = 20.0",
+        "",
+        "pinion.ball_diameter: has no effect without over_balls",
+    ),
     "no ball": ("over_balls = 65.0", "", "pinion: ball_diameter: missing, over_balls needs it"),
     "too long": ("span = 23.5\nteeth_spanned = 3", "", "pinion.span: 23.5 mm must be at most 23.144"),
     "of another gear": ("span = 35.0\nteeth_spanned = 3", "", "pinion.span: measured = 35 mm must be at least 14"),
@@ -325,6 +356,11 @@ REFUSED = {
     "class of one gear": ("quality_class = 6", "", "wheel.quality_class: missing, the other gear has one"),
     "no such class": ("quality_class = 14", "", "pinion.quality_class: 14 must be at least 1 and at most 11"),
     "form circle outside": ("tip_form_diameter = 65.0", "", "pinion.tip_form_diameter: 65 mm must be at most 63.6 mm"),
+    "form circle of meeting chamfers": (
+        "tip_form_diameter = 59.0",
+        "",
+        "pinion.tip_form_diameter: 59 mm leaves no tip land: chamfers of 45 degrees are there 2.3 mm high",
+    ),
     "form circle inside": ("tip_form_diameter = 50.0", "", "pinion.tip_form_diameter: 50 mm must be greater than 53."),
 }
 

@@ -338,6 +338,19 @@ def test_slopes_backwards_are_those_forwards(mesh):
     assert float(jax.jit(jax.grad(safety))(at)) == pytest.approx(float(jax.jit(jax.jacfwd(safety))(at)), rel=1e-9)
 
 
+def test_standstill_is_never_safe(solve):
+    """Without motion there is neither a film nor a coefficient of friction: a traced speed of 0 gives no numbers."""
+
+    @jax.jit
+    def safeties(speed):
+        cycle = solve(50.0, speed)
+        names = "scuffing_safety", "mesh_efficiency", "max_contact_temperature", "max_flash_temperature"
+        return jnp.stack([OIL.quantity(name)(cycle) for name in names])
+
+    assert np.all(np.isfinite(safeties(100.0)))
+    assert not np.any(np.isfinite(safeties(0.0)))
+
+
 def test_many_cycles_and_many_oils(solve):
     cycles = [solve(torque) for torque in (150.0, 250.0)]
     many = jax.tree.map(lambda *parts: jnp.stack(parts), *cycles)

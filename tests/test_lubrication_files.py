@@ -84,6 +84,7 @@ def test_tables_bring_the_quantities_that_they_tell_of(load):
     assert names(PAIR) == {"max_flash_temperature"}
     rubbing = names(PAIR + "friction = 0.05")
     assert rubbing == {"max_flash_temperature", "loss_power", "mesh_efficiency"}
+    assert names(PAIR.replace("speed = 3000.0", "friction = 0.05")) == {"mesh_efficiency"}
     oiled = names(PAIR + OIL)
     assert oiled > rubbing and "scuffing_safety" in oiled and "micropitting_safety" not in oiled
     rated = {"pinion_pitting_safety", "wheel_pitting_safety", "pinion_root_safety", "wheel_root_safety"}
@@ -94,6 +95,14 @@ def test_tables_bring_the_quantities_that_they_tell_of(load):
     "text, message",
     [
         (PAIR.replace("speed = 3000.0", "") + OIL, "pair.toml: lubricant: has no effect without load.speed"),
+        (
+            PAIR.replace("3000.0", "0.0") + OIL,
+            "pair.toml: load.speed: 0 rpm must be greater than 0 rpm with [lubricant]",
+        ),
+        (
+            PAIR.replace("3000.0", '"n"') + OIL + "[variables]\nn = { low = 0.0, high = 3000.0 }",
+            "pair.toml: variables.n.low: 0 rpm must be greater than 0 rpm with [lubricant]",
+        ),
         (PAIR + OIL + 'friction = "xu"', 'lubricant.friction: "xu" is not known'),
         (PAIR + "friction = 0.05" + OIL + 'friction = "schlenk"', "lubricant.friction: has no effect beside load.fric"),
         (

@@ -33,6 +33,7 @@ def replaced(cycle, where, **values):
 
 def test_a_usual_design_raises_no_doubt(cycle):
     assert plausibility(cycle, torque_range=(25.0, 100.0), speed=3000.0, friction=0.06) == ()
+    assert plausibility(cycle, oil_friction=0.06, bulk_temperature=95.0) == ()
 
 
 @pytest.mark.parametrize(
@@ -44,6 +45,9 @@ def test_a_usual_design_raises_no_doubt(cycle):
         ({"pinion": jg.TipRelief(7.0, 3.0) + jg.RootRelief(7.0, 30.0)}, ("length of the modification", "pinion")),
         ({"pinion": jg.EndRelief(7.0, 15.0)}, ("length of the modification", "pinion")),
         ({"friction": 3.7}, ("coefficient of friction", "")),
+        ({"oil_friction": 0.3}, ("coefficient of friction of the oil", "")),
+        ({"oil_friction": float("nan")}, ("coefficient of friction of the oil", "")),
+        ({"bulk_temperature": 190.0}, ("bulk temperature", "")),
         ({"speed": 1e6}, ("pitch line velocity", "")),
         ({"torque_range": (60.0, 100.0)}, ("torque", "")),
     ],
@@ -81,6 +85,15 @@ def test_results_beyond_materials_and_contact(cycle, mesh):
     assert {("flank pressure", ""), ("root stress", "pinion"), ("root stress", "wheel")} <= names(heavy)
     deep = jg.solve(mesh, 2.0, pinion=jg.TipRelief(60.0, 5.5), wheel=jg.TipRelief(60.0, 5.5))
     assert ("effective contact ratio", "") in names(deep)
+
+
+def test_nominal_stress_is_not_made_for_contact_ratios_above_two():
+    slim = [
+        jg.Gear(teeth, 3.0, 20.0, face_width=20.0, addendum=1.35, dedendum=1.6, root_radius=0.2) for teeth in (40, 60)
+    ]
+    cycle = jg.solve(jg.prepare(jg.GearPair(*slim), resolution=jg.Resolution(positions=8, pairs=4)), 100.0)
+    assert float(cycle.kinematics.path_of_contact.contact_ratio) > 2
+    assert ("contact ratio", "") in names(cycle)
 
 
 def test_a_doubt_reads_like_a_question_of_a_colleague(cycle):

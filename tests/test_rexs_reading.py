@@ -9,6 +9,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import equinox as eqx
+import jax
 import numpy as np
 import pytest
 
@@ -302,6 +303,19 @@ def test_tooth_thickness_by_every_measure_of_a_drawing(written):
         assert float(found.tooth_thickness_tolerance) == pytest.approx(40.0, abs=1e-6), name
 
 
+def test_a_tooth_without_deviation_over_balls_is_read_in_single_precision(written):
+    name = "backlash_allowance_balls_or_pins"
+    limits = ((f"upper_{name}", "0.0"), (f"lower_{name}", "-0.1"), ("diameter_of_measuring_ball_or_pin", "5.5"))
+    tolerances = []
+    for double in (False, True):
+        with jax.enable_x64(double):
+            written.path.write_text(written.text)
+            found = gear_with(written, *limits)
+        assert float(found.tooth_thickness_allowance) == 0.0
+        tolerances.append(float(found.tooth_thickness_tolerance))
+    assert tolerances[0] == pytest.approx(tolerances[1], rel=1e-3) and tolerances[1] > 40.0
+
+
 def test_a_chamfered_tip_by_its_diameter_or_its_height(written):
     assert float(gear_with(written, ("tip_form_diameter", "62.5")).tip_form_diameter) == 62.5
     assert gear_with(written, ("tip_form_diameter", "63.0")).tip_form_diameter is None
@@ -326,6 +340,8 @@ REFUSED = {
     "no tip form": (TEETH, attribute("tip_form_diameter", "63.5") + TEETH, "tip_form_diameter = 63.5 mm must be"),
     "no class": (TEETH, attribute("global_tolerance_class_iso_1328_2013", "12", "none") + TEETH,
                  'global_tolerance_class_iso_1328_2013: "12" is not supported, must be one of 1, 2,'),
+    "one class": (TEETH, attribute("global_tolerance_class_iso_1328_2013", "6", "none") + TEETH,
+                  "global_tolerance_class_iso_1328_2013: missing, the other gear has one"),
     "no ball": (TEETH, attribute("upper_backlash_allowance_balls_or_pins", "-0.1") + TEETH,
                 "diameter_of_measuring_ball_or_pin: missing"),
     "reversed": (TEETH, attribute("upper_backlash_allowance_referenced_to_span", "-90", "mum")

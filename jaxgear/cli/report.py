@@ -102,6 +102,8 @@ def doubts(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, 
     found = {}
     for name, design in evaluations.items():
         options |= {"pinion": design.pinion, "wheel": design.wheel}
+        options |= {"oil_friction": design.metrics.get("friction_coefficient")}
+        options |= {"bulk_temperature": design.metrics.get("bulk_temperature_degC")}
         options["verified"] = design.verified and design.verified.ppte
         found[name] = plausibility(design.cycle, **options)
     return found

@@ -37,7 +37,8 @@ class Gear(Checked):
             which cannot pass its torque on along the axis, so without a held circle its wind-up has no limit.
         tip_form_diameter: d_Fa, where chamfer or rounding of the tip begins and the active flank ends [mm] (ISO 21771);
             None for a flank up to the tip diameter. The path of contact ends there, the corner that touches beyond it
-            is the edge there, and tip reliefs count from it. A chamfer is taken to lie at 45 degrees.
+            is the edge there, and tip reliefs count from it. A chamfer is taken to lie at 45 degrees and
+            leaves some of the tip land.
         tip_edge_radius: radius of the edge between flank and tip cylinder or chamfer [mm], used for the pressure of
             corner contact only.
         tooth_thickness_allowance: E_sns, upper allowance of the tooth thickness (ISO 21771), by which the tooth is
@@ -167,7 +168,7 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
     shape = _shape(gear)
     if any(isinstance(number, jax.core.Tracer) for number in shape):
         return ()
-    height, land, rim, chamfer, tip, form, base, root, bore = (float(number) for number in shape)
+    height, land, rim, chamfer, left, tip, form, base, root, bore = (float(number) for number in shape)
     name = "addendum" if gear.tip_diameter is None else "tip_diameter"
     faults = []
     if not height > 0:
@@ -181,6 +182,11 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
         faults.append(f"Gear: tip_form_diameter = {form:.6g} mm must be at most {tip:.6g} mm, the tip diameter")
     elif height > 0 and not form > max(base, root):
         faults.append(f"Gear: tip_form_diameter = {form:g} mm must be greater than {max(base, root):g} mm")
+    elif land > 0 and not left > -CHAMFER_ACCURACY:
+        faults.append(
+            f"Gear: tip_form_diameter = {form:.6g} mm leaves no tip land: chamfers of 45 degrees are there "
+            f"{chamfer:.4g} mm high and meet below the tip diameter, {tip:.6g} mm"
+        )
     if not rim > 0:
         faults.append(f"Gear: bore_diameter = {bore:g} mm must be less than {root:g} mm")
     return tuple(faults)
@@ -189,8 +195,12 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
 @program
 def _shape(gear: Gear) -> tuple[Scalar, ...]:
     """Margins of the shape, then the diameters of tip, tip form, base and root circle and bore [mm]."""
+    # chamfers of 45 degrees meet as high above the form circle's chord as half of that is long; a rounding is no higher
+    angle = half_tooth_angle(gear, gear.tip_roll_length)
+    left = gear.tip_form_radius * (jnp.sin(angle) + jnp.cos(angle)) - gear.tip_radius
     radii = (gear.tip_radius, gear.tip_form_radius, gear.base_radius, gear.root_circle_radius, gear.bore_radius)
-    return gear.tip_height, gear.tip_land, gear.rim_thickness, gear.tip_chamfer, *(2 * radius for radius in radii)
+    margins = gear.tip_height, gear.tip_land, gear.rim_thickness, gear.tip_chamfer, left
+    return *margins, *(2 * radius for radius in radii)
 
 
 def _rack_radius_limit(gear: Gear) -> float | None:

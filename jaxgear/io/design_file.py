@@ -17,7 +17,7 @@ from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
 from . import rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, template
 from .as_function import FileDesign, FileMesh
-from .errors import DesignFileError, naming, refuse_given, refused
+from .errors import DesignFileError, naming, refused
 from .flanks import check_files
 from .gearbox import support_of
 from .gears import both_classes, gear_of, materials_of, pair_of, quality_of, with_quality
@@ -48,7 +48,7 @@ class DesignFile:
         torque: design torque on the pinion [N m]; the middle of its bounds where it is a variable.
         torque_range: lowest and highest torque of interest [N m].
         speed: of the pinion [rpm], None if the file names none; the middle of its bounds where it is a variable.
-        friction: mean coefficient of friction; used with a speed only, None for the library's default.
+        friction: mean coefficient of friction; None for the library's default.
         quality_classes: flank tolerance classes of pinion and wheel, of the gears or of [tolerance]; None without.
         bounds: (low, high) of every free parameter, in its unit.
         units: unit of every free parameter, "" for a pure number.
@@ -250,7 +250,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         tolerance=tolerance,
         dynamics=None if top.dynamics is None else decode("dynamics", top.dynamics, schema_dynamics.DynamicsSection),
         wear=None if top.wear is None else decode("wear", top.wear, schema_wear.WearSection),
-        lubricant=rating.lubricant_of(top.lubricant, load, file.parent),
+        lubricant=rating.lubricant_of(top.lubricant, load, bounds, file.parent),
         strength=rating.strength_of(top.strength, file.parent),
         layout=layout,
         support=support_of(top, layout, usual_pair, torque, file.parent, materials),
@@ -272,8 +272,6 @@ def _load(table: schema.Tables) -> schema.LoadSection:
     if load.torque_range is not None:
         low, high = load.torque_range
         increasing("load.torque_range[1]", low, high, unit=" N m")
-    if load.speed is None:
-        refuse_given("load", load, ["friction"], " without load.speed (flash temperature)")
     return load
 
 

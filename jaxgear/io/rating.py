@@ -1,5 +1,6 @@
 """The tables [lubricant] and [strength], which may stand in files of their own."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -34,22 +35,32 @@ class StrengthSection(FileKey, section_of(Strength, open=False)):  # type: ignor
     """What the gears bear, for the safety factors."""
 
 
-def lubricant_of(table: Tables | None, load: LoadSection, folder: Path) -> Lubricant | None:
+def lubricant_of(
+    table: Tables | None, load: LoadSection, bounds: Mapping[str, tuple[float, float]], folder: Path
+) -> Lubricant | None:
     """The lubricant of a design file; None without the table.
 
     Args:
         table: as it was read.
         load: under which the oil is used.
+        bounds: (low, high) of every free parameter.
         folder: of the design file.
 
     Raises:
-        DesignFileError: for anything that is wrong with it, or without a speed.
+        DesignFileError: for anything that is wrong with it, or without a speed, or at standstill.
     """
     if table is None:
         return None
     section = _whole("lubricant", table, LubricantSection, folder)
     if load.speed is None:
         raise DesignFileError("lubricant", "has no effect without load.speed")
+    key, slowest = "load.speed", load.speed
+    if isinstance(slowest, str):
+        key, slowest = f"variables.{slowest}.low", bounds[slowest][0]
+    if not slowest > 0:
+        raise DesignFileError(
+            key, f"{slowest:g} rpm must be greater than 0 rpm with [lubricant]: no film without motion"
+        )
     if load.friction is not None:
         for name in ("friction", "friction_factor"):
             if getattr(section, name) is not None:

@@ -158,7 +158,8 @@ class LoadSection(section_of(Operation)):  # type: ignore[misc]
         torque: design torque on the pinion.
         torque_range: lowest and highest torque of interest; half and twice the design torque without it.
         speed: of the pinion, for temperatures, film and loss.
-        friction: mean coefficient of friction, used with a speed only; in place of the law of [lubricant].
+        friction: mean coefficient of friction, for efficiency and, with a speed, loss and temperatures; in place of the
+            law of [lubricant].
     """
 
     torque: Annotated[Any, real(Number("N m", low=0.0, open_low=True), open=True)]

@@ -84,12 +84,13 @@ def drawn_gear(**given: Any) -> Gear:
     thickness = {name: given.pop(name) for name in _THICKNESS if given.get(name) is not None}
     if not thickness:
         return Gear(**given)
+    says = ToothThickness(**thickness)
     if given.get("tooth_thickness_tolerance") is not None:
         which = next(name for name in ("span", "over_balls", "tooth_thickness_allowance") if name in thickness)
         if which != "tooth_thickness_allowance" or np.ndim(thickness[which]):
             raise ValueError(f"Gear: tooth_thickness_tolerance: has no effect, give lower and upper limit of {which}")
         return Gear(**given, **thickness)
-    return with_thickness(Gear(**given), ToothThickness(**thickness))
+    return with_thickness(Gear(**given), says)
 
 
 def with_thickness(gear: Gear, thickness: ToothThickness) -> Gear:

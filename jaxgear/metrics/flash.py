@@ -49,5 +49,6 @@ def _flash(cycle: MeshCycle, speed, friction) -> Load:
     sink = pair.pinion.material.thermal_contact_coefficient * safe_sqrt(
         pinion_speed
     ) + pair.wheel.material.thermal_contact_coefficient * safe_sqrt(wheel_speed)
-    rise = _BLOK_FACTOR * safe_divide(heat, sink[:, None] * safe_sqrt(2 * half_width))
+    # no heat makes no rise, also where it is not conducted; heat that is not finite stays so
+    rise = _BLOK_FACTOR * safe_divide(heat, sink[:, None] * safe_sqrt(2 * half_width), default=0.0 * heat)
     return jnp.where((kinematics.outside <= 0)[:, None], rise, 0.0)

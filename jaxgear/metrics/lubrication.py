@@ -162,7 +162,7 @@ def specific_film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
 
 
 def _mean_over_path(cycle: MeshCycle, field: Load) -> Scalar:
-    """Mean of a field over the path of contact, where it is not zero, and over the face."""
+    """Mean of a field over the whole path of contact, where it is zero included, and over the face."""
     kinematics = cycle.kinematics
     width = kinematics.slice_width
     over_face = jnp.einsum("psn,s->pn", field, width) / jnp.sum(width)

@@ -46,6 +46,13 @@ LIMITS = {
     "tip edge radius in modules": Limit(0.0, 0.2, "", "an edge is broken by 0.01 to 0.1 modules"),
     "least backlash": Limit(-0.1, np.inf, "um", "the thickest teeth that the tolerances allow jam"),
     "coefficient of friction": Limit(0.0, 0.5, "", "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"),
+    "coefficient of friction of the oil": Limit(
+        0.01, 0.2, "", "lubricated gears 0.03 to 0.12: the law is not made for it"
+    ),
+    "bulk temperature": Limit(
+        -np.inf, 180.0, "degC", "case-hardened steel softens there, and mineral oil ages above 120"
+    ),
+    "contact ratio": Limit(1.0, 2.0, "", "nominal contact stress and pitting safety are made for 1 to 2 (ISO 6336-2)"),
     "pitch line velocity": Limit(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
     "depth of the modification": Limit(0.1, np.inf, "um", "less than flanks can be measured to: is it in mm?"),
     "depth of the modification in modules": Limit(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
@@ -89,6 +96,8 @@ def plausibility(
     torque_range: tuple[float, float] | None = None,
     speed: float | None = None,
     friction: float | None = None,
+    oil_friction: float | None = None,
+    bulk_temperature: float | None = None,
     compliance: AbstractCompliance | None = None,
     verified: float | None = None,
 ) -> tuple[Doubt, ...]:
@@ -100,6 +109,8 @@ def plausibility(
         torque_range: lowest and highest torque of interest [N m].
         speed: of the pinion [rpm]; None for that of the cycle.
         friction: coefficient of friction; None for that of the cycle.
+        oil_friction: coefficient of friction that a law gives; None without a lubricant.
+        bulk_temperature: of the teeth [degC]; None without a lubricant.
         compliance: by which it was solved, which the cycle does not tell; None for one that is composed of models.
         verified: PPTE of the same design by the finite-element structure, where it is known [um].
     """
@@ -117,6 +128,10 @@ def plausibility(
         numbers.append(_doubt("pitch line velocity", "", velocity))
     if coefficient is not None:
         numbers.append(_doubt("coefficient of friction", "", coefficient))
+    elif oil_friction is not None:
+        numbers.append(_doubt("coefficient of friction of the oil", "", oil_friction))
+    if bulk_temperature is not None:
+        numbers.append(_doubt("bulk temperature", "", bulk_temperature))
     if torque_range is not None:
         low, high = torque_range
         numbers.append(_doubt("torque", "", cycle.torque, low=low, high=high))
@@ -173,6 +188,7 @@ def _numbers(cycle: MeshCycle):
         ("root stress", "pinion", jnp.max(stress.pinion)),
         ("root stress", "wheel", jnp.max(stress.wheel)),
         ("effective contact ratio", "", effective_contact_ratio(cycle)),
+        ("contact ratio", "", cycle.kinematics.path_of_contact.contact_ratio),
     ]
     return gears, results, cycle.sides
 

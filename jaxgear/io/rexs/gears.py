@@ -19,7 +19,7 @@ _SHIFT = "addendum_modification_coefficient"
 _ALLOWANCES = "chordal_tooth_thickness_upper_deviation", "chordal_tooth_thickness_lower_deviation"
 _SPANS = "upper_backlash_allowance_referenced_to_span", "lower_backlash_allowance_referenced_to_span"
 _BALLS = "upper_backlash_allowance_balls_or_pins", "lower_backlash_allowance_balls_or_pins"
-_QUALITY = "global_tolerance_class_iso_1328_2013"
+QUALITY = "global_tolerance_class_iso_1328_2013"
 # What a gear of the library has not: it must be absent or zero. (component, attribute, unit)
 _NOT_HERE = (
     ("cylindrical_gear", "chamfer_at_tooth_end", "mm"),
@@ -121,9 +121,9 @@ def read_gear(model: Model, gear: Component, flank: Component) -> Gear:
 
 def read_quality(gear: Component) -> int | None:
     """Flank tolerance class of ISO 1328-1:2013, None where it names none."""
-    if _QUALITY not in gear.attributes:
+    if QUALITY not in gear.attributes:
         return None
-    return int(gear.choice(_QUALITY, None, [str(number) for number in range(1, 12)]))
+    return int(gear.choice(QUALITY, None, [str(number) for number in range(1, 12)]))
 
 
 def write_gear(model: Model, gear: Gear, name: str, quality: int | None) -> tuple[Component, list[Component]]:
@@ -142,7 +142,7 @@ def write_gear(model: Model, gear: Gear, name: str, quality: int | None) -> tupl
         root_diameter=(2 * gear.root_circle_radius, "mm"),
         inner_diameter=(gear.bore_diameter, "mm"),
         datum_face_orientation=("negative", "none"),
-        **{_QUALITY: (None if quality is None else str(quality), "none")},
+        **{QUALITY: (None if quality is None else str(quality), "none")},
         **{name: (_chordal(gear, limit), "mm") for name, limit in zip(_ALLOWANCES, limits)},
         **{_THERMAL: (shifted(gear.material.thermal_contact_coefficient, -3), "N / (mm s^0.5 K)")},
         **{_EDGE: (gear.tip_edge_radius, "mm")},
@@ -249,7 +249,10 @@ def _thickness(gear: Component, made: Gear) -> dict[str, Any]:
         given = [limit for limit in limits if limit is not None]
         if not given:
             continue
-        high, low = (refused(gear.where(names[0]), allowance, limit) for limit in (given[0], given[-1]))
+        # no deviation is no allowance, whatever the measure is rounded to on the way
+        high, low = (
+            refused(gear.where(names[0]), allowance, limit) if limit else 0.0 for limit in (given[0], given[-1])
+        )
         if low > high:
             raise gear.refuse(names[1], f"{given[-1]:g} must be at most the upper one, {given[0]:g}")
         if high > 0:

@@ -14,7 +14,7 @@ from ...microgeometry import AbstractModification, NoModification
 from ..errors import DesignFileError, naming, refused
 from ..toml import content
 from .frame import Frame, frames
-from .gears import check_spur, read_gear, read_quality
+from .gears import QUALITY, check_spur, read_gear, read_quality
 from .json_form import parse_json
 from .model import Component, Model
 from .parse import parse
@@ -105,9 +105,17 @@ def _read(model: Model, stage: int | None, flank: str | None, load_case: int | N
     torque, speed = _load(model, chosen, gears[0], load_case)
     units = [part for part in model.components.values() if part.type == "gear_unit"]
     title = units[0].text("model_name") if units else ""
+    return RexsPair(title, pair, on_pinion, on_wheel, torque, speed, _classes(gears))
+
+
+def _classes(gears: list[Component]) -> tuple[int, int] | None:
+    """Flank tolerance classes of both gears; None where neither has one."""
     first, second = (read_quality(gear) for gear in gears)
-    classes = None if first is None or second is None else (first, second)
-    return RexsPair(title, pair, on_pinion, on_wheel, torque, speed, classes)
+    if first is None and second is None:
+        return None
+    if first is None or second is None:
+        raise gears[0 if first is None else 1].refuse(QUALITY, "missing, the other gear has one")
+    return first, second
 
 
 def _stage(model: Model, wanted: int | None) -> Component:
