@@ -117,7 +117,7 @@ def few_modes(
     share the modes of their mean.
 
     Loads beside an overhang fall or rise within less than a root chord of the end, which few waves cannot follow. With
-    `ends` these four shapes take the place of the two shortest waves, and F is exact on the constant for every overhang.
+    `ends` these four shapes take the place of the two shortest waves, and F is exact on the constant for any overhang.
 
     Args:
         kernel: F, symmetric, positive definite; a leading axis for several.
