@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import jaxgear as jg
-from jaxgear.compliance import ElasticRing, face_kernel
+from jaxgear.compliance import ElasticRing, face_ends, face_kernel, few_modes
 from jaxgear.compliance.plane import plane_stress_share
 from jaxgear.geometry import outline
 from jaxgear.layout import FlankLine
@@ -30,7 +30,7 @@ def pair_of(pinion=18.0, wheel=18.0, offset=0.0):
 
 
 def mesh_of(pair, slices=6):
-    sizes = jg.Resolution(positions=4, slices=slices, pairs=2, patch_nodes=1, face_modes=3)
+    sizes = jg.Resolution(positions=4, slices=slices, pairs=2, patch_nodes=1, face_modes=6)
     return jg.prepare(pair, resolution=sizes)
 
 
@@ -41,6 +41,20 @@ def contact(pinion=18.0, wheel=18.0, offset=0.0, *, slope=0.0, crowning=0.0, on_
     `on_wheel` is the crowning of the wheel.
     """
     return contact_of(jnp.asarray([pinion, wheel, offset]), jnp.asarray([slope, crowning, on_wheel]))
+
+
+def kernels_of(width, slices, overhangs):
+    """Of both gears, over their means as a mesh has them, and these means."""
+    both = jnp.stack([face_kernel(width, CHORD, slices, each) for each in overhangs])
+    shares = jnp.mean(jnp.sum(both, axis=2), axis=1)
+    return both / shares[:, None, None], shares
+
+
+def by_few(kernels, width, count=5):
+    """The kernels that few modes make, the modes, and their shares."""
+    slices = kernels.shape[-1]
+    modes, share, rest = few_modes(kernels, count, face_ends(width, CHORD, slices))
+    return rest[:, None, None] * jnp.eye(slices)[None] + modes @ share @ modes.T, modes, share
 
 
 @eqx.filter_jit
@@ -187,3 +201,51 @@ def test_faces_that_do_not_overlap_are_refused():
     overlap = jax.jit(jax.value_and_grad(lambda offset: jg.margins(pair_of(offset=offset)).face_overlap))
     np.testing.assert_allclose(overlap(19.0), (-1.0, -1.0))
     assert not bool(jnp.any(contact(offset=19.0)[2]))
+
+
+@pytest.mark.parametrize("width", [6.0, 18.0, 60.0, 200.0])
+@pytest.mark.parametrize("slices", [9, 24])
+def test_few_modes_are_exact_on_an_even_load(width, slices):
+    """Whatever overhangs, rows of the kernel sum to a constant and shapes that decay from the ends."""
+    for overhangs in (((0.0, 0.0), (0.0, 0.0)), ((6.0, 0.0), (0.0, 0.0)), ((20.0, 5.0), (0.0, 7.0))):
+        kernels, _ = kernels_of(width, slices, overhangs)
+        found, modes, share = by_few(kernels, width)
+        assert modes.shape == (slices, 7)
+        np.testing.assert_allclose(modes.T @ modes, np.eye(7), atol=1e-11)
+        np.testing.assert_allclose(found.sum(axis=2), kernels.sum(axis=2), rtol=1e-11)
+        assert np.linalg.eigvalsh(share).min() > 0
+
+
+@pytest.mark.parametrize(
+    "width, overhangs, even, others",
+    [(18.0, ((6.0, 0.0), (0.0, 0.0)), 5e-4, 2e-3), (60.0, ((10.0, 5.0), (0.0, 0.0)), 3e-3, 1.2e-2)],
+)
+def test_line_loads_by_few_modes_are_those_by_all(width, overhangs, even, others):
+    """Of two bodies with springs between them: an even approach, a slope and crowning, over the largest line load."""
+    slices, load = 24, 150.0
+    kernels, shares = kernels_of(width, slices, overhangs)
+    place = (np.arange(slices) + 0.5) / slices - 0.5
+
+    def loads(kernels, gap):  # of a typical pair [um mm/N]: each gear 0.025, Hertzian contact 0.02; all touch
+        matrix = np.einsum("g,gst->st", 0.025 * np.asarray(shares), kernels) + 0.02 * np.eye(slices)
+        unit, bent = np.linalg.solve(matrix, np.stack([np.ones(slices), gap], axis=1)).T
+        return unit * (load * slices + bent.sum()) / unit.sum() - bent
+
+    for gap, most in ((0 * place, even), (8 * place, others), (16 * place**2, others)):
+        whole, few = loads(np.asarray(kernels), gap), loads(np.asarray(by_few(kernels, width)[0]), gap)
+        assert whole.min() > 0 and np.ptp(whole) > 0.02 * load
+        assert np.abs(few - whole).max() < most * whole.max()
+
+
+def test_few_modes_of_flush_ends_have_derivatives():
+    weight = jnp.asarray(np.random.default_rng(0).normal(size=(2, 11, 11)))
+
+    def number(width, overhang):
+        kernels, _ = kernels_of(width, 11, ((overhang, 0.0), (0.0, overhang)))
+        return jnp.sum(weight * by_few(kernels, width)[0])
+
+    for index, step in ((0, 1e-4), (1, 1e-5)):
+        at = [jnp.asarray(18.0), jnp.asarray(0.0)]
+        ends = [number(*(x + sign * step * (i == index) for i, x in enumerate(at))) for sign in (1, -1)]
+        central = (ends[0] - ends[1]) / (2 * step)
+        np.testing.assert_allclose(jax.grad(number, index)(*at), central, rtol=1e-5)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import equinox as eqx
+import jax.numpy as jnp
 import pytest
 
 import jaxgear as jg
@@ -70,6 +71,20 @@ def test_slips_of_flanks_and_operation(cycle, options, expected):
 def test_slips_of_gears(cycle, values, expected):
     wrong = replaced(replaced(cycle, "wheel", **values), "pinion", **values)
     assert expected in {name for name, _ in names(wrong)}
+
+
+def test_end_reliefs_beyond_the_mate(cycle):
+    """A gear that overhangs the load by 2 mm at both ends has 2 mm of relief without effect."""
+    width = float(cycle.kinematics.pair.wheel.face_width)
+    wide, relief = replaced(cycle, "pinion", face_width=width + 4.0), ("length of the end relief", "pinion")
+    assert relief in names(wide, pinion=jg.EndRelief(7.0, 1.9))
+    assert relief in names(wide, pinion=jg.TipRelief(7.0, 3.0) + jg.EndRelief(7.0, 1.9, side="positive"))
+    assert relief not in names(wide, pinion=jg.EndRelief(7.0, 2.1))
+    assert names(wide, wheel=jg.EndRelief(7.0, 1.9)) == set()
+    aside = replaced(wide, "pinion", face_width=width + 2.0)
+    aside = eqx.tree_at(lambda c: c.kinematics.pair.axial_offset, aside, jnp.asarray(1.0))
+    assert relief in names(aside, pinion=jg.EndRelief(7.0, 1.9, side="negative"))
+    assert relief not in names(aside, pinion=jg.EndRelief(7.0, 1.9, side="positive"))
 
 
 def test_wide_teeth_are_not_in_plane_stress(cycle):

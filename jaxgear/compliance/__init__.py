@@ -18,6 +18,7 @@ from .body import AbstractBody as AbstractBody
 from .body import ElasticRing as ElasticRing
 from .body import HalfPlane as HalfPlane
 from .body import Sainsot as Sainsot
+from .face import face_ends as face_ends
 from .face import face_kernel as face_kernel
 from .face import few_modes as few_modes
 from .finite_element import GearTable as GearTable

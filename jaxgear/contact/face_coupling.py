@@ -12,6 +12,7 @@ from ..compliance import few_modes
 from ..geometry import GearPair
 from ..numerics import Coupling, Other, concrete
 from ..shafts import AbstractSupport, TabulatedSupport
+from .face_spreading import Spreading
 from .kinematics import Kinematics
 from .resolution import Resolution
 
@@ -22,7 +23,7 @@ _MOST_MISSED = 0.05
 
 def coupling_of(
     moving: Kinematics,
-    kernels: Float[Array, "gears slices slices"],
+    spreading: Spreading,
     wheel: Float[Array, "pairs pairs positions"],
     support: AbstractSupport | None,
 ) -> Coupling | None:
@@ -32,14 +33,15 @@ def coupling_of(
 
     Args:
         moving: kinematics of the pair.
-        kernels: see `Spreading`.
+        spreading: how both gears spread loads.
         wheel: compliance of the wheel, see `Mesh.structure`.
         support: what holds the gears.
     """
     sizes = moving.resolution
     if not sizes.is_coupled:
         return None
-    modes, shares, rests = few_modes(kernels, sizes.face_modes)
+    kernels = spreading.kernels
+    modes, shares, rests = few_modes(kernels, sizes.face_modes, spreading.ends)
     coupling = Coupling(modes, shares[0], rests[0])
     if len(kernels) > 1:
         coupling = replace(coupling, other=Other(wheel, shares[1] - shares[0], rests[1] - rests[0]))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..compliance import face_kernel
+from ..compliance import face_ends, face_kernel
 from ..geometry import GearPair
 from ..geometry.outline import Outline
 from .resolution import Resolution
@@ -18,10 +18,12 @@ class Spreading(NamedTuple):
         shares: mean deflection of the common face under a load that is uniform over it, of pinion and wheel, over that
             of gears which end with it: less than 1 where a gear overhangs the load and helps to carry it.
         kernels: of pinion and wheel, `face_kernel` over its share; a single one where both faces are known to be one.
+        ends: `face_ends`; None where both faces are known to be one.
     """
 
     shares: Float[Array, "gears"]
     kernels: Float[Array, "gears slices slices"]
+    ends: Float[Array, "slices ends"] | None = None
 
 
 def spreading_of(pair: GearPair, outlines: tuple[Outline, Outline], sizes: Resolution, even: bool) -> Spreading:
@@ -42,4 +44,5 @@ def spreading_of(pair: GearPair, outlines: tuple[Outline, Outline], sizes: Resol
     both = [face_kernel(pair.face_width, root_chord, sizes.slices, overhang) for overhang in pair.overhangs]
     kernels = jnp.stack(both)
     shares = jnp.sum(kernels, axis=(1, 2)) / sizes.slices
-    return Spreading(shares, kernels / shares[:, None, None])
+    ends = face_ends(pair.face_width, root_chord, sizes.slices)
+    return Spreading(shares, kernels / shares[:, None, None], ends)

@@ -229,7 +229,7 @@ def prepare_from(
         width_factor=geometry.width_factor[:, 0],
         hub=jnp.sum(compliance.hub(pinion, wheel) * (pair.face_width / own_widths)),
         slice_width=moving.slice_width,
-        coupling=coupling_of(moving, spreading.kernels, structures[1], support),
+        coupling=coupling_of(moving, spreading, structures[1], support),
         support=support,
         support_gap=None if support is None else support.gap(moving.face_coordinate).astype(moving.slice_width.dtype),
         support_torque=None if support is None else support.torque,

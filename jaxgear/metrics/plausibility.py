@@ -13,7 +13,7 @@ import numpy as np
 
 from ..compliance import AbstractCompliance, TabulatedCompliance
 from ..contact import MeshCycle
-from ..microgeometry import AbstractModification, NoModification
+from ..microgeometry import AbstractModification, EndRelief, NoModification
 from ..numerics import program
 from .flank import flank_surface
 from .load import effective_contact_ratio
@@ -57,6 +57,7 @@ LIMITS = {
     "depth of the modification": Limit(0.1, np.inf, "um", "less than flanks can be measured to: is it in mm?"),
     "depth of the modification in modules": Limit(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
     "length of the modification": Limit(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
+    "length of the end relief": Limit(0.0, np.inf, "mm", "less than the gear is wider than its mate: it has no effect"),
     "mean transmission error in modules": Limit(0.0, 0.02, "", "the teeth bend beyond what the model is made for"),
     "PPTE": Limit(0.1, np.inf, "um", "finer than the model can claim of modified flanks"),
     "PPTE by finite elements": Limit(0.03, np.inf, "um", "finer than a model in two dimensions can claim"),
@@ -118,8 +119,9 @@ def plausibility(
     rpm = cycle.operation.speed if speed is None else speed
     coefficient = cycle.operation.friction if friction is None else friction
     # without the flanks: one program serves every kind of them
-    gears, results, sides = _numbers(replace(cycle, pinion=None, wheel=None))
-    numbers = [*(_doubt(*each) for each in gears), *_of_flanks(sides, flanks), *(_doubt(*each) for each in results)]
+    gears, results, sides, overhangs = _numbers(replace(cycle, pinion=None, wheel=None))
+    numbers = [_doubt(*each) for each in (*gears, *results)]
+    numbers[len(gears) : len(gears)] = [*_of_flanks(sides, flanks), *_of_end_reliefs(overhangs, flanks)]
     pair = cycle.kinematics.pair
     if any(float(gear.tooth_thickness_tolerance) for gear in (pair.pinion, pair.wheel)):
         numbers.append(_doubt("least backlash", "", pair.backlash_limits[0]))
@@ -167,7 +169,7 @@ def _doubt(name: str, where: str, value, *, low: float | None = None, high: floa
 
 @program
 def _numbers(cycle: MeshCycle):
-    """Numbers of the gears and of the solution with their names, and both sides."""
+    """Numbers of the gears and of the solution with their names, both sides, and by how much they overhang the load."""
     pair = cycle.kinematics.pair
     gears = []
     for where, gear in (("pinion", pair.pinion), ("wheel", pair.wheel)):
@@ -190,7 +192,7 @@ def _numbers(cycle: MeshCycle):
         ("effective contact ratio", "", effective_contact_ratio(cycle)),
         ("contact ratio", "", cycle.kinematics.path_of_contact.contact_ratio),
     ]
-    return gears, results, cycle.sides
+    return gears, results, cycle.sides, pair.overhangs
 
 
 def _of_flanks(sides, flanks) -> Iterator[Doubt]:
@@ -213,3 +215,12 @@ def _lengths(modification: AbstractModification, profile: float, half_face: floa
     for term in terms:
         if hasattr(term, "length"):
             yield float(term.length), half_face if getattr(term, "varies_along_face", False) else profile
+
+
+def _of_end_reliefs(overhangs, flanks) -> Iterator[Doubt]:
+    """Whether end reliefs reach the common face, at both ends where they are at both."""
+    for where, ends, modification in zip(("pinion", "wheel"), overhangs, flanks):
+        for term in jax.tree.leaves(modification, is_leaf=lambda part: isinstance(part, EndRelief)):
+            if isinstance(term, EndRelief) and term.varies_along_face:
+                beyond = {"negative": ends[:1], "positive": ends[1:], "both": ends}[term.side]
+                yield _doubt("length of the end relief", where, term.length, low=max(map(float, beyond)))

@@ -65,6 +65,9 @@ def crowning_for_tolerance(helix_tolerance, *, limited: bool = False) -> Scalar:
 def iso_crowning(helix_tolerance, shaft_deflection=None, *, limited: bool = True) -> LeadCrowning:
     """Crowning of ISO 6336-1 Annex B, ready to use.
 
+    It counts over the gear's own face: on a gear that is wider than its mate the common face has (common / own)^2 of
+    it. There give it to the narrower gear, or widen its amount.
+
     Args:
         helix_tolerance: f_Hbeta, helix slope tolerance [um].
         shaft_deflection: f_sh [um over the face width]; None where shafts are stiff or their deflection is compensated.
@@ -107,5 +110,9 @@ def end_relief_length(pair: GearPair) -> Scalar:
 def iso_end_relief(
     pair: GearPair, helix_tolerance, shaft_deflection=0.0, *, kind: Kind = "surface_hardened"
 ) -> EndRelief:
-    """Linear end relief on both ends: `end_relief_amount` over `end_relief_length`."""
+    """Linear end relief on both ends: `end_relief_amount` over `end_relief_length`.
+
+    For a gear that ends with the common face. On one that is wider than its mate the relief lies at its own ends,
+    outside of the contact as far as the gear overhangs (a doubt of `plausibility`): give it to the narrower gear.
+    """
     return EndRelief(end_relief_amount(helix_tolerance, shaft_deflection, kind=kind), end_relief_length(pair))
