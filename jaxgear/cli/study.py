@@ -1,7 +1,7 @@
 """Evaluation of a design over the torques of a design file."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import jax
@@ -106,6 +106,6 @@ def _factor(cycle: MeshCycle):
 
 
 @program
-def _numbers(cycle: MeshCycle, further: tuple[str, ...], tables: dict[str, Checked | None]):
+def _numbers(cycle: MeshCycle, further: tuple[str, ...], tables: Mapping[str, Checked | None]):
     """The numbers of a cycle, and some quantities of [lubricant] and [strength], by name and unit."""
     return summary(cycle) | {quantities[name].key: of_tables(name, tables, cycle) for name in further}
