@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jaxgear as jg
-from jaxgear.cli import commands, sweep
+from jaxgear.cli import commands, study, sweep
 from jaxgear.contact import Operation
 from jaxgear.io import DesignFileError, load_design, optimize_request, quantities_of_tables, sweep_request
 
@@ -188,6 +188,20 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
     for label in ("scuffing safety S_B", "pinion root safety S_F", "power loss of the flanks [W]"):
         assert label in shown
     assert "micropitting" not in shown
+
+
+def test_other_oils_and_strengths_are_other_numbers_of_one_program(load, monkeypatch):
+    traced = []
+    monkeypatch.setattr(study, "summary", lambda cycle: traced.append(cycle) or {})
+    cycle = jg.solve(load(PAIR).mesh(), Operation(50.0, 3000.0))
+    for temperature in ("80.0", "90.0"):
+        design = load(PAIR + OIL.replace("80.0", temperature) + STRENGTH.replace("900.0", f"9{temperature}"))
+        further = tuple(quantities_of_tables(design))
+        tables = {"lubricant": design.lubricant, "strength": design.strength}
+        found = study._numbers(cycle, tuple(quantity.name for quantity in further), tables)
+        expected = {quantity.key: float(quantity(cycle)) for quantity in further}
+        assert {name: float(value) for name, value in found.items()} == pytest.approx(expected, rel=1e-9)
+    assert len(traced) == 1
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 """Evaluation of a design over the torques of a design file."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import jax
@@ -9,9 +9,10 @@ import numpy as np
 
 from ..contact import Mesh, MeshCycle, Operation
 from ..io import DesignFile, quantities_of_tables
-from ..metrics import Quantity, face_load_factor, summary
+from ..metrics import face_load_factor, quantities, summary
+from ..metrics.settings import of_tables
 from ..microgeometry import AbstractModification
-from ..numerics import optional_real, program, real
+from ..numerics import Checked, optional_real, program, real
 from ..optimize import Verified
 from ..sweeps import Scatter, over_torques
 
@@ -64,7 +65,10 @@ def evaluate(
     # without the flanks: one program serves every kind of them
     running = Operation(real(file.torque), optional_real(file.speed), optional_real(file.friction))
     bare = replace(cycles[0], pinion=None, wheel=None, operation=running)
-    metrics = jax.tree.map(np.asarray, _numbers(bare, tuple(quantities_of_tables(file))))
+    # names and settings, which are arrays: one program serves all oils and strengths
+    further = tuple(quantity.name for quantity in quantities_of_tables(file))
+    tables = {"lubricant": file.lubricant, "strength": file.strength}
+    metrics = jax.tree.map(np.asarray, _numbers(bare, further, tables))
     return Evaluation(
         pinion=pinion,
         wheel=wheel,
@@ -102,6 +106,6 @@ def _factor(cycle: MeshCycle):
 
 
 @program
-def _numbers(cycle: MeshCycle, further: tuple[Quantity, ...]):
-    """The numbers of a cycle, and some quantities, by name and unit."""
-    return summary(cycle) | {quantity.key: quantity(cycle) for quantity in further}
+def _numbers(cycle: MeshCycle, further: tuple[str, ...], tables: Mapping[str, Checked | None]):
+    """The numbers of a cycle, and some quantities of [lubricant] and [strength], by name and unit."""
+    return summary(cycle) | {quantities[name].key: of_tables(name, tables, cycle) for name in further}

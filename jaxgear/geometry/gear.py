@@ -37,8 +37,8 @@ class Gear(Checked):
             which cannot pass its torque on along the axis, so without a held circle its wind-up has no limit.
         tip_form_diameter: d_Fa, where chamfer or rounding of the tip begins and the active flank ends [mm] (ISO 21771);
             None for a flank up to the tip diameter. The path of contact ends there, the corner that touches beyond it
-            is the edge there, and tip reliefs count from it. A chamfer is taken to lie at 45 degrees and
-            leaves some of the tip land.
+            is the edge there, and tip reliefs count from it. A chamfer is taken to lie at 45 degrees; it
+            must leave some of the tip land.
         tip_edge_radius: radius of the edge between flank and tip cylinder or chamfer [mm], used for the pressure of
             corner contact only.
         tooth_thickness_allowance: E_sns, upper allowance of the tooth thickness (ISO 21771), by which the tooth is

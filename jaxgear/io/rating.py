@@ -28,7 +28,7 @@ class FileKey(Section):
 
 
 class LubricantSection(FileKey, section_of(Lubricant, open=False)):  # type: ignore[misc]
-    """The oil, for friction, temperatures, film and scuffing; needs load.speed."""
+    """The oil, for friction, temperatures, film and scuffing; needs a load.speed greater than 0."""
 
 
 class StrengthSection(FileKey, section_of(Strength, open=False)):  # type: ignore[misc]

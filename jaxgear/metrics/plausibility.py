@@ -126,7 +126,9 @@ def plausibility(
     if any(float(gear.tooth_thickness_tolerance) for gear in (pair.pinion, pair.wheel)):
         numbers.append(_doubt("least backlash", "", pair.backlash_limits[0]))
     if rpm is not None:
-        velocity = float(rpm) * 2 * np.pi / 60 * float(pair.pinion.pitch_radius) * 1e-3
+        # from numbers, as a product of arrays compiles anew in every process
+        diameter = float(pair.pinion.module) * float(pair.pinion.teeth)
+        velocity = float(rpm) * np.pi / 60 * diameter * 1e-3
         numbers.append(_doubt("pitch line velocity", "", velocity))
     if coefficient is not None:
         numbers.append(_doubt("coefficient of friction", "", coefficient))

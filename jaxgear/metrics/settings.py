@@ -1,7 +1,8 @@
 """Quantities that need more than a cycle: settings, as plain data, so that compiled programs know them again."""
 
 import dataclasses
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import jax
@@ -99,6 +100,24 @@ def with_settings(name: str, settings: Checked) -> Quantity:
     return dataclasses.replace(quantities[name], of=settled(name, settings, _by_settings))
 
 
+def of_tables(name: str, tables: Mapping[str, Any], cycle: MeshCycle) -> Any:
+    """A quantity of a cycle with settings that may be traced: one program for all their numbers.
+
+    Args:
+        name: of a quantity that the class of the settings gives.
+        tables: settings by the table of a design file that holds them; None for what the quantity is without.
+        cycle: solved.
+    """
+    quantity = quantities[name]
+    stands = without_settings(quantity)
+    assert stands is not None and stands.of is not None  # or it were no quantity of a table
+    settings = tables[stands.table]
+    if settings is None:
+        return quantity(cycle)
+    of = functools.partial(_with, stands.of, settings)
+    return dataclasses.replace(quantity, of=of)(cycle)
+
+
 def without_settings(quantity: Quantity) -> WithoutSettings | None:
     """What stands in the vocabulary for a quantity of settings; None for any other one."""
     return quantity.of if isinstance(quantity.of, WithoutSettings) else None
@@ -113,9 +132,12 @@ def _given_by(owner: str, quantity: Quantity | None) -> WithoutSettings | None:
 def _by_settings(given: WithSettings, cycle: MeshCycle) -> Any:
     stands = without_settings(quantities[given.name])
     assert stands is not None and stands.of is not None  # `with_settings` has looked
+    return _with(stands.of, given.settings, cycle)
+
+
+def _with(of: Callable[[MeshCycle, Any], Any], settings: Any, cycle: MeshCycle) -> Any:
     dtype = cycle.transmission_error.dtype
-    settings = jax.tree.map(lambda number: number.astype(dtype), given.settings)
-    return stands.of(cycle, settings)
+    return of(cycle, jax.tree.map(lambda number: number.astype(dtype), settings))
 
 
 def _hashable(owner: str, name: str, value: Any) -> Any:
