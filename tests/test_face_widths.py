@@ -249,3 +249,15 @@ def test_few_modes_of_flush_ends_have_derivatives():
         ends = [number(*(x + sign * step * (i == index) for i, x in enumerate(at))) for sign in (1, -1)]
         central = (ends[0] - ends[1]) / (2 * step)
         np.testing.assert_allclose(jax.grad(number, index)(*at), central, rtol=1e-5)
+
+
+def test_models_of_two_dimensions_know_no_overhang():
+    """In one plane a wider pinion is the same pinion: references in two dimensions have one width."""
+
+    def error(width, plane):
+        sizes = jg.Resolution(positions=4, pairs=2, patch_nodes=1)
+        mesh = jg.prepare(pair_of(pinion=width), compliance=jg.default_compliance(plane=plane), resolution=sizes)
+        return np.asarray(jg.solve(mesh, TORQUE).transmission_error)
+
+    np.testing.assert_allclose(error(24.0, "strain"), error(18.0, "strain"), rtol=1e-12)
+    assert (error(24.0, "auto") < 0.95 * error(18.0, "auto")).all()

@@ -76,7 +76,7 @@ class Compliance(AbstractCompliance):
         contact: approach of the flanks.
         plane: "auto" for teeth and bodies between plane stress and plane strain, each gear by its face width over its
             root chord, and the contact in plane strain; "stress" or "strain" for everything in one of them, as
-            two-dimensional references are.
+            two-dimensional references are: what overhangs the mate's face does not help there.
         edge_softening: soften the contact where a tip corner cuts it off (see `edge`).
     """
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..compliance import face_ends, face_kernel
-from ..geometry import GearPair
+from ..compliance import AbstractCompliance, face_ends, face_kernel
+from ..geometry import GearPair, is_even
 from ..geometry.outline import Outline
 from .resolution import Resolution
 
@@ -26,6 +26,11 @@ class Spreading(NamedTuple):
     ends: Float[Array, "slices ends"] | None = None
 
 
+def ends_together(pair: GearPair, compliance: AbstractCompliance) -> bool:
+    """Whether neither gear is known to help beyond the common face: in one plane nothing lies beyond it."""
+    return is_even(pair) or compliance.plane != "auto"
+
+
 def spreading_of(pair: GearPair, outlines: tuple[Outline, Outline], sizes: Resolution, even: bool) -> Spreading:
     """How both gears spread loads over the slices of a mesh.
 
@@ -35,7 +40,7 @@ def spreading_of(pair: GearPair, outlines: tuple[Outline, Outline], sizes: Resol
         pair: the gears.
         outlines: of both.
         sizes: for the number of slices.
-        even: whether both faces are known to be one.
+        even: as of `ends_together`.
     """
     root_chord = 0.5 * (outlines[0].root_chord + outlines[1].root_chord)
     if even:

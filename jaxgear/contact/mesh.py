@@ -12,13 +12,13 @@ from ..compliance import AbstractCompliance, default_compliance
 from ..compliance.hertz import contact_geometry
 from ..compliance.plane import contact_plane
 from ..compliance.toothload import tooth_load
-from ..geometry import GearPair, Margins, PathOfContact, is_even, margins_between, outline
+from ..geometry import GearPair, Margins, PathOfContact, margins_between, outline
 from ..microgeometry import Flank
 from ..numerics import AbstractSpring, Coupling, on_both, program
 from ..shafts import AbstractSupport
 from .covering import check_cover, closing, pairs_for
 from .face_coupling import check_modes, check_support, coupling_of
-from .face_spreading import spreading_of
+from .face_spreading import ends_together, spreading_of
 from .kinematics import Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution
 
@@ -54,7 +54,8 @@ class Mesh(eqx.Module):
         support_gap: by which it opens the flanks without the force of this mesh [um], shape (slices,); None without.
         support_torque: at which the support holds [N m]; None where it does at every torque.
         automatic: whether the number of pairs was left to `prepare`: `solve` takes more where they are too few.
-        even: whether both faces are known to be one, so that neither gear overhangs the other.
+        even: whether neither gear is known to help beyond the common face: both end together, or the model is one of
+            two dimensions.
     """
 
     kinematics: Kinematics
@@ -180,7 +181,7 @@ def prepare(
     if automatic:
         resolution = replace(resolution, pairs=pairs_for(pair, deflection))
     check_support(support, pair, resolution)
-    mesh = prepare_from(np.zeros(()), pair, compliance, resolution, support, is_even(pair))
+    mesh = prepare_from(np.zeros(()), pair, compliance, resolution, support, ends_together(pair, compliance))
     check_cover(mesh.path_of_contact, resolution)
     check_modes(support, resolution)
     return replace(mesh, automatic=True) if automatic else mesh
@@ -208,7 +209,9 @@ def prepare_from(
     outer = contacts(pair, contact, jnp.stack([moving.path[-1] - base_pitch, moving.path[0] + base_pitch]))
     spreading = spreading_of(pair, outlines, resolution, even)
     structures = spreading.shares[:, None, None, None] * compliance.structure(pinion, wheel)
-    own_widths = jnp.stack([gear.face_width for gear in pair.gears])
+    hubs = compliance.hub(pinion, wheel)
+    if not even:
+        hubs = hubs * (pair.face_width / jnp.stack([gear.face_width for gear in pair.gears]))
     return Mesh(
         kinematics=moving,
         compliance=compliance,
@@ -227,7 +230,7 @@ def prepare_from(
         structure=structures[0] + structures[1],
         law=compliance.law(geometry, pinion, wheel, moving.outside),
         width_factor=geometry.width_factor[:, 0],
-        hub=jnp.sum(compliance.hub(pinion, wheel) * (pair.face_width / own_widths)),
+        hub=jnp.sum(hubs),
         slice_width=moving.slice_width,
         coupling=coupling_of(moving, spreading, structures[1], support),
         support=support,

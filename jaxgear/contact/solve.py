@@ -9,13 +9,14 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..compliance import AbstractCompliance
-from ..geometry import GearPair, is_even, reduced_radius
+from ..geometry import GearPair, reduced_radius
 from ..microgeometry import AbstractModification, NoModification, terms
 from ..numerics import ContactProblem, concrete, minimum, program, solve_contact, stored, tangent_stiffness
 from ..numerics.programs import begin
 from ..shafts import AbstractSupport
 from .cycle import MeshCycle
 from .face_coupling import check_torque, holds_at
+from .face_spreading import ends_together
 from .loaded_width import loaded_material, unlabelled
 from .mesh import Mesh, prepare, prepare_from
 from .operation import Operation, operation_of
@@ -158,7 +159,7 @@ def begin_contact(
     Who knows that this will be needed, and has something else to do until then, calls it. What prepares the pair at the
     array sizes that are needed `first` goes ahead.
     """
-    even = is_even(pair)
+    even = ends_together(pair, compliance)
     begin(prepare_from, np.zeros(()), pair, compliance, first, support, even)
     mesh = begin(prepare_from, np.zeros(()), pair, compliance, resolution, support, even)
     if mesh is not None:
