@@ -80,11 +80,18 @@ def test_end_reliefs_beyond_the_mate(cycle):
     assert relief in names(wide, pinion=jg.EndRelief(7.0, 1.9))
     assert relief in names(wide, pinion=jg.TipRelief(7.0, 3.0) + jg.EndRelief(7.0, 1.9, side="positive"))
     assert relief not in names(wide, pinion=jg.EndRelief(7.0, 2.1))
-    assert names(wide, wheel=jg.EndRelief(7.0, 1.9)) == set()
+    assert not {name for name, where in names(wide, wheel=jg.EndRelief(7.0, 1.9)) if where == "wheel"}
     aside = replaced(wide, "pinion", face_width=width + 2.0)
     aside = eqx.tree_at(lambda c: c.kinematics.pair.axial_offset, aside, jnp.asarray(1.0))
     assert relief in names(aside, pinion=jg.EndRelief(7.0, 1.9, side="negative"))
     assert relief not in names(aside, pinion=jg.EndRelief(7.0, 1.9, side="positive"))
+
+
+@pytest.mark.parametrize("wider, doubted", [(0.7, False), (2.0, True)])
+def test_one_slice_does_not_show_load_beside_an_overhang(cycle, wider, doubted):
+    wheel = cycle.kinematics.pair.wheel
+    wide = replaced(cycle, "pinion", face_width=float(wheel.face_width + wider * wheel.module))
+    assert (("overhang in modules, one slice", "") in names(wide)) == doubted
 
 
 def test_wide_teeth_are_not_in_plane_stress(cycle):

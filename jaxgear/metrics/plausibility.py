@@ -43,6 +43,7 @@ LIMITS = {
     "bore to root diameter": Limit(0.1, 0.95, "", "the body is a ring held at its bore, which is hardly one"),
     "face width in modules, plane stress": Limit(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
     "face width in modules": Limit(2.0, 48.0, "", "as compared with finite elements; narrower contacts are softer"),
+    "overhang in modules, one slice": Limit(0.0, 1.0, "", "load gathers beside it, which takes Resolution(slices=9)"),
     "tip edge radius in modules": Limit(0.0, 0.2, "", "an edge is broken by 0.01 to 0.1 modules"),
     "least backlash": Limit(-0.1, np.inf, "um", "the thickest teeth that the tolerances allow jam"),
     "coefficient of friction": Limit(0.0, 0.5, "", "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"),
@@ -186,6 +187,9 @@ def _numbers(cycle: MeshCycle):
     in_stress = cycle.kinematics.plane == "stress"
     name = "face width in modules, plane stress" if in_stress else "face width in modules"
     gears.append((name, "", pair.face_width / module))
+    if cycle.kinematics.resolution.slices == 1:
+        wider = jnp.maximum(*(gear.face_width for gear in pair.gears)) - pair.face_width
+        gears.append(("overhang in modules, one slice", "", wider / module))
     results = [
         ("mean transmission error in modules", "", 1e-3 * jnp.mean(cycle.transmission_error) / module),
         ("flank pressure", "", jnp.max(cycle.contact_pressure)),
