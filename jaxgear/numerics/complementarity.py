@@ -58,7 +58,7 @@ _OWN_STEPS = 3
 # to the rounding of single precision, as a rule, at a third of the cost of another one with the laws.
 _LOGARITHM_STEPS = 2
 # Steps with the laws where slices feel each other: their active sets settle later, and of 400 random tip reliefs on
-# crowned flanks 45 % still need a second step in double precision after one of these, 0.5 % after two.
+# crowned bodies 45 % still need a second step in double precision after one of these, 0.5 % after two.
 _LAW_STEPS_COUPLED = 2
 # A secant follows the logarithm between these multiples of the load at the start, and changes per logarithm by this
 # share of itself at most: slopes stay positive.
