@@ -262,7 +262,7 @@ profile_shift = {shift}
 [wheel]
 teeth = 17
 module = 2.0
-face_width = 20.0
+face_width = {width}
 [load]
 torque = 20.0
 [model]

@@ -196,7 +196,8 @@ def test_deviated_material_is_the_sum_of_modifications(wide_mesh, tolerance):
         flank = getattr(deviation, side)
         lead = jg.LeadSlope(flank.helix_slope)
         sides[side] = design + jg.ProfileSlope(flank.profile_slope) + Waviness(flank.waviness) + lead
-    sides["pinion"] += jg.LeadSlope(deviation.misalignment)
+    pair = wide_mesh.pair  # the misalignment is over the common face, the slope of a flank over its own
+    sides["pinion"] += jg.LeadSlope(deviation.misalignment * pair.pinion.face_width / pair.face_width)
     pitch = (deviation.pinion.pitch + deviation.wheel.pitch)[:, None, None]
     expected = (jg.contact.removed_material(wide_mesh, TORQUE, **sides) + pitch).amount
     np.testing.assert_allclose(
