@@ -76,8 +76,11 @@ def test_removes_nothing_in_common(mesh, optimum):
     # tips are relieved, pitch points are not
     assert np.all(values[:, -1] > 5.0)
     assert np.all(values[:, : POINTS // 4] < 1.0)
-    thicker = jg.TabulatedProfile(optimum.pinion.position, optimum.pinion.amount + 3.0)
-    assert ppte(mesh, TORQUE, thicker, optimum.wheel) == pytest.approx(optimum.ppte, abs=1e-9)
+    error = eqx.filter_jit(lambda pinion: jg.solve(mesh, TORQUE, pinion=pinion, wheel=optimum.wheel).transmission_error)
+    thinner = jg.TabulatedProfile(optimum.pinion.position, optimum.pinion.amount + 3.0)
+    beside = np.abs(np.asarray(error(thinner) - error(optimum.pinion)) - 3.0)
+    # where a contact is sought from a kink of a table, rounding decides on which side: 1e-5 um, see below
+    assert np.median(beside) < 1e-12 and np.mean(beside < 1e-9) > 0.7 and beside.max() < 2e-5
 
 
 def test_objective_is_the_variation_and_the_penalty(mesh, optimum):
