@@ -97,9 +97,12 @@ def test_its_numbers_are_variables_of_a_sweep_alone(load):
     assert file.resolution().slices == 11 and file.units == {"f": "um"}
     mesh = file.sweep_mesh(SIZES)
     assert not isinstance(mesh, jg.Mesh)
-    cycles = [jg.solve(mesh({"f": amount}), 50.0, pinion=jg.TipRelief(5.0, 3.0)) for amount in (0.0, 20.0)]
-    even, skew = (float(jg.metrics.face_load_factor(cycle)) for cycle in cycles)
-    assert even == pytest.approx(1.0, abs=1e-9) and skew > 1.5
+    parallel = jg.prepare(file.pair(), resolution=SIZES)
+    meshes = mesh({"f": 0.0}), mesh({"f": 20.0}), parallel
+    cycles = [jg.solve(each, 50.0, pinion=jg.TipRelief(5.0, 3.0)) for each in meshes]
+    even, skew, without = (float(jg.metrics.face_load_factor(cycle)) for cycle in cycles)
+    # the pinion overhangs the wheel by 1 mm on either side, where the load gathers a little
+    assert even == pytest.approx(without, abs=1e-9) and 1.0 < without < 1.05 and skew > 1.5
     with pytest.raises(DesignFileError, match=r'misalignment\.direct: "f" is a variable, which a sweep alone'):
         optimize_request(load('direct = "f"', variables + "[optimize]\n"))
 
