@@ -66,11 +66,11 @@ class Problem:
 def prepare(positions: int = 64, slices: int = 1, *, coupled: bool = False):
     """The prepared mesh of the 19/48 pair of `examples/spur_19_48.toml`, a `jaxgear.Mesh`.
 
-    The slices of the baselines do not feel each other.
+    The slices of the baselines do not feel each other, and no gear overhangs the other.
     """
     import jaxgear as jg
 
-    pinion = jg.Gear(teeth=19, module=3.0, face_width=20.0, bore_diameter=24.0)
+    pinion = jg.Gear(teeth=19, module=3.0, face_width=18.0, bore_diameter=24.0)
     wheel = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=70.0)
     pair = jg.GearPair(pinion, wheel)
     pairs = jg.fewest_pairs(pair, deflection=DEFLECTION)
