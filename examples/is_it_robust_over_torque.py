@@ -23,7 +23,7 @@ SERVICE = TORQUES >= 25.0
 
 
 def gear_pair():
-    pinion = jg.Gear(teeth=19, module=3.0, face_width=20.0, bore_diameter=24.0)
+    pinion = jg.Gear(teeth=19, module=3.0, face_width=18.0, bore_diameter=24.0)
     wheel = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=70.0)
     return jg.GearPair(pinion, wheel)
 
