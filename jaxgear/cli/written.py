@@ -31,6 +31,7 @@ def summary(
     found: Mapping[str, tuple[Doubt, ...]],
 ) -> dict[str, Any]:
     """Contents of `summary.json`, with the doubts that were `found` of every design."""
+    shape = geometry(file.pair())
     return {
         "title": file.title,
         "design_file": file.path.name,
@@ -39,7 +40,7 @@ def summary(
         "speed_rpm": file.speed,
         "friction": file.friction,
         "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
-        "center_distance_mm": _center_distance(mesh),
+        "center_distance_mm": shape["pair"]["center_distance_mm"],
         **_misalignment(mesh),
         **manufactured.tolerances(file),
         **{name: _numbers(part) for name in ("lubricant", "strength") if (part := getattr(file, name)) is not None},
@@ -53,7 +54,7 @@ def summary(
             "torque_Nm": torques,
             **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
         },
-        "geometry": geometry(file.pair()),
+        "geometry": shape,
         "resolution": sizes(mesh.resolution),
         "versions": versions(),
     }
@@ -102,15 +103,6 @@ def _numbers(part: eqx.Module) -> dict[str, Any]:
 def _key(name: str, field: Number) -> str:
     unit = "" if field.unit == "x module" else field.unit.replace(" ", "").replace("/", "_per_")
     return f"{name}_{unit}" if unit else name
-
-
-def _center_distance(mesh: Mesh) -> float:
-    """Sum of the working pitch radii [mm]."""
-    contact = mesh.path_of_contact
-    return float(
-        np.hypot(contact.pinion_base_radius, contact.pinion_pitch_roll_length)
-        + np.hypot(contact.wheel_base_radius, contact.wheel_pitch_roll_length)
-    )
 
 
 def versions() -> dict[str, str]:

@@ -5,16 +5,16 @@ design file has the table [dynamics].
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..contact import MeshCycle
 from ..metrics import Quantity, quantities
-from ..metrics.settings import WithoutSettings, WithSettings, settled
-from ..numerics import Checked, once
+from ..metrics.settings import WithoutSettings, WithSettings
+from ..numerics import once
 from ..numerics.reductions import Max
 from .steady import SteadyNumbers
 
@@ -49,21 +49,6 @@ DYNAMIC_QUANTITIES: Mapping[str, Kind] = {
 }
 
 
-def with_settings(name: str, settings: Checked) -> Quantity:
-    """A dynamic quantity with the settings that it needs; equal settings make equal quantities.
-
-    Args:
-        name: one of `DYNAMIC_QUANTITIES`.
-        settings: a `Dynamics` of concrete numbers.
-
-    Raises:
-        ValueError: for another name, or settings that are being traced.
-    """
-    if name not in DYNAMIC_QUANTITIES:
-        raise ValueError(f'Dynamics: quantity "{name}" is not known, must be one of {", ".join(DYNAMIC_QUANTITIES)}')
-    return _quantity(name, settled(name, settings, _numbers_of))
-
-
 def _numbers_of(given: WithSettings, cycle: MeshCycle) -> Numbers:
     """The numbers of a cycle, whose worst counts."""
     kind = DYNAMIC_QUANTITIES[given.name]
@@ -90,12 +75,9 @@ def mesh_frequency(teeth, speed):
     return teeth * speed / 60
 
 
-def _quantity(name: str, of: Callable[[MeshCycle], Any]) -> Quantity:
-    kind = DYNAMIC_QUANTITIES[name]
-    return Quantity(name, of, kind.unit, kind.meaning, Max())
+def _quantity(name: str, kind: Kind) -> Quantity:
+    stands = WithoutSettings(name, "jaxgear.dynamics.Dynamics", "dynamics", given=_numbers_of)
+    return Quantity(name, stands, kind.unit, kind.meaning, Max())
 
 
-quantities.add(
-    *(_quantity(name, WithoutSettings(name, "jaxgear.dynamics.Dynamics", "dynamics")) for name in DYNAMIC_QUANTITIES),
-    package=__package__,
-)
+quantities.add(*(_quantity(name, kind) for name, kind in DYNAMIC_QUANTITIES.items()), package=__package__)

@@ -12,12 +12,12 @@ from ..conditions import deviation_of
 from ..contact import Mesh, MeshCycle
 from ..geometry import GearPair
 from ..metrics import Quantity
+from ..metrics.settings import with_settings
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, concrete, count, number
 from .force import AbstractMeshForce
 from .from_contact import Model, mesh_force
 from .oscillator import Oscillator
-from .quantities import with_settings
 from .response import SpeedResponse
 from .runs import Run, design_runs, speed_runs
 from .speed_sweep import speed_sweep

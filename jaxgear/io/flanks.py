@@ -101,7 +101,7 @@ def check_files(parts: Mapping[str, Sequence[template.Part]], pair: GearPair) ->
     for name, several in parts.items():
         for part in several:
             if isinstance(part.make, _FromFile):
-                start, middle = starts(pair)[name], dict(zip(("pinion", "wheel"), pair.face_middles))[name]
+                start, middle = starts(pair)[name], pair.face_middles[name == "wheel"]
                 try:
                     part.make.reach.check_on(getattr(pair, name), start, pair.face_width, middle)
                 except DesignFileError as error:

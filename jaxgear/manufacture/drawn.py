@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Gear
-from ..numerics import Checked, concrete, count, number
+from ..numerics import Checked, concrete, count, fields_of, number
 from .tooth_thickness import allowance_of_balls, allowance_of_span, over_balls, span
 
 Limits = Float[Array, "..."]  # one number, or lower and upper limit
@@ -17,6 +17,7 @@ Limits = Float[Array, "..."]  # one number, or lower and upper limit
 # By how much a tooth may come out thicker than without allowance [um]: a drawing rounds its lengths to a micrometre,
 # which is up to half of that on a span and less over balls.
 _ROUNDED = 1.0
+_WAYS = "span", "over_balls", "tooth_thickness_allowance"
 
 
 class ToothThickness(Checked):
@@ -43,15 +44,14 @@ class ToothThickness(Checked):
     tooth_thickness_allowance: Limits | None = number("um", high=0.0, limits=True, optional=True, default=None)
 
     def check_together(self) -> None:
-        ways = ("span", "over_balls", "tooth_thickness_allowance")
-        given = [name for name in ways if getattr(self, name) is not None]
+        given = [name for name in _WAYS if getattr(self, name) is not None]
         for name, other in (("teeth_spanned", "span"), ("ball_diameter", "over_balls")):
             if getattr(self, name) is not None and other not in given:
                 raise ValueError(f"ToothThickness: {name}: has no effect without {other}")
             if other in given and getattr(self, name) is None:
                 raise ValueError(f"ToothThickness: {name}: missing, {other} needs it")
         if not given:
-            raise ValueError(f"ToothThickness: {ways[0]}: missing, give one of {', '.join(ways)}")
+            raise ValueError(f"ToothThickness: {_WAYS[0]}: missing, give one of {', '.join(_WAYS)}")
         if len(given) > 1:
             problem = f"cannot stand beside {given[0]}: either says how thick the tooth is"
             raise ValueError(f"ToothThickness: {given[1]}: {problem}")
@@ -81,12 +81,12 @@ def drawn_gear(**given: Any) -> Gear:
     Raises:
         ValueError: for what either of them refuses, and for a `tooth_thickness_tolerance` beside lower and upper limit.
     """
-    thickness = {name: given.pop(name) for name in _THICKNESS if given.get(name) is not None}
+    thickness = {name: given.pop(name) for name in fields_of(ToothThickness) if given.get(name) is not None}
     if not thickness:
         return Gear(**given)
     says = ToothThickness(**thickness)
     if given.get("tooth_thickness_tolerance") is not None:
-        which = next(name for name in ("span", "over_balls", "tooth_thickness_allowance") if name in thickness)
+        which = next(name for name in _WAYS if name in thickness)
         if which != "tooth_thickness_allowance" or np.ndim(thickness[which]):
             raise ValueError(f"Gear: tooth_thickness_tolerance: has no effect, give lower and upper limit of {which}")
         return Gear(**given, **thickness)
@@ -104,9 +104,6 @@ def with_thickness(gear: Gear, thickness: ToothThickness) -> Gear:
     # limits that were traced may be the wrong way round: such a gear is none, and nothing made with it converges
     tolerance = jnp.where(high >= low, high - low, jnp.nan)
     return replace(gear, tooth_thickness_allowance=high, tooth_thickness_tolerance=tolerance)
-
-
-_THICKNESS = ("span", "teeth_spanned", "over_balls", "ball_diameter", "tooth_thickness_allowance")
 
 
 def _without_allowance(gear: Gear) -> Gear:

@@ -93,7 +93,7 @@ def micropitting_safety(cycle: MeshCycle, lubricant: Lubricant) -> Load:
         ValueError: for a lubricant without `permissible_film`.
     """
     limit = _given("micropitting_safety", lubricant, "permissible_film")
-    return jnp.minimum(specific_film_thickness(cycle, lubricant) / limit, LARGEST_SAFETY)
+    return safety_factor(specific_film_thickness(cycle, lubricant), limit)
 
 
 @over_batch

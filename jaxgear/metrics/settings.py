@@ -61,6 +61,7 @@ class WithoutSettings:
         needs: field of the settings that must be given.
         otherwise: computes it from a cycle alone; None where nothing can.
         operation: what the load must say for that: fields of an `Operation`.
+        given: computes it from the settings as plain data and a cycle, where that takes more than `of`; None for `of`.
     """
 
     name: str
@@ -70,6 +71,7 @@ class WithoutSettings:
     needs: str | None = None
     otherwise: Callable[[MeshCycle], Any] | None = None
     operation: tuple[str, ...] = ()
+    given: Callable[[WithSettings, MeshCycle], Any] | None = None
 
     def __call__(self, cycle: MeshCycle) -> Any:
         if self.otherwise is not None:
@@ -92,12 +94,12 @@ def with_settings(name: str, settings: Checked) -> Quantity:
     """
     owner = type(settings).__name__
     stands = _given_by(owner, quantities.get(name))
-    if stands is None:
+    if stands is None or stands.name != name:
         known = ", ".join(each.name for each in quantities.values() if _given_by(owner, each))
         raise ValueError(f'{owner}: quantity "{name}" is not known, must be one of {known}')
     if stands.needs is not None and getattr(settings, stands.needs) is None:
         raise ValueError(f'{owner}: quantity "{name}" needs {stands.needs}')
-    return dataclasses.replace(quantities[name], of=settled(name, settings, _by_settings))
+    return dataclasses.replace(quantities[name], of=settled(name, settings, stands.given or _by_settings))
 
 
 def of_tables(name: str, tables: Mapping[str, Any], cycle: MeshCycle) -> Any:
@@ -126,7 +128,7 @@ def without_settings(quantity: Quantity) -> WithoutSettings | None:
 def _given_by(owner: str, quantity: Quantity | None) -> WithoutSettings | None:
     """What stands for a quantity that `with_settings` gives for a class of settings; None for any other one."""
     stands = None if quantity is None else without_settings(quantity)
-    return stands if stands and stands.of and stands.settings.rpartition(".")[2] == owner else None
+    return stands if stands and stands.settings.rpartition(".")[2] == owner else None
 
 
 def _by_settings(given: WithSettings, cycle: MeshCycle) -> Any:

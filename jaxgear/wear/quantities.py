@@ -12,8 +12,8 @@ import jax.numpy as jnp
 from ..conditions import deviation_of, solved
 from ..contact import MeshCycle
 from ..metrics import Quantity, quantities
-from ..metrics.settings import WithoutSettings, WithSettings, settled
-from ..numerics import Checked, maximum, once
+from ..metrics.settings import WithoutSettings, WithSettings
+from ..numerics import maximum, once
 from .life import WearLife
 from .over_life import life_to, life_to_depth, mean_over_life, over_life, wear_depth
 
@@ -79,24 +79,6 @@ WEAR_QUANTITIES: Mapping[str, Kind] = {
 }
 
 
-def with_settings(name: str, settings: Checked) -> Quantity:
-    """A quantity of worn flanks with the settings that it needs; equal settings make equal quantities.
-
-    Args:
-        name: one of `WEAR_QUANTITIES`.
-        settings: a `Wear` of concrete numbers.
-
-    Raises:
-        ValueError: for another name, settings that are being traced, or a limit that they do not have.
-    """
-    if name not in WEAR_QUANTITIES:
-        raise ValueError(f'Wear: quantity "{name}" is not known, must be one of {", ".join(WEAR_QUANTITIES)}')
-    needs = WEAR_QUANTITIES[name].needs
-    if needs is not None and getattr(settings, needs) is None:
-        raise ValueError(f'Wear: quantity "{name}" needs {needs}')
-    return _quantity(name, settled(name, settings, _number))
-
-
 def _number(given: WithSettings, cycle: MeshCycle):
     settings = given.settings
     # all quantities of the same settings come from one life
@@ -110,12 +92,9 @@ def _life(name: str, settings: Any, cycle: MeshCycle) -> WearLife:
     return settings.life(mesh, cycle.operation, **flanks, deviation=deviation_of(cycle, mesh))
 
 
-def _quantity(name: str, of: Callable[[MeshCycle], Any]) -> Quantity:
-    kind = WEAR_QUANTITIES[name]
-    return Quantity(name, of, kind.unit, kind.meaning, better=kind.better)
+def _quantity(name: str, kind: Kind) -> Quantity:
+    stands = WithoutSettings(name, "jaxgear.wear.Wear", "wear", needs=kind.needs, given=_number)
+    return Quantity(name, stands, kind.unit, kind.meaning, better=kind.better)
 
 
-quantities.add(
-    *(_quantity(name, WithoutSettings(name, "jaxgear.wear.Wear", "wear")) for name in WEAR_QUANTITIES),
-    package=__package__,
-)
+quantities.add(*(_quantity(name, kind) for name, kind in WEAR_QUANTITIES.items()), package=__package__)

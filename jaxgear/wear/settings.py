@@ -7,10 +7,10 @@ from jaxtyping import Array, Float
 
 from ..contact import Mesh
 from ..metrics import Quantity
+from ..metrics.settings import with_settings
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, count, number
 from .life import BLOCKS, WearLife, check_blocks, wear
-from .quantities import with_settings
 
 Scalar = Float[Array, ""]
 
