@@ -54,13 +54,12 @@ def dynamics_request(design: DesignFile, *, quick: bool = False) -> DynamicsRequ
 
 
 def dynamic_quantity(design: DesignFile, key: str, name: str) -> Quantity:
-    """A dynamic quantity with the settings of the table [dynamics].
+    """A dynamic quantity with the settings of the table [dynamics], which is there.
 
     Raises:
-        DesignFileError: without the table, or a speed that the quantity needs.
+        DesignFileError: without a speed that the quantity needs.
     """
-    if design.dynamics is None:
-        raise DesignFileError(key, f'"{name}" needs the table [dynamics]')
+    assert design.dynamics is not None  # `quantity_named` has looked
     if DYNAMIC_QUANTITIES[name].at_speed and design.speed is None:
         raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{name}" is that of all speeds of [dynamics]')
     return _settings(design, design.dynamics, design.dynamics.number).quantity(name)

@@ -25,16 +25,16 @@ def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
     """
     check_known(key, name, quantities)
     plain = quantities[name].name
-    if plain in DYNAMIC_QUANTITIES:
-        return dynamic_quantity(design, key, plain)
-    if plain in WEAR_QUANTITIES:
-        return wear_quantity(design, key, plain)
     stands = without_settings(quantities[plain])
     if stands is None:
         return name
     missing = _missing(design, stands)
     if missing:
         raise DesignFileError(key, f'"{plain}" needs {missing}')
+    if plain in DYNAMIC_QUANTITIES:
+        return dynamic_quantity(design, key, plain)
+    if plain in WEAR_QUANTITIES:
+        return wear_quantity(design, plain)
     settings = getattr(design, stands.table)
     return name if settings is None else settings.quantity(plain)
 
@@ -50,7 +50,7 @@ def quantities_of_tables(design: DesignFile) -> Iterator[Quantity]:
 
 
 def _missing(design: DesignFile, stands: WithoutSettings) -> str:
-    """What a design file lacks for a quantity of the tables [lubricant] and [strength]; "" for nothing."""
+    """What a design file lacks for a quantity of one of its tables; "" for nothing."""
     settings = getattr(design, stands.table)
     if settings is not None:
         unset = stands.needs is not None and getattr(settings, stands.needs) is None

@@ -3,7 +3,7 @@
 import dataclasses
 
 from ..metrics import Quantity
-from ..wear import WEAR_QUANTITIES, Wear
+from ..wear import Wear
 from .design_file import DesignFile
 from .errors import DesignFileError, naming
 from .template import part_of
@@ -46,15 +46,7 @@ def wear_request(design: DesignFile, *, quick: bool = False) -> WearRequest:
         return WearRequest(settings, section.largest_increment)
 
 
-def wear_quantity(design: DesignFile, key: str, name: str) -> Quantity:
-    """A quantity of worn flanks with the settings of the table [wear].
-
-    Raises:
-        DesignFileError: without the table, or the limit that the quantity needs.
-    """
-    if design.wear is None:
-        raise DesignFileError(key, f'"{name}" needs the table [wear]')
-    needs = WEAR_QUANTITIES[name].needs
-    if needs is not None and getattr(design.wear, needs) is None:
-        raise DesignFileError(key, f'"{name}" needs wear.{needs}')
+def wear_quantity(design: DesignFile, name: str) -> Quantity:
+    """A quantity of worn flanks with the settings of the table [wear], which has what the quantity needs."""
+    assert design.wear is not None  # `quantity_named` has looked
     return part_of("wear", design.wear, Wear).build({}).quantity(name)
