@@ -24,6 +24,7 @@ Model = Literal["map", "varying stiffness", "loaded error", "tangent"]
 # Flanks that press on both sides without a load by more than this jam [um]; rounding of single precision is less.
 _JAMMED = 1e-2
 _MOST_PAIRS = 12
+_LEVELS, _REACH = 48, 5.0
 
 
 def mesh_force(
@@ -35,8 +36,8 @@ def mesh_force(
     coast: Both | None = None,
     model: Model = "map",
     positions: int = 640,
-    levels: int = 48,
-    reach: Any = 5.0,
+    levels: int = _LEVELS,
+    reach: Any = _REACH,
     compliance: Any = 0.0,
     deviation: Any = None,
 ) -> Any:
@@ -74,6 +75,18 @@ def mesh_force(
         ValueError: for a number outside its range, flanks that jam, or a modification that varies along the face on a
             mesh of one slice.
     """
+    flanks = {"pinion": pinion, "wheel": wheel, "coast": coast, "deviation": deviation}
+    return force_and_mesh(
+        mesh, torque=torque, model=model, positions=positions, levels=levels, reach=reach, compliance=compliance,
+        **flanks,
+    )[0]  # fmt: skip
+
+
+def force_and_mesh(
+    mesh: Mesh, *, torque, model, positions, compliance, pinion=None, wheel=None, coast=None, deviation=None,
+    levels=_LEVELS, reach=_REACH,
+) -> tuple[AbstractMeshForce, Mesh]:  # fmt: skip
+    """`mesh_force`, and the mesh that it was made on."""
     check_mesh("mesh_force", mesh)
     torque = operation_of("mesh_force", torque, mesh.slice_width.dtype).torque
     check("mesh_force", "torque", torque, "N m", low=0.0, open_low=True)
@@ -84,18 +97,18 @@ def mesh_force(
         raise ValueError(f"mesh_force: model = {model!r} must be one of {wanted}")
     whole("mesh_force", "levels", levels, 4, 4096)
     whole("mesh_force", "positions", positions, 4, 65536)
-    given, mesh = mesh, _with(mesh, positions=positions)
+    given, mesh = mesh, resized(mesh, positions=positions)
     both = (pinion, wheel), _coast_of(coast, (pinion, wheel))
-    off = _interpolated(deviation, given, mesh)
+    off = interpolated(deviation, given, mesh)
     made = _made(mesh, torque, both, off, model, levels, farthest, series)
     while _is_too_narrow(mesh, made):
-        mesh = _with(mesh, pairs=mesh.resolution.chosen_pairs + 1)
-        made = _made(mesh, torque, both, _interpolated(deviation, given, mesh), model, levels, farthest, series)
-    return made
+        mesh = resized(mesh, pairs=mesh.resolution.chosen_pairs + 1)
+        made = _made(mesh, torque, both, interpolated(deviation, given, mesh), model, levels, farthest, series)
+    return made, mesh
 
 
-def _with(mesh: Mesh, **sizes: Any) -> Mesh:
-    """The mesh in other array sizes."""
+def resized(mesh: Mesh, **sizes: Any) -> Mesh:
+    """The mesh in other array sizes, with its number of pairs fixed or open as before."""
     wanted = replace(mesh.resolution, **sizes)
     if wanted == mesh.resolution:
         return mesh
@@ -103,7 +116,7 @@ def _with(mesh: Mesh, **sizes: Any) -> Mesh:
     return replace(made, automatic=mesh.automatic)
 
 
-def _interpolated(deviation: Any, of: Mesh, mesh: Mesh):
+def interpolated(deviation: Any, of: Mesh, mesh: Mesh):
     """Material that deviations remove on another mesh of the same gears; a number where there are none."""
     if deviation is None:
         return 0.0
