@@ -1,7 +1,9 @@
 """The command `jaxgear wear`: from a design file to its flanks over their life."""
 
+import dataclasses
 from pathlib import Path
 
+from ..contact import Operation
 from ..io import DesignFile, WearRequest, wear_request, write_worn
 from ..optimize import Optimum
 from ..wear import WearLife, wear_in_steps
@@ -16,7 +18,9 @@ from .wear_report import Study
 def _plan(design: DesignFile, quick: bool) -> Make[Study]:
     request = wear_request(design, quick=quick)
     search = search_of(design, quick=quick)
-    lasting = None if search is None else search.over_life(request.settings)
+    # a step of the search wears a life: under the static load, which takes far less than a motion in every block
+    static = dataclasses.replace(request.settings, line_load=None, dynamics=None)
+    lasting = None if search is None else search.over_life(static)
 
     def make(target: Path, stages: Stages):
         highest = max(design.torque, design.torque_range[1])
@@ -49,12 +53,14 @@ def _life(design: DesignFile, request: WearRequest, mesh, name: str, flanks, kep
 
     return wear_in_steps(
         mesh,
-        design.torque,
+        Operation(design.torque, design.speed, design.friction),
         settings.revolutions,
         coefficient=settings.coefficients,
         pinion=pinion,
         wheel=wheel,
         points=settings.points,
+        dynamics=settings.dynamics,
+        line_load=settings.line_load,
         blocks=settings.blocks,
         largest_increment=request.largest_increment,
         keep=kept,

@@ -7,7 +7,7 @@ from .kinds import positive
 from .layout import section_of
 
 
-class WearSection(section_of(Wear, open=False)):  # type: ignore[misc]
+class WearSection(section_of(Wear, ("dynamics",), open=False)):  # type: ignore[misc]
     """How long the pair runs, and how fast it wears; for `jaxgear wear` and for the quantities that need it.
 
     Attributes:

@@ -3,8 +3,9 @@
 import dataclasses
 
 from ..metrics import Quantity
-from ..wear import Wear
+from ..wear import WEAR_QUANTITIES, Wear
 from .design_file import DesignFile
+from .dynamics_request import dynamics_of
 from .errors import DesignFileError, naming
 from .template import part_of
 
@@ -40,7 +41,7 @@ def wear_request(design: DesignFile, *, quick: bool = False) -> WearRequest:
             raise DesignFileError("wear", "missing, nothing says for how long the pair runs and how it wears")
         if section.largest_increment is not None and section.blocks is not None:
             raise DesignFileError("wear.blocks", "has no effect beside wear.largest_increment")
-        settings = part_of("wear", section, Wear).build({})
+        settings = _settings(design, vibrates=section.line_load == "dynamic")
         if quick:
             return WearRequest(dataclasses.replace(settings, blocks=_QUICK_BLOCKS), None)
         return WearRequest(settings, section.largest_increment)
@@ -49,4 +50,19 @@ def wear_request(design: DesignFile, *, quick: bool = False) -> WearRequest:
 def wear_quantity(design: DesignFile, name: str) -> Quantity:
     """A quantity of worn flanks with the settings of the table [wear], which has what the quantity needs."""
     assert design.wear is not None  # `quantity_named` has looked
-    return part_of("wear", design.wear, Wear).build({}).quantity(name)
+    vibrates = WEAR_QUANTITIES[name].needs == "dynamics" or design.wear.line_load == "dynamic"
+    return _settings(design, vibrates=vibrates).quantity(name)
+
+
+def _settings(design: DesignFile, *, vibrates: bool) -> Wear:
+    """The settings of the library: flanks wear under the static load unless the file says otherwise."""
+    section = design.wear
+    assert section is not None
+    part = part_of("wear", section, Wear)
+    if vibrates:
+        for known, name in ((design.dynamics, "the table [dynamics]"), (design.speed, "load.speed")):
+            if known is None:
+                raise DesignFileError("wear.line_load", f'"dynamic" needs {name}')
+        fields = {**part.fields, "dynamics": dynamics_of(design), "line_load": section.line_load or "static"}
+        part = dataclasses.replace(part, fields=fields)
+    return part.build({})

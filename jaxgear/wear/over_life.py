@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..conditions import joined, solved
-from ..metrics import Quantity, quantity_of
+from ..metrics import Quantity, quantities, quantity_of
 from ..numerics import AbstractMeasure, Mean, check, maximum, real
 from .life import WearLife
 
@@ -20,14 +20,22 @@ def over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure
 
     Args:
         life: of one pair of flanks.
-        of: a name of the vocabulary, a `Quantity`, or a function of a cycle.
+        of: a name of the vocabulary, a `Quantity`, or a function of a cycle; "dynamic_factor" is that of the dynamics
+            of the life.
         measure: how the torques of a load spectrum are joined; None for their mean.
 
     Raises:
-        ValueError: for an unknown name.
+        ValueError: for an unknown name, and for the dynamic factor of a life without dynamics.
     """
     quantity = quantity_of(of, "over_life")
-    values = jnp.where(solved(life.cycles), quantity(life.cycles), jnp.nan)
+    if quantity.of is quantities["dynamic_factor"].of:
+        if life.dynamic_factor is None:
+            raise ValueError(
+                'over_life: "dynamic_factor" needs a life with dynamics: wear(..., dynamics=Dynamics(...))'
+            )
+        values = life.dynamic_factor
+    else:
+        values = jnp.where(solved(life.cycles), quantity(life.cycles), jnp.nan)
     if life.weights is None:
         return values
     many = [joined(measure or Mean(), row, life.weights, quantity.better) for row in values]

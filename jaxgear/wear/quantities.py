@@ -56,6 +56,18 @@ WEAR_QUANTITIES: Mapping[str, Kind] = {
     "max_pressure_over_life": Kind(
         lambda life, _: maximum(over_life(life, "max_contact_pressure")), "MPa", "largest pressure of the life"
     ),
+    "worn_dynamic_factor": Kind(
+        lambda life, _: over_life(life, "dynamic_factor")[-1],
+        "",
+        "largest mesh force over the static one when worn, at the speed of the pinion",
+        needs="dynamics",
+    ),
+    "max_dynamic_factor_over_life": Kind(
+        lambda life, _: maximum(over_life(life, "dynamic_factor")),
+        "",
+        "largest mesh force over the static one, worst of the life, at the speed of the pinion",
+        needs="dynamics",
+    ),
     "wear_depth": Kind(lambda life, _: wear_depth(life)[-1], "um", "largest wear depth of both gears"),
     "pinion_wear_depth": Kind(lambda life, _: wear_depth(life, "pinion")[-1], "um", "largest wear depth, pinion"),
     "wheel_wear_depth": Kind(lambda life, _: wear_depth(life, "wheel")[-1], "um", "largest wear depth, wheel"),

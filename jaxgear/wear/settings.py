@@ -6,11 +6,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import Mesh
+from ..dynamics import Dynamics
 from ..metrics import Quantity
 from ..metrics.settings import with_settings
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, count, number
 from .life import BLOCKS, WearLife, check_blocks, wear
+from .vibration import LineLoad, check_line_load
 
 Scalar = Float[Array, ""]
 
@@ -28,6 +30,9 @@ class Wear(Checked):
             most 33.
         depth_limit: depth to which a life is asked for.
         ppte_limit: peak-to-peak transmission error to which a life is asked for.
+        line_load: under which the flanks wear: "static", or that of the steady motion at the speed of the load,
+            "dynamic"; None for "dynamic" with dynamics, "static" without.
+        dynamics: what vibrates, its speeds aside; None for no vibration.
     """
 
     revolutions: Scalar = number("", low=0.0, open_low=True)
@@ -38,8 +43,12 @@ class Wear(Checked):
     depth_limit: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
     ppte_limit: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
 
+    line_load: LineLoad | None = None
+    dynamics: Dynamics | None = None
+
     def check_together(self) -> None:
         check_blocks("Wear", self.blocks)
+        check_line_load("Wear", self.line_load, self.dynamics)
 
     @property
     def coefficients(self) -> Float[Array, " gears"]:
@@ -58,6 +67,7 @@ class Wear(Checked):
     ) -> WearLife:
         """The life of a design; arguments and errors as `wear`."""
         options: dict[str, Any] = {"coefficient": self.coefficients, "blocks": self.blocks, "points": self.points}
+        options |= {"dynamics": self.dynamics, "line_load": self.line_load}
         flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
         return wear(mesh, torque, self.revolutions, **flanks, **options)
 
@@ -72,7 +82,9 @@ class Wear(Checked):
         Args:
             name: one of `WEAR_QUANTITIES`: "worn_ppte", "mean_ppte_over_life", "max_ppte_over_life",
                 "max_pressure_over_life", "wear_depth", "pinion_wear_depth", "wheel_wear_depth", "wear_depth_error",
-                "life_to_depth" (needs `depth_limit`) or "life_to_ppte" (needs `ppte_limit`).
+                "life_to_depth" (needs `depth_limit`), "life_to_ppte" (needs `ppte_limit`), "worn_dynamic_factor" or
+                "max_dynamic_factor_over_life" (both need `dynamics`). The steps of the integrator are those of the
+                dynamics, or 256.
 
         Raises:
             ValueError: for another name, and for a limit that is missing.

@@ -1,6 +1,6 @@
 """The load of teeth that vibrate: forces of the steady motion to which worn flanks are driven."""
 
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import equinox as eqx
 import jax
@@ -74,14 +74,9 @@ def vibration_of(
         ValueError: for a dynamic load without dynamics, another word, loads without speed, at rest or of nothing, and
             as `mesh_force`.
     """
-    if line_load not in (None, "static", "dynamic"):
-        raise ValueError(f'{owner}: line_load = {line_load!r} must be "static" or "dynamic"')
+    check_line_load(owner, line_load, settings)
     if settings is None:
-        if line_load == "dynamic":
-            raise ValueError(f'{owner}: line_load = "dynamic" needs dynamics: give jaxgear.dynamics.Dynamics(...)')
         return None
-    if not isinstance(settings, Dynamics):
-        raise TypeError(f"{owner}: dynamics is of type {type(settings).__name__}, must be Dynamics")
     if loads.speed is None:
         raise ValueError(f"{owner}: dynamics needs a speed: give Operation(torque, speed), or speeds of the spectrum")
     check(owner, "speed with dynamics", loads.speed, "rpm", low=0.0, open_low=True)
@@ -101,3 +96,18 @@ def vibration_of(
         steps = max(counts) if settings.steps is None else settings.steps
     off = None if deviation is None else interpolated(deviation, mesh, fine)
     return Vibration(settings, fine, coast, off, steps, line_load != "static")
+
+
+def check_line_load(owner: str, line_load: Any, dynamics: Any) -> None:
+    """Checks under which load flanks are to wear.
+
+    Raises:
+        TypeError: for dynamics that are something else.
+        ValueError: for another word, and for a dynamic load without dynamics.
+    """
+    if line_load not in (None, *get_args(LineLoad)):
+        raise ValueError(f'{owner}: line_load = {line_load!r} must be "static" or "dynamic"')
+    if dynamics is None and line_load == "dynamic":
+        raise ValueError(f'{owner}: line_load = "dynamic" needs dynamics: give jaxgear.dynamics.Dynamics(...)')
+    if dynamics is not None and not isinstance(dynamics, Dynamics):
+        raise TypeError(f"{owner}: dynamics is of type {type(dynamics).__name__}, must be Dynamics")
