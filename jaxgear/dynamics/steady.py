@@ -146,7 +146,7 @@ def _at_positions(oscillator: Oscillator, orbit: Orbit, phase: Positions) -> Flo
     """Force of an orbit of even steps at mesh positions, by the cubics through its approach and the rate of that."""
     count = len(orbit.phase)
     steps = count // orbit.periods
-    place = (phase - jnp.floor(phase) + jnp.arange(orbit.periods, dtype=phase.dtype)[:, None]) * steps
+    place = ((phase - jnp.floor(phase))[None] + jnp.arange(orbit.periods, dtype=phase.dtype)[:, None]) * steps
     left = jnp.floor(place)
     share, first = place - left, left.astype(jnp.int32) % count
     last, step = (first + 1) % count, 1 / (steps * orbit.mesh_frequency)

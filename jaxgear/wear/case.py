@@ -17,7 +17,7 @@ from ..contact.solve import check_mesh, flanks_of
 from ..dynamics import Dynamics
 from ..dynamics.steady import SteadyForce
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
-from ..numerics import check, kernel, real, whole
+from ..numerics import check, kernel, program, real, whole
 from .archard import worn
 from .coefficient import Constant, OfLubrication, wear_law
 from .deposit import PARTS, Deposit, deposit
@@ -167,9 +167,12 @@ def tables(roll_length, face_coordinate, depth) -> tuple[AbstractModification, A
     return of(0), of(1)
 
 
-@kernel
 def marched(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> March:
     """Wear of a case over pairs of blocks, see `march`."""
+    return (_marched if case.vibration is None else _marched_quickly)(case, start, revolutions)
+
+
+def _march(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> March:
     places, mesh = case.places(), case.mesh
     shares = jnp.ones((1,), start.dtype) if case.weights is None else case.weights
     passages = jnp.stack([jnp.ones((), start.dtype), mesh.pair.pinion.teeth / mesh.pair.wheel.teeth])
@@ -186,6 +189,10 @@ def marched(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> Ma
         return jax.lax.map(lambda each: under(*each), (case.loads, places))
 
     return march(analyze, start, revolutions)
+
+
+# of a motion it is twice as many programs in one, which compile for a hundred times as long as a life of theirs takes
+_marched, _marched_quickly = kernel(_march), program(_march)
 
 
 def case_of(
