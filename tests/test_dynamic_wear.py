@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,7 +20,7 @@ SIZES = jg.Resolution(positions=16, pairs=2, slide_steps=0)
 TORQUE, COEFFICIENT, REVOLUTIONS, BLOCKS = 100.0, 1e-18, 4e7, 2
 TEETH = 20, 30
 # compiles in a tenth of the time of the map; as many steps as the lowest speed needs, so that one program serves all
-SETTINGS = Dynamics([1.0], damping_ratio=0.1, model="varying stiffness", positions=64, steps=256)
+SETTINGS = Dynamics([1.0], damping_ratio=0.1, model="varying stiffness", positions=16, steps=256)
 RELIEF = jg.TipRelief(8.0, 2.0)
 FLANKS = {"pinion": RELIEF, "wheel": RELIEF}
 
@@ -56,10 +57,16 @@ PHASES = jnp.linspace(0.0, 1.0, 64, endpoint=False)
 OF_MESH = slice(None, None, 4)
 
 
+@eqx.filter_jit
+def motion_of(oscillator, frequency):
+    """Forces at `PHASES`."""
+    return SETTINGS.force(oscillator, frequency, PHASES, SETTINGS.steps)
+
+
 def motion_at(mesh, frequency):
-    """Forces on the new flanks at `PHASES`."""
+    """What vibrates with new flanks, and its forces."""
     oscillator = SETTINGS.oscillator(mesh, TORQUE, **FLANKS)
-    return oscillator, SETTINGS.force(oscillator, jnp.asarray(frequency), PHASES, SETTINGS.steps)
+    return oscillator, motion_of(oscillator, jnp.asarray(frequency))
 
 
 def static_force(mesh):
@@ -71,8 +78,16 @@ def resonant(mesh, natural):
     return life_of(mesh, natural)
 
 
+def test_slow_gears_have_the_static_force(mesh, natural):
+    """But for the vibration after every step of the stiffness."""
+    _, motion = motion_at(mesh, natural / 40)
+    assert motion.found and not motion.coast_contact
+    np.testing.assert_allclose(motion.force[:, OF_MESH], static_force(mesh), rtol=0.02)
+    assert float(jnp.std(motion.force)) < 0.01 * static_force(mesh)
+
+
+@pytest.mark.slow
 def test_slow_gears_wear_as_under_the_static_load(mesh, natural):
-    """What is left is the vibration after every step of the stiffness."""
     slow, static = life_of(mesh, natural / 40), life_of(mesh, natural, dynamics=None)
     assert slow.known.all() and static.dynamic_factor is None
     np.testing.assert_allclose(wear_depth(slow)[1:], wear_depth(static)[1:], rtol=0.01)
@@ -109,6 +124,7 @@ def test_the_worn_volume_is_that_of_the_forces_of_the_motion(mesh, natural):
     assert float(motion.force.max()) == pytest.approx(float(short.dynamic_factor[0]) * static_force(mesh), rel=0.01)
 
 
+@pytest.mark.slow
 def test_wear_is_deeper_where_the_force_of_the_motion_peaks(mesh, natural):
     """Where a pair is alone, its load is the force of the motion."""
     dynamic, static = life_of(mesh, natural, 1e5), life_of(mesh, natural, 1e5, dynamics=None)
@@ -199,12 +215,12 @@ def test_refuses_in_one_line(mesh, options, message):
         wear(mesh, given.pop("torque"), REVOLUTIONS, **given)
 
 
-def test_settings_and_lives_without_dynamics_are_refused(mesh, natural):
+def test_settings_and_lives_without_dynamics_are_refused(resonant):
     with pytest.raises(ValueError, match='Wear: line_load = "dynamic" needs dynamics'):
         Wear(REVOLUTIONS, COEFFICIENT, line_load="dynamic")
     with pytest.raises(ValueError, match='Wear: quantity "worn_dynamic_factor" needs dynamics'):
         Wear(REVOLUTIONS, COEFFICIENT).quantity("worn_dynamic_factor")
-    life = life_of(mesh, natural, dynamics=None)
+    life = replace(resonant, dynamic_factor=None)
     with pytest.raises(ValueError, match='over_life: "dynamic_factor" needs a life with dynamics'):
         over_life(life, "dynamic_factor")
 
