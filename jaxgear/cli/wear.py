@@ -23,7 +23,8 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
     lasting = None if search is None else search.over_life(static)
 
     def make(target: Path, stages: Stages):
-        highest = max(design.torque, design.torque_range[1])
+        loads = request.settings.loads
+        highest = max(design.torque, design.torque_range[1], 0.0 if loads is None else float(loads.torques.max()))
         mesh, designs = compared(design, highest, search, stages, quick=quick)
         if lasting is not None:
             stages.begin("searching the optimum over the life")
@@ -53,7 +54,7 @@ def _life(design: DesignFile, request: WearRequest, mesh, name: str, flanks, kep
 
     return wear_in_steps(
         mesh,
-        Operation(design.torque, design.speed, design.friction),
+        settings.loads or Operation(design.torque, design.speed, design.friction),
         settings.revolutions,
         coefficient=settings.coefficients,
         pinion=pinion,

@@ -37,7 +37,8 @@ _PANEL, _HEIGHT = 80.0, 84.0  # [mm]
 _OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks touch: jaxgear dynamics tells."
 
 ASSUMED = (
-    "Wear follows Archard: depth is the coefficient times pressure and sliding distance, at the torque of the file."
+    "Wear follows Archard: depth is the coefficient times pressure and sliding distance, at the torque of the file or "
+    "the torques of [wear], on gears without manufacturing deviations."
 )
 
 
@@ -88,9 +89,7 @@ def _numbers(study: Study, life: WearLife) -> dict[str, float]:
 def table(study: Study) -> Table:
     """One row per design."""
     settings = study.request.settings
-    title = f"{study.design.title}: {float(settings.revolutions):.3g} revolutions at {study.design.torque:g} N m"
-    if settings.dynamics is not None:
-        title += f", dynamic line load at {study.design.speed:g} rpm"
+    title = f"{study.design.title}: {float(settings.revolutions):.3g} revolutions at {_loads(study)}"
     result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
     result.add_column("design", no_wrap=True)
     columns = {
@@ -117,6 +116,20 @@ def table(study: Study) -> Table:
     return result
 
 
+def _loads(study: Study) -> str:
+    """Under what the flanks wear."""
+    settings, design = study.request.settings, study.design
+    if settings.loads is None:
+        text, speeds = f"{design.torque:g} N m", design.speed
+    else:
+        text = ", ".join(f"{float(torque):g}" for torque in settings.loads.torques) + " N m"
+        speeds = settings.loads.speeds
+    if settings.dynamics is None or speeds is None:
+        return text
+    shown = ", ".join(f"{speed:g}" for speed in dict.fromkeys(np.atleast_1d(np.asarray(speeds)).tolist()))
+    return f"{text}, {settings.line_load} line load at {shown} rpm"
+
+
 def _cell(key: str, value: float) -> str:
     if not key.endswith("revolutions"):
         return f"{value:.3f}"
@@ -140,7 +153,8 @@ def verdict(study: Study) -> Iterator[str]:
 def failures(study: Study) -> Iterator[str]:
     """A line for every design whose contact was not found at some life."""
     for name, life in study.lives.items():
-        lost = ~np.asarray(life.cycles.converged).all(axis=-1)
+        found = np.asarray(life.cycles.converged)
+        lost = ~found.reshape(len(found), -1).all(axis=1)
         if lost.any():
             first = float(life.revolutions[int(lost.argmax())])
             yield (

@@ -2,11 +2,13 @@
 
 import dataclasses
 
+from ..conditions import LoadSpectrum
 from ..metrics import Quantity
 from ..wear import WEAR_QUANTITIES, Wear
 from .design_file import DesignFile
 from .dynamics_request import dynamics_of
-from .errors import DesignFileError, naming
+from .errors import DesignFileError, naming, refuse_given, refused
+from .schema_wear import WearSection
 from .template import part_of
 
 _QUICK_BLOCKS = 4
@@ -39,8 +41,6 @@ def wear_request(design: DesignFile, *, quick: bool = False) -> WearRequest:
         section = design.wear
         if section is None:
             raise DesignFileError("wear", "missing, nothing says for how long the pair runs and how it wears")
-        if section.largest_increment is not None and section.blocks is not None:
-            raise DesignFileError("wear.blocks", "has no effect beside wear.largest_increment")
         settings = _settings(design, vibrates=section.line_load == "dynamic")
         if quick:
             return WearRequest(dataclasses.replace(settings, blocks=_QUICK_BLOCKS), None)
@@ -49,8 +49,12 @@ def wear_request(design: DesignFile, *, quick: bool = False) -> WearRequest:
 
 def wear_quantity(design: DesignFile, name: str) -> Quantity:
     """A quantity of worn flanks with the settings of the table [wear], which has what the quantity needs."""
-    assert design.wear is not None  # `quantity_named` has looked
-    vibrates = WEAR_QUANTITIES[name].needs == "dynamics" or design.wear.line_load == "dynamic"
+    section = design.wear
+    assert section is not None  # `quantity_named` has looked
+    if section.largest_increment is not None and section.blocks is None:
+        problem = f'missing, "{name}" needs it: wear.largest_increment is for the lives of `jaxgear wear` alone'
+        raise DesignFileError("wear.blocks", problem)
+    vibrates = WEAR_QUANTITIES[name].needs == "dynamics" or section.line_load == "dynamic"
     return _settings(design, vibrates=vibrates).quantity(name)
 
 
@@ -65,4 +69,17 @@ def _settings(design: DesignFile, *, vibrates: bool) -> Wear:
                 raise DesignFileError("wear.line_load", f'"dynamic" needs {name}')
         fields = {**part.fields, "dynamics": dynamics_of(design), "line_load": section.line_load or "static"}
         part = dataclasses.replace(part, fields=fields)
-    return part.build({})
+    return dataclasses.replace(part.build({}), loads=_loads(design, section))
+
+
+def _loads(design: DesignFile, section: WearSection) -> LoadSpectrum | None:
+    """The spectrum of the table; None where it names no torques."""
+    if section.torques is None:
+        refuse_given("wear", section, ["weights", "speeds"], " without wear.torques")
+        return None
+    speeds = design.speed if section.speeds is None else section.speeds
+    run_at = {"speeds": speeds, "friction": design.friction}
+    load = refused("wear.torques" if section.speeds is None else "wear.speeds", LoadSpectrum, section.torques, **run_at)
+    if section.weights is None:
+        return load
+    return refused("wear.weights", LoadSpectrum, section.torques, section.weights, **run_at)

@@ -43,8 +43,9 @@ _FOUND = (
 
 _DYNAMIC_FACTOR = "dynamic_factor"
 
-# On more points than on 64 positions the depth would be that of spikes narrower than a contact, at the tip.
-_MOST_POINTS = 33
+# Of the grid on each flank: as many as the width of usual contacts shows. Fewer hide depth at the root of the driver
+# (17 of them 2.3 %); with 33 the depth at 24 positions is within 0.7 % of that at 128, at 16 within 2 % (20/30 pair).
+POINTS = 33
 
 
 class Case(eqx.Module):
@@ -215,16 +216,24 @@ def case_of(
     loads, weights = _loads(owner, torque, dtype)
     check_torque(owner, mesh.support_torque, loads.torque)
     law = wear_law(coefficient, loads, dtype)
-    points = usual_points(mesh) if points is None else whole(owner, "points", points, low=3)
-    other = jnp.zeros((), dtype) if deviation is None else real(deviation).astype(dtype)
+    points = POINTS if points is None else whole(owner, "points", points, low=3)
+    other = _deviation(owner, mesh, deviation)
     flanks = {"pinion": pinion, "wheel": wheel}
     vibration = vibration_of(owner, mesh, loads, dynamics, line_load, flanks, None if deviation is None else other)
     return Case(mesh, loads, weights, law, pinion, wheel, other, points, vibration)
 
 
-def usual_points(mesh: Mesh) -> int:
-    """Points of the grid on each flank where nobody says how many."""
-    return min(mesh.resolution.positions // 2 + 1, _MOST_POINTS)
+def _deviation(owner: str, mesh: Mesh, deviation: Any) -> Float[Array, "*shape"]:
+    """Material removed by manufacturing deviations [um]; zero where there are none."""
+    if deviation is None:
+        return jnp.zeros((), mesh.slice_width.dtype)
+    deviation = real(deviation).astype(mesh.slice_width.dtype)
+    wanted = mesh.resolution.pairs, mesh.resolution.slices, mesh.resolution.positions
+    if deviation.shape != wanted:
+        shown = "(pairs, slices, positions)"
+        raise ValueError(f"{owner}: deviation has shape {deviation.shape}, must be {wanted} {shown}")
+    check(owner, "deviation", deviation, "um")
+    return deviation
 
 
 def _loads(owner: str, torque: Any, dtype) -> tuple[Operation, Float[Array, " torques"] | None]:

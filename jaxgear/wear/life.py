@@ -83,7 +83,12 @@ class WearLife(Checked):
 
         Args:
             life: which of the lives; the last one by default.
+
+        Raises:
+            IndexError: where there are not so many.
         """
+        if not -len(self.depth) <= life < len(self.depth):
+            raise IndexError(f"WearLife: life = {life} must be less than {len(self.depth)}, of so many it is one")
         return tables(self.roll_length, self.face_coordinate, self.depth[life])
 
 
@@ -124,8 +129,8 @@ def wear(
         deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions);
             None for perfect gears.
         blocks: of equal length, even: two and two are compared with one of double length.
-        points: of the grid on each flank, evenly spaced from the start of the active profile to the tip; None for half
-            as many as the mesh has positions, and one, at most 33. Points nearer to each other than the contact is wide
+        points: of the grid on each flank, evenly spaced from the start of the active profile to the tip; None for 33.
+            Points nearer to each other than the contact is wide
             show no more, and pile up at the tip what the contact there would wear beyond it.
         dynamics: what vibrates, its speeds aside: the motion is that at the speed of an `Operation`, or of every load
             of a spectrum. None for no vibration.
