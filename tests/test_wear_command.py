@@ -169,6 +169,63 @@ def test_loads_of_the_table_wear_one_flank_together(file):
     assert float(asked) == pytest.approx(float(wear_depth(life)[-1]), rel=1e-12)
 
 
+DYNAMICS = """
+[dynamics]
+speeds = [500.0, 1000.0]
+model = "varying stiffness"
+damping_ratio = 0.1
+positions = 16
+"""
+DYNAMIC = TABLE + 'line_load = "dynamic"\n'
+FAST = PAIR.replace("torque = 150.0", "torque = 150.0\nspeed = 6000.0").replace(
+    "bore_diameter = 12.6", "bore_diameter = 12.6\ntooth_thickness_allowance = -60.0"
+)
+
+
+def test_a_dynamic_line_load_needs_a_speed_and_what_vibrates(file):
+    settings = wear_request(load_design(file(FAST + DYNAMICS + DYNAMIC))).settings
+    assert settings.line_load == "dynamic" and settings.dynamics.model == "varying stiffness"
+    static = wear_request(load_design(file(FAST + DYNAMICS + TABLE))).settings
+    assert static.dynamics is None  # as before there was such a load
+    for text, needs in ((FAST + DYNAMIC, r"the table \[dynamics\]"), (PAIR + DYNAMICS + DYNAMIC, "load.speed")):
+        with pytest.raises(DesignFileError, match=f'wear.line_load: "dynamic" needs {needs}'):
+            wear_request(load_design(file(text)))
+    with pytest.raises(DesignFileError, match='wear.line_load: "quick"'):
+        load_design(file(PAIR + TABLE + 'line_load = "quick"\n'))
+
+
+def test_dynamic_factors_over_the_life_are_results_of_a_file(file):
+    """Of flanks that wear under either load."""
+    asked = SWEEP.format(name="worn_dynamic_factor")
+    for table in (TABLE, DYNAMIC):
+        quantity = sweep_request(load_design(file(FAST + DYNAMICS + table + asked))).results[1]
+        settings = quantity.of.settings
+        assert settings.dynamics.positions == 16
+        assert settings.line_load == ("dynamic" if table is DYNAMIC else "static")
+    for text, needs in (
+        (FAST + DYNAMICS, r"the table \[wear\]"),
+        (FAST + TABLE, r"the table \[dynamics\]"),
+        (PAIR + DYNAMICS + TABLE, "load.speed"),
+    ):
+        with pytest.raises(DesignFileError, match=f'sweep.results.1.: "worn_dynamic_factor" needs {needs}'):
+            sweep_request(load_design(file(text + asked)))
+
+
+@pytest.mark.slow
+def test_the_command_shows_the_dynamic_factor(file, tmp_path):
+    folder = tmp_path / "out"
+    done = call("wear", str(file(FAST + DYNAMICS + DYNAMIC)), "--output", str(folder))
+    assert done.code == 0, done.err
+    assert "K_v worst" in done.out and "dynamic line load at 6000 rpm" in done.out
+    assert (folder / "dynamic_factor_over_life.png").exists()
+    found = json.loads((folder / "summary.json").read_text())
+    assert found["settings"]["line_load"] == "dynamic" and found["settings"]["dynamics"]["positions"] == 16
+    with (folder / "life.csv").open() as lines:
+        factors = [float(row["dynamic_factor"]) for row in csv.DictReader(lines) if row["design"] == "unmodified"]
+    assert len(factors) == 5 and min(factors) > 1.0
+    assert found["designs"]["unmodified"]["max_dynamic_factor_over_life"] == pytest.approx(max(factors), rel=1e-6)
+
+
 def test_a_quick_run_has_few_blocks(file):
     request = wear_request(load_design(file(PAIR + TABLE.replace("blocks = 4", "largest_increment = 0.1"))), quick=True)
     assert request.settings.blocks == 4 and request.largest_increment is None

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ..contact import Operation
 from ..io import DesignFile, WearRequest, wear_request, write_worn
+from ..numerics import optional_real, real
 from ..optimize import Optimum
 from ..wear import WearLife, wear_in_steps
 from . import wear_report
@@ -54,7 +55,7 @@ def _life(design: DesignFile, request: WearRequest, mesh, name: str, flanks, kep
 
     return wear_in_steps(
         mesh,
-        settings.loads or Operation(design.torque, design.speed, design.friction),
+        settings.loads or Operation(real(design.torque), optional_real(design.speed), optional_real(design.friction)),
         settings.revolutions,
         coefficient=settings.coefficients,
         pinion=pinion,

@@ -119,14 +119,15 @@ def table(study: Study) -> Table:
 def _loads(study: Study) -> str:
     """Under what the flanks wear."""
     settings, design = study.request.settings, study.design
+    speeds: Any = design.speed
     if settings.loads is None:
-        text, speeds = f"{design.torque:g} N m", design.speed
+        torques = [design.torque]
     else:
-        text = ", ".join(f"{float(torque):g}" for torque in settings.loads.torques) + " N m"
-        speeds = settings.loads.speeds
-    if settings.dynamics is None or speeds is None:
+        torques, speeds = settings.loads.torques.tolist(), settings.loads.speeds
+    text = ", ".join(f"{torque:g}" for torque in torques) + " N m"
+    if settings.dynamics is None:
         return text
-    shown = ", ".join(f"{speed:g}" for speed in dict.fromkeys(np.atleast_1d(np.asarray(speeds)).tolist()))
+    shown = ", ".join(f"{speed:g}" for speed in dict.fromkeys(np.atleast_1d(np.asarray(speeds, float)).tolist()))
     return f"{text}, {settings.line_load} line load at {shown} rpm"
 
 

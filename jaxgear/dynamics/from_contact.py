@@ -176,7 +176,7 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
         return LoadedError(first, start + deflection - mean[:, None], force / mean, converged)
     farthest = reach * jnp.max(deflection[0])
     both = tuple((side, _in_own_order(side, each)) for side, each in zip(sides, found))
-    drive, coast = _of_both(lambda side: tabulate(*side, compliance, farthest, levels), both)
+    drive, coast = _of_both(lambda of: tabulate(of[0], of[1], compliance, farthest, levels), both)
     return ForceMap(
         first_phase=first,
         start=start,
@@ -190,7 +190,8 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
 def _of_both(function: Callable[[Any], Any], sides: tuple[Any, Any]) -> list[Any]:
     """A function of each side; as a part of another program in a loop, which compiles in half of the time."""
     (drive, like), (coast, other) = (eqx.partition(side, eqx.is_array) for side in sides)
-    if is_eager() or jax.tree.structure(drive) != jax.tree.structure(coast) or not eqx.tree_equal(like, other):
+    trees: list[Any] = [jax.tree.structure(arrays) for arrays in (drive, coast)]
+    if is_eager() or trees[0] != trees[1] or not eqx.tree_equal(like, other):
         return [function(side) for side in sides]
     stacked = jax.tree.map(lambda *parts: jnp.stack(parts), drive, coast)
     found = jax.lax.map(lambda arrays: function(eqx.combine(arrays, like)), stacked)

@@ -244,8 +244,10 @@ def _constraint(design: DesignFile, number: int, table: schema.Tables) -> Constr
 
 def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:
     """A life to a limit of PPTE is known up to the life that is looked at: no design can be shown to last longer."""
-    longest = None if design.wear is None else design.wear.revolutions
-    if isinstance(of, Quantity) and of.name == "life_to_ppte" and low is not None and not low <= longest:
+    if design.wear is None or low is None or not (isinstance(of, Quantity) and of.name == "life_to_ppte"):
+        return
+    longest = design.wear.revolutions
+    if low > longest:
         raise DesignFileError(key, f"{low:g} must be at most wear.revolutions = {longest:g}, beyond which nobody looks")
 
 

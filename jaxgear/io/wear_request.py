@@ -67,7 +67,7 @@ def _settings(design: DesignFile, *, vibrates: bool) -> Wear:
         for known, name in ((design.dynamics, "the table [dynamics]"), (design.speed, "load.speed")):
             if known is None:
                 raise DesignFileError("wear.line_load", f'"dynamic" needs {name}')
-        fields = {**part.fields, "dynamics": dynamics_of(design), "line_load": section.line_load or "static"}
+        fields = {**part.fields, "dynamics": dynamics_of(design), "line_load": section.line_load}
         part = dataclasses.replace(part, fields=fields)
     return dataclasses.replace(part.build({}), loads=_loads(design, section))
 

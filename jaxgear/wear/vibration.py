@@ -87,7 +87,7 @@ def vibration_of(
     fine = resized(mesh, positions=settings.positions)
     given = mesh, loads, settings, flanks, deviation
     if is_eager() and not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(given)):
-        counts = []
+        counts: list[int] = []
         for number in range(len(loads.torque)):
             torque, speed = loads.torque[number], loads.speed[number]
             off = None if deviation is None else interpolated(deviation, mesh, fine)
