@@ -24,7 +24,7 @@ from jaxgear.io import (
     write_worn,
 )
 from jaxgear.io.folder import RESULT_FILES
-from jaxgear.wear import March, over_life, wear_in_steps
+from jaxgear.wear import March, over_life, wear, wear_depth, wear_in_steps
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -105,10 +105,11 @@ def check_flanks(path, folder, rows):
     [
         ("", "wear: missing, nothing says for how long the pair runs and how it wears"),
         ("[wear]\n", "wear.revolutions: missing"),
-        (TABLE.replace("2e7", "-1.0"), "wear.revolutions: -1 must be greater than 0"),
+        (TABLE.replace("2e7", "-1.0"), "wear.revolutions: -1 revolutions must be greater than 0"),
         (TABLE.replace("1e-18", "-1e-18"), "wear.coefficient: -1e-18 m2/N must be at least 0 m2/N"),
         (TABLE.replace("blocks = 4", "blocks = 5"), "wear.blocks: 5 must be even"),
-        (TABLE + "largest_increment = 1.0\n", "wear.blocks: has no effect beside wear.largest_increment"),
+        (TABLE + "weights = [1.0]\n", "wear.weights: has no effect without wear.torques"),
+        (TABLE + "torques = [50.0, 50.0]\n", "wear.torques: torques must be different"),
         (TABLE.replace("depth_limit = 5.0", "depth_limit = 0.0"), "wear.depth_limit: 0 um must be greater than 0 um"),
         (TABLE + "coeficient = 1.0\n", "wear.coeficient: unknown key"),
     ],
@@ -129,8 +130,100 @@ def test_a_design_file_binds_names_to_its_settings(file):
     assert results == ("ppte", settings.quantity("worn_ppte"))
     with pytest.raises(DesignFileError, match=r'sweep.results\[1\]: "worn_ppte" needs the table \[wear\]'):
         sweep_request(load_design(file(text)))
+    of_increments = TABLE.replace("blocks = 4", "largest_increment = 0.1")
+    with pytest.raises(DesignFileError, match=r'wear.blocks: missing, "worn_ppte" needs it'):
+        sweep_request(load_design(file(text + of_increments)))
+    assert sweep_request(load_design(file(text + TABLE + "largest_increment = 0.1\n"))).results == results
     with pytest.raises(DesignFileError, match='"life_to_ppte" needs wear.ppte_limit'):
         sweep_request(load_design(file(PAIR + SWEEP.format(name="life_to_ppte") + TABLE)))
+
+
+def test_a_real_life_can_be_asked_for(file):
+    """20 000 h at 3000 rpm are 3.6e9 revolutions."""
+    table = (
+        TABLE.replace("2e7", "3.6e9")
+        + """
+[optimize]
+objective = "wear_depth"
+constraint = [{ of = "life_to_depth", low = 7.2e9 }]
+"""
+    )
+    design = load_design(file(PAIR + VARIABLES + table))
+    assert wear_request(design).settings.revolutions == 3.6e9
+    assert optimize_request(design).method == "minimax"
+    beyond = table.replace("life_to_depth", "life_to_ppte").replace("[wear]", "[wear]\nppte_limit = 3.0")
+    with pytest.raises(DesignFileError, match=r"constraint\[0\].low: 7.2e\+09 must be at most wear.revolutions = 3.6e"):
+        optimize_request(load_design(file(PAIR + VARIABLES + beyond)))
+
+
+def test_loads_of_the_table_wear_one_flank_together(file):
+    """As `wear` under the spectrum; the quantities have it too, whatever the load of the case."""
+    table = TABLE + "torques = [50.0, 150.0]\nweights = [3.0, 1.0]\n"
+    design = load_design(file(PAIR + SWEEP.format(name="wear_depth") + table))
+    settings = wear_request(design).settings
+    assert settings.loads is not None and settings.loads.weights.tolist() == [0.75, 0.25]
+    mesh = load_design(file(PAIR)).mesh()
+    spectrum = jg.LoadSpectrum([50.0, 150.0], [3.0, 1.0])
+    life = wear(mesh, spectrum, 2e7, coefficient=1e-18, blocks=4)
+    asked = sweep_request(design).results[1](jg.solve(mesh, 150.0).on(mesh))
+    assert float(asked) == pytest.approx(float(wear_depth(life)[-1]), rel=1e-12)
+
+
+DYNAMICS = """
+[dynamics]
+speeds = [500.0, 1000.0]
+model = "varying stiffness"
+damping_ratio = 0.1
+positions = 16
+"""
+DYNAMIC = TABLE + 'line_load = "dynamic"\n'
+FAST = PAIR.replace("torque = 150.0", "torque = 150.0\nspeed = 6000.0").replace(
+    "bore_diameter = 12.6", "bore_diameter = 12.6\ntooth_thickness_allowance = -60.0"
+)
+
+
+def test_a_dynamic_line_load_needs_a_speed_and_what_vibrates(file):
+    settings = wear_request(load_design(file(FAST + DYNAMICS + DYNAMIC))).settings
+    assert settings.line_load == "dynamic" and settings.dynamics.model == "varying stiffness"
+    static = wear_request(load_design(file(FAST + DYNAMICS + TABLE))).settings
+    assert static.dynamics is None  # as before there was such a load
+    for text, needs in ((FAST + DYNAMIC, r"the table \[dynamics\]"), (PAIR + DYNAMICS + DYNAMIC, "load.speed")):
+        with pytest.raises(DesignFileError, match=f'wear.line_load: "dynamic" needs {needs}'):
+            wear_request(load_design(file(text)))
+    with pytest.raises(DesignFileError, match='wear.line_load: "quick"'):
+        load_design(file(PAIR + TABLE + 'line_load = "quick"\n'))
+
+
+def test_dynamic_factors_over_the_life_are_results_of_a_file(file):
+    """Of flanks that wear under either load."""
+    asked = SWEEP.format(name="worn_dynamic_factor")
+    for table in (TABLE, DYNAMIC):
+        quantity = sweep_request(load_design(file(FAST + DYNAMICS + table + asked))).results[1]
+        settings = quantity.of.settings
+        assert settings.dynamics.positions == 16
+        assert settings.line_load == ("dynamic" if table is DYNAMIC else "static")
+    for text, needs in (
+        (FAST + DYNAMICS, r"the table \[wear\]"),
+        (FAST + TABLE, r"the table \[dynamics\]"),
+        (PAIR + DYNAMICS + TABLE, "load.speed"),
+    ):
+        with pytest.raises(DesignFileError, match=f'sweep.results.1.: "worn_dynamic_factor" needs {needs}'):
+            sweep_request(load_design(file(text + asked)))
+
+
+@pytest.mark.slow
+def test_the_command_shows_the_dynamic_factor(file, tmp_path):
+    folder = tmp_path / "out"
+    done = call("wear", str(file(FAST + DYNAMICS + DYNAMIC)), "--output", str(folder))
+    assert done.code == 0, done.err
+    assert "K_v worst" in done.out and "dynamic line load at 6000 rpm" in done.out
+    assert (folder / "dynamic_factor_over_life.png").exists()
+    found = json.loads((folder / "summary.json").read_text())
+    assert found["settings"]["line_load"] == "dynamic" and found["settings"]["dynamics"]["positions"] == 16
+    with (folder / "life.csv").open() as lines:
+        factors = [float(row["dynamic_factor"]) for row in csv.DictReader(lines) if row["design"] == "unmodified"]
+    assert len(factors) == 5 and min(factors) > 1.0
+    assert found["designs"]["unmodified"]["max_dynamic_factor_over_life"] == pytest.approx(max(factors), rel=1e-6)
 
 
 def test_a_quick_run_has_few_blocks(file):

@@ -37,7 +37,8 @@ def test_quantities_are_those_of_the_life(mesh):
         "life_to_depth": life_to_depth(life, 2.0),
         "life_to_ppte": jnp.minimum(life_to(life, "ppte", 6.0), 4e7),
     }
-    assert {*expected, *found} == {*WEAR_QUANTITIES}
+    vibrating = {"worn_dynamic_factor", "max_dynamic_factor_over_life"}
+    assert {*expected, *found, *vibrating} == {*WEAR_QUANTITIES}
     for name, number in expected.items():
         np.testing.assert_allclose(WEAR_QUANTITIES[name].of(life, SETTINGS), number, rtol=1e-12)
 
@@ -51,6 +52,22 @@ def test_a_limit_that_is_never_reached_is_no_failure(mesh):
     idle = SETTINGS.life(mesh, 0.0)
     assert np.isinf(life_to_depth(idle, 1.0))
     assert 4e7 < float(WEAR_QUANTITIES["life_to_depth"].of(idle, far)) < np.inf
+
+
+def test_overlong_blocks_give_no_number_but_their_error(mesh):
+    """Where flanks overshoot from block to block nobody knows what is left; the estimated error tells."""
+    cycle = jg.solve(mesh, TORQUE).on(mesh)
+    long, enough = (Wear(revolutions, 1e-18, blocks=2) for revolutions in (2e9, 2e7))
+    assert np.isnan(float(long.quantity("wear_depth")(cycle)))
+    assert float(long.quantity("wear_depth_error")(cycle)) > 1.0
+    assert 0 < float(enough.quantity("wear_depth")(cycle)) < np.inf
+
+
+def test_a_life_is_under_one_load(mesh):
+    spectrum = Wear(2e7, 1e-18, loads=jg.LoadSpectrum([50.0, 100.0]))
+    for settings, torque in ((SETTINGS, None), (spectrum, TORQUE)):
+        with pytest.raises(ValueError, match="Wear: give a torque where there are no loads, and none where there are"):
+            settings.life(mesh, torque)
 
 
 def test_equal_settings_make_equal_quantities():
@@ -73,7 +90,7 @@ def test_a_name_without_settings_says_what_it_needs(mesh):
         (lambda: SETTINGS.quantity("depth"), 'Wear: quantity "depth" is not known, must be one of worn_ppte'),
         (lambda: Wear(1e7, 1e-18).quantity("life_to_depth"), 'Wear: quantity "life_to_depth" needs depth_limit'),
         (lambda: Wear(1e7, 1e-18).quantity("life_to_ppte"), 'Wear: quantity "life_to_ppte" needs ppte_limit'),
-        (lambda: Wear(-1.0, 1e-18), "Wear: revolutions = -1 must be greater than 0"),
+        (lambda: Wear(-1.0, 1e-18), "Wear: revolutions = -1 revolutions must be greater than 0 revolutions"),
         (lambda: Wear(1e7, -1e-18), "Wear: coefficient = -1e-18 m2/N must be at least 0 m2/N"),
         (lambda: Wear(1e7, 1e-18, -1.0), "Wear: wheel_coefficient = -1 m2/N must be at least 0 m2/N"),
         (lambda: Wear(1e7, 1e-18, blocks=5), "Wear: blocks = 5 must be even"),

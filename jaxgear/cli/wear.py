@@ -1,8 +1,11 @@
 """The command `jaxgear wear`: from a design file to its flanks over their life."""
 
+import dataclasses
 from pathlib import Path
 
+from ..contact import Operation
 from ..io import DesignFile, WearRequest, wear_request, write_worn
+from ..numerics import optional_real, real
 from ..optimize import Optimum
 from ..wear import WearLife, wear_in_steps
 from . import wear_report
@@ -16,10 +19,13 @@ from .wear_report import Study
 def _plan(design: DesignFile, quick: bool) -> Make[Study]:
     request = wear_request(design, quick=quick)
     search = search_of(design, quick=quick)
-    lasting = None if search is None else search.over_life(request.settings)
+    # a step of the search wears a life: under the static load, which takes far less than a motion in every block
+    static = dataclasses.replace(request.settings, line_load=None, dynamics=None)
+    lasting = None if search is None else search.over_life(static)
 
     def make(target: Path, stages: Stages):
-        highest = max(design.torque, design.torque_range[1])
+        loads = request.settings.loads
+        highest = max(design.torque, design.torque_range[1], 0.0 if loads is None else float(loads.torques.max()))
         mesh, designs = compared(design, highest, search, stages, quick=quick)
         if lasting is not None:
             stages.begin("searching the optimum over the life")
@@ -49,12 +55,14 @@ def _life(design: DesignFile, request: WearRequest, mesh, name: str, flanks, kep
 
     return wear_in_steps(
         mesh,
-        design.torque,
+        settings.loads or Operation(real(design.torque), optional_real(design.speed), optional_real(design.friction)),
         settings.revolutions,
         coefficient=settings.coefficients,
         pinion=pinion,
         wheel=wheel,
         points=settings.points,
+        dynamics=settings.dynamics,
+        line_load=settings.line_load,
         blocks=settings.blocks,
         largest_increment=request.largest_increment,
         keep=kept,

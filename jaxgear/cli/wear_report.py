@@ -34,9 +34,11 @@ _QUANTITIES = (
 # of the depth: what the blocks leave uncertain and nobody asks about
 _WORTH_A_WORD = 0.01
 _PANEL, _HEIGHT = 80.0, 84.0  # [mm]
+_OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks touch: jaxgear dynamics tells."
 
 ASSUMED = (
-    "Wear follows Archard: depth is the coefficient times pressure and sliding distance, at the torque of the file."
+    "Wear follows Archard: depth is the coefficient times pressure and sliding distance, at the torque of the file or "
+    "the torques of [wear], on gears without manufacturing deviations."
 )
 
 
@@ -73,6 +75,10 @@ def _numbers(study: Study, life: WearLife) -> dict[str, float]:
         "volume_by_tip_corners_share": volume[:, 1].sum() / max(volume.sum(), np.finfo(float).tiny),
         "wear_depth_error_um": life.error[-1],
     }
+    if life.dynamic_factor is not None:
+        factors = np.asarray(over_life(life, "dynamic_factor"))
+        found["new_dynamic_factor"], found["worn_dynamic_factor"] = factors[0], factors[-1]
+        found["max_dynamic_factor_over_life"] = factors.max()
     if settings.depth_limit is not None:
         found["life_to_depth_revolutions"] = life_to_depth(life, settings.depth_limit)
     if settings.ppte_limit is not None:
@@ -83,7 +89,7 @@ def _numbers(study: Study, life: WearLife) -> dict[str, float]:
 def table(study: Study) -> Table:
     """One row per design."""
     settings = study.request.settings
-    title = f"{study.design.title}: {float(settings.revolutions):.3g} revolutions at {study.design.torque:g} N m"
+    title = f"{study.design.title}: {float(settings.revolutions):.3g} revolutions at {_loads(study)}"
     result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
     result.add_column("design", no_wrap=True)
     columns = {
@@ -95,6 +101,8 @@ def table(study: Study) -> Table:
         "worn_ppte_um": "worn",
         "mean_ppte_over_life_um": "mean [um]",
     }
+    if settings.dynamics is not None:
+        columns |= {"new_dynamic_factor": "K_v new", "max_dynamic_factor_over_life": "K_v worst"}
     limits = {
         "life_to_depth_revolutions": (settings.depth_limit, "{:g} um deep"),
         "life_to_ppte_revolutions": (settings.ppte_limit, "PPTE {:g} um"),
@@ -106,6 +114,21 @@ def table(study: Study) -> Table:
         numbers = _numbers(study, life)
         result.add_row(name, *(_cell(key, numbers[key]) for key in columns))
     return result
+
+
+def _loads(study: Study) -> str:
+    """Under what the flanks wear."""
+    settings, design = study.request.settings, study.design
+    speeds: Any = design.speed
+    if settings.loads is None:
+        torques = [design.torque]
+    else:
+        torques, speeds = settings.loads.torques.tolist(), settings.loads.speeds
+    text = ", ".join(f"{torque:g}" for torque in torques) + " N m"
+    if settings.dynamics is None:
+        return text
+    shown = ", ".join(f"{speed:g}" for speed in dict.fromkeys(np.atleast_1d(np.asarray(speeds, float)).tolist()))
+    return f"{text}, {settings.line_load} line load at {shown} rpm"
 
 
 def _cell(key: str, value: float) -> str:
@@ -131,19 +154,21 @@ def verdict(study: Study) -> Iterator[str]:
 def failures(study: Study) -> Iterator[str]:
     """A line for every design whose contact was not found at some life."""
     for name, life in study.lives.items():
-        lost = ~np.asarray(life.cycles.converged).all(axis=-1)
+        found = np.asarray(life.cycles.converged)
+        lost = ~found.reshape(len(found), -1).all(axis=1)
         if lost.any():
             first = float(life.revolutions[int(lost.argmax())])
             yield (
                 f"NOT CONVERGED: {name} from {first:.3g} revolutions on; its numbers are not to be trusted. "
                 "Take more blocks, or raise resolution.newton_steps or resolution.pairs."
+                + _OF_MOTION
+                * (life.dynamic_factor is not None)
             )
 
 
 def summary(study: Study) -> dict[str, Any]:
     """Contents of `summary.json`."""
     settings = study.request.settings
-    given = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
     designs = {
         name: {
             **_numbers(study, life),
@@ -157,7 +182,7 @@ def summary(study: Study) -> dict[str, Any]:
         "title": study.design.title,
         "design_file": study.design.path.name,
         "torque_Nm": study.design.torque,
-        "settings": {name: value for name, value in given.items() if value is not None},
+        "settings": _without_none(settings),
         "largest_increment_um": study.request.largest_increment,
         "designs": designs,
         "geometry": geometry(study.design.pair()),
@@ -165,9 +190,20 @@ def summary(study: Study) -> dict[str, Any]:
     }
 
 
+def _without_none(settings: Any) -> dict[str, Any]:
+    """Fields of settings, and of settings within them."""
+    given = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
+    return {
+        name: _without_none(value) if dataclasses.is_dataclass(value) else value
+        for name, value in given.items()
+        if value is not None
+    }
+
+
 def write_lives(path: Path, study: Study) -> None:
     """Every life of every design as CSV."""
-    known = [quantity_of(name) for name in _QUANTITIES]
+    vibrates = study.request.settings.dynamics is not None
+    known = [quantity_of(name) for name in (*_QUANTITIES, *(["dynamic_factor"] if vibrates else []))]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         depths = "pinion_wear_depth_um", "wheel_wear_depth_um", "wear_depth_error_um"
@@ -197,4 +233,6 @@ def write_figures(folder: Path, study: Study) -> list[Path]:
         axes[f"worn_{gear}"] = panels
     axes["ppte_over_life"] = plot.lives(study.lives, "ppte")
     axes["depth_over_life"] = plot.lives(study.lives, "wear_depth")
+    if study.request.settings.dynamics is not None:
+        axes["dynamic_factor_over_life"] = plot.lives(study.lives, "dynamic_factor")
     return report.save_figures(folder, axes)

@@ -1,4 +1,4 @@
-"""Contact of the mesh at a prescribed transmission error: what dynamics and wear ask for."""
+"""Contact of the mesh at a prescribed transmission error, or under a force of every position: for dynamics and wear."""
 
 from typing import Any, NamedTuple
 
@@ -130,6 +130,30 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
         residual=solution.residual,
         converged=solution.solved & mesh.margins.valid & (teeth < outermost(mesh, removed)),
     )
+
+
+class ForcedContact(NamedTuple):
+    """Contact under forces that differ from position to position.
+
+    Attributes:
+        line_load: [N/mm], shape (pairs, slices, positions).
+        converged: where the contact has been found, shape (positions,).
+    """
+
+    line_load: Load
+    converged: Bool[Array, " positions"]
+
+
+@program
+def solve_forces(mesh: Mesh, force: Curve, removed: RemovedMaterial) -> ForcedContact:
+    """Contact under a force on the line of action at every mesh position [N], at least zero, shape (positions,)."""
+    law, gap = mesh.law.moved(removed.shift), mesh.held(mesh.corner_gap[:, None] + removed.amount)
+    problem = ContactProblem(
+        mesh.structure, law, gap, mesh.lever, mesh.slice_width, force, start_law=mesh.law, coupling=mesh.coupling
+    )
+    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
+    teeth = solution.approach - mesh.given_way(solution.line_load)
+    return ForcedContact(solution.line_load, solution.solved & mesh.margins.valid & (teeth < outermost(mesh, removed)))
 
 
 class SeriesContact(NamedTuple):

@@ -1,8 +1,10 @@
 """Mesh forces of a prepared mesh: the map of its contact, and simpler models of it."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Literal, get_args
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -13,6 +15,7 @@ from ..contact.operation import operation_of
 from ..contact.solve import check_mesh
 from ..microgeometry import AbstractModification
 from ..numerics import check, concrete, real, whole
+from ..numerics.quick import is_eager
 from .flanks import Both, Flanks, Static, coast_flanks, drive_flanks, static
 from .force import AbstractMeshForce
 from .force_map import ForceMap, tabulate
@@ -24,6 +27,7 @@ Model = Literal["map", "varying stiffness", "loaded error", "tangent"]
 # Flanks that press on both sides without a load by more than this jam [um]; rounding of single precision is less.
 _JAMMED = 1e-2
 _MOST_PAIRS = 12
+_LEVELS, _REACH = 48, 5.0
 
 
 def mesh_force(
@@ -35,8 +39,8 @@ def mesh_force(
     coast: Both | None = None,
     model: Model = "map",
     positions: int = 640,
-    levels: int = 48,
-    reach: Any = 5.0,
+    levels: int = _LEVELS,
+    reach: Any = _REACH,
     compliance: Any = 0.0,
     deviation: Any = None,
 ) -> Any:
@@ -74,6 +78,18 @@ def mesh_force(
         ValueError: for a number outside its range, flanks that jam, or a modification that varies along the face on a
             mesh of one slice.
     """
+    flanks = {"pinion": pinion, "wheel": wheel, "coast": coast, "deviation": deviation}
+    return force_and_mesh(
+        mesh, torque=torque, model=model, positions=positions, levels=levels, reach=reach, compliance=compliance,
+        **flanks,
+    )[0]  # fmt: skip
+
+
+def force_and_mesh(
+    mesh: Mesh, *, torque, model, positions, compliance, pinion=None, wheel=None, coast=None, deviation=None,
+    levels=_LEVELS, reach=_REACH,
+) -> tuple[AbstractMeshForce, Mesh]:  # fmt: skip
+    """`mesh_force`, and the mesh that it was made on."""
     check_mesh("mesh_force", mesh)
     torque = operation_of("mesh_force", torque, mesh.slice_width.dtype).torque
     check("mesh_force", "torque", torque, "N m", low=0.0, open_low=True)
@@ -84,18 +100,18 @@ def mesh_force(
         raise ValueError(f"mesh_force: model = {model!r} must be one of {wanted}")
     whole("mesh_force", "levels", levels, 4, 4096)
     whole("mesh_force", "positions", positions, 4, 65536)
-    given, mesh = mesh, _with(mesh, positions=positions)
+    given, mesh = mesh, resized(mesh, positions=positions)
     both = (pinion, wheel), _coast_of(coast, (pinion, wheel))
-    off = _interpolated(deviation, given, mesh)
+    off = interpolated(deviation, given, mesh)
     made = _made(mesh, torque, both, off, model, levels, farthest, series)
     while _is_too_narrow(mesh, made):
-        mesh = _with(mesh, pairs=mesh.resolution.chosen_pairs + 1)
-        made = _made(mesh, torque, both, _interpolated(deviation, given, mesh), model, levels, farthest, series)
-    return made
+        mesh = resized(mesh, pairs=mesh.resolution.chosen_pairs + 1)
+        made = _made(mesh, torque, both, interpolated(deviation, given, mesh), model, levels, farthest, series)
+    return made, mesh
 
 
-def _with(mesh: Mesh, **sizes: Any) -> Mesh:
-    """The mesh in other array sizes."""
+def resized(mesh: Mesh, **sizes: Any) -> Mesh:
+    """The mesh in other array sizes, with its number of pairs fixed or open as before."""
     wanted = replace(mesh.resolution, **sizes)
     if wanted == mesh.resolution:
         return mesh
@@ -103,7 +119,7 @@ def _with(mesh: Mesh, **sizes: Any) -> Mesh:
     return replace(made, automatic=mesh.automatic)
 
 
-def _interpolated(deviation: Any, of: Mesh, mesh: Mesh):
+def interpolated(deviation: Any, of: Mesh, mesh: Mesh):
     """Material that deviations remove on another mesh of the same gears; a number where there are none."""
     if deviation is None:
         return 0.0
@@ -145,7 +161,7 @@ def _is_too_narrow(mesh: Mesh, made) -> bool:
 def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> AbstractMeshForce:
     drive = drive_flanks(mesh, torque, both[0])
     sides = drive._replace(removed=drive.removed + deviation), coast_flanks(mesh, torque, both[1])
-    found = [static(side, torque, compliance) for side in sides]
+    found = _of_both(lambda side: static(side, torque, compliance), sides)
     force, first = 1e3 * torque / mesh.pair.pinion.base_radius, mesh.kinematics.first_phase
     converged = jnp.all(found[0].converged) & jnp.all(found[1].converged)
     if model == "tangent":
@@ -159,10 +175,8 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
         mean = jnp.mean(deflection, axis=1)
         return LoadedError(first, start + deflection - mean[:, None], force / mean, converged)
     farthest = reach * jnp.max(deflection[0])
-    tables = [
-        tabulate(side, _in_own_order(side, each), compliance, farthest, levels) for side, each in zip(sides, found)
-    ]
-    drive, coast = tables
+    both = tuple((side, _in_own_order(side, each)) for side, each in zip(sides, found))
+    drive, coast = _of_both(lambda of: tabulate(of[0], of[1], compliance, farthest, levels), both)
     return ForceMap(
         first_phase=first,
         start=start,
@@ -171,6 +185,17 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
         node_stiffness=jnp.stack([drive[1], coast[1]]),
         converged=converged & drive[2] & coast[2],
     )
+
+
+def _of_both(function: Callable[[Any], Any], sides: tuple[Any, Any]) -> list[Any]:
+    """A function of each side; as a part of another program in a loop, which compiles in half of the time."""
+    (drive, like), (coast, other) = (eqx.partition(side, eqx.is_array) for side in sides)
+    trees: list[Any] = [jax.tree.structure(arrays) for arrays in (drive, coast)]
+    if is_eager() or trees[0] != trees[1] or not eqx.tree_equal(like, other):
+        return [function(side) for side in sides]
+    stacked = jax.tree.map(lambda *parts: jnp.stack(parts), drive, coast)
+    found = jax.lax.map(lambda arrays: function(eqx.combine(arrays, like)), stacked)
+    return [jax.tree.map(lambda part: part[number], found) for number in range(len(sides))]  # noqa: B023 - at once
 
 
 def _in_own_order(side: Flanks, found: Static):

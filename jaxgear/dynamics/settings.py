@@ -16,12 +16,12 @@ from ..metrics.settings import with_settings
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, concrete, count, number
 from .force import AbstractMeshForce
-from .from_contact import Model, mesh_force
+from .from_contact import Model, force_and_mesh
 from .oscillator import Oscillator
 from .response import SpeedResponse
 from .runs import Run, design_runs, speed_runs
 from .speed_sweep import speed_sweep
-from .steady import SteadyNumbers, differentiable
+from .steady import SteadyForce, SteadyNumbers, differentiable, steady_force
 from .systems import inertia_of, on_bearings, torsional
 
 Scalar = Float[Array, ""]
@@ -114,8 +114,13 @@ class Dynamics(Checked):
         return self._oscillator(mesh, torque, pinion=pinion, wheel=wheel)
 
     def _oscillator(self, mesh: Mesh, torque: Any, **flanks: Any) -> Oscillator:
+        return self.oscillator_and_mesh(mesh, torque, **flanks)[0]
+
+    def oscillator_and_mesh(self, mesh: Mesh, torque: Any, **flanks: Any) -> tuple[Oscillator, Mesh]:
+        """`oscillator`, of coast flanks and manufacturing deviations too, and the mesh of its mesh force."""
         options: dict[str, Any] = {"model": self.model, "compliance": self.compliance, "positions": self.positions}
-        return self.masses(mesh_force(mesh, torque=torque, **options, **flanks), mesh.pair, torque)
+        force, mesh = force_and_mesh(mesh, torque=torque, **options, **flanks)
+        return self.masses(force, mesh.pair, torque), mesh
 
     def masses(self, force: AbstractMeshForce, pair: GearPair, torque: Any) -> Oscillator:
         """The oscillator of any mesh force between the gears of a pair under a torque on the pinion [N m]."""
@@ -198,12 +203,13 @@ class Dynamics(Checked):
         Raises:
             ValueError: for designs without a common leading axis, and steps out of their range.
         """
-        steps = self._traced_steps if steps is None else steps
+        steps = self.traced_steps if steps is None else steps
         options: dict[str, Any] = {"steps": steps, "keep": keep, "batch": batch}
         return design_runs(make, designs, self.mesh_frequencies, self._runs, **options)
 
     @property
-    def _traced_steps(self) -> int:
+    def traced_steps(self) -> int:
+        """Of the integrator per mesh cycle where the natural frequency is being traced."""
         return _STEPS if self.steps is None else self.steps
 
     def quantity(self, name: str) -> Quantity:
@@ -220,12 +226,27 @@ class Dynamics(Checked):
         """
         return with_settings(name, self)
 
+    def force(
+        self, oscillator: Oscillator, mesh_frequency: Scalar, phase: Float[Array, " positions"], steps: int
+    ) -> SteadyForce:
+        """Mesh force of the steady motion from rest at a mesh frequency [Hz], whatever the speeds of the settings.
+
+        Args:
+            oscillator: what vibrates; derivatives pass through it and the frequency.
+            mesh_frequency: [Hz].
+            phase: mesh positions at which the force is asked for [base pitches], shape (positions,).
+            steps: of the integrator per mesh cycle.
+        """
+        held, frequency = jax.lax.stop_gradient((oscillator, mesh_frequency))
+        alone = replace(self, mesh_frequencies=frequency[None], steps=steps)
+        return steady_force(oscillator, mesh_frequency, alone.run(held, UP), phase, steps)
+
     def numbers(self, oscillator: Oscillator) -> SteadyNumbers:
         """The numbers of all runs with their derivatives, leading axis (runs,).
 
         The steps of the integrator are `steps`, or 256: nothing else is known of what is being traced.
         """
-        steps = self._traced_steps
+        steps = self.traced_steps
         runs = replace(self, steps=steps).runs(jax.lax.stop_gradient(oscillator))
         return differentiable(oscillator, tuple(runs.values()), steps)
 

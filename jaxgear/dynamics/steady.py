@@ -1,4 +1,4 @@
-"""Numbers of steady vibration that can be differentiated, whatever the number of cycles after which it repeats."""
+"""Numbers and forces of steady vibration with derivatives, whatever the number of cycles after which it repeats."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,11 +7,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from .orbit import find_orbit
+from .orbit import Orbit, find_orbit
 from .oscillator import Oscillator
 from .response import SpeedResponse
+from .static import static_force
 
 Numbers = Float[Array, "responses speeds"]
+Positions = Float[Array, " positions"]
+Scalar = Float[Array, ""]
 
 # Mesh cycles of the orbits that are differentiated: an orbit of two, three or four cycles is one of twelve too.
 _PERIODS = (1, 12)
@@ -45,18 +48,7 @@ def differentiable(oscillator: Oscillator, responses: Sequence[SpeedResponse], s
         responses: to as many speeds each, with orbits of up to four mesh cycles.
         steps: of a mesh cycle.
     """
-    each = [
-        (
-            of.mesh_frequency,
-            *jax.lax.stop_gradient((of.state, of.period)),
-            jax.lax.stop_gradient(
-                SteadyNumbers(
-                    of.dynamic_factor, of.approach_rms, of.no_contact, of.coast_contact, jnp.zeros_like(of.settled)
-                )
-            ),
-        )
-        for of in responses
-    ]
+    each = [(of.mesh_frequency, *_settled_on(of), _recorded(of)) for of in responses]
     together = jax.tree.map(lambda *parts: jnp.concatenate(parts), *each)
 
     def of_speed(given):
@@ -73,11 +65,94 @@ def differentiable(oscillator: Oscillator, responses: Sequence[SpeedResponse], s
     return jax.tree.map(lambda part: part.reshape(len(responses), -1), found)
 
 
+def _settled_on(of: SpeedResponse):
+    """State at every speed, and mesh cycles of the orbit."""
+    return jax.lax.stop_gradient((of.state, of.period))
+
+
+def _recorded(of: SpeedResponse) -> SteadyNumbers:
+    """The numbers of a response, without derivatives."""
+    found = of.dynamic_factor, of.approach_rms, of.no_contact, of.coast_contact, jnp.zeros_like(of.settled)
+    return jax.lax.stop_gradient(SteadyNumbers(*found))
+
+
 def _of_orbit(oscillator, frequency, start, periods: int, steps: int, recorded: SteadyNumbers) -> SteadyNumbers:
-    orbit = find_orbit(oscillator, frequency, start, periods=periods, steps=steps)
-    factor, rms = orbit.dynamic_factor, orbit.approach_rms
-    scale = recorded.approach_rms + jnp.finfo(rms.dtype).eps ** 0.5 * jnp.abs(orbit.approach_mean)
-    same = jnp.abs(factor - recorded.dynamic_factor) <= _SAME * recorded.dynamic_factor
-    same &= (jnp.abs(rms - recorded.approach_rms) <= _SAME * scale) & orbit.converged
-    exact = recorded._replace(dynamic_factor=factor, approach_rms=rms, exact=same)
+    orbit, same = _orbit_of(oscillator, frequency, start, periods, steps, recorded)
+    exact = recorded._replace(dynamic_factor=orbit.dynamic_factor, approach_rms=orbit.approach_rms, exact=same)
     return jax.tree.map(lambda there, otherwise: jnp.where(same, there, otherwise), exact, recorded)
+
+
+def _orbit_of(
+    oscillator, frequency, start, periods: int, steps: int, recorded: SteadyNumbers
+) -> tuple[Orbit, Bool[Array, ""]]:
+    """The orbit through a state that the motion has settled on, and whether it is that of the motion."""
+    orbit = find_orbit(oscillator, frequency, start, periods=periods, steps=steps)
+    scale = recorded.approach_rms + jnp.finfo(orbit.approach_rms.dtype).eps ** 0.5 * jnp.abs(orbit.approach_mean)
+    same = jnp.abs(orbit.dynamic_factor - recorded.dynamic_factor) <= _SAME * recorded.dynamic_factor
+    return orbit, same & (jnp.abs(orbit.approach_rms - recorded.approach_rms) <= _SAME * scale) & orbit.converged
+
+
+class SteadyForce(NamedTuple):
+    """What a motion that repeats makes of the mesh force, for derivatives by every number of the oscillator.
+
+    Attributes:
+        force: elastic force at mesh positions of successive cycles [N], shape (cycles, positions), negative on the
+            coast flanks; as many cycles as any orbit that is looked for repeats in.
+        dynamic_factor: largest force at any time over the static one.
+        coast_contact: whether the coast flanks touch at any time.
+        found: whether the motion has settled on an orbit, of a mesh force whose contacts were found; forces are the
+            static one otherwise.
+    """
+
+    force: Float[Array, "cycles positions"]
+    dynamic_factor: Scalar
+    coast_contact: Bool[Array, ""]
+    found: Bool[Array, ""]
+
+
+def steady_force(
+    oscillator: Oscillator, frequency: Scalar, response: SpeedResponse, phase: Positions, steps: int
+) -> SteadyForce:
+    """Mesh force of the orbit that a motion has settled on.
+
+    Args:
+        oscillator: that the response is of.
+        frequency: of the mesh [Hz].
+        response: to that one speed, with orbits of up to four mesh cycles.
+        phase: mesh positions [base pitches], shape (positions,).
+        steps: of a mesh cycle.
+    """
+    recorded, start, period = jax.tree.map(lambda part: part[0], (_recorded(response), *_settled_on(response)))
+    even = static_force(oscillator)
+    most = max(_PERIODS)
+
+    def orbit(periods: int):
+        def found() -> SteadyForce:
+            orbit, same = _orbit_of(oscillator, frequency, start, periods, steps, recorded)
+            force = jnp.tile(_at_positions(oscillator, orbit, phase), (most // periods, 1))
+            same &= oscillator.converged
+            return SteadyForce(jnp.where(same, force, even), orbit.dynamic_factor, orbit.coast_contact > 0, same)
+
+        return found
+
+    def none() -> SteadyForce:
+        no = jnp.zeros((), bool)
+        return SteadyForce(jnp.full((most, len(phase)), even), jnp.full_like(even, jnp.nan), no, no)
+
+    return jax.lax.switch(jnp.asarray(_CHOICE)[period], [*map(orbit, _PERIODS), none])
+
+
+def _at_positions(oscillator: Oscillator, orbit: Orbit, phase: Positions) -> Float[Array, "cycles positions"]:
+    """Force of an orbit of even steps at mesh positions, by the cubics through its approach and the rate of that."""
+    count = len(orbit.phase)
+    steps = count // orbit.periods
+    place = ((phase - jnp.floor(phase))[None] + jnp.arange(orbit.periods, dtype=phase.dtype)[:, None]) * steps
+    left = jnp.floor(place)
+    share, first = place - left, left.astype(jnp.int32) % count
+    last, step = (first + 1) % count, 1 / (steps * orbit.mesh_frequency)
+    rise = step * orbit.approach_rate
+    change = orbit.approach[last] - orbit.approach[first]
+    bend = (1 - share) * (rise[first] - change) - share * (rise[last] - change)
+    approach = orbit.approach[first] + share * (change + (1 - share) * bend)
+    at = jax.vmap(oscillator.mesh_force)
+    return jax.vmap(lambda cycle: at(phase, cycle))(approach)

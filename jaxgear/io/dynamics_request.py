@@ -62,7 +62,13 @@ def dynamic_quantity(design: DesignFile, key: str, name: str) -> Quantity:
     assert design.dynamics is not None  # `quantity_named` has looked
     if DYNAMIC_QUANTITIES[name].at_speed and design.speed is None:
         raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{name}" is that of all speeds of [dynamics]')
-    return _settings(design, design.dynamics, design.dynamics.number).quantity(name)
+    return dynamics_of(design).quantity(name)
+
+
+def dynamics_of(design: DesignFile) -> Dynamics:
+    """The settings of the table [dynamics], which is there."""
+    assert design.dynamics is not None
+    return _settings(design, design.dynamics, design.dynamics.number)
 
 
 def _settings(design: DesignFile, section: DynamicsSection, number: int) -> Dynamics:

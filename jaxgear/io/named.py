@@ -52,6 +52,11 @@ def quantities_of_tables(design: DesignFile) -> Iterator[Quantity]:
 def _missing(design: DesignFile, stands: WithoutSettings) -> str:
     """What a design file lacks for a quantity of one of its tables; "" for nothing."""
     settings = getattr(design, stands.table)
+    if stands.needs == "dynamics":  # which other settings hold, and a file has a table for
+        for known, name in ((settings, f"the table [{stands.table}]"), (design.dynamics, "the table [dynamics]")):
+            if known is None:
+                return name
+        return "" if design.speed is not None else "load.speed"
     if settings is not None:
         unset = stands.needs is not None and getattr(settings, stands.needs) is None
         return f"{stands.table}.{stands.needs}" if unset else ""

@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..contact import Mesh
-from ..metrics import Quantity
-from ..numerics import AbstractMeasure, Callback, CVaR, Mean, Quantile, Worst
+from ..metrics import Quantity, quantity_of
+from ..numerics import AbstractMeasure, Callback, CVaR, Mean, Number, Quantile, Worst
 from ..optimize import (
     METHODS,
     Constraint,
@@ -27,6 +27,7 @@ from .cases import load_of, tolerance_of
 from .design_file import DesignFile
 from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
 from .named import quantity_named
+from .ranges import outside
 from .toml import decode
 
 _DEFAULT_METHOD = "minimax"
@@ -223,16 +224,31 @@ def _constraint(design: DesignFile, number: int, table: schema.Tables) -> Constr
     key = f"optimize.constraint[{number}]"
     section = decode(key, table, schema.ConstraintSection)
     of: Any = section.variables if section.of is None else section.of
+    unit = ""
     if of is None or (section.of is not None and section.variables is not None):
         raise DesignFileError(key, "needs either of = a quantity or variables = a table of coefficients")
     if isinstance(of, str):
         of = quantity_named(design, f"{key}.of", of)
+        _check_reachable(design, f"{key}.low", of, section.low)
+        unit = quantity_of(of, key).unit
     else:
         for name in of:
             if name not in design.bounds:
                 problem = f'"{name}" is not a variable, {suggestion(name, design.bounds)}'
                 raise DesignFileError(f"{key}.variables", problem)
+    for name, limit in (("low", section.low), ("high", section.high)):
+        if limit is not None and (problem := outside(Number(unit), limit)):
+            raise DesignFileError(f"{key}.{name}", problem)
     return refused(key, Constraint, of, low=section.low, high=section.high)
+
+
+def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:
+    """A life to a limit of PPTE is known up to the life that is looked at: no design can be shown to last longer."""
+    if design.wear is None or low is None or not (isinstance(of, Quantity) and of.name == "life_to_ppte"):
+        return
+    longest = design.wear.revolutions
+    if low > longest:
+        raise DesignFileError(key, f"{low:g} must be at most wear.revolutions = {longest:g}, beyond which nobody looks")
 
 
 def _check_iteration(design: DesignFile, start: str, section: schema.OptimizeSection) -> None:

@@ -12,6 +12,7 @@ PLAUSIBLE: Mapping[str, tuple[float, float]] = {
     "um": (1e-6, 1e5),
     "N m": (1e-6, 1e9),
     "rpm": (1e-3, 1e7),
+    "revolutions": (1e-3, 1e15),
     "MPa": (1.0, 1e7),
     "kg/m^3": (50.0, 5e4),
     "N/(m s^0.5 K)": (1.0, 1e6),

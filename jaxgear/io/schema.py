@@ -251,8 +251,8 @@ class ConstraintSection(Section):
 
     of: Annotated[str | None, text()] = None
     variables: Annotated[dict[str, float] | None, table(_NUMBER)] = None
-    low: Annotated[float | None, _NUMBER] = None
-    high: Annotated[float | None, _NUMBER] = None
+    low: Annotated[float | None, real(plausible=False)] = None
+    high: Annotated[float | None, real(plausible=False)] = None
 
 
 class FactorialOptions(Section):

@@ -2,10 +2,13 @@
 
 import dataclasses
 
+from ..conditions import LoadSpectrum
 from ..metrics import Quantity
-from ..wear import Wear
+from ..wear import WEAR_QUANTITIES, Wear
 from .design_file import DesignFile
-from .errors import DesignFileError, naming
+from .dynamics_request import dynamics_of
+from .errors import DesignFileError, naming, refuse_given, refused
+from .schema_wear import WearSection
 from .template import part_of
 
 _QUICK_BLOCKS = 4
@@ -38,9 +41,7 @@ def wear_request(design: DesignFile, *, quick: bool = False) -> WearRequest:
         section = design.wear
         if section is None:
             raise DesignFileError("wear", "missing, nothing says for how long the pair runs and how it wears")
-        if section.largest_increment is not None and section.blocks is not None:
-            raise DesignFileError("wear.blocks", "has no effect beside wear.largest_increment")
-        settings = part_of("wear", section, Wear).build({})
+        settings = _settings(design, vibrates=section.line_load == "dynamic")
         if quick:
             return WearRequest(dataclasses.replace(settings, blocks=_QUICK_BLOCKS), None)
         return WearRequest(settings, section.largest_increment)
@@ -48,5 +49,37 @@ def wear_request(design: DesignFile, *, quick: bool = False) -> WearRequest:
 
 def wear_quantity(design: DesignFile, name: str) -> Quantity:
     """A quantity of worn flanks with the settings of the table [wear], which has what the quantity needs."""
-    assert design.wear is not None  # `quantity_named` has looked
-    return part_of("wear", design.wear, Wear).build({}).quantity(name)
+    section = design.wear
+    assert section is not None  # `quantity_named` has looked
+    if section.largest_increment is not None and section.blocks is None:
+        problem = f'missing, "{name}" needs it: wear.largest_increment is for the lives of `jaxgear wear` alone'
+        raise DesignFileError("wear.blocks", problem)
+    vibrates = WEAR_QUANTITIES[name].needs == "dynamics" or section.line_load == "dynamic"
+    return _settings(design, vibrates=vibrates).quantity(name)
+
+
+def _settings(design: DesignFile, *, vibrates: bool) -> Wear:
+    """The settings of the library: flanks wear under the static load unless the file says otherwise."""
+    section = design.wear
+    assert section is not None
+    part = part_of("wear", section, Wear)
+    if vibrates:
+        for known, name in ((design.dynamics, "the table [dynamics]"), (design.speed, "load.speed")):
+            if known is None:
+                raise DesignFileError("wear.line_load", f'"dynamic" needs {name}')
+        fields = {**part.fields, "dynamics": dynamics_of(design), "line_load": section.line_load}
+        part = dataclasses.replace(part, fields=fields)
+    return dataclasses.replace(part.build({}), loads=_loads(design, section))
+
+
+def _loads(design: DesignFile, section: WearSection) -> LoadSpectrum | None:
+    """The spectrum of the table; None where it names no torques."""
+    if section.torques is None:
+        refuse_given("wear", section, ["weights", "speeds"], " without wear.torques")
+        return None
+    speeds = design.speed if section.speeds is None else section.speeds
+    run_at = {"speeds": speeds, "friction": design.friction}
+    load = refused("wear.torques" if section.speeds is None else "wear.speeds", LoadSpectrum, section.torques, **run_at)
+    if section.weights is None:
+        return load
+    return refused("wear.weights", LoadSpectrum, section.torques, section.weights, **run_at)

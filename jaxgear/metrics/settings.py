@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 
@@ -31,10 +31,21 @@ class WithSettings:
     @property
     def settings(self) -> Any:
         """The settings."""
-        return self.make(**dict(self.fields))
+        return _made(self.make, self.fields)
 
     def __call__(self, cycle: MeshCycle) -> Any:
         return self.of(self, cycle)
+
+
+class _Within(NamedTuple):
+    """Settings that are a field of others."""
+
+    make: type[Any]
+    fields: tuple[tuple[str, Any], ...]
+
+
+def _made(make: type[Any], fields: tuple[tuple[str, Any], ...]) -> Any:
+    return make(**{name: _made(*value) if isinstance(value, _Within) else value for name, value in fields})
 
 
 def settled(name: str, settings: Checked, of: Callable[[WithSettings, MeshCycle], Any]) -> WithSettings:
@@ -43,10 +54,13 @@ def settled(name: str, settings: Checked, of: Callable[[WithSettings, MeshCycle]
     Raises:
         ValueError: for settings that are being traced.
     """
+    return WithSettings(name, of, *_plain(settings))
+
+
+def _plain(settings: Checked) -> _Within:
     owner = type(settings).__name__
     names = [field.name for field in dataclasses.fields(settings)]
-    fields = tuple((field, _hashable(owner, field, getattr(settings, field))) for field in names)
-    return WithSettings(name, of, type(settings), fields)
+    return _Within(type(settings), tuple((field, _hashable(owner, field, getattr(settings, field))) for field in names))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,6 +159,8 @@ def _with(of: Callable[[MeshCycle, Any], Any], settings: Any, cycle: MeshCycle) 
 def _hashable(owner: str, name: str, value: Any) -> Any:
     if value is None or isinstance(value, str | int):
         return value
+    if isinstance(value, Checked):
+        return _plain(value)
     known = concrete(value)
     if known is None:
         raise ValueError(f"{owner}: {name} is being traced, a quantity needs numbers")

@@ -220,8 +220,8 @@ def _start(problem: ContactProblem) -> tuple[Rows, Slopes, Slopes]:
     secant = secants_under(problem, loads)
     # gaps wider than the approach of any one spring that bears the load alone stay open
     alone = [
-        jnp.max(gap + (c + problem.compliance[i, i][None]) * even, axis=0) / lever
-        for i, (gap, c, lever) in enumerate(zip(problem.gap, secant, problem.lever))
+        jnp.max(gap + (c + problem.compliance[i, i][None]) * load, axis=0) / lever
+        for i, (gap, c, lever, load) in enumerate(zip(problem.gap, secant, problem.lever, loads))
     ]
     bound = jnp.min(jnp.stack(alone), axis=0)
     return [(lever * bound)[None] - gap for lever, gap in zip(problem.lever, problem.gap)], loads, secant

@@ -16,7 +16,7 @@ class ContactProblem(eqx.Module):
         gap: shape (pairs, slices, positions).
         lever: what a spring closes per unit of common approach, positive, shape (pairs, positions).
         weight: width of each slice, shape (slices,).
-        load: total load, scalar; None where the approach is prescribed.
+        load: total load, scalar or shape (positions,); None where the approach is prescribed.
         approach: prescribed common approach d, shape (positions,); None where the load is.
         start_law: a law like h that many problems share, which spares each of them the evaluations that its solution
             starts from; None for h.
@@ -31,7 +31,7 @@ class ContactProblem(eqx.Module):
     gap: Float[Array, "pairs slices positions"]
     lever: Float[Array, "pairs positions"]
     weight: Float[Array, " slices"]
-    load: Float[Array, ""] | None = None
+    load: Float[Array, ""] | Float[Array, " positions"] | None = None
     approach: Float[Array, " positions"] | None = None
     start_law: AbstractSpring | None = None
     coupling: Coupling | None = None

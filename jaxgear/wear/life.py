@@ -7,12 +7,14 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..contact import Mesh, MeshCycle
+from ..dynamics import Dynamics
 from ..geometry import Gear
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, check, maximum, program, real, result, whole
 from .case import Case, case_of, marched, tables
 from .deposit import arcs, grid
 from .march import BLOCKS_OF_A_PAIR, March
+from .vibration import LineLoad
 
 Scalar = Float[Array, ""]
 Lives = Float[Array, " lives"]
@@ -39,6 +41,9 @@ class WearLife(Checked):
         cycles: the mesh on these flanks, leading axis (lives,); (lives, torques) under a load spectrum. None has
             converged on flanks that are not known.
         weights: of the torques of a load spectrum in the revolutions, shape (torques,); None under one torque.
+        dynamic_factor: largest mesh force of the steady motion over the static one, at the speed of the load (K_v),
+            shape (lives,), (lives, torques) under a load spectrum; NaN where the motion does not settle on an orbit of
+            up to four mesh cycles, and on flanks that are not known. None without dynamics.
     """
 
     revolutions: Lives = result()
@@ -51,6 +56,7 @@ class WearLife(Checked):
     known: Bool[Array, " lives"] = result()
     cycles: MeshCycle
     weights: Float[Array, " torques"] | None = result()
+    dynamic_factor: Float[Array, "lives *torques"] | None = result()
 
     @property
     def pinion_depth(self) -> Depths:
@@ -77,7 +83,12 @@ class WearLife(Checked):
 
         Args:
             life: which of the lives; the last one by default.
+
+        Raises:
+            IndexError: where there are not so many.
         """
+        if not -len(self.depth) <= life < len(self.depth):
+            raise IndexError(f"WearLife: life = {life} must be less than {len(self.depth)}, of so many it is one")
         return tables(self.roll_length, self.face_coordinate, self.depth[life])
 
 
@@ -92,6 +103,8 @@ def wear(
     deviation: Any = None,
     blocks: int = BLOCKS,
     points: int | None = None,
+    dynamics: Dynamics | None = None,
+    line_load: LineLoad | None = None,
 ) -> WearLife:
     """Wear of both flanks over their life, in blocks of revolutions of one length: contact, wear, new flank, again.
 
@@ -116,9 +129,17 @@ def wear(
         deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions);
             None for perfect gears.
         blocks: of equal length, even: two and two are compared with one of double length.
-        points: of the grid on each flank, evenly spaced from the start of the active profile to the tip; None for half
-            as many as the mesh has positions, and one, at most 33. Points nearer to each other than the contact is wide
+        points: of the grid on each flank, evenly spaced from the start of the active profile to the tip; None for 33.
+            Points nearer to each other than the contact is wide
             show no more, and pile up at the tip what the contact there would wear beyond it.
+        dynamics: what vibrates, its speeds aside: the motion is that at the speed of an `Operation`, or of every load
+            of a spectrum. None for no vibration.
+        line_load: "dynamic" for the flanks to wear under the elastic force of the steady motion that begins at rest,
+            found anew in every contact analysis: the contact at every mesh position is that under the force of the
+            motion there, and the wear is the mean of the mesh cycles of its orbit, as if every tooth took part in each
+            of them. Flanks are not `known` where the motion does not settle on an orbit of up to four mesh cycles, or
+            where coast flanks touch, which do not wear here. "static" for dynamic factors alone. None for "dynamic"
+            with dynamics, "static" without.
 
     Returns:
         flanks and mesh at the start of every block and after the last one.
@@ -127,11 +148,13 @@ def wear(
         TypeError: for something else than a prepared mesh or a modification.
         ValueError: for numbers out of their range, an odd number of blocks, a coefficient that is a function where
             there is no speed, a load spectrum with hours without speeds, a torque that is not that of the gearbox which
-            holds the gears, and whatever `solve` refuses.
+            holds the gears, dynamics without a speed, a dynamic load without dynamics, and whatever `solve` and
+            `mesh_force` refuse.
     """
     check_blocks("wear", blocks)
     flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
-    case = case_of("wear", mesh, torque, coefficient=coefficient, points=points, **flanks)
+    vibrating: dict[str, Any] = {"dynamics": dynamics, "line_load": line_load}
+    case = case_of("wear", mesh, torque, coefficient=coefficient, points=points, **flanks, **vibrating)
     revolutions = checked_revolutions("wear", revolutions, mesh)
     pairs = blocks // BLOCKS_OF_A_PAIR
     found = marched(case, case.start(), jnp.full((pairs,), 1.0 / blocks, revolutions.dtype) * revolutions)
@@ -172,6 +195,7 @@ def life_of(case: Case, found: March, revolutions: Lives) -> WearLife:
         known=found.known,
         cycles=case.cycles(roll_length, found),
         weights=case.weights,
+        dynamic_factor=case.dynamic_factor(found),
     )
 
 

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..conditions import joined, solved
-from ..metrics import Quantity, quantity_of
+from ..metrics import Quantity, quantities, quantity_of
 from ..numerics import AbstractMeasure, Mean, check, maximum, real
 from .life import WearLife
 
@@ -20,14 +20,23 @@ def over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure
 
     Args:
         life: of one pair of flanks.
-        of: a name of the vocabulary, a `Quantity`, or a function of a cycle.
+        of: a name of the vocabulary, a `Quantity`, or a function of a cycle; "dynamic_factor" is that of the dynamics
+            of the life.
         measure: how the torques of a load spectrum are joined; None for their mean.
 
     Raises:
-        ValueError: for an unknown name.
+        ValueError: for an unknown name, and for the dynamic factor of a life without dynamics.
     """
+    _single("over_life", life)
     quantity = quantity_of(of, "over_life")
-    values = jnp.where(solved(life.cycles), quantity(life.cycles), jnp.nan)
+    if quantity.of is quantities["dynamic_factor"].of:
+        if life.dynamic_factor is None:
+            raise ValueError(
+                'over_life: "dynamic_factor" needs a life with dynamics: wear(..., dynamics=Dynamics(...))'
+            )
+        values = life.dynamic_factor
+    else:
+        values = jnp.where(solved(life.cycles), quantity(life.cycles), jnp.nan)
     if life.weights is None:
         return values
     many = [joined(measure or Mean(), row, life.weights, quantity.better) for row in values]
@@ -48,6 +57,7 @@ def wear_depth(life: WearLife, gear: Worn = "both") -> Lives:
     Raises:
         ValueError: for another gear than "pinion", "wheel" or "both".
     """
+    _single("wear_depth", life)
     depths = {
         "pinion": [life.pinion_depth],
         "wheel": [life.wheel_depth],
@@ -64,6 +74,7 @@ def worn_volume(life: WearLife) -> Float[Array, "lives gears parts"]:
     Where a gear wears at tip corners, its tip edge and its flank at the mate's tip corners count alike.
     NaN after a life whose contact was not found.
     """
+    _single("worn_volume", life)
     volume = 1e-3 * jnp.einsum("lgpsk,gk,s->lgp", life.depth, life.arc, life.slice_width)
     return jnp.where(life.known[:, None, None], volume, jnp.nan)
 
@@ -97,6 +108,12 @@ def life_to(life: WearLife, of: str | Quantity | Any, limit: Any, measure: Abstr
     check("life_to", "limit", limit, quantity.unit)
     values = over_life(life, quantity, measure)
     return _reached(life.revolutions, quantity.sign * values, quantity.sign * limit, goes_on=False)
+
+
+def _single(owner: str, life: WearLife) -> None:
+    """Refuses lives of many designs: their axis would be taken for that of the lives of one."""
+    if life.revolutions.ndim != 1:
+        raise ValueError(f"{owner}: life is of a batch of designs, must be of one: put jax.vmap around {owner} as well")
 
 
 def _reached(done: Lives, values: Lives, limit: Scalar, *, goes_on: bool) -> Scalar:

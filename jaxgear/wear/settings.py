@@ -5,12 +5,15 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..conditions import LoadSpectrum
 from ..contact import Mesh
+from ..dynamics import Dynamics
 from ..metrics import Quantity
 from ..metrics.settings import with_settings
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, count, number
 from .life import BLOCKS, WearLife, check_blocks, wear
+from .vibration import LineLoad, check_line_load
 
 Scalar = Float[Array, ""]
 
@@ -24,13 +27,17 @@ class Wear(Checked):
             5e-16 for mild wear in mixed lubrication.
         wheel_coefficient: of wear of the wheel; None for that of the pinion.
         blocks: contact analyses and steps of wear in turn, of equal length; even.
-        points: of the grid on each flank; None for half as many as the mesh has positions, and one, at
-            most 33.
+        points: of the grid on each flank; None for 33.
         depth_limit: depth to which a life is asked for.
         ppte_limit: peak-to-peak transmission error to which a life is asked for.
+        line_load: under which the flanks wear: "static", or that of the steady motion at the speed of the load,
+            "dynamic"; None for "dynamic" with dynamics, "static" without.
+        dynamics: what vibrates, its speeds aside; None for no vibration.
+        loads: a spectrum whose loads wear one flank together, its weights shares of the revolutions; None for the load
+            under which a mesh is looked at.
     """
 
-    revolutions: Scalar = number("", low=0.0, open_low=True)
+    revolutions: Scalar = number("revolutions", low=0.0, open_low=True)
     coefficient: Scalar = number("m2/N", low=0.0)
     wheel_coefficient: Scalar | None = number("m2/N", low=0.0, optional=True, default=None)
     blocks: int = count(low=2, high=100_000, default=BLOCKS)
@@ -38,8 +45,13 @@ class Wear(Checked):
     depth_limit: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
     ppte_limit: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
 
+    line_load: LineLoad | None = None
+    dynamics: Dynamics | None = None
+    loads: LoadSpectrum | None = None
+
     def check_together(self) -> None:
         check_blocks("Wear", self.blocks)
+        check_line_load("Wear", self.line_load, self.dynamics)
 
     @property
     def coefficients(self) -> Float[Array, " gears"]:
@@ -50,29 +62,48 @@ class Wear(Checked):
     def life(
         self,
         mesh: Mesh,
-        torque: Any,
+        torque: Any = None,
         *,
         pinion: AbstractModification | None = None,
         wheel: AbstractModification | None = None,
         deviation: Any = None,
     ) -> WearLife:
-        """The life of a design; arguments and errors as `wear`."""
+        """The life of a design; arguments and errors as `wear`.
+
+        Args:
+            mesh: prepared mesh.
+            torque: on the pinion [N m], or an `Operation`; None, and only then, where the settings have loads.
+            pinion, wheel: modifications of the new flanks.
+            deviation: material that manufacturing deviations remove besides [um].
+
+        Raises:
+            ValueError: for a torque beside loads, or neither.
+        """
+        if (torque is None) == (self.loads is None):
+            raise ValueError("Wear: give a torque where there are no loads, and none where there are")
         options: dict[str, Any] = {"coefficient": self.coefficients, "blocks": self.blocks, "points": self.points}
+        options |= {"dynamics": self.dynamics, "line_load": self.line_load}
         flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
-        return wear(mesh, torque, self.revolutions, **flanks, **options)
+        return wear(mesh, torque if self.loads is None else self.loads, self.revolutions, **flanks, **options)
 
     def quantity(self, name: str) -> Quantity:
         """A quantity of the life for objectives, constraints, sweeps and Pareto fronts, with these settings.
 
-        Every load of a spectrum and every manufactured pair is taken to run the whole life, and the lives are joined
+        With `loads` these wear one flank together, whatever the load under which the quantity is asked for. Without,
+        every load of a spectrum and every manufactured pair is taken to run the whole life, and the lives are joined
         as all numbers of such cases are. Under a spectrum join them by `Worst()`: that is the life of a pair which
-        runs at one of the loads, while a mean joins numbers of different flanks, of which no pair has all. `wear`
-        itself takes a spectrum, whose loads wear one flank together, each for its share of the revolutions.
+        runs at one of the loads, while a mean joins numbers of different flanks, of which no pair has all.
+
+        A number is NaN where a contact was not found, and where blocks are so long that flanks overshoot: the error of
+        the depth, as `wear_depth_error` estimates it, is more than a tenth of the depth, or a block wears off more than
+        twice what the new teeth deflect. `wear_depth_error` itself is told in any case.
 
         Args:
             name: one of `WEAR_QUANTITIES`: "worn_ppte", "mean_ppte_over_life", "max_ppte_over_life",
                 "max_pressure_over_life", "wear_depth", "pinion_wear_depth", "wheel_wear_depth", "wear_depth_error",
-                "life_to_depth" (needs `depth_limit`) or "life_to_ppte" (needs `ppte_limit`).
+                "life_to_depth" (needs `depth_limit`), "life_to_ppte" (needs `ppte_limit`), "worn_dynamic_factor" or
+                "max_dynamic_factor_over_life" (both need `dynamics`). The steps of the integrator are those of the
+                dynamics, or 256.
 
         Raises:
             ValueError: for another name, and for a limit that is missing.

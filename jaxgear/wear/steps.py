@@ -8,11 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact import Mesh
+from ..dynamics import Dynamics
 from ..microgeometry import AbstractModification
 from ..numerics import check, real
 from .case import Case, case_of, marched
 from .life import BLOCKS, WearLife, check_blocks, checked_revolutions, life_of
 from .march import BLOCKS_OF_A_PAIR, Depth, March
+from .vibration import LineLoad
 
 Make = Callable[[], March]
 
@@ -32,6 +34,8 @@ def wear_in_steps(
     wheel: AbstractModification | None = None,
     deviation: Any = None,
     points: int | None = None,
+    dynamics: Dynamics | None = None,
+    line_load: LineLoad | None = None,
     blocks: int = BLOCKS,
     largest_increment: Any = None,
     keep: Callable[[Any, Make], March] | None = None,
@@ -40,7 +44,8 @@ def wear_in_steps(
     """`wear` of concrete numbers, in blocks of equal length, or as long as their wear allows.
 
     Args:
-        mesh, torque, revolutions, coefficient, pinion, wheel, deviation, points, blocks: as for `wear`.
+        mesh, torque, revolutions, coefficient, pinion, wheel, deviation, points, dynamics, line_load,
+            blocks: as for `wear`.
         largest_increment: depth that no block wears off beyond a tenth more [um], in place of `blocks`. It should stay
             below what the teeth deflect under their load.
         keep: called for every two blocks with all that they depend on and with what makes them; gives them, made now or
@@ -53,7 +58,8 @@ def wear_in_steps(
     owner = "wear_in_steps"
     check_blocks(owner, blocks)
     flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
-    case = case_of(owner, mesh, torque, coefficient=coefficient, points=points, **flanks)
+    vibrating: dict[str, Any] = {"dynamics": dynamics, "line_load": line_load}
+    case = case_of(owner, mesh, torque, coefficient=coefficient, points=points, **flanks, **vibrating)
     total = float(checked_revolutions(owner, revolutions, mesh))
     limit = None
     if largest_increment is not None:

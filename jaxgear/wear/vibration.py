@@ -1,0 +1,113 @@
+"""The load of teeth that vibrate: forces of the steady motion to which worn flanks are driven."""
+
+from typing import Any, Literal, get_args
+
+import equinox as eqx
+import jax
+from jaxtyping import Array, Float
+
+from ..contact import Mesh, Operation
+from ..dynamics import Dynamics, mesh_frequency, steps_for
+from ..dynamics.from_contact import interpolated, resized
+from ..dynamics.steady import SteadyForce
+from ..microgeometry import AbstractModification
+from ..numerics import check
+from ..numerics.quick import is_eager
+
+LineLoad = Literal["static", "dynamic"]
+Flanks = dict[str, AbstractModification]  # of pinion and wheel
+Deviation = Float[Array, "pairs slices positions"]
+
+
+class Vibration(eqx.Module):
+    """What vibrates while a mesh wears.
+
+    Attributes:
+        settings: masses, damping, and how the mesh force is made; not the speeds.
+        mesh: prepared at the positions of the mesh force.
+        coast: modifications of the coast flanks of (pinion, wheel), which do not wear.
+        deviation: material that manufacturing deviations remove from the drive flanks at these positions [um]; None
+            for perfect gears.
+        steps: of the integrator per mesh cycle.
+        wears: whether the flanks wear under the forces of the motion.
+    """
+
+    settings: Dynamics
+    mesh: Mesh
+    coast: tuple[AbstractModification, AbstractModification]
+    deviation: Deviation | None
+    steps: int = eqx.field(static=True)
+    wears: bool = eqx.field(static=True)
+
+    def force(self, flanks: Flanks, load: Operation, phase: Float[Array, " positions"]) -> SteadyForce:
+        """Force of the steady motion from rest, at mesh positions [base pitches]."""
+        assert load.speed is not None  # `vibration_of` has asked for it
+        more: dict[str, Any] = {"coast": self.coast, "deviation": self.deviation}
+        oscillator, _ = self.settings.oscillator_and_mesh(self.mesh, load.torque, **flanks, **more)
+        frequency = mesh_frequency(self.mesh.pair.pinion.teeth, load.speed)
+        return self.settings.force(oscillator, frequency, phase, self.steps)
+
+
+def vibration_of(
+    owner: str,
+    mesh: Mesh,
+    loads: Operation,
+    settings: Dynamics | None,
+    line_load: LineLoad | None,
+    flanks: Flanks,
+    deviation: Deviation | None,
+) -> Vibration | None:
+    """What vibrates; None where nobody asks for it.
+
+    Where nothing is traced the mesh has as many pairs and the integrator as many steps as the new flanks need.
+
+    Args:
+        owner: who asks, for messages.
+        mesh: prepared mesh.
+        loads: with a leading axis (torques,).
+        settings, line_load: as for `wear`.
+        flanks: modifications of the new flanks.
+        deviation: material that manufacturing deviations remove besides [um].
+
+    Raises:
+        TypeError: for something else than `Dynamics`.
+        ValueError: for a dynamic load without dynamics, another word, loads without speed, at rest or of nothing, and
+            as `mesh_force`.
+    """
+    check_line_load(owner, line_load, settings)
+    if settings is None:
+        return None
+    if loads.speed is None:
+        raise ValueError(f"{owner}: dynamics needs a speed: give Operation(torque, speed), or speeds of the spectrum")
+    check(owner, "speed with dynamics", loads.speed, "rpm", low=0.0, open_low=True)
+    check(owner, "torque with dynamics", loads.torque, "N m", low=0.0, open_low=True)
+    numbers, rest = eqx.partition(settings, eqx.is_array)
+    settings = eqx.combine(jax.tree.map(lambda number: number.astype(loads.torque.dtype), numbers), rest)
+    coast, steps = (flanks["pinion"], flanks["wheel"]), settings.traced_steps
+    fine = resized(mesh, positions=settings.positions)
+    given = mesh, loads, settings, flanks, deviation
+    if is_eager() and not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(given)):
+        counts: list[int] = []
+        for number in range(len(loads.torque)):
+            torque, speed = loads.torque[number], loads.speed[number]
+            off = None if deviation is None else interpolated(deviation, mesh, fine)
+            oscillator, fine = settings.oscillator_and_mesh(fine, torque, **flanks, coast=coast, deviation=off)
+            counts += steps_for(oscillator, mesh_frequency(mesh.pair.pinion.teeth, speed)[None])
+        steps = max(counts) if settings.steps is None else settings.steps
+    off = None if deviation is None else interpolated(deviation, mesh, fine)
+    return Vibration(settings, fine, coast, off, steps, line_load != "static")
+
+
+def check_line_load(owner: str, line_load: Any, dynamics: Any) -> None:
+    """Checks under which load flanks are to wear.
+
+    Raises:
+        TypeError: for dynamics that are something else.
+        ValueError: for another word, and for a dynamic load without dynamics.
+    """
+    if line_load not in (None, *get_args(LineLoad)):
+        raise ValueError(f'{owner}: line_load = {line_load!r} must be "static" or "dynamic"')
+    if dynamics is None and line_load == "dynamic":
+        raise ValueError(f'{owner}: line_load = "dynamic" needs dynamics: give jaxgear.dynamics.Dynamics(...)')
+    if dynamics is not None and not isinstance(dynamics, Dynamics):
+        raise TypeError(f"{owner}: dynamics is of type {type(dynamics).__name__}, must be Dynamics")
