@@ -16,8 +16,10 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 
 # Most of the time of a test goes into compiling a program that runs once: without optimization that takes a quarter.
 QUICK_COMPILER = "--xla_backend_optimization_level=0"
-if jax.__version_info__ < (0, 11):  # later compilers do not know the flag, and an unknown one ends the process
+if jax.__version_info__ < (0, 11):  # later compilers do not know the first, and an unknown one ends the process
     QUICK_COMPILER += " --xla_cpu_use_fusion_emitters=false"
+    # to split a program among threads costs work, and gains nothing where every core has a worker
+    QUICK_COMPILER += " --xla_cpu_parallel_codegen_split_count=1"
 
 
 def pytest_configure(config):
@@ -59,12 +61,37 @@ except OSError:  # a read-only home: the tests run all the same, only slower
     pass
 
 
+# Each compiled program holds some mappings of memory, of which Linux grants a process 65530.
+MOST_MAPPINGS = 12_000
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _forget_compiled_programs():
-    """Drops what a file of tests compiled: the system refuses a process that holds too many programs."""
+    """Drops what files of tests compiled once it is much: the system refuses a process that holds too many programs."""
     yield
+    if _mappings() > MOST_MAPPINGS:
+        _forget()
+
+
+def _mappings() -> float:
+    """Mappings of memory that this process holds; infinite where the system does not list them."""
+    try:
+        return Path("/proc/self/maps").read_bytes().count(b"\n")
+    except OSError:
+        return float("inf")
+
+
+def _forget():
     jax.clear_caches()
     gc.collect()  # programs in reference cycles too
+
+
+@pytest.fixture
+def nothing_compiled():
+    """For tests that count traces or replace what is traced: no program of another test, and none for another one."""
+    _forget()
+    yield
+    _forget()
 
 
 @pytest.fixture

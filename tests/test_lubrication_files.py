@@ -190,7 +190,7 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
     assert "micropitting" not in shown
 
 
-def test_other_oils_and_strengths_are_other_numbers_of_one_program(load, monkeypatch):
+def test_other_oils_and_strengths_are_other_numbers_of_one_program(load, nothing_compiled, monkeypatch):
     traced = []
     monkeypatch.setattr(study, "summary", lambda cycle: traced.append(cycle) or {})
     cycle = jg.solve(load(PAIR).mesh(), Operation(50.0, 3000.0))

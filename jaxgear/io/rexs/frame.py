@@ -12,6 +12,7 @@ import numpy as np
 
 from ...geometry import Gear, GearPair, path_of_contact
 from ...microgeometry import AbstractModification, Flank
+from ...numerics import program
 
 _SAME = 1e-9  # mm: what a diameter in 12 digits leaves open
 _ROUNDING = 1e-12  # of the squares of radii
@@ -60,7 +61,7 @@ class Frame:
         padding = (0, chunks * _POINTS - count)
         points = [np.pad(np.ravel(of), padding, mode="edge") for of in (roll_length, face_coordinate)]
         parts = zip(*(np.split(of, chunks) for of in points))
-        found = [np.asarray(modification(self._flank(rho, y))) for rho, y in parts]
+        found = [np.asarray(_amount(modification, self._flank(rho, y))) for rho, y in parts]
         return np.concatenate([np.broadcast_to(part, _POINTS) for part in found])[:count].reshape(shape)
 
     def _flank(self, roll_length, face_coordinate) -> Flank:
@@ -72,6 +73,11 @@ class Frame:
             face_coordinate=jnp.asarray(face_coordinate),
             face_width=jnp.asarray(self.width),
         )
+
+
+@program
+def _amount(modification: AbstractModification, flank: Flank):
+    return modification(flank)
 
 
 def frames(pair: GearPair) -> tuple[Frame, Frame]:
