@@ -1,8 +1,11 @@
 """The command `jaxgear wear` and the table [wear]: what it writes and says, and one line for what is wrong."""
 
 import csv
+import dataclasses
 import json
+from types import SimpleNamespace
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ from test_cli import call
 
 import jaxgear as jg
 from jaxgear import plot
+from jaxgear.cli.compared import sought
 from jaxgear.cli.kept import Kept, Marches
 from jaxgear.io import (
     DesignFileError,
@@ -296,6 +300,32 @@ def test_kept_blocks_are_not_worn_again(tmp_path, file):
     whole = wear_in_steps(mesh, 150.0, 2e7, **options)
     np.testing.assert_array_equal(again.depth, whole.depth)
     np.testing.assert_array_equal(over_life(again, "ppte"), over_life(whole, "ppte"))
+
+
+def test_what_a_search_has_found_is_not_sought_again(tmp_path, file):
+    """The mesh on which it ended, and the flanks, come from a few numbers beside the results."""
+    design = load_design(file(PAIR + VARIABLES))
+    mesh, searched = design.mesh(), []
+
+    def search(mesh, callback):
+        searched.append(mesh)
+        numbers = {"amount": 12.3, "length": 2.1}
+        finer = jg.prepare(mesh.pair, resolution=dataclasses.replace(mesh.resolution, positions=24))
+        return SimpleNamespace(parameters=numbers, mesh=finer)
+
+    def found(name="optimum", text=""):
+        stages = SimpleNamespace(step=None)
+        there = load_design(file(PAIR + VARIABLES + text))
+        return sought(there, name, search, mesh, tmp_path / "out", stages, quick=False)
+
+    first, again = found(), found()
+    assert len(searched) == 1
+    for ended, (pinion, wheel) in (first, again):
+        assert ended.resolution.positions == 24 and str(pinion) == str(wheel) == str(jg.TipRelief(12.3, 2.1))
+    assert eqx.tree_equal(first, again)
+    found("optimum over life")
+    found(text='[optimize]\nmethod = "genetic"\n')
+    assert len(searched) == 3  # another search, another file
 
 
 def test_blocks_on_the_disk_are_the_blocks(tmp_path):

@@ -1,17 +1,25 @@
 """The designs that a study compares: unmodified, rule-based, that of the file or the optimum of its variables."""
 
-import jax
+import dataclasses
+from pathlib import Path
+from typing import Any
 
-from ..contact import Mesh
+import jax
+import numpy as np
+
+from ..contact import Mesh, prepare
 from ..io import DesignFile, OptimizeRequest, optimize_request
 from ..io.schema import METHODS_WITHOUT_VARIABLES
 from ..microgeometry import AbstractModification, NoModification
-from ..optimize import Front
+from ..optimize import Front, Optimum
 from .commands import rule_based
+from .kept import Kept, runs_beside
 from .progress import Stages
 from .run import coarse
 
 Modifications = tuple[AbstractModification, AbstractModification]
+
+_POSITIONS, _PAIRS = "positions of the mesh", "pairs of the mesh"  # no names of variables, which have no spaces
 
 
 def search_of(design: DesignFile, *, quick: bool) -> OptimizeRequest | None:
@@ -28,9 +36,18 @@ def first_mesh(design: DesignFile, torque: float, *, quick: bool) -> Mesh:
 
 
 def compared(
-    design: DesignFile, torque: float, search: OptimizeRequest | None, stages: Stages, *, quick: bool
+    design: DesignFile, torque: float, search: OptimizeRequest | None, target: Path, stages: Stages, *, quick: bool
 ) -> tuple[Mesh, dict[str, Modifications]]:
-    """The designs by their names, and the mesh on which they are compared, up to a torque [N m]."""
+    """The designs by their names, and the mesh on which they are compared, up to a torque [N m].
+
+    Args:
+        design: the design file.
+        torque: largest of interest [N m].
+        search: for the optimum; None for none.
+        target: result folder, beside which what a search has found is kept until the results are there.
+        stages: told what goes on.
+        quick: on coarse positions.
+    """
     stages.begin("preparing the mesh")
     mesh = first_mesh(design, torque, quick=quick)
     involute = NoModification()
@@ -42,8 +59,54 @@ def compared(
             designs["modified"] = given
     if search is not None:
         stages.begin(f"searching the optimum ({search.method})")
-        found = search(mesh, stages.step)
-        optimum = found.compromise if isinstance(found, Front) else found
-        designs["optimum"] = optimum.pinion, optimum.wheel
-        mesh = optimum.mesh  # on which the search has ended
+        mesh, designs["optimum"] = sought(design, "optimum", search, mesh, target, stages, quick=quick)
     return mesh, designs
+
+
+def sought(
+    design: DesignFile, name: str, search: OptimizeRequest, mesh: Mesh, target: Path, stages: Stages, *, quick: bool
+) -> tuple[Mesh, Modifications]:
+    """The mesh on which a search has ended, and what it has found, now or before the command was interrupted.
+
+    Args:
+        design: the design file.
+        name: of what the search gives; one search of a file has it.
+        search: to be run.
+        mesh: on which it begins.
+        target, stages, quick: as for `compared`.
+    """
+
+    def found() -> Optimum:
+        optimum = search(mesh, stages.step)
+        return optimum.compromise if isinstance(optimum, Front) else optimum
+
+    if not design.bounds:  # flanks without variables: there are no few numbers to keep
+        optimum = found()
+        return optimum.mesh, (optimum.pinion, optimum.wheel)
+    lowest = design.design({name: low for name, (low, _) in design.bounds.items()})  # with what files hold
+    text = np.frombuffer(design.path.read_bytes(), np.uint8)
+    asked = name, quick
+    numbers = Kept(runs_beside(target), _Numbers())((text, mesh, lowest, asked), lambda: _numbers(found()))
+    sizes = dataclasses.replace(mesh.resolution, positions=int(numbers[_POSITIONS]), pairs=int(numbers[_PAIRS]))
+    flanks = design.design({name: numbers[name] for name in design.bounds})
+    if sizes == mesh.resolution:
+        return mesh, flanks
+    return prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes, support=mesh.support), flanks
+
+
+def _numbers(optimum: Optimum) -> dict[str, float]:
+    """Numbers that give design and mesh of an optimum again."""
+    sizes = optimum.mesh.resolution
+    return {**optimum.parameters, _POSITIONS: sizes.positions, _PAIRS: sizes.chosen_pairs}
+
+
+class _Numbers:
+    """Named numbers as arrays."""
+
+    def arrays(self, found: dict[str, float]) -> dict[str, Any]:
+        """All of them."""
+        return found
+
+    def result(self, arrays: dict[str, Any]) -> dict[str, float]:
+        """The numbers."""
+        return {name: float(value) for name, value in arrays.items()}

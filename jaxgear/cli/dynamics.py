@@ -14,7 +14,7 @@ from . import dynamics_figures, dynamics_report
 from .compared import Modifications, compared, search_of
 from .dynamics_branches import branches_of
 from .dynamics_report import Study, next_to_design
-from .kept import Kept, SpeedResponses
+from .kept import Kept, SpeedResponses, runs_beside
 from .progress import Stages
 from .study_command import Make, StudyCommand
 
@@ -24,8 +24,8 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
     search = search_of(design, quick=quick)
 
     def make(target: Path, stages: Stages):
-        mesh, designs = compared(design, max(design.torque, *request.torques), search, stages, quick=quick)
-        kept = Kept(target.with_name(f".{target.name}.runs"), SpeedResponses(), _count(designs, request))
+        mesh, designs = compared(design, max(design.torque, *request.torques), search, target, stages, quick=quick)
+        kept = Kept(runs_beside(target), SpeedResponses(), _count(designs, request))
         return _study(design, request, mesh, designs, kept, stages), kept.remove
 
     return make

@@ -85,6 +85,11 @@ class Kept(Generic[_Found]):
         shutil.rmtree(self._folder, ignore_errors=True)
 
 
+def runs_beside(target: Path) -> Path:
+    """Where results are kept until those of a folder are there."""
+    return target.with_name(f".{target.name}.runs")
+
+
 def _digest(tree: Any) -> str:
     leaves, structure = jax.tree.flatten(tree)
     digest = hashlib.sha256(f"{version()} {jax.__version__} {structure}".encode())

@@ -6,11 +6,10 @@ from pathlib import Path
 from ..contact import Operation
 from ..io import DesignFile, WearRequest, wear_request, write_worn
 from ..numerics import optional_real, real
-from ..optimize import Optimum
 from ..wear import WearLife, wear_in_steps
 from . import wear_report
-from .compared import compared, first_mesh, search_of
-from .kept import Kept, Marches
+from .compared import compared, first_mesh, search_of, sought
+from .kept import Kept, Marches, runs_beside
 from .progress import Stages
 from .study_command import Make, StudyCommand
 from .wear_report import Study
@@ -26,13 +25,13 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
     def make(target: Path, stages: Stages):
         loads = request.settings.loads
         highest = max(design.torque, design.torque_range[1], 0.0 if loads is None else float(loads.torques.max()))
-        mesh, designs = compared(design, highest, search, stages, quick=quick)
+        mesh, designs = compared(design, highest, search, target, stages, quick=quick)
         if lasting is not None:
             stages.begin("searching the optimum over the life")
-            optimum = lasting(first_mesh(design, highest, quick=quick), stages.step)
-            assert isinstance(optimum, Optimum)  # of one objective
-            designs["optimum over life"] = optimum.pinion, optimum.wheel
-        kept = Kept(target.with_name(f".{target.name}.runs"), Marches())
+            start = first_mesh(design, highest, quick=quick)
+            name = "optimum over life"
+            _, designs[name] = sought(design, name, lasting, start, target, stages, quick=quick)
+        kept = Kept(runs_beside(target), Marches())
         lives = {name: _life(design, request, mesh, name, flanks, kept, stages) for name, flanks in designs.items()}
         return Study(design, request, designs, lives), kept.remove
 
