@@ -1,4 +1,4 @@
-"""Slices of unequal width: kernel, contact problem, limits, symmetry, derivatives, and what they are for, end reliefs."""
+"""Slices of unequal width: kernel, contact problem, limits, symmetry, derivatives, and end reliefs, which need them."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ import jaxgear as jg
 from jaxgear.compliance import face_ends, face_kernel, few_modes, slice_basis
 from jaxgear.contact import end_relief_widths
 from jaxgear.io import DesignFileError, load_design
-from jaxgear.metrics import edge_load_factor, face_load_factor, face_load_factors, mean_removed_material
+from jaxgear.metrics import edge_load_factor, face_load_factor, face_load_factors, mean_removed_material, plausibility
 from jaxgear.numerics import Coupling, solve_contact, tangent_stiffness
 from jaxgear.shafts import Misalignment, RigidSupport, TabulatedSupport
 
@@ -337,7 +337,10 @@ def test_design_file(tmp_path):
     size = load_design(path).resolution()
     assert size.slices == 5 and size.slice_widths == (1, 2, 3, 2, 1)
     for line, problem in (
-        ("slices = 4\nslice_widths = [1, 2, 1]", r": slice_widths has 3 numbers, must have one for each of the slices = 4"),
+        (
+            "slices = 4\nslice_widths = [1, 2, 1]",
+            r": slice_widths has 3 numbers, must have one for each of the slices = 4",
+        ),
         ("slice_widths = [1, 0]", r"\.slice_widths\[1\]: 0 must be at least 1"),
         ("slice_widths = 3", r"\.slice_widths: must be a list"),
         ("slice_widths = [2]", r"\.slices: must be at least 2"),
@@ -345,3 +348,15 @@ def test_design_file(tmp_path):
         path.write_text(FILE + line + "\n")
         with pytest.raises(DesignFileError, match=f"resolution{problem}"):
             load_design(path)
+
+
+def test_few_slices_over_an_end_relief_are_a_doubt(mesh):
+    """Parts of 1.8 mm: one slice and a half from either end; two slices from the positive one."""
+    cycle = jg.solve(mesh, TORQUE)
+
+    def shown(*relief):
+        found = plausibility(cycle, pinion=jg.EndRelief(10.0, *relief))
+        return [doubt.value for doubt in found if doubt.name == "slices over the end relief"]
+
+    assert shown(3.6) == [1.5] and shown(5.4) == [] and shown(1.8) == [1.0]
+    assert shown(5.3, jg.Linear(), "positive") == [pytest.approx(1 + 3.5 / 3.6, abs=1e-6)]

@@ -56,8 +56,8 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
 
 
 def _held(support: ShaftSupport, torque: float, size: Resolution) -> AbstractSupport:
-    """The support of a mesh: as numbers, so that what is compiled for one serves the other, over slices of one width."""
-    if size.parts is None:
+    """The support of a mesh."""
+    if size.parts is None:  # as numbers, so that what is compiled for one support serves the other
         return at_stations(support, torque, stations=size.slices)
     return at_torque(support, torque)
 

@@ -9,7 +9,7 @@ from ..numerics import Checked, check, count, number, whole
 
 _SLIDING_NODES = 3  # a parabola
 _SLIDE_STEPS = 2
-# Widths of slices from an end of the face on, and how much of that is over the relief; finest parts of the narrowest one
+# Widths of slices from an end of the face on, how much of that is over the relief, and finest parts of the narrowest
 _END, _OVER_RELIEF, _FINEST = (3, 2, 1, 1), 6, 8
 _MOST_PARTS = 1024  # of equal width, that slices of unequal width are put together from
 

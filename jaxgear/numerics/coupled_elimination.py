@@ -7,9 +7,9 @@ springs obey
     A q = known + X b - V p,     (C^-1 x M^-1) p = V^T q,     b = sqrt(n) approach e_1 - H z,     z = X^T q,
 
 X being the levers times the support's modes. Where slices differ in weight, w q is solved for in place of q, by
-w A^-1 in place of A^-1, w being the weight over the mean of all. So p follows from the symmetric, positive definite matrix
-C^-1 x M^-1 + V^T A^-1 V, a few unknowns at every position, and what is left are the equations of the support. What
-several loops read ends with a division, for compilers to store it.
+w A^-1 in place of A^-1, w being the weight over the mean of all. So p follows from the symmetric, positive definite
+matrix C^-1 x M^-1 + V^T A^-1 V, a few unknowns at every position, and what is left are the equations of the support.
+What several loops read ends with a division, for compilers to store it.
 """
 
 from functools import reduce
