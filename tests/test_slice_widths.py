@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from contact_problems import random_problem
 
 import jaxgear as jg
+from jaxgear import plot
 from jaxgear.compliance import face_ends, face_kernel, few_modes, slice_basis
 from jaxgear.contact import end_relief_widths
 from jaxgear.io import DesignFileError, load_design
@@ -195,6 +197,16 @@ def test_factors_count_widths(mesh):
     np.testing.assert_allclose(edge_load_factor(cycle), max(row[0], row[-1]) / mean, rtol=1e-12)
     # a slope removes nothing on the mean of the face, whatever the slices are
     assert abs(float(mean_removed_material(cycle))) < 1e-9
+
+
+def test_plots_have_the_slices(mesh):
+    cycle = jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(20.0))
+    fields = plot.pressure_map(cycle).collections[0].get_coordinates()
+    np.testing.assert_allclose(fields[:, 0, 1], np.cumsum([0, *UNEVEN]) * 1.8 - 9.0, atol=1e-12)
+    heaviest = float(face_load_factor(cycle))
+    texts = [text.get_text() for text in plot.line_load(cycle).get_legend().get_texts()]
+    assert any(text.endswith(f"K = {heaviest:.2f}") for text in texts)
+    plt.close("all")
 
 
 class Bent(RigidSupport):

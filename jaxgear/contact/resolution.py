@@ -129,8 +129,8 @@ def end_relief_widths(face_width, length, slices: int = 11) -> tuple[int, ...]:
     """Widths of slices that show an end relief, for `Resolution.slice_widths`.
 
     The load peaks where the relief begins: slices end there, and narrow to a sixth of its length on either side. Eleven
-    such slices show K_Hbeta within 1 % of 72 equal ones where 11 equal ones miss it by 11 % (19/48 teeth, face of 6
-    modules, relief of 15 um over a sixth of it at both ends).
+    such slices show the largest over the mean line load within 1 % of 72 equal ones where 11 equal ones miss it by 11 %
+    (19/48 teeth, face of 6 modules, relief of 15 um over a sixth of it at both ends).
 
     Args:
         face_width: b over which both faces overlap [mm].
