@@ -257,6 +257,7 @@ def test_peak_line_load_has_the_derivatives_of_central_differences():
         np.testing.assert_allclose(found[place], central, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_gradient_by_the_flank(mesh):
     def peak(amounts):
         cycle = jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(amounts[0]) + jg.LeadCrowning(amounts[1]))
