@@ -23,6 +23,8 @@ _MARGIN = {"factor": 0.1, "rms": 0.1, "shift": 0.005, "ppte": 0.005}
 _WIDTH = 120
 _END = 3.0  # length of the end relief where a case has none [mm]
 
+Slices = int | tuple[int, ...]  # their number, or widths in slices of the reference
+
 
 @dataclass(frozen=True)
 class FaceCase:
@@ -42,16 +44,24 @@ class Face:
     Attributes:
         line_load: [N/mm], shape (pairs, slices, positions).
         transmission_error: [um], shape (positions,).
+        slices: over which the line loads are means.
     """
 
     line_load: np.ndarray
     transmission_error: np.ndarray
+    slices: Slices
+
+    @property
+    def weight(self) -> np.ndarray:
+        """Widths of the slices over their sum."""
+        widths = _widths(self.slices)
+        return np.asarray(widths) / sum(widths)
 
     @property
     def factor(self) -> float:
         """Largest over mean line load over the face of the most loaded pair, mean over the positions."""
         most = np.take_along_axis(self.line_load, self.line_load.max(axis=1).argmax(axis=0)[None, None], axis=0)[0]
-        return float(np.mean(most.max(axis=0) / most.mean(axis=0)))
+        return float(np.mean(most.max(axis=0) / np.average(most, axis=0, weights=self.weight)))
 
 
 @dataclass(frozen=True)
@@ -104,14 +114,19 @@ def aligned(case: FaceCase) -> FaceCase | None:
     return None
 
 
-def reference(case: FaceCase, slices: int = SLICES) -> Face:
-    """By finite elements, the line loads as means over 24 / `slices` slices."""
+def _widths(slices: Slices) -> tuple[int, ...]:
+    return (1,) * slices if isinstance(slices, int) else slices
+
+
+def reference(case: FaceCase, slices: Slices = SLICES) -> Face:
+    """By finite elements, the line loads as means over its slices that are in one of the given ones."""
     data = _stored()[case.pair]
     loaded = np.asarray(inputs(case)["line_load_N_per_mm"])  # positions, loaded pairs, slices
     load = np.zeros((data["positions"], PAIR_COUNT, data["slices"]))
     load[:, data["loaded_pairs"]] = loaded
-    means = load.reshape(*load.shape[:2], slices, -1).mean(axis=-1)
-    return Face(np.moveaxis(means, 0, -1), np.asarray(inputs(case)["transmission_error_um"]))
+    widths = np.asarray(_widths(slices)) * data["slices"] // sum(_widths(slices))
+    means = np.add.reduceat(load, np.cumsum(widths) - widths, axis=-1) / widths
+    return Face(np.moveaxis(means, 0, -1), np.asarray(inputs(case)["transmission_error_um"]), slices)
 
 
 @functools.cache
@@ -125,11 +140,15 @@ def gear_pair(name: str) -> jg.GearPair:
     return strong(jg.GearPair(*gears))
 
 
-def run(pair: str, *, slices: int = SLICES, coupled: bool = True) -> dict[FaceCase, Face]:
+def run(pair: str, *, slices: Slices = SLICES, coupled: bool = True) -> dict[FaceCase, Face]:
     """All cases of a pair by jaxgear in its default model, at the positions of the reference."""
     chosen = cases(pair)
     sizes = jg.Resolution(
-        positions=_stored()[pair]["positions"], slices=slices, pairs=PAIR_COUNT, coupled_slices=coupled
+        positions=_stored()[pair]["positions"],
+        slices=len(_widths(slices)),
+        slice_widths=_widths(slices),
+        pairs=PAIR_COUNT,
+        coupled_slices=coupled,
     )
     mesh = jg.prepare(gear_pair(pair), resolution=sizes)
     keys = "torque_Nm", "lead_slope_um", "lead_crowning_um", "end_relief_um"
@@ -145,7 +164,7 @@ def run(pair: str, *, slices: int = SLICES, coupled: bool = True) -> dict[FaceCa
     load, error, converged = map(np.asarray, jax.lax.map(solved, numbers))
     if not converged.all():
         raise RuntimeError(f"{pair}: contact not converged")
-    return {case: Face(*found) for case, found in zip(chosen, zip(load, error))}
+    return {case: Face(*found, slices) for case, found in zip(chosen, zip(load, error))}
 
 
 def errors(found: dict[FaceCase, Face]) -> dict[FaceCase, Errors]:
@@ -155,16 +174,17 @@ def errors(found: dict[FaceCase, Face]) -> dict[FaceCase, Errors]:
 
 def _errors(case: FaceCase, found: dict[FaceCase, Face]) -> Errors:
     face = found[case]
-    slices = face.line_load.shape[1]
+    slices = face.slices
     truth, even = reference(case, slices), aligned(case)
     shift = ppte = None
     if even is not None:
         shift = _change(np.mean, face, found[even]) - _change(np.mean, truth, reference(even, slices))
         ppte = _change(np.ptp, face, found[even]) - _change(np.ptp, truth, reference(even, slices))
-    difference = face.line_load - truth.line_load
+    root = np.sqrt(face.weight)[:, None]
+    difference, whole = root * (face.line_load - truth.line_load), root * truth.line_load
     return Errors(
         factor=100 * (face.factor / truth.factor - 1),
-        rms=float(100 * np.linalg.norm(difference) / np.linalg.norm(truth.line_load)),
+        rms=float(100 * np.linalg.norm(difference) / np.linalg.norm(whole)),
         shift=shift,
         ppte=ppte,
     )

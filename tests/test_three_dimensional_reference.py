@@ -59,3 +59,15 @@ def test_finer_slices_agree():
         means = fine[case].line_load.reshape(4, 12, 2, -1).mean(axis=2)
         difference = np.linalg.norm(means - coarse[case].line_load) / np.linalg.norm(means)
         assert difference < (0.05 if kind(case) == "endrelief" else 0.02), case
+
+
+@pytest.mark.slow
+def test_unequal_slices_show_an_end_relief_as_twice_as_many_equal_ones_do():
+    """The K of the reference itself grows with its slices: 1.63 over 12, 1.83 over 24 and over the unequal ones."""
+    unequal = (2, 2, 1, 1, 4, 4, 4, 1, 1, 2, 2)
+    case = next(case for case in face.cases("b18") if kind(case) == "endrelief")
+    few, fine, coarse = (face.run("b18", slices=slices)[case] for slices in (unequal, 24, 12))
+    assert face.reference(case, unequal).factor > 1.1 * face.reference(case).factor
+    assert few.factor == pytest.approx(fine.factor, rel=0.01) and coarse.factor < 0.97 * fine.factor
+    error = face.errors({case: few})[case]
+    assert abs(error.factor) <= FACTOR["endrelief"]["b18"] and error.rms < 7.5

@@ -4,10 +4,19 @@ from pathlib import Path
 
 import jax
 
-from ..contact import Mesh
+from ..contact import Mesh, Resolution
 from ..io import DesignFile, LayoutRequest, layout_request, write_flanks
 from ..io.schema_shafts import ProfileSection
-from ..layout import FlankLine, FlankLineLayout, ProfileLayout, at_stations, layout_flank_lines, vary_profiles
+from ..layout import (
+    FlankLine,
+    FlankLineLayout,
+    ProfileLayout,
+    at_stations,
+    at_torque,
+    layout_flank_lines,
+    vary_profiles,
+)
+from ..shafts import AbstractSupport, ShaftSupport
 from . import layout_report
 from .layout_report import Study
 from .progress import Stages
@@ -38,13 +47,19 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
         for name in layouts if wanted.shafts else list(layouts)[:1]:
             stages.begin("preparing the mesh" + (f", {name}" if wanted.shafts else ""))
             size = design.resolution()
-            # as numbers, so that what is compiled for one support serves the other
-            held = at_stations(request.supports[name], request.profile_torque, stations=size.slices)
+            held = _held(request.supports[name], request.profile_torque, size)
             given = coarse(size) if quick else size, held if wanted.shafts else None
             mesh = jax.block_until_ready(design.mesh(*given))
             stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
             meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
     return Study(design, request, layouts, meshes, profiles)
+
+
+def _held(support: ShaftSupport, torque: float, size: Resolution) -> AbstractSupport:
+    """The support of a mesh."""
+    if size.parts is None:  # as numbers, so that what is compiled for one support serves the other
+        return at_stations(support, torque, stations=size.slices)
+    return at_torque(support, torque)
 
 
 def _profile(

@@ -21,6 +21,7 @@ from .body import Sainsot as Sainsot
 from .face import face_ends as face_ends
 from .face import face_kernel as face_kernel
 from .face import few_modes as few_modes
+from .face import slice_basis as slice_basis
 from .finite_element import GearTable as GearTable
 from .finite_element import TabulatedCompliance as TabulatedCompliance
 from .finite_element import finite_element_compliance as finite_element_compliance

@@ -15,6 +15,10 @@ end reliefs within 17 %; slices that do not feel each other miss it by up to 40 
 
 A gear that is wider than its mate has its free ends, and with them the images, farther out: what overhangs the load
 helps to carry it. The rows of F then sum to less than one.
+
+Slices of unequal width w are put together from parts of equal width: a line load on a slice is one on all of its parts,
+and its deflection is the mean of theirs. F of the slices is then not symmetric, but w^1/2 F w^-1/2 is, between loads
+and deflections times w^1/2: B^T F B of the parts, B being `slice_basis`.
 """
 
 import jax.numpy as jnp
@@ -92,6 +96,22 @@ def face_waves(slices: int) -> np.ndarray:
     return np.sqrt((2.0 - (waves == 0)) / slices) * np.cos(np.pi * waves * middle[:, None])
 
 
+def slice_basis(parts: tuple[int, ...]) -> Float[np.ndarray, "parts slices"]:
+    """Even loads of slices over the parts of equal width that they are put together from, as orthonormal columns.
+
+    Args:
+        parts: number of them that make up each slice.
+    """
+    return np.repeat(np.diag(np.asarray(parts) ** -0.5), parts, axis=0)
+
+
+def _uneven_waves(parts: tuple[int, ...]) -> np.ndarray:
+    """`face_waves` of slices of unequal width, as `few_modes` takes their kernel: the longest waves of the parts."""
+    over_slices = slice_basis(parts).T @ face_waves(sum(parts))[:, : len(parts)]
+    waves, upper = np.linalg.qr(over_slices)
+    return waves * np.where(np.diagonal(upper) < 0, -1.0, 1.0)
+
+
 def face_ends(face_width, root_chord, slices: int) -> Float[Array, "slices ends"]:
     """Shapes that decay from both ends of the load as a kernel does: the rows of every F sum to a constant and these.
 
@@ -107,7 +127,10 @@ def face_ends(face_width, root_chord, slices: int) -> Float[Array, "slices ends"
 
 
 def few_modes(
-    kernel: Float[Array, "*gears slices slices"], count: int, ends: Float[Array, "slices ends"] | None = None
+    kernel: Float[Array, "*gears slices slices"],
+    count: int,
+    ends: Float[Array, "slices ends"] | None = None,
+    parts: tuple[int, ...] | None = None,
 ) -> tuple[Float[Array, "slices modes"], Float[Array, "*gears modes modes"], Float[Array, "*gears"]]:
     """A kernel by few modes and one number for all others: F = rest 1 + modes share modes^T.
 
@@ -123,12 +146,14 @@ def few_modes(
         kernel: F, symmetric, positive definite; a leading axis for several.
         count: number of modes, with `ends` of two less; more than slices are as many as slices.
         ends: `face_ends`, where a gear may overhang the load.
+        parts: of slices of unequal width, whose kernel and ends are those of `slice_basis`, and whose constant is the
+            root of the widths; None for equal ones.
 
     Returns:
         modes, orthonormal; share, positive definite; rest.
     """
     slices, gears = kernel.shape[-1], kernel.shape[:-2]
-    waves = jnp.asarray(face_waves(slices), kernel.dtype)
+    waves = jnp.asarray(face_waves(slices) if parts is None else _uneven_waves(parts), kernel.dtype)
     longest = count if ends is None else max(count - 2, _FEWEST_WAVES)
     count = longest if ends is None else longest + ends.shape[1]
     if count >= slices:
@@ -136,7 +161,7 @@ def few_modes(
     felt = jnp.mean(kernel.reshape(-1, slices, slices), axis=0) @ waves[:, 1:longest]
     if ends is None:
         # orthogonal to the constant, as they are where rows sum to one
-        others = orthonormal(felt - jnp.mean(felt, axis=0, keepdims=True))[0]
+        others = orthonormal(felt - waves[:, :1] @ (waves[:, :1].T @ felt))[0]
         modes = jnp.concatenate([waves[:, :1], others], axis=1)
     else:  # nearly dependent on narrow faces: what rounding leaves of the constant would be amplified
         modes = orthonormal(jnp.concatenate([waves[:, :1], ends.astype(kernel.dtype), felt], axis=1))[0]

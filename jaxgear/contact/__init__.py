@@ -11,6 +11,7 @@ from .operation import Operation as Operation
 from .prescribed import PrescribedContact as PrescribedContact
 from .prescribed import solve_at as solve_at
 from .resolution import Resolution as Resolution
+from .resolution import end_relief_widths as end_relief_widths
 from .slide import RemovedMaterial as RemovedMaterial
 from .solve import begin_contact as begin_contact
 from .solve import removed_material as removed_material

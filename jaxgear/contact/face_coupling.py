@@ -41,25 +41,31 @@ def coupling_of(
     if not sizes.is_coupled:
         return None
     kernels = spreading.kernels
-    modes, shares, rests = few_modes(kernels, sizes.face_modes, spreading.ends)
-    coupling = Coupling(modes, shares[0], rests[0])
+    modes, shares, rests = few_modes(kernels, sizes.face_modes, spreading.ends, sizes.parts)
+    weight = None if sizes.slice_weights is None else jnp.asarray(sizes.slice_weights, modes.dtype)
+    if weight is not None:  # modes of the loads times the roots of the widths
+        modes = modes / jnp.sqrt(weight)[:, None]
+    coupling = Coupling(modes, shares[0], rests[0], weight=weight)
     if len(kernels) > 1:
         coupling = replace(coupling, other=Other(wheel, shares[1] - shares[0], rests[1] - rests[0]))
     if support is None:
         return coupling
-    bends = jnp.asarray(_polynomials(sizes.slices, min(sizes.face_modes, sizes.slices)), kernels.dtype)
-    influence = support.influence(moving.face_coordinate).astype(kernels.dtype) * moving.slice_width[0]
-    bent = jnp.linalg.multi_dot([bends.T, influence, bends])
+    bends = jnp.asarray(_polynomials(sizes), kernels.dtype)
+    loads = bends if weight is None else weight[:, None] * bends
+    influence = support.influence(moving.face_coordinate).astype(kernels.dtype) * jnp.mean(moving.slice_width)
+    bent = jnp.linalg.multi_dot([loads.T, influence, loads])
     return eqx.tree_at(
         lambda c: (c.support_modes, c.support), coupling, (bends, bent), is_leaf=lambda leaf: leaf is None
     )
 
 
-def _polynomials(slices: int, count: int) -> Float[np.ndarray, "slices count"]:
-    """Of degree 0, 1, 2, ... at the middles of the slices, orthonormal."""
-    middle = (np.arange(slices) + 0.5) / slices - 0.5
-    found, upper = np.linalg.qr(np.polynomial.legendre.legvander(2 * middle, count - 1))
-    return found * np.sign(np.diagonal(upper))
+def _polynomials(sizes: Resolution) -> Float[np.ndarray, "slices bends"]:
+    """Of degree 0, 1, 2, ... at the middles of the slices, as many as modes, orthonormal with the weights of these."""
+    edges, count = sizes.slice_edges, min(sizes.face_modes, sizes.slices)
+    root = np.ones(sizes.slices) if sizes.slice_weights is None else np.sqrt(sizes.slice_weights)
+    powers = np.polynomial.legendre.legvander(edges[1:] + edges[:-1], count - 1)
+    found, upper = np.linalg.qr(root[:, None] * powers)
+    return found * np.sign(np.diagonal(upper)) / root[:, None]
 
 
 def check_support(support: AbstractSupport | None, pair: GearPair, resolution: Resolution) -> None:
@@ -81,6 +87,11 @@ def check_support(support: AbstractSupport | None, pair: GearPair, resolution: R
         )
     if not resolution.coupled_slices:
         raise ValueError("prepare: support needs slices that feel each other: Resolution(coupled_slices=True)")
+    if support.needs_even_slices and resolution.parts is not None:
+        raise ValueError(
+            f"prepare: support is a {type(support).__name__}, over slices of equal width, the mesh has others: leave "
+            "slice_widths out of the resolution, or give a support that is known all over the face"
+        )
     # numbers that one pair has and the other leaves to its defaults cannot be compared one by one
     given, own = (jax.tree.leaves(each, is_leaf=lambda leaf: leaf is None) for each in (support.pair, pair))
     for one, other in zip(given, own, strict=True):
@@ -98,7 +109,7 @@ def check_modes(support: AbstractSupport | None, resolution: Resolution) -> None
     matrix = concrete(support.matrix) if isinstance(support, TabulatedSupport) else None
     if matrix is None or not matrix.any():
         return
-    bends = _polynomials(resolution.slices, min(resolution.face_modes, resolution.slices))
+    bends = _polynomials(resolution)
     kept = bends @ (bends.T @ matrix @ bends) @ bends.T
     missed = np.linalg.norm(matrix - kept) / np.linalg.norm(matrix)
     if missed > _MOST_MISSED:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..compliance import AbstractCompliance, face_ends, face_kernel
+from ..compliance import AbstractCompliance, face_ends, face_kernel, slice_basis
 from ..geometry import GearPair, is_even
 from ..geometry.outline import Outline
 from .resolution import Resolution
@@ -18,7 +18,8 @@ class Spreading(NamedTuple):
         shares: mean deflection of the common face under a load that is uniform over it, of pinion and wheel, over that
             of gears which end with it: less than 1 where a gear overhangs the load and helps to carry it.
         kernels: of pinion and wheel, `face_kernel` over its share; a single one where both faces are known to be one.
-        ends: `face_ends`; None where both faces are known to be one.
+            Of slices of unequal width between loads and deflections times the roots of the widths.
+        ends: `face_ends` likewise; None where both faces are known to be one.
     """
 
     shares: Float[Array, "gears"]
@@ -39,15 +40,26 @@ def spreading_of(pair: GearPair, outlines: tuple[Outline, Outline], sizes: Resol
     Args:
         pair: the gears.
         outlines: of both.
-        sizes: for the number of slices.
+        sizes: for the slices.
         even: as of `ends_together`.
     """
     root_chord = 0.5 * (outlines[0].root_chord + outlines[1].root_chord)
+    parts = sizes.slices if sizes.parts is None else sum(sizes.parts)
     if even:
-        kernel = face_kernel(pair.face_width, root_chord, sizes.slices)
-        return Spreading(jnp.ones((2,), kernel.dtype), kernel[None])
-    both = [face_kernel(pair.face_width, root_chord, sizes.slices, overhang) for overhang in pair.overhangs]
+        kernel = face_kernel(pair.face_width, root_chord, parts)
+        return Spreading(jnp.ones((2,), kernel.dtype), _over_slices(kernel, sizes)[None])
+    both = [face_kernel(pair.face_width, root_chord, parts, overhang) for overhang in pair.overhangs]
     kernels = jnp.stack(both)
-    shares = jnp.sum(kernels, axis=(1, 2)) / sizes.slices
-    ends = face_ends(pair.face_width, root_chord, sizes.slices)
-    return Spreading(shares, kernels / shares[:, None, None], ends)
+    shares = jnp.sum(kernels, axis=(1, 2)) / parts
+    ends = face_ends(pair.face_width, root_chord, parts)
+    if sizes.parts is not None:
+        ends = jnp.asarray(slice_basis(sizes.parts).T, ends.dtype) @ ends
+    return Spreading(shares, _over_slices(kernels, sizes) / shares[:, None, None], ends)
+
+
+def _over_slices(kernel: Float[Array, "*gears parts parts"], sizes: Resolution) -> Float[Array, "*gears slices slices"]:
+    """A kernel of parts of equal width as one of the slices."""
+    if sizes.parts is None:
+        return kernel
+    basis = jnp.asarray(slice_basis(sizes.parts), kernel.dtype)
+    return basis.T @ kernel @ basis

@@ -122,15 +122,19 @@ class Kinematics(Checked):
     @over_batch
     def face_coordinate(self) -> Float[Array, " slices"]:
         """Middle of every slice, from the middle of the common face [mm], shape (slices,)."""
-        slices = self.resolution.slices
-        return ((self._count(slices) + 0.5) / slices - 0.5) * self.pair.face_width
+        slices, edges = self.resolution.slices, self.resolution.slice_edges
+        if self.resolution.parts is None:
+            return ((self._count(slices) + 0.5) / slices - 0.5) * self.pair.face_width
+        return jnp.asarray(0.5 * (edges[1:] + edges[:-1]), self._dtype) * self.pair.face_width
 
     @property
     @over_batch
     def slice_width(self) -> Float[Array, " slices"]:
         """[mm], shape (slices,)."""
         slices = self.resolution.slices
-        return jnp.full((slices,), 1.0 / slices, self._dtype) * self.pair.face_width
+        if self.resolution.parts is None:
+            return jnp.full((slices,), 1.0 / slices, self._dtype) * self.pair.face_width
+        return jnp.asarray(np.diff(self.resolution.slice_edges), self._dtype) * self.pair.face_width
 
     def _count(self, number: int):
         return jnp.arange(number, dtype=self._dtype)

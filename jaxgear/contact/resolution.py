@@ -1,11 +1,17 @@
 """Array sizes of a mesh."""
 
-import equinox as eqx
+from math import gcd
 
-from ..numerics import Checked, count, number
+import equinox as eqx
+import numpy as np
+
+from ..numerics import Checked, check, count, number, whole
 
 _SLIDING_NODES = 3  # a parabola
 _SLIDE_STEPS = 2
+# Widths of slices from an end of the face on, how much of that is over the relief, and finest parts of the narrowest
+_END, _OVER_RELIEF, _FINEST = (3, 2, 1, 1), 6, 8
+_MOST_PARTS = 1024  # of equal width, that slices of unequal width are put together from
 
 
 class Resolution(Checked):
@@ -13,7 +19,10 @@ class Resolution(Checked):
 
     Attributes:
         positions: mesh positions over one base pitch.
-        slices: slices of equal width over the common face.
+        slices: slices over the common face.
+        slice_widths: relative widths of the slices as whole numbers, from the negative end of the face to the positive
+            one; None for slices of equal width. What changes over a short piece of the face takes narrow slices there,
+            see `end_relief_widths`.
         pairs: tooth pairs carried along; None for as few as the gears and the load need, see `prepare`. Pair i runs at
             phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two base pitches on either side of the pitch
             point: contact ratios up to 3.
@@ -34,6 +43,9 @@ class Resolution(Checked):
 
     positions: int = count(low=4, default=64)
     slices: int = count(default=1)
+    slice_widths: tuple[int, ...] | None = number(
+        "", low=1, high=_MOST_PARTS, whole=True, static=True, shape=("slices",), optional=True, default=None
+    )
     pairs: int | None = count(low=2, optional=True, default=None)
     patch_nodes: int = count(default=4)
     slide_steps: int | None = count(low=0, high=20, optional=True, default=None)
@@ -50,6 +62,38 @@ class Resolution(Checked):
                 f"Resolution: slide_steps = {self.slide_steps} needs patch_nodes >= {_SLIDING_NODES}, is "
                 f"{self.patch_nodes}: fewer points across the contact do not see slope and curvature of a flank"
             )
+
+        if self.slice_widths is None:
+            return
+        if len(self.slice_widths) != self.slices:
+            raise ValueError(
+                f"Resolution: slice_widths has {len(self.slice_widths)} numbers, must have one for each of the "
+                f"slices = {self.slices}"
+            )
+        if sum(self.slice_widths) > _MOST_PARTS:
+            raise ValueError(
+                f"Resolution: slice_widths sum to {sum(self.slice_widths)}, must sum to at most {_MOST_PARTS}: small "
+                "whole numbers do"
+            )
+
+    @property
+    def parts(self) -> tuple[int, ...] | None:
+        """Parts of equal width that make up each slice, as few as can be; None where the slices are of equal width."""
+        if self.slice_widths is None or len(set(self.slice_widths)) == 1:
+            return None
+        common = gcd(*self.slice_widths)
+        return tuple(width // common for width in self.slice_widths)
+
+    @property
+    def slice_edges(self) -> np.ndarray:
+        """Where slices end, from -0.5 to 0.5 of the common face, one more than slices."""
+        parts = self.parts or (1,) * self.slices
+        return np.cumsum([0, *parts]) / sum(parts) - 0.5
+
+    @property
+    def slice_weights(self) -> np.ndarray | None:
+        """Widths of the slices over their mean; None where all are equal."""
+        return None if self.parts is None else np.asarray(self.parts) / np.mean(self.parts)
 
     @property
     def chosen_slide_steps(self) -> int:
@@ -79,6 +123,39 @@ class Resolution(Checked):
     def reach(self) -> tuple[int, int]:
         """Base pitches behind and ahead of the pitch point that the pairs cover."""
         return reach(self.chosen_pairs)
+
+
+def end_relief_widths(face_width, length, slices: int = 11) -> tuple[int, ...]:
+    """Widths of slices that show an end relief, for `Resolution.slice_widths`.
+
+    The load peaks where the relief begins: slices end there, and narrow to a sixth of its length on either side. Eleven
+    such slices show the largest over the mean line load within 1 % of 72 equal ones where 11 equal ones miss it by 11 %
+    (19/48 teeth, face of 6 modules, relief of 15 um over a sixth of it at both ends).
+
+    Args:
+        face_width: b over which both faces overlap [mm].
+        length: of the relief at either end of that face [mm], b/3 at most; what of it lies outside the mate does not
+            count.
+        slices: number of slices, at least 9.
+
+    Raises:
+        ValueError: for numbers out of these ranges, and where the relief is too short for whole numbers.
+    """
+    whole("end_relief_widths", "slices", slices, low=2 * len(_END) + 1)
+    check("end_relief_widths", "face_width", face_width, "mm", low=0.0, open_low=True)
+    check("end_relief_widths", "length", length, "mm", low=0.0, high=float(face_width) / 3, open_low=True)
+    middle, best = slices - 2 * len(_END), None
+    for unit in range(1, _FINEST + 1):  # parts of the face in the narrowest slice
+        wide = max(unit, round((_OVER_RELIEF * face_width / length - 2 * sum(_END)) * unit / middle))
+        end = [unit * width for width in _END]
+        made = (*end, *[wide] * middle, *end[::-1])
+        missed = abs(_OVER_RELIEF * unit / sum(made) * face_width / length - 1)
+        if sum(made) <= _MOST_PARTS and (best is None or missed < 0.5 * best[0]):
+            best = missed, made
+    if best is None:
+        least = _OVER_RELIEF * float(face_width) / _MOST_PARTS
+        raise ValueError(f"end_relief_widths: length = {float(length):g} mm must be at least {least:g} mm on this face")
+    return best[1]
 
 
 def reach(pairs: int) -> tuple[int, int]:

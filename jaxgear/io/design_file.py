@@ -278,6 +278,8 @@ def _load(table: schema.Tables) -> schema.LoadSection:
 def _resolution(table: schema.Tables, uneven: list[str]) -> Resolution:
     """The array sizes; `uneven` are the keys of the modifications that vary along the face."""
     sizes = decode("resolution", table, schema.ResolutionSection).given()
+    if sizes.get("slice_widths") is not None:
+        sizes.setdefault("slices", len(sizes["slice_widths"]))
     if uneven and sizes.setdefault("slices", _SLICES) == 1:
         problem = f"must be at least 2, 1 cannot show {uneven[0]}, which varies along the face"
         raise DesignFileError("resolution.slices", f"{problem} ({_SLICES} where the key is left out)")

@@ -20,8 +20,8 @@ _SAME_TORQUE = 1e-6  # relative; single precision
 class Stations(AbstractSupport):
     """A support as numbers at evenly spaced stations, under one torque; made by `at_stations`.
 
-    With as many stations as slices it stands for the support in `prepare`, and programs compiled for one gearbox serve
-    every other.
+    With as many stations as slices, all of one width, it stands for the support in `prepare`, and programs compiled for
+    one gearbox serve every other.
 
     Attributes:
         table: what it does over the face.
@@ -40,6 +40,10 @@ class Stations(AbstractSupport):
     def torque(self) -> Scalar:
         """`load`."""
         return self.load
+
+    @property
+    def needs_even_slices(self) -> bool:
+        return True
 
     @property
     def count(self) -> int:

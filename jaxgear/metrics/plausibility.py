@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..compliance import AbstractCompliance, TabulatedCompliance
-from ..contact import MeshCycle
+from ..contact import MeshCycle, Resolution
 from ..microgeometry import AbstractModification, EndRelief, NoModification
 from ..numerics import program
 from .flank import flank_surface
@@ -59,6 +59,7 @@ LIMITS = {
     "depth of the modification in modules": Limit(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
     "length of the modification": Limit(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
     "length of the end relief": Limit(0.0, np.inf, "mm", "less than the gear is wider than its mate: it has no effect"),
+    "slices over the end relief": Limit(2.0, np.inf, "", "the load peaks beside it: jaxgear.contact.end_relief_widths"),
     "mean transmission error in modules": Limit(0.0, 0.02, "", "the teeth bend beyond what the model is made for"),
     "PPTE": Limit(0.1, np.inf, "um", "finer than the model can claim of modified flanks"),
     "PPTE by finite elements": Limit(0.03, np.inf, "um", "finer than a model in two dimensions can claim"),
@@ -122,7 +123,11 @@ def plausibility(
     # without the flanks: one program serves every kind of them
     gears, results, sides, overhangs = _numbers(replace(cycle, pinion=None, wheel=None))
     numbers = [_doubt(*each) for each in (*gears, *results)]
-    numbers[len(gears) : len(gears)] = [*_of_flanks(sides, flanks), *_of_end_reliefs(overhangs, flanks)]
+    sizes, common = cycle.kinematics.resolution, float(sides[0].common_width)
+    numbers[len(gears) : len(gears)] = [
+        *_of_flanks(sides, flanks),
+        *_of_end_reliefs(sizes, common, overhangs, flanks),
+    ]
     pair = cycle.kinematics.pair
     if any(float(gear.tooth_thickness_tolerance) for gear in (pair.pinion, pair.wheel)):
         numbers.append(_doubt("least backlash", "", pair.backlash_limits[0]))
@@ -223,10 +228,21 @@ def _lengths(modification: AbstractModification, profile: float, half_face: floa
             yield float(term.length), half_face if getattr(term, "varies_along_face", False) else profile
 
 
-def _of_end_reliefs(overhangs, flanks) -> Iterator[Doubt]:
-    """Whether end reliefs reach the common face, at both ends where they are at both."""
+def _of_end_reliefs(sizes: Resolution, face_width: float, overhangs, flanks) -> Iterator[Doubt]:
+    """Whether end reliefs reach the common face, at both ends where they are at both, and slices that show them."""
     for where, ends, modification in zip(("pinion", "wheel"), overhangs, flanks):
         for term in jax.tree.leaves(modification, is_leaf=lambda part: isinstance(part, EndRelief)):
             if isinstance(term, EndRelief) and term.varies_along_face:
-                beyond = {"negative": ends[:1], "positive": ends[1:], "both": ends}[term.side]
-                yield _doubt("length of the end relief", where, term.length, low=max(map(float, beyond)))
+                sides = {"negative": (0,), "positive": (1,), "both": (0, 1)}[term.side]
+                yield _doubt("length of the end relief", where, term.length, low=max(float(ends[end]) for end in sides))
+                reach = {end: (float(term.length) - float(ends[end])) / face_width for end in sides}
+                shown = [_slices_over(sizes, end, share) for end, share in reach.items() if share > 0]
+                if sizes.slices > 1 and shown:
+                    yield _doubt("slices over the end relief", where, min(shown))
+
+
+def _slices_over(sizes: Resolution, end: int, share: float) -> float:
+    """Number of slices over a share of the face from its negative (0) or positive (1) end."""
+    edges = sizes.slice_edges + 0.5
+    count = np.interp(share, 1.0 - edges[::-1] if end else edges, np.arange(len(edges)))
+    return round(float(count), 6)  # the end of a slice is one, rounding or not

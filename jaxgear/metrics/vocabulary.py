@@ -41,7 +41,9 @@ def mean_removed_material(cycle: MeshCycle) -> Scalar:
     """
     inside = cycle.kinematics.outside <= 0
     # on the path of contact unmodified flanks have no gap: what is there is the modification
-    removed = jnp.where(inside, jnp.mean(cycle.gap, axis=1), 0.0)
+    width = cycle.kinematics.slice_width
+    over_face = jnp.einsum("psn,s->pn", cycle.gap, width) / jnp.sum(width)
+    removed = jnp.where(inside, over_face, 0.0)
     return jnp.sum(removed) / jnp.sum(inside.astype(removed.dtype))
 
 

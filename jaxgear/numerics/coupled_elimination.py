@@ -6,9 +6,10 @@ springs obey
 
     A q = known + X b - V p,     (C^-1 x M^-1) p = V^T q,     b = sqrt(n) approach e_1 - H z,     z = X^T q,
 
-X being the levers times the support's modes. So p follows from the symmetric, positive definite matrix
-C^-1 x M^-1 + V^T A^-1 V, a few unknowns at every position, and what is left are the equations of the support. What
-several loops read ends with a division, for compilers to store it.
+X being the levers times the support's modes. Where slices differ in weight, w q is solved for in place of q, by
+w A^-1 in place of A^-1, w being the weight over the mean of all. So p follows from the symmetric, positive definite
+matrix C^-1 x M^-1 + V^T A^-1 V, a few unknowns at every position, and what is left are the equations of the support.
+What several loops read ends with a division, for compilers to store it.
 """
 
 from functools import reduce
@@ -51,7 +52,7 @@ class CoupledFactors(NamedTuple):
     Attributes:
         coupling: of the slices.
         lever: of the springs.
-        inverse: of the matrices A, zero where springs are apart, by springs.
+        inverse: of the matrices A, zero where springs are apart, by springs; with the weights of the slices.
         blocks: of the modal system.
         bent: L^-1 V^T A^-1 X by mode, and D^-1 times it.
         force: z under unit b, symmetric.
@@ -86,6 +87,8 @@ def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
         own: elimination of every slice with the local compliance and the slopes of the springs.
     """
     inverse = inverse_of(own)
+    if coupling.weight is not None:
+        inverse = [[coupling.weighted(x) for x in row] for row in inverse]
     modal = _products(coupling.modes, inverse)
     blocks = _eliminated(coupling, modal)
     right, force = _of_support(coupling, lever, inverse, modal)
@@ -190,13 +193,16 @@ def respond(
     constant = jnp.full((count, 1), count**-0.5, force.dtype)
     shapes = constant if coupling.support_modes is None else coupling.support_modes
     carried = onto(shapes, force) - _joined(factors.bent[0], divided)[:, 0]
-    bends, approach = _bends(factors, carried, None if load is None else load / weight[0], approach)
+    mean = weight[0] if coupling.weight is None else weight[0] / coupling.weight[0]
+    bends, approach = _bends(factors, carried, None if load is None else load / mean, approach)
     eliminated = [a[0] + jnp.sum(b * bends[:, None], axis=0) for a, b in zip(divided, factors.bent[1])]
     deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
     even = along(shapes, bends)
     pressed = [height[None] * even - deflected[:, i] for i, height in enumerate(factors.lever)]
     pressed = [row / kept for row in pressed]
     loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(inside, factors.inverse)]
+    if coupling.weight is not None:
+        loads = [row / coupling.weight[:, None] for row in loads]
     return Response(loads, approach, pressed)
 
 

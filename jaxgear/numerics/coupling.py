@@ -7,7 +7,8 @@ The deflection of spring p in slice s under all line loads is
 
 springs on bodies whose deflection at one place is felt at others, on a support that gives way under the force of all
 springs of a slice. Where the two bodies that make up C spread loads in their own way each, a second sum of this form
-follows, with the C of one of them and by how much its M and rest differ.
+follows, with the C of one of them and by how much its M and rest differ. Of slices of unequal weight, w times the line
+load of slice t stands for q in the sums over t, w being the weight over the mean of all.
 """
 
 from functools import reduce
@@ -63,15 +64,16 @@ class Other(eqx.Module):
 
 
 class Coupling(eqx.Module):
-    """How slices of equal weight feel each other.
+    """How slices feel each other.
 
     Attributes:
-        modes: V, orthonormal, the constant first.
+        modes: V, orthonormal, the constant first; with the weights w of the slices, V^T w V = 1, where they differ.
         share: M, symmetric and positive definite.
         rest: what all that is orthogonal to the modes has of C.
-        support_modes: R, orthonormal, the constant first; None without a support.
+        support_modes: R, orthonormal likewise, the constant first; None without a support.
         support: H, symmetric and positive semi-definite, the deflection under line loads; None without a support.
         other: of two bodies that spread loads in their own way each; None where both do alike.
+        weight: w of the slices, over their mean; None where all are equal.
         held: for eliminations, see `with_inverses`; None before.
     """
 
@@ -81,6 +83,7 @@ class Coupling(eqx.Module):
     support_modes: Float[Array, "slices bends"] | None = None
     support: Float[Array, "bends bends"] | None = None
     other: Other | None = None
+    weight: Float[Array, " slices"] | None = None
     held: Held | None = None
 
     def deflection(self, compliance: Springs, lever: Float[Array, "pairs positions"], load: Rows) -> Rows:
@@ -95,8 +98,12 @@ class Coupling(eqx.Module):
     def _spread(self, compliance: Springs, share: Float[Array, "modes modes"], rest, load: Rows) -> Rows:
         uniform = [stored(sum(c[None] * q for c, q in zip(row, load))) for row in compliance]
         spread = self.modes @ share
-        modal = [stored(onto(self.modes, row)) for row in uniform]
+        modal = [stored(onto(self.modes, self.weighted(row))) for row in uniform]
         return [stored(rest * row + along(spread, each)) for row, each in zip(uniform, modal)]
+
+    def weighted(self, row: Float[Array, "slices positions"]) -> Float[Array, "slices positions"]:
+        """w times values of the slices."""
+        return row if self.weight is None else self.weight[:, None] * row
 
     def support_deflection(
         self, lever: Float[Array, "pairs positions"], load: Rows
@@ -104,7 +111,7 @@ class Coupling(eqx.Module):
         """By how much the support gives way under line loads, per unit of lever; None without a support."""
         if self.support is None or self.support_modes is None:
             return None
-        force = sum(height[None] * q for height, q in zip(lever, load))
+        force = self.weighted(sum(height[None] * q for height, q in zip(lever, load)))
         return along(self.support_modes, along(self.support, onto(self.support_modes, force)))
 
 

@@ -32,7 +32,7 @@ class Number:
         shape: names of the axes, () for a single number.
         fewest: smallest length of an axis.
         limits: lower and upper limit, shape (2,), may stand for a single number.
-        static: a Python number that is part of the structure, not a leaf.
+        static: a Python number that is part of the structure, not a leaf; with a shape, a tuple of whole numbers.
         checked: False for a result, which may hold anything, NaN included.
     """
 
@@ -181,7 +181,9 @@ def whole(owner: str, name: str, value, low: float = 1, high: float = _MOST) -> 
 
 
 def _plain(value):
-    """NumPy's scalars as Python's, which can be static."""
+    """NumPy's scalars and lists as Python's numbers and tuples, which can be static."""
+    if isinstance(value, list | tuple | np.ndarray):
+        return tuple(_plain(item) for item in value)
     return value.item() if isinstance(value, np.generic) else value
 
 
@@ -208,6 +210,12 @@ def _check_number(owner: str, name: str, value, kind: Number) -> None:
     if value is None and kind.optional:
         return
     if kind.static:
+        if kind.shape:
+            if not isinstance(value, tuple) or not value:
+                raise ValueError(f"{owner}: {name} = {value!r} must be a list of whole numbers")
+            for item in value:
+                _check_number(owner, name, item, dataclasses.replace(kind, shape=(), optional=False))
+            return
         if kind.whole:
             assert kind.low is not None and kind.high is not None  # `count` gives both
             whole(owner, name, value, kind.low, kind.high)

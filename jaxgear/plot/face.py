@@ -19,11 +19,11 @@ def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None 
     """
     where = _heaviest(cycle)[1] if position is None else position
     load = np.asarray(cycle.line_load)[:, :, where]
-    face = np.asarray(cycle.kinematics.face_coordinate)
+    face, width = (np.asarray(of) for of in (cycle.kinematics.face_coordinate, cycle.kinematics.slice_width))
     with report_axes(ax) as ax:
         for index, pair in enumerate(np.flatnonzero(load.max(axis=1) > 0)):
             style = marker_style(index)
-            mean = load[pair].mean()
+            mean = np.average(load[pair], weights=width)
             name = f"pair {_place(cycle, int(pair), where)}, K = {load[pair].max() / mean:.2f}"
             ax.plot(face, load[pair], label=name, **style)
             ax.axhline(mean, color=style["color"], linewidth=0.6, zorder=0.6)

@@ -60,8 +60,7 @@ def _pressed(cycle: MeshCycle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Edges of path positions and slices [mm], and the pressure between them [MPa]; NaN where the flanks part."""
     path, flank = pair_history(cycle, cycle.contact_pressure)
     step = path[1] - path[0]
-    half = 0.5 * float(cycle.kinematics.pair.face_width)
-    face = np.linspace(-half, half, cycle.kinematics.resolution.slices + 1)
+    face = cycle.kinematics.resolution.slice_edges * float(cycle.kinematics.pair.face_width)
     return np.append(path, path[-1] + step) - 0.5 * step, face, np.where(flank > 0, flank, np.nan)
 
 

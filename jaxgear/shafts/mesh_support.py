@@ -37,6 +37,11 @@ class AbstractSupport(Checked):
         """On the pinion [N m], where influence and gap belong to one; None where they hold at every torque."""
         return None
 
+    @property
+    def needs_even_slices(self) -> bool:
+        """Whether it is known over slices of equal width alone."""
+        return False
+
     @abstractmethod
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
         """Gap that opens at y[s] under a unit force between the flanks at y[t] [um/N], symmetric, semidefinite."""
@@ -109,6 +114,10 @@ class TabulatedSupport(AbstractSupport):
     def pair(self) -> GearPair:
         """`gears`."""
         return self.gears
+
+    @property
+    def needs_even_slices(self) -> bool:
+        return True
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
         """`matrix`, its symmetric part.
