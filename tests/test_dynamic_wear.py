@@ -124,6 +124,19 @@ def test_the_worn_volume_is_that_of_the_forces_of_the_motion(mesh, natural):
     assert float(motion.force.max()) == pytest.approx(float(short.dynamic_factor[0]) * static_force(mesh), rel=0.01)
 
 
+@pytest.mark.parametrize("slices", [1, pytest.param(7, marks=pytest.mark.slow)])
+def test_one_force_at_every_position_is_a_torque(mesh, slices):
+    """Slices that feel each other too."""
+    mesh = mesh if slices == 1 else prepare(mesh.pair, resolution=replace(SIZES, slices=slices, face_modes=3))
+    forces = static_force(mesh) * jnp.where(jnp.arange(16) < 8, 1.0, 0.5)
+    contact = solve_forces(mesh, forces, removed_material(mesh, TORQUE, **FLANKS))
+    full = jg.solve(mesh, TORQUE, **FLANKS)
+    half = jg.contact.solve_removed(mesh, TORQUE / 2, removed_material(mesh, TORQUE, **FLANKS))
+    expected = np.where(np.arange(16) < 8, full.line_load, half.line_load)
+    assert contact.converged.all()
+    np.testing.assert_allclose(contact.line_load, expected, rtol=1e-8, atol=1e-8)
+
+
 @pytest.mark.slow
 def test_wear_is_deeper_where_the_force_of_the_motion_peaks(mesh, natural):
     """Where a pair is alone, its load is the force of the motion."""

@@ -188,7 +188,7 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
 
 
 def _of_both(function: Callable[[Any], Any], sides: tuple[Any, Any]) -> list[Any]:
-    """A function of each side; as a part of another program in a loop, which compiles in half of the time."""
+    """A function of each side; as a part of another program in a loop, so that it is compiled once."""
     (drive, like), (coast, other) = (eqx.partition(side, eqx.is_array) for side in sides)
     trees: list[Any] = [jax.tree.structure(arrays) for arrays in (drive, coast)]
     if is_eager() or trees[0] != trees[1] or not eqx.tree_equal(like, other):
