@@ -7,7 +7,15 @@ import jax
 from ..contact import Mesh
 from ..io import DesignFile, LayoutRequest, layout_request, write_flanks
 from ..io.schema_shafts import ProfileSection
-from ..layout import FlankLine, FlankLineLayout, ProfileLayout, at_stations, layout_flank_lines, vary_profiles
+from ..layout import (
+    FlankLine,
+    FlankLineLayout,
+    ProfileLayout,
+    at_stations,
+    layout_flank_lines,
+    plausibility,
+    vary_profiles,
+)
 from . import layout_report
 from .layout_report import Study
 from .progress import Stages
@@ -44,7 +52,8 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
             mesh = jax.block_until_ready(design.mesh(*given))
             stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
             meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
-    return Study(design, request, layouts, meshes, profiles)
+    unusual = {name: plausibility(layout, request.supports[name]) for name, layout in layouts.items()}
+    return Study(design, request, layouts, meshes, profiles, unusual)
 
 
 def _profile(
@@ -75,4 +84,5 @@ run_layout = StudyCommand(
     layout_report.tables,
     layout_report.verdict,
     layout_report.failures,
+    doubts=layout_report.doubts,
 )

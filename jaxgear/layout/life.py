@@ -20,7 +20,7 @@ from ..conditions import LoadSpectrum
 from ..geometry import Gear, GearPair, path_of_contact
 from ..metrics.root_stress import root_factors
 from ..numerics import Checked, maximum, number, program, result, whole
-from ..shafts import AbstractSupport, FaceLoad, annex_e, root_face_load_factor, tooth_height
+from ..shafts import AbstractSupport, FaceLoad, annex_e, face_load_factor, root_face_load_factor, tooth_height
 from .flank_line import FlankLine
 from .stations import STATIONS, Stations, at_stations
 
@@ -159,7 +159,7 @@ def damage_of(
     """`damage` of supports that are worked out."""
     found = face_loads(faces, pinion, wheel)
     pair = jax.tree.map(lambda leaf: leaf[0], faces.pair)
-    loaded = Loaded(maximum(found.line_load, axis=-1), found.face_load_factor, found.converged)
+    loaded = Loaded(maximum(found.line_load, axis=-1), face_load_factor(found.line_load), found.converged)
     return summed(pair, loaded, load, endurance)
 
 

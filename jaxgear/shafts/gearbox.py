@@ -168,7 +168,7 @@ def _valid(gearbox: Gearbox) -> Bool[Array, ""]:
     bearings = jnp.stack([bearing.matrix for shaft in gearbox.shafts for bearing in shaft.bearings])
     each = [within_limits(gearbox), jnp.all(jax.vmap(semidefinite)(bearings))]
     each += [shaft.valid for shaft in gearbox.shafts]
-    each += [gearbox.pair(index).face_width > 0 for index in range(len(gearbox.meshes))]
+    each += [gearbox.pair(index).face_overlap > 0 for index in range(len(gearbox.meshes))]
     if gearbox.housing is not None:
         each.append(gearbox.housing.valid)
     return jnp.all(jnp.stack(each)) & jnp.all(gearbox.pinion_torques() >= 0)

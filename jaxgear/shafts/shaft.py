@@ -85,10 +85,10 @@ class Shaft(Checked):
     @property
     def valid(self) -> Bool[Array, ""]:
         """Whether such a shaft can be; concrete ones that cannot are refused, traced ones flagged."""
-        return _holds(_facts(self))
+        return _holds(facts_of(self))
 
     def _named(self) -> tuple[str, ...]:
-        """What is on the shaft, in the order of `_Facts.low`."""
+        """What is on the shaft, in the order of `ShaftFacts.low`."""
         return (
             *(f'bearing "{item.name}"' for item in self.bearings),
             *(f'gear "{item.name}"' for item in self.gears),
@@ -97,7 +97,7 @@ class Shaft(Checked):
         )
 
 
-class _Facts(NamedTuple):
+class ShaftFacts(NamedTuple):
     """What a shaft is judged by; one rule decides what of concrete numbers is refused and of traced ones not valid.
 
     Attributes:
@@ -128,7 +128,7 @@ class _Facts(NamedTuple):
 
 
 @program
-def _facts(shaft: Shaft) -> _Facts:
+def facts_of(shaft: Shaft) -> ShaftFacts:
     others: tuple[Coupling | ShaftLoad, ...] = (*shaft.couplings, *shaft.loads)
     points = [item.position for item in shaft.bearings], [item.position for item in others]
     length = shaft.length
@@ -146,7 +146,7 @@ def _facts(shaft: Shaft) -> _Facts:
     pushed = jnp.max(jnp.abs(jnp.stack([jnp.zeros(()), *(load.force[2] for load in shaft.loads)])))
     held = _held(shaft)
     bending = np.array([0, 1, 3, 4])
-    return _Facts(
+    return ShaftFacts(
         length=length,
         low=low,
         high=high,
@@ -175,7 +175,7 @@ def _resists(stiffness: Float[Array, "4 4"]) -> Bool[Array, ""]:
     return positive_definite(stiffness - least * jnp.eye(len(stiffness), dtype=stiffness.dtype))
 
 
-def _holds(facts: _Facts) -> Bool[Array, ""]:
+def _holds(facts: ShaftFacts) -> Bool[Array, ""]:
     """Whether such a shaft can be."""
     fits = jnp.maximum(facts.thickest, facts.body) < facts.tip
     several = jnp.all(facts.inside) & jnp.all(facts.hollow) & jnp.all(fits) & ~jnp.any(facts.overlap)
@@ -186,7 +186,7 @@ def _check(shaft: Shaft) -> None:
     """Raises where a shaft of concrete numbers cannot be, or where a body has no effect."""
     if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(shaft)):
         return
-    facts = _facts(shaft)
+    facts = facts_of(shaft)
     if isinstance(facts.length, jax.core.Tracer):  # within a trace of something else
         return
     facts = jax.tree.map(np.asarray, facts)
@@ -194,7 +194,7 @@ def _check(shaft: Shaft) -> None:
         raise ValueError(f'Shaft "{shaft.name}": {fault}')
 
 
-def _faults(shaft: Shaft, facts: _Facts) -> Iterator[str]:
+def _faults(shaft: Shaft, facts: ShaftFacts) -> Iterator[str]:
     for what, first, last, inside in zip(shaft._named(), facts.low, facts.high, facts.inside):
         if not inside:
             place = f"{first:g} mm" if first == last else f"{first:g} to {last:g} mm"
