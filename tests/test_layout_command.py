@@ -95,7 +95,9 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     done = call("layout", str(path), "--output", str(folder), "--report")
     assert done.code == 0, done.err
     doubts = [line for line in done.out.splitlines() if line.startswith("please check")]
-    assert len(doubts) == 1 and doubts[0].startswith('please check: gear "wheel", shaft diameter over bore 1.023 is more')
+    assert len(doubts) == 1 and doubts[0].startswith(
+        'please check: gear "wheel", shaft diameter over bore 1.023 is more'
+    )
     assert "please check" in (folder / "report.html").read_text()
     names = {entry.name for entry in folder.iterdir()}
     assert names == {"summary.json", "report.html", "tolerance_cases.png", "face_load_factors.png"} <= RESULT_FILES
@@ -117,7 +119,9 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     assert "life relative to the even load" in done.out and "life after step 1 [h]" in done.out
     assert found["profiles"] == {}
     for one in (housed, rigid):
-        assert [(each["name"], each["where"]) for each in one["doubts"]] == [("shaft diameter over bore", 'gear "wheel"')]
+        assert [(each["name"], each["where"]) for each in one["doubts"]] == [
+            ("shaft diameter over bore", 'gear "wheel"')
+        ]
 
 
 @pytest.mark.slow

@@ -14,7 +14,16 @@ from test_supported_contact import PAIR, gearbox
 import jaxgear as jg
 from jaxgear.layout import Endurance, WoehlerLine, damage
 from jaxgear.numerics import positive_definite, within_limits
-from jaxgear.shafts import Bearing, Housing, Misalignment, RigidSupport, TabulatedSupport, annex_e, bearing_reactions, support
+from jaxgear.shafts import (
+    Bearing,
+    Housing,
+    Misalignment,
+    RigidSupport,
+    TabulatedSupport,
+    annex_e,
+    bearing_reactions,
+    support,
+)
 from jaxgear.shafts.matrices import semidefinite
 
 NODES = tuple(f"{seat}.{way}" for seat in "ABCDEF" for way in "xy")
