@@ -110,7 +110,7 @@ def _check_definite(matrix: np.ndarray, kind: Kind, nodes: tuple[str, ...]) -> N
             f"Housing: stiffness must be positive definite, but its smallest eigenvalue is {lowest:.3g} of its "
             "diagonal: is the housing fixed to its foundation?"
         )
-    if lowest < -_DEFINITE:
+    if lowest < -max(_DEFINITE, 10 * len(matrix) * np.finfo(matrix.dtype).eps):
         raise ValueError(
             f"Housing: {kind} must be positive semidefinite, but its smallest eigenvalue is {lowest:.3g} of its "
             "diagonal"
