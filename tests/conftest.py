@@ -62,7 +62,7 @@ except OSError:  # a read-only home: the tests run all the same, only slower
 
 
 # Each compiled program holds some mappings of memory, of which Linux grants a process 65530.
-MOST_MAPPINGS = 12_000
+MOST_MAPPINGS = 8_000
 
 
 @pytest.fixture(scope="module", autouse=True)

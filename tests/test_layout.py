@@ -23,6 +23,7 @@ from jaxgear.layout import (
     layout_flank_lines,
     level_load,
     longest_life,
+    plausibility,
     tolerance_cases,
     without_housing,
 )
@@ -198,6 +199,45 @@ def test_two_steps_keep_the_load_off_the_edges(layout):
     assert str(layout).count("*") == 8 + 1  # four cases of both kinds before step 2, and what the mark means
 
 
+def test_a_load_that_is_not_found_is_not_level(layout):
+    """Of traced shafts that cannot be: no flank line, no crowning, and an edge that nobody keeps the load off."""
+    face = eqx.tree_at(lambda face: face.held, at_stations(SUPPORT, stations=STATIONS), jnp.zeros((), bool))
+    tolerance = flank_line_tolerance(SUPPORT.pair, 6, 130.0)
+    line = level_load(face)
+    assert np.isnan([line.slope, line.crowning, crowning_off_the_edges(face, tolerance)]).all()
+    cases = tolerance_cases(face, tolerance)
+    assert cases.edge_contact.all() and np.isnan(cases.loaded_share).all() and np.isnan(cases.face_load_factor).all()
+    with pytest.raises(ValueError, match="^layout_flank_lines: the load over the face is not found: "):
+        layout_flank_lines(face, tolerance, stations=STATIONS)
+
+
+def softened(radial):
+    """The first bearings of the middle and the last shaft with another radial stiffness."""
+    return support(
+        eqx.tree_at(lambda box: [box.shafts[k].bearings[0].radial for k in (1, 2)], BOX, [radial, radial]), 1
+    )
+
+
+def test_usual_shafts_raise_no_doubt_and_slips_of_a_unit_do(layout):
+    (thick,) = plausibility(layout, SUPPORT)  # a bore of 40 mm on a shaft of 45 mm
+    assert (thick.name, thick.where, thick.value) == ("shaft diameter over bore", 'gear "w2"', 45.0 / 40.0)
+    soft = softened(jnp.asarray(0.1))
+    found = layout_flank_lines(
+        soft, FlankLineTolerance(8.0), further=helix_slope_limits(SUPPORT.pair, 6), gear="pinion", stations=STATIONS
+    )
+    told = {(doubt.name, doubt.where): doubt for doubt in plausibility(found, soft) if doubt.name != thick.name}
+    bearings = {("radial stiffness", f'bearing "{name}"') for name in "CE"}
+    moved = {("radial displacement in modules", f'bearing "{name}"') for name in "CE"}
+    flank = {("K_Hbeta", "without modification"), ("slope and crowning in modules", "pinion")}
+    assert set(told) == bearings | moved | flank
+    # nearly all of the load is on one of the stations
+    few = told["K_Hbeta", "without modification"]
+    assert few.value > 0.5 * STATIONS and few.limit.high == STATIONS / 4
+    stiff = plausibility(layout, softened(jnp.asarray(5e5)))
+    assert {doubt.name for doubt in stiff} == {"radial stiffness", thick.name}
+    assert str(stiff[0]).startswith('bearing "C", radial stiffness 5e+05 N/um is more than 2e+04 (')
+
+
 def test_crowning_grows_where_the_rule_does_not_suffice(layout):
     tolerance = FlankLineTolerance(30.0)
     given = layout_flank_lines(SUPPORT, tolerance, further=(1.0, 2.0), stations=STATIONS)
@@ -278,8 +318,10 @@ def test_longest_life_beats_its_neighbours_and_every_single_layout():
 
 
 def test_layout_for_a_duty_cycle_tells_relative_lives():
+    """At the largest torque that it is run at."""
+    duty = jg.LoadSpectrum.from_hours([60.0, 180.0, 600.0], [3000.0, 20.0, 0.0], [1000.0, 500.0, 500.0])
     found = layout_flank_lines(
-        SUPPORT, FlankLineTolerance(8.0), duty_cycle=DUTY, endurance=ENDURANCE, stations=STATIONS
+        SUPPORT, FlankLineTolerance(8.0), duty_cycle=duty, endurance=ENDURANCE, stations=STATIONS
     )
     assert float(found.torque) == 180.0
     before, level, after = found.relative_life

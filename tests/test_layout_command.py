@@ -91,9 +91,14 @@ def file(file, tmp_path):
 def test_the_command_writes_what_it_says(file, tmp_path):
     """Flank lines for a duty cycle, with and without housing."""
     folder = tmp_path / "out"
-    path = file(FILE + LIFE)
+    path = file(FILE.replace("bore_diameter = 70.0", "bore_diameter = 44.0") + LIFE)  # less than the shaft, a doubt
     done = call("layout", str(path), "--output", str(folder), "--report")
     assert done.code == 0, done.err
+    doubts = [line for line in done.out.splitlines() if line.startswith("please check")]
+    assert len(doubts) == 1 and doubts[0].startswith(
+        'please check: gear "wheel", shaft diameter over bore 1.023 is more'
+    )
+    assert "please check" in (folder / "report.html").read_text()
     names = {entry.name for entry in folder.iterdir()}
     assert names == {"summary.json", "report.html", "tolerance_cases.png", "face_load_factors.png"} <= RESULT_FILES
     check_report(folder, path, "layout", path, "--output", folder, "--report")
@@ -113,6 +118,10 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     assert housed["torque_Nm"] == 150.0 and before < 0.9 and level == 1.0
     assert "life relative to the even load" in done.out and "life after step 1 [h]" in done.out
     assert found["profiles"] == {}
+    for one in (housed, rigid):
+        assert [(each["name"], each["where"]) for each in one["doubts"]] == [
+            ("shaft diameter over bore", 'gear "wheel"')
+        ]
 
 
 @pytest.mark.slow

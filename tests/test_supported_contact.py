@@ -125,6 +125,20 @@ def test_teeth_that_pass_their_load_on_raise_the_factor_of_the_one_dimensional_a
     assert 1.05 < float(face_load_factor(carried)) / alone < 1.25
 
 
+def test_a_contact_on_shafts_that_cannot_be_does_not_converge():
+    mesh = jg.prepare(PAIR, resolution=SIZES, support=support(gearbox(), 0))
+    assert bool(mesh.valid)
+    refused = eqx.tree_at(lambda of: of.support_valid, mesh, jnp.zeros((), bool))
+    assert not bool(refused.valid) and not bool(jg.solve(refused, TORQUE, pinion=FLANK).converged.any())
+
+    @jax.jit
+    def valid(position):
+        box = eqx.tree_at(lambda of: of.shafts[0].gears[0].position, gearbox(), position)
+        return jg.prepare(PAIR, resolution=SIZES, support=support(box, 0)).valid
+
+    assert bool(valid(45.0)) and not bool(valid(300.0))
+
+
 def housed(values):
     """Gearbox with another radial stiffness of bearing A and another compliance of its seat in y."""
     nodes = tuple(f"{seat}.{way}" for seat in "ABCD" for way in "xyz")

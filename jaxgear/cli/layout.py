@@ -14,6 +14,7 @@ from ..layout import (
     at_stations,
     at_torque,
     layout_flank_lines,
+    plausibility,
     vary_profiles,
 )
 from ..shafts import AbstractSupport, ShaftSupport
@@ -52,7 +53,8 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
             mesh = jax.block_until_ready(design.mesh(*given))
             stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
             meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
-    return Study(design, request, layouts, meshes, profiles)
+    unusual = {name: plausibility(layout, request.supports[name]) for name, layout in layouts.items()}
+    return Study(design, request, layouts, meshes, profiles, unusual)
 
 
 def _held(support: ShaftSupport, torque: float, size: Resolution) -> AbstractSupport:
@@ -90,4 +92,5 @@ run_layout = StudyCommand(
     layout_report.tables,
     layout_report.verdict,
     layout_report.failures,
+    doubts=layout_report.doubts,
 )

@@ -12,11 +12,12 @@ from rich.table import Table
 from ..contact import Mesh
 from ..io import DesignFile, LayoutRequest, describe
 from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, ToleranceCases
+from ..metrics import Doubt
 from ..microgeometry import AbstractModification
 from ..shafts import bearing_reactions
 from . import report
 from .geometry import geometry
-from .written import versions
+from .written import doubt_data, versions
 
 _PANEL, _HEIGHT = 92.0, 90.0  # [mm]
 
@@ -31,6 +32,7 @@ class Study:
         layouts: flank lines, by the name of the support; the first is that of the design.
         meshes: of step 3, likewise; empty without it.
         profiles: profile modifications of step 3.
+        unusual: what of every layout is not usual, by the name of the support.
     """
 
     design: DesignFile
@@ -38,6 +40,7 @@ class Study:
     layouts: Mapping[str, FlankLineLayout]
     meshes: Mapping[str, Mesh]
     profiles: Mapping[str, ProfileLayout]
+    unusual: Mapping[str, tuple[Doubt, ...]]
 
     @property
     def profile(self) -> ProfileLayout | None:
@@ -155,7 +158,8 @@ def failures(study: Study) -> Iterator[str]:
     """What is not to be trusted or not reached."""
     for name, layout in study.layouts.items():
         cases = [*layout.before.values(), *layout.after.values()]
-        if not all(bool(np.all(one.load.converged)) for one in cases):
+        found = [*(one.load.converged for one in cases), *(one.converged for one in layout.damage)]
+        if not all(bool(np.all(one)) for one in found):
             yield f"LOAD OVER THE FACE NOT FOUND: {name}; its numbers are not to be trusted"
         if layout.touches_edges:
             yield f"the largest load is at an edge: {name}"
@@ -168,6 +172,11 @@ def failures(study: Study) -> Iterator[str]:
             yield "every profile modification has contact shock: larger amounts are needed"
 
 
+def doubts(study: Study) -> Iterator[str]:
+    """What is not usual."""
+    return report.doubt_lines(study.unusual)
+
+
 def summary(study: Study) -> dict[str, Any]:
     """Contents of `summary.json`."""
     return {
@@ -178,7 +187,10 @@ def summary(study: Study) -> dict[str, Any]:
             name: {"f_Hbeta_um": one.helix_slope, "f_ma_um": one.misalignment}
             for name, one in study.request.tolerances.items()
         },
-        "layouts": {name: _layout(layout) for name, layout in study.layouts.items()},
+        "layouts": {
+            name: {**_layout(layout), "doubts": [doubt_data(doubt) for doubt in study.unusual[name]]}
+            for name, layout in study.layouts.items()
+        },
         "bearings": {name: _reactions(support) for name, support in study.request.supports.items()},
         "profiles": {name: _profile(study, profile) for name, profile in study.profiles.items()},
         "designs": {

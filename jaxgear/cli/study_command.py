@@ -37,6 +37,7 @@ class StudyCommand(Generic[S]):
         verdict: the results in words.
         failures: a line for everything that is not to be trusted; the command fails where there is one.
         assumptions: of the study, for a report.
+        doubts: a line for everything that is not usual; None where nobody looks.
     """
 
     name: str
@@ -49,6 +50,7 @@ class StudyCommand(Generic[S]):
     verdict: Callable[[S], Iterable[str]]
     failures: Callable[[S], Iterable[str]]
     assumptions: tuple[str, ...] = ()
+    doubts: Callable[[S], Iterable[str]] | None = None
 
     def __call__(
         self,
@@ -78,14 +80,15 @@ class StudyCommand(Generic[S]):
                 files = self.draw(folder, study) if figures else []
                 tables, lines = list(self.tables(study)), list(self.verdict(study))
                 failures = list(self.failures(study))
+                doubts = None if self.doubts is None else list(self.doubts(study))
                 if asked is not None:
-                    found = Found(lines, failures, tables=tables, figures=files, assumptions=self.assumptions)
+                    found = Found(lines, failures, doubts, tables=tables, figures=files, assumptions=self.assumptions)
                     asked.write(folder, design, data, found)
                 putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
                 putting_in_place.callback(finish)
         for table in tables:
             report.console().print(table)
-        report.say(*lines)
+        report.say(*lines, *(doubts or ()))
         if quick:
             report.say(f"quick run: {self.coarse}, not a result to build on")
         report.say(f"results in {target}{os.sep}, {stages.elapsed:.1f} s")

@@ -46,7 +46,7 @@ def summary(
         **{name: _numbers(part) for name in ("lubricant", "strength") if (part := getattr(file, name)) is not None},
         "model": model(mesh),
         "designs": {
-            name: {**_design(evaluations[name]), "doubts": [_doubt(doubt) for doubt in several]}
+            name: {**_design(evaluations[name]), "doubts": [doubt_data(doubt) for doubt in several]}
             for name, several in found.items()
         },
         "ppte_reduction_percent": reduction(evaluations),
@@ -140,5 +140,6 @@ def _words(part: eqx.Module) -> str:
     return f"{type(part).__name__}({', '.join(inner)})"
 
 
-def _doubt(doubt: Doubt) -> dict[str, Any]:
+def doubt_data(doubt: Doubt) -> dict[str, Any]:
+    """A doubt by name, place, value and what is usual."""
     return {"name": doubt.name, "where": doubt.where, "value": doubt.value, **doubt.limit._asdict()}

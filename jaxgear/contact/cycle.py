@@ -45,7 +45,7 @@ class MeshCycle(eqx.Module):
         tangent_stiffness: d force / d transmission error at fixed position [N/um].
         residual: largest relative violation of the contact conditions, shape (positions,).
         converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
-            touch and the gears are valid, shape (positions,).
+            touch, and gears and support are valid, shape (positions,).
         mesh: the prepared mesh, for quantities that solve further on it; None in every result, see `on`.
     """
 

@@ -6,7 +6,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..compliance import AbstractCompliance, default_compliance
 from ..compliance.hertz import contact_geometry
@@ -53,6 +53,7 @@ class Mesh(eqx.Module):
         support: what holds the gears; None for rigid, parallel shafts.
         support_gap: by which it opens the flanks without the force of this mesh [um], shape (slices,); None without.
         support_torque: at which the support holds [N m]; None where it does at every torque.
+        support_valid: whether such a support can be; None without.
         automatic: whether the number of pairs was left to `prepare`: `solve` takes more where they are too few.
         even: whether neither gear is known to help beyond the common face: both end together, or the model is one of
             two dimensions.
@@ -76,6 +77,7 @@ class Mesh(eqx.Module):
     support: AbstractSupport | None = None
     support_gap: Float[Array, " slices"] | None = None
     support_torque: Scalar | None = None
+    support_valid: Bool[Array, ""] | None = None
     automatic: bool = eqx.field(static=True, default=False)
     even: bool = eqx.field(static=True, default=False)
 
@@ -86,6 +88,11 @@ class Mesh(eqx.Module):
     def pair(self) -> GearPair:
         """The gear pair."""
         return self.kinematics.pair
+
+    @property
+    def valid(self) -> Bool[Array, ""]:
+        """Whether such gears can run and such a support can be, which only traced ones may fail to."""
+        return self.margins.valid if self.support_valid is None else self.margins.valid & self.support_valid
 
     @property
     def path_of_contact(self) -> PathOfContact:
@@ -236,6 +243,7 @@ def prepare_from(
         support=support,
         support_gap=None if support is None else support.gap(moving.face_coordinate).astype(moving.slice_width.dtype),
         support_torque=None if support is None else support.torque,
+        support_valid=None if support is None else support.valid,
         even=even,
     )
 

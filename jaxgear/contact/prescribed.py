@@ -128,7 +128,7 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
         line_load=solution.line_load,
         tangent_stiffness=tangent_stiffness(problem, solution),
         residual=solution.residual,
-        converged=solution.solved & mesh.margins.valid & (teeth < outermost(mesh, removed)),
+        converged=solution.solved & mesh.valid & (teeth < outermost(mesh, removed)),
     )
 
 

@@ -264,7 +264,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
     windup = mesh.hub * force / mesh.pair.face_width
     contact_stiffness = tangent_stiffness(problem, solution)
     unloaded = minimum(held / mesh.lever[:, None], axis=(0, 1))
-    valid = mesh.margins.valid & holds_at(mesh.support_torque, torque)
+    valid = mesh.valid & holds_at(mesh.support_torque, torque)
     teeth = solution.approach - mesh.given_way(solution.line_load)  # what closes the gaps of pairs that are not there
     return {
         "transmission_error": solution.approach + windup,

@@ -5,6 +5,7 @@ tolerance_cases              2: five cases of deviations, and the crowning that 
 layout_flank_lines           both together
 vary_profiles                3: profile modifications in all combinations
 damage                       pitting and bending under a duty cycle, as a differentiable number
+plausibility                 what of a layout is not usual
 
 Steps 1 and 2 run on the one-dimensional analysis `shafts.annex_e`, step 3 on the loaded tooth contact.
 
@@ -19,6 +20,7 @@ from .life import Endurance as Endurance
 from .life import WoehlerLine as WoehlerLine
 from .life import damage as damage
 from .longest_life import longest_life as longest_life
+from .plausibility import plausibility as plausibility
 from .profiles import ProfileLayout as ProfileLayout
 from .profiles import vary_profiles as vary_profiles
 from .stations import at_stations as at_stations

@@ -72,6 +72,9 @@ def level_load(
         stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1, see `mesh_stiffness`.
         stations: over the face; None for 41, or those that `Stations` have.
 
+    Returns:
+        the flank line; NaN where the load over the face has not been found.
+
     Raises:
         ValueError: for a torque that is missing or out of range.
     """
@@ -88,15 +91,17 @@ def coordinates(face: Stations) -> tuple[Float[Array, " slices"], Float[Array, "
 def _level(face: Stations, stiffness, hollow: bool) -> FlankLine:
     slope, crowning = coordinates(face)
 
-    def unevenness(amounts):
-        line = FlankLine(amounts[0], amounts[1] if len(amounts) > 1 else jnp.zeros_like(amounts[0]))
-        load = annex_e(
+    def loaded(line):
+        return annex_e(
             face,
             torque=face.torque,
             wheel=line.on(face.pair, "wheel").modification,
             stiffness=stiffness,
             stations=face.count,
-        ).line_load
+        )
+
+    def unevenness(amounts):
+        load = loaded(FlankLine(amounts[0], amounts[1] if len(amounts) > 1 else jnp.zeros_like(amounts[0]))).line_load
         mean = jnp.mean(load)
         # without any load every flank line is as good as another
         return 0.5 * jnp.sum((load / jnp.where(mean > 0, mean, 1.0) - jnp.where(mean > 0, 1.0, 0.0)) ** 2)
@@ -106,8 +111,9 @@ def _level(face: Stations, stiffness, hollow: bool) -> FlankLine:
         return implicit_root(jax.grad(unevenness), -fit(basis, face.bent, "least_squares")[1:])
 
     both = best((slope, crowning))
-    if hollow:
-        return FlankLine(both[0], both[1])
-    alone = best((slope,))
-    concave = both[1] < 0
-    return FlankLine(jnp.where(concave, alone[0], both[0]), jnp.where(concave, 0.0, both[1]))
+    line = FlankLine(both[0], both[1])
+    if not hollow:
+        alone, concave = best((slope,)), line.crowning < 0
+        line = FlankLine(jnp.where(concave, alone[0], line.slope), jnp.where(concave, 0.0, line.crowning))
+    found = loaded(line).converged
+    return FlankLine(*(jnp.where(found, amount, jnp.nan) for amount in (line.slope, line.crowning)))

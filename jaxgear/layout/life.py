@@ -9,9 +9,12 @@ References:
     of modifications, on flank lines for the longest life under a load spectrum.
 """
 
+from typing import NamedTuple
+
+import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..conditions import LoadSpectrum
 from ..geometry import Gear, GearPair, path_of_contact
@@ -62,6 +65,8 @@ class Damage(Checked):
         contact_stress: at every torque.
         root_stress: of both gears.
         face_load_factor: K_Hbeta at every torque.
+        converged: whether the load over the face has been found at every torque; where it has not, its numbers are
+            NaN, and with them every sum. Without torque there is nothing to find.
         duration: of the duty cycle; None where it has none: the damage is that of one revolution of the pinion.
     """
 
@@ -70,6 +75,7 @@ class Damage(Checked):
     contact_stress: Torques = result("MPa")
     root_stress: OfGears = result("MPa")
     face_load_factor: Torques = result()
+    converged: Bool[Array, " torques"] = eqx.field()
     duration: Scalar | None = result("h")
 
     @property
@@ -85,9 +91,10 @@ class Damage(Checked):
     @property
     def life(self) -> Scalar:
         """Hours until the largest damage sum is 1; without a duration the revolutions of the pinion. Infinite without
-        damage."""
+        damage, NaN where a load has not been found."""
         worst, lasts = self.largest, 1.0 if self.duration is None else self.duration
-        return jnp.where(worst > 0, lasts / jnp.where(worst > 0, worst, 1.0), jnp.inf)
+        none = worst == 0
+        return jnp.where(none, jnp.inf, lasts / jnp.where(none, 1.0, worst))
 
 
 def damage(
@@ -152,14 +159,29 @@ def damage_of(
     """`damage` of supports that are worked out."""
     found = face_loads(faces, pinion, wheel)
     pair = jax.tree.map(lambda leaf: leaf[0], faces.pair)
-    load_over_face = found.line_load
-    return summed(pair, maximum(load_over_face, axis=-1), face_load_factor(load_over_face), load, endurance)
+    loaded = Loaded(maximum(found.line_load, axis=-1), face_load_factor(found.line_load), found.converged)
+    return summed(pair, loaded, load, endurance)
 
 
-def summed(
-    pair: GearPair, largest: Torques, factor: Torques, load: LoadSpectrum, endurance: tuple[Endurance, Endurance]
-) -> Damage:
-    """The damage of largest line loads [N/mm] and face load factors."""
+class Loaded(NamedTuple):
+    """The load over the face at every torque.
+
+    Attributes:
+        largest: line load [N/mm].
+        factor: K_Hbeta.
+        converged: whether it has been found.
+    """
+
+    largest: Torques
+    factor: Torques
+    converged: Bool[Array, " torques"]
+
+
+def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, endurance: tuple[Endurance, Endurance]) -> Damage:
+    """The damage of loads over the face."""
+    # without torque teeth carry nothing, whether the place of the shafts has been found or not
+    carries = load.torques > 0
+    largest, factor = jnp.where(carries, found.largest, 0.0), jnp.where(carries, found.factor, 1.0)
     contact = _contact_stress_square(pair)
     root = _root_stress(pair)
     mean = largest / factor
@@ -167,21 +189,26 @@ def summed(
     bent = mean * root_face_load_factor(jnp.maximum(factor, 1.0), pair.face_width, tooth_height(pair))
     hours, speeds = load.hours, load.speeds
     turns = load.weights if hours is None or speeds is None else _MINUTES * hours * speeds
-    pitting, bending, loaded = [], [], largest > 0
+    loaded = largest != 0
+    pitting: list[Torques] = []
+    bending: list[Torques] = []
     for turned, share, bears in zip((turns, turns / pair.gear_ratio), root, endurance):
         lines = bears.pitting, bears.bending
         # by the square of the stress, whose root has no derivative at zero load
         square = jnp.where(loaded, largest * contact / lines[0].endurance ** 2, 1.0)
         power = jnp.where(loaded, square ** (0.5 * lines[0].exponent), 0.0)
-        pitting.append(turned / lines[0].cycles * power)
-        bending.append(turned / lines[1].cycles * (bent * share / lines[1].endurance) ** lines[1].exponent)
-    stress = jnp.where(largest > 0, jnp.sqrt(jnp.where(largest > 0, largest * contact, 1.0)), 0.0)
+        shares = power / lines[0].cycles, (bent * share / lines[1].endurance) ** lines[1].exponent / lines[1].cycles
+        # a load that is never run does nothing, even where it has not been found
+        for each, damaged in zip((pitting, bending), shares):
+            each.append(jnp.where(turned > 0, turned * damaged, 0.0))
+    stress = jnp.where(loaded, jnp.sqrt(jnp.where(loaded, largest * contact, 1.0)), 0.0)
     return Damage(
         jnp.stack(pitting),
         jnp.stack(bending),
         stress,
         jnp.stack([bent * share for share in root]),
-        factor,
+        found.factor,
+        found.converged | ~carries,
         load.duration,
     )
 

@@ -16,7 +16,7 @@ from ..conditions import LoadSpectrum
 from ..numerics import concrete, kernel, maximum
 from ..shafts import AbstractSupport
 from .flank_line import FlankLine, level_load
-from .life import Damage, Endurance, damage, damage_of, face_loads, summed, under_loads
+from .life import Damage, Endurance, Loaded, damage, damage_of, face_loads, summed, under_loads
 from .stations import STATIONS, Stations
 
 # Exponents of the mean that stands for the largest line load: from one that most of the face has a say in to one that
@@ -51,7 +51,8 @@ def longest_life(
         the flank line over the common face, of numbers: what it is made of has no derivatives, the damage with it has.
 
     Raises:
-        ValueError: as `damage` does, for torques that are all zero, and for numbers that are being traced.
+        ValueError: as `damage` does, for torques that are all zero, numbers that are being traced, and a torque whose
+            load over the face is not found.
     """
     if any(concrete(leaf) is None for leaf in jax.tree.leaves((support, load, endurance))):
         raise ValueError("longest_life: searches with numbers, not inside of a traced function; `damage` can be traced")
@@ -59,7 +60,14 @@ def longest_life(
     if not float(jnp.max(jnp.where(load.weights > 0, load.torques, 0.0))) > 0:
         raise ValueError("longest_life: torques are all zero, every flank line lives for ever")
     faces = under_loads(support, load, stations=stations)
-    worst = int(np.argmax(np.sum(damage(support, load, both, stations=stations).pitting, axis=0)))
+    unmodified = damage(support, load, both, stations=stations)
+    missed = np.asarray(load.torques)[~np.asarray(unmodified.converged)]
+    if len(missed):
+        raise ValueError(
+            f"longest_life: the load over the face at {float(missed[0]):g} N m is not found: do loads leave a shaft "
+            "afloat in its clearances?"
+        )
+    worst = int(np.argmax(np.sum(unmodified.pitting, axis=0)))
     start = level_load(support, load.torques[worst], hollow=hollow, stations=stations)
     point = np.array([float(start.slope), float(start.crowning)])
     bounds = [(None, None), (None if hollow else 0.0, None)]
@@ -97,7 +105,7 @@ def _soft_damage(faces: Stations, load: LoadSpectrum, endurance, at: Float[Array
         top = jax.lax.stop_gradient(jnp.max(share, axis=-1))
         factor = top * jnp.mean((share / jnp.where(loaded, top, 1.0)[:, None]) ** sharpness, axis=-1) ** (1 / sharpness)
         factor = jnp.where(loaded, factor, 1.0)
-        made: Damage = summed(pair, factor * mean, factor, load, endurance)
+        made: Damage = summed(pair, Loaded(factor * mean, factor, found.converged), load, endurance)
         return jnp.log(jnp.maximum(maximum(made.total), _NONE))
 
     return jax.value_and_grad(of)(at)

@@ -3,7 +3,7 @@
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..geometry import GearPair
 from ..numerics import check, concrete, optional_real, program, real, result, whole
@@ -26,10 +26,17 @@ class Stations(AbstractSupport):
     Attributes:
         table: what it does over the face.
         load: torque on the pinion under which it does that.
+        held: whether the support that it was worked out from can be.
     """
 
     table: TabulatedSupport
     load: Scalar = result("N m")
+    held: Bool[Array, ""] = eqx.field()
+
+    @property
+    def valid(self) -> Bool[Array, ""]:
+        """`held`."""
+        return self.held
 
     @property
     def pair(self) -> GearPair:
@@ -144,4 +151,4 @@ def _at_stations(support: AbstractSupport, torque: Scalar | None, stations: int)
         torque = support.torque
     assert torque is not None
     gap = jnp.broadcast_to(support.gap(y), y.shape)
-    return Stations(TabulatedSupport(support.pair, support.influence(y), gap), torque)
+    return Stations(TabulatedSupport(support.pair, support.influence(y), gap), torque, support.valid)

@@ -124,7 +124,7 @@ def layout_flank_lines(
     Args:
         support: shafts at the mesh, `support` of a gearbox or `RigidSupport`.
         tolerances: by name, for instance {"statistical": ..., "maximum": ...}; the worst of all counts.
-        torque: on the pinion [N m]; None for the largest of the duty cycle, or that of the couplings.
+        torque: on the pinion [N m]; None for the largest that the duty cycle has hours of, or that of the couplings.
         duty_cycle: torques with their hours, for step 1; None to level the load.
         endurance: of the gears under it.
         gear: whose flank line levels the load.
@@ -135,7 +135,7 @@ def layout_flank_lines(
 
     Raises:
         ValueError: for a duty cycle without endurance or the reverse, another gear, amounts or numbers out of range,
-            and where no crowning keeps the load off the edges.
+            where the load over the face is not found, and where no crowning keeps it off the edges.
     """
     if gear not in ("pinion", "wheel"):
         raise ValueError(f'layout_flank_lines: gear = {gear!r} must be "pinion" or "wheel"')
@@ -144,7 +144,7 @@ def layout_flank_lines(
         raise ValueError(f"layout_flank_lines: {given} has no effect without {missing}")
     check("layout_flank_lines", "further", further, "um", low=0.0)
     if torque is None and duty_cycle is not None:
-        torque = jnp.max(duty_cycle.torques)
+        torque = jnp.max(jnp.where(duty_cycle.weights > 0, duty_cycle.torques, 0.0))
     several = tolerances if isinstance(tolerances, Mapping) else {"tolerance": tolerances}
     if not several:
         raise ValueError("layout_flank_lines: tolerances must not be empty")
@@ -155,6 +155,10 @@ def layout_flank_lines(
         line = longest_life(support, duty_cycle, endurance, hollow=hollow, stations=stations)
     each = [crowning_off_the_edges(face, one, line=line, share=share) for one in several.values()]
     needed = jnp.max(jnp.stack(each))
+    if not bool(jnp.isfinite(line.slope)):
+        raise ValueError(
+            "layout_flank_lines: the load over the face is not found: do loads leave a shaft afloat in its clearances?"
+        )
     if not bool(jnp.isfinite(needed)):
         raise ValueError("layout_flank_lines: no crowning keeps the load off the edges: the shafts are too soft")
     added = _further(needed, further)

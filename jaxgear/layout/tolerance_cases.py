@@ -128,13 +128,14 @@ class ToleranceCases(Checked):
 
     @property
     def edge_contact(self) -> Bool[Array, " cases"]:
-        """Whether the largest line load is at an end of the face; an even load touches no edge."""
-        return self.edge_excess > _LEVEL
+        """Whether the largest line load is at an end of the face, or not found; an even load touches no edge."""
+        return ~(self.edge_excess <= _LEVEL)
 
     @property
     def loaded_share(self) -> Cases:
-        """Share of the face that carries load."""
-        return jnp.mean(self.load.in_contact.astype(self.slope.dtype), axis=-1)
+        """Share of the face that carries load, NaN where that has not been found."""
+        share = jnp.mean(self.load.in_contact.astype(self.slope.dtype), axis=-1)
+        return jnp.where(self.load.converged, share, jnp.nan)
 
 
 def tolerance_cases(
@@ -198,7 +199,7 @@ def crowning_off_the_edges(
 
     Returns:
         the crowning, 0 where none is needed; NaN where 16 times the sum of all deviations and of the opening by bent
-        shafts are not enough. Differentiable.
+        shafts are not enough, or the load has not been found. Differentiable.
     """
     check("crowning_off_the_edges", "share", share, "", low=0.0, high=1.0, open_low=True)
     face = at_stations(support, torque, stations=stations)
@@ -219,7 +220,8 @@ def _off_the_edges(face: Stations, tolerance: FlankLineTolerance, line: FlankLin
     size = jax.lax.stop_gradient(_MOST * (size + jnp.abs(line.slope) + jnp.abs(line.crowning)))
     zero = jnp.zeros_like(size)
     found = bracketed_root(_worst_excess, zero, size, given)
-    enough, needed = _worst_excess(size, given) < 0, _worst_excess(zero, given) > _LEVEL
+    # what has not been found is NaN, which is not level either
+    enough, needed = _worst_excess(size, given) < 0, ~(_worst_excess(zero, given) <= _LEVEL)
     return jnp.where(needed, jnp.where(enough, found, jnp.nan), 0.0)
 
 

@@ -6,6 +6,7 @@ from .contact_problem import ContactProblem as ContactProblem
 from .contact_problem import ContactSolution as ContactSolution
 from .coupling import Coupling as Coupling
 from .coupling import Other as Other
+from .dense import positive_definite as positive_definite
 from .dense import pseudo_inverse as pseudo_inverse
 from .dense import solve_dense as solve_dense
 from .extremes import maximum as maximum
@@ -25,6 +26,7 @@ from .fields import whole as whole
 from .frozen import Frozen as Frozen
 from .leading import on_both as on_both
 from .leading import over_batch as over_batch
+from .limits import within_limits as within_limits
 from .logarithm import log as log
 from .newton import implicit_root as implicit_root
 from .newton import newton as newton

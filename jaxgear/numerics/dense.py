@@ -16,7 +16,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 Matrix = Float[Array, "n n"]
 Right = Float[Array, "n *columns"]
@@ -93,6 +93,23 @@ def _exchanged(slab: Slab, chosen: Int[Array, " n"], at) -> tuple[Slab, Int[Arra
         return slab, jnp.where(rows == at + k, pick, chosen)
 
     return jax.lax.fori_loop(0, slab.shape[1], exchange, (slab, chosen))
+
+
+def positive_definite(matrix: Matrix) -> Bool[Array, ""]:
+    """Whether all eigenvalues of a symmetric matrix are positive: as many as pivots are (Sylvester's law of inertia).
+
+    They are above x where matrix - x I is positive definite. False where a number is NaN.
+    """
+    rows = jnp.arange(len(matrix))
+
+    def eliminate(k, state):
+        left, positive = state
+        pivot = left[k, k]
+        share = jnp.where(rows > k, left[:, k], 0.0) / jnp.where(pivot > 0, pivot, 1.0)
+        return left - share[:, None] * left[k][None], positive & (pivot > 0)
+
+    start = jax.lax.stop_gradient(matrix), jnp.ones((), bool)
+    return jax.lax.fori_loop(0, len(matrix), eliminate, start)[1]
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(1,))

@@ -8,13 +8,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..numerics import Checked, concrete, number
-from .matrices import check_symmetric, symmetric
+from .matrices import ROUNDING, check_symmetric, symmetric
 
 Scalar = Float[Array, ""]
 Matrix = Float[Array, "5 5"]
-
-# Smallest eigenvalue over the largest one that may be a rounding error of a semidefinite matrix.
-_ROUNDING = 1e-9
 
 
 class AbstractBearing(Checked):
@@ -90,7 +87,7 @@ class MatrixBearing(AbstractBearing):
             return
         check_symmetric(f'MatrixBearing "{self.name}"', "stiffness", known)
         least, most = np.linalg.eigvalsh(known)[[0, -1]]
-        if least < -_ROUNDING * most:
+        if least < -ROUNDING * most:
             raise ValueError(
                 f'MatrixBearing "{self.name}": stiffness must be positive semidefinite, smallest eigenvalue {least:g}'
             )

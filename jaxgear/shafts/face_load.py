@@ -26,7 +26,7 @@ _LEVEL = 1 - 1e-5  # factor of an even load, less rounding
 
 
 class FaceLoad(Checked):
-    """Load over the face by the one-dimensional analysis.
+    """Load over the face by the one-dimensional analysis; NaN where it has not been found.
 
     Attributes:
         face_coordinate: of the stations, evenly over the common face, from its middle.
@@ -35,7 +35,7 @@ class FaceLoad(Checked):
         deformation: by which shafts, bearings and housing open the gap under the line load.
         approach: of the flanks along the line of action.
         in_contact: stations that carry load.
-        converged: whether all contact conditions hold.
+        converged: whether all contact conditions hold, and such a support can be.
     """
 
     face_coordinate: Slices = result("mm")
@@ -53,7 +53,7 @@ class FaceLoad(Checked):
 
 
 def face_load_factor(line_load: Float[Array, "... slices"], slice_width: Slices | None = None) -> Float[Array, "..."]:
-    """K_Hbeta: largest over mean line load over the face, 1 without load.
+    """K_Hbeta: largest over mean line load over the face, 1 without load, NaN of loads that have not been found.
 
     Args:
         line_load: over the face [N/mm], last axis; of a contact analysis that of one pair at one position, which
@@ -131,6 +131,10 @@ def annex_e(
         stations: over the face. The largest load is that of a station's middle, (K_Hbeta - 1) / stations below that
             at the end of a straight line load.
 
+    Returns:
+        the load, differentiable; NaN and not `converged` where it has not been found, as of shafts afloat in their
+        bearings, and where traced shafts, bearings or housing cannot be.
+
     Raises:
         ValueError: for a torque beside that of a gearbox, or without any; for numbers out of their range.
     """
@@ -159,14 +163,20 @@ def _annex_e(support, pinion, wheel, torque, stiffness, stations: int) -> FaceLo
     gap = support.gap(y) + sum(item(flank) for item, flank in zip((pinion, wheel), pitch_lines(pair, y)))
     gap = jnp.broadcast_to(gap, y.shape)
     found = press(influence + jnp.eye(stations) / (stiffness * step), gap, 1e3 * moment / pair.pinion.base_radius)
+    converged = found.solved & support.valid & (stiffness > 0)
+
+    def where_found(value):
+        return jnp.where(converged, value, jnp.nan)
+
+    # a load that has not been found must not pass for an even one, nor for none
     return FaceLoad(
         face_coordinate=y,
-        line_load=found.force / step,
+        line_load=where_found(found.force / step),
         gap=gap,
-        deformation=influence @ found.force,
-        approach=found.approach,
+        deformation=where_found(influence @ found.force),
+        approach=where_found(found.approach),
         in_contact=found.in_contact,
-        converged=found.solved,
+        converged=converged,
     )
 
 

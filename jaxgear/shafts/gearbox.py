@@ -3,14 +3,17 @@
 from typing import Literal
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..geometry import GearPair
-from ..numerics import Checked, concrete, number, program
+from ..numerics import Checked, concrete, number, program, within_limits
 from .housing import Housing
+from .matrices import semidefinite
 from .misalignment import Misalignment
-from .shaft import MountedGear, Shaft
+from .parts import MountedGear
+from .shaft import Shaft
 from .torque_path import Path, torque_path
 
 Scalar = Float[Array, ""]
@@ -92,6 +95,16 @@ class Gearbox(Checked):
                 raise ValueError(f'Gearbox: the housing has no seat for bearing "{name}"')
 
     @property
+    def valid(self) -> Bool[Array, ""]:
+        """Whether such a gearbox can be, as far as numbers tell: every one in its range, shafts held, nothing beyond
+        their ends, the housing definite, faces that overlap, pinions that drive.
+
+        Concrete gearboxes that cannot be are refused; traced ones are flagged, and the load over the face of one that
+        cannot be is not found.
+        """
+        return _valid(self)
+
+    @property
     def bearing_names(self) -> tuple[str, ...]:
         """Of all shafts, in their order."""
         return tuple(bearing.name for shaft in self.shafts for bearing in shaft.bearings)
@@ -148,6 +161,17 @@ class Gearbox(Checked):
 @program
 def _torques(gearbox: Gearbox) -> Float[Array, " meshes"]:
     return gearbox.pinion_torques()
+
+
+@program
+def _valid(gearbox: Gearbox) -> Bool[Array, ""]:
+    bearings = jnp.stack([bearing.matrix for shaft in gearbox.shafts for bearing in shaft.bearings])
+    each = [within_limits(gearbox), jnp.all(jax.vmap(semidefinite)(bearings))]
+    each += [shaft.valid for shaft in gearbox.shafts]
+    each += [gearbox.pair(index).face_overlap > 0 for index in range(len(gearbox.meshes))]
+    if gearbox.housing is not None:
+        each.append(gearbox.housing.valid)
+    return jnp.all(jnp.stack(each)) & jnp.all(gearbox.pinion_torques() >= 0)
 
 
 def _check_single(kind: str, names: list[str]) -> None:

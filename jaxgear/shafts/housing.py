@@ -5,11 +5,11 @@ from typing import Literal
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
-from ..numerics import Checked, concrete, number, solve_dense
+from ..numerics import Checked, concrete, number, positive_definite, solve_dense
 from .beam import DIRECTIONS
-from .matrices import check_symmetric, symmetric
+from .matrices import check_symmetric, semidefinite, symmetric
 
 Matrix = Float[Array, "rows columns"]
 Kind = Literal["stiffness", "compliance"]
@@ -51,6 +51,17 @@ class Housing(Checked):
     def seats(self) -> tuple[str, ...]:
         """Names of the seats in the order of their first rows."""
         return tuple(dict.fromkeys(_split(node)[0] for node in self.nodes))
+
+    @property
+    def valid(self) -> Bool[Array, ""]:
+        """Whether the symmetric part of the matrix is definite, a compliance semidefinite; traced ones may not be."""
+        even = symmetric(self.matrix)
+        diagonal, unit = jnp.diagonal(even), jnp.eye(len(even), dtype=even.dtype)
+        scale = 1 / jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
+        scaled = scale[:, None] * even * scale[None]
+        if self.kind == "stiffness":
+            return jnp.all(diagonal > 0) & positive_definite(scaled - _DEFINITE * unit)
+        return jnp.all(diagonal >= 0) & semidefinite(scaled)
 
     @property
     def compliance(self) -> Matrix:
@@ -99,7 +110,7 @@ def _check_definite(matrix: np.ndarray, kind: Kind, nodes: tuple[str, ...]) -> N
             f"Housing: stiffness must be positive definite, but its smallest eigenvalue is {lowest:.3g} of its "
             "diagonal: is the housing fixed to its foundation?"
         )
-    if lowest < -_DEFINITE:
+    if lowest < -max(_DEFINITE, 10 * len(matrix) * np.finfo(matrix.dtype).eps):
         raise ValueError(
             f"Housing: {kind} must be positive semidefinite, but its smallest eigenvalue is {lowest:.3g} of its "
             "diagonal"

@@ -5,23 +5,20 @@ from abc import abstractmethod
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..geometry import GearPair
-from ..numerics import Checked, concrete, number, program, real, whole
+from ..numerics import Checked, concrete, number, program, real, whole, within_limits
 from .beam import twist
 from .equilibrium import solve
 from .gearbox import Gearbox
 from .loads import acting, load_pattern, mesh_patterns, side_by_side, torques_on
-from .matrices import check_symmetric, symmetric
+from .matrices import ROUNDING, check_symmetric, semidefinite, symmetric
 from .misalignment import Misalignment
 from .operating_point import system_under_load
 
 Slices = Float[Array, " slices"]
 Scalar = Float[Array, ""]
-
-# Smallest eigenvalue over the largest one that may be a rounding error of a semidefinite matrix.
-_ROUNDING = 1e-9
 
 
 class AbstractSupport(Checked):
@@ -41,6 +38,11 @@ class AbstractSupport(Checked):
     def needs_even_slices(self) -> bool:
         """Whether it is known over slices of equal width alone."""
         return False
+
+    @property
+    @abstractmethod
+    def valid(self) -> Bool[Array, ""]:
+        """Whether such a support can be: concrete ones that cannot are refused, traced ones flagged."""
 
     @abstractmethod
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
@@ -66,6 +68,11 @@ class RigidSupport(AbstractSupport):
     def pair(self) -> GearPair:
         """`gears`."""
         return self.gears
+
+    @property
+    def valid(self) -> Bool[Array, ""]:
+        """Whether all numbers are in their ranges."""
+        return within_limits(self)
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
         """Zero."""
@@ -100,7 +107,7 @@ class TabulatedSupport(AbstractSupport):
                 raise ValueError(f"TabulatedSupport: matrix is {known.shape[0]} x {known.shape[1]}, must be square")
             check_symmetric("TabulatedSupport", "matrix", known)
             values = np.linalg.eigvalsh(symmetric(known))
-            if values[0] < -_ROUNDING * values[-1]:
+            if values[0] < -ROUNDING * values[-1]:
                 raise ValueError(
                     f"TabulatedSupport: matrix has the eigenvalue {values[0]:.6g} um/N, must not be negative: a "
                     "support gives way under a force"
@@ -118,6 +125,11 @@ class TabulatedSupport(AbstractSupport):
     @property
     def needs_even_slices(self) -> bool:
         return True
+
+    @property
+    def valid(self) -> Bool[Array, ""]:
+        """Whether all numbers are in their ranges, and no eigenvalue of the matrix is negative."""
+        return within_limits(self) & semidefinite(symmetric(self.matrix))
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
         """`matrix`, its symmetric part.
@@ -165,6 +177,11 @@ class ShaftSupport(AbstractSupport):
     def torque(self) -> Scalar:
         """On the pinion [N m]."""
         return self.gearbox.pinion_torques()[self.mesh]
+
+    @property
+    def valid(self) -> Bool[Array, ""]:
+        """Whether such a gearbox can be."""
+        return self.gearbox.valid
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
         """Bending, shear, torsion, bearings and housing of both shafts, and of all others through the housing.

@@ -59,7 +59,7 @@ class ElasticLine(Checked):
 
 
 def bearing_reactions(gearbox: Gearbox) -> BearingReactions:
-    """Bearings under all loads of a gearbox, the force of every mesh even over its face."""
+    """Bearings under all loads of a gearbox, the force of every mesh even over its face; NaN where nothing holds it."""
     return _reactions(gearbox)
 
 
@@ -97,8 +97,10 @@ def elastic_line(gearbox: Gearbox, shaft: str, position) -> ElasticLine:
 @program
 def _reactions(gearbox: Gearbox) -> BearingReactions:
     found = solve(system_under_load(gearbox, load_pattern(gearbox)), jnp.ones((1, 1)), actual=True)
-    shape = -1, _WAYS
-    force, shaft, seat = (item[:, 0].reshape(shape) for item in (-found.force, found.bearing, found.seat))
+    valid = gearbox.valid
+    force, shaft, seat = (
+        jnp.where(valid, item[:, 0].reshape(-1, _WAYS), jnp.nan) for item in (-found.force, found.bearing, found.seat)
+    )
     return BearingReactions(gearbox.bearing_names, force, shaft, seat)
 
 
@@ -114,4 +116,6 @@ def _line(gearbox: Gearbox, shaft: int, position: Float[Array, " points"]) -> El
     at, torque = torques_on(gearbox, shaft)
     # of two torques that turn a shaft against each other, the one on the left holds
     turned = twist(gearbox.shafts[shaft].beam, jnp.minimum(position[:, None], at[None, :])) @ torque
-    return ElasticLine(position, found.reshape(count, _WAYS), turned)
+    # no answer of a traced shaft that cannot be
+    bent, turned = (jnp.where(gearbox.valid, each, jnp.nan) for each in (found.reshape(count, _WAYS), turned))
+    return ElasticLine(position, bent, turned)

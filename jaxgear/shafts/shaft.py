@@ -4,107 +4,27 @@ All shafts of a gearbox are parallel to z. Positions on a shaft count from its l
 Directions x, y, z, rx, ry are those of the gearbox, rotations right-handed.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
-from ..geometry import Gear, Material
-from ..numerics import Checked, concrete, number, program
+from ..geometry import Material
+from ..numerics import Checked, positive_definite, program
 from .beam import Beam, beam, rigid
 from .bearing import AbstractBearing
+from .parts import Coupling, MountedGear, Section, ShaftLoad
 
 Scalar = Float[Array, ""]
+OfGears = Float[Array, " gears"]
 
-# A shaft is held where its bearings resist every movement by at least this share of what they resist the stiffest one.
+# A shaft is held where its bearings resist every movement by at least this share of what they resist all together.
 _SUPPORTED = 1e-9
 _ROUNDING = 1e-6  # of a sum of lengths, in single precision too
-
-
-class Section(Checked):
-    """Part of a shaft with one cross-section.
-
-    Attributes:
-        length: [mm].
-        diameter: outer [mm].
-        bore: inner diameter [mm].
-    """
-
-    length: Scalar = number("mm", low=0.0, open_low=True)
-    diameter: Scalar = number("mm", low=0.0, open_low=True)
-    bore: Scalar = number("mm", low=0.0, default=0.0)
-
-    def check_together(self) -> None:
-        outer, inner = concrete(self.diameter), concrete(self.bore)
-        if outer is not None and inner is not None and inner >= outer:
-            raise ValueError(f"Section: bore = {float(inner):g} mm must be less than {float(outer):g} mm, the diameter")
-
-
-class MountedGear(Checked):
-    """A gear on a shaft.
-
-    Attributes:
-        name: by which a mesh refers to it.
-        gear: the gear; its face width is that of the body.
-        position: of the middle of its face, from the left end of the shaft [mm].
-        body_diameter: outer diameter of the shaft over the face width [mm], by which the gear body stiffens it: of an
-            integral pinion `integral_diameter`, of a pressed or keyed wheel less; None where the body does not stiffen.
-    """
-
-    name: str = eqx.field(static=True)
-    gear: Gear
-    position: Scalar = number("mm")
-    body_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
-
-    @property
-    def start(self) -> Scalar:
-        """Left end of the face [mm]."""
-        return self.position - 0.5 * self.gear.face_width
-
-    @property
-    def end(self) -> Scalar:
-        """Right end of the face [mm]."""
-        return self.position + 0.5 * self.gear.face_width
-
-
-class Coupling(Checked):
-    """Where torque enters or leaves a gearbox.
-
-    Attributes:
-        position: from the left end of the shaft [mm].
-        torque: positive where it drives the shaft, negative where the shaft gives it away [N m]; None for what is left
-            of the others, at one coupling of a gearbox.
-    """
-
-    position: Scalar = number("mm")
-    torque: Scalar | None = number("N m", optional=True, default=None)
-
-
-class ShaftLoad(Checked):
-    """Force and moment from outside: belt, weight, overhung impeller.
-
-    Attributes:
-        position: from the left end of the shaft [mm].
-        force: in x, y and z [N].
-        moment: about x and y [N m]; torque enters by a `Coupling`.
-    """
-
-    position: Scalar = number("mm")
-    force: Float[Array, "3"] = number("N", shape=("axes",), default=(0.0, 0.0, 0.0))
-    moment: Float[Array, "2"] = number("N m", shape=("axes",), default=(0.0, 0.0))
-
-    def check_together(self) -> None:
-        for name, value, size in (("force", self.force, 3), ("moment", self.moment, 2)):
-            if value.shape != (size,):
-                raise ValueError(f"ShaftLoad: {name} has shape {value.shape}, must be a list of {size} numbers")
-
-    @property
-    def vector(self) -> Float[Array, "5"]:
-        """In x, y, z, rx, ry [N, N mm]."""
-        return jnp.concatenate([self.force, 1e3 * self.moment])
 
 
 class Shaft(Checked):
@@ -120,9 +40,10 @@ class Shaft(Checked):
         material: of shaft and gear bodies.
 
     Raises:
-        ValueError: for something beyond the ends of the shaft, two things of one name, or bearings that do not hold the
-            shaft: one of no tilting stiffness leaves it free to turn, none to move. A shaft without axial stiffness is
-            taken as held axially unless something pushes it that way.
+        ValueError: for something beyond the ends of the shaft, gears that overlap, a shaft or body as thick as the
+            gear, a body that the shaft is thicker than anyhow, or bearings that do not hold the shaft: one of no
+            tilting stiffness leaves it free to turn, none to move. A shaft without axial stiffness is taken as held
+            axially unless something pushes it that way.
     """
 
     name: str = eqx.field(static=True)
@@ -161,8 +82,13 @@ class Shaft(Checked):
             diameter = jnp.where(inside, jnp.maximum(diameter, body), diameter)
         return beam(edges, diameter, bore, self.material)
 
+    @property
+    def valid(self) -> Bool[Array, ""]:
+        """Whether such a shaft can be; concrete ones that cannot are refused, traced ones flagged."""
+        return _holds(facts_of(self))
+
     def _named(self) -> tuple[str, ...]:
-        """What is on the shaft, in the order of `_Facts.low`."""
+        """What is on the shaft, in the order of `ShaftFacts.low`."""
         return (
             *(f'bearing "{item.name}"' for item in self.bearings),
             *(f'gear "{item.name}"' for item in self.gears),
@@ -171,73 +97,129 @@ class Shaft(Checked):
         )
 
 
-class _Facts(NamedTuple):
-    """What a shaft is judged by.
+class ShaftFacts(NamedTuple):
+    """What a shaft is judged by; one rule decides what of concrete numbers is refused and of traced ones not valid.
 
     Attributes:
         length: of the shaft [mm].
         low, high: ends of everything on it [mm].
-        held: stiffness of all bearings against movements of the whole shaft in x, y, rx, ry [N/um ...], rotations as
-            displacements of its ends.
-        axial: the same in z.
-        pushed: largest axial force [N].
+        inside: of everything on it, whether it lies within the shaft.
+        hollow: of every section, whether its bore is less than its diameter.
+        thinnest, thickest: smallest and largest diameter of the sections under the face of every gear [mm].
+        body: its body diameter, 0 where it has none [mm].
+        tip: its tip diameter [mm].
+        overlap: whether the faces of two gears have more than an end in common.
+        held: whether the bearings resist every movement but that along the axis.
+        axial: whether they resist that too where something pushes.
     """
 
     length: Scalar
     low: Float[Array, " items"]
     high: Float[Array, " items"]
-    held: Float[Array, "4 4"]
-    axial: Scalar
-    pushed: Scalar
+    inside: Bool[Array, " items"]
+    hollow: Bool[Array, " sections"]
+    thinnest: OfGears
+    thickest: OfGears
+    body: OfGears
+    tip: OfGears
+    overlap: Bool[Array, "gears gears"]
+    held: Bool[Array, ""]
+    axial: Bool[Array, ""]
 
 
 @program
-def _facts(shaft: Shaft) -> _Facts:
+def facts_of(shaft: Shaft) -> ShaftFacts:
     others: tuple[Coupling | ShaftLoad, ...] = (*shaft.couplings, *shaft.loads)
     points = [item.position for item in shaft.bearings], [item.position for item in others]
     length = shaft.length
-    scale = jnp.stack([1.0, 1.0, 1.0, 1 / length, 1 / length])
-    places = rigid(jnp.stack(points[0]))
-    held = sum(r.T @ item.matrix @ r for r, item in zip(places, shaft.bearings)) * scale[None] * scale[:, None]
+    slack = _ROUNDING * length
+    starts, ends = ([getattr(gear, end) for gear in shaft.gears] for end in ("start", "end"))
+    low, high = (jnp.stack([*points[0], *faces, *points[1]]) for faces in (starts, ends))
+    first, last = (jnp.stack(faces) if faces else jnp.zeros(0) for faces in (starts, ends))
+    diameter = jnp.stack([section.diameter for section in shaft.sections])
+    bore = jnp.stack([section.bore for section in shaft.sections])
+    steps = jnp.cumsum(jnp.stack([jnp.zeros(()), *(section.length for section in shaft.sections)]))
+    under = (steps[None, :-1] < last[:, None] - slack) & (steps[None, 1:] > first[:, None] + slack)
+    bodies = [jnp.zeros(()) if gear.body_diameter is None else gear.body_diameter for gear in shaft.gears]
+    tips = [2 * gear.gear.tip_radius for gear in shaft.gears]
+    common = jnp.minimum(last[:, None], last[None]) - jnp.maximum(first[:, None], first[None])
+    pushed = jnp.max(jnp.abs(jnp.stack([jnp.zeros(()), *(load.force[2] for load in shaft.loads)])))
+    held = _held(shaft)
     bending = np.array([0, 1, 3, 4])
-    return _Facts(
-        length,
-        jnp.stack([*points[0], *(gear.start for gear in shaft.gears), *points[1]]),
-        jnp.stack([*points[0], *(gear.end for gear in shaft.gears), *points[1]]),
-        held[bending[:, None], bending],
-        held[2, 2],
-        jnp.max(jnp.abs(jnp.stack([jnp.zeros(()), *(load.force[2] for load in shaft.loads)]))),
+    return ShaftFacts(
+        length=length,
+        low=low,
+        high=high,
+        inside=(low >= -slack) & (high <= length + slack),
+        hollow=bore < diameter,
+        thinnest=jnp.min(jnp.where(under, diameter[None], jnp.inf), axis=1),
+        thickest=jnp.max(jnp.where(under, diameter[None], 0.0), axis=1),
+        body=jnp.stack(bodies) if bodies else jnp.zeros(0),
+        tip=jnp.stack(tips) if tips else jnp.zeros(0),
+        overlap=jnp.triu(common > slack, 1),
+        held=_resists(held[bending[:, None], bending]),
+        axial=(held[2, 2] > 0) | (pushed == 0),
     )
 
 
+def _held(shaft: Shaft) -> Float[Array, "5 5"]:
+    """Stiffness of all bearings against movements of the whole shaft, rotations as displacements of its ends."""
+    scale = jnp.stack([1.0, 1.0, 1.0, 1 / shaft.length, 1 / shaft.length])
+    places = rigid(jnp.stack([item.position for item in shaft.bearings]))
+    return sum(r.T @ item.matrix @ r for r, item in zip(places, shaft.bearings)) * scale[None] * scale[:, None]
+
+
+def _resists(stiffness: Float[Array, "4 4"]) -> Bool[Array, ""]:
+    # the trace is the sum of the eigenvalues
+    least = max(_SUPPORTED, 10 * float(jnp.finfo(stiffness.dtype).eps)) * jnp.trace(stiffness)
+    return positive_definite(stiffness - least * jnp.eye(len(stiffness), dtype=stiffness.dtype))
+
+
+def _holds(facts: ShaftFacts) -> Bool[Array, ""]:
+    """Whether such a shaft can be."""
+    fits = jnp.maximum(facts.thickest, facts.body) < facts.tip
+    several = jnp.all(facts.inside) & jnp.all(facts.hollow) & jnp.all(fits) & ~jnp.any(facts.overlap)
+    return several & facts.held & facts.axial
+
+
 def _check(shaft: Shaft) -> None:
-    """Raises where a shaft of concrete numbers is not held, or something is beyond its ends."""
+    """Raises where a shaft of concrete numbers cannot be, or where a body has no effect."""
     if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(shaft)):
         return
-    facts = _facts(shaft)
+    facts = facts_of(shaft)
     if isinstance(facts.length, jax.core.Tracer):  # within a trace of something else
         return
-    length, low, high, held, axial, pushed = map(np.asarray, facts)
-    slack = _ROUNDING * length
-    for what, first, last in zip(shaft._named(), low, high):
-        if first < -slack or last > length + slack:
+    facts = jax.tree.map(np.asarray, facts)
+    for fault in _faults(shaft, facts):
+        raise ValueError(f'Shaft "{shaft.name}": {fault}')
+
+
+def _faults(shaft: Shaft, facts: ShaftFacts) -> Iterator[str]:
+    for what, first, last, inside in zip(shaft._named(), facts.low, facts.high, facts.inside):
+        if not inside:
             place = f"{first:g} mm" if first == last else f"{first:g} to {last:g} mm"
-            raise ValueError(f'Shaft "{shaft.name}": {what} at {place} must lie within 0 and {length:g} mm')
-    least, most = np.linalg.eigvalsh(held)[[0, -1]]
-    if not least > _SUPPORTED * most:
+            yield f"{what} at {place} must lie within 0 and {facts.length:g} mm"
+    for mounted, thin, thick, body, tip in zip(shaft.gears, facts.thinnest, facts.thickest, facts.body, facts.tip):
+        gear = f'gear "{mounted.name}"'
+        if not thick < tip:
+            yield f"its diameter under {gear} is {thick:g} mm, must be less than {tip:g} mm, the tip diameter"
+        if not body < tip:
+            yield f"body_diameter of {gear} = {body:g} mm must be less than {tip:g} mm, the tip diameter"
+        if mounted.body_diameter is not None and body <= thin:
+            yield (
+                f"body_diameter of {gear} = {body:g} mm has no effect on a shaft of {thin:g} mm: it must be more, or "
+                "left out"
+            )
+    first = len(shaft.bearings)
+    faces = [f"{low:g} to {high:g} mm" for low, high in zip(facts.low[first:], facts.high[first:])]
+    for pair in np.argwhere(facts.overlap):
+        places = [f'"{shaft.gears[index].name}" at {faces[index]}' for index in pair]
+        yield f"gears {' and '.join(places)} must not overlap"
+    if not facts.held:
         names = ", ".join(f'"{item.name}"' for item in shaft.bearings)
-        raise ValueError(
-            f'Shaft "{shaft.name}": bearings {names} do not hold it: it needs two that are radially stiff and apart, '
-            "or one that is stiff against tilting too"
+        yield (
+            f"bearings {names} do not hold it: it needs two that are radially stiff and apart, or one that is stiff "
+            "against tilting too"
         )
-    if axial == 0 and pushed != 0:
-        raise ValueError(f'Shaft "{shaft.name}": an axial load needs a bearing of axial stiffness')
-
-
-def integral_diameter(gear: Gear) -> Scalar:
-    """Diameter of a shaft that is as stiff as a gear cut into it [mm].
-
-    d + 2 x m - h_fP m, halfway between reference circle and root circle of an unshifted gear: the torsion diameter
-    d - m h_aP0 with which a straight torsional wind-up agrees with a program of influence numbers within 0.3 %.
-    """
-    return 2 * gear.root_circle_radius + gear.dedendum * gear.module
+    if not facts.axial:
+        yield "an axial load needs a bearing of axial stiffness"

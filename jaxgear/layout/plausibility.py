@@ -1,0 +1,91 @@
+"""Layouts that can be computed but hardly be meant: what an experienced engineer would ask about.
+
+Nothing is refused here: a doubt is a question. The limits are of this project where no source is named.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..metrics import Doubt
+from ..metrics.plausibility import Limit
+from ..shafts import AbstractSupport, Gearbox, Shaft, ShaftSupport, bearing_reactions
+from ..shafts.shaft import facts_of
+from .steps import FlankLineLayout
+
+# Of a load that falls straight to zero over m stations, K_Hbeta is 2 n / m, and 1 / 2 m of it below that at the end.
+_FEWEST = 8
+
+LIMITS = {
+    "K_Hbeta": Limit(
+        0.0,
+        np.inf,
+        "",
+        f"fewer than {_FEWEST} stations carry the load, so that it depends on their number: more stations? are the "
+        "units of bearings, shafts and housing right?",
+    ),
+    "slope and crowning in modules": Limit(
+        0.0, 0.04, "", "twice the tip relief of ISO 53:1974: are the units of bearings, shafts and housing right?"
+    ),
+    "radial displacement in modules": Limit(
+        0.0, 0.05, "", "about the backlash of a gear: center distance and contact ratio are those of shafts in place"
+    ),
+    "radial stiffness": Limit(1.0, 20_000.0, "N/um", "rolling bearings have ten to some thousands: is it in N/um?"),
+    "shaft diameter over bore": Limit(
+        0.0, 1.0, "", "only a gear that is cut into its shaft is on one thicker than its bore: integral?"
+    ),
+}
+
+
+def plausibility(layout: FlankLineLayout, support: AbstractSupport) -> tuple[Doubt, ...]:
+    """What of a layout and of the shafts that it was made for is not usual; empty where nothing is.
+
+    Args:
+        layout: flank lines, not traced.
+        support: that they were made for; bearings move under the torques of its couplings.
+    """
+    numbers = [*_of_load(layout), *_of_flank_lines(layout)]
+    if isinstance(support, ShaftSupport):
+        gearbox, module = support.gearbox, float(layout.pair.pinion.module)
+        mesh = gearbox.meshes[support.mesh]
+        own = [gearbox.shafts[gearbox.place(name)[0]] for name in (mesh.pinion, mesh.wheel)]
+        numbers += [*_of_bearings(gearbox, own, module), *(each for shaft in own for each in _of_bores(shaft))]
+    return tuple(each for each in numbers if not each.limit.low <= each.value <= each.limit.high)
+
+
+def _doubt(name: str, where: str, value, limit: Limit | None = None) -> Doubt:
+    return Doubt(name, where, float(value), limit or LIMITS[name])
+
+
+def _of_load(layout: FlankLineLayout) -> Iterator[Doubt]:
+    cases = list(layout.after.values())
+    stations = cases[0].load.line_load.shape[-1]
+    limit = LIMITS["K_Hbeta"]._replace(high=2 * stations / _FEWEST)
+    worst = max(float(np.max(each.face_load_factor)) for each in cases)
+    for where, factor in zip(("without modification", "after step 1", "after step 2"), (*layout.factors, worst)):
+        yield _doubt("K_Hbeta", where, factor, limit)
+
+
+def _of_flank_lines(layout: FlankLineLayout) -> Iterator[Doubt]:
+    for where, line, gear in zip(("pinion", "wheel"), (layout.pinion, layout.wheel), layout.pair.gears):
+        removed = abs(float(line.slope)) + abs(float(line.crowning))
+        yield _doubt("slope and crowning in modules", where, 1e-3 * removed / float(gear.module))
+
+
+def _of_bearings(gearbox: Gearbox, shafts: list[Shaft], module: float) -> Iterator[Doubt]:
+    found = bearing_reactions(gearbox)
+    moved = dict(zip(found.names, np.hypot(*np.asarray(found.shaft)[:, :2].T)))
+    for bearing in (bearing for shaft in shafts for bearing in shaft.bearings):
+        where = f'bearing "{bearing.name}"'
+        yield _doubt("radial displacement in modules", where, 1e-3 * moved[bearing.name] / module)
+        for stiffness in np.unique(np.diagonal(np.asarray(bearing.matrix))[:2]):
+            if stiffness > 0:
+                yield _doubt("radial stiffness", where, stiffness)
+
+
+def _of_bores(shaft: Shaft) -> Iterator[Doubt]:
+    for mounted, thickest in zip(shaft.gears, np.asarray(facts_of(shaft).thickest)):
+        gear, body = mounted.gear, mounted.body_diameter
+        integral = body is not None and float(body) >= 2 * float(gear.root_circle_radius)
+        if gear.bore_diameter is not None and not integral:
+            yield _doubt("shaft diameter over bore", f'gear "{mounted.name}"', thickest / float(gear.bore_diameter))
