@@ -19,7 +19,7 @@ from . import rating, schema, schema_dynamics, schema_shafts, schema_sweep, sche
 from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refused
 from .flanks import check_files
-from .gearbox import support_of
+from .gearbox import layout_of, support_of
 from .gears import both_classes, gear_of, materials_of, pair_of, quality_of, with_quality
 from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
@@ -225,9 +225,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         raise DesignFileError("sweep", "has no effect without [variables]")
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
     sweep = None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection)
-    layout = None
-    if top.layout is not None:
-        layout = with_quality("layout", decode("layout", top.layout, schema_shafts.LayoutSection), quality)
+    layout = layout_of(top.layout, quality)
     if layout is not None and axes.fields:
         raise DesignFileError("misalignment", "has no effect with [layout], which takes that of [[meshes]]")
     if layout is not None and layout.profile is not None:
