@@ -62,7 +62,7 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
             # as numbers, so that what is compiled for one support serves the other
             held = at_stations(request.supports[name], request.profile_torque, stations=size.slices)
             given = coarse(size) if quick else size, held if wanted.shafts else None
-            mesh = jax.block_until_ready(design.mesh(*given))
+            mesh = jax.block_until_ready(design.mesh(*given, rigid=not wanted.shafts))
             stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
             meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
             if wanted.shafts:
@@ -134,4 +134,5 @@ run_layout = StudyCommand(
     layout_tables.tables,
     layout_report.verdict,
     layout_report.failures,
+    takes_shafts=True,
 )

@@ -37,6 +37,7 @@ class StudyCommand(Generic[S]):
         verdict: the results in words.
         failures: a line for everything that is not to be trusted; the command fails where there is one.
         assumptions: of the study, for a report.
+        takes_shafts: whether the study is on the shafts of the file at every load.
     """
 
     name: str
@@ -49,6 +50,7 @@ class StudyCommand(Generic[S]):
     verdict: Callable[[S], Iterable[str]]
     failures: Callable[[S], Iterable[str]]
     assumptions: tuple[str, ...] = ()
+    takes_shafts: bool = False
 
     def __call__(
         self,
@@ -66,20 +68,28 @@ class StudyCommand(Generic[S]):
         with Stages() as stages:
             design = opened(file, cache=cache)
             make = self.plan(design, quick)
+            left_out = "" if self.takes_shafts else design.left_out
             target = output or default_folder(file, self.name, quick=quick)
             with ExitStack() as putting_in_place, result_folder(target) as folder:
                 if figures:
                     import_ahead("matplotlib.pyplot")
                 study, finish = make(target, stages)
                 stages.begin("writing the results")
-                data = {**self.summary(study), "quick": quick}
+                data = {**self.summary(study), "quick": quick, **({"left_out": left_out} if left_out else {})}
                 write_summary(folder / "summary.json", data)
                 self.write(folder, study)
                 files = self.draw(folder, study) if figures else []
                 tables, lines = list(self.tables(study)), list(self.verdict(study))
                 failures = list(self.failures(study))
                 if asked is not None:
-                    found = Found(lines, failures, tables=tables, figures=files, assumptions=self.assumptions)
+                    found = Found(
+                        lines,
+                        failures,
+                        tables=tables,
+                        figures=files,
+                        assumptions=self.assumptions,
+                        left_out=left_out,
+                    )
                     asked.write(folder, design, data, found)
                 putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
                 putting_in_place.callback(finish)
@@ -89,6 +99,8 @@ class StudyCommand(Generic[S]):
         if quick:
             report.say(f"quick run: {self.coarse}, not a result to build on")
         report.say(f"results in {target}{os.sep}, {stages.elapsed:.1f} s")
+        if left_out:
+            report.warn(left_out)
         for line in failures:
             report.warn(line)
         return not failures

@@ -111,7 +111,7 @@ def _axes(given: str | dict | None, width: float):
     if span is not None and span < width:
         raise DesignFileError(f"{key}.bearing_span", f"{span:g} mm must be at least {width:g} mm, the face width")
     if not amounts:
-        raise DesignFileError(key, "missing skew and inclination over a bearing_span, or direct")
+        raise DesignFileError(key, "must have skew or inclination over a bearing_span, or direct")
     return part_of(key, section, Misalignment).build({})
 
 

@@ -1,0 +1,45 @@
+"""What of the shafts of a design file acts in every analysis of the mesh, and what does not, in words."""
+
+from ..contact import Resolution
+from ..numerics import concrete
+from ..shafts import ShaftSupport, TabulatedSupport
+from ..shafts.mesh_support import even_coordinates
+
+
+def over_slices(support: ShaftSupport, slices: int) -> TabulatedSupport:
+    """Shafts that do at every torque what they do at one, as numbers over the slices of a mesh."""
+    y = even_coordinates(support.pair.face_width, slices)
+    return TabulatedSupport(support.pair, support.influence(y), support.gap(y))
+
+
+def left_out(support: ShaftSupport, sizes: Resolution, *, open_gears: bool) -> str:
+    """What a mesh without them lacks, and why; "" where the shafts act.
+
+    Args:
+        support: the mesh on its shafts.
+        sizes: of the mesh.
+        open_gears: numbers of the gears or their model are variables.
+    """
+    why = _why_rigid(support, sizes, open_gears)
+    if not why:
+        return ""
+    parts = ["shafts", "bearings"]
+    if support.gearbox.housing is not None:
+        parts.append("housing")
+    if any(mesh.misalignment.varies_along_face for mesh in support.gearbox.meshes):
+        parts.append("the misalignment of [[meshes]]")
+    named = f"{', '.join(parts[:-1])} and {parts[-1]}"
+    return f"{named} are not part of this analysis, the gears stand rigid ({why}): jaxgear layout takes them"
+
+
+def _why_rigid(support: ShaftSupport, sizes: Resolution, open_gears: bool) -> str:
+    if open_gears:
+        return "the variables change the gears or their model"
+    if len(support.gearbox.meshes) > 1:
+        return "what other meshes do to them belongs to one torque"
+    plays = [bearing.play for shaft in support.gearbox.shafts for bearing in shaft.bearings]
+    if any(play is not None and concrete(play) != 0 for play in plays):
+        return "bearings with clearance belong to one torque"
+    if sizes.slices == 1:
+        return "resolution.slices = 1 shows nothing over the face"
+    return "" if sizes.coupled_slices else "resolution.coupled_slices = false"
