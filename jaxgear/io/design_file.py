@@ -129,7 +129,8 @@ class DesignFile:
         """What of shafts, bearings and housing `mesh` lacks and why, in words; "" for nothing."""
         if self.support is None:
             return ""
-        return held.left_out(self.support, self._resolution, open_gears=self._open_gears)
+        vibrates = self.dynamics is not None
+        return held.left_out(self.support, self._resolution, open_gears=self._open_gears, vibrates=vibrates)
 
     @property
     def _open_gears(self) -> bool:

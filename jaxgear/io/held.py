@@ -12,15 +12,16 @@ def over_slices(support: ShaftSupport, slices: int) -> TabulatedSupport:
     return TabulatedSupport(support.pair, support.influence(y), support.gap(y))
 
 
-def left_out(support: ShaftSupport, sizes: Resolution, *, open_gears: bool) -> str:
+def left_out(support: ShaftSupport, sizes: Resolution, *, open_gears: bool, vibrates: bool) -> str:
     """What a mesh without them lacks, and why; "" where the shafts act.
 
     Args:
         support: the mesh on its shafts.
         sizes: of the mesh.
         open_gears: numbers of the gears or their model are variables.
+        vibrates: the gears vibrate on the mesh.
     """
-    why = _why_rigid(support, sizes, open_gears)
+    why = _why_rigid(support, sizes, open_gears, vibrates)
     if not why:
         return ""
     parts = ["shafts", "bearings"]
@@ -32,7 +33,9 @@ def left_out(support: ShaftSupport, sizes: Resolution, *, open_gears: bool) -> s
     return f"{named} are not part of this analysis, the gears stand rigid ({why}): jaxgear layout takes them"
 
 
-def _why_rigid(support: ShaftSupport, sizes: Resolution, open_gears: bool) -> str:
+def _why_rigid(support: ShaftSupport, sizes: Resolution, open_gears: bool, vibrates: bool) -> str:
+    if vibrates:  # shafts without mass would lower the natural frequencies
+        return "[dynamics] would need the inertia of the shafts too"
     if open_gears:
         return "the variables change the gears or their model"
     if len(support.gearbox.meshes) > 1:
