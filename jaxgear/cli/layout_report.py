@@ -48,8 +48,12 @@ def failures(study: Study) -> Iterator[str]:
             yield f"LOAD OVER THE FACE NOT FOUND: {name}; its numbers are not to be trusted"
         if layout.touches_edges:
             yield f"the largest load is at an edge: {name}"
+    for name, steps in study.contacts.items():
+        for step, found in steps.items():
+            if not np.isfinite(found["face_load_factor"]):
+                yield f"NOT CONVERGED: contact analysis of {step}, {name}; raise resolution.newton_steps"
     for profile in study.profiles.values():
-        failed = profile.table.failures()  # the flank lines alone are among them
+        failed = profile.table.failures()
         if failed:
             total = len(profile.table)
             yield f"NOT CONVERGED: {failed} of {total} profile modifications; raise resolution.newton_steps"
