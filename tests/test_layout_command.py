@@ -213,7 +213,8 @@ misalignment = { direct = 5.0 }
 
 def test_the_bearing_span_of_a_drawing_matters(file):
     """Of half the span twice the deviation is left over the face; by class no span is asked for."""
-    spans = {span: layout_request(load_design(file(replaced("span = 80.0", f"span = {span}")))).tolerances for span in ("40.0", "80.0")}
+    texts = {span: replaced("span = 80.0", f"span = {span}") for span in ("40.0", "80.0")}
+    spans = {span: layout_request(load_design(file(text))).tolerances for span, text in texts.items()}
     for kind in ("maximum", "statistical"):
         near, far = (spans[span][kind].misalignment for span in ("40.0", "80.0"))
         assert float(far) > 1.0 and float(near) == pytest.approx(2 * float(far))
@@ -282,7 +283,7 @@ WRONG = [
     (replaced("quality_class = 6", "quality_class = 14"), "layout.quality_class: 14 must be at least 1 and at most 11"),
     (replaced("stations = 21", "hollo = true"), 'layout.hollo: unknown key, did you mean "hollow"?'),
     (replaced(f"misalignment = {AXES}", "bearing_span = 80.0"), "layout.bearing_span: has no effect without skew or"),
-    (replaced("span = 80.0", "span = 17.0"), "layout.misalignment.bearing_span: 17 mm must be at least 18 mm, the face width"),
+    (replaced("span = 80.0", "span = 17.0"), "misalignment.bearing_span: 17 mm must be at least 18 mm, the face width"),
     (replaced("skew = 15.0", "skew = -1.0"), "layout.misalignment.skew: -1 um must be at least 0 um"),
     (replaced(", bearing_span = 80.0", ""), "layout.misalignment.skew: 15 um needs bearing_span"),
     (
