@@ -13,7 +13,6 @@ from ..layout import (
     FlankLine,
     FlankLineLayout,
     ProfileLayout,
-    Stations,
     at_stations,
     face_load_over_torques,
     flank_line_contact,
@@ -67,7 +66,7 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
             meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
             if wanted.shafts:
                 contacts[name] = _contacts(request, mesh, layouts[name], profiles[name])
-                factors[name] = _factors(held, layouts[name])
+                factors[name] = _factors(request, name, layouts[name], stations=size.slices)
     return Study(design, request, layouts, over_torque, meshes, contacts, factors, profiles)
 
 
@@ -96,12 +95,13 @@ def _contacts(
     return found
 
 
-def _factors(held: Stations, layout: FlankLineLayout) -> dict[str, float]:
+def _factors(request: LayoutRequest, name: str, layout: FlankLineLayout, *, stations: int) -> dict[str, float]:
     """K_Hbeta of the one-dimensional analysis, on as many stations as the contact has slices."""
     found = {}
+    face = at_stations(request.supports[name], request.profile_torque, stations=stations)
     for step, (pinion, wheel) in flank_lines(layout).items():
         on = {"pinion": pinion.modification, "wheel": wheel.modification}
-        load = annex_e(held, torque=held.torque, stations=held.count, **on)
+        load = annex_e(face, torque=face.torque, stations=stations, **on)
         found[step] = float(load.face_load_factor)
     return found
 

@@ -139,7 +139,7 @@ class DesignFile:
     def _held(self, sizes: Resolution) -> AbstractSupport | None:
         if self.support is None or self.left_out:
             return self._support
-        return held.over_slices(self.support, sizes.slices)
+        return held.over_slices(self.support, sizes)
 
     def mesh(
         self, resolution: Resolution | None = None, support: AbstractSupport | None = None, *, rigid: bool = False

@@ -1,14 +1,14 @@
 """What of the shafts of a design file acts in every analysis of the mesh, and what does not, in words."""
 
 from ..contact import Resolution
-from ..numerics import concrete
+from ..contact.kinematics import kinematics
+from ..numerics import concrete, real
 from ..shafts import ShaftSupport, TabulatedSupport
-from ..shafts.mesh_support import even_coordinates
 
 
-def over_slices(support: ShaftSupport, slices: int) -> TabulatedSupport:
+def over_slices(support: ShaftSupport, sizes: Resolution) -> TabulatedSupport:
     """Shafts that do at every torque what they do at one, as numbers over the slices of a mesh."""
-    y = even_coordinates(support.pair.face_width, slices)
+    y = kinematics(support.pair, real(0.0), sizes, "strain").face_coordinate
     return TabulatedSupport(support.pair, support.influence(y), support.gap(y))
 
 
