@@ -102,7 +102,8 @@ def flank_lines():
             support = shafts.support(replace(gearbox(), housing=seats), number)
             pair = support.pair
             tolerances = {
-                kind: layout.flank_line_tolerance(pair, CLASS, SPAN, kind=kind) for kind in ("statistical", "maximum")
+                kind: layout.flank_line_tolerance(pair, CLASS, "class", kind=kind)
+                for kind in ("statistical", "maximum")
             }
             further = layout.helix_slope_limits(pair, CLASS)
             lines = layout.layout_flank_lines(support, tolerances, gear="pinion", further=further)

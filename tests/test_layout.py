@@ -18,17 +18,19 @@ from jaxgear.layout import (
     at_torque,
     crowning_off_the_edges,
     damage,
+    face_load_over_torques,
     flank_line_tolerance,
     helix_slope_limits,
     layout_flank_lines,
     level_load,
+    lives_in_cases,
     longest_life,
     plausibility,
     tolerance_cases,
     without_housing,
 )
 from jaxgear.metrics.root_stress import root_factors
-from jaxgear.shafts import Housing, Misalignment, RigidSupport, annex_e, support
+from jaxgear.shafts import Housing, Misalignment, RigidSupport, annex_e, axis_tolerance, support
 from jaxgear.tolerance import ToleranceClass
 
 PAIR = jg.GearPair(PINION, WHEEL)
@@ -117,14 +119,32 @@ def test_tolerances_are_those_of_the_standards():
     total = max(float(one.helix_total) for one in classes)
     angle = np.deg2rad(20.0)
     axes = 0.5 * total * np.array([np.cos(angle), 2 * np.sin(angle)])  # both grow with L / b, and act over b / L
-    most = flank_line_tolerance(PAIR, (6, 7), 120.0, kind="maximum")
-    usual = flank_line_tolerance(PAIR, (6, 7), 240.0)
+    most = flank_line_tolerance(PAIR, (6, 7), "class", kind="maximum")
+    usual = flank_line_tolerance(PAIR, (6, 7), "class")
     np.testing.assert_allclose([most.helix_slope, most.misalignment], [sum(slopes), axes.sum()], rtol=1e-12)
     np.testing.assert_allclose(
         [usual.helix_slope, usual.misalignment], [np.hypot(*slopes), np.hypot(*axes)], rtol=1e-12
     )
     assert float(flank_line_tolerance(PAIR, 6).misalignment) == 0.0
     np.testing.assert_allclose(helix_slope_limits(PAIR, (6, 7)), slopes, rtol=1e-12)
+
+
+def test_limits_of_a_drawing_count_over_their_bearing_span():
+    """Equation 2 of the study, scaled from the span to the face: of twice the span half of them is left."""
+    angle = np.deg2rad(20.0)
+    for span in (90.0, 180.0):
+        axes = Misalignment(skew=20.0, inclination=30.0, bearing_span=span, direct=2.0)
+        parts = np.array([2.0, 20.0 * np.cos(angle) * WIDTH / span, 30.0 * np.sin(angle) * WIDTH / span])
+        most, usual = (flank_line_tolerance(PAIR, 6, axes, kind=kind) for kind in ("maximum", "statistical"))
+        np.testing.assert_allclose(most.misalignment, parts.sum(), rtol=1e-12)
+        np.testing.assert_allclose(usual.misalignment, np.sqrt((parts**2).sum()), rtol=1e-12)
+    direct = flank_line_tolerance(PAIR, 6, Misalignment(direct=7.0))
+    np.testing.assert_allclose(direct.misalignment, 7.0)
+    # those of the standard by the same way, over any span
+    limit = max(float(ToleranceClass.of(gear, 6).helix_total) for gear in (PINION, WHEEL))
+    given = flank_line_tolerance(PAIR, 6, axis_tolerance(limit, WIDTH, 77.0), kind="maximum")
+    by_class = flank_line_tolerance(PAIR, 6, "class", kind="maximum")
+    np.testing.assert_allclose(given.misalignment, by_class.misalignment, rtol=1e-12)
 
 
 @pytest.mark.parametrize("own", [24.0, 60.0])
@@ -137,7 +157,7 @@ def test_limits_of_a_wider_gear_count_over_its_own_face(own):
     for each, name, limit in zip(further, ("pinion", "wheel"), limits):
         ground = FlankLine(0.0, each).on(pair, name)
         np.testing.assert_allclose(ground.crowning, limit.helix_slope, rtol=1e-12)
-    found = flank_line_tolerance(pair, 6, 120.0, kind="maximum")
+    found = flank_line_tolerance(pair, 6, "class", kind="maximum")
     slopes = np.array([limit.helix_slope for limit in limits])
     np.testing.assert_allclose(found.helix_slope, slopes[0] * WIDTH / own + slopes[1], rtol=1e-12)
     # f_Sigma_beta / L = 0.5 F_beta / b of the gear whose helix deviates more per width, here the narrow one
@@ -178,7 +198,7 @@ def test_least_crowning_brings_the_peak_just_inside():
 
 @pytest.fixture(scope="module")
 def layout():
-    several = {kind: flank_line_tolerance(SUPPORT.pair, 6, 130.0, kind=kind) for kind in ("statistical", "maximum")}
+    several = {kind: flank_line_tolerance(SUPPORT.pair, 6, "class", kind=kind) for kind in ("statistical", "maximum")}
     return layout_flank_lines(
         SUPPORT, several, further=helix_slope_limits(SUPPORT.pair, 6), gear="pinion", stations=STATIONS
     )
@@ -326,6 +346,31 @@ def test_layout_for_a_duty_cycle_tells_relative_lives():
     assert float(found.torque) == 180.0
     before, level, after = found.relative_life
     assert float(level) == 1.0 and float(before) < 0.9 and float(after) < 1.0
+    # further crowning costs life where nothing deviates, and saves it in the worst case
+    np.testing.assert_allclose(found.lives["tolerance"][:, 0], [one.life for one in found.damage[1:]], rtol=1e-9)
+    uncrowned, crowned = found.worst_relative_life("tolerance")
+    assert float(uncrowned) < float(crowned) < float(after)
+
+
+def test_lives_in_cases_are_those_of_misaligned_axes():
+    """A deviation of the slope is a misalignment of the axes; of a rigid pair both signs cost the same."""
+    tolerance = FlankLineTolerance(4.0, 2.0)
+    found = lives_in_cases(rigid(), DUTY, ENDURANCE, tolerance, stations=STATIONS)
+    each = [damage(rigid(slope), DUTY, ENDURANCE, stations=STATIONS).life for slope in (0.0, 6.0, 2.0, -2.0, -6.0)]
+    np.testing.assert_allclose(found, each, rtol=1e-9)
+    np.testing.assert_allclose(found[1:3], found[4:2:-1], rtol=1e-9)
+    assert float(found[1]) < float(found[2]) < float(found[0])
+
+
+def test_face_load_over_torques_is_that_of_each_torque():
+    """A flank line levels one torque; without any, linear shafts have the same factor at all."""
+    torques = np.array([60.0, 120.0, 240.0])
+    bare = face_load_over_torques(SUPPORT, torques, stations=STATIONS)
+    each = [annex_e(at_torque(SUPPORT, torque), stations=STATIONS).face_load_factor for torque in torques]
+    np.testing.assert_allclose(bare, each, rtol=1e-9)
+    line = level_load(SUPPORT, torques[1], stations=STATIONS)
+    low, level, high = face_load_over_torques(SUPPORT, torques, wheel=line, stations=STATIONS)
+    assert float(level) < 1.001 < 1.05 < min(float(low), float(high))
 
 
 def test_housing_can_be_left_out():
@@ -357,6 +402,15 @@ def test_hours_are_weights_with_a_duration():
         (lambda: at_torque(support(two_stages_idle(), 0), 5.0), "at_torque: the couplings bring no torque to the mesh"),
         (lambda: FlankLineTolerance(-1.0), "FlankLineTolerance: helix_slope = -1 um must be at least 0 um"),
         (lambda: flank_line_tolerance(PAIR, 6, kind="usual"), "flank_line_tolerance: kind = 'usual' must be"),
+        (lambda: flank_line_tolerance(PAIR, 6, 80.0), "flank_line_tolerance: axes = 80.0 must be a Misalignment"),
+        (
+            lambda: flank_line_tolerance(PAIR, 6, Misalignment(skew=3.0, bearing_span=10.0)),
+            "flank_line_tolerance: bearing_span = 10 mm must be at least the face width, 18 mm",
+        ),
+        (
+            lambda: flank_line_tolerance(PAIR, 6, Misalignment(direct=-3.0)),
+            "flank_line_tolerance: direct = -3 um must be at least 0 um",
+        ),
         (lambda: flank_line_tolerance(PAIR, (5, 6, 7)), "flank_line_tolerance: quality_class has 3 entries"),
         (
             lambda: flank_line_tolerance(PAIR, 14),

@@ -1,5 +1,6 @@
 """The command `jaxgear layout` and its tables: what it writes and says, and one line for what is wrong."""
 
+import csv
 import json
 
 import numpy as np
@@ -9,7 +10,7 @@ from test_cli import call
 
 from jaxgear.io import layout_request, load_design
 from jaxgear.io.folder import RESULT_FILES
-from jaxgear.layout import layout_flank_lines
+from jaxgear.layout import at_stations, layout_flank_lines
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -51,13 +52,14 @@ gears = [{ name = "wheel", position = 45.0, body_diameter = 70.0 }]
 couplings = [{ position = 190.0 }]
 [layout]
 quality_class = 6
-bearing_span = 80.0
+misalignment = { skew = 15.0, inclination = 30.0, bearing_span = 80.0 }
 stations = 21
 """
 PROFILE = """
 [layout.profile]
 pinion_amounts = [10.0, 20.0]
 """
+AXES = "{ skew = 15.0, inclination = 30.0, bearing_span = 80.0 }"
 LIFE = """
 torques = [60.0, 150.0]
 hours = [1000.0, 50.0]
@@ -77,6 +79,11 @@ B.x, 0, 1e-3, 0, 0
 C.x, 0, 0, 2e-3, 0
 D.x, 0, 0, 0, 8e-3
 """
+
+
+def replaced(old, new):
+    assert old in FILE
+    return FILE.replace(old, new, 1)
 
 
 @pytest.fixture
@@ -100,7 +107,8 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     )
     assert "please check" in (folder / "report.html").read_text()
     names = {entry.name for entry in folder.iterdir()}
-    assert names == {"summary.json", "report.html", "tolerance_cases.png", "face_load_factors.png"} <= RESULT_FILES
+    figures = {"tolerance_cases.png", "face_load_factors.png", "face_load_over_torque.png", "shaft_deflection.png"}
+    assert names == {"summary.json", "report.html", "flanks.csv", *figures} <= RESULT_FILES
     check_report(folder, path, "layout", path, "--output", folder, "--report")
     found = json.loads((folder / "summary.json").read_text())
     housed, rigid = found["layouts"]["housing"], found["layouts"]["rigid seats"]
@@ -114,8 +122,22 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     seats = {name: np.abs(each["seat_um"]).max() for name, each in found["bearings"]["housing"].items()}
     assert max(seats, key=seats.get) in ("A", "D")
     assert not any(np.any(each["seat_um"]) for each in found["bearings"]["rigid seats"].values())
-    before, level, _ = housed["relative_life"]
+    before, level, after = housed["relative_life"]
     assert housed["torque_Nm"] == 150.0 and before < 0.9 and level == 1.0
+    uncrowned, crowned = housed["worst_relative_life"]["maximum"]
+    assert uncrowned < crowned < after and "worst case of maximum deviations" in done.out
+    assert min(housed["step_2_cases"]["maximum"]["life_h"]) == pytest.approx(crowned * housed["life_h"][1])
+    factor = housed["face_load_factor"]["unmodified"]
+    assert 1 < housed["root_face_load_factor"]["unmodified"] < factor and "K_Fbeta, worst case" in done.out
+    over = found["face_load_over_torque"]
+    assert {60.0, 75.0, 150.0, 300.0} <= set(over["torque_Nm"])  # of the duty cycle and of the range of the file
+    assert over["unmodified"] == pytest.approx([factor] * len(over["torque_Nm"]))
+    with (folder / "flanks.csv").open() as rows:
+        flanks = {row["design"]: row for row in csv.DictReader(rows) if row["gear"] == "wheel"}
+    # the last row of a flank is its tip at the end of the face
+    end = housed["wheel"]["slope_um"] / 2 + housed["wheel"]["crowning_um"]
+    assert float(flanks["flank lines"]["modification_um"]) == pytest.approx(end, abs=1e-5)
+    assert float(flanks["step 1"]["modification_um"]) < end
     assert "life relative to the even load" in done.out and "life after step 1 [h]" in done.out
     assert found["profiles"] == {}
     for one in (housed, rigid):
@@ -130,7 +152,8 @@ def test_profiles_follow_the_flank_lines(file, tmp_path):
     done = call("layout", str(file(FILE + PROFILE)), "--output", str(folder), "--quick")
     assert done.code == 0, done.err
     names = {entry.name for entry in folder.iterdir()}
-    figures = {"tolerance_cases.png", "face_load_factors.png", "radar.png"}
+    figures = {"tolerance_cases.png", "face_load_factors.png", "face_load_over_torque.png", "shaft_deflection.png"}
+    figures |= {"radar.png"}
     assert names == {"summary.json", "flanks.csv", "profiles.csv", *figures} and names <= RESULT_FILES
     found = json.loads((folder / "summary.json").read_text())
     assert found["quick"] and found["layouts"]["housing"]["face_load_factor"]["step_1"] < 1.01
@@ -138,6 +161,15 @@ def test_profiles_follow_the_flank_lines(file, tmp_path):
     assert profile["best"]["ppte_um"] == pytest.approx(other["best"]["ppte_um"], rel=0.05)  # both are level
     assert profile["variants"] == 5 and profile["torque_Nm"] == pytest.approx(135.0)
     assert profile["best"]["ppte_um"] < profile["unmodified"]["ppte_um"]
+    contact = found["contact"]["housing"]
+    bare, level, crowned = (contact[step]["face_load_factor"] for step in ("unmodified", "step_1", "step_2"))
+    assert level < 1.1 < 1.3 < min(bare, crowned)
+    assert contact["step_2"]["edge_load_factor"] < 1.0 < contact["unmodified"]["edge_load_factor"]
+    assert 1 < contact["unmodified"]["root_face_load_factor"] < bare
+    assert contact["annex_e_face_load_factor"]["unmodified"] == pytest.approx(bare, rel=0.25)
+    with (folder / "profiles.csv").open() as rows:
+        head = rows.readline()
+    assert all(name in head for name in ("face_load_factor", "root_face_load_factor", "edge_load_factor"))
     kinds = [one["type"] for one in found["designs"]["layout"]["wheel_modification"]]
     assert kinds == ["lead_slope", "lead_crowning", "tip_relief"]
 
@@ -188,20 +220,87 @@ misalignment = { direct = 5.0 }
     assert float(found.gearbox.meshes[1].misalignment.direct) == 5.0
 
 
-def replaced(old, new):
-    assert old in FILE
-    return FILE.replace(old, new, 1)
+def test_the_bearing_span_of_a_drawing_matters(file):
+    """Of half the span twice the deviation is left over the face; by class no span is asked for."""
+    texts = {span: replaced("span = 80.0", f"span = {span}") for span in ("40.0", "80.0")}
+    spans = {span: layout_request(load_design(file(text))).tolerances for span, text in texts.items()}
+    for kind in ("maximum", "statistical"):
+        near, far = (spans[span][kind].misalignment for span in ("40.0", "80.0"))
+        assert float(far) > 1.0 and float(near) == pytest.approx(2 * float(far))
+    given = {}
+    for text in ('"class"', "{ direct = 5.0 }"):
+        request = layout_request(load_design(file(replaced(AXES, text))))
+        given[text] = float(request.tolerances["maximum"].misalignment)
+    assert given["{ direct = 5.0 }"] == pytest.approx(5.0) and given['"class"'] > 5.0
+    parallel = layout_request(load_design(file(replaced(f"misalignment = {AXES}\n", ""))))
+    assert float(parallel.tolerances["maximum"].misalignment) == 0.0
+
+
+def test_an_analysis_stands_on_the_shafts_of_the_file(file):
+    """What they do holds at every torque: the mesh of the file is that of its gearbox, at any."""
+    design = load_design(file(FILE))
+    mesh = design.mesh()
+    assert design.left_out == "" and mesh.support_torque is None
+    own = layout_request(design).supports["housing"]
+    for torque in (75.0, 150.0):
+        held = at_stations(own, torque, stations=4)
+        y = mesh.face_coordinate
+        np.testing.assert_allclose(mesh.support.influence(y), held.influence(y), rtol=1e-9)
+        np.testing.assert_allclose(mesh.support.gap(y), held.gap(y), atol=1e-12)
+    assert design.mesh(rigid=True).support is None
+    # shafts bend where no number of slices is said either
+    assert load_design(file(replaced("slices = 4\n", ""))).resolution().slices == 11
+
+
+PLAY = "radial = 250.0, clearance = 10.0"
+RIGID = [
+    (replaced("slices = 4", "slices = 1"), "resolution.slices = 1"),
+    (replaced("slices = 4", "slices = 4\ncoupled_slices = false"), "coupled_slices = false"),
+    (replaced("radial = 250.0", PLAY), "bearings with clearance"),
+    (FILE + "[dynamics]\nspeeds = [100.0, 900.0]\n", "[dynamics]"),
+]
+
+
+@pytest.mark.parametrize("text, why", RIGID)
+def test_what_an_analysis_leaves_out_has_a_reason(file, text, why):
+    line = load_design(file(text)).left_out
+    assert line.startswith("shafts, bearings and housing are not part of this analysis, the gears stand rigid")
+    assert why in line and line.endswith("jaxgear layout takes them")
+
+
+def test_an_analysis_says_what_it_leaves_out(file, tmp_path):
+    """On stderr, in the summary and in the report; nothing of it where the file has no shafts."""
+    axes = '[[meshes]]\npinion = "pinion"\nwheel = "wheel"\nmisalignment = { direct = 5.0 }\n[layout]'
+    text = replaced("slices = 4", "slices = 1").replace("[layout]", axes)
+    folder = tmp_path / "out"
+    done = call("analyze", str(file(text)), "--output", str(folder), "--report", "--no-figures")
+    assert done.code == 0
+    line = load_design(file(text)).left_out
+    assert line.startswith("shafts, bearings, housing and the misalignment of [[meshes]] are not part")
+    assert line in done.err and json.loads((folder / "summary.json").read_text())["left_out"] == line
+    report = (folder / "report.html").read_text("utf-8")
+    assert line[1:] in report and "Shafts, bearings and housing are those of the design file" not in report
 
 
 WRONG = [
     (
-        replaced("[layout]\nquality_class = 6\nbearing_span = 80.0\nstations = 21\n", ""),
+        FILE[: FILE.index("[layout]")],
         "shafts: has no effect without [layout]",
     ),
     (FILE[: FILE.index("[housing]")] + "[layout]\nquality_class = 6\n", "layout: has no effect without [[shafts]]"),
     (replaced("quality_class = 6\n", ""), "layout.quality_class: missing, this key is required"),
     (replaced("quality_class = 6", "quality_class = 14"), "layout.quality_class: 14 must be at least 1 and at most 11"),
-    (replaced("bearing_span", "bearing_gap"), 'layout.bearing_gap: unknown key, did you mean "bearing_span"?'),
+    (replaced("stations = 21", "hollo = true"), 'layout.hollo: unknown key, did you mean "hollow"?'),
+    (replaced(f"misalignment = {AXES}", "bearing_span = 80.0"), "layout.bearing_span: has no effect without skew or"),
+    (replaced("span = 80.0", "span = 17.0"), "misalignment.bearing_span: 17 mm must be at least 18 mm, the face width"),
+    (replaced("skew = 15.0", "skew = -1.0"), "layout.misalignment.skew: -1 um must be at least 0 um"),
+    (replaced(", bearing_span = 80.0", ""), "layout.misalignment.skew: 15 um needs bearing_span"),
+    (
+        replaced("skew = 15.0, inclination = 30.0", "direct = 3.0"),
+        "layout.misalignment.bearing_span: has no effect without skew or inclination",
+    ),
+    (replaced(AXES, "{}"), "layout.misalignment: must have skew or inclination over a bearing_span, or direct"),
+    (replaced(AXES, '"clas"'), 'layout.misalignment: "clas" is not known, did you mean "class"?'),
     (
         replaced("position = 140.0, radial", "position = 240.0, radial"),
         'shafts[0]: Shaft "in": bearing "B" at 240 mm must lie within',

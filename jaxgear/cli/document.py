@@ -49,6 +49,7 @@ _INPUTS = (
     "model",
     "resolution",
     "quick",
+    "left_out",
 )
 _IDENTITY = ("title", "design_file", "versions", "geometry")
 
@@ -65,6 +66,7 @@ class Found:
         figures: files of its pictures.
         pages: further parts.
         assumptions: of this command, beside those of every contact analysis.
+        left_out: what of the file is not part of it.
     """
 
     lines: Sequence[str]
@@ -74,6 +76,7 @@ class Found:
     figures: Sequence[Path] = ()
     pages: Sequence[Section] = ()
     assumptions: Sequence[str] = ()
+    left_out: str = ""
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,7 @@ class Document:
             *found.pages,
             *_figures(found.figures),
             _validity(found, data),
-            _inputs(design, data, found.assumptions),
+            _inputs(design, data, found),
             Section("Geometry", [_GEOMETRY_NOTE], tables=geometry_tables(data["geometry"]), new_page=True),
             *_all_numbers(data),
             Section(
@@ -196,10 +199,11 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
     return Section("Convergence and validity", lines, found.warnings, found.doubts or (), tables, new_page=True)
 
 
-def _inputs(design: DesignFile, data: Mapping[str, Any], further: Sequence[str]) -> Section:
+def _inputs(design: DesignFile, data: Mapping[str, Any], found: Found) -> Section:
     """What was assumed."""
     given = {name: data[name] for name in _INPUTS if data.get(name) is not None}
-    points = [*_ASSUMED, *further, _SUPPORTED if design.support is not None else _RIGID]
+    held = f"{found.left_out[:1].upper()}{found.left_out[1:]}." if found.left_out else _SUPPORTED
+    points = [*_ASSUMED, *found.assumptions, _RIGID if design.support is None else held]
     if design.resolution().slices == 1:
         points.append(_EVEN)
     return Section("Inputs and assumptions", (), (), points, [Table(("", "value"), tuple(numbers(given)), "inputs")])

@@ -3,8 +3,10 @@
 from pathlib import Path
 
 import jax
+import numpy as np
 
 from ..contact import Mesh, Resolution
+from ..contact.kinematics import kinematics
 from ..io import DesignFile, LayoutRequest, layout_request, write_flanks
 from ..io.schema_shafts import ProfileSection
 from ..layout import (
@@ -13,13 +15,16 @@ from ..layout import (
     ProfileLayout,
     at_stations,
     at_torque,
+    face_load_over_torques,
+    flank_line_contact,
     layout_flank_lines,
     plausibility,
     vary_profiles,
 )
-from ..shafts import AbstractSupport, ShaftSupport
-from . import layout_report
-from .layout_report import Study
+from ..numerics import real
+from ..shafts import AbstractSupport, ShaftSupport, annex_e
+from . import layout_figures, layout_report, layout_tables
+from .layout_study import STEPS, Study, designs, flank_lines
 from .progress import Stages
 from .run import coarse
 from .study_command import Make, StudyCommand
@@ -31,8 +36,11 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
 
 
 def _write(folder: Path, study: Study) -> None:
+    design = study.design
+    # the flanks need no mesh, which only step 3 has
+    moving = kinematics(design.pair(), real(0.0), design.resolution(), "strain")
+    write_flanks(folder / "flanks.csv", moving, designs(study))
     if study.profile is not None:
-        write_flanks(folder / "flanks.csv", next(iter(study.meshes.values())), layout_report.designs(study))
         study.profile.table.to_csv(folder / "profiles.csv")
 
 
@@ -41,7 +49,11 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
     for name, support in request.supports.items():
         stages.begin(f"flank lines, {name}")
         layouts[name] = layout_flank_lines(support, request.tolerances, **request.options)
+    stages.begin("face load factor over the torque")
+    over_torque = _over_torque(request, next(iter(layouts.values())))
     meshes: dict[str, Mesh] = {}
+    contacts: dict[str, dict[str, dict[str, float]]] = {}
+    factors: dict[str, dict[str, float]] = {}
     profiles: dict[str, ProfileLayout] = {}
     wanted = request.profile
     if wanted is not None:
@@ -50,11 +62,50 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
             size = design.resolution()
             held = _held(request.supports[name], request.profile_torque, size)
             given = coarse(size) if quick else size, held if wanted.shafts else None
-            mesh = jax.block_until_ready(design.mesh(*given))
+            mesh = jax.block_until_ready(design.mesh(*given, rigid=not wanted.shafts))
             stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
             meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
+            if wanted.shafts:
+                contacts[name] = _contacts(request, mesh, layouts[name], profiles[name])
+                factors[name] = _factors(request, name, layouts[name], stations=size.slices)
     unusual = {name: plausibility(layout, request.supports[name]) for name, layout in layouts.items()}
-    return Study(design, request, layouts, meshes, profiles, unusual)
+    return Study(design, request, layouts, over_torque, meshes, contacts, factors, profiles, unusual)
+
+
+def _over_torque(request: LayoutRequest, layout: FlankLineLayout) -> dict[str, np.ndarray]:
+    """K_Hbeta of the design over the torque after every step."""
+    support, stations = next(iter(request.supports.values())), request.options["stations"]
+    found = {}
+    for step, (pinion, wheel) in flank_lines(layout).items():
+        given = {"pinion": pinion, "wheel": wheel, "stations": stations}
+        found[step] = np.asarray(face_load_over_torques(support, request.torques, **given))
+    return found
+
+
+def _contacts(
+    request: LayoutRequest, mesh: Mesh, layout: FlankLineLayout, profile: ProfileLayout
+) -> dict[str, dict[str, float]]:
+    """What the contact says of every step."""
+    first, second, last = STEPS
+    found = {}
+    for step in (first, second):
+        lines = flank_lines(layout)[step]
+        modifications = lines[0].modification, lines[1].modification
+        found[step] = flank_line_contact(mesh, request.profile_torque, modifications, kind=profile.kind)
+    for step, row in ((last, 0), ("step 3", profile.best)):
+        found[step] = {name: float(profile.table.column(name)[row]) for name in profile.table.results}
+    return found
+
+
+def _factors(request: LayoutRequest, name: str, layout: FlankLineLayout, *, stations: int) -> dict[str, float]:
+    """K_Hbeta of the one-dimensional analysis, on as many stations as the contact has slices."""
+    found = {}
+    face = at_stations(request.supports[name], request.profile_torque, stations=stations)
+    for step, (pinion, wheel) in flank_lines(layout).items():
+        on = {"pinion": pinion.modification, "wheel": wheel.modification}
+        load = annex_e(face, torque=face.torque, stations=stations, **on)
+        found[step] = float(load.face_load_factor)
+    return found
 
 
 def _held(support: ShaftSupport, torque: float, size: Resolution) -> AbstractSupport:
@@ -88,9 +139,10 @@ run_layout = StudyCommand(
     _plan,
     layout_report.summary,
     _write,
-    layout_report.write_figures,
-    layout_report.tables,
+    layout_figures.write_figures,
+    layout_tables.tables,
     layout_report.verdict,
     layout_report.failures,
     doubts=layout_report.doubts,
+    takes_shafts=True,
 )

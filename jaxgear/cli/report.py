@@ -104,6 +104,7 @@ def doubts(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, 
         options |= {"pinion": design.pinion, "wheel": design.wheel}
         options |= {"oil_friction": design.metrics.get("friction_coefficient")}
         options |= {"bulk_temperature": design.metrics.get("bulk_temperature_degC")}
+        options["given_way"] = float(np.mean(mesh.given_way(design.cycle.line_load)))
         options["verified"] = design.verified and design.verified.ppte
         found[name] = plausibility(design.cycle, **options)
     return found

@@ -152,6 +152,8 @@ class Run:
         if self._optimum is not None:
             data["optimum"] = optimum_report.summary(self.design, self._optimum, self._projection)
         data["quick"] = self._quick
+        if self.design.left_out:
+            data["left_out"] = self.design.left_out
         write_summary(self._folder / "summary.json", data)
         write_flanks(self._folder / "flanks.csv", self._mesh, report.flanks(self._evaluations))
         if self._front is not None:
@@ -159,7 +161,8 @@ class Run:
         files = self._draw() if figures else []
         if document is not None:
             said = list(self._lines()), self._failures(), list(self._doubt_lines()), [self._table()]
-            found = Found(*said, files, manufactured.pages(self.design, self._evaluations))
+            pages = manufactured.pages(self.design, self._evaluations)
+            found = Found(*said, files, pages, left_out=self.design.left_out)
             document.write(self._folder, self.design, data, found)
 
     def _draw(self) -> list[Path]:
@@ -176,7 +179,7 @@ class Run:
         report.say(*self._lines(), *self._doubt_lines())
         report.say(f"results in {self._target}{os.sep}, {self._stages.elapsed:.1f} s")
         failures = self._failures()
-        for line in failures:
+        for line in [self.design.left_out] * bool(self.design.left_out) + failures:
             report.warn(line)
         return not failures
 

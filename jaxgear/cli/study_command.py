@@ -38,6 +38,7 @@ class StudyCommand(Generic[S]):
         failures: a line for everything that is not to be trusted; the command fails where there is one.
         assumptions: of the study, for a report.
         doubts: a line for everything that is not usual; None where nobody looks.
+        takes_shafts: whether the study is on the shafts of the file at every load.
     """
 
     name: str
@@ -51,6 +52,7 @@ class StudyCommand(Generic[S]):
     failures: Callable[[S], Iterable[str]]
     assumptions: tuple[str, ...] = ()
     doubts: Callable[[S], Iterable[str]] | None = None
+    takes_shafts: bool = False
 
     def __call__(
         self,
@@ -68,13 +70,14 @@ class StudyCommand(Generic[S]):
         with Stages() as stages:
             design = opened(file, cache=cache)
             make = self.plan(design, quick)
+            left_out = "" if self.takes_shafts else design.left_out
             target = output or default_folder(file, self.name, quick=quick)
             with ExitStack() as putting_in_place, result_folder(target) as folder:
                 if figures:
                     import_ahead("matplotlib.pyplot")
                 study, finish = make(target, stages)
                 stages.begin("writing the results")
-                data = {**self.summary(study), "quick": quick}
+                data = {**self.summary(study), "quick": quick, **({"left_out": left_out} if left_out else {})}
                 write_summary(folder / "summary.json", data)
                 self.write(folder, study)
                 files = self.draw(folder, study) if figures else []
@@ -82,7 +85,15 @@ class StudyCommand(Generic[S]):
                 failures = list(self.failures(study))
                 doubts = None if self.doubts is None else list(self.doubts(study))
                 if asked is not None:
-                    found = Found(lines, failures, doubts, tables=tables, figures=files, assumptions=self.assumptions)
+                    found = Found(
+                        lines,
+                        failures,
+                        doubts,
+                        tables=tables,
+                        figures=files,
+                        assumptions=self.assumptions,
+                        left_out=left_out,
+                    )
                     asked.write(folder, design, data, found)
                 putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
                 putting_in_place.callback(finish)
@@ -92,6 +103,8 @@ class StudyCommand(Generic[S]):
         if quick:
             report.say(f"quick run: {self.coarse}, not a result to build on")
         report.say(f"results in {target}{os.sep}, {stages.elapsed:.1f} s")
+        if left_out:
+            report.warn(left_out)
         for line in failures:
             report.warn(line)
         return not failures

@@ -72,7 +72,10 @@ def run_sweep(
             target, asked, design, table, chosen, closer, files, request.results, size=size, quick=quick
         )
     interrupt.note(f"all results are in {target}{os.sep}")
-    return _show(table, chosen, target, meter, quick=quick)
+    fine = _show(table, chosen, target, meter, quick=quick)
+    if design.left_out:
+        report.warn(design.left_out)
+    return fine
 
 
 def _check(target: Path) -> None:

@@ -72,9 +72,11 @@ def write(
         "variables": {_with_unit(design, name): limits for name, limits in design.bounds.items()},
         "geometry": geometry(design.pair()),
         "versions": release,
+        **({"left_out": design.left_out} if design.left_out else {}),
     }
     pictures = [*chosen.figures, *figures]
-    found = Found(lines, warnings, chosen.doubts, chosen.tables, pictures, pages if len(best) else ())
+    shown = pages if len(best) else ()
+    found = Found(lines, warnings, chosen.doubts, chosen.tables, pictures, shown, left_out=design.left_out)
     asked.write(folder, design, data, found)
 
 

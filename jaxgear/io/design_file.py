@@ -15,12 +15,13 @@ from ..metrics import Lubricant, Strength
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
-from . import rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, template
+from . import held, rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, template
 from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refused
 from .flanks import check_files
-from .gearbox import support_of
+from .gearbox import layout_of, support_of
 from .gears import both_classes, gear_of, materials_of, pair_of, quality_of, with_quality
+from .sizes import resolution_of
 from .stiffness import FINITE_ELEMENTS, model_part, with_tables
 from .toml import decode, read
 from .variables import increasing, read_variables
@@ -31,9 +32,6 @@ _DEFLECTIONS = 2.0
 _DYNAMIC_DEFLECTIONS = 5.5
 # Where gears are left open, at least as many as `prepare` takes for traced gears: contact ratios up to 3.
 _OPEN_PAIRS = 4
-# Slices where a modification varies along the face: the mean of a parabola over the middles of n slices is 1 / n^2 too
-# small, so that 11 show a lead crowning to 1 %.
-_SLICES = 11
 # Torques of interest where the file names none, relative to the design torque.
 _TORQUE_RANGE = (0.5, 2.0)
 
@@ -126,32 +124,53 @@ class DesignFile:
             pairs = max(pairs, _OPEN_PAIRS)
         return replace(self._resolution, pairs=pairs)
 
-    def mesh(self, resolution: Resolution | None = None, support: AbstractSupport | None = None) -> Mesh:
+    @property
+    def left_out(self) -> str:
+        """What of shafts, bearings and housing `mesh` lacks and why, in words; "" for nothing."""
+        if self.support is None:
+            return ""
+        vibrates = self.dynamics is not None
+        return held.left_out(self.support, self._resolution, open_gears=self._open_gears, vibrates=vibrates)
+
+    @property
+    def _open_gears(self) -> bool:
+        return any(part.free() for part in (self._pair, self._model, self._misalignment))
+
+    def _held(self, sizes: Resolution) -> AbstractSupport | None:
+        if self.support is None or self.left_out:
+            return self._support
+        return held.over_slices(self.support, sizes)
+
+    def mesh(
+        self, resolution: Resolution | None = None, support: AbstractSupport | None = None, *, rigid: bool = False
+    ) -> Mesh:
         """The prepared mesh.
 
         Args:
             resolution: array sizes in place of the file's.
-            support: what holds the gears; None for rigid shafts with the file's misalignment.
+            support: what holds the gears; None for the file's shafts, where they do the same at every torque (see
+                `left_out`), or its misalignment.
+            rigid: without the file's shafts.
 
         Raises:
             DesignFileError: when the resolution does not cover the path of contact.
         """
         sizes = resolution or self.resolution()
-        held = self._support if support is None else support
-        options = {"compliance": self._compliance, "resolution": sizes, "support": held}
+        if support is None:
+            support = self._support if rigid else self._held(sizes)
+        options = {"compliance": self._compliance, "resolution": sizes, "support": support}
         with naming(self.path):
             return refused("resolution", prepare, self._middle, **options)
 
     def begin_contact(self, first: Resolution, resolution: Resolution) -> None:
         """Starts to compile what prepares and solves the mesh, see `contact.begin_contact`."""
-        begin_contact(self._middle, self._compliance, first, resolution, self._support)
+        begin_contact(self._middle, self._compliance, first, resolution, self._held(first))
 
     def sweep_mesh(self, resolution: Resolution) -> Mesh | Callable[[Mapping[str, Any]], Mesh]:
         """The prepared mesh; a function of the parameters that prepares it where numbers of the gears are free."""
-        parts = self._pair, self._model, self._misalignment
-        if not any(part.free() for part in parts):
+        if not self._open_gears:
             return self.mesh(resolution)
-        return FileMesh(*parts, resolution)
+        return FileMesh(self._pair, self._model, self._misalignment, resolution)
 
     def operation(self, parameters: Mapping[str, Any]) -> Operation:
         """Torque, speed and friction; pure and traceable.
@@ -225,14 +244,12 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
         raise DesignFileError("sweep", "has no effect without [variables]")
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
     sweep = None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection)
-    layout = None
-    if top.layout is not None:
-        layout = with_quality("layout", decode("layout", top.layout, schema_shafts.LayoutSection), quality)
+    layout = layout_of(top.layout, quality)
     if layout is not None and axes.fields:
         raise DesignFileError("misalignment", "has no effect with [layout], which takes that of [[meshes]]")
     if layout is not None and layout.profile is not None:
         uneven.append("the flank lines of layout.profile")
-    resolution = _resolution(top.resolution or {}, uneven)
+    resolution = resolution_of(top.resolution or {}, uneven, bent=layout is not None and len(top.meshes) < 2)
     model = with_tables(model, stiffness, file.parent, pair, usual_pair)  # last, as it takes longer than all the rest
     classes = quality if tolerance is None else tolerance.quality_class
     return DesignFile(
@@ -273,14 +290,3 @@ def _load(table: schema.Tables) -> schema.LoadSection:
         low, high = load.torque_range
         increasing("load.torque_range[1]", low, high, unit=" N m")
     return load
-
-
-def _resolution(table: schema.Tables, uneven: list[str]) -> Resolution:
-    """The array sizes; `uneven` are the keys of the modifications that vary along the face."""
-    sizes = decode("resolution", table, schema.ResolutionSection).given()
-    if sizes.get("slice_widths") is not None:
-        sizes.setdefault("slices", len(sizes["slice_widths"]))
-    if uneven and sizes.setdefault("slices", _SLICES) == 1:
-        problem = f"must be at least 2, 1 cannot show {uneven[0]}, which varies along the face"
-        raise DesignFileError("resolution.slices", f"{problem} ({_SLICES} where the key is left out)")
-    return template.Part(Resolution, sizes, "resolution").build({})

@@ -52,6 +52,7 @@ RESULT_FILES = frozenset(
         "profiles.csv",
         "tolerance_cases.png",
         "face_load_factors.png",
+        "shaft_deflection.png",
         "radar.png",
     }
 )

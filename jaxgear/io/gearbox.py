@@ -26,7 +26,7 @@ from ..shafts import (
 from ..shafts import Section as ShaftPart
 from . import schema_shafts as schema
 from .errors import DesignFileError, refuse_given, refused
-from .gears import Materials, fixed_gear
+from .gears import Materials, fixed_gear, with_quality
 from .layout import section_of
 from .schema import FileSection
 from .template import part_of
@@ -35,6 +35,20 @@ from .toml import decode
 _OWN = "pinion", "wheel"
 _OF_PAIR = "center_distance", "axial_offset"
 _SAME_TORQUE = 1e-3  # relative; what is left is rounding of ratios written by hand
+
+
+def layout_of(table: Mapping[str, Any] | None, quality: list[int] | None) -> schema.LayoutSection | None:
+    """The table of that name, with the quality classes of the gears where it has none of its own.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it.
+    """
+    if table is None:
+        return None
+    if "bearing_span" in table:
+        instead = 'misalignment = "class", or misalignment = { skew = ..., inclination = ..., bearing_span = ... }'
+        raise DesignFileError("layout.bearing_span", f"has no effect without skew or inclination: write {instead}")
+    return with_quality("layout", decode("layout", table, schema.LayoutSection), quality)
 
 
 def support_of(

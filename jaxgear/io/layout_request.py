@@ -2,6 +2,8 @@
 
 import dataclasses
 
+import numpy as np
+
 from ..conditions import LoadSpectrum
 from ..layout import (
     Endurance,
@@ -11,15 +13,16 @@ from ..layout import (
     helix_slope_limits,
     without_housing,
 )
-from ..shafts import ShaftSupport
+from ..shafts import Misalignment, ShaftSupport
 from .design_file import DesignFile
 from .errors import DesignFileError, naming, refuse_given, refused
 from .gears import both_classes
-from .schema_shafts import LayoutSection, ProfileSection, WoehlerSection
+from .schema_shafts import LayoutSection, MisalignmentSection, ProfileSection, WoehlerSection
 from .template import part_of
 from .toml import decode
 
 _QUICK_STATIONS, _QUICK_AMOUNTS = 21, 3
+_TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,6 +33,7 @@ class LayoutRequest:
         supports: the mesh on its shafts, in the housing first where there is one, then on rigid seats.
         tolerances: by name.
         options: of `layout_flank_lines`.
+        torques: on the pinion, at which K_Hbeta is told: the range of the file, and those of the duty cycle [N m].
         profile: what step 3 tries; None for no step 3.
         profile_torque: on the pinion, of step 3 [N m].
     """
@@ -37,6 +41,7 @@ class LayoutRequest:
     supports: dict[str, ShaftSupport]
     tolerances: dict[str, FlankLineTolerance]
     options: dict
+    torques: np.ndarray
     profile: ProfileSection | None
     profile_torque: float
 
@@ -58,8 +63,9 @@ def layout_request(design: DesignFile, *, quick: bool = False) -> LayoutRequest:
         _check_open(design)
         pair = support.pair
         classes = both_classes(section.quality_class)
+        axes = _axes(section.misalignment, float(pair.face_width))
         tolerances = {
-            kind: refused("layout.quality_class", flank_line_tolerance, pair, classes, section.bearing_span, kind=kind)
+            kind: refused("layout.quality_class", flank_line_tolerance, pair, classes, axes, kind=kind)
             for kind in ("statistical", "maximum")
         }
         further = helix_slope_limits(pair, classes) if section.further_crowning == "rule" else None
@@ -74,7 +80,10 @@ def layout_request(design: DesignFile, *, quick: bool = False) -> LayoutRequest:
         housed = support.gearbox.housing is not None
         supports = {"housing": support, "rigid seats": without_housing(support)} if housed else {"rigid seats": support}
         profile = None if section.profile is None else decode("layout.profile", section.profile, ProfileSection)
-        return LayoutRequest(supports, tolerances, options, _profile(profile, quick), _profile_torque(design, profile))
+        range_of_file = np.linspace(*design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
+        torques = np.union1d(range_of_file, section.torques or [])
+        torque = _profile_torque(design, profile)
+        return LayoutRequest(supports, tolerances, options, torques, _profile(profile, quick), torque)
 
 
 def _check_open(design: DesignFile) -> None:
@@ -84,6 +93,26 @@ def _check_open(design: DesignFile) -> None:
     for gear, parts in (("pinion", design.design.pinion), ("wheel", design.design.wheel)):
         if parts:
             raise DesignFileError(f"{gear}.modification", "layout finds the modifications, leave them out")
+
+
+def _axes(given: str | dict | None, width: float):
+    """Limits of the axes, as `flank_line_tolerance` takes them."""
+    if not isinstance(given, dict):
+        return given
+    key = "layout.misalignment"
+    section = decode(key, given, MisalignmentSection)
+    amounts = section.given()
+    span = amounts.pop("bearing_span", None)
+    for name, value in amounts.items():
+        if value < 0:
+            raise DesignFileError(f"{key}.{name}", f"{value:g} um must be at least 0 um: it counts with either sign")
+    if span is not None and not amounts.keys() & {"skew", "inclination"}:
+        raise DesignFileError(f"{key}.bearing_span", "has no effect without skew or inclination")
+    if span is not None and span < width:
+        raise DesignFileError(f"{key}.bearing_span", f"{span:g} mm must be at least {width:g} mm, the face width")
+    if not amounts:
+        raise DesignFileError(key, "must have skew or inclination over a bearing_span, or direct")
+    return part_of(key, section, Misalignment).build({})
 
 
 def _life(section: LayoutSection) -> dict:

@@ -11,7 +11,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from ..contact import Mesh
+from ..contact import Kinematics, Mesh
 from ..metrics import flank_surface
 from ..microgeometry import AbstractModification, NoModification, Sum
 from ..numerics import fields_of
@@ -47,10 +47,13 @@ def unit_of(kind: str, name: str) -> str:
     return number.unit if number else ""
 
 
-def flank_rows(mesh: Mesh, designs: Designs) -> Iterator[tuple[str, str, float, float, float, float, float]]:
+def flank_rows(
+    mesh: Mesh | Kinematics, designs: Designs
+) -> Iterator[tuple[str, str, float, float, float, float, float]]:
     """Rows of `flanks.csv`: both gears of every design from the start of the active profile to the tip.
 
-    Rows are in the middle of the face, and on further lines across it where the modification varies along the face.
+    Rows are in the middle of the face, and on further lines across it where the modification varies along the face. Of
+    a mesh its kinematics suffice.
     """
     for design, flanks in designs.items():
         for gear, side, modification in zip(("pinion", "wheel"), mesh.sides, flanks):
@@ -63,7 +66,7 @@ def flank_rows(mesh: Mesh, designs: Designs) -> Iterator[tuple[str, str, float, 
                     yield design, gear, float(face[line]), float(angle), float(length), float(size), float(amount)
 
 
-def write_flanks(path: Path, mesh: Mesh, designs: Designs) -> None:
+def write_flanks(path: Path, mesh: Mesh | Kinematics, designs: Designs) -> None:
     """Writes `flank_rows` as CSV, values to a nanometre or better."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

@@ -6,7 +6,7 @@ from ..layout import WoehlerLine
 from ..numerics import Number
 from ..shafts import Bearing, Coupling, GearMesh, MatrixBearing, Misalignment, MountedGear, ShaftLoad
 from ..shafts import Section as ShaftPart
-from .kinds import QUALITY_CLASSES, choice, count, list_of, positive, real, switch, table, text
+from .kinds import QUALITY_CLASSES, choice, count, either, list_of, positive, real, switch, table, text
 from .layout import Section, section_of
 
 Tables = dict[str, Any]
@@ -14,6 +14,7 @@ Tables = dict[str, Any]
 _ROWS, _ROWS_OR_NONE = list_of(table()), list_of(table(), empty=True)
 _AMOUNTS = list_of(real(Number("um", low=0.0)))
 _HOURS = list_of(real(Number("h", low=0.0)))
+_AXES = either(choice("class"), table(), '"class" or a table')
 
 PartSection = section_of(ShaftPart, open=False)
 BearingSection = section_of(Bearing, open=False)
@@ -89,7 +90,10 @@ class LayoutSection(Section):
     Attributes:
         quality_class: flank tolerance class of ISO 1328-1, of both gears or of pinion and wheel; that of the gears
             without it.
-        bearing_span: over which the deviations of the axes are measured; parallel axes without it.
+        misalignment: largest deviations of the axes, each of either sign: `skew` and `inclination` over the
+            `bearing_span`, or `direct`, f_ma over the face, as in [misalignment]; "class" takes those of ISO/TR 10064-3
+            by F_beta of the quality class, which over the face are the same for every bearing span. Parallel axes
+            without it.
         gear: whose flank line levels the load.
         direction: in which the first shaft turns, seen against z.
         further_crowning: "rule" takes C_b = f_Hbeta of ISO 6336-1 Annex B for both gears and more where that does not
@@ -106,7 +110,7 @@ class LayoutSection(Section):
     """
 
     quality_class: Annotated[int | list[int] | None, QUALITY_CLASSES] = None
-    bearing_span: Annotated[float | None, positive("mm")] = None
+    misalignment: Annotated[str | Tables | None, _AXES] = None
     gear: Annotated[str, choice("pinion", "wheel")] = "wheel"
     direction: Annotated[str, choice("counterclockwise", "clockwise")] = "counterclockwise"
     further_crowning: Annotated[str, choice("rule", "least")] = "rule"

@@ -4,8 +4,11 @@ level_load, longest_life     1: helix slope and crowning, at a torque or for a d
 tolerance_cases              2: five cases of deviations, and the crowning that keeps the load off the edges
 layout_flank_lines           both together
 vary_profiles                3: profile modifications in all combinations
+flank_line_contact           the loaded tooth contact of the flank lines alone
 damage                       pitting and bending under a duty cycle, as a differentiable number
 plausibility                 what of a layout is not usual
+lives_in_cases               what is left of the life in the five cases
+face_load_over_torques       K_Hbeta over the torque
 
 Steps 1 and 2 run on the one-dimensional analysis `shafts.annex_e`, step 3 on the loaded tooth contact.
 
@@ -19,10 +22,14 @@ from .life import Damage as Damage
 from .life import Endurance as Endurance
 from .life import WoehlerLine as WoehlerLine
 from .life import damage as damage
+from .lives_in_cases import lives_in_cases as lives_in_cases
 from .longest_life import longest_life as longest_life
+from .over_torque import face_load_over_torques as face_load_over_torques
 from .plausibility import plausibility as plausibility
 from .profiles import ProfileLayout as ProfileLayout
+from .profiles import flank_line_contact as flank_line_contact
 from .profiles import vary_profiles as vary_profiles
+from .stations import Stations as Stations
 from .stations import at_stations as at_stations
 from .stations import at_torque as at_torque
 from .steps import FlankLineLayout as FlankLineLayout

@@ -25,10 +25,19 @@ from ..sweeps import SweepTable, VariantList, sweep
 
 Kind = Literal["tip_relief", "profile_crowning"]
 
-RESULTS = ("ppte", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure")
+RESULTS = (
+    "ppte",
+    "effective_contact_ratio",
+    "mesh_loss_factor",
+    "max_flank_pressure",
+    "face_load_factor",
+    "root_face_load_factor",
+    "edge_load_factor",
+)
 # By so much the effective contact ratio may be above the theoretical one: positions resolve ends of contact to less.
 _SHOCK = 0.01
 _NAMES = "pinion_amount", "wheel_amount"
+_UNITS = dict.fromkeys(_NAMES, "um")
 
 
 @dataclass(frozen=True)
@@ -100,7 +109,8 @@ def vary_profiles(
         kind: "tip_relief", for spur gears a long one, or "profile_crowning".
         length: of the tip relief [mm]; None for the long one.
         curve: of the tip relief; None for its default.
-        results: further results, beside transmission error, contact ratio, loss and pressure.
+        results: further results, beside transmission error, contact ratio, loss, pressure and the face load factors of
+            the contact.
         output: folder of the table; None keeps it in memory.
         callback: of the progress, as `sweep` takes it.
 
@@ -123,21 +133,32 @@ def vary_profiles(
     rows = [(0.0, 0.0), *((first, second) for first in pinion_amounts for second in wheel_amounts)]
     wanted = (*RESULTS, *(one for one in results if one not in RESULTS))
     plan = VariantList(_NAMES, rows)
-    table = sweep(
-        design,
-        plan,
-        mesh=mesh,
-        torque=torque,
-        results=wanted,
-        output=output,
-        callback=callback,
-        title="profile modifications",
-        units=dict.fromkeys(_NAMES, "um"),
-    )
+    given = {"mesh": mesh, "torque": torque, "results": wanted, "units": _UNITS}
+    table = sweep(design, plan, output=output, callback=callback, title="profile modifications", **given)
     theoretical = float(path_of_contact(mesh.pair).contact_ratio)
     best = _best(table, theoretical)
     first, second = rows[best]
     return ProfileLayout(kind, table, best, theoretical, (design.profile(real(first)), design.profile(real(second))))
+
+
+def flank_line_contact(
+    mesh: Mesh,
+    torque,
+    flank_lines: tuple[AbstractModification, AbstractModification],
+    *,
+    kind: Kind = "tip_relief",
+) -> dict[str, float]:
+    """What the loaded tooth contact says of flank lines without profile modifications: `RESULTS`, NaN where it fails.
+
+    Args:
+        mesh, torque: as for `vary_profiles`, whose compiled program serves here.
+        flank_lines: modifications of pinion and wheel.
+        kind: of the profile modifications that are varied elsewhere, which are zero here.
+    """
+    design = _Crossed(flank_lines, _Profile(kind, real(long_relief_length(mesh.pair)), None))
+    plan = VariantList(_NAMES, [(0.0, 0.0)])
+    table = sweep(design, plan, mesh=mesh, torque=torque, results=RESULTS, units=_UNITS)
+    return {name: float(table.column(name)[0]) for name in table.results}
 
 
 class _Profile(eqx.Module):

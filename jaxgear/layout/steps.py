@@ -15,6 +15,7 @@ from ..numerics import Checked, check, real, result
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
 from .flank_line import FlankLine, GearName, level_load
 from .life import Damage, Endurance, damage
+from .lives_in_cases import lives_in_cases
 from .longest_life import longest_life
 from .stations import STATIONS, at_stations
 from .tolerance_cases import CASES, FlankLineTolerance, ToleranceCases, crowning_off_the_edges, tolerance_cases
@@ -35,7 +36,10 @@ class FlankLineLayout(Checked):
         factors: K_Hbeta without modification and after step 1, both without deviations.
         before, after: the five cases with the flank line of step 1 alone, and with those of step 2, by the name of the
             tolerance.
-        damage: under the duty cycle without modification, after step 1 and after step 2; empty without one.
+        damage: under the duty cycle without modification, after step 1 and after step 2, without deviations; empty
+            without one.
+        lives: [h] of the five cases after step 1 and after step 2, shape (steps, cases), by the name of the tolerance;
+            empty without a duty cycle.
     """
 
     gear: GearName = eqx.field(static=True)
@@ -48,6 +52,7 @@ class FlankLineLayout(Checked):
     before: dict[str, ToleranceCases]
     after: dict[str, ToleranceCases]
     damage: tuple[Damage, ...] = ()
+    lives: dict[str, Float[Array, "steps cases"]] = eqx.field(default_factory=dict)
 
     @property
     def pinion(self) -> FlankLine:
@@ -71,14 +76,30 @@ class FlankLineLayout(Checked):
 
     @property
     def relative_life(self) -> Float[Array, " steps"]:
-        """Life without modification, after step 1 and after step 2, relative to that after step 1.
+        """Life without modification, after step 1 and after step 2, relative to that after step 1; no deviations.
 
         Raises:
             ValueError: for a layout without a duty cycle.
         """
+        return jnp.stack([each.life for each in self.damage]) / self._level_life("relative_life")
+
+    def worst_relative_life(self, tolerance: str) -> Float[Array, " steps"]:
+        """Life of the worst case of deviations after step 1 and after step 2, relative to that after step 1 without
+        any.
+
+        Args:
+            tolerance: its name.
+
+        Raises:
+            ValueError: for a layout without a duty cycle.
+        """
+        level = self._level_life("worst_relative_life")
+        return jnp.min(self.lives[tolerance], axis=-1) / level
+
+    def _level_life(self, name: str) -> Scalar:
         if not self.damage:
-            raise ValueError("FlankLineLayout: relative_life needs a duty cycle")
-        return jnp.stack([each.life for each in self.damage]) / self.damage[1].life
+            raise ValueError(f"FlankLineLayout: {name} needs a duty cycle")
+        return self.damage[1].life
 
     def _line(self, gear: GearName, index: int) -> FlankLine:
         own = self.line if self.gear == gear else FlankLine()
@@ -183,7 +204,13 @@ def layout_flank_lines(
         return layout
     steps = FlankLine(), on_wheel, crowned
     spent = tuple(damage(support, duty_cycle, endurance, wheel=one, stations=stations) for one in steps)
-    return replace(layout, damage=spent)
+    lives = {
+        name: jnp.stack(
+            [lives_in_cases(support, duty_cycle, endurance, each, wheel=one, stations=stations) for one in steps[1:]]
+        )
+        for name, each in several.items()
+    }
+    return replace(layout, damage=spent, lives=lives)
 
 
 def _further(needed: Scalar, given) -> Float[Array, "2"]:

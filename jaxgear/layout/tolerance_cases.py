@@ -13,8 +13,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..geometry import GearPair
-from ..numerics import Checked, bracketed_root, check, maximum, number, program, real, result
-from ..shafts import AbstractSupport, FaceLoad, annex_e, axis_tolerance, face_load_factor
+from ..numerics import Checked, bracketed_root, check, concrete, maximum, number, program, real, result
+from ..shafts import AbstractSupport, FaceLoad, Misalignment, annex_e, axis_tolerance, face_load_factor
 from ..tolerance import ToleranceClass
 from .flank_line import FlankLine
 from .stations import Stations, at_stations
@@ -22,6 +22,7 @@ from .stations import Stations, at_stations
 Scalar = Float[Array, ""]
 Cases = Float[Array, " cases"]
 Kind = Literal["maximum", "statistical"]
+Axes = Misalignment | Literal["class"] | None
 
 CASES = ("no deviation", "+f_Hb +f_ma", "+f_Hb -f_ma", "-f_Hb +f_ma", "-f_Hb -f_ma")
 _SIGNS = ((0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
@@ -47,12 +48,13 @@ class FlankLineTolerance(Checked):
 
 
 def flank_line_tolerance(
-    pair: GearPair, quality_class, bearing_span=None, *, kind: Kind = "statistical"
+    pair: GearPair, quality_class, axes: Axes = None, *, kind: Kind = "statistical"
 ) -> FlankLineTolerance:
     """Deviations that flank tolerance classes and the parallelism of the axes allow.
 
     "maximum" adds the limits: f_HbetaT1 + f_HbetaT2, and f_ma = (f_Sigma_beta cos(alpha_wt) + f_Sigma_delta
-    sin(alpha_wt)) b / L (equation 2 of the study, which leaves out the scaling from the bearing span to the face).
+    sin(alpha_wt)) b / L (equation 2 of the study, which leaves out the scaling from the bearing span to the face), to
+    which f_ma that is given directly is added.
     Helix deviations count over a gear's own face: of a wider gear the common face has them in the ratio of the widths.
     "statistical" takes the root of the sum of the squares: where every deviation is normal and 97 % of it lie within
     its limits, 97 % of the independent sum lie within that.
@@ -60,12 +62,14 @@ def flank_line_tolerance(
     Args:
         pair: gear pair.
         quality_class: flank tolerance class of ISO 1328-1, one for both gears or (pinion, wheel).
-        bearing_span: L [mm], over which the deviations of the axes are measured, see `axis_tolerance`; None for
-            parallel axes.
+        axes: largest skew and inclination over the bearing span, or f_ma itself, each of either sign; "class" for
+            those of `axis_tolerance` by the larger F_beta of both gears, whose share over the face is the same for
+            every bearing span; None for parallel axes.
         kind: "maximum" or "statistical".
 
     Raises:
-        ValueError: for a class or gear outside of the range of the standard, or another kind.
+        ValueError: for a class or gear outside of the range of the standard, negative limits of the axes, a bearing
+            span that is shorter than the face, or another kind.
     """
     if kind not in ("maximum", "statistical"):
         raise ValueError(f'flank_line_tolerance: kind = {kind!r} must be "maximum" or "statistical"')
@@ -75,16 +79,29 @@ def flank_line_tolerance(
     gears = pair.pinion, pair.wheel
     limits = [ToleranceClass.of(gear, each) for gear, each in zip(gears, classes)]
     slopes = [limit.helix_slope * pair.face_width / gear.face_width for limit, gear in zip(limits, gears)]
-    if bearing_span is None:
-        parts = [jnp.zeros(())]
-    else:
-        angle = pair.working_pressure_angle
+    if axes == "class":
         # F_beta counts over the gear's own face, as the slope does
         totals = [limit.helix_total * pair.face_width / gear.face_width for limit, gear in zip(limits, gears)]
-        axes = axis_tolerance(jnp.maximum(*totals), pair.face_width, bearing_span)
-        share = pair.face_width / real(bearing_span)
-        parts = [share * axes.skew * jnp.cos(angle), share * axes.inclination * jnp.sin(angle)]
-    return FlankLineTolerance(_together(slopes, kind), _together(parts, kind))
+        axes = axis_tolerance(jnp.maximum(*totals), pair.face_width, pair.face_width)
+    return FlankLineTolerance(_together(slopes, kind), _together(_over_face(pair, axes), kind))
+
+
+def _over_face(pair: GearPair, axes) -> list[Scalar]:
+    """What each deviation of the axes makes of the gap over the face [um]."""
+    if axes is None:
+        return [jnp.zeros(())]
+    if not isinstance(axes, Misalignment):
+        raise ValueError(f'flank_line_tolerance: axes = {axes!r} must be a Misalignment, "class" or None')
+    for name in ("skew", "inclination", "direct"):
+        check("flank_line_tolerance", name, getattr(axes, name), "um", low=0.0)
+    if axes.bearing_span is None:
+        return [axes.direct]
+    span, width = concrete(axes.bearing_span), concrete(pair.face_width)
+    if span is not None and width is not None and span < width:
+        problem = f"bearing_span = {float(span):g} mm must be at least the face width, {float(width):g} mm"
+        raise ValueError(f"flank_line_tolerance: {problem}")
+    angle, share = pair.working_pressure_angle, pair.face_width / axes.bearing_span
+    return [axes.direct, share * axes.skew * jnp.cos(angle), share * axes.inclination * jnp.sin(angle)]
 
 
 def helix_slope_limits(pair: GearPair, quality_class) -> Float[Array, "2"]:

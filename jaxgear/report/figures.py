@@ -36,6 +36,7 @@ CAPTIONS = {
     "bifurcation": "Approach at the start of every mesh cycle over the mesh frequency.",
     "phase_portrait": "Motion at the speed of the largest dynamic factor; marked once per mesh cycle.",
     "branches": "Stable and unstable periodic motions of the unmodified design.",
+    "shaft_deflection": "Elastic lines of the shafts at the design torque, exaggerated, with bearings and gears.",
     "tolerance_cases": "Load over the face under the combinations of deviations within the tolerances.",
     "face_load_factors": "Face load factor under the combinations of deviations within the tolerances.",
     "worn_pinion": "Flank of the pinion at several lives.",

@@ -1,0 +1,79 @@
+"""What `jaxgear layout` has found."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..contact import Mesh
+from ..io import DesignFile, LayoutRequest
+from ..layout import FlankLine, FlankLineLayout, ProfileLayout
+from ..metrics import Doubt
+from ..microgeometry import AbstractModification
+from ..shafts import root_face_load_factor, tooth_height
+
+STEPS = ("unmodified", "step 1", "step 2")
+
+
+@dataclass(frozen=True)
+class Study:
+    """What has been found.
+
+    Attributes:
+        design: the design file.
+        request: what it asks for.
+        layouts: flank lines, by the name of the support; the first is that of the design.
+        over_torque: K_Hbeta of the design after every of the `STEPS` at the torques of the request, without deviations.
+        meshes: of step 3, by the name of the support; empty without it.
+        contacts: what the contact says of the flank lines of every step on their shafts, by the names of the support
+            and of the step; empty without step 3 on shafts.
+        factors: K_Hbeta of the one-dimensional analysis at the same torque and on as many stations, likewise.
+        profiles: profile modifications of step 3, by the name of the support.
+        unusual: what of every layout is not usual, by the name of the support.
+    """
+
+    design: DesignFile
+    request: LayoutRequest
+    layouts: Mapping[str, FlankLineLayout]
+    over_torque: Mapping[str, np.ndarray]
+    meshes: Mapping[str, Mesh]
+    contacts: Mapping[str, Mapping[str, Mapping[str, float]]]
+    factors: Mapping[str, Mapping[str, float]]
+    profiles: Mapping[str, ProfileLayout]
+    unusual: Mapping[str, tuple[Doubt, ...]]
+
+    @property
+    def profile(self) -> ProfileLayout | None:
+        """The profile modifications of the design; None without step 3."""
+        return next(iter(self.profiles.values()), None)
+
+    @property
+    def main(self) -> FlankLineLayout:
+        """The layout of the design."""
+        return next(iter(self.layouts.values()))
+
+
+def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine]]:
+    """Flank lines of pinion and wheel over their own faces, after every of the `STEPS`."""
+    none = FlankLine()
+    level = layout.line.on(layout.pair, layout.gear)
+    first = (level, none) if layout.gear == "pinion" else (none, level)
+    return dict(zip(STEPS, ((none, none), first, (layout.pinion, layout.wheel))))
+
+
+def root_factor(layout: FlankLineLayout, factor) -> np.ndarray:
+    """K_Fbeta of K_Hbeta."""
+    pair = layout.pair
+    return np.asarray(root_face_load_factor(np.maximum(factor, 1.0), pair.face_width, tooth_height(pair)))
+
+
+def designs(study: Study) -> dict[str, tuple[AbstractModification, AbstractModification]]:
+    """Modifications of pinion and wheel: the flank lines after both steps, and with the profile modification."""
+    _, first, _ = flank_lines(study.main).values()
+    pinion, wheel = study.main.modifications
+    found = {"step 1": (first[0].modification, first[1].modification), "flank lines": (pinion, wheel)}
+    if study.profile is not None:
+        # the profile was made on the further crowning, which the flank line has as well
+        of_pinion, of_wheel = study.profile.profiles
+        found["layout"] = pinion + of_pinion, wheel + of_wheel
+    return found
