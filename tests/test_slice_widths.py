@@ -270,6 +270,24 @@ def test_gradient_by_the_flank(mesh):
         np.testing.assert_allclose(found @ place, central, rtol=1e-6)
 
 
+@pytest.mark.parametrize("parts", [end_relief_widths(80.0, 4.0, 15), (3, 1, 1, 16, 22, 8, 12, 6, 24, 16, 1, 18)])
+def test_the_share_of_the_modes_is_positive_definite_beside_an_overhang(parts):
+    """Wide slices beside narrow ones give way far less than the mean of all, which as a rest would not leave it so."""
+    basis, width, chord = slice_basis(parts), 80.0, 4.0
+    even = basis.T @ np.asarray(face_kernel(width, chord, sum(parts), (0.0, 8.0))) @ basis
+    ends = basis.T @ np.asarray(face_ends(width, chord, sum(parts)))
+    modes, share, rest = few_modes(jnp.asarray(even), 5, jnp.asarray(ends), parts)
+    assert np.linalg.eigvalsh(share).min() > 0 and float(rest) > 0
+    np.testing.assert_allclose(
+        modes @ share @ modes.T + float(rest) * modes @ modes.T, _projected(even, modes), atol=1e-12
+    )
+
+
+def _projected(kernel, modes):
+    onto = np.asarray(modes @ modes.T)
+    return onto @ kernel @ onto
+
+
 def test_widths_for_an_end_relief():
     """Slices end where the relief begins, the narrowest beside it; symmetric; few whole numbers."""
     for face, length, slices in ((18.0, 3.0, 11), (18.0, 2.5, 13), (60.0, 2.0, 11), (20.0, 20.0 / 3, 9)):
@@ -322,6 +340,8 @@ def test_refusals(mesh):
         end_relief_widths(18.0, 3.0, 8)
     with pytest.raises(ValueError, match="length = 0.1 mm must be at least 0.10"):
         end_relief_widths(18.0, 0.1)
+    with pytest.raises(ValueError, match="end_relief_widths: slices = 40 are too many for a relief of length = 6 mm"):
+        end_relief_widths(18.0, 6.0, 40)
 
 
 FILE = """

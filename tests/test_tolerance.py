@@ -207,10 +207,10 @@ def test_deviated_material_is_the_sum_of_modifications(wide_mesh, tolerance):
 
 def test_zero_tolerance_is_the_nominal_design(mesh, solve):
     zero, design = zero_deviation(mesh), jg.contact.removed_material(mesh, TORQUE, **RELIEF).amount
-    np.testing.assert_allclose(jg.tolerance.deviated_material(mesh, TORQUE, zero, **RELIEF).amount, design, rtol=1e-14)
+    # another compilation may round differently; within one, all samples are the same to the last bit
+    np.testing.assert_allclose(jg.tolerance.deviated_material(mesh, TORQUE, zero, **RELIEF).amount, design, rtol=1e-13)
     nominal = np.asarray(solve(zero).transmission_error)
     scatter = jg.monte_carlo(mesh, TORQUE, tolerance=jg.Tolerance(), samples=20, **RELIEF)
-    # another compilation may round differently; within one, all samples are the same to the last bit
     np.testing.assert_allclose(scatter.nominal_transmission_error, nominal, rtol=1e-13)
     assert (np.asarray(scatter.transmission_error_quantiles) == scatter.nominal_transmission_error[None]).all()
     assert (np.asarray(scatter.ppte) == scatter.nominal_ppte).all()

@@ -142,6 +142,21 @@ def test_a_design_file_binds_names_to_its_settings(file):
         sweep_request(load_design(file(PAIR + SWEEP.format(name="life_to_ppte") + TABLE)))
 
 
+def test_the_mesh_has_pairs_for_the_loads_that_wear_it(file):
+    open_pairs = PAIR.replace("pairs = 2\n", "").replace("torque = 150.0", "torque = 20.0")
+    few, more = (load_design(file(open_pairs + TABLE + f"torques = [{torque}]\n")) for torque in (20.0, 6000.0))
+    assert few.resolution().pairs == few.resolution(20.0).pairs < more.resolution().pairs
+
+
+def test_loads_of_wear_do_not_follow_a_variable_of_the_load(file):
+    text = PAIR.replace("torque = 150.0", 'torque = 150.0\nspeed = "n"') + SWEEP.format(name="wear_depth")
+    text = text.replace("[variables]\n", '[variables]\nn = { low = 500.0, high = 900.0, unit = "rpm" }\n')
+    table = TABLE + "torques = [50.0, 150.0]\n"
+    with pytest.raises(DesignFileError, match='wear.torques: load.speed is the variable "n", which they do not follow'):
+        sweep_request(load_design(file(text + table)))
+    sweep_request(load_design(file(text + table + "speeds = [500.0, 1000.0]\n")))
+
+
 def test_a_real_life_can_be_asked_for(file):
     """20 000 h at 3000 rpm are 3.6e9 revolutions."""
     table = (
@@ -156,7 +171,7 @@ constraint = [{ of = "life_to_depth", low = 7.2e9 }]
     assert wear_request(design).settings.revolutions == 3.6e9
     assert optimize_request(design).method == "minimax"
     beyond = table.replace("life_to_depth", "life_to_ppte").replace("[wear]", "[wear]\nppte_limit = 3.0")
-    with pytest.raises(DesignFileError, match=r"constraint\[0\].low: 7.2e\+09 must be at most wear.revolutions = 3.6e"):
+    with pytest.raises(DesignFileError, match=r"constraint\[0\].low: 7.2e\+09 must be at most 3.6e"):
         optimize_request(load_design(file(PAIR + VARIABLES + beyond)))
 
 
@@ -194,6 +209,8 @@ def test_a_dynamic_line_load_needs_a_speed_and_what_vibrates(file):
     for text, needs in ((FAST + DYNAMIC, r"the table \[dynamics\]"), (PAIR + DYNAMICS + DYNAMIC, "load.speed")):
         with pytest.raises(DesignFileError, match=f'wear.line_load: "dynamic" needs {needs}'):
             wear_request(load_design(file(text)))
+    loads = DYNAMIC + "torques = [50.0, 150.0]\nspeeds = [500.0, 1000.0]\n"  # which have speeds of their own
+    assert wear_request(load_design(file(PAIR + DYNAMICS + loads))).settings.loads.speeds.tolist() == [500.0, 1000.0]
     with pytest.raises(DesignFileError, match='wear.line_load: "quick"'):
         load_design(file(PAIR + TABLE + 'line_load = "quick"\n'))
 
@@ -302,30 +319,51 @@ def test_kept_blocks_are_not_worn_again(tmp_path, file):
     np.testing.assert_array_equal(over_life(again, "ppte"), over_life(whole, "ppte"))
 
 
+class Search:
+    """Stands for a search that takes long."""
+
+    method = "minimax"
+
+    def __init__(self, parameters):
+        self.parameters, self.run = parameters, 0
+
+    def __call__(self, mesh, callback):
+        self.run += 1
+        finer = jg.prepare(mesh.pair, resolution=dataclasses.replace(mesh.resolution, positions=24))
+        relief = jg.TipRelief(12.3, 2.1)
+        return SimpleNamespace(parameters=self.parameters, mesh=finer, pinion=relief, wheel=relief)
+
+
 def test_what_a_search_has_found_is_not_sought_again(tmp_path, file):
     """The mesh on which it ended, and the flanks, come from a few numbers beside the results."""
-    design = load_design(file(PAIR + VARIABLES))
-    mesh, searched = design.mesh(), []
+    mesh, stages = load_design(file(PAIR)).mesh(), SimpleNamespace(step=None)
+    search = Search({"amount": 12.3, "length": 2.1})
 
-    def search(mesh, callback):
-        searched.append(mesh)
-        numbers = {"amount": 12.3, "length": 2.1}
-        finer = jg.prepare(mesh.pair, resolution=dataclasses.replace(mesh.resolution, positions=24))
-        return SimpleNamespace(parameters=numbers, mesh=finer)
-
-    def found(name="optimum", text=""):
-        stages = SimpleNamespace(step=None)
-        there = load_design(file(PAIR + VARIABLES + text))
-        return sought(there, name, search, mesh, tmp_path / "out", stages, quick=False)
+    def found(name="optimum", text="", oil=100.0):
+        (tmp_path / "oil.toml").write_text(f"viscosity_40 = {oil}\nviscosity_100 = 5.0\n")
+        design = load_design(
+            file(FAST + VARIABLES + '[lubricant]\nfile = "oil.toml"\ntemperature = 80.0\nroughness = 0.5\n' + text)
+        )
+        return sought(design, name, search, mesh, tmp_path / "out", stages, quick=False)
 
     first, again = found(), found()
-    assert len(searched) == 1
+    assert search.run == 1
     for ended, (pinion, wheel) in (first, again):
         assert ended.resolution.positions == 24 and str(pinion) == str(wheel) == str(jg.TipRelief(12.3, 2.1))
     assert eqx.tree_equal(first, again)
     found("optimum over life")
     found(text='[optimize]\nmethod = "genetic"\n')
-    assert len(searched) == 3  # another search, another file
+    found(oil=30.0)
+    assert search.run == 4  # another search, another file, another oil
+
+
+def test_a_search_without_numbers_to_keep_gives_its_flanks(tmp_path, file):
+    """Although the file has variables, as the transmission-error iteration may."""
+    design, stages = load_design(file(PAIR + VARIABLES)), SimpleNamespace(step=None)
+    search = Search({})
+    search.method = "te_iteration"
+    mesh, flanks = sought(design, "optimum", search, design.mesh(), tmp_path / "out", stages, quick=False)
+    assert mesh.resolution.positions == 24 and str(flanks[0]) == str(jg.TipRelief(12.3, 2.1))
 
 
 def test_blocks_on_the_disk_are_the_blocks(tmp_path):

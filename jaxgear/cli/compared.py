@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import numpy as np
 
 from ..contact import Mesh, prepare
 from ..io import DesignFile, OptimizeRequest, optimize_request
@@ -80,13 +79,12 @@ def sought(
         optimum = search(mesh, stages.step)
         return optimum.compromise if isinstance(optimum, Front) else optimum
 
-    if not design.bounds:  # flanks without variables: there are no few numbers to keep
+    if search.method in METHODS_WITHOUT_VARIABLES:  # there are no few numbers to keep
         optimum = found()
         return optimum.mesh, (optimum.pinion, optimum.wheel)
     lowest = design.design({name: low for name, (low, _) in design.bounds.items()})  # with what files hold
-    text = np.frombuffer(design.path.read_bytes(), np.uint8)
-    asked = name, quick
-    numbers = Kept(runs_beside(target), _Numbers())((text, mesh, lowest, asked), lambda: _numbers(found()))
+    asked = name, quick, design.says, design.lubricant, design.strength
+    numbers = Kept(runs_beside(target), _Numbers())((mesh, lowest, asked), lambda: _numbers(found()))
     sizes = dataclasses.replace(mesh.resolution, positions=int(numbers[_POSITIONS]), pairs=int(numbers[_PAIRS]))
     flanks = design.design({name: numbers[name] for name in design.bounds})
     if sizes == mesh.resolution:

@@ -23,8 +23,7 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
     lasting = None if search is None else search.over_life(static)
 
     def make(target: Path, stages: Stages):
-        loads = request.settings.loads
-        highest = max(design.torque, design.torque_range[1], 0.0 if loads is None else float(loads.torques.max()))
+        highest = max(design.torque, design.torque_range[1])
         mesh, designs = compared(design, highest, search, target, stages, quick=quick)
         if lasting is not None:
             stages.begin("searching the optimum over the life")

@@ -11,6 +11,7 @@ _SLIDING_NODES = 3  # a parabola
 _SLIDE_STEPS = 2
 # Widths of slices from an end of the face on, how much of that is over the relief, and finest parts of the narrowest
 _END, _OVER_RELIEF, _FINEST = (3, 2, 1, 1), 6, 8
+_MISSED = 0.02  # of the length of a relief, by which slices may end beside where it begins
 _MOST_PARTS = 1024  # of equal width, that slices of unequal width are put together from
 
 
@@ -139,7 +140,8 @@ def end_relief_widths(face_width, length, slices: int = 11) -> tuple[int, ...]:
         slices: number of slices, at least 9.
 
     Raises:
-        ValueError: for numbers out of these ranges, and where the relief is too short for whole numbers.
+        ValueError: for numbers out of these ranges, where the relief is too short for whole numbers, and for more
+            slices than a long relief leaves room for.
     """
     whole("end_relief_widths", "slices", slices, low=2 * len(_END) + 1)
     check("end_relief_widths", "face_width", face_width, "mm", low=0.0, open_low=True)
@@ -155,7 +157,13 @@ def end_relief_widths(face_width, length, slices: int = 11) -> tuple[int, ...]:
     if best is None:
         least = _OVER_RELIEF * float(face_width) / _MOST_PARTS
         raise ValueError(f"end_relief_widths: length = {float(length):g} mm must be at least {least:g} mm on this face")
-    return best[1]
+    missed, made = best
+    if missed > _MISSED:
+        raise ValueError(
+            f"end_relief_widths: slices = {slices} are too many for a relief of length = {float(length):g} mm on "
+            f"{float(face_width):g} mm: those between the reliefs would be narrower than those at their ends"
+        )
+    return made
 
 
 def reach(pairs: int) -> tuple[int, int]:

@@ -1,5 +1,6 @@
 """Design files: a gear pair, its load, its flank modifications and their free parameters, as TOML."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -42,6 +43,7 @@ class DesignFile:
 
     Attributes:
         path: the file.
+        says: all that it held when it was read, as one text.
         title: free text, the file's stem if it has none.
         torque: design torque on the pinion [N m]; the middle of its bounds where it is a variable.
         torque_range: lowest and highest torque of interest [N m].
@@ -64,6 +66,7 @@ class DesignFile:
     """
 
     path: Path
+    says: str
     title: str
     torque: float
     torque_range: tuple[float, float]
@@ -104,7 +107,8 @@ class DesignFile:
         """The array sizes that the file asks for, with as few tooth pairs as the load needs where it names none.
 
         Args:
-            torque: largest torque on the pinion [N m], None for the largest that the file names.
+            torque: largest torque on the pinion [N m], None for the largest that [load] names; those that wear the
+                flanks count besides.
 
         Raises:
             DesignFileError: when no number of pairs is enough, because of a torque or modulus in another unit.
@@ -112,6 +116,7 @@ class DesignFile:
         if self._resolution.pairs is not None:
             return self._resolution
         torque = max(self.torque, self.torque_range[1]) if torque is None else torque
+        torque = max([torque, *((self.wear and self.wear.torques) or ())])
         times = _DEFLECTIONS if self.dynamics is None else _DYNAMIC_DEFLECTIONS
         deflection = times * float(_single_deflection(self._middle, np.asarray(torque)))
         try:
@@ -199,10 +204,11 @@ def load_design(path: str | Path) -> DesignFile:
     """
     file = Path(path)
     with naming(file):
-        return _checked(file, decode("", read(file), schema.FileSection))
+        says = read(file)
+        return _checked(file, json.dumps(says, sort_keys=True, default=str), decode("", says, schema.FileSection))
 
 
-def _checked(file: Path, top: schema.FileSection) -> DesignFile:
+def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
     materials = materials_of(top)
     (pinion_says, pinion, pinion_flank), (wheel_says, wheel, wheel_flank) = (
         gear_of(name, getattr(top, name), materials, file.parent) for name in ("pinion", "wheel")
@@ -254,6 +260,7 @@ def _checked(file: Path, top: schema.FileSection) -> DesignFile:
     classes = quality if tolerance is None else tolerance.quality_class
     return DesignFile(
         path=file,
+        says=says,
         title=top.title or file.stem,
         torque=torque,
         torque_range=(low, high),

@@ -56,7 +56,8 @@ def _missing(design: DesignFile, stands: WithoutSettings) -> str:
         for known, name in ((settings, f"the table [{stands.table}]"), (design.dynamics, "the table [dynamics]")):
             if known is None:
                 return name
-        return "" if design.speed is not None else "load.speed"
+        speeds = design.wear and design.wear.speeds  # the only such settings that have their own
+        return "" if design.speed is not None or speeds else "load.speed"
     if settings is not None:
         unset = stands.needs is not None and getattr(settings, stands.needs) is None
         return f"{stands.table}.{stands.needs}" if unset else ""

@@ -22,6 +22,7 @@ from ..optimize import (
 from ..optimize.projection import CURVES
 from ..optimize.refine import POSITIONS
 from ..wear import WEAR_QUANTITIES, Wear
+from ..wear.quantities import LIVES_AHEAD
 from . import schema
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
@@ -243,12 +244,14 @@ def _constraint(design: DesignFile, number: int, table: schema.Tables) -> Constr
 
 
 def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:
-    """A life to a limit of PPTE is known up to the life that is looked at: no design can be shown to last longer."""
-    if design.wear is None or low is None or not (isinstance(of, Quantity) and of.name == "life_to_ppte"):
+    """A life to a limit is known for so many of the lives that are looked at: no design can be shown to last longer."""
+    lives = {"life_to_ppte": 1.0, "life_to_depth": LIVES_AHEAD}
+    if design.wear is None or low is None or not (isinstance(of, Quantity) and of.name in lives):
         return
-    longest = design.wear.revolutions
-    if low > longest:
-        raise DesignFileError(key, f"{low:g} must be at most wear.revolutions = {longest:g}, beyond which nobody looks")
+    looked_at = design.wear.revolutions
+    if low > lives[of.name] * looked_at:
+        most = f"{lives[of.name] * looked_at:g}, beyond which nobody looks"
+        raise DesignFileError(key, f"{low:g} must be at most {most}: wear.revolutions = {looked_at:g}")
 
 
 def _check_iteration(design: DesignFile, start: str, section: schema.OptimizeSection) -> None:

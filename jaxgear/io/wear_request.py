@@ -64,7 +64,8 @@ def _settings(design: DesignFile, *, vibrates: bool) -> Wear:
     assert section is not None
     part = part_of("wear", section, Wear)
     if vibrates:
-        for known, name in ((design.dynamics, "the table [dynamics]"), (design.speed, "load.speed")):
+        speed = design.speed if section.speeds is None else section.speeds
+        for known, name in ((design.dynamics, "the table [dynamics]"), (speed, "load.speed")):
             if known is None:
                 raise DesignFileError("wear.line_load", f'"dynamic" needs {name}')
         fields = {**part.fields, "dynamics": dynamics_of(design), "line_load": section.line_load}
@@ -77,6 +78,10 @@ def _loads(design: DesignFile, section: WearSection) -> LoadSpectrum | None:
     if section.torques is None:
         refuse_given("wear", section, ["weights", "speeds"], " without wear.torques")
         return None
+    own = ("load.torque", *(["load.speed"] if section.speeds is not None else []))
+    for free in design.open_case:
+        if free.key.startswith("load.") and free.key not in own:
+            raise DesignFileError("wear.torques", f'{free.key} is the variable "{free.name}", which they do not follow')
     speeds = design.speed if section.speeds is None else section.speeds
     run_at = {"speeds": speeds, "friction": design.friction}
     load = refused("wear.torques" if section.speeds is None else "wear.speeds", LoadSpectrum, section.torques, **run_at)

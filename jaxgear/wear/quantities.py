@@ -39,7 +39,7 @@ class Kind(NamedTuple):
 
 # A limit that is never reached is no failure, which not finite values of a quantity are. Nothing is known of the
 # transmission error beyond the life that was looked at; the depth goes on, but so far nobody extrapolates.
-_LONGEST = 1000.0
+LIVES_AHEAD = 1000.0
 # Blocks are too long, and flanks overshoot from one to the next, where the error is estimated at more than this share
 # of the depth, or a block wears off more than so many deflections of the new teeth under their load (see `wear`). The
 # estimate alone misses some: on a 20/30 pair, 2 blocks against 128, it says 5 % for 9 %, and 21 % for 56 % where a
@@ -82,7 +82,7 @@ WEAR_QUANTITIES: Mapping[str, Kind] = {
         lambda life, _: life.error[-1], "um", "error of the wear depth by the length of the blocks, as estimated"
     ),
     "life_to_depth": Kind(
-        lambda life, settings: _at_most(_LONGEST * settings.revolutions, life_to_depth(life, settings.depth_limit)),
+        lambda life, settings: _at_most(LIVES_AHEAD * settings.revolutions, life_to_depth(life, settings.depth_limit)),
         "revolutions",
         "life to the limit of the wear depth, at most a thousand of those looked at",
         "larger",
