@@ -14,7 +14,8 @@ from jaxgear.contact import Operation, solve_at
 from jaxgear.metrics import LUBRICANT_QUANTITIES, STRENGTH_QUANTITIES
 
 OIL = metrics.Lubricant(220.0, 19.0, 80.0, 0.4, permissible_film=0.2, scuffing_temperature=300.0)
-STRENGTH = metrics.Strength(1500.0, wheel_pitting=1400.0, bending=900.0, wheel_bending=800.0, pressure=2000.0)
+LINES = {"pitting_exponent": 13.0, "pitting_cycles": 5e7, "bending_exponent": 9.0, "bending_cycles": 3e6}
+STRENGTH = metrics.Strength(1500.0, wheel_pitting=1400.0, bending=900.0, wheel_bending=800.0, pressure=2000.0, **LINES)
 TORQUE, SPEED = 200.0, 2250.0
 POINT = (TORQUE, SPEED, 12.0, 80.0, 0.4)  # torque, speed, amount of relief, temperature, roughness
 PITCH = 0  # position and pair that touch at the pitch point
@@ -72,6 +73,8 @@ def with_slope(mesh):
                 metrics.bulk_temperature(cycle, dataclasses.replace(oil, bulk="loss")),
                 jg.quantities["relative_ppte"](cycle),
                 jg.quantities["force_excitation"](cycle),
+                *metrics.pitting_damage(cycle, STRENGTH),
+                *(jnp.max(field) for field in metrics.root_damage(cycle, STRENGTH)),
             ]
         )
 
@@ -275,6 +278,10 @@ def test_safety_is_what_is_borne_over_what_is_there(cycle):
         "wheel_root_safety": 800.0 / number("wheel_root_stress"),
         "pressure_safety": 2000.0 / number("max_contact_pressure"),
     }
+    turns = 1.0, float(cycle.kinematics.pair.pinion.teeth / cycle.kinematics.pair.wheel.teeth)
+    for gear, turned in zip(("pinion", "wheel"), turns):  # by the safety factors: N = N_0 S^p
+        expected[f"{gear}_pitting_damage"] = 1e6 * turned / 5e7 * expected[f"{gear}_pitting_safety"] ** -13
+        expected[f"{gear}_root_damage"] = 1e6 * turned / 3e6 * expected[f"{gear}_root_safety"] ** -9
     assert safety == pytest.approx(expected, rel=1e-12)
     alike = metrics.Strength(1500.0, bending=900.0)
     assert float(alike.quantity("wheel_root_safety")(cycle)) == pytest.approx(900.0 / number("wheel_root_stress"))
@@ -282,6 +289,23 @@ def test_safety_is_what_is_borne_over_what_is_there(cycle):
     assert oiled["micropitting_safety"] == pytest.approx(oiled["min_film_thickness"] / 0.4 / 0.2, rel=1e-12)
     rise = oiled["max_contact_temperature"] - 80.0
     assert oiled["scuffing_safety"] == pytest.approx((300.0 - 80.0) / rise, rel=1e-12)
+
+
+def test_the_mean_of_damage_over_a_spectrum_is_the_damage_sum():
+    """Contact stress goes with the root of the torque: its damage with a power of half the exponent."""
+    pair = jg.GearPair(jg.Gear(19, 3.0, face_width=18.0), jg.Gear(48, 3.0, face_width=18.0))
+    mesh = jg.prepare(pair, resolution=jg.Resolution(positions=8, pairs=2, slide_steps=0))
+    named = STRENGTH.quantity("pinion_pitting_damage")
+    load = jg.LoadSpectrum([50.0, 100.0], [3.0, 1.0])
+    found = jg.sweep(
+        lambda x: (jg.TipRelief(x["amount"], 3.0), None),
+        jg.FullFactorial({"amount": (0.0, 5.0)}, 2),
+        mesh=mesh,
+        torque=load,
+        results=(named,),
+    )
+    low = float(named(jg.solve(mesh, 50.0)))
+    np.testing.assert_allclose(found.column(named.key), low * (0.75 + 0.25 * 2**6.5), rtol=1e-9)
 
 
 def test_without_load_nothing_fails_and_slopes_are_finite(solve, with_slope):
@@ -413,6 +437,9 @@ def test_names_without_settings_say_what_they_need(solve, cycle):
         ),
         (lambda: metrics.Strength(-1.0), "Strength: pitting = -1 MPa must be greater than 0 MPa"),
         (lambda: metrics.Strength(wheel_bending=900.0), "Strength: bending must be given where wheel_bending is"),
+        (lambda: metrics.Strength(9.0, pitting_exponent=6.0), "pitting_cycles must be given where pitting_exponent is"),
+        (lambda: metrics.Strength(9.0, pitting_cycles=6.0), "pitting_exponent must be given where pitting_cycles is"),
+        (lambda: metrics.Strength(bending_cycles=6.0, bending_exponent=3.0), "bending must be given where bending_exp"),
     ],
 )  # fmt: skip
 def test_refuses_in_one_line(make, message):

@@ -47,6 +47,10 @@ _ROWS = {
     "pinion_root_safety": ("pinion root safety S_F", ".2f"),
     "wheel_root_safety": ("wheel root safety S_F", ".2f"),
     "pressure_safety": ("pressure safety p_lim / p_max", ".2f"),
+    "pinion_pitting_damage": ("pinion pitting damage per 1e6 revolutions", ".3g"),
+    "wheel_pitting_damage": ("wheel pitting damage per 1e6 revolutions", ".3g"),
+    "pinion_root_damage": ("pinion root damage per 1e6 revolutions", ".3g"),
+    "wheel_root_damage": ("wheel root damage per 1e6 revolutions", ".3g"),
     "micropitting_safety": ("micropitting safety S_lambda", ".2f"),
     "scuffing_safety": ("scuffing safety S_B", ".2f"),
 }

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
 from ..numerics.reductions import Max, Min
+from .damage import pitting_damage, root_damage
 from .flash import flash_temperature
 from .lubrication import (
     bulk_temperature,
@@ -44,9 +45,14 @@ def _oiled(name: str, of: Any, unit: str, meaning: str, needs: str | None = None
 
 def _borne(name: str, of: Any, meaning: str, needs: str, **options: Any) -> Quantity:
     stands = WithoutSettings(name, "jaxgear.metrics.Strength", "strength", of, needs)
-    return Quantity(name, stands, meaning=meaning, better="larger", **options)
+    return Quantity(name, stands, meaning=meaning, **{"better": "larger", **options})
 
 
+def _of_gear(of: Any, gear: int) -> Any:
+    return lambda cycle, strength: of(cycle, strength)[gear]
+
+
+_GEARS = "pinion", "wheel"
 _LEAST: dict[str, Any] = {"reduction": Min(), "better": "larger"}
 
 LUBRICATED = (
@@ -109,25 +115,24 @@ LUBRICATED = (
 )
 RATED = (
     *(
-        _borne(f"{gear}_pitting_safety", of, f"S_H, pitting strength over nominal contact stress, {gear}", "pitting")
-        for gear, of in (
-            ("pinion", lambda cycle, strength: pitting_safety(cycle, strength)[0]),
-            ("wheel", lambda cycle, strength: pitting_safety(cycle, strength)[1]),
+        _borne(
+            f"{gear}_pitting_safety",
+            _of_gear(pitting_safety, number),
+            f"S_H, pitting strength over nominal contact stress, {gear}",
+            "pitting",
         )
+        for number, gear in enumerate(_GEARS)
     ),
     *(
         _borne(
             f"{gear}_root_safety",
-            of,
+            _of_gear(root_safety, number),
             f"S_F, bending strength over root stress, {gear}",
             "bending",
             reduction=Min(),
             local=True,
         )
-        for gear, of in (
-            ("pinion", lambda cycle, strength: root_safety(cycle, strength)[0]),
-            ("wheel", lambda cycle, strength: root_safety(cycle, strength)[1]),
-        )
+        for number, gear in enumerate(_GEARS)
     ),
     _borne(
         "pressure_safety",
@@ -136,6 +141,28 @@ RATED = (
         "pressure",
         reduction=Min(),
         local=True,
+    ),
+    *(
+        _borne(
+            f"{gear}_pitting_damage",
+            _of_gear(pitting_damage, number),
+            f"share of the life that pitting takes in 1e6 revolutions of the pinion, {gear}",
+            "pitting_exponent",
+            better="smaller",
+        )
+        for number, gear in enumerate(_GEARS)
+    ),
+    *(
+        _borne(
+            f"{gear}_root_damage",
+            _of_gear(root_damage, number),
+            f"share of the life that bending takes in 1e6 revolutions of the pinion, {gear}",
+            "bending_exponent",
+            reduction=Max(),
+            local=True,
+            better="smaller",
+        )
+        for number, gear in enumerate(_GEARS)
     ),
 )
 LUBRICANT_QUANTITIES = tuple(quantity.name for quantity in LUBRICATED)

@@ -31,6 +31,10 @@ class Strength(Checked):
             none of its own: sigma_FG of ISO 6336-3.
         wheel_bending: the same of the wheel; None for that of the pinion.
         pressure: largest pressure of the contact analysis that the flanks bear, tip edges included.
+        pitting_exponent: p of the Woehler line N = `pitting_cycles` (pitting / stress)^p of both gears, for damage.
+        pitting_cycles: that `pitting` is borne for.
+        bending_exponent: of the Woehler line of the tooth roots, likewise.
+        bending_cycles: that `bending` is borne for.
     """
 
     pitting: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
@@ -38,18 +42,27 @@ class Strength(Checked):
     bending: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
     wheel_bending: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
     pressure: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
+    pitting_exponent: Scalar | None = number("", low=1.0, high=100.0, optional=True, default=None)
+    pitting_cycles: Scalar | None = number("", low=0.0, open_low=True, optional=True, default=None)
+    bending_exponent: Scalar | None = number("", low=1.0, high=100.0, optional=True, default=None)
+    bending_cycles: Scalar | None = number("", low=0.0, open_low=True, optional=True, default=None)
 
     def check_together(self) -> None:
         for name in ("pitting", "bending"):
-            if getattr(self, name) is None and getattr(self, f"wheel_{name}") is not None:
-                raise ValueError(f"Strength: {name} must be given where wheel_{name} is")
+            exponent, cycles = f"{name}_exponent", f"{name}_cycles"
+            pairs = (f"wheel_{name}", name), (exponent, name), (exponent, cycles), (cycles, exponent)
+            for given, needed in pairs:
+                if getattr(self, given) is not None and getattr(self, needed) is None:
+                    raise ValueError(f"Strength: {needed} must be given where {given} is")
 
     def quantity(self, name: str) -> Quantity:
-        """A safety factor for objectives, constraints, sweeps and tables, with these strengths.
+        """A safety factor or damage for objectives, constraints, sweeps and tables, with these strengths.
 
         Args:
             name: "pinion_pitting_safety", "wheel_pitting_safety" (need `pitting`), "pinion_root_safety",
-                "wheel_root_safety" (need `bending`) or "pressure_safety" (needs `pressure`).
+                "wheel_root_safety" (need `bending`), "pressure_safety" (needs `pressure`), "pinion_pitting_damage",
+                "wheel_pitting_damage" (need `pitting_exponent`), "pinion_root_damage" or "wheel_root_damage" (need
+                `bending_exponent`).
 
         Raises:
             ValueError: for another name, and for a strength that is missing.
@@ -66,7 +79,7 @@ def safety_factor(borne: Real, reached: Real) -> Real:
 def pitting_safety(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
     """S_H of pinion and wheel: pitting strength over the nominal contact stress."""
     stress = nominal_contact_stress(cycle)
-    limits = _of_gears("pitting_safety", strength, "pitting")
+    limits = strengths_of("pitting_safety", strength, "pitting")
     return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
 
 
@@ -74,14 +87,14 @@ def pitting_safety(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar
 def root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Load, Load]:
     """S_F of pinion and wheel: bending strength over the root stress at every contact."""
     stress = root_stress(cycle)
-    limits = _of_gears("root_safety", strength, "bending")
+    limits = strengths_of("root_safety", strength, "bending")
     return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
 
 
 @over_batch
 def pressure_safety(cycle: MeshCycle, strength: Strength) -> Load:
     """p_lim / p at every contact, on the flanks and at the tip edges."""
-    limit = _given("pressure_safety", strength, "pressure")
+    limit = given_strength("pressure_safety", strength, "pressure")
     return safety_factor(limit, cycle.contact_pressure + cycle.corner_pressure)
 
 
@@ -92,7 +105,7 @@ def micropitting_safety(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     Raises:
         ValueError: for a lubricant without `permissible_film`.
     """
-    limit = _given("micropitting_safety", lubricant, "permissible_film")
+    limit = given_strength("micropitting_safety", lubricant, "permissible_film")
     return safety_factor(specific_film_thickness(cycle, lubricant), limit)
 
 
@@ -108,17 +121,19 @@ def scuffing_safety(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     References:
         ISO/TS 6336-20 (ISO/TR 13989-1), flash temperature method.
     """
-    limit = _given("scuffing_safety", lubricant, "scuffing_temperature")
+    limit = given_strength("scuffing_safety", lubricant, "scuffing_temperature")
     oil = lubricant.temperature
     return safety_factor(limit - oil, contact_temperature(cycle, lubricant) - oil)
 
 
-def _of_gears(owner: str, strength: Strength, name: str) -> tuple[Scalar, Scalar]:
-    pinion, wheel = _given(owner, strength, name), getattr(strength, f"wheel_{name}")
+def strengths_of(owner: str, strength: Strength, name: str) -> tuple[Scalar, Scalar]:
+    """That of pinion and wheel; raises a `ValueError` where there is none."""
+    pinion, wheel = given_strength(owner, strength, name), getattr(strength, f"wheel_{name}")
     return pinion, pinion if wheel is None else wheel
 
 
-def _given(owner: str, settings: Checked, name: str) -> Scalar:
+def given_strength(owner: str, settings: Checked, name: str) -> Scalar:
+    """A number of settings; raises a `ValueError` where it is not given."""
     value = getattr(settings, name)
     if value is None:
         raise ValueError(f"{owner}: needs {type(settings).__name__}.{name}")
