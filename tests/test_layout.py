@@ -222,7 +222,7 @@ def test_two_steps_keep_the_load_off_the_edges(layout):
 def test_a_load_that_is_not_found_is_not_level(layout):
     """Of traced shafts that cannot be: no flank line, no crowning, and an edge that nobody keeps the load off."""
     face = eqx.tree_at(lambda face: face.held, at_stations(SUPPORT, stations=STATIONS), jnp.zeros((), bool))
-    tolerance = flank_line_tolerance(SUPPORT.pair, 6, 130.0)
+    tolerance = flank_line_tolerance(SUPPORT.pair, 6, "class")
     line = level_load(face)
     assert np.isnan([line.slope, line.crowning, crowning_off_the_edges(face, tolerance)]).all()
     cases = tolerance_cases(face, tolerance)

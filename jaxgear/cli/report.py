@@ -4,7 +4,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 from rich.console import Console
 from rich.table import Table
 
@@ -108,10 +110,17 @@ def doubts(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, 
         options |= {"pinion": design.pinion, "wheel": design.wheel}
         options |= {"oil_friction": design.metrics.get("friction_coefficient")}
         options |= {"bulk_temperature": design.metrics.get("bulk_temperature_degC")}
-        options["given_way"] = float(np.mean(mesh.given_way(design.cycle.line_load)))
+        if mesh.support is not None:
+            options["given_way"] = float(_given_way(mesh, design.cycle.line_load))
         options["verified"] = design.verified and design.verified.ppte
         found[name] = plausibility(design.cycle, **options)
     return found
+
+
+@program
+def _given_way(mesh: Mesh, line_load) -> Float[Array, ""]:
+    """Mean transmission error that is that of what holds the gears [um]."""
+    return jnp.mean(mesh.given_way(line_load))
 
 
 def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
