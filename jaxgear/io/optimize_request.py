@@ -55,7 +55,7 @@ _QUICK: Mapping[str, dict[str, Any]] = {
     "free_form": {"points": 12, "steps": 10},
 }
 _QUICK_GEARS = 4
-_LASTING, _OVER_LIFE = "mean_ppte_over_life", {"starts": 1, "rounds": 1, "steps": 15}  # of the search over the life
+_LASTING, _OVER_LIFE = "mean_ppte_over_life", {"starts": 4, "rounds": 1, "steps": 15}  # of the search over the life
 
 
 @dataclasses.dataclass(frozen=True)
