@@ -12,12 +12,20 @@ def load_of(design: DesignFile, table: str, section: OptimizeSection | SweepSect
     """The load spectrum of a table; the design torque where it names no torques."""
     if section.torques is None:
         refuse_given(table, section, ["weights"], f" without {table}.torques")
-    torques = section.torques or [design.torque]
-    run_at = {"speeds": design.speed, "friction": design.friction}
-    load = refused(f"{table}.torques", LoadSpectrum, torques, **run_at)
-    if section.weights is None:
-        return load
-    return refused(f"{table}.weights", LoadSpectrum, torques, section.weights, **run_at)
+    return spectrum(design, table, section.torques or [design.torque], section.weights)
+
+
+def spectrum(
+    design: DesignFile,
+    table: str,
+    torques: list[float],
+    weights: list[float] | None,
+    speeds: list[float] | None = None,
+) -> LoadSpectrum:
+    """The load spectrum of keys of a table, at the speed of the file where it has no speeds of its own."""
+    run_at = {"speeds": design.speed if speeds is None else speeds, "friction": design.friction}
+    load = refused(f"{table}.{'torques' if speeds is None else 'speeds'}", LoadSpectrum, torques, **run_at)
+    return load if weights is None else refused(f"{table}.weights", LoadSpectrum, torques, weights, **run_at)
 
 
 def quality_classes(design: DesignFile) -> tuple[ToleranceClass, ToleranceClass] | None:

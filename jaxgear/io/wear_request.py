@@ -5,9 +5,10 @@ import dataclasses
 from ..conditions import LoadSpectrum
 from ..metrics import Quantity
 from ..wear import WEAR_QUANTITIES, Wear
+from .cases import spectrum
 from .design_file import DesignFile
 from .dynamics_request import dynamics_of
-from .errors import DesignFileError, naming, refuse_given, refused
+from .errors import DesignFileError, naming, refuse_given
 from .schema_wear import WearSection
 from .template import part_of
 
@@ -82,9 +83,4 @@ def _loads(design: DesignFile, section: WearSection) -> LoadSpectrum | None:
     for free in design.open_case:
         if free.key.startswith("load.") and free.key not in own:
             raise DesignFileError("wear.torques", f'{free.key} is the variable "{free.name}", which they do not follow')
-    speeds = design.speed if section.speeds is None else section.speeds
-    run_at = {"speeds": speeds, "friction": design.friction}
-    load = refused("wear.torques" if section.speeds is None else "wear.speeds", LoadSpectrum, section.torques, **run_at)
-    if section.weights is None:
-        return load
-    return refused("wear.weights", LoadSpectrum, section.torques, section.weights, **run_at)
+    return spectrum(design, "wear", section.torques, section.weights, section.speeds)

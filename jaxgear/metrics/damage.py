@@ -8,7 +8,6 @@ References:
     ISO 6336-6 (load spectra); ISO 6336-2 and -3 for the nominal stresses.
 """
 
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
@@ -31,8 +30,7 @@ def pitting_damage(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar
         ValueError: for a strength without `pitting` or without its Woehler line.
     """
     stress = nominal_contact_stress(cycle)
-    pinion, wheel = _damage(cycle, "pitting", strength, stress.pinion, stress.wheel)
-    return pinion, wheel
+    return _damage(cycle, "pitting", strength, stress.pinion, stress.wheel)
 
 
 @over_batch
@@ -45,16 +43,15 @@ def root_damage(cycle: MeshCycle, strength: Strength) -> tuple[Load, Load]:
         ValueError: for a strength without `bending` or without its Woehler line.
     """
     stress = root_stress(cycle)
-    pinion, wheel = _damage(cycle, "bending", strength, stress.pinion, stress.wheel)
-    return pinion, wheel
+    return _damage(cycle, "bending", strength, stress.pinion, stress.wheel)
 
 
-def _damage(cycle: MeshCycle, name: str, strength: Strength, *stresses):
+def _damage(cycle: MeshCycle, name: str, strength: Strength, pinion, wheel):
+    """Of both gears by their stresses."""
     owner = f"{name} damage"
     exponent, cycles = (given_strength(owner, strength, f"{name}_{part}") for part in ("exponent", "cycles"))
-    turns = jnp.ones(()), 1 / cycle.kinematics.pair.gear_ratio
-    borne = strengths_of(owner, strength, name)
-    return [
-        REVOLUTIONS * turned / cycles * (stress / limit) ** exponent
-        for turned, stress, limit in zip(turns, stresses, borne)
-    ]
+    limits = strengths_of(owner, strength, name)
+    of_pinion, of_wheel = (
+        REVOLUTIONS / cycles * (stress / limit) ** exponent for stress, limit in zip((pinion, wheel), limits)
+    )
+    return of_pinion, of_wheel / cycle.kinematics.pair.gear_ratio

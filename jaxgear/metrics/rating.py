@@ -4,6 +4,8 @@ A name alone does not say which: `Lubricant.quantity` and `Strength.quantity` gi
 the tables [lubricant] and [strength].
 """
 
+from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 from jaxtyping import Array, Float
@@ -48,11 +50,16 @@ def _borne(name: str, of: Any, meaning: str, needs: str, **options: Any) -> Quan
     return Quantity(name, stands, meaning=meaning, **{"better": "larger", **options})
 
 
-def _of_gear(of: Any, gear: int) -> Any:
-    return lambda cycle, strength: of(cycle, strength)[gear]
+def _of_gears(kind: str, of: Any, meaning: str, needs: str, **options: Any) -> Iterator[Quantity]:
+    """A quantity of pinion and wheel, which `of` gives together."""
+    for number, gear in enumerate(("pinion", "wheel")):
+        yield _borne(f"{gear}_{kind}", partial(_one, of, number), f"{meaning}, {gear}", needs, **options)
 
 
-_GEARS = "pinion", "wheel"
+def _one(of: Any, number: int, cycle: MeshCycle, strength: Any) -> Any:
+    return of(cycle, strength)[number]
+
+
 _LEAST: dict[str, Any] = {"reduction": Min(), "better": "larger"}
 
 LUBRICATED = (
@@ -114,26 +121,8 @@ LUBRICATED = (
     ),
 )
 RATED = (
-    *(
-        _borne(
-            f"{gear}_pitting_safety",
-            _of_gear(pitting_safety, number),
-            f"S_H, pitting strength over nominal contact stress, {gear}",
-            "pitting",
-        )
-        for number, gear in enumerate(_GEARS)
-    ),
-    *(
-        _borne(
-            f"{gear}_root_safety",
-            _of_gear(root_safety, number),
-            f"S_F, bending strength over root stress, {gear}",
-            "bending",
-            reduction=Min(),
-            local=True,
-        )
-        for number, gear in enumerate(_GEARS)
-    ),
+    *_of_gears("pitting_safety", pitting_safety, "S_H, pitting strength over nominal contact stress", "pitting"),
+    *_of_gears("root_safety", root_safety, "S_F, bending strength over root stress", "bending", **_LEAST, local=True),
     _borne(
         "pressure_safety",
         pressure_safety,
@@ -142,27 +131,21 @@ RATED = (
         reduction=Min(),
         local=True,
     ),
-    *(
-        _borne(
-            f"{gear}_pitting_damage",
-            _of_gear(pitting_damage, number),
-            f"share of the life that pitting takes in 1e6 revolutions of the pinion, {gear}",
-            "pitting_exponent",
-            better="smaller",
-        )
-        for number, gear in enumerate(_GEARS)
+    *_of_gears(
+        "pitting_damage",
+        pitting_damage,
+        "share of the life that pitting takes in 1e6 revolutions of the pinion",
+        "pitting_exponent",
+        better="smaller",
     ),
-    *(
-        _borne(
-            f"{gear}_root_damage",
-            _of_gear(root_damage, number),
-            f"share of the life that bending takes in 1e6 revolutions of the pinion, {gear}",
-            "bending_exponent",
-            reduction=Max(),
-            local=True,
-            better="smaller",
-        )
-        for number, gear in enumerate(_GEARS)
+    *_of_gears(
+        "root_damage",
+        root_damage,
+        "share of the life that bending takes in 1e6 revolutions of the pinion",
+        "bending_exponent",
+        reduction=Max(),
+        local=True,
+        better="smaller",
     ),
 )
 LUBRICANT_QUANTITIES = tuple(quantity.name for quantity in LUBRICATED)
