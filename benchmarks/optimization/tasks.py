@@ -37,7 +37,7 @@ class Task:
 
     def mesh(self, positions: int) -> jg.Mesh:
         """Prepared mesh with as few tooth pairs as the load needs."""
-        return jg.prepare(self.pair, resolution=jg.Resolution(positions, self.slices, jg.fewest_pairs(self.pair)))
+        return jg.prepare(self.pair, resolution=jg.Resolution(positions, self.slices, pairs=jg.fewest_pairs(self.pair)))
 
     @property
     def tolerance(self) -> jg.Tolerance:

@@ -21,9 +21,6 @@ class Resolution(Checked):
     Attributes:
         positions: mesh positions over one base pitch.
         slices: slices over the common face.
-        slice_widths: relative widths of the slices as whole numbers, from the negative end of the face to the positive
-            one; None for slices of equal width. What changes over a short piece of the face takes narrow slices there,
-            see `end_relief_widths`.
         pairs: tooth pairs carried along; None for as few as the gears and the load need, see `prepare`. Pair i runs at
             phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two base pitches on either side of the pitch
             point: contact ratios up to 3.
@@ -40,13 +37,13 @@ class Resolution(Checked):
         newton_steps: largest number of steps of the contact solution.
         rtol: residual at which the contact solution ends, relative to the transmission error and to the force;
             None for 1e-11 in double and 5e-6 in single precision.
+        slice_widths: relative widths of the slices as whole numbers, from the negative end of the face to the positive
+            one; None for slices of equal width. What changes over a short piece of the face takes narrow slices there,
+            see `end_relief_widths`.
     """
 
     positions: int = count(low=4, default=64)
     slices: int = count(default=1)
-    slice_widths: tuple[int, ...] | None = number(
-        "", low=1, high=_MOST_PARTS, whole=True, static=True, shape=("slices",), optional=True, default=None
-    )
     pairs: int | None = count(low=2, optional=True, default=None)
     patch_nodes: int = count(default=4)
     slide_steps: int | None = count(low=0, high=20, optional=True, default=None)
@@ -55,6 +52,9 @@ class Resolution(Checked):
     newton_steps: int = count(default=8)
     rtol: float | None = number(
         "", low=0.0, high=1.0, open_low=True, open_high=True, static=True, optional=True, default=None
+    )
+    slice_widths: tuple[int, ...] | None = number(
+        "", low=1, high=_MOST_PARTS, whole=True, static=True, shape=("slices",), optional=True, default=None
     )
 
     def check_together(self) -> None:
