@@ -1,5 +1,7 @@
 """Flank lines: what they level has closed forms, crowning keeps the load off the edges, lives add up, refusals."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -30,7 +32,7 @@ from jaxgear.layout import (
     without_housing,
 )
 from jaxgear.metrics.root_stress import root_factors
-from jaxgear.shafts import Housing, Misalignment, RigidSupport, annex_e, axis_tolerance, support
+from jaxgear.shafts import Housing, Misalignment, MountedGear, RigidSupport, annex_e, axis_tolerance, support
 from jaxgear.tolerance import ToleranceClass
 
 PAIR = jg.GearPair(PINION, WHEEL)
@@ -258,6 +260,29 @@ def test_usual_shafts_raise_no_doubt_and_slips_of_a_unit_do(layout):
     assert str(stiff[0]).startswith('bearing "C", radial stiffness 5e+05 N/um is more than 2e+04 (')
 
 
+def test_slips_that_the_load_does_not_show_raise_a_doubt(layout):
+    """Clearance and axes in mm, a bearing under the teeth, a gear that meshes with nothing."""
+    into, middle, out = BOX.shafts
+    middle = replace(middle, bearings=(replace(middle.bearings[0], clearance=0.01), middle.bearings[1]))
+    bearings = replace(out.bearings[0], position=105.0), out.bearings[1]
+    out = replace(out, bearings=bearings, gears=(*out.gears, MountedGear("idle", WHEEL, 40.0)))
+    meshes = BOX.meshes[0], replace(BOX.meshes[1], misalignment=Misalignment(direct=0.02))
+    box = replace(BOX, shafts=(into, middle, out), meshes=meshes)
+    cases = replace(layout.before["maximum"], slope=1e-3 * layout.before["maximum"].slope)
+    told = {
+        (each.name, each.where) for each in plausibility(replace(layout, before={"maximum": cases}), support(box, 1))
+    }
+    usual = {(each.name, each.where) for each in plausibility(layout, SUPPORT)}
+    assert told - usual == {
+        ("clearance", 'bearing "C"'),
+        ("distance from the face", 'bearing "E"'),
+        ("number of meshes", 'gear "idle"'),
+        ("shaft diameter over bore", 'gear "idle"'),
+        ("misalignment over the face", '"p2" and "w2"'),
+        ("misalignment over the face", "maximum deviations"),
+    }
+
+
 def test_crowning_grows_where_the_rule_does_not_suffice(layout):
     tolerance = FlankLineTolerance(30.0)
     given = layout_flank_lines(SUPPORT, tolerance, further=(1.0, 2.0), stations=STATIONS)
@@ -350,6 +375,16 @@ def test_layout_for_a_duty_cycle_tells_relative_lives():
     np.testing.assert_allclose(found.lives["tolerance"][:, 0], [one.life for one in found.damage[1:]], rtol=1e-9)
     uncrowned, crowned = found.worst_relative_life("tolerance")
     assert float(uncrowned) < float(crowned) < float(after)
+    # a life that is over before the hours are, and speeds of another unit
+    worst = found.damage[-1]
+    assert 0 < float(worst.largest) < 1
+    fast = replace(duty, speeds=1e3 * duty.speeds)
+    spent = replace(found, damage=(*found.damage[:2], replace(worst, pitting=worst.pitting * 1.5 / worst.largest)))
+    usual = {each.name for each in plausibility(found, SUPPORT, duty_cycle=duty)}
+    for layout, load, name in ((found, fast, "pitch line velocity"), (spent, duty, "damage by the duty cycle")):
+        (doubt,) = [each for each in plausibility(layout, SUPPORT, duty_cycle=load) if each.name not in usual]
+        assert doubt.name == name
+    assert doubt.value == pytest.approx(1.5) and doubt.where == "after step 2"
 
 
 def test_lives_in_cases_are_those_of_misaligned_axes():
