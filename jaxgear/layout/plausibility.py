@@ -13,6 +13,7 @@ from ..metrics import Doubt
 from ..metrics.plausibility import LIMITS as LIMITS_OF_MESH
 from ..metrics.plausibility import Limit
 from ..shafts import AbstractSupport, Gearbox, Shaft, ShaftSupport, bearing_reactions
+from ..shafts.places import tip_clearances
 from ..shafts.shaft import facts_of
 from .profiles import AMOUNTS, ProfileLayout
 from .steps import FlankLineLayout
@@ -40,6 +41,9 @@ LIMITS = {
         0.0, np.inf, "mm", "a bearing under the teeth holds a gear in its bore, but not a shaft: is its position right?"
     ),
     "number of meshes": Limit(1.0, np.inf, "", "it turns idle, no force acts on it: is a mesh missing?"),
+    "tip clearance": Limit(
+        0.0, np.inf, "mm", "they run into each other: are angles of the meshes and positions right?"
+    ),
     "shaft diameter over bore": Limit(
         0.0, 1.0, "", "only a gear that is cut into its shaft is on one thicker than its bore: integral?"
     ),
@@ -47,7 +51,8 @@ LIMITS = {
     "damage by the duty cycle": Limit(
         1e-12, 1.0, "", "1 is a used-up life: are torques in N m, endurance in MPa and cycles single ones?"
     ),
-    **{name: LIMITS_OF_MESH[name] for name in ("depth of the modification", "pitch line velocity")},
+    **{name: LIMITS_OF_MESH[name] for name in ("depth of the modification", "depth of the modification in modules")},
+    "pitch line velocity": LIMITS_OF_MESH["pitch line velocity"],
 }
 
 
@@ -76,7 +81,7 @@ def plausibility(
     if duty_cycle is not None:
         numbers += _of_duty_cycle(layout, duty_cycle)
     if profiles is not None:
-        numbers += _of_profiles(profiles)
+        numbers += _of_profiles(profiles, float(layout.pair.pinion.module))
     return tuple(each for each in numbers if not each.limit.low <= each.value <= each.limit.high)
 
 
@@ -127,11 +132,13 @@ def _of_bores(shaft: Shaft) -> Iterator[Doubt]:
 
 
 def _of_meshes(gearbox: Gearbox) -> Iterator[Doubt]:
-    """Gears that nothing meshes with, and axes that deviate by next to nothing."""
+    """Gears that nothing meshes with or that run into others, and axes that deviate by next to nothing."""
     names = [name for mesh in gearbox.meshes for name in (mesh.pinion, mesh.wheel)]
     for shaft in gearbox.shafts:
         for gear in shaft.gears:
             yield _doubt("number of meshes", f'gear "{gear.name}"', names.count(gear.name))
+    for where, room in tip_clearances(gearbox).items():
+        yield _doubt("tip clearance", where, room)
     for index, mesh in enumerate(gearbox.meshes):
         yield from _of_misalignment(
             f'"{mesh.pinion}" and "{mesh.wheel}"', mesh.misalignment.over_face(gearbox.pair(index))
@@ -161,8 +168,9 @@ def _velocity(pair: GearPair, speed) -> float:
     return 1e-3 * float(pair.pinion.pitch_radius) * 2 * np.pi / 60 * float(speed)
 
 
-def _of_profiles(profiles: ProfileLayout) -> Iterator[Doubt]:
+def _of_profiles(profiles: ProfileLayout, module: float) -> Iterator[Doubt]:
     for where, name in zip(("pinion", "wheel"), AMOUNTS):
         deepest = float(np.max(profiles.table.column(name)))
         if deepest > 0:
             yield _doubt("depth of the modification", where, deepest)
+        yield _doubt("depth of the modification in modules", where, 1e-3 * deepest / module)
