@@ -15,7 +15,7 @@ from jaxgear.shafts import (
     annex_e,
     axis_tolerance,
     face_load_factor,
-    iso_shaft_deformation,
+    iso_shaft_deflection,
     mesh_stiffness,
     method_c,
     root_face_load_factor,
@@ -129,7 +129,7 @@ def test_method_c_of_a_stiff_pair_meets_the_one_dimensional_analysis():
         np.testing.assert_allclose(factor, rigid(f).face_load_factor, rtol=1.5 / STATIONS)
     by_hand = 300.0 * 0.023 * (abs(1 + 0.8 * 200 * 10 / 60**2 * (60 / 55) ** 4 - 0.3) + 0.3) * (40 / 60) ** 2
     given = {"arrangement": "a", "span": 200.0, "offset": 10.0}
-    np.testing.assert_allclose(iso_shaft_deformation(300.0, 40.0, 60.0, 55.0, **given), by_hand, rtol=1e-12)
+    np.testing.assert_allclose(iso_shaft_deflection(300.0, 40.0, 60.0, 55.0, **given), by_hand, rtol=1e-12)
 
 
 def test_default_stiffness_is_that_of_the_standard():

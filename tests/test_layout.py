@@ -1,5 +1,8 @@
 """Flank lines: what they level has closed forms, crowning keeps the load off the edges, lives add up, refusals."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -30,7 +33,8 @@ from jaxgear.layout import (
     without_housing,
 )
 from jaxgear.metrics.root_stress import root_factors
-from jaxgear.shafts import Housing, Misalignment, RigidSupport, annex_e, axis_tolerance, support
+from jaxgear.shafts import Housing, Misalignment, MountedGear, RigidSupport, annex_e, axis_tolerance, support
+from jaxgear.shafts.places import axes_of, tip_clearances
 from jaxgear.tolerance import ToleranceClass
 
 PAIR = jg.GearPair(PINION, WHEEL)
@@ -258,6 +262,60 @@ def test_usual_shafts_raise_no_doubt_and_slips_of_a_unit_do(layout):
     assert str(stiff[0]).startswith('bearing "C", radial stiffness 5e+05 N/um is more than 2e+04 (')
 
 
+def test_slips_that_the_load_does_not_show_raise_a_doubt(layout):
+    """Clearance and axes in mm, a bearing under the teeth, a gear that meshes with nothing and hits another."""
+    into, middle, out = BOX.shafts
+    middle = replace(middle, bearings=(replace(middle.bearings[0], clearance=0.01), middle.bearings[1]))
+    bearings = replace(out.bearings[0], position=105.0), out.bearings[1]
+    out = replace(out, bearings=bearings, gears=(*out.gears, MountedGear("idle", WHEEL, 40.0)))
+    meshes = BOX.meshes[0], replace(BOX.meshes[1], misalignment=Misalignment(direct=0.02))
+    box = replace(BOX, shafts=(into, middle, out), meshes=meshes)
+    cases = replace(layout.before["maximum"], slope=1e-3 * layout.before["maximum"].slope)
+    told = {
+        (each.name, each.where) for each in plausibility(replace(layout, before={"maximum": cases}), support(box, 1))
+    }
+    usual = {(each.name, each.where) for each in plausibility(layout, SUPPORT)}
+    assert told - usual == {
+        ("clearance", 'bearing "C"'),
+        ("distance from the face", 'bearing "E"'),
+        ("number of meshes", 'gear "idle"'),
+        ("shaft diameter over bore", 'gear "idle"'),
+        ("tip clearance", 'gear "w1" and gear "idle"'),
+        ("misalignment over the face", '"p2" and "w2"'),
+        ("misalignment over the face", "maximum deviations"),
+    }
+    # of step 3, in mm on one gear and far too deep on the other
+    amounts = {"pinion_amount": np.array([0.0, 0.02]), "wheel_amount": np.array([0.0, 900.0])}
+    tried = SimpleNamespace(table=SimpleNamespace(column=amounts.get))
+    told = {(each.name, each.where) for each in plausibility(layout, SUPPORT, profiles=tried)}
+    deep = ("depth of the modification in modules", "wheel")
+    assert told - usual == {("depth of the modification", "pinion"), deep}
+
+
+def test_gears_need_room_beside_what_they_do_not_mesh_with():
+    """The output wheel folds back over the input shaft: it passes the pinion there, but neither a gear beside it nor a
+    shaft as thick as the room."""
+    folded = replace(BOX, meshes=(BOX.meshes[0], replace(BOX.meshes[1], angle=130.0)))
+    alpha, distance = np.deg2rad(130.0), 0.5 * 3.0 * 67
+    bent = distance * np.array([1 + np.cos(alpha), np.sin(alpha), 0.0])
+    np.testing.assert_allclose(axes_of(folded), [np.zeros(3), [distance, 0, 0], bent], atol=1e-12)
+    rooms = tip_clearances(folded)
+    assert not [name for name in rooms if name.count("gear") == 2]  # 32 mm lie between the faces
+    apart, tip = np.hypot(*bent[:2]), 0.5 * 3.0 * 50
+    np.testing.assert_allclose(rooms['shaft "in" and gear "w2"'], apart - tip - 12.5, rtol=1e-12)
+    assert min(rooms.values()) < 0 and [name for name, room in rooms.items() if room < 0] == [
+        'shaft "in" and gear "w2"'
+    ]
+    into, middle, out = folded.shafts
+    moved = replace(into, gears=(*into.gears, MountedGear("idle", PINION, 100.0)))
+    rooms = tip_clearances(replace(folded, shafts=(moved, middle, out)))
+    np.testing.assert_allclose(rooms['gear "idle" and gear "p2"'], distance - 3.0 * (19 + 2), rtol=1e-12)
+    np.testing.assert_allclose(rooms['gear "idle" and gear "w2"'], apart - tip - 0.5 * 3.0 * 21, rtol=1e-12)
+    # seen from the other end the shafts lie as they do
+    back = replace(folded, shafts=folded.shafts[::-1], direction="clockwise")
+    np.testing.assert_allclose(axes_of(back)[::-1] - axes_of(back)[-1], axes_of(folded), atol=1e-12)
+
+
 def test_crowning_grows_where_the_rule_does_not_suffice(layout):
     tolerance = FlankLineTolerance(30.0)
     given = layout_flank_lines(SUPPORT, tolerance, further=(1.0, 2.0), stations=STATIONS)
@@ -350,6 +408,16 @@ def test_layout_for_a_duty_cycle_tells_relative_lives():
     np.testing.assert_allclose(found.lives["tolerance"][:, 0], [one.life for one in found.damage[1:]], rtol=1e-9)
     uncrowned, crowned = found.worst_relative_life("tolerance")
     assert float(uncrowned) < float(crowned) < float(after)
+    # a life that is over before the hours are, and speeds of another unit
+    worst = found.damage[-1]
+    assert 0 < float(worst.largest) < 1
+    fast = replace(duty, speeds=1e3 * duty.speeds)
+    spent = replace(found, damage=(*found.damage[:2], replace(worst, pitting=worst.pitting * 1.5 / worst.largest)))
+    usual = {each.name for each in plausibility(found, SUPPORT, duty_cycle=duty)}
+    for layout, load, name in ((found, fast, "pitch line velocity"), (spent, duty, "damage by the duty cycle")):
+        (doubt,) = [each for each in plausibility(layout, SUPPORT, duty_cycle=load) if each.name not in usual]
+        assert doubt.name == name
+    assert doubt.value == pytest.approx(1.5) and doubt.where == "after step 2"
 
 
 def test_lives_in_cases_are_those_of_misaligned_axes():

@@ -2,12 +2,14 @@
 
 import csv
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from report_page import check_report
 from test_cli import call
 
+from jaxgear.cli.layout_report import failures
 from jaxgear.io import layout_request, load_design
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.layout import at_stations, layout_flank_lines
@@ -252,6 +254,20 @@ def test_an_analysis_stands_on_the_shafts_of_the_file(file):
     assert load_design(file(replaced("slices = 4\n", ""))).resolution().slices == 11
 
 
+PLASTIC = "[materials.pom]\nelastic_modulus = 3000.0\npoisson_ratio = 0.35\n"
+SOFT = replaced("bore_diameter = 24.0", 'bore_diameter = 24.0\nmaterial = "pom"')
+
+
+def test_a_shaft_is_of_its_own_material(file):
+    """Steel without a word; a gear that is cut into it is of the same, within what tables of steel differ by."""
+    of = [PLASTIC + SOFT.replace('name = "in"', 'name = "in"\nmaterial = "pom"'), FILE]
+    of.append(replaced("bore_diameter = 24.0", "bore_diameter = 24.0\nmaterial = { elastic_modulus = 210000.0 }"))
+    boxes = [load_design(file(text)).support.gearbox for text in of]
+    assert [float(box.shafts[0].material.elastic_modulus) for box in boxes] == [3000.0, 206000.0, 206000.0]
+    assert float(boxes[0].shafts[0].material.poisson_ratio) == 0.35
+    assert float(boxes[0].shafts[1].material.elastic_modulus) == 206000.0
+
+
 PLAY = "radial = 250.0, clearance = 10.0"
 RIGID = [
     (replaced("slices = 4", "slices = 1"), "resolution.slices = 1"),
@@ -327,6 +343,19 @@ WRONG = [
         "couplings have no torque of their own",
     ),
     (replaced('name = "D"', 'name = "A"'), 'shafts: bearing "A" is given twice'),
+    (
+        replaced("radial = 250.0, axial = 80.0", "stiffness = [[1.0, 0.0], [0.0]]"),
+        "shafts[0].bearings[0].stiffness: row 1 has 1 numbers, must have 2 as the first",
+    ),
+    (PLASTIC + SOFT, "shafts[0].gears[0].integral: a gear that is cut into its shaft is of its material, but these"),
+    (replaced('name = "in"', 'name = "in"\nmaterial = "stel"'), 'shafts[0].material: "stel" is not known'),
+    (replaced("radial = 250.0, axial", "radial = -250.0, axial"), "bearings[0].radial: -250 N/um must be at least 0"),
+    (replaced("position = 60.0, radial", "position = 140.0, radial"), 'bearings "A", "B" do not hold it'),
+    (replaced("position = 20.0, integral", "position = 5.0, integral"), 'gear "pinion" at -4 to 14 mm must lie within'),
+    (replaced("torque = 150.0 }]", "torque = -150.0 }]"), "the pinion of a mesh drives its wheel"),
+    (FILE + LIFE.replace("[1000.0, 50.0]", "[1000.0, -50.0]"), "layout.hours[1]: -50 h must be at least 0 h"),
+    (FILE + LIFE.replace("[900.0, 600.0]", "[900.0, 0.0]"), "layout.speeds[1]: 0 rpm must be greater than 0 rpm"),
+    (FILE + LIFE.replace("exponent = 13.2\n", ""), "layout.pitting.exponent: missing, this key is required"),
     (FILE + "torques = [10.0]\n", "layout.hours: missing, layout.torques needs it"),
     (FILE + "hours = [10.0]\n", "layout.hours: has no effect without layout.torques"),
     (FILE + LIFE.replace("[900.0, 600.0]", "[900.0]"), "layout.speeds: 1 numbers must be as many as the 2 torques"),
@@ -369,6 +398,14 @@ def test_what_is_wrong_is_one_line(file, tmp_path, text, housing, message):
     assert done.code == 2 and done.out == ""
     assert message in lines[-1] and lines[-1].startswith("jaxgear: error: ")
     assert not (tmp_path / "out").exists()
+
+
+def test_torques_without_a_load_over_the_face_are_told():
+    """Of shafts afloat in their clearances at some torques only."""
+    nothing: dict = {"layouts": {}, "contacts": {}, "profiles": {}}
+    over = {"unmodified": np.array([1.2, np.nan, 1.1]), "step 1": np.array([1.0, np.nan, 1.0])}
+    study = SimpleNamespace(**nothing, over_torque=over, request=SimpleNamespace(torques=np.array([50.0, 75.0, 100.0])))
+    assert list(failures(study)) == ["LOAD OVER THE FACE NOT FOUND at 75 N m"]
 
 
 def test_a_layout_needs_its_table(file, tmp_path):

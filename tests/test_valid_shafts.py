@@ -12,7 +12,7 @@ from test_shafts import PINION, TILTED, WHEEL, two_stages
 from test_supported_contact import PAIR, gearbox
 
 import jaxgear as jg
-from jaxgear.layout import Endurance, WoehlerLine, damage
+from jaxgear.layout import Endurance, WoehlerLine, damage, level_load
 from jaxgear.numerics import positive_definite, within_limits
 from jaxgear.shafts import (
     Bearing,
@@ -143,6 +143,26 @@ def test_a_batch_keeps_its_good_members():
     np.testing.assert_array_equal(converged, [[True, good, good] for good in (False, True, False, False)])
     np.testing.assert_array_equal(pitting[..., 0], 0.0)
     assert np.isnan(pitting[bad, :, 1]).all() and (pitting[1, :, 1] > 0).all()
+
+
+def test_gears_that_cannot_run_carry_no_load_whatever_holds_them():
+    """Traced ones with a pointed or an undercut pinion: not converged, as in the contact, and NaN."""
+
+    def of(shift):
+        box = eqx.tree_at(lambda box: box.shafts[0].gears[0].gear.profile_shift, gearbox(), shift)
+        pair = box.pair(0)
+        table = TabulatedSupport(pair, jnp.zeros((STATIONS, STATIONS)))
+        faces = [annex_e(each, torque=50.0, stations=STATIONS) for each in (RigidSupport(pair), table)]
+        faces.append(annex_e(support(box), stations=STATIONS))
+        loads = jnp.stack([jnp.append(face.line_load, face.approach) for face in faces])
+        slope = level_load(RigidSupport(pair), torque=50.0, stations=STATIONS).slope
+        return jg.margins(pair).valid, jnp.stack([face.converged for face in faces]), loads, slope
+
+    valid, converged, loads, slopes = jax.jit(jax.vmap(of))(jnp.array([0.0, 2.0, -0.8]))
+    np.testing.assert_array_equal(valid, [True, False, False])
+    np.testing.assert_array_equal(converged, np.repeat(valid[:, None], 3, axis=1))
+    assert np.isfinite(loads[0]).all() and np.isnan(loads[1:]).all()
+    assert np.isfinite(slopes[0]) and np.isnan(slopes[1:]).all()
 
 
 def test_a_shaft_afloat_carries_no_even_load():

@@ -68,7 +68,11 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
             if wanted.shafts:
                 contacts[name] = _contacts(request, mesh, layouts[name], profiles[name])
                 factors[name] = _factors(request, name, layouts[name], stations=size.slices)
-    unusual = {name: plausibility(layout, request.supports[name]) for name, layout in layouts.items()}
+    duty_cycle = request.options.get("duty_cycle")
+    unusual = {
+        name: plausibility(layout, request.supports[name], duty_cycle=duty_cycle, profiles=profiles.get(name))
+        for name, layout in layouts.items()
+    }
     return Study(design, request, layouts, over_torque, meshes, contacts, factors, profiles, unusual)
 
 

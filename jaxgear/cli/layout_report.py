@@ -50,6 +50,10 @@ def failures(study: Study) -> Iterator[str]:
             yield f"LOAD OVER THE FACE NOT FOUND: {name}; its numbers are not to be trusted"
         if layout.touches_edges:
             yield f"the largest load is at an edge: {name}"
+    known = np.isfinite(list(study.over_torque.values())).all(axis=0)
+    if not known.all():
+        missed = ", ".join(f"{torque:g}" for torque in study.request.torques[~known])
+        yield f"LOAD OVER THE FACE NOT FOUND at {missed} N m"
     for name, steps in study.contacts.items():
         for step, numbers in steps.items():
             if not np.isfinite(numbers["face_load_factor"]):

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry import GearPair
+from ..geometry import GearPair, Material
+from ..numerics import concrete
 from ..shafts import (
     Bearing,
     Coupling,
@@ -26,7 +27,7 @@ from ..shafts import (
 from ..shafts import Section as ShaftPart
 from . import schema_shafts as schema
 from .errors import DesignFileError, refuse_given, refused
-from .gears import Materials, fixed_gear, with_quality
+from .gears import Materials, fixed_gear, fixed_material, with_quality
 from .layout import section_of
 from .schema import FileSection
 from .template import part_of
@@ -34,6 +35,7 @@ from .toml import decode
 
 _OWN = "pinion", "wheel"
 _OF_PAIR = "center_distance", "axial_offset"
+_SAME_MATERIAL = 0.05  # relative, of elastic constants: as far as tables of steel differ
 _SAME_TORQUE = 1e-3  # relative; what is left is rounding of ratios written by hand
 
 
@@ -101,6 +103,7 @@ def support_of(
 
 def _shaft(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materials) -> Shaft:
     section = decode(key, table, schema.ShaftSection)
+    material = fixed_material(f"{key}.material", section.material, materials)
 
     def each(name, make):
         return [make(f"{key}.{name}[{i}]", item) for i, item in enumerate(getattr(section, name))]
@@ -111,9 +114,10 @@ def _shaft(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materi
         section.name,
         each("sections", lambda at, item: _plain(at, item, ShaftPart)),
         each("bearings", lambda at, item: _plain(at, item, MatrixBearing if "stiffness" in item else Bearing)),
-        each("gears", lambda at, item: _gear(at, item, pair, materials)),
+        each("gears", lambda at, item: _gear(at, item, pair, materials, material)),
         each("couplings", lambda at, item: _plain(at, item, Coupling)),
         each("loads", lambda at, item: _plain(at, item, ShaftLoad)),
+        material,
     )
 
 
@@ -122,7 +126,7 @@ def _plain(key: str, table: Mapping[str, Any], cls):
     return part_of(key, decode(key, table, section_of(cls, open=False)), cls).build({})
 
 
-def _gear(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materials) -> MountedGear:
+def _gear(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materials, of_shaft: Material) -> MountedGear:
     section = decode(key, table, schema.MountedGearSection)
     if section.name in _OWN:
         if section.gear is not None:
@@ -134,8 +138,20 @@ def _gear(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materia
         gear = fixed_gear(f"{key}.gear", section.gear, materials)
     if section.integral and section.body_diameter is not None:
         raise DesignFileError(f"{key}.body_diameter", "has no effect on an integral gear")
+    if section.integral and _differ(gear.material, of_shaft):
+        problem = "a gear that is cut into its shaft is of its material, but these differ: material of [[shafts]]"
+        raise DesignFileError(f"{key}.integral", problem)
     body = integral_diameter(gear) if section.integral else section.body_diameter
     return refused(key, MountedGear, section.name, gear, section.position, body)
+
+
+def _differ(one: Material, other: Material) -> bool:
+    """Whether elastic constants differ, as far as they are known."""
+    pairs = (
+        (concrete(one.elastic_modulus), concrete(other.elastic_modulus)),
+        (concrete(one.poisson_ratio), concrete(other.poisson_ratio)),
+    )
+    return any(a is not None and b is not None and not np.isclose(a, b, rtol=_SAME_MATERIAL) for a, b in pairs)
 
 
 def _mesh(key: str, table: Mapping[str, Any], pair: GearPair) -> GearMesh:

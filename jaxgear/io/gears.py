@@ -54,22 +54,34 @@ def fixed_gear(key: str, table: schema.Tables, materials: Materials) -> Gear:
     for name in _WITHOUT_FLANKS:
         if name in section.model_fields_set:
             raise DesignFileError(f"{key}.{name}", "has no effect, only pinion and wheel have flanks")
-    part = _gear(key, section, materials)
-    for free in part.free():
-        raise DesignFileError(free.key, not_of_kind("a number", free.name))
-    return part.build({})
+    return _fixed(_gear(key, section, materials))
 
 
 def _gear(key: str, section: schema.GearSection, materials: Materials) -> template.Part:
     gear = template.part_of(key, section, Gear, without=("material",))
     fields = {**gear.fields, **template.part_of(key, section, ToothThickness).fields}
-    if isinstance(section.material, str):
-        check_known(f"{key}.material", section.material, materials)
-        fields["material"] = materials[section.material]
-    elif section.material is not None:
-        fields["material"] = template.parse(f"{key}.material", section.material, Material)
+    if section.material is not None:
+        fields["material"] = _material(f"{key}.material", section.material, materials)
     # without any measure of a drawing the gear is the library's: messages then name its own fields
     return replace(gear, make=drawn_gear if set(fields) & set(fields_of(ToothThickness)) else Gear, fields=fields)
+
+
+def _material(key: str, given: str | schema.Tables, materials: Materials) -> template.Part:
+    if not isinstance(given, str):
+        return template.parse(key, given, Material)
+    check_known(key, given, materials)
+    return materials[given]
+
+
+def fixed_material(key: str, given: str | schema.Tables | None, materials: Materials) -> Material:
+    """A material of numbers, by its name or table; steel for None."""
+    return _fixed(_material(key, _STEEL if given is None else given, materials))
+
+
+def _fixed(part: template.Part) -> Any:
+    for free in part.free():
+        raise DesignFileError(free.key, not_of_kind("a number", free.name))
+    return part.build({})
 
 
 def pair_of(top: schema.FileSection, pinion: template.Part, wheel: template.Part) -> template.Part:

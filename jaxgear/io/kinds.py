@@ -116,6 +116,19 @@ def list_of(item: Kind, *, length: int | None = None, empty: bool = False) -> Ki
     return Kind(f"a list, each {item.words}", schema, item.number)
 
 
+def rows_of(item: Kind) -> Kind:
+    """A list of rows, lists that are as long as the first."""
+    rows = list_of(list_of(item))
+
+    def even(value: list[list[Any]]) -> list[list[Any]]:
+        for number, row in enumerate(value):
+            if len(row) != len(value[0]):
+                raise ValueError(f"row {number} has {len(row)} numbers, must have {len(value[0])} as the first")
+        return value
+
+    return Kind(rows.words, core_schema.no_info_after_validator_function(even, rows.schema), item.number)
+
+
 def table(item: Kind | None = None) -> Kind:
     """A table with keys of its own and values of one kind; None for a table that is looked into later."""
     keys = core_schema.str_schema()

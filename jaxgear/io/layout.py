@@ -16,7 +16,7 @@ import equinox as eqx
 from pydantic import BaseModel, ConfigDict, create_model
 
 from ..numerics import Number, fields_of
-from .kinds import Kind, choice, either, list_of, real, switch, table, text
+from .kinds import Kind, choice, either, list_of, real, rows_of, switch, table, text
 
 
 class Section(BaseModel):
@@ -135,9 +135,9 @@ def _number(number: Number, open: bool) -> Kind | None:
     kind = real(number, open=open and not (number.static or number.whole))
     if number.limits:
         return either(kind, list_of(kind, length=2), f"{kind.words}, or a list of both limits")
-    for _ in number.shape:
-        kind = list_of(kind)
-    return kind
+    if len(number.shape) == 2:
+        return rows_of(kind)
+    return list_of(kind) if number.shape else kind
 
 
 def _hint(cls, field: dataclasses.Field) -> Any:

@@ -49,7 +49,7 @@ class FileSection(Section):
         wheel: the driven gear.
         load: torque and speed.
         title: free text; the name of the file without it.
-        materials: of the gears, by names of the file's own; "STEEL" is known without it.
+        materials: of gears and shafts, by names of the file's own; "STEEL" is known without it.
         pair: how the gears are mounted.
         model: the stiffness model; the library's default without it.
         misalignment: of the axes; parallel ones without it.

@@ -36,6 +36,7 @@ class ShaftSection(Section):
         gears: on the shaft.
         couplings: where torque enters and leaves, each with `position` and `torque`; one of a gearbox has no torque.
         loads: from outside, each with `position`, `force` and `moment`.
+        material: of the shaft and what stiffens it, name in [materials] or elastic constants; "STEEL" without it.
     """
 
     name: Annotated[str, text()]
@@ -44,6 +45,7 @@ class ShaftSection(Section):
     gears: Annotated[list[Tables], _ROWS_OR_NONE] = []
     couplings: Annotated[list[Tables], _ROWS_OR_NONE] = []
     loads: Annotated[list[Tables], _ROWS_OR_NONE] = []
+    material: Annotated[Any, either(text(), table(), "the name of a material, or a table")] = None
 
 
 class MountedGearSection(section_of(MountedGear, ("name", "gear"), open=False)):  # type: ignore[misc]

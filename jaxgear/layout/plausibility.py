@@ -7,10 +7,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..conditions import LoadSpectrum
+from ..geometry import GearPair
 from ..metrics import Doubt
+from ..metrics.plausibility import LIMITS as LIMITS_OF_MESH
 from ..metrics.plausibility import Limit
 from ..shafts import AbstractSupport, Gearbox, Shaft, ShaftSupport, bearing_reactions
+from ..shafts.places import tip_clearances
 from ..shafts.shaft import facts_of
+from .profiles import AMOUNTS, ProfileLayout
 from .steps import FlankLineLayout
 
 # Of a load that falls straight to zero over m stations, K_Hbeta is 2 n / m, and 1 / 2 m of it below that at the end.
@@ -31,25 +36,52 @@ LIMITS = {
         0.0, 0.05, "", "about the backlash of a gear: center distance and contact ratio are those of shafts in place"
     ),
     "radial stiffness": Limit(1.0, 20_000.0, "N/um", "rolling bearings have ten to some thousands: is it in N/um?"),
+    "clearance": Limit(0.1, 500.0, "um", "rolling bearings have 2 to 100 um to either side: is it in um?"),
+    "distance from the face": Limit(
+        0.0, np.inf, "mm", "a bearing under the teeth holds a gear in its bore, but not a shaft: is its position right?"
+    ),
+    "number of meshes": Limit(1.0, np.inf, "", "it turns idle, no force acts on it: is a mesh missing?"),
+    "tip clearance": Limit(
+        0.0, np.inf, "mm", "they run into each other: are angles of the meshes and positions right?"
+    ),
     "shaft diameter over bore": Limit(
         0.0, 1.0, "", "only a gear that is cut into its shaft is on one thicker than its bore: integral?"
     ),
+    "misalignment over the face": Limit(0.1, np.inf, "um", "less than axes can be measured to: is it in mm?"),
+    "damage by the duty cycle": Limit(
+        1e-12, 1.0, "", "1 is a used-up life: are torques in N m, endurance in MPa and cycles single ones?"
+    ),
+    **{name: LIMITS_OF_MESH[name] for name in ("depth of the modification", "depth of the modification in modules")},
+    "pitch line velocity": LIMITS_OF_MESH["pitch line velocity"],
 }
 
 
-def plausibility(layout: FlankLineLayout, support: AbstractSupport) -> tuple[Doubt, ...]:
+def plausibility(
+    layout: FlankLineLayout,
+    support: AbstractSupport,
+    *,
+    duty_cycle: LoadSpectrum | None = None,
+    profiles: ProfileLayout | None = None,
+) -> tuple[Doubt, ...]:
     """What of a layout and of the shafts that it was made for is not usual; empty where nothing is.
 
     Args:
         layout: flank lines, not traced.
         support: that they were made for; bearings move under the torques of its couplings.
+        duty_cycle: for which they were made; None without one.
+        profiles: that were tried on them in step 3; None without it.
     """
-    numbers = [*_of_load(layout), *_of_flank_lines(layout)]
+    numbers = [*_of_load(layout), *_of_flank_lines(layout), *_of_axes(layout)]
     if isinstance(support, ShaftSupport):
         gearbox, module = support.gearbox, float(layout.pair.pinion.module)
         mesh = gearbox.meshes[support.mesh]
         own = [gearbox.shafts[gearbox.place(name)[0]] for name in (mesh.pinion, mesh.wheel)]
         numbers += [*_of_bearings(gearbox, own, module), *(each for shaft in own for each in _of_bores(shaft))]
+        numbers += _of_meshes(gearbox)
+    if duty_cycle is not None:
+        numbers += _of_duty_cycle(layout, duty_cycle)
+    if profiles is not None:
+        numbers += _of_profiles(profiles, float(layout.pair.pinion.module))
     return tuple(each for each in numbers if not each.limit.low <= each.value <= each.limit.high)
 
 
@@ -81,6 +113,14 @@ def _of_bearings(gearbox: Gearbox, shafts: list[Shaft], module: float) -> Iterat
         for stiffness in np.unique(np.diagonal(np.asarray(bearing.matrix))[:2]):
             if stiffness > 0:
                 yield _doubt("radial stiffness", where, stiffness)
+        if bearing.play is not None and bearing.play > 0:
+            yield _doubt("clearance", where, bearing.play)
+    for shaft in shafts:
+        for bearing in shaft.bearings:
+            beside = [
+                abs(float(bearing.position - gear.position)) - 0.5 * float(gear.gear.face_width) for gear in shaft.gears
+            ]
+            yield _doubt("distance from the face", f'bearing "{bearing.name}"', min(beside))
 
 
 def _of_bores(shaft: Shaft) -> Iterator[Doubt]:
@@ -89,3 +129,48 @@ def _of_bores(shaft: Shaft) -> Iterator[Doubt]:
         integral = body is not None and float(body) >= 2 * float(gear.root_circle_radius)
         if gear.bore_diameter is not None and not integral:
             yield _doubt("shaft diameter over bore", f'gear "{mounted.name}"', thickest / float(gear.bore_diameter))
+
+
+def _of_meshes(gearbox: Gearbox) -> Iterator[Doubt]:
+    """Gears that nothing meshes with or that run into others, and axes that deviate by next to nothing."""
+    names = [name for mesh in gearbox.meshes for name in (mesh.pinion, mesh.wheel)]
+    for shaft in gearbox.shafts:
+        for gear in shaft.gears:
+            yield _doubt("number of meshes", f'gear "{gear.name}"', names.count(gear.name))
+    for where, room in tip_clearances(gearbox).items():
+        yield _doubt("tip clearance", where, room)
+    for index, mesh in enumerate(gearbox.meshes):
+        yield from _of_misalignment(
+            f'"{mesh.pinion}" and "{mesh.wheel}"', mesh.misalignment.over_face(gearbox.pair(index))
+        )
+
+
+def _of_axes(layout: FlankLineLayout) -> Iterator[Doubt]:
+    for name, cases in layout.before.items():
+        _, both, apart, *_ = np.asarray(cases.slope)  # +f_Hb +f_ma, +f_Hb -f_ma
+        yield from _of_misalignment(f"{name} deviations", 0.5 * (both - apart))
+
+
+def _of_misalignment(where: str, value) -> Iterator[Doubt]:
+    if value != 0:
+        yield _doubt("misalignment over the face", where, abs(float(value)))
+
+
+def _of_duty_cycle(layout: FlankLineLayout, duty_cycle: LoadSpectrum) -> Iterator[Doubt]:
+    if duty_cycle.speeds is not None:
+        yield _doubt("pitch line velocity", "", _velocity(layout.pair, np.max(duty_cycle.speeds)))
+    if layout.damage and duty_cycle.duration is not None:
+        yield _doubt("damage by the duty cycle", "after step 2", layout.damage[-1].largest)
+
+
+def _velocity(pair: GearPair, speed) -> float:
+    """[m/s]"""
+    return 1e-3 * float(pair.pinion.pitch_radius) * 2 * np.pi / 60 * float(speed)
+
+
+def _of_profiles(profiles: ProfileLayout, module: float) -> Iterator[Doubt]:
+    for where, name in zip(("pinion", "wheel"), AMOUNTS):
+        deepest = float(np.max(profiles.table.column(name)))
+        if deepest > 0:
+            yield _doubt("depth of the modification", where, deepest)
+        yield _doubt("depth of the modification in modules", where, 1e-3 * deepest / module)

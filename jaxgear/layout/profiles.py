@@ -36,8 +36,8 @@ RESULTS = (
 )
 # By so much the effective contact ratio may be above the theoretical one: positions resolve ends of contact to less.
 _SHOCK = 0.01
-_NAMES = "pinion_amount", "wheel_amount"
-_UNITS = dict.fromkeys(_NAMES, "um")
+AMOUNTS = "pinion_amount", "wheel_amount"
+_UNITS = dict.fromkeys(AMOUNTS, "um")
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class ProfileLayout:
     @property
     def amounts(self) -> tuple[float, float]:
         """Of the variant that was chosen, on pinion and wheel [um]."""
-        first, second = (float(self.table.column(name)[self.best]) for name in _NAMES)
+        first, second = (float(self.table.column(name)[self.best]) for name in AMOUNTS)
         return first, second
 
     @property
@@ -80,7 +80,7 @@ class ProfileLayout:
         ppte = np.where(self.without_shock, self.table.column("ppte"), np.inf)
         ranked = [int(row) for row in np.argsort(ppte, kind="stable") if row and np.isfinite(ppte[row])]
         rows = list(dict.fromkeys([self.best, *ranked]))[:count]
-        first, second = (self.table.column(name) for name in _NAMES)
+        first, second = (self.table.column(name) for name in AMOUNTS)
         return [0, *rows], ["no profile modification", *(f"{first[row]:g} and {second[row]:g} µm" for row in rows)]
 
 
@@ -132,7 +132,7 @@ def vary_profiles(
     )
     rows = [(0.0, 0.0), *((first, second) for first in pinion_amounts for second in wheel_amounts)]
     wanted = (*RESULTS, *(one for one in results if one not in RESULTS))
-    plan = VariantList(_NAMES, rows)
+    plan = VariantList(AMOUNTS, rows)
     given = {"mesh": mesh, "torque": torque, "results": wanted, "units": _UNITS}
     table = sweep(design, plan, output=output, callback=callback, title="profile modifications", **given)
     theoretical = float(path_of_contact(mesh.pair).contact_ratio)
@@ -156,7 +156,7 @@ def flank_line_contact(
         kind: of the profile modifications that are varied elsewhere, which are zero here.
     """
     design = _Crossed(flank_lines, _Profile(kind, real(long_relief_length(mesh.pair)), None))
-    plan = VariantList(_NAMES, [(0.0, 0.0)])
+    plan = VariantList(AMOUNTS, [(0.0, 0.0)])
     table = sweep(design, plan, mesh=mesh, torque=torque, results=RESULTS, units=_UNITS)
     return {name: float(table.column(name)[0]) for name in table.results}
 
@@ -181,7 +181,7 @@ class _Crossed(eqx.Module):
     profile: _Profile
 
     def __call__(self, variant):
-        pinion, wheel = (line + self.profile(variant[name]) for line, name in zip(self.flank_lines, _NAMES))
+        pinion, wheel = (line + self.profile(variant[name]) for line, name in zip(self.flank_lines, AMOUNTS))
         return pinion, wheel
 
 

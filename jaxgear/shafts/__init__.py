@@ -22,7 +22,7 @@ from .gearbox import GearMesh as GearMesh
 from .housing import Housing as Housing
 from .housing_file import read_housing as read_housing
 from .housing_file import write_housing as write_housing
-from .iso_method_c import iso_shaft_deformation as iso_shaft_deformation
+from .iso_method_c import iso_shaft_deflection as iso_shaft_deflection
 from .iso_method_c import method_c as method_c
 from .mesh_support import AbstractSupport as AbstractSupport
 from .mesh_support import RigidSupport as RigidSupport

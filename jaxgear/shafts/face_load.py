@@ -35,7 +35,7 @@ class FaceLoad(Checked):
         deformation: by which shafts, bearings and housing open the gap under the line load.
         approach: of the flanks along the line of action.
         in_contact: stations that carry load.
-        converged: whether all contact conditions hold, and such a support can be.
+        converged: whether all contact conditions hold, such a support can be, and its gears can run.
     """
 
     face_coordinate: Slices = result("mm")
@@ -133,7 +133,7 @@ def annex_e(
 
     Returns:
         the load, differentiable; NaN and not `converged` where it has not been found, as of shafts afloat in their
-        bearings, and where traced shafts, bearings or housing cannot be.
+        bearings, and where traced gears, shafts, bearings or housing cannot be.
 
     Raises:
         ValueError: for a torque beside that of a gearbox, or without any; for numbers out of their range.

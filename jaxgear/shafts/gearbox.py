@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ..geometry import GearPair
+from ..geometry import GearPair, margins
 from ..numerics import Checked, concrete, number, program, within_limits
 from .housing import Housing
 from .matrices import semidefinite
@@ -97,7 +97,7 @@ class Gearbox(Checked):
     @property
     def valid(self) -> Bool[Array, ""]:
         """Whether such a gearbox can be, as far as numbers tell: every one in its range, shafts held, nothing beyond
-        their ends, the housing definite, faces that overlap, pinions that drive.
+        their ends, the housing definite, gears that can run with each other, pinions that drive.
 
         Concrete gearboxes that cannot be are refused; traced ones are flagged, and the load over the face of one that
         cannot be is not found.
@@ -168,7 +168,7 @@ def _valid(gearbox: Gearbox) -> Bool[Array, ""]:
     bearings = jnp.stack([bearing.matrix for shaft in gearbox.shafts for bearing in shaft.bearings])
     each = [within_limits(gearbox), jnp.all(jax.vmap(semidefinite)(bearings))]
     each += [shaft.valid for shaft in gearbox.shafts]
-    each += [gearbox.pair(index).face_overlap > 0 for index in range(len(gearbox.meshes))]
+    each += [margins(gearbox.pair(index)).valid for index in range(len(gearbox.meshes))]
     if gearbox.housing is not None:
         each.append(gearbox.housing.valid)
     return jnp.all(jnp.stack(each)) & jnp.all(gearbox.pinion_torques() >= 0)

@@ -31,7 +31,7 @@ _EFFECTS = {
     "helix_corrected_crowned": (0.1, 0.5),
     "end_relief": (0.7, 0.7),
 }
-_DEFORMATION = 0.023  # of an unmodified pair [um mm/N]
+_DEFLECTION = 0.023  # of an unmodified pair [um mm/N]
 _LEAST_PER_LOAD = 0.005  # F_betax,min per line load [um mm/N]
 _RUN_IN = 0.15  # y_beta over F_betax of surface-hardened flanks, up to
 _RUN_IN_MOST = 6.0  # [um]
@@ -39,7 +39,7 @@ _RUN_IN_CAST = 0.55
 _RUN_IN_SOFT = 320.0  # over sigma_Hlim [MPa]
 
 
-def iso_shaft_deformation(
+def iso_shaft_deflection(
     line_load, face_width, pitch_diameter, shaft_diameter, *, arrangement: Arrangement, span, offset, power_share=100.0
 ) -> Scalar:
     """f_sh, misalignment by bending and torsion of the pinion and its shaft [um over the face width].
@@ -59,25 +59,25 @@ def iso_shaft_deformation(
     """
     values = {"line_load": (line_load, "N/mm"), "offset": (offset, "mm")}
     for name, (value, unit) in values.items():
-        check("iso_shaft_deformation", name, value, unit, low=0.0)
+        check("iso_shaft_deflection", name, value, unit, low=0.0)
     sizes = {"face_width": face_width, "pitch_diameter": pitch_diameter, "shaft_diameter": shaft_diameter, "span": span}
     for name, value in sizes.items():
-        check("iso_shaft_deformation", name, value, "mm", low=0.0, open_low=True)
-    check("iso_shaft_deformation", "power_share", power_share, "%", low=0.0, high=100.0, open_low=True)
-    _check_choice("iso_shaft_deformation", "arrangement", arrangement, _ARRANGEMENTS)
+        check("iso_shaft_deflection", name, value, "mm", low=0.0, open_low=True)
+    check("iso_shaft_deflection", "power_share", power_share, "%", low=0.0, high=100.0, open_low=True)
+    _check_choice("iso_shaft_deflection", "arrangement", arrangement, _ARRANGEMENTS)
     ratio = real(pitch_diameter) / real(shaft_diameter)
     stiffened, plain = _ARRANGEMENTS[arrangement]
     lever = jnp.where(ratio >= _STIFFENED, stiffened, plain)
     through = 1 + 2 * (100 - real(power_share)) / real(power_share)
     bending = lever * real(span) * offset / real(pitch_diameter) ** 2 * ratio**4
     shape = jnp.abs(through + bending - 0.3) + 0.3
-    return real(line_load) * _DEFORMATION * shape * (real(face_width) / pitch_diameter) ** 2
+    return real(line_load) * _DEFLECTION * shape * (real(face_width) / pitch_diameter) ** 2
 
 
 def method_c(
     line_load,
     stiffness,
-    shaft_deformation,
+    shaft_deflection,
     misalignment,
     *,
     flank_line: FlankLine = "none",
@@ -92,7 +92,7 @@ def method_c(
     Args:
         line_load: F_m / b = F_t K_A K_v / b [N/mm].
         stiffness: c_gamma_beta [N/(mm um)].
-        shaft_deformation: f_sh [um], for instance `iso_shaft_deformation`.
+        shaft_deflection: f_sh [um], for instance `iso_shaft_deflection`.
         misalignment: f_ma [um].
         flank_line: what has been done about the flank line.
         helix_tolerance: f_Hbeta [um].
@@ -106,7 +106,7 @@ def method_c(
     check("method_c", "line_load", line_load, "N/mm", low=0.0, open_low=True)
     check("method_c", "stiffness", stiffness, "N/(mm um)", low=0.0, open_low=True)
     for name, value in (
-        ("shaft_deformation", shaft_deformation),
+        ("shaft_deflection", shaft_deflection),
         ("misalignment", misalignment),
         ("helix_tolerance", helix_tolerance),
     ):
@@ -114,7 +114,7 @@ def method_c(
     _check_choice("method_c", "flank_line", flank_line, _EFFECTS)
     first, second = _EFFECTS[flank_line]
     least = jnp.maximum(_LEAST_PER_LOAD * real(line_load), 0.5 * real(helix_tolerance))
-    initial = jnp.maximum(1.33 * first * real(shaft_deformation) + second * real(misalignment), least)
+    initial = jnp.maximum(1.33 * first * real(shaft_deflection) + second * real(misalignment), least)
     effective = initial - _running_in(initial, hardening, endurance_limit)
     # half the deviation is taken up by the mesh stiffness, unless that leaves part of the face without load
     share = effective * real(stiffness) / real(line_load)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..geometry import GearPair
+from ..geometry import GearPair, margins
 from ..numerics import Checked, concrete, number, program, real, whole, within_limits
 from .beam import twist
 from .equilibrium import solve
@@ -42,7 +42,7 @@ class AbstractSupport(Checked):
     @property
     @abstractmethod
     def valid(self) -> Bool[Array, ""]:
-        """Whether such a support can be: concrete ones that cannot are refused, traced ones flagged."""
+        """Whether such a support can be and its gears run: concrete ones are refused else, traced ones flagged."""
 
     @abstractmethod
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
@@ -71,8 +71,8 @@ class RigidSupport(AbstractSupport):
 
     @property
     def valid(self) -> Bool[Array, ""]:
-        """Whether all numbers are in their ranges."""
-        return within_limits(self)
+        """Whether all numbers are in their ranges and the gears can run."""
+        return within_limits(self) & margins(self.gears).valid
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
         """Zero."""
@@ -128,8 +128,8 @@ class TabulatedSupport(AbstractSupport):
 
     @property
     def valid(self) -> Bool[Array, ""]:
-        """Whether all numbers are in their ranges, and no eigenvalue of the matrix is negative."""
-        return within_limits(self) & semidefinite(symmetric(self.matrix))
+        """Whether all numbers are in their ranges, the gears can run, and no eigenvalue of the matrix is negative."""
+        return within_limits(self) & margins(self.gears).valid & semidefinite(symmetric(self.matrix))
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
         """`matrix`, its symmetric part.
