@@ -46,8 +46,8 @@ def left_out(design: DesignFile) -> str:
     if design.tolerance is None or design.wear is None or design.wear.line_load != "dynamic":
         return ""
     return (
-        "[tolerance] is not part of this analysis, the gears are perfect (lives under the motion are not worked out for "
-        'every manufactured pair): wear.line_load = "static" takes it'
+        "[tolerance] is not part of this analysis, the gears are perfect (lives under the motion are not worked out "
+        'for every manufactured pair): wear.line_load = "static" takes it'
     )
 
 
