@@ -180,7 +180,7 @@ def failures(study: Study) -> Iterator[str]:
             first = float(life.revolutions[int(lost.argmax())])
             yield (
                 f"NOT CONVERGED: {name} from {first:.3g} revolutions on; its numbers are not to be trusted. "
-                "Take more blocks, or raise resolution.newton_steps or resolution.pairs."
+                "Take more blocks, or raise resolution.newton_steps or resolution.pairs. Or teeth are worn through."
                 + _OF_MOTION
                 * (life.dynamic_factor is not None)
             )
