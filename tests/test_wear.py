@@ -118,6 +118,27 @@ def test_worn_volume_is_coefficient_times_force_times_sliding(mesh):
     np.testing.assert_allclose(volume, 1e6 * coefficients[:, None] * sliding, rtol=1e-10)
 
 
+@pytest.mark.parametrize(
+    "teeth, module, shift, widths, torque",
+    [((17, 41), 1.25, (0.3, 0.0), (8.0, 5.0), 4.0), ((41, 23), 6.0, (-0.1, 0.35), (60.0, 75.0), 1500.0)],
+)
+def test_any_pair_loses_what_its_forces_slide(teeth, module, shift, widths, torque):
+    """On the path of contact by the closed form of the sliding, every gear by its own coefficient and revolutions."""
+    wide = gear_pair(teeth, module, shift=shift, face_width=widths[0], bores=(None, None))
+    narrow = gear_pair(teeth, module, shift=shift, face_width=widths[1], bores=(None, None))
+    mesh = prepare(jg.GearPair(wide.pinion, narrow.wheel), resolution=SIZES)
+    coefficients, passages = np.array([1.3e-18, 0.4e-18]), 1e-3 * np.array([1.0, teeth[0] / teeth[1]])
+    life = life_of(mesh, torque, revolutions=1e-3, coefficient=coefficients)
+    path, piece = mesh.path_of_contact, float(mesh.path_of_contact.base_pitch) / 16
+    ends = np.clip(np.asarray(mesh.path)[..., None] + 0.5 * piece * np.array([-1, 1]), path.start, path.end)
+    sliding = np.diff(0.5 * ends * np.abs(ends), axis=-1)[..., 0]
+    sliding *= 1 / float(path.pinion_base_radius) + 1 / float(path.wheel_base_radius)
+    force = np.asarray(life.cycles.line_load)[0, :, 0] * min(widths)
+    assert life.known.all() and float(mesh.slice_width[0]) == min(widths)
+    expected = 1e6 * coefficients * passages * (force * sliding).sum()
+    np.testing.assert_allclose(worn_volume(life)[-1, :, 0], expected, rtol=1e-10)
+
+
 def test_an_even_load_wears_by_the_formula_at_every_point(equal):
     place = deposit(equal, jnp.asarray(TORQUE), 33)
     depth = np.asarray(worn(jnp.full((2, 1, 16), 100.0), 1e-18, place))[:, 0, 0]
