@@ -297,10 +297,28 @@ def test_failed_pairs_are_told_and_count_as_the_worst():
     told = wear_scatter.summary(samples)["manufactured"]
     assert told["failed"] == 1 and told["mean_ppte_over_life_um"]["q95"] == np.inf
     assert np.isnan(told["mean_ppte_over_life_um"]["mean"])
-    assert told["life_to_ppte_revolutions"]["q95"] == -np.inf
+    assert told["life_to_ppte_revolutions"]["half_last"] == 3e6  # two of three reach it
+    assert np.isnan(told["life_to_ppte_revolutions"]["95_percent_last"])
     fine = {name: values[:2] for name, values in samples.items()}
     assert not list(wear_scatter.failures({"relieved": fine}))
     assert wear_scatter.summary(fine)["manufactured"]["mean_ppte_over_life_um"]["mean"] == 1.5
+
+
+def test_so_many_pairs_last_so_long():
+    """At least 19 of 20 of them, exactly; lives that nobody follows further are no average with shorter ones."""
+    lives = {"mean_ppte_over_life": np.ones(40), "life_to_ppte": np.where(np.arange(40) < 2, 0.0, 2e7)}
+    told = wear_scatter.summary(lives)["manufactured"]["life_to_ppte_revolutions"]
+    assert told == {"half_last": 2e7, "95_percent_last": 2e7}
+    lives["life_to_ppte"][2] = 5.0
+    assert wear_scatter.summary(lives)["manufactured"]["life_to_ppte_revolutions"]["95_percent_last"] == 5.0
+
+
+def test_a_life_that_is_not_known_is_not_endless(file, tmp_path):
+    text = PAIR + TABLE.replace("1e-18", "1e-12")
+    done = call("wear", str(file(text)), "--output", str(tmp_path / "out"), "--no-figures")
+    assert done.code == 1 and "never" not in done.out and "NOT CONVERGED: unmodified from" in done.err
+    found = json.loads((tmp_path / "out" / "summary.json").read_text())["designs"]["unmodified"]
+    assert found["life_to_depth_revolutions"] is None
 
 
 def test_tolerances_are_left_out_under_the_dynamic_load_alone(file):

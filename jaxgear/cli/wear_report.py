@@ -143,7 +143,7 @@ def _torques(study: Study) -> str:
 def _cell(key: str, value: float) -> str:
     if not key.endswith("revolutions"):
         return f"{value:.3f}"
-    return f"{value:.3g}" if np.isfinite(value) else "never"
+    return "never" if np.isposinf(value) else f"{value:.3g}"  # NaN where the flanks are not known
 
 
 def verdict(study: Study) -> Iterator[str]:

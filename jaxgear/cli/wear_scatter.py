@@ -120,7 +120,7 @@ def tables(design: DesignFile, settings: Wear, scatters: Mapping[str, Samples]) 
         result.add_column(heading, justify="right")
     for name, samples in scatters.items():
         cells = [f"{of(samples, key):.3f}" for key in (_PPTE, _DEPTH) for of in (_mean, _bound)]
-        cells += [_life(settings, key, _bound(samples, key)) for key in lives]
+        cells += [_life(settings, key, _lasts(samples, key, _LEVEL)) for key in lives]
         result.add_row(name, *cells, str(failed(samples)))
     yield result
 
@@ -147,12 +147,12 @@ def failures(scatters: Mapping[str, Samples]) -> Iterator[str]:
 
 
 def summary(samples: Samples) -> dict[str, Any]:
-    """The scatter of a design as plain data; q95 is what 95 % of the pairs do not pass on its bad side."""
+    """The scatter of a design as plain data; q95 is what 95 % of the pairs do not pass."""
     found: dict[str, Any] = {"pairs": len(samples[_PPTE]), "failed": failed(samples)}
     for name in samples:
         values, key = samples[name], f"{name}_{WEAR_QUANTITIES[name].unit}"
         if name in _LIVES:  # which nobody follows for ever: their mean would be that of the time looked at
-            found[key] = {"median": _bound(samples, name, 0.5), "q95": _bound(samples, name)}
+            found[key] = {"half_last": _lasts(samples, name, 0.5), "95_percent_last": _lasts(samples, name, _LEVEL)}
             continue
         found[key] = {"mean": _mean(samples, name), "std": float(np.std(values, ddof=1)), "q95": _bound(samples, name)}
     return {"manufactured": found}
@@ -178,16 +178,25 @@ def _mean(samples: Samples, name: str) -> float:
     return float(np.mean(samples[name]))
 
 
-def _bound(samples: Samples, name: str, level: float = _LEVEL) -> float:
-    return float(ranked(Quantile(real(level)), samples[name], WEAR_QUANTITIES[name].better))
+def _bound(samples: Samples, name: str) -> float:
+    return float(ranked(Quantile(real(_LEVEL)), samples[name], WEAR_QUANTITIES[name].better))
+
+
+def _lasts(samples: Samples, name: str, share: float) -> float:
+    """The longest life of a pair that at least a share of the pairs reach; NaN where failed ones are among the others.
+
+    No mean of the lives about that place, as quantiles are elsewhere: many are zero, or as long as anybody has looked.
+    """
+    values = samples[name]
+    lives = np.sort(np.where(np.isfinite(values), values, -np.inf))
+    found = float(lives[int((1 - share) * len(lives) + 1e-9)])
+    return found if np.isfinite(found) else np.nan
 
 
 def _life(settings: Wear, name: str, value: float) -> str:
     """Revolutions; beyond what is looked at nobody knows more."""
     most = _LIVES[name][1] * float(settings.revolutions)
-    if value >= most:
-        return f"> {most:.3g}"
-    return f"{value:.3g}" if value >= 1 else "0"
+    return f"> {most:.3g}" if value >= most else f"{value:.3g}"
 
 
 def _pairs(design: DesignFile, scatters: Mapping[str, Samples]) -> str:
