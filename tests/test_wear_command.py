@@ -257,21 +257,21 @@ def test_the_command_shows_the_dynamic_factor(file, tmp_path):
 TOLERANCE = "[tolerance]\nquality_class = 7\nsamples = 3\n"
 
 
-def scatter(design, flanks):
+def scatter(design, flanks, kept):
     """Lives of the manufactured pairs of a file, with reliefs of one height."""
     sizes = dataclasses.replace(design.resolution(), positions=8)  # of a program that compiles quickly
     mesh, settings = design.mesh(sizes), wear_request(design).settings
     relief = jg.TipRelief(flanks, 2.0)
-    kept = lambda made_of, make: make()  # noqa: E731
     designs = {"relieved": (relief, relief)}
     found = wear_scatter.scattered(design, settings, mesh, designs, tolerance_of(design), kept, quick=False)
     return mesh, relief, found["relieved"]
 
 
-def test_manufactured_pairs_live_as_their_deviations_let_them(file):
+def test_manufactured_pairs_live_as_their_deviations_let_them(file, tmp_path, monkeypatch):
     """Each is the life of the gears that `sample_deviations` draws; finer gears scatter less."""
     design = load_design(file(PAIR + TABLE + TOLERANCE))
-    mesh, relief, found = scatter(design, 5.0)
+    kept = Kept(tmp_path / ".runs", wear_scatter.Arrays())
+    mesh, relief, found = scatter(design, 5.0, kept)
     assert list(found) == ["mean_ppte_over_life", "wear_depth", "life_to_depth"]
     drawn = sample_deviations(tolerance_of(design), mesh, 3, seed=0)
     options = {"pinion": relief, "wheel": relief}
@@ -285,9 +285,13 @@ def test_manufactured_pairs_live_as_their_deviations_let_them(file):
         assert found["wear_depth"][number] == pytest.approx(float(wear_depth(life)[-1]), rel=1e-6)
         assert found["mean_ppte_over_life"][number] == pytest.approx(float(mean_over_life(life, "ppte")), rel=1e-6)
     assert np.ptp(found["mean_ppte_over_life"]) > 1.0
-    _, _, finer = scatter(load_design(file(PAIR + TABLE + TOLERANCE.replace("7", "1"))), 5.0)
+    _, _, finer = scatter(load_design(file(PAIR + TABLE + TOLERANCE.replace("7", "1"))), 5.0, kept)
     # an eighth of the limits, but for their rounding
     assert np.ptp(finer["mean_ppte_over_life"]) < 0.5 * np.ptp(found["mean_ppte_over_life"])
+    monkeypatch.setattr(wear_scatter, "_numbers", None)  # after Ctrl-C nothing is worn again
+    _, _, again = scatter(design, 5.0, kept)
+    assert list(again) == list(found)
+    assert all((again[name] == found[name]).all() for name in found)
 
 
 def test_failed_pairs_are_told_and_count_as_the_worst():
@@ -311,6 +315,13 @@ def test_so_many_pairs_last_so_long():
     assert told == {"half_last": 2e7, "95_percent_last": 2e7}
     lives["life_to_ppte"][2] = 5.0
     assert wear_scatter.summary(lives)["manufactured"]["life_to_ppte_revolutions"]["95_percent_last"] == 5.0
+
+
+def test_overlong_blocks_are_a_failure(file, tmp_path):
+    """As quantities are no numbers then: flanks that wear ten times as much in two blocks overshoot."""
+    text = PAIR + TABLE.replace("1e-18", "1e-17").replace("blocks = 4", "blocks = 2")
+    done = call("wear", str(file(text)), "--output", str(tmp_path / "out"), "--no-figures")
+    assert done.code == 1 and "BLOCKS TOO LONG: unmodified, flanks overshoot" in done.err
 
 
 def test_a_life_that_is_not_known_is_not_endless(file, tmp_path):

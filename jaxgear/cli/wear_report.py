@@ -15,6 +15,7 @@ from ..io import DesignFile, WearRequest, describe
 from ..metrics import quantity_of
 from ..microgeometry import AbstractModification
 from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, wear_depth, worn_volume
+from ..wear.quantities import blocks_are_short
 from . import manufactured, report, wear_scatter
 from .geometry import geometry
 from .written import versions
@@ -172,7 +173,7 @@ def _sought(study: Study) -> str:
 
 
 def failures(study: Study) -> Iterator[str]:
-    """A line for every design whose contact was not found at some life."""
+    """A line for every design whose contact was not found at some life, or whose blocks were too long."""
     for name, life in study.lives.items():
         found = np.asarray(life.cycles.converged)
         lost = ~found.reshape(len(found), -1).all(axis=1)
@@ -184,6 +185,8 @@ def failures(study: Study) -> Iterator[str]:
                 + _OF_MOTION
                 * (life.dynamic_factor is not None)
             )
+        elif not blocks_are_short(life):
+            yield f"BLOCKS TOO LONG: {name}, flanks overshoot; its numbers are not to be trusted. Take more blocks."
     yield from wear_scatter.failures(study.scatters)
 
 

@@ -107,11 +107,11 @@ def _number(given: WithSettings, cycle: MeshCycle):
 
 def number_of(name: str, life: WearLife, settings: Any) -> Float[Array, ""]:
     """A quantity of a life that was worn by `Wear` settings; NaN as `Wear.quantity` says."""
-    usable = jnp.all(solved(life.cycles)) & (name == _ERROR or _is_fine(life))
+    usable = jnp.all(solved(life.cycles)) & (name == _ERROR or blocks_are_short(life))
     return jnp.where(usable, WEAR_QUANTITIES[name].of(life, settings), jnp.nan)
 
 
-def _is_fine(life: WearLife) -> Bool[Array, ""]:
+def blocks_are_short(life: WearLife) -> Bool[Array, ""]:
     """Whether the blocks are short enough for the depth to mean something."""
     worn = jnp.sum(life.depth, axis=2)
     deflection = life.cycles.transmission_error[0] - life.cycles.unloaded_transmission_error[0]
