@@ -230,6 +230,7 @@ def test_all_result_files_are_there(folder, analyzed, optimized):
     of_others |= {"shaft_deflection.png"}
     of_others |= {"life.csv", "worn_flanks.csv", "worn_flanks.parquet", "worn_pinion.png", "worn_wheel.png"}
     of_others |= {"ppte_over_life.png", "depth_over_life.png", "dynamic_factor_over_life.png"}  # of `jaxgear wear`
+    of_others |= {"life_ppte_distribution.png"}
     assert {path.name for path in (folder / "optimized").iterdir()} == RESULT_FILES - of_others
     assert {path.name for path in (folder / "analyzed").iterdir()} == {"summary.json", "flanks.csv", "report.html"}
     for path in (folder / "optimized").glob("*.png"):

@@ -11,6 +11,7 @@ from catalogue import gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear.conditions import solved
+from jaxgear.geometry import tooth_thickness
 from jaxgear.wear import (
     life_to,
     life_to_depth,
@@ -25,9 +26,10 @@ from jaxgear.wear import (
 from jaxgear.wear import wear as worn_flanks
 from jaxgear.wear.archard import worn
 from jaxgear.wear.case import case_of, marched
-from jaxgear.wear.deposit import deposit
+from jaxgear.wear.deposit import deposit, grid
 from jaxgear.wear.life import life_of as life_from
 from jaxgear.wear.march import Analysis, march
+from jaxgear.wear.worn_flank import worn_through
 
 # contacts that stay at their nominal places: sliding down a kinked flank they see rounding, by up to 1e-3 um
 SIZES = jg.Resolution(positions=16, pairs=2, slide_steps=0)
@@ -116,6 +118,27 @@ def test_worn_volume_is_coefficient_times_force_times_sliding(mesh):
     np.testing.assert_allclose(volume, 1e6 * coefficients[:, None] * sliding, rtol=1e-10)
 
 
+@pytest.mark.parametrize(
+    "teeth, module, shift, widths, torque",
+    [((17, 41), 1.25, (0.3, 0.0), (8.0, 5.0), 4.0), ((41, 23), 6.0, (-0.1, 0.35), (60.0, 75.0), 1500.0)],
+)
+def test_any_pair_loses_what_its_forces_slide(teeth, module, shift, widths, torque):
+    """On the path of contact by the closed form of the sliding, every gear by its own coefficient and revolutions."""
+    wide = gear_pair(teeth, module, shift=shift, face_width=widths[0], bores=(None, None))
+    narrow = gear_pair(teeth, module, shift=shift, face_width=widths[1], bores=(None, None))
+    mesh = prepare(jg.GearPair(wide.pinion, narrow.wheel), resolution=SIZES)
+    coefficients, passages = np.array([1.3e-18, 0.4e-18]), 1e-3 * np.array([1.0, teeth[0] / teeth[1]])
+    life = life_of(mesh, torque, revolutions=1e-3, coefficient=coefficients)
+    path, piece = mesh.path_of_contact, float(mesh.path_of_contact.base_pitch) / 16
+    ends = np.clip(np.asarray(mesh.path)[..., None] + 0.5 * piece * np.array([-1, 1]), path.start, path.end)
+    sliding = np.diff(0.5 * ends * np.abs(ends), axis=-1)[..., 0]
+    sliding *= 1 / float(path.pinion_base_radius) + 1 / float(path.wheel_base_radius)
+    force = np.asarray(life.cycles.line_load)[0, :, 0] * min(widths)
+    assert life.known.all() and float(mesh.slice_width[0]) == min(widths)
+    expected = 1e6 * coefficients * passages * (force * sliding).sum()
+    np.testing.assert_allclose(worn_volume(life)[-1, :, 0], expected, rtol=1e-10)
+
+
 def test_an_even_load_wears_by_the_formula_at_every_point(equal):
     place = deposit(equal, jnp.asarray(TORQUE), 33)
     depth = np.asarray(worn(jnp.full((2, 1, 16), 100.0), 1e-18, place))[:, 0, 0]
@@ -189,6 +212,10 @@ def test_half_of_the_revolutions_of_a_spectrum_without_load_wear_nothing(mesh, l
     np.testing.assert_allclose(half.depth, life.depth, rtol=1e-9, atol=1e-12)
     assert over_life(half, "mean_te").shape == (BLOCKS + 1,)
     np.testing.assert_allclose(over_life(half, "mean_te"), np.asarray(half.cycles.transmission_error).mean((1, 2)))
+    # where the contact under one of the loads was not found, nothing is known of the flanks under both
+    lost = eqx.tree_at(lambda life: life.cycles.converged, half, half.cycles.converged.at[3, 1].set(False))
+    assert np.isnan(over_life(lost, "ppte")).tolist() == [life == 3 for life in range(BLOCKS + 1)]
+    assert np.isnan(life_to(lost, "ppte", 1e3)) and np.isnan(mean_over_life(lost, "ppte"))
 
 
 @pytest.fixture(scope="module")
@@ -479,6 +506,34 @@ def test_no_step_wears_more_than_the_increment(mesh, life):
     assert steps.revolutions[-1] == REVOLUTIONS
     error = np.abs(np.asarray(steps.depth[-1] - life.depth[-1]).sum(axis=1)).max()
     assert error < float(life.error[-1] + steps.error[-1])
+
+
+def test_teeth_that_are_worn_through_are_told(mesh):
+    """Depth over base radius is an angle by which the flank turns; at half of the tip's it is half through."""
+    lengths = grid(mesh, 9)
+    for number, gear in enumerate((mesh.pair.pinion, mesh.pair.wheel)):
+        tip = float(tooth_thickness(gear, gear.tip_diameter))
+        arc = 2e3 * tip * float(gear.base_radius) / float(gear.tip_diameter)
+        for share, gone in ((0.99, False), (1.01, True)):
+            # two parts of the depth, on one of two slices
+            depth = jnp.zeros((2, 2, 2, 9)).at[number, :, 1, -1].set(0.5 * share * arc)
+            assert bool(worn_through(mesh.pair, lengths, depth)) == gone
+
+
+def test_what_is_worn_through_is_not_worn_on(mesh):
+    """A slip of four powers of ten in the coefficient ends after some blocks, with numbers up to there."""
+    blocks = []
+    options = {"coefficient": 1e4 * COEFFICIENT, "largest_increment": 60.0}
+    life = wear_in_steps(mesh, TORQUE, REVOLUTIONS, callback=lambda *given: blocks.append(given), **options)
+    known = np.asarray(life.known)
+    tip = [float(tooth_thickness(gear, gear.tip_diameter)) for gear in life.gears]
+    assert known[0] and not known[-1] and life.revolutions[-1] == REVOLUTIONS == blocks[-1][0]
+    assert 100 < float(np.nanmax(wear_depth(life))) < 4e3 * max(tip)
+    assert len(known) < 200 and known.tolist() == sorted(known, reverse=True)
+    assert np.isnan(over_life(life, "ppte")).tolist() == (~known).tolist()
+    assert np.isnan(life_to_depth(life, 1e6)) and 0 < float(life_to_depth(life, 5.0)) < float(
+        life.revolutions[known][-1]
+    )
 
 
 def test_steps_refuse_in_one_line(mesh):

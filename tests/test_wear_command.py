@@ -6,6 +6,7 @@ import json
 from types import SimpleNamespace
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -15,8 +16,10 @@ from test_cli import call
 
 import jaxgear as jg
 from jaxgear import plot
+from jaxgear.cli import wear_scatter
 from jaxgear.cli.compared import sought
 from jaxgear.cli.kept import Kept, Marches
+from jaxgear.contact import removed_material
 from jaxgear.io import (
     DesignFileError,
     load_design,
@@ -27,8 +30,10 @@ from jaxgear.io import (
     wear_request,
     write_worn,
 )
+from jaxgear.io.cases import tolerance_of
 from jaxgear.io.folder import RESULT_FILES
-from jaxgear.wear import March, over_life, wear, wear_depth, wear_in_steps
+from jaxgear.tolerance import deviated_material, sample_deviations
+from jaxgear.wear import March, mean_over_life, over_life, wear, wear_depth, wear_in_steps
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -235,16 +240,111 @@ def test_dynamic_factors_over_the_life_are_results_of_a_file(file):
 @pytest.mark.slow
 def test_the_command_shows_the_dynamic_factor(file, tmp_path):
     folder = tmp_path / "out"
-    done = call("wear", str(file(FAST + DYNAMICS + DYNAMIC)), "--output", str(folder))
+    done = call("wear", str(file(FAST + DYNAMICS + DYNAMIC + TOLERANCE)), "--output", str(folder))
     assert done.code == 0, done.err
+    assert "[tolerance] is not part of this analysis" in done.err
     assert "K_v worst" in done.out and "dynamic line load at 6000 rpm" in done.out
     assert (folder / "dynamic_factor_over_life.png").exists()
     found = json.loads((folder / "summary.json").read_text())
+    assert found["left_out"].startswith("[tolerance] is not part") and "tolerances" not in found
     assert found["settings"]["line_load"] == "dynamic" and found["settings"]["dynamics"]["positions"] == 16
     with (folder / "life.csv").open() as lines:
         factors = [float(row["dynamic_factor"]) for row in csv.DictReader(lines) if row["design"] == "unmodified"]
     assert len(factors) == 5 and min(factors) > 1.0
     assert found["designs"]["unmodified"]["max_dynamic_factor_over_life"] == pytest.approx(max(factors), rel=1e-6)
+
+
+TOLERANCE = "[tolerance]\nquality_class = 7\nsamples = 3\n"
+
+
+def scatter(design, flanks, kept):
+    """Lives of the manufactured pairs of a file, with reliefs of one height."""
+    sizes = dataclasses.replace(design.resolution(), positions=8)  # of a program that compiles quickly
+    mesh, settings = design.mesh(sizes), wear_request(design).settings
+    relief = jg.TipRelief(flanks, 2.0)
+    designs = {"relieved": (relief, relief)}
+    found = wear_scatter.scattered(design, settings, mesh, designs, tolerance_of(design), kept, quick=False)
+    return mesh, relief, found["relieved"]
+
+
+def test_manufactured_pairs_live_as_their_deviations_let_them(file, tmp_path, monkeypatch):
+    """Each is the life of the gears that `sample_deviations` draws; finer gears scatter less."""
+    design = load_design(file(PAIR + TABLE + TOLERANCE))
+    kept = Kept(tmp_path / ".runs", wear_scatter.Arrays())
+    mesh, relief, found = scatter(design, 5.0, kept)
+    assert list(found) == ["mean_ppte_over_life", "wear_depth", "life_to_depth"]
+    drawn = sample_deviations(tolerance_of(design), mesh, 3, seed=0)
+    options = {"pinion": relief, "wheel": relief}
+    for number in range(3):
+        deviation = jax.tree.map(lambda leaf, number=number: leaf[number], drawn)
+        off = (
+            deviated_material(mesh, 150.0, deviation, **options).amount
+            - removed_material(mesh, 150.0, **options).amount
+        )
+        life = wear_in_steps(mesh, 150.0, 2e7, coefficient=1e-18, blocks=4, deviation=off, **options)
+        assert found["wear_depth"][number] == pytest.approx(float(wear_depth(life)[-1]), rel=1e-6)
+        assert found["mean_ppte_over_life"][number] == pytest.approx(float(mean_over_life(life, "ppte")), rel=1e-6)
+    assert np.ptp(found["mean_ppte_over_life"]) > 1.0
+    _, _, finer = scatter(load_design(file(PAIR + TABLE + TOLERANCE.replace("7", "1"))), 5.0, kept)
+    # an eighth of the limits, but for their rounding
+    assert np.ptp(finer["mean_ppte_over_life"]) < 0.5 * np.ptp(found["mean_ppte_over_life"])
+    monkeypatch.setattr(wear_scatter, "_numbers", None)  # after Ctrl-C nothing is worn again
+    _, _, again = scatter(design, 5.0, kept)
+    assert list(again) == list(found)
+    assert all((again[name] == found[name]).all() for name in found)
+
+
+def test_failed_pairs_are_told_and_count_as_the_worst():
+    samples = {"mean_ppte_over_life": np.array([1.0, 2.0, np.nan]), "life_to_ppte": np.array([3e6, 1e7, np.nan])}
+    (line,) = wear_scatter.failures({"relieved": samples})
+    assert line.startswith("NOT CONVERGED: relieved, 1 of 3 manufactured pairs, which count as the worst")
+    told = wear_scatter.summary(samples)["manufactured"]
+    assert told["failed"] == 1 and told["mean_ppte_over_life_um"]["q95"] == np.inf
+    assert np.isnan(told["mean_ppte_over_life_um"]["mean"])
+    assert told["life_to_ppte_revolutions"]["half_last"] == 3e6  # two of three reach it
+    assert np.isnan(told["life_to_ppte_revolutions"]["95_percent_last"])
+    fine = {name: values[:2] for name, values in samples.items()}
+    assert not list(wear_scatter.failures({"relieved": fine}))
+    assert wear_scatter.summary(fine)["manufactured"]["mean_ppte_over_life_um"]["mean"] == 1.5
+
+
+def test_so_many_pairs_last_so_long():
+    """At least 19 of 20 of them, exactly; lives that nobody follows further are no average with shorter ones."""
+    lives = {"mean_ppte_over_life": np.ones(40), "life_to_ppte": np.where(np.arange(40) < 2, 0.0, 2e7)}
+    told = wear_scatter.summary(lives)["manufactured"]["life_to_ppte_revolutions"]
+    assert told == {"half_last": 2e7, "95_percent_last": 2e7}
+    lives["life_to_ppte"][2] = 5.0
+    assert wear_scatter.summary(lives)["manufactured"]["life_to_ppte_revolutions"]["95_percent_last"] == 5.0
+
+
+def test_overlong_blocks_are_a_failure(file, tmp_path):
+    """As quantities are no numbers then: flanks that wear ten times as much in two blocks overshoot."""
+    text = PAIR + TABLE.replace("1e-18", "1e-17").replace("blocks = 4", "blocks = 2")
+    done = call("wear", str(file(text)), "--output", str(tmp_path / "out"), "--no-figures")
+    assert done.code == 1 and "BLOCKS TOO LONG: unmodified, flanks overshoot" in done.err
+
+
+def test_a_life_that_is_not_known_is_not_endless(file, tmp_path):
+    text = PAIR + TABLE.replace("1e-18", "1e-12")
+    done = call("wear", str(file(text)), "--output", str(tmp_path / "out"), "--no-figures")
+    assert done.code == 1 and "never" not in done.out and "NOT CONVERGED: unmodified from" in done.err
+    found = json.loads((tmp_path / "out" / "summary.json").read_text())["designs"]["unmodified"]
+    assert found["life_to_depth_revolutions"] is None
+
+
+def test_tolerances_are_left_out_under_the_dynamic_load_alone(file):
+    assert wear_scatter.left_out(load_design(file(PAIR + TABLE + TOLERANCE))) == ""
+    assert wear_scatter.left_out(load_design(file(FAST + DYNAMICS + DYNAMIC))) == ""
+    told = wear_scatter.left_out(load_design(file(FAST + DYNAMICS + DYNAMIC + TOLERANCE)))
+    assert told.startswith("[tolerance] is not part of this analysis, the gears are perfect (lives under")
+    assert "\n" not in told
+
+
+def test_a_misalignment_needs_slices(file, tmp_path):
+    path = file(PAIR + TABLE + TOLERANCE + "misalignment = 5.0\n")
+    done = call("wear", str(path), "--output", str(tmp_path / "out"))
+    assert done.code == 2 and "tolerance.misalignment: needs resolution.slices of at least 2" in done.err
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_quick_run_has_few_blocks(file):
@@ -269,14 +369,23 @@ length = "length"
 
 @pytest.mark.slow
 def test_the_command_seeks_the_relief_that_lasts(file, tmp_path):
-    done = call("wear", str(file(PAIR + TABLE + VARIABLES)), "--quick", "--output", str(tmp_path / "out"))
+    folder = tmp_path / "out"
+    done = call("wear", str(file(PAIR + TABLE + VARIABLES + TOLERANCE)), "--quick", "--output", str(folder), "--report")
     assert done.code == 0, done.err
-    designs = json.loads((tmp_path / "out" / "summary.json").read_text())["designs"]
+    found = json.loads((folder / "summary.json").read_text())
+    designs, how = found["designs"], "sought at 150 N m, under the static line load, on gears without deviations"
+    assert found["optimum_over_life"] == how and f"optimum over life: {how}" in " ".join(done.out.split())
+    assert how in (folder / "report.html").read_text("utf-8")
     assert list(designs) == ["unmodified", "rule-based", "optimum", "optimum over life"]
     new, lasting = designs["optimum"], designs["optimum over life"]
     assert new["new_ppte_um"] < lasting["new_ppte_um"]
     assert lasting["mean_ppte_over_life_um"] < 0.9 * new["mean_ppte_over_life_um"]
     assert "least mean PPTE over the life: optimum over life" in done.out
+    assert "3 manufactured pairs of quality class 7, the same for every design" in done.out
+    assert (folder / "life_ppte_distribution.png").exists() and found["tolerances"]["quality_class"] == 7
+    spread = [design["manufactured"]["mean_ppte_over_life_um"] for design in designs.values()]
+    assert all(of["mean"] > 0 and of["std"] > 0 and of["q95"] > of["mean"] for of in spread)
+    assert f"{spread[-1]['q95']:.3f}" in done.out
 
 
 def test_a_search_that_is_for_the_life_already_has_no_other(file):

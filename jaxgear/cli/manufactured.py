@@ -25,7 +25,7 @@ def scattered(
 ) -> dict[str, Evaluation]:
     """The evaluations with their scatter within a tolerance; all designs meet the same gears."""
     assert design.tolerance is not None
-    samples = min(design.tolerance.samples, _QUICK_PAIRS) if quick else design.tolerance.samples
+    samples = pairs_of(design, quick=quick)
     options: dict[str, Any] = {"tolerance": tolerance, "samples": samples, "seed": design.tolerance.seed}
     return {
         name: replace(
@@ -33,6 +33,12 @@ def scattered(
         )
         for name, found in evaluations.items()
     }
+
+
+def pairs_of(design: DesignFile, *, quick: bool) -> int:
+    """How many manufactured pairs a design is judged by."""
+    assert design.tolerance is not None
+    return min(design.tolerance.samples, _QUICK_PAIRS) if quick else design.tolerance.samples
 
 
 def lines(design: DesignFile, evaluations: Evaluations) -> Iterator[str]:
@@ -118,8 +124,12 @@ def _scatters(evaluations: Evaluations) -> Mapping[str, Scatter]:
 
 
 def _pairs(design: DesignFile, scatter: Scatter) -> str:
+    return pairs_in_words(design, scatter.ppte.shape[0])
+
+
+def pairs_in_words(design: DesignFile, count: int) -> str:
     """How many manufactured pairs of which class."""
     assert design.tolerance is not None
     classes = design.tolerance.quality_class
     named = "/".join(map(str, classes)) if isinstance(classes, list) else str(classes)
-    return f"{scatter.ppte.shape[0]} manufactured pairs of quality class {named}"
+    return f"{count} manufactured pairs of quality class {named}"

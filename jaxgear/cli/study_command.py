@@ -39,6 +39,7 @@ class StudyCommand(Generic[S]):
         assumptions: of the study, for a report.
         doubts: a line for everything that is not usual; None where nobody looks.
         takes_shafts: whether the study is on the shafts of the file at every load.
+        omits: what else of the file is not part of the study and why, "" for nothing; None where nobody looks.
     """
 
     name: str
@@ -53,6 +54,7 @@ class StudyCommand(Generic[S]):
     assumptions: tuple[str, ...] = ()
     doubts: Callable[[S], Iterable[str]] | None = None
     takes_shafts: bool = False
+    omits: Callable[[DesignFile], str] | None = None
 
     def __call__(
         self,
@@ -70,14 +72,20 @@ class StudyCommand(Generic[S]):
         with Stages() as stages:
             design = opened(file, cache=cache)
             make = self.plan(design, quick)
-            left_out = "" if self.takes_shafts else design.left_out
+            held = "" if self.takes_shafts else design.left_out
+            omitted = "" if self.omits is None else self.omits(design)
+            left_out = [line for line in (held, omitted) if line]
             target = output or default_folder(file, self.name, quick=quick)
             with ExitStack() as putting_in_place, result_folder(target) as folder:
                 if figures:
                     import_ahead("matplotlib.pyplot")
                 study, finish = make(target, stages)
                 stages.begin("writing the results")
-                data = {**self.summary(study), "quick": quick, **({"left_out": left_out} if left_out else {})}
+                data = {
+                    **self.summary(study),
+                    "quick": quick,
+                    **({"left_out": "; ".join(left_out)} if left_out else {}),
+                }
                 write_summary(folder / "summary.json", data)
                 self.write(folder, study)
                 files = self.draw(folder, study) if figures else []
@@ -91,8 +99,8 @@ class StudyCommand(Generic[S]):
                         doubts,
                         tables=tables,
                         figures=files,
-                        assumptions=self.assumptions,
-                        left_out=left_out,
+                        assumptions=(*self.assumptions, *([f"{omitted}."] if omitted else [])),
+                        left_out=held,
                     )
                     asked.write(folder, design, data, found)
                 putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
@@ -103,8 +111,6 @@ class StudyCommand(Generic[S]):
         if quick:
             report.say(f"quick run: {self.coarse}, not a result to build on")
         report.say(f"results in {target}{os.sep}, {stages.elapsed:.1f} s")
-        if left_out:
-            report.warn(left_out)
-        for line in failures:
+        for line in (*left_out, *failures):
             report.warn(line)
         return not failures

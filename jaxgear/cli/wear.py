@@ -1,13 +1,16 @@
 """The command `jaxgear wear`: from a design file to its flanks over their life."""
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..contact import Operation
 from ..io import DesignFile, WearRequest, wear_request, write_worn
+from ..io.cases import tolerance_of
+from ..io.errors import naming
 from ..numerics import optional_real, real
 from ..wear import WearLife, wear_in_steps
-from . import wear_report
+from . import wear_report, wear_scatter
 from .compared import compared, first_mesh, search_of, sought
 from .kept import Kept, Marches, runs_beside
 from .progress import Stages
@@ -21,6 +24,8 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
     # a step of the search wears a life: under the static load, which takes far less than a motion in every block
     static = dataclasses.replace(request.settings, line_load=None, dynamics=None)
     lasting = None if search is None else search.over_life(static)
+    with naming(design.path):
+        tolerance = None if wear_scatter.left_out(design) else tolerance_of(design)
 
     def make(target: Path, stages: Stages):
         highest = max(design.torque, design.torque_range[1])
@@ -28,11 +33,19 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
         if lasting is not None:
             stages.begin("searching the optimum over the life")
             start = first_mesh(design, highest, quick=quick)
-            name = "optimum over life"
+            name = wear_report.OVER_LIFE
             _, designs[name] = sought(design, name, lasting, start, target, stages, quick=quick)
         kept = Kept(runs_beside(target), Marches())
         lives = {name: _life(design, request, mesh, name, flanks, kept, stages) for name, flanks in designs.items()}
-        return Study(design, request, designs, lives), kept.remove
+        scatters: Mapping[str, wear_scatter.Samples] = {}
+        if tolerance is not None:
+            stages.begin("wearing manufactured gears of all designs")
+            # of one length, as quantities take them, and as many as the perfect gears have taken
+            blocks = max(len(life.revolutions) - 1 for life in lives.values())
+            settings = dataclasses.replace(request.settings, blocks=blocks)
+            of_pairs = Kept(runs_beside(target), wear_scatter.Arrays())
+            scatters = wear_scatter.scattered(design, settings, mesh, designs, tolerance, of_pairs, quick=quick)
+        return Study(design, request, designs, lives, scatters), kept.remove
 
     return make
 
@@ -75,8 +88,9 @@ run_wear = StudyCommand(
     wear_report.summary,
     _write,
     wear_report.write_figures,
-    lambda study: [wear_report.table(study)],
+    wear_report.tables,
     wear_report.verdict,
     wear_report.failures,
     (wear_report.ASSUMED,),
+    omits=wear_scatter.left_out,
 )

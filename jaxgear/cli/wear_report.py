@@ -15,7 +15,8 @@ from ..io import DesignFile, WearRequest, describe
 from ..metrics import quantity_of
 from ..microgeometry import AbstractModification
 from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, wear_depth, worn_volume
-from . import report
+from ..wear.quantities import blocks_are_short
+from . import manufactured, report, wear_scatter
 from .geometry import geometry
 from .written import versions
 
@@ -33,12 +34,13 @@ _QUANTITIES = (
 )
 # of the depth: what the blocks leave uncertain and nobody asks about
 _WORTH_A_WORD = 0.01
+OVER_LIFE = "optimum over life"  # the design that is sought for the least mean PPTE over the life
 _PANEL, _HEIGHT = 80.0, 84.0  # [mm]
 _OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks touch: jaxgear dynamics tells."
 
 ASSUMED = (
     "Wear follows Archard: depth is the coefficient times pressure and sliding distance, at the torque of the file or "
-    "the torques of [wear], on gears without manufacturing deviations."
+    "the torques of [wear]. Lives, flanks and figures over the life are of gears without manufacturing deviations."
 )
 
 
@@ -51,12 +53,14 @@ class Study:
         request: what it asks for.
         designs: their modifications (pinion, wheel) by name.
         lives: by name.
+        scatters: lives of manufactured pairs by name; empty where the file has no tolerances.
     """
 
     design: DesignFile
     request: WearRequest
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]]
     lives: Mapping[str, WearLife]
+    scatters: Mapping[str, wear_scatter.Samples]
 
 
 def _numbers(study: Study, life: WearLife) -> dict[str, float]:
@@ -86,7 +90,12 @@ def _numbers(study: Study, life: WearLife) -> dict[str, float]:
     return {name: float(value) for name, value in found.items()}
 
 
-def table(study: Study) -> Table:
+def tables(study: Study) -> list[Table]:
+    """The lives of all designs, and their scatter over manufactured pairs where the file has tolerances."""
+    return [_table(study), *wear_scatter.tables(study.design, study.request.settings, study.scatters)]
+
+
+def _table(study: Study) -> Table:
     """One row per design."""
     settings = study.request.settings
     title = f"{study.design.title}: {float(settings.revolutions):.3g} revolutions at {_loads(study)}"
@@ -118,23 +127,24 @@ def table(study: Study) -> Table:
 
 def _loads(study: Study) -> str:
     """Under what the flanks wear."""
-    settings, design = study.request.settings, study.design
-    speeds: Any = design.speed
-    if settings.loads is None:
-        torques = [design.torque]
-    else:
-        torques, speeds = settings.loads.torques.tolist(), settings.loads.speeds
-    text = ", ".join(f"{torque:g}" for torque in torques) + " N m"
+    settings, text = study.request.settings, _torques(study)
     if settings.dynamics is None:
         return text
+    speeds: Any = study.design.speed if settings.loads is None else settings.loads.speeds
     shown = ", ".join(f"{speed:g}" for speed in dict.fromkeys(np.atleast_1d(np.asarray(speeds, float)).tolist()))
     return f"{text}, {settings.line_load} line load at {shown} rpm"
+
+
+def _torques(study: Study) -> str:
+    loads = study.request.settings.loads
+    torques = [study.design.torque] if loads is None else loads.torques.tolist()
+    return ", ".join(f"{torque:g}" for torque in torques) + " N m"
 
 
 def _cell(key: str, value: float) -> str:
     if not key.endswith("revolutions"):
         return f"{value:.3f}"
-    return f"{value:.3g}" if np.isfinite(value) else "never"
+    return "never" if np.isposinf(value) else f"{value:.3g}"  # NaN where the flanks are not known
 
 
 def verdict(study: Study) -> Iterator[str]:
@@ -144,6 +154,9 @@ def verdict(study: Study) -> Iterator[str]:
     if found:
         best = min(found, key=lambda name: found[name])
         yield f"least mean PPTE over the life: {best}, {found[best]:.3f} um"
+    yield from wear_scatter.lines(study.design, study.scatters)
+    if OVER_LIFE in study.designs:
+        yield f"{OVER_LIFE}: {_sought(study)}"
     for name, life in study.lives.items():
         error, deepest = float(life.error[-1]), float(wear_depth(life)[-1])
         if np.isfinite(deepest) and not error <= _WORTH_A_WORD * deepest:  # NaN where it could not be told
@@ -151,8 +164,16 @@ def verdict(study: Study) -> Iterator[str]:
             yield f"{name}: the depth is uncertain {by}, take more blocks"
 
 
+def _sought(study: Study) -> str:
+    """Under what the relief that lasts has been sought."""
+    settings = study.request.settings
+    text = f"sought at {_torques(study)}, under the static line load, on gears without deviations"
+    vibrates = settings.dynamics is not None and settings.line_load == "dynamic"
+    return text + ", not under the dynamic one under which all designs wear here" * vibrates
+
+
 def failures(study: Study) -> Iterator[str]:
-    """A line for every design whose contact was not found at some life."""
+    """A line for every design whose contact was not found at some life, or whose blocks were too long."""
     for name, life in study.lives.items():
         found = np.asarray(life.cycles.converged)
         lost = ~found.reshape(len(found), -1).all(axis=1)
@@ -160,10 +181,13 @@ def failures(study: Study) -> Iterator[str]:
             first = float(life.revolutions[int(lost.argmax())])
             yield (
                 f"NOT CONVERGED: {name} from {first:.3g} revolutions on; its numbers are not to be trusted. "
-                "Take more blocks, or raise resolution.newton_steps or resolution.pairs."
+                "Take more blocks, or raise resolution.newton_steps or resolution.pairs. Or teeth are worn through."
                 + _OF_MOTION
                 * (life.dynamic_factor is not None)
             )
+        elif not blocks_are_short(life):
+            yield f"BLOCKS TOO LONG: {name}, flanks overshoot; its numbers are not to be trusted. Take more blocks."
+    yield from wear_scatter.failures(study.scatters)
 
 
 def summary(study: Study) -> dict[str, Any]:
@@ -175,6 +199,7 @@ def summary(study: Study) -> dict[str, Any]:
             "blocks": len(life.revolutions) - 1,
             "pinion_modification": describe(study.designs[name][0]),
             "wheel_modification": describe(study.designs[name][1]),
+            **(wear_scatter.summary(study.scatters[name]) if name in study.scatters else {}),
         }
         for name, life in study.lives.items()
     }
@@ -184,6 +209,8 @@ def summary(study: Study) -> dict[str, Any]:
         "torque_Nm": study.design.torque,
         "settings": _without_none(settings),
         "largest_increment_um": study.request.largest_increment,
+        **(manufactured.tolerances(study.design) if study.scatters else {}),
+        **({"optimum_over_life": _sought(study)} if OVER_LIFE in study.designs else {}),
         "designs": designs,
         "geometry": geometry(study.design.pair()),
         "versions": versions(),
@@ -235,4 +262,4 @@ def write_figures(folder: Path, study: Study) -> list[Path]:
     axes["depth_over_life"] = plot.lives(study.lives, "wear_depth")
     if study.request.settings.dynamics is not None:
         axes["dynamic_factor_over_life"] = plot.lives(study.lives, "dynamic_factor")
-    return report.save_figures(folder, axes)
+    return report.save_figures(folder, axes) + wear_scatter.write_figures(folder, study.scatters)

@@ -48,6 +48,7 @@ RESULT_FILES = frozenset(
         "worn_wheel.png",
         "ppte_over_life.png",
         "depth_over_life.png",
+        "life_ppte_distribution.png",
         "dynamic_factor_over_life.png",
         "profiles.csv",
         "tolerance_cases.png",

@@ -41,7 +41,7 @@ class SweepSection(Section):
 
 
 class ToleranceSection(section_of(Tolerance, ("pinion", "wheel", "distribution"), open=False)):  # type: ignore[misc]
-    """Deviations of manufactured gears after ISO 1328-1: the scatter of all designs of analyze and optimize.
+    """Deviations of manufactured gears after ISO 1328-1: the scatter of all designs of analyze, optimize and wear.
 
     Attributes:
         quality_class: of both gears, or of pinion and wheel; that of the gears without it.

@@ -80,13 +80,20 @@ def ppte_histogram(scatter: Scatter, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def ppte_distribution(samples: Mapping[str, np.ndarray], ax: Axes | None = None, level: float = 0.95) -> Axes:
+def ppte_distribution(
+    samples: Mapping[str, np.ndarray],
+    ax: Axes | None = None,
+    level: float = 0.95,
+    *,
+    of: str = "peak-to-peak transmission error",
+) -> Axes:
     """Share of the manufactured gears whose PPTE stays below a value, of several designs.
 
     Args:
         samples: PPTE of every sample [um] by the name of the design; those that failed, NaN, stay below no value.
         ax: Axes to draw into; None for a new figure.
         level: share that a line marks; the legend has each design's quantile, as `Quantile` takes it.
+        of: what the samples are, in words.
     """
     with report_axes(ax) as ax:
         for index, (name, values) in enumerate(samples.items()):
@@ -99,6 +106,6 @@ def ppte_distribution(samples: Mapping[str, np.ndarray], ax: Axes | None = None,
         ax.axhline(100 * level, color=GREY, linewidth=0.8, zorder=0.5)
         ax.set_xlim(left=0)
         ax.set_ylim(0, 100)
-        ax.set(xlabel="peak-to-peak transmission error [µm]", ylabel="share of the gears below [%]")
+        ax.set(xlabel=f"{of} [µm]", ylabel="share of the gears below [%]")
         legend_above(ax)
     return ax

@@ -43,6 +43,7 @@ CAPTIONS = {
     "worn_wheel": "Flank of the wheel at several lives.",
     "ppte_over_life": "PPTE over the life.",
     "depth_over_life": "Depth of wear over the life.",
+    "life_ppte_distribution": "Share of the manufactured pairs whose mean PPTE over the life stays below a value.",
     "dynamic_factor_over_life": "Largest mesh force of the steady motion over the static one, over the life.",
     "pareto": "Results of the variants against each other, with the Pareto front.",
     "parallel_coordinates": "Variables and results of the variants, one line per variant.",

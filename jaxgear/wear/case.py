@@ -1,6 +1,7 @@
 """A mesh that wears: what its flanks are made of, how fast they wear, and the cycles on them."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -20,10 +21,10 @@ from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfi
 from ..numerics import check, kernel, program, real, whole
 from .archard import worn
 from .coefficient import Constant, OfLubrication, wear_law
-from .deposit import PARTS, Deposit, deposit
+from .deposit import PARTS, Deposit, deposit, grid
 from .march import Analysis, Depth, March, march
 from .vibration import Flanks, LineLoad, Vibration, vibration_of
-from .worn_flank import WornFlank
+from .worn_flank import WornFlank, worn_through
 
 # what a cycle holds that differs from flank to flank
 _FOUND = (
@@ -178,10 +179,12 @@ def _march(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> Mar
     shares = jnp.ones((1,), start.dtype) if case.weights is None else case.weights
     passages = jnp.stack([jnp.ones((), start.dtype), mesh.pair.pinion.teeth / mesh.pair.wheel.teeth])
 
+    through = partial(worn_through, mesh.pair, grid(mesh, case.points))
+
     def analyze(depth) -> Analysis:
         rates, seen, found = over_loads(lambda load, place: case.under(load, place, depth))
         rate = jnp.tensordot(shares, rates, 1) * passages[:, None, None, None]
-        return Analysis(rate, seen, jnp.all(found))
+        return Analysis(rate, seen, jnp.all(found) & ~through(depth))
 
     def over_loads(under):
         if case.vibration is None:
@@ -189,7 +192,9 @@ def _march(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> Mar
         # one after the other: side by side orbits of one cycle would be worked out as those of many, too
         return jax.lax.map(lambda each: under(*each), (case.loads, places))
 
-    return march(analyze, start, revolutions)
+    found = march(analyze, start, revolutions)
+    gone = jnp.cumsum(jax.vmap(through)(found.depth)) > 0
+    return found._replace(known=found.known & ~gone)
 
 
 # of a motion it is twice as many programs in one, which compile for a hundred times as long as a life of theirs takes

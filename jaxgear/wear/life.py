@@ -37,7 +37,8 @@ class WearLife(Checked):
             slices, points).
         error: estimate of the error of that depth by the length of the blocks, largest of all points [um], shape
             (lives,); NaN where that of two blocks is not known.
-        known: whether all contacts that have worn these flanks were found, also within blocks, shape (lives,).
+        known: whether all contacts that have worn these flanks were found, also within blocks, and something is left of
+            the teeth, shape (lives,).
         cycles: the mesh on these flanks, leading axis (lives,); (lives, torques) under a load spectrum. None has
             converged on flanks that are not known.
         weights: of the torques of a load spectrum in the revolutions, shape (torques,); None under one torque.

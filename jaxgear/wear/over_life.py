@@ -39,8 +39,9 @@ def over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure
         values = jnp.where(solved(life.cycles), quantity(life.cycles), jnp.nan)
     if life.weights is None:
         return values
-    many = [joined(measure or Mean(), row, life.weights, quantity.better) for row in values]
-    return jnp.stack(many)
+    many = jnp.stack([joined(measure or Mean(), row, life.weights, quantity.better) for row in values])
+    # a failed case of many is joined as an infinite one: of one pair of flanks nothing is known
+    return jnp.where(jnp.any(jnp.isnan(values), axis=-1), jnp.nan, many)
 
 
 def mean_over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Scalar:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Literal, NamedTuple
 
 import jax.numpy as jnp
-from jaxtyping import Array, Bool
+from jaxtyping import Array, Bool, Float
 
 from ..conditions import deviation_of, solved
 from ..contact import MeshCycle
@@ -102,11 +102,16 @@ def _number(given: WithSettings, cycle: MeshCycle):
     settings = given.settings
     # all quantities of the same settings come from one life
     life = once(cycle, (given.make, given.fields), lambda: _life(given.name, settings, cycle))
-    usable = jnp.all(solved(life.cycles)) & (given.name == _ERROR or _is_fine(life))
-    return jnp.where(usable, WEAR_QUANTITIES[given.name].of(life, settings), jnp.nan)
+    return number_of(given.name, life, settings)
 
 
-def _is_fine(life: WearLife) -> Bool[Array, ""]:
+def number_of(name: str, life: WearLife, settings: Any) -> Float[Array, ""]:
+    """A quantity of a life that was worn by `Wear` settings; NaN as `Wear.quantity` says."""
+    usable = jnp.all(solved(life.cycles)) & (name == _ERROR or blocks_are_short(life))
+    return jnp.where(usable, WEAR_QUANTITIES[name].of(life, settings), jnp.nan)
+
+
+def blocks_are_short(life: WearLife) -> Bool[Array, ""]:
     """Whether the blocks are short enough for the depth to mean something."""
     worn = jnp.sum(life.depth, axis=2)
     deflection = life.cycles.transmission_error[0] - life.cycles.unloaded_transmission_error[0]

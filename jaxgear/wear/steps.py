@@ -73,18 +73,21 @@ def wear_in_steps(
 
     done, depth, found, at = 0.0, case.start(), [], [0.0]
     length = total / blocks if limit is None else _first(two, case, total, limit)
-    left = blocks // BLOCKS_OF_A_PAIR
+    left, lost = blocks // BLOCKS_OF_A_PAIR, False
     while (left > 0) if limit is None else (done < total):
         now = length if limit is None else min(length, (total - done) / BLOCKS_OF_A_PAIR)
         pair = two(depth, now)
         if limit is not None:
             most = _most(pair)
             length = now * min(limit / most, _GROWTH) if most > 0 else _GROWTH * now
-            if most > _SLACK * limit:
+            if most > _SLACK * limit and not lost:
                 continue
+            lost = lost or not np.asarray(pair.known).all()
             # the rest is gone through in pairs of one length, not in a last short one
             rest = total - done - BLOCKS_OF_A_PAIR * now
             length = rest / (BLOCKS_OF_A_PAIR * max(1, np.ceil(rest / (BLOCKS_OF_A_PAIR * length) - 1e-9)))
+            if lost:  # the flanks of the rest are not known, however short the blocks
+                length = rest / BLOCKS_OF_A_PAIR
         at += [done + now, done + BLOCKS_OF_A_PAIR * now]
         done, left = at[-1], left - 1
         if limit is not None and (total - done) < 1e-9 * total:

@@ -2,8 +2,10 @@
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
+from ..geometry import GearPair
+from ..geometry.involute import half_tooth_angle
 from ..microgeometry import AbstractModification, Flank
 from ..numerics import result
 
@@ -34,3 +36,18 @@ class WornFlank(AbstractModification):
         line = jnp.arange(len(self.amount), dtype=jnp.int32)[None, :, None]
         low, high = self.amount[line, left], self.amount[line, left + 1]
         return low + (place - left.astype(place.dtype)) * (high - low)
+
+
+def worn_through(
+    pair: GearPair, roll_length: Float[Array, "gears points"], depth: Float[Array, "gears parts slices points"]
+) -> Bool[Array, ""]:
+    """Whether nothing is left of a tooth of either gear somewhere up its flank.
+
+    Material taken off all over an involute turns it about the gear by depth over base radius; there is none left where
+    that is the angle of the tooth.
+    """
+    left = [
+        2e3 * half_tooth_angle(gear, lengths) * gear.base_radius - jnp.max(jnp.sum(worn, axis=0), axis=0)
+        for gear, lengths, worn in zip((pair.pinion, pair.wheel), roll_length, depth)
+    ]
+    return jnp.any(jnp.stack(left) <= 0)

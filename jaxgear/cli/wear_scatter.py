@@ -1,0 +1,203 @@
+"""What the designs of `jaxgear wear` are worth once they are made: lives of gears within the tolerances of the file."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from ..conditions import conditions, ranked
+from ..contact import Mesh
+from ..io import DesignFile
+from ..microgeometry import AbstractModification
+from ..numerics import Quantile, program, real
+from ..tolerance import Tolerance
+from ..wear import WEAR_QUANTITIES, Wear
+from ..wear.quantities import LIVES_AHEAD, number_of
+from . import manufactured, report
+from .kept import Kept
+
+# of every manufactured pair of a design, by name of the quantity, shape (pairs,); NaN where it has failed
+Samples = Mapping[str, np.ndarray]
+
+_PPTE, _DEPTH = "mean_ppte_over_life", "wear_depth"
+_LIVES = {"life_to_depth": ("depth_limit", LIVES_AHEAD), "life_to_ppte": ("ppte_limit", 1.0)}
+_LEVEL = 0.95
+_SIDE_BY_SIDE = 32  # lives
+
+
+class Arrays:
+    """Samples as arrays, for `Kept`."""
+
+    def arrays(self, found: Samples) -> dict[str, Any]:
+        """All of them."""
+        return dict(found)
+
+    def result(self, arrays: dict[str, Any]) -> Samples:
+        """The samples."""
+        return arrays
+
+
+def left_out(design: DesignFile) -> str:
+    """Why the scatter is not told where the file has tolerances; "" where it is."""
+    if design.tolerance is None or design.wear is None or design.wear.line_load != "dynamic":
+        return ""
+    return (
+        "[tolerance] is not part of this analysis, the gears are perfect (lives under the motion are not worked out "
+        'for every manufactured pair): wear.line_load = "static" takes it'
+    )
+
+
+def scattered(
+    design: DesignFile,
+    settings: Wear,
+    mesh: Mesh,
+    designs: Mapping[str, tuple[AbstractModification, AbstractModification]],
+    tolerance: Tolerance,
+    kept: Kept[Samples],
+    *,
+    quick: bool,
+) -> dict[str, Samples]:
+    """Lives of all designs over manufactured pairs; all designs meet the same gears.
+
+    Args:
+        design: the design file.
+        settings: of the lives, under the static load.
+        mesh: on which the designs are compared.
+        designs: modifications of pinion and wheel by name.
+        tolerance: of the gears.
+        kept: what was found before the command was interrupted.
+        quick: of few pairs.
+    """
+    assert design.tolerance is not None
+    options = {"samples": manufactured.pairs_of(design, quick=quick), "seed": design.tolerance.seed}
+    cases = conditions("jaxgear wear", mesh, design.torque, tolerance=tolerance, **options).on(mesh)
+    assert cases.removed is not None
+    names, torque, removed = tuple(asked(settings)), cases.torque[0], cases.removed[0]
+
+    def of(pinion: AbstractModification, wheel: AbstractModification) -> Samples:
+        def make() -> Samples:
+            found = _numbers(settings, names, mesh, torque, pinion, wheel, removed)
+            return {name: np.asarray(found[name]) for name in names}
+
+        return kept((mesh, torque, removed, pinion, wheel, settings, settings.blocks), make)
+
+    return {name: of(*flanks) for name, flanks in designs.items()}
+
+
+@program
+def _numbers(settings: Wear, names: tuple[str, ...], mesh: Mesh, torque, pinion, wheel, removed):
+    """Quantities of the lives of all pairs; compiles for longer than it runs."""
+    load = torque if settings.loads is None else None
+
+    def of(deviation):
+        life = settings.life(mesh, load, pinion=pinion, wheel=wheel, deviation=deviation)
+        return {name: number_of(name, life, settings) for name in names}
+
+    return jax.lax.map(of, removed, batch_size=_SIDE_BY_SIDE)
+
+
+def asked(settings: Wear) -> list[str]:
+    """Names of the quantities whose scatter is told."""
+    return [_PPTE, _DEPTH, *(name for name, (limit, _) in _LIVES.items() if getattr(settings, limit) is not None)]
+
+
+def tables(design: DesignFile, settings: Wear, scatters: Mapping[str, Samples]) -> Iterator[Table]:
+    """One row per design; nothing without a table [tolerance]."""
+    if not scatters:
+        return
+    title = f"{_pairs(design, scatters)}, the same for every design"
+    result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
+    result.add_column("design", no_wrap=True)
+    headings = ["mean PPTE [um]", "95 % below", "depth [um]", "95 % below"]
+    lives = asked(settings)[2:]
+    limits = {"life_to_depth": "95 % last, {:g} um deep", "life_to_ppte": "95 % last, PPTE {:g} um"}
+    headings += [limits[name].format(float(getattr(settings, _LIVES[name][0]))) for name in lives]
+    for heading in (*headings, "failed"):
+        result.add_column(heading, justify="right")
+    for name, samples in scatters.items():
+        cells = [f"{of(samples, key):.3f}" for key in (_PPTE, _DEPTH) for of in (_mean, _bound)]
+        cells += [_life(settings, key, _lasts(samples, key, _LEVEL)) for key in lives]
+        result.add_row(name, *cells, str(failed(samples)))
+    yield result
+
+
+def lines(design: DesignFile, scatters: Mapping[str, Samples]) -> Iterator[str]:
+    """The best design of manufactured pairs in words; nothing without a table [tolerance]."""
+    bounds = {name: _bound(samples, _PPTE) for name, samples in scatters.items()}
+    found = {name: bound for name, bound in bounds.items() if np.isfinite(bound)}
+    if found:
+        best = min(found, key=lambda name: found[name])
+        even = ", without deviations along the face, which one slice cannot show" * (design.resolution().slices == 1)
+        best_of = f"95 % stay below {found[best]:.3f} um mean PPTE over the life with {best}"
+        yield f"{_pairs(design, scatters)}{even}: {best_of}"
+
+
+def failures(scatters: Mapping[str, Samples]) -> Iterator[str]:
+    """A line for every design of which manufactured pairs have failed."""
+    for name, samples in scatters.items():
+        if failed(samples):
+            yield (
+                f"NOT CONVERGED: {name}, {failed(samples)} of {len(samples[_PPTE])} manufactured pairs, which count as "
+                "the worst: their contact was not found, or their blocks are too long. Take more blocks."
+            )
+
+
+def summary(samples: Samples) -> dict[str, Any]:
+    """The scatter of a design as plain data; q95 is what 95 % of the pairs do not pass."""
+    found: dict[str, Any] = {"pairs": len(samples[_PPTE]), "failed": failed(samples)}
+    for name in samples:
+        values, key = samples[name], f"{name}_{WEAR_QUANTITIES[name].unit}"
+        if name in _LIVES:  # which nobody follows for ever: their mean would be that of the time looked at
+            found[key] = {"half_last": _lasts(samples, name, 0.5), "95_percent_last": _lasts(samples, name, _LEVEL)}
+            continue
+        found[key] = {"mean": _mean(samples, name), "std": float(np.std(values, ddof=1)), "q95": _bound(samples, name)}
+    return {"manufactured": found}
+
+
+def failed(samples: Samples) -> int:
+    """Number of failed pairs."""
+    return int(np.sum(~np.isfinite(samples[_PPTE])))
+
+
+def write_figures(folder: Path, scatters: Mapping[str, Samples]) -> list[Path]:
+    """Draws the scatter of all designs; gives the files."""
+    if not scatters:
+        return []
+    from .. import plot
+
+    samples = {name: of[_PPTE] for name, of in scatters.items()}
+    axes = plot.ppte_distribution(samples, of="mean PPTE over the life")
+    return report.save_figures(folder, {"life_ppte_distribution": axes})
+
+
+def _mean(samples: Samples, name: str) -> float:
+    return float(np.mean(samples[name]))
+
+
+def _bound(samples: Samples, name: str) -> float:
+    return float(ranked(Quantile(real(_LEVEL)), samples[name], WEAR_QUANTITIES[name].better))
+
+
+def _lasts(samples: Samples, name: str, share: float) -> float:
+    """The longest life of a pair that at least a share of the pairs reach; NaN where failed ones are among the others.
+
+    No mean of the lives about that place, as quantiles are elsewhere: many are zero, or as long as anybody has looked.
+    """
+    values = samples[name]
+    lives = np.sort(np.where(np.isfinite(values), values, -np.inf))
+    found = float(lives[int((1 - share) * len(lives) + 1e-9)])
+    return found if np.isfinite(found) else np.nan
+
+
+def _life(settings: Wear, name: str, value: float) -> str:
+    """Revolutions; beyond what is looked at nobody knows more."""
+    most = _LIVES[name][1] * float(settings.revolutions)
+    return f"> {most:.3g}" if value >= most else f"{value:.3g}"
+
+
+def _pairs(design: DesignFile, scatters: Mapping[str, Samples]) -> str:
+    return manufactured.pairs_in_words(design, len(next(iter(scatters.values()))[_PPTE]))
