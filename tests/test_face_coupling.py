@@ -72,6 +72,14 @@ def test_kernel_is_a_stiffness_of_equal_rows(width, slices):
     assert values[0] > 0 and values[-1] <= 1 + 1e-12
 
 
+def test_no_load_deflects_the_face_more_than_an_even_one():
+    """Up to 18 root chords; the ends of wider faces are softer than that, by little."""
+    for chord in (2.7, 8.2, 13.0):
+        for chords, most in ((0.5, 1.0), (7.0, 1.0), (18.0, 1.0), (40.0, 1.01)):
+            values = np.linalg.eigvalsh(kernel(24, chords * chord, chord))
+            assert 0 < values[0] and values[-1] <= most + 1e-12
+
+
 def test_teeth_far_wider_than_thick_do_not_couple_and_thick_ones_are_rigid():
     np.testing.assert_allclose(kernel(5, 1e6), np.eye(5), atol=1e-4)
     np.testing.assert_allclose(kernel(5, 1e-3), np.full((5, 5), 0.2), atol=1e-4)

@@ -46,7 +46,8 @@ _FEWEST_WAVES = 3  # beside modes that decay from the ends, the constant include
 def face_kernel(face_width, root_chord, slices: int, overhang: tuple | None = None) -> Kernel:
     """F: deflection of a slice under the line load of another, over that of a load uniform over the whole gear.
 
-    Symmetric, positive definite. Its rows sum to one where nothing overhangs, else to less.
+    Symmetric, positive definite. Its rows sum to one where nothing overhangs, else to less. Its eigenvalues are at most
+    one on faces of up to 18 root chords, some 50 modules; on wider ones a load at the softer ends makes up to 1.01.
 
     Args:
         face_width: over which the load is spread [mm].
