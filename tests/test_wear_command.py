@@ -303,6 +303,8 @@ def test_failed_pairs_are_told_and_count_as_the_worst():
     assert np.isnan(told["mean_ppte_over_life_um"]["mean"])
     assert told["life_to_ppte_revolutions"]["half_last"] == 3e6  # two of three reach it
     assert np.isnan(told["life_to_ppte_revolutions"]["95_percent_last"])
+    none = {name: np.full(3, np.nan) for name in samples}
+    assert wear_scatter.summary(none)["manufactured"]["mean_ppte_over_life_um"]["q95"] == np.inf
     fine = {name: values[:2] for name, values in samples.items()}
     assert not list(wear_scatter.failures({"relieved": fine}))
     assert wear_scatter.summary(fine)["manufactured"]["mean_ppte_over_life_um"]["mean"] == 1.5

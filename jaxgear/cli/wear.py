@@ -17,6 +17,8 @@ from .progress import Stages
 from .study_command import Make, StudyCommand
 from .wear_report import Study
 
+_MOST_BLOCKS = 1000  # of a life of manufactured gears
+
 
 def _plan(design: DesignFile, quick: bool) -> Make[Study]:
     request = wear_request(design, quick=quick)
@@ -41,7 +43,7 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
         if tolerance is not None:
             stages.begin("wearing manufactured gears of all designs")
             # of one length, as quantities take them, and as many as the perfect gears have taken
-            blocks = max(len(life.revolutions) - 1 for life in lives.values())
+            blocks = min(max(len(life.revolutions) - 1 for life in lives.values()), _MOST_BLOCKS)
             settings = dataclasses.replace(request.settings, blocks=blocks)
             of_pairs = Kept(runs_beside(target), wear_scatter.Arrays())
             scatters = wear_scatter.scattered(design, settings, mesh, designs, tolerance, of_pairs, quick=quick)

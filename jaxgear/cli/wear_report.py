@@ -40,7 +40,8 @@ _OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks tou
 
 ASSUMED = (
     "Wear follows Archard: depth is the coefficient times pressure and sliding distance, at the torque of the file or "
-    "the torques of [wear]. Lives, flanks and figures over the life are of gears without manufacturing deviations."
+    "the torques of [wear]. Lives, flanks and figures over the life are of gears without manufacturing deviations. "
+    "Under several torques every number of the mesh is the mean by their shares of the revolutions."
 )
 
 

@@ -40,9 +40,9 @@ def ranked(measure: AbstractMeasure, values: np.ndarray, better: Better = "small
     shares = np.diff(np.asarray(measure.spread(edges, jnp.asarray(count, edges.dtype)))).astype(values.dtype)
     ordered = np.sort(np.where(np.isfinite(values), sign * values, np.inf), axis=0)
     carried = shares > 0
-    # from the smallest on, so that equal values give that value to the last bit
-    excess = ordered[carried] - ordered[:1]
-    return sign * (ordered[0] + np.tensordot(shares[carried], excess, 1))
+    # from the smallest on, so that equal values give that value to the last bit; it is infinite where all have failed
+    smallest = np.where(np.isfinite(ordered[0]), ordered[0], 0.0).astype(values.dtype)
+    return sign * (smallest + np.tensordot(shares[carried], ordered[carried] - smallest, 1))
 
 
 def label(measure: AbstractMeasure) -> str:
