@@ -36,6 +36,7 @@ _QUANTITIES = (
 _WORTH_A_WORD = 0.01
 OVER_LIFE = "optimum over life"  # the design that is sought for the least mean PPTE over the life
 _PANEL, _HEIGHT = 80.0, 84.0  # [mm]
+_BEYOND = "*"  # marks lives that are longer than what was looked at
 _OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks touch: jaxgear dynamics tells."
 
 ASSUMED = (
@@ -100,7 +101,7 @@ def _table(study: Study) -> Table:
     """One row per design."""
     settings = study.request.settings
     title = f"{study.design.title}: {float(settings.revolutions):.3g} revolutions at {_loads(study)}"
-    result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
+    result = Table(title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD)
     result.add_column("design", no_wrap=True)
     columns = {
         "pinion_wear_depth_um": "pinion [um]",
@@ -120,9 +121,12 @@ def _table(study: Study) -> Table:
     columns |= {key: text.format(float(limit)) for key, (limit, text) in limits.items() if limit is not None}
     for heading in columns.values():
         result.add_column(heading, justify="right", no_wrap=True)
+    ended = float(settings.revolutions)
     for name, life in study.lives.items():
         numbers = _numbers(study, life)
-        result.add_row(name, *(_cell(key, numbers[key]) for key in columns))
+        result.add_row(name, *(_cell(key, numbers[key], ended) for key in columns))
+        if ended < numbers.get("life_to_depth_revolutions", 0.0) < np.inf:
+            result.caption = f"{_BEYOND} beyond the revolutions that were worn, at the rate of the last block"
     return result
 
 
@@ -142,10 +146,13 @@ def _torques(study: Study) -> str:
     return ", ".join(f"{torque:g}" for torque in torques) + " N m"
 
 
-def _cell(key: str, value: float) -> str:
+def _cell(key: str, value: float, ended: float) -> str:
+    """A number of a life of so many revolutions."""
     if not key.endswith("revolutions"):
         return f"{value:.3f}"
-    return "never" if np.isposinf(value) else f"{value:.3g}"  # NaN where the flanks are not known
+    if np.isposinf(value):  # the depth goes on, PPTE is not known any further
+        return "never" if key == "life_to_depth_revolutions" else f"> {ended:.3g}"
+    return f"{value:.3g}" + f" {_BEYOND}" * (value > ended)  # NaN where the flanks are not known
 
 
 def verdict(study: Study) -> Iterator[str]:
