@@ -6,7 +6,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from jaxgear.numerics import AbstractSpring, ContactProblem
+from jaxgear.compliance import face_kernel, few_modes
+from jaxgear.numerics import AbstractSpring, ContactProblem, solve_contact, tangent_stiffness
+
+# one program for all numbers of the same shapes, in place of one for every operation in it
+solved_in_20 = eqx.filter_jit(lambda data: solve_contact(data, steps=20))
+stiffness_at = eqx.filter_jit(tangent_stiffness)
+kernel_of = jax.jit(face_kernel, static_argnums=2)
+modes_of = jax.jit(few_modes, static_argnums=(1, 3))
 
 
 class LinearSpring(AbstractSpring):

@@ -8,6 +8,7 @@ from catalogue import gear_pair, high_contact_ratio_pair, kahraman_gear
 
 import jaxgear as jg
 from jaxgear.geometry import outline
+from jaxgear.geometry.gear import with_diameters
 from jaxgear.geometry.involute import half_tooth_angle, involute
 
 # tip diameter of the 50/50 module 3 gear and the contact ratio it makes
@@ -221,3 +222,17 @@ def test_eager_calls_compile_once(caplog):
     with jax.log_compiles():
         use(3.1)
     assert [record.getMessage() for record in caplog.records if "ompil" in record.getMessage()] == []
+
+
+def test_diameters_that_are_not_given_are_those_of_the_rack_and_follow_traced_numbers():
+    open_ended = jg.Gear(19, 3.0, profile_shift=0.2, face_width=18.0)
+    numbered = with_diameters(open_ended)
+    expected = [3.0 * (19 + 2 * 0.2 + 2 * 1.0), 0.5 * 3.0 * (19 + 2 * 0.2 - 2 * 1.25)]
+    np.testing.assert_allclose([numbered.tip_diameter, numbered.bore_diameter], expected, rtol=1e-15)
+    assert with_diameters(numbered) is numbered and open_ended.tip_diameter is None is open_ended.bore_diameter
+    radii = jax.jacfwd(lambda m: jnp.stack(_radii(with_diameters(jg.Gear(19, m, face_width=18.0)))))
+    np.testing.assert_allclose(radii(3.0), [0.5 * 21, 0.25 * 16.5], rtol=1e-14)
+
+
+def _radii(gear):
+    return gear.tip_radius, gear.bore_radius

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -120,9 +121,36 @@ def test_errors_are_those_of_the_function(shelf):
 def test_a_contact_that_was_begun_compiles_nothing_more(shelf, traced):
     pair, compliance = gear_pair(), jg.default_compliance()
     begin_contact(pair, compliance, TWO_PAIRS, TWO_PAIRS)
-    before = [name for name in traced if name in ("prepare_from", "_solve_removed")]
+    before = [name for name in traced if name in ("_arrays_of", "_solve_removed")]
     jg.solve(jg.prepare(pair, compliance=compliance, resolution=TWO_PAIRS), 50.0)
-    assert [name for name in traced if name in before] == before == ["prepare_from", "_solve_removed"]
+    assert [name for name in traced if name in before] == before == ["_arrays_of", "_solve_removed"]
+
+
+def test_gears_share_programs_whether_their_diameters_are_given_or_not(shelf, traced):
+    """What None stands for is a number to the programs, and None to everybody who reads the gears."""
+    found = []
+    for tips, bores in (((None, None), (None, None)), ((63.0, 150.0), (24.75, None))):
+        gears = zip((19, 48), tips, bores)
+        pair = jg.GearPair(*(jg.Gear(z, 3.0, face_width=18.0, tip_diameter=t, bore_diameter=b) for z, t, b in gears))
+        mesh = jg.prepare(pair, resolution=TWO_PAIRS)
+        cycle = jg.solve(mesh, 50.0, pinion=jg.TipRelief(5.0, 3.0))
+        for held in (mesh.pair.gears, cycle.kinematics.pair.gears):
+            assert [gear.tip_diameter is None for gear in held] == [tip is None for tip in tips]
+            assert [gear.bore_diameter is None for gear in held] == [bore is None for bore in bores]
+        found.append(np.asarray(cycle.transmission_error))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-12)
+    assert [traced.count(name) for name in ("_arrays_of", "slid_material", "_solve_removed")] == [1, 1, 1]
+
+
+def test_sizes_that_a_program_does_not_read_make_no_other_one(shelf, traced):
+    pair = gear_pair()
+    for given in ({}, {"slide_steps": 0}, {"face_modes": 3, "newton_steps": 6}):
+        sizes = replace(TWO_PAIRS, **given)
+        mesh = jg.prepare(pair, resolution=sizes)
+        cycle = jg.solve(mesh, 50.0, pinion=jg.TipRelief(5.0, 3.0))
+        assert mesh.resolution == sizes == cycle.kinematics.resolution
+    # contacts that slide and that do not; 8 and 6 steps
+    assert [traced.count(name) for name in ("_arrays_of", "slid_material", "_solve_removed")] == [1, 2, 2]
 
 
 def test_a_function_that_can_change_without_a_word_is_not_kept(shelf):

@@ -127,13 +127,13 @@ class MeshCycle(eqx.Module):
         p = sqrt(q E* / (pi R)) (Hertz) with the curvature 1 / R of both involutes and of what is removed from them, in
         plane strain unless the compliance model is in plane stress throughout.
         """
-        return pressures(self.kinematics, self.line_load, self.bend)[0]
+        return pressures(self.kinematics.explicit, self.line_load, self.bend)[0]
 
     @property
     @over_batch
     def corner_pressure(self) -> Load:
         """Hertzian pressure of the tip edge on the mate's flank [MPa]; zero on the theoretical path of contact."""
-        return pressures(self.kinematics, self.line_load, self.bend)[1]
+        return pressures(self.kinematics.explicit, self.line_load, self.bend)[1]
 
     def __str__(self) -> str:
         if self.batch_ndim:

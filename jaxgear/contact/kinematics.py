@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..compliance import Plane
-from ..geometry import Gear, GearPair, PathOfContact, path_of_contact
+from ..geometry import Gear, GearPair, PathOfContact, explicit, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import Checked, concrete, on_both, over_batch, program, real, result
+from ..numerics import Checked, changed, concrete, on_both, over_batch, program, real, result
 from .corner import REACH, corner_gap
 from .resolution import Resolution
 
@@ -23,7 +23,7 @@ class Side(Checked):
     """One gear's side of the contact.
 
     Attributes:
-        gear: the gear.
+        gear: the gear, with numbers where that of the pair leaves the diameters of tip or bore open.
         start_roll_length, pitch_roll_length: roll lengths at the start of the active profile and at the pitch point
             [mm].
         contact_roll_length: roll length of every contact [mm], shape (pairs, positions).
@@ -113,10 +113,14 @@ class Kinematics(Checked):
 
     @property
     @over_batch
-    @program
     def sides(self) -> tuple[Side, Side]:
         """Pinion and wheel."""
-        return sides(self.pair, self.path_of_contact, contacts(self.pair, self.path_of_contact, self.path))
+        return _sides(self.explicit)
+
+    @property
+    def explicit(self) -> "Kinematics":
+        """The same of the pair with its diameters as numbers, for programs that serve gears with and without them."""
+        return changed(self, pair=explicit(self.pair))
 
     @property
     @over_batch
@@ -142,6 +146,12 @@ class Kinematics(Checked):
     @property
     def _dtype(self):
         return self.path_of_contact.start.dtype
+
+
+@program
+def _sides(moving: Kinematics) -> tuple[Side, Side]:
+    pair, contact = moving.pair, moving.path_of_contact
+    return sides(pair, contact, contacts(pair, contact, moving.path))
 
 
 def _phases(first, count: int):

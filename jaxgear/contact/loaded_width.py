@@ -7,13 +7,14 @@ to 9 % too small, and the loaded width leaves 2.5 % at worst.
 
 from collections.abc import Callable
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..compliance import default_compliance
 from ..microgeometry import AbstractModification, NoModification
+from ..numerics import changed
 from .mesh import Mesh
+from .resolution import Resolution
 from .slide import RemovedMaterial, nothing_removed, slid_material
 
 # Largest relative violation of the contact conditions at which loads still tell how wide the contacts are.
@@ -41,7 +42,8 @@ def loaded_material(
     """
     if isinstance(pinion, NoModification) and isinstance(wheel, NoModification):
         return nothing_removed(mesh.resolution, torque.dtype)
-    prepared, sizes = unlabelled(mesh), mesh.resolution
+    sizes = mesh.resolution
+    prepared = _unlabelled(mesh, sizes.of_material)
     if not mesh.compliance.averages_over_loaded_width:
         return slid_material(prepared, torque, pinion, wheel)
     full = 1e3 * torque / (mesh.pair.pinion.base_radius * mesh.pair.face_width)
@@ -54,7 +56,18 @@ def loaded_material(
     return RemovedMaterial(known, removed.shift, removed.bend)
 
 
-def unlabelled(mesh: Mesh) -> Mesh:
-    """The mesh for programs that read its prepared arrays alone: without its own models one serves them all."""
-    without = eqx.tree_at(lambda mesh: mesh.compliance, mesh, default_compliance())
-    return without if mesh.support is None else eqx.tree_at(lambda mesh: mesh.support, without, None)
+def for_contact(mesh: Mesh) -> Mesh:
+    """The mesh for programs that solve its contact for material that is known."""
+    return _unlabelled(mesh, mesh.resolution.of_contact)
+
+
+def _unlabelled(mesh: Mesh, resolution: Resolution) -> Mesh:
+    """The mesh for programs that read its prepared arrays alone: one serves all whose arrays are of the same shapes.
+
+    It is without its own models, of sizes that the program asks for, and its pair is of the gears of its sides, for
+    which it makes no difference which diameters were given.
+    """
+    pinion, wheel = (side.gear for side in mesh.sides)
+    pair = changed(mesh.pair, pinion=pinion, wheel=wheel)
+    own = {"compliance": default_compliance(), "support": None, "automatic": False, "even": False}
+    return changed(mesh, kinematics=changed(mesh.kinematics, pair=pair, resolution=resolution), **own)

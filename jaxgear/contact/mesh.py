@@ -12,9 +12,10 @@ from ..compliance import AbstractCompliance, default_compliance
 from ..compliance.hertz import contact_geometry
 from ..compliance.plane import contact_plane
 from ..compliance.toothload import tooth_load
-from ..geometry import GearPair, Margins, PathOfContact, margins_between, outline
+from ..geometry import GearPair, Margins, PathOfContact, explicit, margins_between, outline
 from ..microgeometry import Flank
-from ..numerics import AbstractSpring, Coupling, on_both, program
+from ..numerics import AbstractSpring, Coupling, changed, on_both, program
+from ..numerics.programs import begin
 from ..shafts import AbstractSupport
 from .covering import check_cover, closing, pairs_for
 from .face_coupling import check_modes, check_support, coupling_of
@@ -186,7 +187,7 @@ def prepare(
     resolution = Resolution() if resolution is None else resolution
     automatic = resolution.pairs is None
     if automatic:
-        resolution = replace(resolution, pairs=pairs_for(pair, deflection))
+        resolution = replace(resolution, pairs=pairs_for(explicit(pair), deflection))
     check_support(support, pair, resolution)
     mesh = prepare_from(np.zeros(()), pair, compliance, resolution, support, ends_together(pair, compliance))
     check_cover(mesh.path_of_contact, resolution)
@@ -194,7 +195,6 @@ def prepare(
     return replace(mesh, automatic=True) if automatic else mesh
 
 
-@program
 def prepare_from(
     first_phase,
     pair: GearPair,
@@ -204,6 +204,37 @@ def prepare_from(
     even: bool,
 ) -> Mesh:
     """The mesh over the base pitch that begins with a mesh position [base pitches]; `even` as of the mesh."""
+    mesh = _arrays_of(first_phase, explicit(pair), compliance, resolution.of_arrays, support, even)
+    return _labelled(mesh, pair, resolution)
+
+
+def begin_mesh(
+    pair: GearPair,
+    compliance: AbstractCompliance,
+    resolution: Resolution,
+    support: AbstractSupport | None,
+    even: bool,
+) -> Mesh | None:
+    """Starts to compile what `prepare` runs; gives the mesh of shapes that it will make, see `begin`."""
+    made = begin(_arrays_of, np.zeros(()), explicit(pair), compliance, resolution.of_arrays, support, even)
+    return None if made is None else eqx.filter_eval_shape(_labelled, made, pair, resolution)
+
+
+def _labelled(mesh: Mesh, pair: GearPair, resolution: Resolution) -> Mesh:
+    """The mesh with what its program leaves out, so as to serve many."""
+    return changed(mesh, kinematics=changed(mesh.kinematics, pair=pair, resolution=resolution))
+
+
+@program
+def _arrays_of(
+    first_phase,
+    pair: GearPair,
+    compliance: AbstractCompliance,
+    resolution: Resolution,
+    support: AbstractSupport | None,
+    even: bool,
+) -> Mesh:
+    """`prepare_from`, for an `explicit` pair and the sizes `of_arrays`."""
     plane = contact_plane(compliance.plane)
     moving = kinematics(pair, first_phase, resolution, plane)
     contact = moving.path_of_contact

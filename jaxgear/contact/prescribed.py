@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, ContactProblem, check, program, real, result, solve_contact, tangent_stiffness
 from .face_coupling import check_torque
-from .loaded_width import loaded_material, unlabelled
+from .loaded_width import for_contact, loaded_material
 from .mesh import Mesh
 from .operation import operation_of
 from .slide import RemovedMaterial
@@ -90,7 +90,7 @@ def solve_at(
     check("solve_at", "transmission_error", error, "um")
     torque = operation_of("solve_at", torque, mesh.slice_width.dtype).torque
     check_torque("solve_at", mesh.support_torque, torque)
-    flanks, prepared = flanks_of("solve_at", mesh, pinion, wheel), unlabelled(mesh)
+    flanks, prepared = flanks_of("solve_at", mesh, pinion, wheel), for_contact(mesh)
     error = jnp.broadcast_to(error.astype(torque.dtype), (positions,))
 
     def first_contact(removed):

@@ -1,5 +1,6 @@
 """Array sizes of a mesh."""
 
+from dataclasses import replace
 from math import gcd
 
 import equinox as eqx
@@ -114,6 +115,27 @@ class Resolution(Checked):
         if self.pairs is None:
             raise ValueError("Resolution: pairs = None has no number yet: prepare chooses it")
         return self.pairs
+
+    @property
+    def of_arrays(self) -> "Resolution":
+        """What the arrays of a prepared mesh depend on, all else at its default: one program makes them for many."""
+        plain = Resolution(self.positions, self.slices, self.pairs, slice_widths=self.parts)
+        if self.slices == 1:
+            return plain
+        modes = self.face_modes if self.coupled_slices else plain.face_modes
+        return replace(plain, coupled_slices=self.coupled_slices, face_modes=modes)
+
+    @property
+    def of_material(self) -> "Resolution":
+        """What the material depends on that is removed from the flanks of a prepared mesh, likewise."""
+        nodes, steps = self.patch_nodes, self.chosen_slide_steps
+        return Resolution(self.positions, self.slices, self.pairs, nodes, steps, slice_widths=self.parts)
+
+    @property
+    def of_contact(self) -> "Resolution":
+        """What the contact of a prepared mesh depends on once that material is known, likewise."""
+        steps, rtol = self.newton_steps, self.rtol
+        return Resolution(self.positions, self.slices, self.pairs, newton_steps=steps, rtol=rtol)
 
     @property
     def leading(self) -> int:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,8 +18,8 @@ from ..shafts import AbstractSupport
 from .cycle import MeshCycle
 from .face_coupling import check_torque, holds_at
 from .face_spreading import ends_together
-from .loaded_width import loaded_material, unlabelled
-from .mesh import Mesh, prepare, prepare_from
+from .loaded_width import for_contact, loaded_material
+from .mesh import Mesh, begin_mesh, prepare
 from .operation import Operation, operation_of
 from .resolution import Resolution
 from .slide import RemovedMaterial, as_removed, nothing_removed
@@ -61,7 +62,7 @@ def solve(
     pinion, wheel = flanks_of("solve", mesh, pinion, wheel)
     # two programs: that of the contact, by far the longer one to compile, serves every kind of modification
     removed = _material(mesh, operation.torque, pinion, wheel)
-    cycle = _cycle(mesh, operation, _solve_removed(unlabelled(mesh), operation.torque, removed), pinion, wheel)
+    cycle = _cycle(mesh, operation, _solve_removed(for_contact(mesh), operation.torque, removed), pinion, wheel)
     wider = _wider(mesh, cycle)
     return cycle if wider is None else solve(wider, operation, pinion=pinion, wheel=wheel)
 
@@ -96,7 +97,7 @@ def solve_removed(
     if shape != wanted:
         raise ValueError(f"solve_removed: removed has shape {shape}, must be {wanted} (pairs, slices, positions)")
     removed = removed if isinstance(removed, RemovedMaterial) else as_removed(mesh.resolution, removed)
-    return _cycle(mesh, operation, _solve_removed(unlabelled(mesh), operation.torque, removed), pinion, wheel)
+    return _cycle(mesh, operation, _solve_removed(for_contact(mesh), operation.torque, removed), pinion, wheel)
 
 
 def removed_material(
@@ -141,7 +142,7 @@ def removed_material(
 
 def _material(mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: AbstractModification) -> RemovedMaterial:
     def first_contact(removed):
-        contact = _solve_removed(unlabelled(mesh), torque, removed)
+        contact = _solve_removed(for_contact(mesh), torque, removed)
         return contact["line_load"], contact["residual"]
 
     return loaded_material(mesh, torque, pinion, wheel, first_contact)
@@ -160,12 +161,12 @@ def begin_contact(
     array sizes that are needed `first` goes ahead.
     """
     even = ends_together(pair, compliance)
-    begin(prepare_from, np.zeros(()), pair, compliance, first, support, even)
-    mesh = begin(prepare_from, np.zeros(()), pair, compliance, resolution, support, even)
+    begin_mesh(pair, compliance, first, support, even)
+    mesh = begin_mesh(pair, compliance, resolution, support, even)
     if mesh is not None:
         dtype = mesh.slice_width.dtype
         nothing = jax.eval_shape(lambda: nothing_removed(resolution, dtype))
-        begin(_solve_removed, unlabelled(mesh), np.zeros((), dtype), nothing)
+        begin(_solve_removed, eqx.filter_eval_shape(for_contact, mesh), np.zeros((), dtype), nothing)
 
 
 def check_mesh(owner: str, mesh: Any) -> None:

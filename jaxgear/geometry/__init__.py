@@ -24,6 +24,7 @@ from .outline import Outline as Outline
 from .outline import outline as outline
 from .pair import GearPair as GearPair
 from .pair import explain as explain
+from .pair import explicit as explicit
 from .pair import is_even as is_even
 from .pair import margins as margins
 from .pair import path_of_contact as path_of_contact

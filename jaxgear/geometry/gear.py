@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, check, concrete, number, program, safe_sqrt
+from ..numerics import Checked, changed, check, concrete, number, program, real, safe_sqrt
 from .involute import half_tooth_angle
 from .material import Material
 
@@ -109,12 +109,12 @@ class Gear(Checked):
         """[mm]"""
         if self.tip_diameter is not None:
             return 0.5 * self.tip_diameter
-        return self.pitch_radius + self.module * (self.profile_shift + self.addendum)
+        return _rack_tip_radius(self)
 
     @property
     def root_circle_radius(self) -> Real:
         """Radius of the root circle [mm]."""
-        return self.pitch_radius + self.module * (self.profile_shift - self.dedendum)
+        return _root_circle_radius(self)
 
     @property
     def bore_radius(self) -> Real:
@@ -163,9 +163,32 @@ class Gear(Checked):
         return self.root_circle_radius - self.bore_radius
 
 
+# of JAX's and of NumPy's numbers
+def _rack_tip_radius(gear: Gear):
+    return 0.5 * gear.module * gear.teeth + gear.module * (gear.profile_shift + gear.addendum)
+
+
+def _root_circle_radius(gear: Gear):
+    return 0.5 * gear.module * gear.teeth + gear.module * (gear.profile_shift - gear.dedendum)
+
+
+def with_diameters(gear: Gear) -> Gear:
+    """The gear with numbers in place of None for the diameters of tip and bore: gears of one tree structure.
+
+    A compiled program then serves gears that give them and gears that do not. A gear with numbers that are being traced
+    is left as it is: its diameters follow them.
+    """
+    names = [name for name in ("tip_diameter", "bore_diameter") if getattr(gear, name) is None]
+    if not names or any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(gear)):
+        return gear
+    known = jax.tree.map(np.asarray, gear)  # compiles nothing
+    diameters = {"tip_diameter": 2 * _rack_tip_radius(known), "bore_diameter": _root_circle_radius(known)}
+    return changed(gear, **{name: real(diameters[name]) for name in names})
+
+
 def shape_faults(gear: Gear) -> tuple[str, ...]:
     """Why a gear of concrete numbers cannot be cut, one line each; empty if it can, or while it is being traced."""
-    shape = _shape(gear)
+    shape = _shape(with_diameters(gear))
     if any(isinstance(number, jax.core.Tracer) for number in shape):
         return ()
     height, land, rim, chamfer, left, tip, form, base, root, bore = (float(number) for number in shape)

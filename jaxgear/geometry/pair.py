@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..numerics import Checked, concrete, number, on_both, program
-from .gear import Gear
+from ..numerics import Checked, changed, concrete, number, on_both, program
+from .gear import Gear, with_diameters
 from .margins import Margins, faults_between, margins_between
 from .outline import outline
 from .path import PathOfContact, path_between, working_pressure_angle
@@ -164,10 +164,16 @@ def explain(pair: GearPair) -> tuple[str, ...]:
 def _faults(pair: GearPair) -> tuple[str, ...]:
     if _traced(pair):
         return ()
-    known, held = _held(pair)
+    known, held = _held(explicit(pair))
     if _traced(known):  # within a trace of something else
         return ()
     return faults_between(pair.pinion, pair.wheel, pair.center_distance, pair.axial_offset, known, held)
+
+
+def explicit(pair: GearPair) -> GearPair:
+    """The pair of gears `with_diameters`, for programs that ask for their numbers and not whether they are given."""
+    pinion, wheel = map(with_diameters, pair.gears)
+    return changed(pair, pinion=pinion, wheel=wheel)
 
 
 def is_even(pair: GearPair) -> bool:

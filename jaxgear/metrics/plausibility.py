@@ -123,7 +123,8 @@ def plausibility(
     rpm = cycle.operation.speed if speed is None else speed
     coefficient = cycle.operation.friction if friction is None else friction
     # without the flanks: one program serves every kind of them
-    gears, results, sides, overhangs = _numbers(replace(cycle, pinion=None, wheel=None))
+    bare = replace(cycle, pinion=None, wheel=None, kinematics=cycle.kinematics.explicit)
+    gears, results, sides, overhangs = _numbers(bare)
     (name, where, deflection), *others = results
     deflection = float(deflection) - 1e-3 * given_way / float(cycle.kinematics.pair.pinion.module)
     numbers = [_doubt(*each) for each in (*gears, (name, where, deflection), *others)]

@@ -9,9 +9,8 @@ import numpy as np
 from ..compliance import TabulatedCompliance, finite_element_compliance
 from ..conditions import solve_case, solved
 from ..contact import Mesh, MeshCycle, prepare
-from ..contact.mesh import prepare_from
+from ..contact.mesh import begin_mesh
 from ..microgeometry import AbstractModification
-from ..numerics.programs import begin
 from .problem import Problem
 from .result import Optimum
 from .verdict import judged
@@ -102,7 +101,7 @@ def begin_verification(mesh: Mesh, compliance: TabulatedCompliance, positions: i
     """
     count = mesh.resolution.positions if positions is None else positions
     sizes = replace(mesh.resolution, positions=count)
-    begin(prepare_from, np.zeros(()), mesh.pair, compliance, sizes, mesh.support, mesh.even)
+    begin_mesh(mesh.pair, compliance, sizes, mesh.support, mesh.even)
 
 
 def verify(optimum: Optimum, *, cache: str | Path | bool | None = True) -> Verified:
