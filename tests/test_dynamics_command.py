@@ -47,10 +47,11 @@ FIGURES = "dynamic_factor", "approach_rms", "waterfall", "bifurcation", "phase_p
 
 
 def test_the_command_writes_what_it_says(file, tmp_path):
-    path, folder = file(PAIR + TABLE), tmp_path / "out"
+    path, folder = file(PAIR + TABLE + "[tolerance]\nquality_class = 7\n"), tmp_path / "out"
     done = call("dynamics", str(path), "--output", str(folder), "--report")
     code, out, err = done.code, done.out, done.err
     assert code == 0, err
+    assert "[tolerance] is not part of this analysis, the gears are perfect\n" in err
     assert {entry.name for entry in folder.iterdir()} == {
         "summary.json",
         "responses.csv",
@@ -63,6 +64,7 @@ def test_the_command_writes_what_it_says(file, tmp_path):
         rows = list(csv.DictReader(lines))
     assert len(rows) == 2 * 3 * 9  # unmodified and rule-based, three runs, nine speeds
     summary = json.loads((folder / "summary.json").read_text())
+    assert summary["left_out"].startswith("[tolerance]")
     for design, data in summary["designs"].items():
         for run in data["runs"]:
             of_run = [row for row in rows if (row["design"], row["speed"]) == (design, run["speed"])]

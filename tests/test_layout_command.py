@@ -151,8 +151,10 @@ def test_the_command_writes_what_it_says(file, tmp_path):
 @pytest.mark.slow
 def test_profiles_follow_the_flank_lines(file, tmp_path):
     folder = tmp_path / "out"
-    done = call("layout", str(file(FILE + PROFILE)), "--output", str(folder), "--quick")
+    text = FILE + PROFILE + "[tolerance]\nquality_class = 7\n"
+    done = call("layout", str(file(text)), "--output", str(folder), "--quick")
     assert done.code == 0, done.err
+    assert "[tolerance] is not part" in done.err and "flank lines deviate by the limits of [layout]" in done.err
     names = {entry.name for entry in folder.iterdir()}
     figures = {"tolerance_cases.png", "face_load_factors.png", "face_load_over_torque.png", "shaft_deflection.png"}
     figures |= {"radar.png"}

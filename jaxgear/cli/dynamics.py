@@ -10,7 +10,7 @@ import numpy as np
 from ..contact import Mesh
 from ..dynamics import Dynamics, Oscillator, steps_for
 from ..io import DesignFile, DynamicsRequest, dynamics_request
-from . import dynamics_figures, dynamics_report
+from . import dynamics_figures, dynamics_report, manufactured
 from .compared import Modifications, compared, search_of
 from .dynamics_branches import branches_of
 from .dynamics_report import Study, next_to_design
@@ -89,4 +89,5 @@ run_dynamics = StudyCommand(
     dynamics_report.verdict,
     dynamics_report.failures,
     (dynamics_report.ASSUMED,),
+    omits=manufactured.left_out,
 )

@@ -41,6 +41,13 @@ def pairs_of(design: DesignFile, *, quick: bool) -> int:
     return min(design.tolerance.samples, _QUICK_PAIRS) if quick else design.tolerance.samples
 
 
+def left_out(design: DesignFile, why: str = "") -> str:
+    """That an analysis is of perfect gears though the file has tolerances; "" where it has none."""
+    if design.tolerance is None:
+        return ""
+    return "[tolerance] is not part of this analysis, the gears are perfect" + f" ({why})" * bool(why)
+
+
 def lines(design: DesignFile, evaluations: Evaluations) -> Iterator[str]:
     """The main design in words; nothing without a table [tolerance]."""
     found = report.main(evaluations).scatter

@@ -43,11 +43,12 @@ class Arrays:
 
 def left_out(design: DesignFile) -> str:
     """Why the scatter is not told where the file has tolerances; "" where it is."""
-    if design.tolerance is None or design.wear is None or design.wear.line_load != "dynamic":
+    if design.wear is None or design.wear.line_load != "dynamic":
         return ""
-    return (
-        "[tolerance] is not part of this analysis, the gears are perfect (lives under the motion are not worked out "
-        'for every manufactured pair): wear.line_load = "static" takes it'
+    return manufactured.left_out(
+        design,
+        "lives under the motion are not worked out for every manufactured pair, those under wear.line_load = "
+        '"static" are',
     )
 
 
