@@ -16,16 +16,16 @@ from ..metrics import Lubricant, Strength
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
-from . import held, rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, template
+from . import held, rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, sections, template
 from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refused
 from .flanks import check_files
 from .gearbox import layout_of, support_of
-from .gears import both_classes, gear_of, materials_of, pair_of, quality_of, with_quality
+from .gears import both_classes, gear_of, materials_of, pair_of, quality_of
 from .sizes import resolution_of
-from .stiffness import FINITE_ELEMENTS, model_part, with_tables
+from .stiffness import model_part, with_tables
 from .toml import decode, read
-from .variables import increasing, read_variables
+from .variables import read_variables
 
 # Tooth pairs are carried along up to this many times the deflection of a single pair after ISO 6336-1.
 _DEFLECTIONS = 2.0
@@ -215,15 +215,11 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
     )
     flanks = [*pinion_flank, *wheel_flank]
     pair, quality = pair_of(top, pinion, wheel), quality_of(pinion_says, wheel_says)
-    load = _load(top.load)
+    load = sections.load_of(top.load)
     operation = template.part_of("load", load, Operation)
     stiffness = decode("model", top.model or {}, schema.ModelSection)
     model = model_part(stiffness)
-    optimize = decode("optimize", top.optimize or {}, schema.optimize_section())
-    if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
-        raise DesignFileError("optimize", "has no effect without [variables]")
-    if optimize.verify and stiffness.structure == FINITE_ELEMENTS:
-        raise DesignFileError("optimize.verify", f'has no effect with model.structure = "{FINITE_ELEMENTS}"')
+    optimize = sections.optimize_of(top, stiffness)
     axes = template.part_of(
         "misalignment", decode("misalignment", top.misalignment or {}, schema.MisalignmentSection), Misalignment
     )
@@ -242,14 +238,8 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
         axes = replace(axes, fields={})
     usual = operation.build(middle)
     torque = float(usual.torque)
-    tolerance = None
-    if top.tolerance is not None:
-        tolerance = decode("tolerance", top.tolerance, schema_sweep.ToleranceSection)
-        tolerance = with_quality("tolerance", tolerance, quality)
-    if top.sweep is not None and not top.variables:
-        raise DesignFileError("sweep", "has no effect without [variables]")
+    tolerance, sweep = sections.tolerance_of(top, quality), sections.sweep_of(top)
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
-    sweep = None if top.sweep is None else decode("sweep", top.sweep, schema_sweep.SweepSection)
     layout = layout_of(top.layout, quality)
     if layout is not None and axes.fields:
         raise DesignFileError("misalignment", "has no effect with [layout], which takes that of [[meshes]]")
@@ -272,8 +262,8 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
         optimize=optimize,
         sweep=sweep,
         tolerance=tolerance,
-        dynamics=None if top.dynamics is None else decode("dynamics", top.dynamics, schema_dynamics.DynamicsSection),
-        wear=None if top.wear is None else decode("wear", top.wear, schema_wear.WearSection),
+        dynamics=sections.optional("dynamics", top.dynamics, schema_dynamics.DynamicsSection),
+        wear=sections.optional("wear", top.wear, schema_wear.WearSection),
         lubricant=rating.lubricant_of(top.lubricant, load, bounds, file.parent),
         strength=rating.strength_of(top.strength, file.parent),
         layout=layout,
@@ -289,11 +279,3 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
         _load=operation,
         _resolution=resolution,
     )
-
-
-def _load(table: schema.Tables) -> schema.LoadSection:
-    load = decode("load", table, schema.LoadSection)
-    if load.torque_range is not None:
-        low, high = load.torque_range
-        increasing("load.torque_range[1]", low, high, unit=" N m")
-    return load
