@@ -10,6 +10,11 @@ from jaxgear.compliance.laws import LinearLaw
 from jaxgear.contact import removed_material, solve_removed
 from jaxgear.microgeometry import AbstractModification
 
+# Sizes that tests share, so that the programs of these sizes are compiled once for all of them: contacts that stay at
+# their nominal places, contacts that slide (where sliding is argued), and slices that feel each other.
+LINE = jg.Resolution(positions=16, pairs=2, slide_steps=0)
+SLIDING = jg.Resolution(positions=16, pairs=2)
+FACE = jg.Resolution(positions=8, slices=6, pairs=2, face_modes=3, slide_steps=0, patch_nodes=1)
 COARSE = jg.Resolution(positions=32, pairs=4)
 # two pairs reach as far as 40 um of deflection at the contact ratios of these tests, and compile in half the time
 TWO_PAIRS = jg.Resolution(positions=32, pairs=2)

@@ -1,32 +1,62 @@
 """Settings of every test: double precision, no silent promotion of dtypes or ranks, annotated shapes checked, compiled
 functions kept on disk, and a garbage collector that does not look through everything all the time."""
 
+import contextlib
 import gc
 import os
+import uuid
 from pathlib import Path
 
 import jax
 import jaxtyping
 import pytest
+from jax._src.lru_cache import LRUCache
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
-
-
 # Most of the time of a test goes into compiling a program that runs once: without optimization that takes a quarter.
-QUICK_COMPILER = "--xla_backend_optimization_level=0"
-if jax.__version_info__ < (0, 11):  # later compilers do not know the first, and an unknown one ends the process
-    QUICK_COMPILER += " --xla_cpu_use_fusion_emitters=false"
-    # to split a program among threads costs work, and gains nothing where every core has a worker
-    QUICK_COMPILER += " --xla_cpu_parallel_codegen_split_count=1"
+jax.config.update("jax_disable_most_optimizations", True)
+
+
+MOST_KEPT = 1 << 30  # bytes of compiled programs, of which one run needs a tenth
+OPTIMIZATION = "xla_backend_optimization_level"
+
+
+def pytest_addoption(parser):
+    parser.addoption("--costs", action="store_true", help="tell where the time of the tests goes")
 
 
 def pytest_configure(config):
-    """Before anything imports jaxgear. Slow tests run what users run: optimized, without the checks of annotations."""
+    """Before anything else imports jaxgear. Slow tests run without checks of annotations, as what users run."""
     if config.option.markexpr != "slow":
         jaxtyping.install_import_hook("jaxgear", "typechecker.arrays")
-        os.environ.setdefault("XLA_FLAGS", QUICK_COMPILER)
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        _before_the_workers()
+
+
+def _before_the_workers():
+    """What they find when they start: room in the cache, and the quicker of two code generators, where there are two.
+
+    To split a program among threads costs work, and gains nothing where every core has a worker.
+    """
+    from jaxgear.numerics import durable, quick
+
+    with contextlib.suppress(OSError):
+        durable.forget_the_oldest(Path(jax.config.jax_compilation_cache_dir), MOST_KEPT)
+    if "XLA_FLAGS" not in os.environ:
+        wanted = {**quick.OPTIONS, "xla_cpu_parallel_codegen_split_count": 1}
+        del wanted[OPTIMIZATION]  # the configuration says it, which a test can change
+        known = (f"--{name}={str(value).lower()}" for name, value in wanted.items() if quick.is_known(name, value))
+        os.environ["XLA_FLAGS"] = " ".join(known)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionstart(session):
+    if session.config.option.costs:
+        from costs import Costs  # of which a run without it knows nothing
+
+        session.config.pluginmanager.register(Costs(session.config))
 
 
 # Collections of the oldest objects took a fifth of the time of tracing: a trace makes many objects, and each collection
@@ -42,21 +72,29 @@ def pytest_collection_finish(session):
 
 
 def _compilation_cache() -> Path:
-    """A folder of this user only, since what is in it gets executed, and of this worker only.
-
-    JAX does not write entries atomically: a worker could read what another one is still writing.
-    """
+    """A folder of this user only, since what is in it gets executed, for all workers of this and of later runs."""
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(base) / "jaxgear" / "tests" / os.environ.get("PYTEST_XDIST_WORKER", "single")
+    folder = Path(base) / "jaxgear" / "tests"
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     folder.chmod(0o700)
     return folder
+
+
+def _put_whole(self, key, value):
+    """In place of `LRUCache.put`, which lets other workers read what it is still writing."""
+    path = self.path / f"{key}-cache"
+    if not path.exists():
+        temporary = path.with_name(f".{uuid.uuid4().hex}.tmp")
+        temporary.write_bytes(value)
+        temporary.replace(path)
 
 
 try:
     jax.config.update("jax_compilation_cache_dir", str(_compilation_cache()))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # they make an entry one of its folder
+    LRUCache.put = _put_whole
 except OSError:  # a read-only home: the tests run all the same, only slower
     pass
 
@@ -92,6 +130,14 @@ def nothing_compiled():
     _forget()
     yield
     _forget()
+
+
+@pytest.fixture
+def optimized(nothing_compiled):
+    """For slow tests of what users run: programs with all optimizations of the compiler."""
+    jax.config.update("jax_disable_most_optimizations", False)
+    yield
+    jax.config.update("jax_disable_most_optimizations", True)
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """Layers import only what comes before them, and importing the library has no side effects."""
 
 import ast
+import functools
 import importlib
 import importlib.metadata
 import inspect
@@ -43,11 +44,17 @@ def layer(path: Path) -> str:
     return parts[0]
 
 
+@functools.cache
+def nodes(path: Path):
+    """All nodes of a file, and those at its module level."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return [*ast.walk(tree)], set(tree.body)
+
+
 def imported(path: Path):
     """Layers that a file imports, at module level or inside functions."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
     package = ("jaxgear", *path.relative_to(PACKAGE).parts[:-1])
-    for node in ast.walk(tree):
+    for node in nodes(path)[0]:
         if isinstance(node, ast.ImportFrom) and node.level:
             base = package[: len(package) - node.level + 1]
             names = [node.module] if node.module else [alias.name for alias in node.names]
@@ -59,13 +66,15 @@ def imported(path: Path):
             yield (node.module or "").split(".")[1]
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_layers_import_only_earlier_ones(path):
-    own = layer(path)
-    if own in ("__init__", "__main__"):
-        return
-    for other in imported(path):
-        assert other == own or ORDER.index(other) < ORDER.index(own), f"{own} imports {other}"
+def test_layers_import_only_earlier_ones():
+    wrong = [
+        f"{path.relative_to(PACKAGE)} imports {other}"
+        for path in FILES
+        if layer(path) not in ("__init__", "__main__")
+        for other in imported(path)
+        if other != layer(path) and ORDER.index(other) >= ORDER.index(layer(path))
+    ]
+    assert wrong == []
 
 
 # imported where they are used, so that the library starts fast and without what it does not need
@@ -89,10 +98,10 @@ COMMANDS = {f"jaxgear.cli.{name}" for name in _NAMES}
 
 def hidden(path: Path):
     """Packages, of jaxgear with the layer, that a file imports anywhere but at module level."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
     package = ("jaxgear", *path.relative_to(PACKAGE).parts[:-1])
-    for node in ast.walk(tree):
-        if node in tree.body:
+    inner, outer = nodes(path)
+    for node in inner:
+        if node in outer:
             continue
         if isinstance(node, ast.Import):
             yield from (alias.name.split(".")[0] for alias in node.names)
@@ -103,13 +112,12 @@ def hidden(path: Path):
             yield from (".".join((*base, node.module or alias.name)) for alias in node.names)
 
 
-# the launcher is no part of the package when it runs: it listens to Ctrl-C before it imports any of it
-@pytest.mark.parametrize(
-    "path", [p for p in FILES if p.name != "launcher.py"], ids=lambda path: str(path.relative_to(PACKAGE))
-)
-def test_no_import_hides_a_circle(path):
+def test_no_import_hides_a_circle():
     """None inside a function, none under TYPE_CHECKING, but for packages that are heavy."""
-    assert set(hidden(path)) <= (HEAVY | COMMANDS if path == PACKAGE / "cli" / "app.py" else HEAVY)
+    app, launcher = PACKAGE / "cli" / "app.py", PACKAGE / "cli" / "launcher.py"
+    files = [path for path in FILES if path != launcher]  # no part of the package when it runs: it comes before
+    found = {path: set(hidden(path)) - HEAVY - (COMMANDS if path == app else set()) for path in files}
+    assert {path: names for path, names in found.items() if names} == {}
 
 
 def test_the_check_sees_imports():
@@ -139,10 +147,15 @@ def test_import_is_silent_and_changes_nothing():
         "assert 'matplotlib' not in sys.modules and 'typer' not in sys.modules\n"
         "assert 'pyarrow' not in sys.modules\n"
         "for name in dir(jaxgear):\n"
-        "    if name != 'plot':\n"
+        "    if name not in ('plot', 'STEEL'):\n"
         "        getattr(jaxgear, name)\n"
         "assert not {'matplotlib', 'optax', 'typer', 'pyarrow', 'evosax'} & set(sys.modules)\n"
         "assert dict(jax.config.values) == before\n"
+        "import jaxgear.cli.commands, jaxgear.cli.sweep\n"
+        "jax.config.update('jax_num_cpu_devices', 3)\n"  # nothing has chosen the devices either
+        "jax.config.update('jax_enable_x64', True)\n"
+        "assert jax.device_count() == 3\n"
+        "assert jaxgear.STEEL.density.dtype == 'float64'\n"
     )
     done = in_a_new_process(script)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
@@ -181,19 +194,6 @@ def test_an_unknown_name_is_refused_as_python_does():
         jaxgear.tip_relief  # noqa: B018
     with pytest.raises(ImportError, match="cannot import name 'tip_relief' from 'jaxgear'"):
         from jaxgear import tip_relief  # noqa: F401
-
-
-def test_import_leaves_the_choice_of_devices_to_the_user():
-    script = (
-        "import jax, jaxgear, jaxgear.cli.commands, jaxgear.cli.sweep\n"
-        "[getattr(jaxgear, name) for name in dir(jaxgear) if name != 'STEEL']\n"
-        "jax.config.update('jax_num_cpu_devices', 3)\n"
-        "jax.config.update('jax_enable_x64', True)\n"
-        "assert jax.device_count() == 3\n"
-        "assert jaxgear.STEEL.density.dtype == 'float64'\n"
-    )
-    done = in_a_new_process(script)
-    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_modules_are_small_enough_to_read_in_one_go():

@@ -4,14 +4,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from test_shafts import PINION, WHEEL
+from gearboxes import PINION, stage
 
 from jaxgear.shafts import (
     Bearing,
-    Coupling,
     Gearbox,
-    GearMesh,
-    MountedGear,
     Section,
     Shaft,
     ShaftLoad,
@@ -26,18 +23,6 @@ Y = jnp.linspace(-8.0, 8.0, 5)
 def beam(clearances, force=(300.0, 400.0, 0.0), at=40.0):
     ends = [Bearing(name, z, 200.0, clearance=c) for name, z, c in zip("AB", (0.0, 100.0), clearances)]
     return Gearbox([Shaft("s", [Section(100, 40)], ends, loads=[ShaftLoad(at, force)])], [])
-
-
-def stage(clearance, radial=300.0, moment=40.0):
-    """One stage with clearance in all bearings; the wheel shaft carries a belt too."""
-
-    def held(names, factor):
-        return [Bearing(n, z, radial, clearance=factor * clearance) for n, z in zip(names, (0.0, 120.0))]
-
-    into = Shaft("in", [Section(120, 30)], held("AB", 1.0), [MountedGear("p", PINION, 50)], [Coupling(0.0, moment)])
-    belt = ShaftLoad(100.0, (900.0, 200.0, 0.0))
-    out = Shaft("out", [Section(120, 40)], held("CD", 1.5), [MountedGear("w", WHEEL, 50)], [Coupling(120.0)], [belt])
-    return Gearbox([into, out], [GearMesh("p", "w")])
 
 
 def test_a_shaft_lies_against_its_bearings_in_the_direction_of_the_load():

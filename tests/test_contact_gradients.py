@@ -1,5 +1,7 @@
 """Derivatives of the contact solver: implicit function theorem against central differences, in every mode of JAX."""
 
+from functools import partial
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -50,32 +52,35 @@ def value(x):
     )
 
 
-def derivatives(x):
-    """Gradient in three modes and Hessian."""
-    return jax.grad(value)(x), jax.jacfwd(value)(x), jax.jacrev(value)(x), jax.hessian(value)(x)
+def derivatives(model, x):
+    """Value, gradient in two modes, and Hessian."""
+
+    def backward(at):
+        number, slope = jax.value_and_grad(model)(at)
+        return slope, (number, slope)
+
+    hessian, (number, slope) = jax.jacfwd(backward, has_aux=True)(x)
+    return number, slope, jax.jacfwd(model)(x), hessian
 
 
 X = 0.01 * jnp.asarray([1.0, -2.0, 1.5, 0.5, -1.0, 0.7])
 
 
 def test_all_modes_agree_with_central_differences():
-    """Batched over two points; a single gradient equals its row of the batch."""
+    """Batched over two points and those around them."""
     h, count = 1e-6, len(LEAVES)
-    points = jnp.stack([X, -0.6 * X])
-    offsets = h * jnp.concatenate([jnp.eye(count), -jnp.eye(count)])
-    around = jax.jit(jax.vmap(jax.vmap(jax.value_and_grad(value))))(points[:, None] + offsets[None])
-    values, slopes = around
-    reverse, forward, jacobian, hessian = jax.jit(jax.vmap(derivatives))(points)
+    offsets = h * jnp.concatenate([jnp.zeros((1, count)), jnp.eye(count), -jnp.eye(count)])
+    points = jnp.stack([X, -0.6 * X])[:, None] + offsets[None]
+    batch = jax.jit(jax.vmap(lambda x: derivatives(value, x)))(points.reshape(-1, count))
+    values, slopes, forward, hessian = (np.asarray(each).reshape(2, 2 * count + 1, *each.shape[1:]) for each in batch)
 
-    difference = (values[:, :count] - values[:, count:]) / (2 * h)
-    assert float(jnp.abs(difference).min()) > 1e-2, "every leaf must matter"
-    np.testing.assert_allclose(reverse, difference, rtol=1e-6)
-    np.testing.assert_allclose(forward, reverse, rtol=1e-11)
-    np.testing.assert_allclose(jacobian, reverse, rtol=1e-11)
-    np.testing.assert_allclose(jax.jit(jax.grad(value))(X), reverse[0], rtol=1e-11)
+    difference = (values[:, 1 : count + 1] - values[:, count + 1 :]) / (2 * h)
+    assert np.abs(difference).min() > 1e-2, "every leaf must matter"
+    np.testing.assert_allclose(slopes[:, 0], difference, rtol=1e-6)
+    np.testing.assert_allclose(forward, slopes, rtol=1e-11)
 
-    curvature = (slopes[:, :count] - slopes[:, count:]) / (2 * h)
-    scale = float(jnp.abs(curvature).max())
+    curvature, hessian = (slopes[:, 1 : count + 1] - slopes[:, count + 1 :]) / (2 * h), hessian[:, 0]
+    scale = np.abs(curvature).max()
     np.testing.assert_allclose(hessian, curvature, rtol=1e-5, atol=1e-7 * scale)
     np.testing.assert_allclose(hessian, hessian.swapaxes(1, 2), rtol=1e-8, atol=1e-11 * scale)
 
@@ -89,11 +94,12 @@ def test_jacobians_of_approach_and_loads():
 
     @jax.jit
     def jacobians(load, gap):
-        by_gap = jax.jacrev(lambda g: solution(load, g)[0])(gap), jax.jacfwd(lambda g: solution(load, g)[1])(gap)
         stiffness = tangent_stiffness(DATA, solve_contact(DATA, steps=STEPS))
-        return jax.jacfwd(solution)(load, gap), by_gap, stiffness
+        return jax.jacfwd(solution, (0, 1))(load, gap), jax.jacrev(lambda g: solution(load, g)[0])(gap), stiffness
 
-    (approach_by_load, load_by_load), (approach_by_gap, load_by_gap), stiffness = jacobians(DATA.load, DATA.gap)
+    forward, approach_by_gap, stiffness = jacobians(DATA.load, DATA.gap)
+    (approach_by_load, approach_by_gap_forward), (load_by_load, load_by_gap) = forward
+    np.testing.assert_allclose(approach_by_gap_forward, approach_by_gap, rtol=1e-10, atol=1e-15)
     np.testing.assert_allclose(approach_by_load, 1 / stiffness, rtol=1e-12)
     own = jnp.stack([approach_by_gap[n, ..., n] for n in range(POSITIONS)], axis=-1)
     np.testing.assert_allclose(own, DATA.weight[None, :, None] * load_by_load, rtol=1e-10, atol=1e-15)
@@ -117,13 +123,14 @@ def linear_pair(x):
     return solution.approach[0] + 0.01 * solution.line_load[0, 0, 0]
 
 
+@partial(jax.jit, static_argnums=0)
 def at_a_corner(model, x, batch):
-    """Value, gradient in two modes, Hessian, and Hessians of a batch."""
-    hessian = jax.hessian(model)
-    return model(x), jax.grad(model)(x), jax.jacfwd(model)(x), hessian(x), jax.vmap(hessian)(batch)
+    """Derivatives at a point, and those of a batch."""
+    return derivatives(model, x), jax.vmap(lambda at: derivatives(model, at))(batch)
 
 
-AT_A_CORNER = jax.jit(at_a_corner, static_argnums=0)
+def around(x):
+    return jnp.stack([x, x + 1e-3])
 
 
 @pytest.mark.parametrize(
@@ -140,16 +147,17 @@ AT_A_CORNER = jax.jit(at_a_corner, static_argnums=0)
 )
 def test_derivatives_stay_finite_where_contact_changes(model, x):
     x = jnp.asarray(x)
-    batch = jnp.stack([x, x + 1e-3])
-    results = AT_A_CORNER(model, x, batch)
-    assert all(bool(jnp.all(jnp.isfinite(result))) for result in results)
-    np.testing.assert_allclose(results[1], results[2], rtol=1e-12, atol=1e-14)
+    alone, batch = at_a_corner(model, x, around(x))
+    assert all(np.isfinite(result).all() for result in (*alone, *batch))
+    np.testing.assert_allclose(alone[1], alone[2], rtol=1e-12, atol=1e-14)
+    for found, expected in zip(batch, alone):
+        np.testing.assert_allclose(found[0], expected, rtol=1e-11, atol=1e-14)
 
 
 def test_derivative_at_a_kissing_spring_is_one_of_its_two_sides():
     """Just before contact the second spring's gap does not matter; just after, both springs bear the approach."""
-    slope = jax.jit(jax.grad(linear_pair))
-    before, at, after = (slope(jnp.asarray([100.0, 0.0, gap])) for gap in (5.0 + 1e-6, 5.0, 5.0 - 1e-6))
+    points = (jnp.asarray([100.0, 0.0, gap]) for gap in (5.0 + 1e-6, 5.0, 5.0 - 1e-6))
+    before, at, after = (at_a_corner(linear_pair, x, around(x))[0][1] for x in points)
     np.testing.assert_allclose(before, [0.05 + 0.01, 1.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(after, [0.025 + 0.005, 0.5 - 0.1, 0.5 + 0.1], atol=1e-12)
     assert any(np.allclose(at, side, atol=1e-9) for side in (before, after))

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from test_clearance import stage
+from gearboxes import stage
 
 import jaxgear as jg
 from jaxgear.layout import level_load
@@ -118,15 +118,10 @@ def test_nothing_stays_nothing_and_nan_stays_nan():
     assert np.isnan(INVERSE(jnp.eye(3).at[1, 2].set(jnp.nan), LEAST)).all()
 
 
-def over_shafts(x):
-    """Two gearboxes side by side, with clearance in their bearings."""
-    return [support(stage(1.0, radial=300.0 * x + more)).influence(jnp.linspace(-8.0, 8.0, 41)) for more in (0, 1)]
-
-
 def over_meshes(x):
     """Slices that feel each other through gears and shafts, and their contact."""
     held = support(stage(1.0, radial=300.0 * x))
-    sizes = jg.Resolution(positions=8, patch_nodes=1, slices=7, pairs=2, newton_steps=2)
+    sizes = jg.Resolution(positions=8, patch_nodes=1, slices=7, pairs=2, slide_steps=0, newton_steps=2)
     return jg.solve(jg.prepare(held.pair, support=held, resolution=sizes), 40.0).transmission_error
 
 
@@ -148,7 +143,7 @@ def test_a_sweep_calls_no_lapack(designs):
 PROCESS = """
 import jax, jax.numpy as jnp, numpy as np
 jax.config.update("jax_enable_x64", True)
-from test_dense import over_shafts
+from gearboxes import over_shafts
 print(jax.jit(jax.vmap(over_shafts))(jnp.linspace(1.0, 1.1, 300))[0].shape)
 """
 

@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import gear_pair, prepare, solve
+from catalogue import TWO_PAIRS, gear_pair, prepare, solve
 
 from jaxgear.dynamics import DeadZone
 from jaxgear.dynamics.dimensionless import (
@@ -181,7 +181,7 @@ def test_a_relief_jumps_between_two_steps_of_a_sweep(steps):
 def test_dead_zone_without_stiffness_variation_is_the_linear_oscillator():
     """Out of the clearance: the amplitude of x is F_ah w^2 / |1 - w^2 + 2 i zeta w| (Kahraman, Singh 1990)."""
     model = dimensionless_model(load=0.1, damping_ratio=0.05, displacement=0.05, clearance=DeadZone())
-    found = settled_vibration(model, 0.7)
+    found = settled_vibration(model, 0.7, start=[1.1, 0.0], settling=40, steps=512)
     assert found.settled
     assert np.isclose(abs(found.harmonic(1)), 0.047593, atol=1e-6)
     assert np.isclose(found.mean, 1.1) and np.isclose(jnp.max(found.approach), 1.147593, atol=2e-6)
@@ -205,11 +205,13 @@ def test_gradient_of_the_settled_amplitude():
         found = settled_vibration(model, 0.6, settling=60, steps=64)
         return jnp.sqrt(jnp.sum(found.weight * (found.approach - found.mean) ** 2))
 
-    at, step = jnp.array([0.2, 0.5]), 1e-5
-    both = jax.jit(jax.value_and_grad(rms))
-    for i, slope in enumerate(both(at)[1]):
-        away = step * jnp.eye(2)[i]
-        assert np.isclose(slope, (both(at + away)[0] - both(at - away)[0]) / (2 * step), rtol=1e-5)
+    along = jax.jit(lambda at, way: jax.jvp(rms, (at,), (way,)))
+    at, step = np.array([0.2, 0.5]), 1e-5
+    for way in np.eye(2):
+        _, slope = along(at, way)
+        assert np.isclose(
+            slope, (along(at + step * way, way)[0] - along(at - step * way, way)[0]) / (2 * step), rtol=1e-5
+        )
 
 
 def test_nodes_lie_where_the_relief_jumps():
@@ -229,7 +231,7 @@ def test_largest_relief_of_the_study():
 
 @pytest.fixture(scope="module")
 def identified():
-    cycle = solve(prepare(gear_pair()), 100.0)
+    cycle = solve(prepare(gear_pair(), resolution=TWO_PAIRS), 100.0)
     return cycle, from_mesh(cycle, mass=0.3, damping_ratio=0.05, half_clearance=40.0)
 
 
@@ -277,9 +279,9 @@ def test_static_optimum_of_the_rectangular_stiffness_is_quiet_at_every_speed():
     )
     single = 1 / (1 + 0.3 * 0.37)
     amount = 2 * 0.5 * (1 / single - 1 / (1.3 * single))
-    quiet = with_relief(model, relief(amount, begin=-0.185))
+    bare, quiet = (with_relief(model, relief(size, begin=-0.185)) for size in (0.0, amount))
     for frequency in (0.5, 0.97):
-        loud = settled_vibration(model, frequency, settling=40, steps=128).amplitude
+        loud = settled_vibration(bare, frequency, settling=40, steps=128).amplitude
         assert settled_vibration(quiet, frequency, settling=40, steps=128).amplitude < 0.1 * loud
 
 

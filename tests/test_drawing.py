@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import TWO_PAIRS, gear_pair
+from catalogue import LINE, gear_pair
 
 import jaxgear as jg
 from jaxgear.compliance.assembly import with_edge
@@ -177,7 +177,7 @@ def test_a_chamfered_pair_runs_as_one_of_tips_cut_there():
         if form is not None:
             gears = [replace(each, tip_form_diameter=end) for each, end in zip((pair.pinion, pair.wheel), form)]
             pair = jg.GearPair(*gears)
-        found = jg.solve(jg.prepare(pair, resolution=TWO_PAIRS), 50.0)
+        found = jg.solve(jg.prepare(pair, resolution=LINE), 50.0)
         return jnp.mean(found.transmission_error), jg.peak_to_peak(found.transmission_error), found.converged.all()
 
     ends = jnp.asarray([62.5, 149.4])

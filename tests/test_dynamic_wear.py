@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import gear_pair, prepare
+from catalogue import LINE, gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear.contact import removed_material
@@ -16,7 +16,7 @@ from jaxgear.dynamics import Dynamics, natural_frequencies
 from jaxgear.wear import WEAR_QUANTITIES, Wear, mean_over_life, over_life, wear, wear_depth, wear_in_steps, worn_volume
 from jaxgear.wear.deposit import deposit
 
-SIZES = jg.Resolution(positions=16, pairs=2, slide_steps=0)
+SIZES = LINE
 TORQUE, COEFFICIENT, REVOLUTIONS, BLOCKS = 100.0, 1e-18, 4e7, 2
 TEETH = 20, 30
 # compiles in a tenth of the time of the map; as many steps as the lowest speed needs, so that one program serves all
@@ -128,7 +128,7 @@ def test_the_worn_volume_is_that_of_the_forces_of_the_motion(mesh, natural):
 def test_one_force_at_every_position_is_a_torque(mesh, slices):
     """Slices that feel each other too."""
     mesh = mesh if slices == 1 else prepare(mesh.pair, resolution=replace(SIZES, slices=slices, face_modes=3))
-    forces = static_force(mesh) * jnp.where(jnp.arange(16) < 8, 1.0, 0.5)
+    forces = jnp.asarray(static_force(mesh) * np.where(np.arange(16) < 8, 1.0, 0.5))
     contact = solve_forces(mesh, forces, removed_material(mesh, TORQUE, **FLANKS))
     full = jg.solve(mesh, TORQUE, **FLANKS)
     half = jg.contact.solve_removed(mesh, TORQUE / 2, removed_material(mesh, TORQUE, **FLANKS))

@@ -5,8 +5,8 @@ import json
 
 import numpy as np
 import pytest
+from commands import LINE, call
 from report_page import check_report
-from test_cli import call
 
 from jaxgear.cli import interrupt
 from jaxgear.cli.kept import Kept, SpeedResponses
@@ -30,7 +30,7 @@ PAIR = f"""
 [load]
 torque = 200.0
 [resolution]
-positions = 16
+{LINE}
 """
 TABLE = """
 [dynamics]

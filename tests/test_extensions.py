@@ -1,5 +1,6 @@
 """What extends the package from outside: a class, and where it shall have a name, one line more."""
 
+import functools
 import re
 from dataclasses import replace
 
@@ -8,10 +9,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import gear_pair
+from catalogue import LINE, gear_pair
+from commands import FREE, call
+from design_texts import loaded, removed, text
 from jaxtyping import Array
-from test_cli import FREE, call
-from test_design_file import load, removed, text  # noqa: F401
 
 import jaxgear as jg
 from jaxgear.compliance import AbstractCompliance, ContactGeometry, Plane
@@ -23,8 +24,13 @@ from jaxgear.numerics.fields import count
 from jaxgear.numerics.reductions import Harmonic
 
 ROLL_LENGTH = np.linspace(0.0, 60.0, 13)
-SMALL = jg.Resolution(positions=16, pairs=2)
 BY_FACTORIAL = FREE.replace("starts = 2\nsteps = 100", 'method = "factorial"')
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Loads a design file with the given content, text or bytes."""
+    return functools.partial(loaded, tmp_path)
 
 
 class BumpAtPitch(AbstractModification):
@@ -57,7 +63,7 @@ class HalfCosine(AbstractCurve):
         return (0.5 - 0.5 * jnp.cos(jnp.pi * d)) ** self.power
 
 
-def test_a_modification_and_a_curve_of_a_user_need_no_line_in_the_package(load):  # noqa: F811
+def test_a_modification_and_a_curve_of_a_user_need_no_line_in_the_package(load):
     """Defined above, outside the package: their fields are the keys, with units, ranges and defaults."""
     table = '[[pinion.modification]]\ntype = "bump_at_pitch"\nheight = "height"\nplace = 9.0\n'
     variables = "[variables]\nheight = { low = 0.0, high = 20.0 }\n"
@@ -86,7 +92,7 @@ class Spring(AbstractSpring):
 
     c: Array
 
-    def secant(self, load):  # noqa: F811
+    def secant(self, load):
         return self.c + 0 * load
 
 
@@ -116,7 +122,7 @@ def test_a_tabulated_compliance_needs_nothing_of_the_package():
 
     def mean_and_pitch(numbers):
         table = Table(numbers[0] + 2e-4 * ROLL_LENGTH**2, numbers[1] + 1e-4 * ROLL_LENGTH**2, numbers[2])
-        cycle = jg.solve(jg.prepare(pair, compliance=table, resolution=SMALL), 50.0)
+        cycle = jg.solve(jg.prepare(pair, compliance=table, resolution=LINE), 50.0)
         return cycle.transmission_error[0], cycle
 
     numbers = jnp.asarray([0.04, 0.05, 0.02])
@@ -149,7 +155,7 @@ def known(monkeypatch):
 @pytest.mark.slow
 def test_a_quantity_of_a_user_is_swept_searched_limited_and_reported(known, tmp_path, monkeypatch):
     """By its name after one line: in sweeps, and as objective and limit of a design file, in the table."""
-    mesh = jg.prepare(gear_pair(), resolution=SMALL)
+    mesh = jg.prepare(gear_pair(), resolution=LINE)
     plan = jg.VariantList(["amount"], [[0.0], [6.0]])
     table = jg.sweep(
         lambda v: (jg.TipRelief(v["amount"], 4.0), None), plan, mesh=mesh, torque=50.0, results=("te_second_harmonic",)
@@ -192,7 +198,7 @@ class Scatter(Checked, jg.optimize.AbstractMethod):
 
 
 @pytest.mark.slow
-def test_a_method_of_a_user_is_given_as_an_object_or_known_by_name(load, monkeypatch):  # noqa: F811
+def test_a_method_of_a_user_is_given_as_an_object_or_known_by_name(load, monkeypatch):
     file = load(BY_FACTORIAL)
     mesh = file.mesh(replace(file.resolution(), positions=8))
     options = {"mesh": mesh, "torque": 50.0, "positions": None}

@@ -7,20 +7,21 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from catalogue import FACE, LINE
 from contact_problems import kernel_of, modes_of, random_problem, solved_in_20, stiffness_at
-from test_shafts import two_stages
+from gearboxes import two_stages
 
 import jaxgear as jg
 from jaxgear.compliance import face_kernel, few_modes
-from jaxgear.numerics import Coupling
+from jaxgear.numerics import ContactProblem, Coupling
 from jaxgear.optimize.refine import _with_positions
 from jaxgear.optimize.verification import verification
 from jaxgear.shafts import Misalignment, RigidSupport, TabulatedSupport, support
 
 WIDTH, CHORD = 18.0, 8.189371
-SLICES, TORQUE = 8, 50.0
+SLICES, TORQUE = FACE.slices, 50.0
 SLOPE = jg.LeadSlope(20.0)
-USUAL = {"pairs": 3, "face_modes": 5}  # what users have
+USUAL = {"slices": 8, "pairs": 3, "face_modes": 5}  # what users have, about
 
 
 def pair_of(width=WIDTH, bore=20.0):
@@ -28,11 +29,8 @@ def pair_of(width=WIDTH, bore=20.0):
     return jg.GearPair(*gears)
 
 
-def mesh_of(slices=SLICES, given=None, pair=None, **sizes):
-    """Two pairs and three waves over the face compile in half the time of what users have."""
-    sizes = {"pairs": 2, "face_modes": 3} | sizes
-    resolution = jg.Resolution(positions=8, slices=slices, slide_steps=0, patch_nodes=1, **sizes)
-    return jg.prepare(pair_of() if pair is None else pair, resolution=resolution, support=given)
+def mesh_of(given=None, pair=None, **sizes):
+    return jg.prepare(pair_of() if pair is None else pair, resolution=replace(FACE, **sizes), support=given)
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +41,12 @@ def mesh():
 @pytest.fixture(scope="module")
 def sloped(mesh):
     return jg.solve(mesh, TORQUE, pinion=SLOPE)
+
+
+@pytest.fixture(scope="module")
+def on_table(mesh):
+    """The same gears on a support that gives way."""
+    return mesh_of(table_of(mesh.pair))
 
 
 def kernel(slices, width=WIDTH, chord=CHORD):
@@ -148,73 +152,114 @@ def dense(problem):
     return found
 
 
-@pytest.mark.parametrize(("springs", "slices", "count", "bends"), [(2, 6, 6, 0), (3, 8, 4, 0), (2, 7, 3, 4)])
-def test_solution_meets_the_conditions_of_the_dense_problem(springs, slices, count, bends):
-    """Deflections by the whole matrix in NumPy: no overlap, no pull, closed where loaded, the load as given."""
-    problem = coupled_problem(3, springs, slices, count, bends)
-    found = solved_in_20(problem)
-    assert found.solved.all()
-    load = np.asarray(found.line_load)
-    own = np.asarray(problem.law.secant(np.maximum(load, 1e-9)))
-    spread = np.einsum("xisjt,jtx->isx", dense(problem), load)
-    left = spread + np.asarray(problem.gap) - (np.asarray(problem.lever) * np.asarray(found.approach))[:, None]
-    total = left + own * load
-    scale = 1e-9 * np.abs(np.asarray(found.approach)).max()
+def assert_conditions(problem, approach, load, own, opening):
+    """Deflections by the whole matrix in NumPy: no overlap, no pull, closed where loaded."""
+    approach, load, lever = map(np.asarray, (approach, load, problem.lever))
+    left = np.einsum("xisjt,jtx->isx", dense(problem), load) + np.asarray(problem.gap) - (lever * approach)[:, None]
+    total = left + np.asarray(own) * load
+    scale = 1e-9 * np.abs(approach).max()
     assert (load >= 0).all() and 0.1 < (load > 0).mean() < 0.9
     np.testing.assert_allclose(total[load > 0], 0.0, atol=scale)
     assert total[load == 0].min() > -scale
-    np.testing.assert_allclose(found.opening, left, atol=scale)
-    carried = np.einsum("ix,s,isx->x", problem.lever, problem.weight, load)
-    np.testing.assert_allclose(carried, 2000.0, rtol=1e-10)
+    np.testing.assert_allclose(opening, left, atol=scale)
 
 
-@pytest.mark.parametrize(("slices", "count", "bends"), [(6, 6, 0), (7, 3, 4)])
-def test_approach_of_a_load_brings_that_load_and_its_stiffness(slices, count, bends):
-    given = coupled_problem(5, 2, slices, count, bends)
+def carried(problem, load):
+    """Force on the line of action at every position."""
+    return np.einsum("ix,s,isx->x", problem.lever, problem.weight, load)
+
+
+own_deflection = jax.jit(lambda law, load: law.secant(jnp.maximum(load, 1e-9)))
+
+
+@pytest.mark.parametrize("held", [False, True], ids=["rigid", "support"])
+def test_solution_meets_the_conditions_of_the_dense_problem(mesh, on_table, held):
+    """Of rough flanks that touch on some of the slices only."""
+    prepared = on_table if held else mesh
+    rough = np.random.default_rng(3).uniform(0.0, 30.0, (2, SLICES, 8))
+    found = jg.contact.solve_removed(prepared, TORQUE, rough)
+    assert bool(found.converged.all())
+    problem = ContactProblem(
+        prepared.structure,
+        prepared.law,
+        prepared.held(found.gap),
+        prepared.lever,
+        prepared.slice_width,
+        found.force,
+        coupling=prepared.coupling,
+    )
+    windup = prepared.hub * found.force / prepared.pair.face_width
+    own = own_deflection(prepared.law, found.line_load)
+    assert_conditions(problem, found.transmission_error - windup, found.line_load, own, found.opening)
+    np.testing.assert_allclose(carried(problem, found.line_load), float(found.force), rtol=1e-10)
+
+
+def test_approach_of_a_load_brings_that_load_and_its_stiffness(on_table):
+    found = jg.solve(on_table, TORQUE, pinion=SLOPE)
+    windup = on_table.hub / on_table.pair.face_width
+    at = found.transmission_error - windup * found.force
+    again, more, less = (
+        jg.contact.solve_at(on_table, at + step, torque=TORQUE, pinion=SLOPE) for step in (0.0, 1e-3, -1e-3)
+    )
+    np.testing.assert_allclose(again.line_load, found.line_load, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(again.tangent_stiffness, 1 / (1 / found.tangent_stiffness - windup), rtol=1e-8)
+    np.testing.assert_allclose(again.tangent_stiffness, (more.force - less.force) / 2e-3, rtol=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("springs", "slices", "count", "bends"), [(2, 4, 4, 0), (3, 7, 3, 4)])
+def test_random_problems_meet_the_conditions_of_the_dense_problem(springs, slices, count, bends):
+    """Under a load, and at the approach that it brings."""
+    given = coupled_problem(3, springs, slices, count, bends)
     found = solved_in_20(given)
+    assert found.solved.all()
+    load = np.asarray(found.line_load)
+    assert_conditions(given, found.approach, load, given.law.secant(np.maximum(load, 1e-9)), found.opening)
+    np.testing.assert_allclose(carried(given, load), 2000.0, rtol=1e-10)
     pressed = replace(given, load=None, approach=found.approach)
     again = solved_in_20(pressed)
-    np.testing.assert_allclose(again.line_load, found.line_load, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(again.line_load, load, rtol=1e-8, atol=1e-8)
     step = 1e-4 * found.approach
     more, less = (solved_in_20(replace(pressed, approach=found.approach + x)) for x in (step, -step))
-    central = (more.load - less.load) / (2 * step)
-    np.testing.assert_allclose(stiffness_at(given, found), central, rtol=1e-5)
+    np.testing.assert_allclose(stiffness_at(given, found), (more.load - less.load) / (2 * step), rtol=1e-5)
 
 
 def test_uniform_flanks_are_one_slice(mesh):
     """Rows of the kernel sum to one."""
-    many, one = jg.solve(mesh, TORQUE), jg.solve(mesh_of(1), TORQUE)
+    many, one = jg.solve(mesh, TORQUE), jg.solve(jg.prepare(mesh.pair, resolution=LINE), TORQUE)
     assert bool(many.converged.all())
-    np.testing.assert_allclose(many.transmission_error, one.transmission_error, rtol=1e-12)
-    np.testing.assert_allclose(many.line_load, np.repeat(one.line_load, SLICES, axis=1), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(many.tangent_stiffness, one.tangent_stiffness, rtol=1e-9)
+    error, load, stiffness = (x[..., ::2] for x in (one.transmission_error, one.line_load, one.tangent_stiffness))
+    np.testing.assert_allclose(many.transmission_error, error, rtol=1e-12)
+    np.testing.assert_allclose(many.line_load, np.repeat(load, SLICES, axis=1), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(many.tangent_stiffness, stiffness, rtol=1e-9)
 
 
 def test_slope_is_mirrored_and_loads_the_end_more_than_slices_of_their_own(mesh, sloped):
     other = jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(-20.0))
     np.testing.assert_allclose(other.line_load, sloped.line_load[:, ::-1], rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(other.transmission_error, sloped.transmission_error, rtol=1e-10)
-    alone = jg.solve(mesh_of(coupled_slices=False), TORQUE, pinion=SLOPE)
+    own = replace(mesh.coupling, share=1e-6 * jnp.eye(3), rest=jnp.ones(()))  # hardly anything of the kernel
+    alone = jg.solve(replace(mesh, coupling=own), TORQUE, pinion=SLOPE)
     # three-dimensional finite elements: 292 instead of 241 N/mm
     assert 1.15 < float(sloped.line_load.max() / alone.line_load.max()) < 1.40
 
 
 def test_without_coupling_nothing_of_it_is_there():
-    off = mesh_of(coupled_slices=False)
-    assert off.coupling is None and mesh_of(1).coupling is None
-    assert not off.resolution.is_coupled and not mesh_of(1).resolution.is_coupled
+    for sizes in (replace(FACE, coupled_slices=False), LINE):
+        off = eqx.filter_eval_shape(jg.prepare, pair_of(), resolution=sizes)
+        assert off.coupling is None and not off.resolution.is_coupled
 
 
 def test_misalignment_is_a_slope_of_the_flank_and_no_support_is_none(mesh, sloped):
     """Beyond the path of contact a misalignment counts as an approach does, by the lever of the corner."""
-    rigid = mesh_of(given=RigidSupport(mesh.pair, Misalignment(direct=20.0)))
+    rigid = mesh_of(RigidSupport(mesh.pair, Misalignment(direct=20.0)))
     found = jg.solve(rigid, TORQUE)
     opened = 20.0 * np.asarray(mesh.face_coordinate)[:, None] / WIDTH
     same = jg.contact.solve_removed(mesh, TORQUE, np.asarray(mesh.lever)[:, None] * opened[None])
     np.testing.assert_allclose(found.line_load, same.line_load, rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(found.transmission_error, same.transmission_error, rtol=1e-10)
     np.testing.assert_allclose(found.transmission_error, sloped.transmission_error, rtol=1e-3)
-    level = mesh_of(given=RigidSupport(mesh.pair))
+    level = mesh_of(RigidSupport(mesh.pair))
     none, bare = jg.solve(level, TORQUE, pinion=SLOPE), sloped
     np.testing.assert_allclose(none.transmission_error, bare.transmission_error, rtol=1e-12)
     np.testing.assert_allclose(none.line_load, bare.line_load, rtol=1e-10, atol=1e-10)
@@ -227,10 +272,10 @@ def table_of(pair, scale=1e-3):
     return TabulatedSupport(pair, matrix, 3.0 * y + 2.0)
 
 
-def test_support_is_that_of_the_dense_matrix(mesh):
+def test_support_is_that_of_the_dense_matrix(mesh, on_table):
     """The constant part of the support is an approach of its own, what tilts levels the load."""
-    given = table_of(mesh.pair)
-    found = jg.solve(mesh_of(given=given), TORQUE, pinion=SLOPE)
+    given = on_table.support
+    found = jg.solve(on_table, TORQUE, pinion=SLOPE)
     force = np.asarray(found.line_load) * np.asarray(mesh.slice_width)[None, :, None]
     bent = np.einsum("st,ix,itx->sx", given.matrix, mesh.lever, force)
     removed = jg.contact.removed_material(mesh, TORQUE, pinion=SLOPE).amount
@@ -244,8 +289,10 @@ def test_support_is_that_of_the_dense_matrix(mesh):
 
 
 def test_a_support_that_gives_way_as_a_whole_adds_to_the_transmission_error(mesh, sloped):
-    flat = TabulatedSupport(mesh.pair, np.full((SLICES, SLICES), 2e-3))
-    found = jg.solve(mesh_of(given=flat), TORQUE, pinion=SLOPE)
+    flat = TabulatedSupport(mesh.pair, np.full((SLICES, SLICES), 2e-3), np.zeros(SLICES))
+    unset = TabulatedSupport(mesh.pair, flat.matrix)
+    np.testing.assert_array_equal(unset.gap(mesh.face_coordinate), flat.gap(mesh.face_coordinate))
+    found = jg.solve(mesh_of(flat), TORQUE, pinion=SLOPE)
     np.testing.assert_allclose(
         found.transmission_error - sloped.transmission_error, 2e-3 * float(sloped.force), rtol=1e-9
     )
@@ -256,32 +303,33 @@ def test_a_support_that_gives_way_as_a_whole_adds_to_the_transmission_error(mesh
 
 def test_pairs_that_are_not_there_give_way_with_the_others(mesh, sloped):
     """Gears on springs move hundreds of micrometres apart without a contact more than on rigid ones."""
-    soft = TabulatedSupport(mesh.pair, np.full((SLICES, SLICES), 0.3))
-    found = jg.solve(mesh_of(given=soft), TORQUE, pinion=SLOPE)
+    soft = TabulatedSupport(mesh.pair, np.full((SLICES, SLICES), 0.3), np.zeros(SLICES))
+    found = jg.solve(mesh_of(soft), TORQUE, pinion=SLOPE)
     assert bool(found.converged.all()) and float(found.transmission_error.min()) > 500
     np.testing.assert_allclose(found.line_load, sloped.line_load, rtol=1e-6, atol=1e-6)
 
 
-def test_finer_and_verifying_meshes_stand_on_the_same_support(mesh):
-    given = table_of(mesh.pair)
-    prepared = mesh_of(given=given)
-    judged = verification(prepared, jg.default_compliance("stress"))._mesh
-    for other in (_with_positions(prepared, 4), judged):
-        np.testing.assert_array_equal(other.support_gap, prepared.support_gap)
-        np.testing.assert_array_equal(other.coupling.support, prepared.coupling.support)
+@pytest.mark.slow
+def test_finer_and_verifying_meshes_stand_on_the_same_support(on_table):
+    judged = verification(on_table, on_table.compliance)._mesh
+    for other in (_with_positions(on_table, 4), judged):
+        np.testing.assert_array_equal(other.support_gap, on_table.support_gap)
+        np.testing.assert_array_equal(other.coupling.support, on_table.coupling.support)
 
 
 def test_no_load_leaves_finite_numbers_and_derivatives(mesh):
     found = jg.solve(mesh, 0.0, pinion=SLOPE)
     np.testing.assert_allclose(found.line_load, 0.0, atol=1e-6)
-    slope = jax.grad(lambda t: jnp.mean(jg.solve(mesh, t, pinion=SLOPE).transmission_error))(0.0)
-    assert np.isfinite(slope)
+    slope = jax.jit(jax.grad(lambda t: jnp.mean(jg.solve(mesh, t, pinion=SLOPE).transmission_error)))
+    assert np.isfinite(slope(0.0))
+    more, less = (jg.solve(mesh, TORQUE + step, pinion=SLOPE).transmission_error.mean() for step in (1e-3, -1e-3))
+    assert float(slope(TORQUE)) == pytest.approx(float(more - less) / 2e-3, rel=1e-6)
 
 
 def peak(width, bore, slope, crowning, matrix):
     pair = pair_of(width, bore)
     given, flank = TabulatedSupport(pair, matrix), jg.LeadSlope(slope) + jg.LeadCrowning(crowning)
-    cycle = jg.solve(mesh_of(given=given, pair=pair, **USUAL), TORQUE, pinion=flank)
+    cycle = jg.solve(mesh_of(given, pair), TORQUE, pinion=flank)
     return jnp.max(cycle.line_load)
 
 
@@ -300,22 +348,21 @@ def test_peak_line_load_has_the_derivatives_of_central_differences():
     np.testing.assert_allclose(jnp.sum(found[4] * way), central, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_many_at_once_and_single_precision(mesh, sloped):
     slopes = jnp.asarray([-20.0, 0.0, 20.0])
-    many = jax.vmap(lambda slope: jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(slope)))(slopes)
-    assert bool(many.converged.all())
-    np.testing.assert_allclose(many.line_load[2], sloped.line_load, rtol=1e-8, atol=1e-8)
     single = jax.tree.map(lambda leaf: leaf.astype("float32") if eqx.is_inexact_array(leaf) else leaf, mesh)
-    found = jg.solve(single, TORQUE, pinion=SLOPE)
+    found = jax.vmap(lambda slope: jg.solve(single, TORQUE, pinion=jg.LeadSlope(slope)))(slopes)
     assert bool(found.converged.all()) and found.line_load.dtype == jnp.float32
-    np.testing.assert_allclose(found.line_load, sloped.line_load, rtol=2e-3, atol=0.05)
+    expected = sloped.line_load[:, ::-1], jg.solve(mesh, TORQUE).line_load, sloped.line_load
+    np.testing.assert_allclose(found.line_load, expected, rtol=2e-3, atol=0.05)
 
 
 @pytest.mark.slow
 def test_shafts_of_a_gearbox_hold_at_its_torque():
     """Two stages: the force that bends the shafts is the one that the contact finds."""
     held = support(two_stages(), 0)
-    prepared = mesh_of(given=held, pair=held.pair, **USUAL)
+    prepared = mesh_of(held, held.pair, **USUAL)
     found = jg.solve(prepared, held.torque)
     assert bool(found.converged.all())
     even = jg.solve(mesh_of(pair=held.pair, **USUAL), held.torque)
@@ -333,15 +380,15 @@ def test_shafts_of_a_gearbox_hold_at_its_torque():
 def test_what_cannot_be_held_is_refused(mesh):
     level = RigidSupport(mesh.pair)
     with pytest.raises(ValueError, match="mesh of 1 slice"):
-        mesh_of(1, given=level)
+        mesh_of(level, slices=1)
     with pytest.raises(ValueError, match="coupled_slices=True"):
-        mesh_of(given=level, coupled_slices=False)
+        mesh_of(level, coupled_slices=False)
     with pytest.raises(ValueError, match="another pair"):
-        mesh_of(given=RigidSupport(pair_of(20.0)))
+        mesh_of(RigidSupport(pair_of(20.0)))
     with pytest.raises(TypeError, match="support is a str"):
-        mesh_of(given="stiff")
-    with pytest.raises(ValueError, match="matrix has 3 slices, the mesh has 8"):
-        mesh_of(given=TabulatedSupport(mesh.pair, np.eye(3)))
+        mesh_of("stiff")
+    with pytest.raises(ValueError, match="matrix has 3 slices, the mesh has 6"):
+        mesh_of(TabulatedSupport(mesh.pair, np.eye(3)))
     with pytest.raises(ValueError, match="symmetric"):
         TabulatedSupport(mesh.pair, [[1.0, 0.5], [0.0, 1.0]])
     with pytest.raises(ValueError, match="eigenvalue -1"):
@@ -351,7 +398,7 @@ def test_what_cannot_be_held_is_refused(mesh):
     with pytest.raises(ValueError, match="opening has 3 slices"):
         TabulatedSupport(mesh.pair, np.eye(2), np.zeros(3))
     with pytest.raises(ValueError, match="3 polynomials over the face miss .* of matrix, must miss at most 5%"):
-        mesh_of(given=TabulatedSupport(mesh.pair, 1e-3 * np.eye(SLICES)))
+        mesh_of(TabulatedSupport(mesh.pair, 1e-3 * np.eye(SLICES)))
     with pytest.raises(ValueError, match="face_modes = 1"):
         jg.Resolution(face_modes=1)
     with pytest.raises(ValueError, match="coupled_slices"):
@@ -363,8 +410,8 @@ def test_finer_slices_and_all_modes_agree():
     flanks = jg.LeadCrowning(10.0) + SLOPE
 
     def factor(slices, **sizes):
-        load = np.asarray(jg.solve(mesh_of(slices, **USUAL | sizes), TORQUE, pinion=flanks).line_load)
-        return load
+        sizes = USUAL | {"slices": slices} | sizes
+        return np.asarray(jg.solve(mesh_of(**sizes), TORQUE, pinion=flanks).line_load)
 
     few, whole = factor(12), factor(12, face_modes=12)
     assert np.abs(few - whole).max() < 0.004 * whole.max()

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import gear_pair, prepare
+from catalogue import FACE, LINE, gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear.metrics import (
@@ -21,12 +21,11 @@ from jaxgear.metrics import (
 from jaxgear.shafts import tooth_height
 
 NAMES = ("face_load_factor", "root_face_load_factor", "edge_load_factor")
-SLICES = 6
 
 
 @pytest.fixture(scope="module")
 def mesh():
-    return prepare(gear_pair(), resolution=jg.Resolution(positions=8, slices=SLICES, pairs=2, face_modes=2))
+    return prepare(gear_pair(), resolution=FACE)
 
 
 @pytest.fixture(scope="module")
@@ -74,13 +73,31 @@ def test_nothing_carried_is_even_and_nothing_found_is_not(cycle):
     assert np.isnan([float(quantities[name](lost)) for name in NAMES]).all()
 
 
-def test_derivative_is_a_central_difference(mesh):
+def test_derivatives_are_central_differences(cycle):
+    """By the line loads, in a direction that changes all of them."""
+    way, step = jnp.asarray(np.random.default_rng(1).normal(size=cycle.line_load.shape)), 1e-6
+
+    def numbers(load):
+        return jnp.stack([quantities[name](loaded(cycle, load)) for name in NAMES])
+
+    along = jax.jit(lambda load: jax.jvp(numbers, (load,), (way,)))
+    _, slope = along(cycle.line_load)
+    after, before = (along(cycle.line_load + side * step * way)[0] for side in (1, -1))
+    np.testing.assert_allclose(slope, (after - before) / (2 * step), rtol=1e-5)
+    assert np.abs(slope).min() > 1e-6
+
+
+@pytest.mark.slow
+def test_derivatives_by_a_slope_are_central_differences(mesh):
+    """Through the contact analysis, forwards and backwards."""
+
     def factor(slope):
         return face_load_factor(jg.solve(mesh, 50.0, pinion=jg.LeadSlope(slope)))
 
     at, step = 10.0, 1e-3
     difference = (factor(at + step) - factor(at - step)) / (2 * step)
     np.testing.assert_allclose(jax.grad(factor)(at), difference, rtol=1e-5)
+    np.testing.assert_allclose(jax.jvp(factor, (at,), (1.0,))[1], difference, rtol=1e-5)
 
 
 @pytest.mark.slow
@@ -92,9 +109,17 @@ def test_many_cycles_at_once(mesh, cycle):
     assert eqx.filter_eval_shape(summary, many)["face_load_factor"].shape == (2,)
 
 
-def test_sweep_and_search_take_them(mesh):
-    """A slope of the pinion levels that of the wheel."""
+def test_a_slope_of_the_pinion_levels_that_of_the_wheel(mesh):
+    found = []
+    for slope in (-6.0, 0.0, 12.0):
+        cycle = jg.solve(mesh, 50.0, pinion=jg.LeadSlope(slope), wheel=jg.LeadSlope(6.0))
+        found.append([float(quantities[name](cycle)) for name in NAMES])
+    np.testing.assert_allclose(found[0], 1.0, atol=1e-6)
+    assert 1.0 < found[1][0] < found[2][0] and found[2][0] > 1.5
 
+
+@pytest.mark.slow
+def test_a_sweep_takes_them(mesh):
     def design(x):
         return jg.LeadSlope(x["slope"]), jg.LeadSlope(6.0)
 
@@ -107,7 +132,7 @@ def test_sweep_and_search_take_them(mesh):
 
 
 def test_one_slice_has_no_load_over_the_face():
-    mesh = prepare(gear_pair(), resolution=jg.Resolution(positions=8, pairs=2))
+    mesh = prepare(gear_pair(), resolution=LINE)
     cycle = jg.solve(mesh, 50.0)
     for name in (*NAMES, "face_load_factors"):
         function = quantities[name] if name in NAMES else face_load_factors

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from catalogue import LINE
 
 import jaxgear as jg
 from benchmarks import cases
@@ -14,7 +15,7 @@ from jaxgear.compliance import plane_stress_share, write_table
 from jaxgear.geometry import outline
 from jaxgear.io import DesignFileError, load_design
 
-SMALL = jg.Resolution(positions=6, slices=1, pairs=3)
+LOAD = jnp.full((2, 1, 16), 100.0)
 making = importlib.import_module("jaxgear.compliance.finite_element.compliance")
 
 
@@ -41,15 +42,14 @@ def tabulated(folder):
 
 
 def prepared(gears, compliance):
-    return jg.prepare(gears, compliance=compliance, resolution=SMALL)
+    return jg.prepare(gears, compliance=compliance, resolution=LINE)
 
 
 def softness(compliance, **numbers):
     """One number that everything in the mesh goes into."""
     mesh = prepared(pair(**numbers), compliance)
     weights = jnp.cos(jnp.arange(mesh.structure.size, dtype=float)).reshape(mesh.structure.shape)
-    load = jnp.full((3, 1, 6), 100.0)
-    return jnp.sum(weights * mesh.structure) + mesh.hub + jnp.mean(mesh.law.secant(load))
+    return jnp.sum(weights * mesh.structure) + mesh.hub + jnp.mean(mesh.law.secant(LOAD))
 
 
 def test_unmodified_gears_deflect_as_in_the_reference(folder):
@@ -57,8 +57,8 @@ def test_unmodified_gears_deflect_as_in_the_reference(folder):
     case = cases.Case("A", "stress", 50.0, "none")
     gears = cases.gear_pair("A")
     compliance = jg.finite_element_compliance(gears, "stress", cache=folder)
-    cycle = jg.solve(jg.prepare(gears, compliance=compliance, resolution=jg.Resolution(positions=64, pairs=4)), 50.0)
-    found, true = np.asarray(cycle.transmission_error), cases.reference(case).transmission_error
+    cycle = jg.solve(prepared(gears, compliance), 50.0)
+    found, true = np.asarray(cycle.transmission_error), cases.reference(case).transmission_error[::8]
     assert found.mean() == pytest.approx(true.mean(), rel=2e-3)
     assert np.ptp(found) == pytest.approx(np.ptp(true), rel=1e-2)
     assert bool(cycle.converged.all())
@@ -95,10 +95,9 @@ def test_auto_lies_between_the_planes_by_the_face_width(tabulated, folder):
     low, high = sorted(map(float, shares))
     assert 0.5 < low < high < 0.9
     share = (mixed.structure - strain.structure) / (stress.structure - strain.structure)
-    own = np.asarray(jnp.stack([share[i, i] for i in range(3)]))
+    own = np.asarray(jnp.stack([share[i, i] for i in range(2)]))
     assert np.all((own > low - 1e-6) & (own < high + 1e-6))
-    load = jnp.full((3, 1, 6), 100.0)
-    np.testing.assert_allclose(mixed.law.secant(load), strain.law.secant(load), rtol=1e-12)
+    np.testing.assert_allclose(mixed.law.secant(LOAD), strain.law.secant(LOAD), rtol=1e-12)
 
 
 def test_derivatives_by_what_a_table_scales_with(tabulated):
@@ -106,13 +105,15 @@ def test_derivatives_by_what_a_table_scales_with(tabulated):
     names, steps = ("module", "modulus", "face_width", "distance"), (1e-6, 1.0, 1e-4, 1e-6)
     point = jnp.asarray([3.0, 206e3, 18.0, 100.6])
 
+    @jax.jit
+    @jax.value_and_grad
     def value(numbers):
         return softness(tabulated, **dict(zip(names, numbers)))
 
-    found = jax.jacrev(value)(point)
+    found = value(point)[1]
     for place, step in enumerate(steps):
         move = jnp.zeros(4).at[place].set(step)
-        central = (value(point + move) - value(point - move)) / (2 * step)
+        central = (value(point + move)[0] - value(point - move)[0]) / (2 * step)
         assert float(found[place]) == pytest.approx(float(central), rel=2e-6)
 
 
@@ -125,12 +126,13 @@ def test_derivatives_that_a_table_cannot_know_are_refused(tabulated, derivative,
 
 
 def test_the_module_has_no_derivative_beside_a_bore_in_millimetres(folder):
-    compliance = jg.finite_element_compliance(pair(bore=20.0), "strain", cache=folder)
+    teeth = (19, 19)
+    compliance = jg.finite_element_compliance(pair(teeth, bore=20.0), "strain", cache=folder)
     with pytest.raises(ValueError, match="no derivative by module: .* leave both None"):
-        jax.grad(lambda module: softness(compliance, module=module, bore=20.0))(3.0)
+        jax.grad(lambda module: softness(compliance, teeth=teeth, module=module, bore=20.0))(3.0)
 
 
-def test_a_thinner_tooth_is_softer_and_has_a_table_of_its_own(tabulated, folder):
+def test_a_thinner_tooth_is_softer_and_has_a_table_of_its_own(folder):
     """By about as much as beam and ring say, which bend the same outline."""
 
     def gears(allowance):
@@ -144,13 +146,14 @@ def test_a_thinner_tooth_is_softer_and_has_a_table_of_its_own(tabulated, folder)
     def mean(allowance, compliance):
         return float(jnp.mean(jnp.diagonal(prepared(gears(allowance), compliance).structure)))
 
+    usual = jg.finite_element_compliance(gears(0.0), "stress", cache=folder)
     with pytest.raises(ValueError, match="pinion tooth_thickness_allowance over module = -0.03 differs from 0 of its"):
-        prepared(gears(-90.0), tabulated)
-    softer = mean(-90.0, jg.finite_element_compliance(gears(-90.0), "auto", cache=folder)) / mean(0.0, tabulated) - 1
-    closed_form = jg.default_compliance("auto")
+        prepared(gears(-90.0), usual)
+    compliance = jg.finite_element_compliance(gears(-90.0), "stress", cache=folder)
+    softer = mean(-90.0, compliance) / mean(0.0, usual) - 1
+    closed_form = jg.default_compliance("stress")
     assert softer == pytest.approx(mean(-90.0, closed_form) / mean(0.0, closed_form) - 1, rel=0.25)
     assert softer > 0.005
-    compliance = jg.finite_element_compliance(gears(-90.0), "auto", cache=folder)
     slope = jax.grad(lambda module: jnp.sum(prepared(scaled(gears(-90.0), module), compliance).structure))
     assert np.isnan(slope(3.0))  # the allowance does not grow with the module
 

@@ -50,15 +50,15 @@ class PrescribedTraction(AbstractBody):
 
 
 @eqx.filter_jit
-def pairs_at(pair, compliance, path, torque):
-    """Transmission error [um] and shares of pairs in contact at path positions [mm], leading pair first."""
+def pairs_at(pair, compliance, path, apart, torque):
+    """Transmission error [um] and shares of pairs at path positions [mm], leading pair first, with flanks `apart`."""
     contact = jg.path_of_contact(pair)
     path = path[:, None]
     pinion = tooth_load(outline(pair.pinion), contact.pinion_roll_length(path))
     wheel = tooth_load(outline(pair.wheel), contact.wheel_roll_length(path))
     law = compliance.contact.prepare(contact_geometry(pinion, wheel, compliance.plane, pair.face_width))
     force = 1e3 * torque / pair.pinion.base_radius
-    gap = jnp.zeros((path.shape[0], 1, 1))
+    gap = apart[:, None, None]
     structure = jnp.sum(compliance.structure(pinion, wheel), axis=0)
     problem = ContactProblem(structure, law, gap, jnp.ones_like(path), pair.face_width[None], force)
     solution = solve_contact(problem, steps=8)
@@ -71,8 +71,9 @@ def points_of(case, compliance):
     pair, torque = case.pair(), jnp.asarray(case.torque)
     path = jg.path_of_contact(pair)
     middle = 0.5 * (path.start + path.inner_single)
-    double = lambda s: pairs_at(pair, compliance, jnp.stack([s + path.base_pitch, s]), torque)  # noqa: E731
-    single = lambda s: pairs_at(pair, compliance, s[None], torque)[0]  # noqa: E731
+    touching, one = jnp.zeros(2), jnp.asarray([1e6, 0.0])
+    double = lambda s: pairs_at(pair, compliance, jnp.stack([s + path.base_pitch, s]), touching, torque)  # noqa: E731
+    single = lambda s: pairs_at(pair, compliance, jnp.stack([path.end, s]), one, torque)[0]  # noqa: E731
     at_start, shares = double(path.start)
     values = {
         "A": at_start,

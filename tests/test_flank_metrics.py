@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import COARSE, gear_pair, kahraman_gear, prepare
+from catalogue import FACE, LINE, gear_pair, kahraman_gear, prepare
 
 import jaxgear as jg
 from jaxgear.metrics import max_relief, profile_relief, relief_reversal, removed_volume
@@ -14,12 +14,12 @@ from jaxgear.microgeometry import ParabolicLinear
 @pytest.fixture(scope="module")
 def mesh():
     """The 50/50 pair of contact ratio 1.37: tip at a roll length of 31.7181 mm, pitch point at 25.6515 mm."""
-    return prepare(jg.GearPair(kahraman_gear(), kahraman_gear()))
+    return prepare(jg.GearPair(kahraman_gear(), kahraman_gear()), resolution=LINE)
 
 
 @pytest.fixture(scope="module")
 def unequal():
-    return prepare(gear_pair())
+    return prepare(gear_pair(), resolution=LINE)
 
 
 def lengths(mesh):
@@ -165,7 +165,7 @@ def test_flank_metrics_under_grad_and_vmap(mesh):
 
 
 def test_flank_metrics_do_not_depend_on_the_resolution(mesh):
-    fine = jg.prepare(mesh.pair, resolution=jg.Resolution(positions=COARSE.positions, slices=3))
+    fine = jg.prepare(mesh.pair, resolution=FACE)
     relief = jg.TipRelief(6.0, 3.0) + jg.LeadCrowning(4.0)
     for metric in (max_relief, removed_volume):
         assert float(metric(fine, pinion=relief)) == pytest.approx(float(metric(mesh, pinion=relief)), rel=1e-12)

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import gear_pair
+from catalogue import LINE, gear_pair
 
 import jaxgear as jg
 from jaxgear.contact import flank_table, removed_material
@@ -72,7 +72,7 @@ def test_the_table_removes_what_the_field_says(mesh, gear):
 
 
 def test_one_slice_gives_a_profile():
-    mesh = jg.prepare(gear_pair(), resolution=jg.Resolution(positions=16, pairs=2))
+    mesh = jg.prepare(gear_pair(), resolution=LINE)
     table = jax.jit(lambda field: flank_table(mesh.kinematics, field, "pinion"))(jnp.ones((2, 1, 16)))
     assert isinstance(table, jg.TabulatedProfile) and not table.varies_along_face
 

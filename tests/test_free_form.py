@@ -6,12 +6,17 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import POWER_BOX, TWO_PAIRS, gear_pair, power_reliefs, ppte
+from catalogue import LINE, POWER_BOX, gear_pair, power_reliefs, ppte
 
 import jaxgear as jg
 from jaxgear.metrics import removed_at
 
 TORQUE, POINTS, SMOOTHNESS = 50.0, 24, 1e-3
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return jg.prepare(gear_pair(), resolution=LINE)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +64,7 @@ def test_beats_the_best_named_curve(mesh, named, optimum):
 
 def test_is_level_between_its_own_positions_too(named, optimum):
     """On a mesh four times as fine."""
-    fine = jg.prepare(gear_pair(), resolution=replace(TWO_PAIRS, positions=128))
+    fine = jg.prepare(gear_pair(), resolution=replace(LINE, positions=64))
     left = ppte(fine, TORQUE, optimum.pinion, optimum.wheel)
     assert left < 0.7 * ppte(fine, TORQUE, named.pinion, named.wheel)
     assert left < 0.02 * ppte(fine, TORQUE)
@@ -76,9 +81,12 @@ def test_removes_nothing_in_common(mesh, optimum):
     # tips are relieved, pitch points are not
     assert np.all(values[:, -1] > 5.0)
     assert np.all(values[:, : POINTS // 4] < 1.0)
-    error = eqx.filter_jit(lambda pinion: jg.solve(mesh, TORQUE, pinion=pinion, wheel=optimum.wheel).transmission_error)
+
+    def error(pinion):
+        return np.asarray(jg.solve(mesh, TORQUE, pinion=pinion, wheel=optimum.wheel).transmission_error)
+
     thinner = jg.TabulatedProfile(optimum.pinion.position, optimum.pinion.amount + 3.0)
-    beside = np.abs(np.asarray(error(thinner) - error(optimum.pinion)) - 3.0)
+    beside = np.abs(error(thinner) - error(optimum.pinion) - 3.0)
     # where a contact is sought from a kink of a table, rounding decides on which side: 1e-5 um, see below
     assert np.median(beside) < 1e-12 and np.mean(beside < 1e-9) > 0.7 and beside.max() < 2e-5
 
@@ -94,11 +102,11 @@ def test_objective_is_the_variation_and_the_penalty(mesh, optimum):
 
 
 def test_a_larger_penalty_makes_smoother_flanks(mesh, optimum):
-    smooth = free(mesh, curvature=0.5)
+    smooth = free(mesh, curvature=3.0)
     assert curvature(mesh, smooth) < 0.9 * curvature(mesh, optimum)
     assert smooth.ppte > optimum.ppte
     # each is the better one by its own measure
-    assert smooth.objective < optimum.ppte + 0.5 * curvature(mesh, optimum)
+    assert smooth.objective < optimum.ppte + 3.0 * curvature(mesh, optimum)
     assert optimum.objective < smooth.ppte + SMOOTHNESS * curvature(mesh, smooth)
 
 

@@ -3,29 +3,15 @@
 import re
 from pathlib import Path
 
-import jax
 import matplotlib
 import pytest
+from snippets import run
 
 matplotlib.use("Agg")
 
 ROOT = Path(__file__).parents[1]
 GUIDES = ROOT / "examples" / "guides"
 PAGES = [page for page in sorted(GUIDES.glob("*.md")) if "```python" in page.read_text("utf-8")]
-
-
-def snippets(page: Path) -> list[str]:
-    return re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
-
-
-def run(page: Path):
-    """Runs the snippets of a page one after the other; yields their names after each."""
-    names: dict = {}
-    # what readers run has JAX's own rules of promotion
-    with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
-        for number, snippet in enumerate(snippets(page), 1):
-            exec(compile(snippet, f"{page.name}, snippet {number}", "exec"), names)
-            yield names
 
 
 @pytest.mark.slow

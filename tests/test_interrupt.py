@@ -9,7 +9,7 @@ import sys
 import time
 
 import pytest
-from test_cli import FIXED, call
+from commands import FIXED, call
 
 from jaxgear.cli import interrupt, launcher, run
 

@@ -1,11 +1,12 @@
 """Every impossible gear, pair, resolution or load is refused in one line: what, how much, and what is allowed."""
 
 import re
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
 import pytest
-from catalogue import high_contact_ratio_pair
+from catalogue import LINE, gear_pair, high_contact_ratio_pair
 
 import jaxgear as jg
 
@@ -191,14 +192,14 @@ def test_too_few_pairs_for_the_path_of_contact():
     pair = high_contact_ratio_pair()
     for pairs in (2, 3):
         refused(
-            lambda pairs=pairs: jg.prepare(pair, resolution=jg.Resolution(positions=4, pairs=pairs)),
+            lambda pairs=pairs: jg.prepare(pair, resolution=replace(LINE, pairs=pairs)),
             f"Resolution: pairs = {pairs}", "at least 4", "base pitches",
         )  # fmt: skip
 
 
 def test_plane_and_load():
     refused(lambda: jg.default_compliance(plane="shell"), "plane = 'shell'", '"auto", "stress" or "strain"')
-    mesh = jg.prepare(jg.GearPair(gear(), gear(30)), resolution=jg.Resolution(positions=4))
+    mesh = jg.prepare(gear_pair(), resolution=LINE)
     refused(lambda: jg.solve(mesh, -5.0), "solve: torque = -5 N m", "at least 0 N m")
     refused(lambda: jg.solve(mesh, jnp.nan), "solve: torque = nan N m")
 

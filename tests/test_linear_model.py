@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import POWER_BOX, power_reliefs, solve_any
+from catalogue import LINE, POWER_BOX, gear_pair, power_reliefs, solve_any
 
 import jaxgear as jg
 from jaxgear.numerics.reductions import Range
@@ -17,9 +17,16 @@ from jaxgear.optimize.linearization import Linearization, Pieces
 from jaxgear.optimize.problem import Roughness, make_problem
 from jaxgear.tolerance import GearTolerance
 
+SLOW = pytest.mark.slow
 TORQUES = (50.0, 30.0)
 POINT = np.array([0.31, 0.46, 0.72, 0.22])
 STEP = 1e-5  # of the central differences, in the unit box
+WAY = np.array([0.6, -0.5, 0.4, 0.7])  # along which the slopes are compared
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return jg.prepare(gear_pair(), resolution=LINE)
 
 
 def problem_of(mesh, loads=TORQUES, objective="ppte", constraints=(), **deviations):
@@ -33,9 +40,8 @@ def linearize(problem, x):
 
 
 def differences(function):
-    """Central differences over the unit box, parameters last."""
-    steps = STEP * np.eye(len(POINT))
-    return np.stack([(function(POINT + s) - function(POINT - s)) / (2 * STEP) for s in steps], axis=-1)
+    """Central differences over the unit box along `WAY`."""
+    return (function(POINT + STEP * WAY) - function(POINT - STEP * WAY)) / (2 * STEP)
 
 
 def reliefs(x):
@@ -65,7 +71,7 @@ def test_slopes_of_the_transmission_error(mesh):
         np.testing.assert_allclose(pieces.upper[case], curve(POINT), atol=1e-8)
         expected = differences(curve)
         assert np.abs(expected).max() > 1.0  # [um over the full range]
-        np.testing.assert_allclose(pieces.slope[case], expected, atol=2e-4 * np.abs(expected).max())
+        np.testing.assert_allclose(np.asarray(pieces.slope[case]) @ WAY, expected, atol=2e-4 * np.abs(expected).max())
 
 
 def test_every_extreme_has_its_pieces(mesh):
@@ -89,18 +95,16 @@ def test_every_extreme_has_its_pieces(mesh):
     local, other, thrice = found.limits[:3]
 
     def excess(x):
-        return (
-            np.asarray(jg.solve(mesh, TORQUES[0], **dict(zip(("pinion", "wheel"), reliefs(x)))).contact_pressure) / 700
-            - 1
-        )
+        cycle = jg.solve(mesh, TORQUES[0], **dict(zip(("pinion", "wheel"), reliefs(x))))
+        return np.asarray(cycle.contact_pressure) / 700 - 1
 
     np.testing.assert_allclose(local.upper[0], excess(POINT).ravel(), atol=1e-9)
     np.testing.assert_allclose(local.slope, other.slope, atol=1e-8)
     np.testing.assert_allclose(thrice.slope[0], np.concatenate([local.slope[0]] * 3), atol=1e-8)
-    expected = differences(excess).reshape(-1, len(POINT))
+    expected = differences(excess).ravel()
     # a contact that begins or ends within the step of the differences has no slope
-    close = np.isclose(local.slope[0], expected, atol=2e-4 * np.abs(expected).max())
-    assert close.all(axis=1).mean() > 0.9
+    close = np.isclose(np.asarray(local.slope[0]) @ WAY, expected, atol=2e-4 * np.abs(expected).max())
+    assert close.mean() > 0.9
 
 
 def problem_value(problem):
@@ -125,7 +129,7 @@ def test_slopes_of_another_objective_and_of_constraints(mesh):
     (pieces,) = found.objectives
     np.testing.assert_allclose(pieces.upper[0], value(POINT), rtol=1e-12)
     assert pieces.lower is None
-    np.testing.assert_allclose(pieces.slope[0], differences(value), atol=1e-5)
+    np.testing.assert_allclose(np.asarray(pieces.slope[0]) @ WAY, differences(value), atol=1e-5)
 
     volume = eqx.filter_jit(jg.metrics.removed_volume)
 
@@ -142,7 +146,7 @@ def test_slopes_of_another_objective_and_of_constraints(mesh):
     limits = [(limit.upper[0, 0], limit.slope[0, 0]) for limit in found.limits]
     passed, slopes = zip(*limits)
     np.testing.assert_allclose(passed, excess(POINT), rtol=1e-9)
-    np.testing.assert_allclose(slopes, differences(excess), atol=1e-4)
+    np.testing.assert_allclose(np.stack(slopes) @ WAY, differences(excess), atol=1e-4)
 
 
 def model(values, slope, x, *, measure=None, weights=None, excess=None, excess_slope=None, forms=None, weight=0.0):
@@ -209,8 +213,14 @@ def merit(data, measure, steps):
     return objective + PENALTY * violation + data["weight"] * rough
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("radius", [0.1, 0.6])
+@pytest.mark.parametrize(
+    ("radius", "seed"),
+    [
+        pytest.param(radius, seed, marks=() if (radius, seed) in ((0.1, 0), (0.6, 1)) else SLOW)
+        for radius in (0.1, 0.6)
+        for seed in range(3)
+    ],
+)
 @pytest.mark.parametrize(
     "measure", [jg.Mean(), jg.Worst(), jg.CVaR(0.7), jg.Quantile(0.7)], ids=["mean", "worst", "cvar", "quantile"]
 )

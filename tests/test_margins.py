@@ -96,9 +96,9 @@ def test_each_rule_has_its_impossible_pair():
 def test_a_pair_is_refused_exactly_where_its_margins_flag_it():
     generator = np.random.default_rng(5)
     low, high = np.array([-0.6, -0.6, 0.8, 99.0, 60.0, 20.0]), np.array([0.8, 0.6, 1.2, 104.0, 67.0, 50.0])
-    points = low + (high - low) * generator.random((120, 6))
+    points = low + (high - low) * generator.random((60, 6))
     valid = np.asarray(held(jnp.asarray(points))[0])
-    assert 10 < valid.sum() < 110
+    assert 5 < valid.sum() < 55
 
     def accepted(x):
         try:

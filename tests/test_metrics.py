@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from catalogue import LINE, gear_pair
 
 import jaxgear as jg
 from jaxgear.metrics import quantities
@@ -68,10 +69,7 @@ def test_smooth_peak_to_peak_rises_to_the_true_one():
 
 @pytest.fixture(scope="module")
 def mesh():
-    gears = jg.Gear(19, 3.0, face_width=20.0, bore_diameter=24.0), jg.Gear(48, 3.0, face_width=18.0, bore_diameter=70.0)
-    return jg.prepare(
-        jg.GearPair(*gears), compliance=jg.default_compliance("strain"), resolution=jg.Resolution(positions=32)
-    )
+    return jg.prepare(gear_pair(), compliance=jg.default_compliance("strain"), resolution=LINE)
 
 
 @pytest.fixture(scope="module")

@@ -5,14 +5,14 @@ import json
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from catalogue import FACE as SIZES
 from catalogue import gear_pair, prepare
-from test_cli import FIXED, assert_refused, call
+from commands import FACE, FIXED, LINE, assert_refused, call
 
 import jaxgear as jg
 from jaxgear.io import DesignFileError, load_design, optimize_request
 from jaxgear.shafts import Misalignment, RigidSupport
 
-SIZES = jg.Resolution(positions=8, slices=4, pairs=2)
 AMOUNT = 12.0
 # on both gears: no pair touches with a tip corner, beyond the path of contact, where a misalignment closes with the
 # lever of the transmission error and a slope does not
@@ -34,15 +34,20 @@ def test_misalignment_is_the_lead_slope_of_its_amount(pair, sloped):
     angle, width = float(pair.working_pressure_angle), float(pair.face_width)
     span, inclination = 120.0, 20.0
     skew = (AMOUNT * span / width - inclination * np.sin(angle)) / np.cos(angle)
-    for given in (Misalignment(direct=AMOUNT), Misalignment(skew, inclination, span)):
-        mesh = jg.prepare(pair, resolution=SIZES, support=RigidSupport(pair, given))
-        found = jg.solve(mesh, 50.0, pinion=RELIEF + jg.LeadSlope(0.0), wheel=RELIEF)
-        inside = np.broadcast_to(np.asarray(mesh.outside == 0)[:, None], found.gap.shape)
-        np.testing.assert_allclose(mesh.held(found.gap)[inside], sloped.gap[inside], rtol=1e-12, atol=1e-12)
-        # two programs, each solved to 1e-11
-        np.testing.assert_allclose(found.transmission_error, sloped.transmission_error, rtol=1e-11)
-        np.testing.assert_allclose(found.line_load, sloped.line_load, rtol=1e-9, atol=1e-7)
-        assert bool(jnp.all(found.converged)) and not np.asarray(found.line_load)[~inside].any()
+    supports = [
+        RigidSupport(pair, given) for given in (Misalignment(direct=AMOUNT), Misalignment(skew, inclination, span))
+    ]
+    mesh = jg.prepare(pair, resolution=SIZES, support=supports[0])
+    gaps = [np.asarray(support.gap(mesh.face_coordinate)) for support in supports]
+    np.testing.assert_allclose(gaps[1], gaps[0], rtol=1e-12, atol=1e-12)
+    assert np.ptp(gaps[0]) == pytest.approx(AMOUNT * 5 / 6)  # between the middles of six slices
+    found = jg.solve(mesh, 50.0, pinion=RELIEF + jg.LeadSlope(0.0), wheel=RELIEF)
+    inside = np.broadcast_to(np.asarray(mesh.outside == 0)[:, None], found.gap.shape)
+    np.testing.assert_allclose(mesh.held(found.gap)[inside], sloped.gap[inside], rtol=1e-12, atol=1e-12)
+    # two programs, each solved to 1e-11
+    np.testing.assert_allclose(found.transmission_error, sloped.transmission_error, rtol=1e-11)
+    np.testing.assert_allclose(found.line_load, sloped.line_load, rtol=1e-9, atol=1e-7)
+    assert bool(jnp.all(found.converged)) and not np.asarray(found.line_load)[~inside].any()
     assert np.ptp(np.asarray(sloped.line_load)[0, :, 0]) > 50
 
 
@@ -58,11 +63,17 @@ def test_one_slice_cannot_show_it(pair):
         jg.prepare(pair, resolution=prepare_one, support=RigidSupport(pair, Misalignment(direct=AMOUNT)))
 
 
+# the gears of `gear_pair` with all their diameters: on the same support they share its programs
+PAIR = FIXED.replace("face_width = 20.0", "face_width = 18.0\nbore_diameter = 24.0\ntip_diameter = 63.0").replace(
+    "48\nmodule = 3.0\n", "48\nmodule = 3.0\nbore_diameter = 70.0\ntip_diameter = 150.0\n"
+)
+
+
 @pytest.fixture
 def load(tmp_path):
     def write_and_load(table, tail=""):
         path = tmp_path / "gear.toml"
-        path.write_text(f"{FIXED}\n[misalignment]\n{table}\n{tail}", encoding="utf-8")
+        path.write_text(f"{PAIR}\n[misalignment]\n{table}\n{tail}", encoding="utf-8")
         return load_design(path)
 
     return write_and_load
@@ -73,7 +84,7 @@ def test_design_files_take_it_and_enough_slices(load):
     assert file.resolution().slices == 11
     assert load("direct = 0.0").resolution().slices == load("").resolution().slices == 1
     with pytest.raises(DesignFileError, match=r"resolution.slices: must be at least 2, 1 cannot show misalignment"):
-        load_one = FIXED.replace("positions = 8", "positions = 8\nslices = 1")
+        load_one = PAIR.replace(LINE, f"{LINE}\nslices = 1")
         file.path.write_text(f"{load_one}\n[misalignment]\ndirect = 12.0\n")
         load_design(file.path)
 
@@ -101,8 +112,7 @@ def test_its_numbers_are_variables_of_a_sweep_alone(load):
     meshes = mesh({"f": 0.0}), mesh({"f": 20.0}), parallel
     cycles = [jg.solve(each, 50.0, pinion=jg.TipRelief(5.0, 3.0)) for each in meshes]
     even, skew, without = (float(jg.metrics.face_load_factor(cycle)) for cycle in cycles)
-    # the pinion overhangs the wheel by 1 mm on either side, where the load gathers a little
-    assert even == pytest.approx(without, abs=1e-9) and 1.0 < without < 1.05 and skew > 1.5
+    assert even == pytest.approx(without, abs=1e-9) and even == pytest.approx(1.0, abs=1e-9) and skew > 1.5
     with pytest.raises(DesignFileError, match=r'misalignment\.direct: "f" is a variable, which a sweep alone'):
         optimize_request(load('direct = "f"', variables + "[optimize]\n"))
 
@@ -131,7 +141,7 @@ def test_the_command_refuses_it_in_one_line(tmp_path):
 @pytest.mark.slow
 def test_analyze_writes_what_is_seen_across_the_face(tmp_path):
     path = tmp_path / "gear.toml"
-    path.write_text(FIXED.replace("positions = 8", "positions = 8\nslices = 4") + "\n[misalignment]\ndirect = 12.0\n")
+    path.write_text(FIXED.replace(LINE, FACE) + "\n[misalignment]\ndirect = 12.0\n")
     result = call("analyze", path, "-o", tmp_path / "out")
     assert result.code == 0 and "face load factor K_Hbeta" in result.out
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["misalignment_um"] == 12.0

@@ -1,22 +1,24 @@
 """A fine mesh as several coarse ones: the same contact at the same mesh positions, by one program."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import gear_pair, prepare
+from catalogue import LINE, gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear.contact.parts import half_way, parts
 from jaxgear.optimize.linearizer import Linearizer
 from jaxgear.optimize.problem import make_problem
 
-TORQUE, COARSE, COUNT = 50.0, 8, 3
+TORQUE, COARSE, COUNT = 50.0, 8, LINE.positions // 8
 RELIEF = jg.TipRelief(8.0, 4.0)
 
 
 def mesh_of(positions):
-    return prepare(gear_pair(), resolution=jg.Resolution(positions=positions, pairs=2))
+    return prepare(gear_pair(), resolution=replace(LINE, positions=positions))
 
 
 def solved(mesh):

@@ -9,7 +9,7 @@ import pytest
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
-from catalogue import gear_pair, prepare
+from catalogue import LINE, gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear import plot
@@ -65,7 +65,7 @@ def state(amount):
 
 @pytest.fixture(scope="module")
 def mesh():
-    return prepare(gear_pair(), resolution=jg.Resolution(positions=16, slices=3))
+    return prepare(gear_pair(), resolution=LINE)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from contact_problems import at_approach, random_problem, with_load
+from contact_problems import at_approach, random_problem, stiffness_at, with_load
 
 from jaxgear.numerics import ContactProblem, solve_contact, tangent_stiffness
 
@@ -42,12 +42,22 @@ def test_slope_of_the_load_is_the_tangent_stiffness_and_the_curvature_that_of_di
         data = at_approach(DATA, loaded.approach + shift)
         return tangent_stiffness(data, solve_contact(data, steps=12))
 
+    def backward(shift):
+        slope = jax.vjp(load, shift)[1]
+        return jax.vmap(slope)(jnp.eye(POSITIONS))[0]
+
+    @jax.jit
+    def all_of(shift):
+        """Slope in both modes, curvature and stiffness."""
+        slope, curvature = jax.jvp(backward, (shift,), (jnp.ones(()),))
+        return slope, jax.jacfwd(load)(shift), curvature, stiffness(shift)
+
     zero, h = jnp.asarray(0.0), 1e-4
-    slope = jax.jit(jax.jacfwd(load))
-    np.testing.assert_allclose(slope(zero), jax.jit(stiffness)(zero), rtol=1e-11)
-    np.testing.assert_allclose(jax.jit(jax.jacrev(load))(zero), slope(zero), rtol=1e-11)
-    difference = (slope(zero + h) - slope(zero - h)) / (2 * h)
-    np.testing.assert_allclose(jax.jit(jax.hessian(load))(zero), difference, rtol=1e-5, atol=1e-5)
+    slope, forward, curvature, tangent = all_of(zero)
+    np.testing.assert_allclose(forward, tangent, rtol=1e-11)
+    np.testing.assert_allclose(slope, forward, rtol=1e-11)
+    difference = (all_of(zero + h)[0] - all_of(zero - h)[0]) / (2 * h)
+    np.testing.assert_allclose(curvature, difference, rtol=1e-5, atol=1e-5)
 
 
 def test_derivatives_by_the_gaps_follow_from_those_under_load(loaded):
@@ -62,7 +72,7 @@ def test_derivatives_by_the_gaps_follow_from_those_under_load(loaded):
         data = eqx.tree_at(lambda p: p.gap, at_approach(DATA, loaded.approach), gap)
         return jnp.sum(solve_contact(data, steps=12).load)
 
-    stiffness = tangent_stiffness(with_load(DATA, jnp.asarray(400.0)), loaded)
+    stiffness = stiffness_at(with_load(DATA, jnp.asarray(400.0)), loaded)
     expected = -stiffness[None, None] * jax.jit(jax.grad(approach))(DATA.gap)
     assert float(jnp.abs(expected).max()) > 1.0
     np.testing.assert_allclose(jax.jit(jax.grad(load))(DATA.gap), expected, rtol=1e-9, atol=1e-9)
@@ -86,9 +96,9 @@ def test_without_contact_loads_and_derivatives_are_exactly_zero():
 @pytest.mark.parametrize("law", ["softening", "power"])
 def test_random_approaches_satisfy_all_conditions(law):
     """Approaches from a touch to 100 um: no load is negative, nothing penetrates, what carries touches."""
-    data = random_problem(32, 3, 4, 600, law)
+    data = random_problem(32, SPRINGS, SLICES, POSITIONS, law)
     touching = jnp.min(data.gap / data.lever[:, None], axis=(0, 1))
-    approach = touching + 10 ** jnp.asarray(np.random.default_rng(1).uniform(-6.0, 2.0, 600))
+    approach = touching + 10 ** jnp.asarray(np.random.default_rng(1).uniform(-6.0, 2.0, POSITIONS))
     solution = solve(at_approach(data, approach))
     assert bool(jnp.all(solution.solved))
     q = np.asarray(solution.line_load)

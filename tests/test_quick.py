@@ -10,15 +10,16 @@ from jaxgear.numerics import quick, quick_jit
 
 @pytest.fixture
 def compiler(monkeypatch):
-    """The options that every program was compiled with, for a version of JAX that knows them."""
-    monkeypatch.setattr(quick, "quick_options", lambda: quick.OPTIONS)
+    """The options that every program was compiled with, where the user has not said how to compile."""
+    monkeypatch.setattr(quick, "quick_options", lambda: {"xla_backend_optimization_level": 0})
+    monkeypatch.setattr(quick, "_everything", False)
     given, whole = [], eqx.filter_jit
 
     def recorded(function, **options):
         jitted = whole(function, **options)
 
         def run(*args):
-            given.append(bool(options))
+            given.append(options.get("compiler_options"))
             return jitted(*args)
 
         return run
@@ -30,19 +31,37 @@ def compiler(monkeypatch):
 def test_numbers_are_quickly_compiled_for_and_tracers_are_not(compiler):
     square = quick_jit(lambda x: x**2)
     one, known = jnp.ones(3), jnp.full(3, 2.0)
-    assert float(square(known)[0]) == 4.0 and compiler == [True]
+    assert float(square(known)[0]) == 4.0 and compiler == [{"xla_backend_optimization_level": 0}]
     compiler.clear()
     # nothing that is traced goes into the last of each: JAX takes no options there either
     assert jax.jit(lambda x: square(x) + square(known))(one).shape == (3,)
     assert jax.vmap(lambda x: square(x) + square(known).sum())(one).shape == (3,)
     assert float(jax.grad(lambda x: (square(x) * square(known)).sum())(one)[0]) == pytest.approx(8.0)
     assert jax.eval_shape(lambda x: square(x) * square(known), one).shape == (3,)
-    assert compiler == 8 * [False]
+    assert compiler == 8 * [None]
+
+
+def test_what_runs_for_long_is_quickly_compiled_where_all_is(compiler):
+    square = quick_jit(lambda x: x**2, always=False)
+    before = jax.config.read("jax_disable_most_optimizations")
+    try:
+        square(jnp.ones(3))
+        quick.compile_quickly()
+        square(jnp.ones(3))
+        assert jax.config.read("jax_disable_most_optimizations")
+    finally:
+        jax.config.update("jax_disable_most_optimizations", before)
+    assert compiler == [None, {"xla_backend_optimization_level": 0}]
+
+
+def test_the_compiler_is_asked_what_it_knows(monkeypatch):
+    assert quick.is_known("xla_backend_optimization_level", 0)
+    assert not quick.is_known("xla_of_another_version", True)
+    monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_enable_fast_math=false")
+    found = quick.quick_options.__wrapped__()
+    assert found["xla_backend_optimization_level"] == 0 and set(found) <= set(quick.OPTIONS)
 
 
 def test_whoever_says_how_to_compile_is_heard(monkeypatch):
     monkeypatch.setenv("XLA_FLAGS", "--xla_backend_optimization_level=2")
-    assert quick.quick_options.__wrapped__() is None
-    monkeypatch.setenv("XLA_FLAGS", "")
-    monkeypatch.setattr(quick, "version", lambda _: "9.9.9")
     assert quick.quick_options.__wrapped__() is None

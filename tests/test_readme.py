@@ -4,14 +4,14 @@ import re
 from pathlib import Path
 
 import pytest
-from test_guides import run
+from snippets import run
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
-def test_snippets_run_as_printed(tmp_path, monkeypatch, clean_figures, capsys):
+def test_snippets_run_as_printed(tmp_path, monkeypatch, clean_figures, capsys, optimized):
     """The first is the script; the others go on from it."""
     monkeypatch.chdir(tmp_path)
     rest = run(ROOT / "README.md")

@@ -12,10 +12,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import openpyxl
 import pytest
+from commands import FIXED, SWEEP, assert_refused, call
 from report_page import Page, assert_well_formed
 from rich.table import Table as Printed
-from test_cli import FIXED, assert_refused, call
-from test_sweep_command import SWEEP
 
 from jaxgear import plot, report
 from jaxgear.cli import document

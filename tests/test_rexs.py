@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import jax
 import numpy as np
 import pytest
+from catalogue import LINE, gear_pair, prepare
 from rexs_schema import FOLDER, faults
 
 import jaxgear as jg
@@ -179,6 +180,11 @@ def test_a_file_is_written_again_as_it_was(tmp_path):
             np.testing.assert_allclose(float(other.text), float(one.text), rtol=1e-12, atol=1e-15)
         else:
             assert one.text == other.text
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return prepare(gear_pair(), resolution=LINE)
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from catalogue import FACE, LINE
 from contact_problems import kernel_of, modes_of, random_problem, solved_in_20, stiffness_at
 
 import jaxgear as jg
@@ -40,7 +41,8 @@ def mesh_of(widths=UNEVEN, slices=None, pair=None, support=None, **sizes):
 
 @pytest.fixture(scope="module")
 def mesh():
-    return mesh_of()
+    """On a support that does not give way, whose contact the program of one that does finds."""
+    return mesh_of(support=RigidSupport(pair_of()))
 
 
 def kernel(slices):
@@ -123,26 +125,49 @@ def coupled_problem(bends):
     return replace(problem, coupling=coupling, weight=jnp.asarray(3.0 * WEIGHT), load=jnp.asarray(2000.0))
 
 
-@pytest.mark.parametrize("bends", [2, pytest.param(0, marks=pytest.mark.slow)])
-def test_solution_meets_the_conditions_of_the_dense_problem(bends):
-    """Deflections by the whole matrix in NumPy: no overlap, no pull, closed where loaded, the load as given."""
-    problem = coupled_problem(bends)
-    found, c = solved_in_20(problem), problem.coupling
-    assert found.solved.all()
-    load, lever = np.asarray(found.line_load), np.asarray(problem.lever)
+def assert_conditions(c, compliance, gap, lever, approach, load, own, opening):
+    """Deflections by the whole matrix in NumPy: no overlap, no pull, closed where loaded."""
+    load, lever, approach = (np.asarray(each) for each in (load, lever, approach))
     face = c.rest * np.eye(6) + c.modes @ c.share @ c.modes.T @ np.diag(WEIGHT)
-    left = np.einsum("ijx,st,jtx->isx", problem.compliance, face, load)
-    if bends:
+    left = np.einsum("ijx,st,jtx->isx", compliance, face, load)
+    if c.support is not None:
         way = c.support_modes @ c.support @ c.support_modes.T @ np.diag(WEIGHT)
         left = left + np.einsum("ix,jx,st,jtx->isx", lever, lever, way, load)
-    left = left + np.asarray(problem.gap) - (lever * np.asarray(found.approach))[:, None]
-    own = np.asarray(problem.law.secant(np.maximum(load, 1e-9)))
-    total, scale = left + own * load, 1e-9 * np.abs(np.asarray(found.approach)).max()
+    left = left + np.asarray(gap) - (lever * approach)[:, None]
+    total, scale = left + np.asarray(own) * load, 1e-9 * np.abs(approach).max()
     assert (load >= 0).all() and 0.1 < (load > 0).mean() < 0.9
     np.testing.assert_allclose(total[load > 0], 0.0, atol=scale)
     assert total[load == 0].min() > -scale
-    np.testing.assert_allclose(found.opening, left, atol=scale)
-    carried = np.einsum("ix,s,isx->x", lever, problem.weight, load)
+    np.testing.assert_allclose(opening, left, atol=scale)
+
+
+own_deflection = jax.jit(lambda law, load: law.secant(jnp.maximum(load, 1e-9)))
+
+
+def test_solution_meets_the_conditions_of_the_dense_problem():
+    """Of rough flanks that touch on some of the slices only, on a support that gives way under the load."""
+    mesh = mesh_of(support=Bent(pair_of(), Misalignment(direct=20.0)))
+    rough = np.random.default_rng(3).uniform(0.0, 30.0, (2, 6, 4))
+    found = jg.contact.solve_removed(mesh, TORQUE, rough)
+    assert bool(found.converged.all())
+    approach = found.transmission_error - mesh.hub * found.force / mesh.pair.face_width
+    own = own_deflection(mesh.law, found.line_load)
+    given = mesh.coupling, mesh.structure, mesh.held(found.gap), mesh.lever
+    assert_conditions(*given, approach, found.line_load, own, found.opening)
+    carried = np.einsum("ix,s,isx->x", mesh.lever, mesh.slice_width, found.line_load)
+    np.testing.assert_allclose(carried, float(found.force), rtol=1e-10)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bends", [2, 0])
+def test_random_problems_meet_the_conditions_of_the_dense_problem(bends):
+    data = coupled_problem(bends)
+    found = solved_in_20(data)
+    assert found.solved.all()
+    own = data.law.secant(np.maximum(found.line_load, 1e-9))
+    given = data.coupling, data.compliance, data.gap, data.lever
+    assert_conditions(*given, found.approach, found.line_load, own, found.opening)
+    carried = np.einsum("ix,s,isx->x", data.lever, data.weight, found.line_load)
     np.testing.assert_allclose(carried, 2000.0, rtol=1e-10)
 
 
@@ -162,25 +187,27 @@ def test_equal_widths_are_none():
     given, none = jg.Resolution(slices=6, slice_widths=(3,) * 6), jg.Resolution(slices=6)
     assert given.parts is None and given.slice_weights is None
     np.testing.assert_array_equal(given.slice_edges, none.slice_edges)
-    meshes = [mesh_of(widths, 6) for widths in ((3,) * 6, None)]
+    meshes = [jg.prepare(pair_of(), resolution=replace(FACE, slice_widths=widths)) for widths in ((3,) * 6, None)]
     assert meshes[0].coupling.weight is None
     for one, other in zip(*map(jax.tree.leaves, meshes), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
 def test_uniform_flanks_are_one_slice(mesh):
-    many, one = jg.solve(mesh, TORQUE), jg.solve(mesh_of((1,)), TORQUE)
+    many, one = jg.solve(mesh, TORQUE), jg.solve(jg.prepare(mesh.pair, resolution=LINE), TORQUE)
+    error, load, stiffness = (x[..., ::4] for x in (one.transmission_error, one.line_load, one.tangent_stiffness))
     assert bool(many.converged.all())
-    np.testing.assert_allclose(many.transmission_error, one.transmission_error, rtol=1e-12)
-    np.testing.assert_allclose(many.line_load, np.repeat(one.line_load, 6, axis=1), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(many.tangent_stiffness, one.tangent_stiffness, rtol=1e-9)
+    np.testing.assert_allclose(many.transmission_error, error, rtol=1e-12)
+    np.testing.assert_allclose(many.line_load, np.repeat(load, 6, axis=1), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(many.tangent_stiffness, stiffness, rtol=1e-9)
     np.testing.assert_allclose(face_load_factors(many), 1.0, rtol=1e-9)
 
 
 @pytest.mark.parametrize("coupled", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_mirrored_slices_and_misalignment_mirror_the_load(mesh, coupled):
     sizes = {} if coupled else {"coupled_slices": False}
-    one, other = mesh if coupled else mesh_of(**sizes), mesh_of(UNEVEN[::-1], **sizes)
+    given = RigidSupport(mesh.pair) if coupled else None
+    one, other = (mesh_of(widths, support=given, **sizes) for widths in (UNEVEN, UNEVEN[::-1]))
     here = jg.solve(one, TORQUE, pinion=jg.LeadSlope(20.0))
     there = jg.solve(other, TORQUE, pinion=jg.LeadSlope(-20.0))
     assert bool(here.converged.all()) and float(face_load_factor(here)) > 1.5

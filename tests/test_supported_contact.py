@@ -7,56 +7,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from catalogue import FACE
+from gearboxes import PAIR, gearbox
 
 import jaxgear as jg
 from jaxgear.metrics import face_load_factor
-from jaxgear.shafts import (
-    Bearing,
-    Coupling,
-    Gearbox,
-    GearMesh,
-    Housing,
-    MountedGear,
-    RigidSupport,
-    Section,
-    Shaft,
-    annex_e,
-    integral_diameter,
-    support,
-)
+from jaxgear.shafts import Housing, RigidSupport, annex_e, support
 
-PINION = jg.Gear(teeth=19, module=3.0, face_width=18.0, bore_diameter=24.0)
-WHEEL = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=40.0)
-PAIR = jg.GearPair(PINION, WHEEL)
-TORQUE, LENGTH = 50.0, 150.0
-SLICES = 5
-SIZES = jg.Resolution(positions=4, slices=SLICES, pairs=2)
+TORQUE = 50.0
 FLANK = jg.LeadSlope(4.0) + jg.LeadCrowning(5.0)
 
 
-def gearbox(radial=150.0, *, mirrored=False, modulus=206e3, housing=None, torque=TORQUE):
-    """One stage between bearings, its gears off the middle; `mirrored` about the plane across the shafts."""
-
-    def at(position):
-        return LENGTH - position if mirrored else position
-
-    def shaft(name, sections, seats, gear, coupling):
-        sections = [Section(length, diameter) for length, diameter in sections]
-        bearings = [Bearing(seat, at(place), radial, 50.0) for seat, place in zip(seats, (10.0, 140.0))]
-        material = jg.Material(elastic_modulus=modulus)
-        return Shaft(name, sections[::-1] if mirrored else sections, bearings, [gear], [coupling], material=material)
-
-    pinion = MountedGear("pinion", PINION, at(45.0), integral_diameter(PINION))
-    wheel = MountedGear("wheel", WHEEL, at(45.0))
-    shafts = [
-        shaft("in", [(50.0, 30.0), (100.0, 26.0)], "AB", pinion, Coupling(at(LENGTH), torque)),
-        shaft("out", [(150.0, 40.0)], "CD", wheel, Coupling(at(0.0))),
-    ]
-    return Gearbox(shafts, [GearMesh("pinion", "wheel")], housing)
-
-
-def solved(given, *, compliance=None, pinion=FLANK):
-    mesh = jg.prepare(PAIR, compliance=compliance, resolution=SIZES, support=given)
+def solved(given, *, compliance=None, pinion=FLANK, sizes=FACE):
+    mesh = jg.prepare(PAIR, compliance=compliance, resolution=sizes, support=given)
     cycle = jg.solve(mesh, TORQUE, pinion=pinion)
     assert bool(jnp.all(cycle.converged))
     return cycle
@@ -85,6 +48,7 @@ def test_what_does_not_give_way_is_no_support(rigid, carried):
     assert difference > 0.02 * float(jnp.max(rigid.line_load))
 
 
+@pytest.mark.slow
 def test_a_housing_of_no_compliance_is_none(carried):
     nodes = tuple(f"{seat}.{way}" for seat in "ABCD" for way in "xyz")
     assert_same(solved(support(gearbox(housing=Housing(nodes, np.zeros((12, 12)), "compliance")), 0)), carried)
@@ -102,14 +66,15 @@ def test_one_pair_of_constant_stiffness_is_the_one_dimensional_analysis(crowning
     """Teeth that do not pass their load on over the face, under a linear law, at the pitch point: that is what the
     standard computes."""
     flank = jg.LeadSlope(4.0) + jg.LeadCrowning(crowning)
-    model = jg.legacy_compliance()
-    mesh = jg.prepare(PAIR, compliance=model, resolution=SIZES, support=support(gearbox(), 0))
-    even = replace(mesh.coupling, share=jnp.eye(SLICES), modes=jnp.eye(SLICES), rest=jnp.zeros(()))
+    model, slices = jg.legacy_compliance(), 5
+    sizes = jg.Resolution(positions=4, slices=slices, pairs=2)  # with as many modes as slices
+    mesh = jg.prepare(PAIR, compliance=model, resolution=sizes, support=support(gearbox(), 0))
+    even = replace(mesh.coupling, share=jnp.eye(slices), modes=jnp.eye(slices), rest=jnp.zeros(()))
     mesh = replace(mesh, coupling=even)
-    aligned = solved(None, compliance=model, pinion=jg.LeadSlope(0.0))
+    aligned = solved(None, compliance=model, pinion=jg.LeadSlope(0.0), sizes=sizes)
     mean = float(aligned.line_load[0, 0, 0])
     stiffness = mean / (float(aligned.transmission_error[0]) - float(mesh.hub) * mean)
-    expected = annex_e(support(gearbox(), 0), pinion=flank, stiffness=stiffness, stations=SLICES)
+    expected = annex_e(support(gearbox(), 0), pinion=flank, stiffness=stiffness, stations=slices)
     found = jg.solve(mesh, TORQUE, pinion=flank)
     load = np.asarray(found.line_load)[:, :, 0]
     assert load[1].max() == 0  # the pitch point, where one pair carries all
@@ -120,13 +85,13 @@ def test_one_pair_of_constant_stiffness_is_the_one_dimensional_analysis(crowning
 def test_teeth_that_pass_their_load_on_raise_the_factor_of_the_one_dimensional_analysis(carried):
     """A load gives way less the shorter it is; one stiffness along the face does not know. 5 to 25 % here."""
     given = support(gearbox(), 0)
-    alone = float(annex_e(given, pinion=FLANK, stations=SLICES).face_load_factor)
+    alone = float(annex_e(given, pinion=FLANK, stations=FACE.slices).face_load_factor)
     assert alone > 1.2
     assert 1.05 < float(face_load_factor(carried)) / alone < 1.25
 
 
 def test_a_contact_on_shafts_that_cannot_be_does_not_converge():
-    mesh = jg.prepare(PAIR, resolution=SIZES, support=support(gearbox(), 0))
+    mesh = jg.prepare(PAIR, resolution=FACE, support=support(gearbox(), 0))
     assert bool(mesh.valid)
     refused = eqx.tree_at(lambda of: of.support_valid, mesh, jnp.zeros((), bool))
     assert not bool(refused.valid) and not bool(jg.solve(refused, TORQUE, pinion=FLANK).converged.any())
@@ -134,7 +99,7 @@ def test_a_contact_on_shafts_that_cannot_be_does_not_converge():
     @jax.jit
     def valid(position):
         box = eqx.tree_at(lambda of: of.shafts[0].gears[0].position, gearbox(), position)
-        return jg.prepare(PAIR, resolution=SIZES, support=support(box, 0)).valid
+        return jg.prepare(PAIR, resolution=FACE, support=support(box, 0)).valid
 
     assert bool(valid(45.0)) and not bool(valid(300.0))
 
@@ -157,7 +122,7 @@ def test_derivatives_of_the_face_load_factor_are_central_differences():
 
     def factor(values):
         box = housed(values[:2])
-        mesh = jg.prepare(PAIR, resolution=SIZES, support=support(box, 0))
+        mesh = jg.prepare(PAIR, resolution=FACE, support=support(box, 0))
         return face_load_factor(jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(values[2]) + jg.LeadCrowning(values[3])))
 
     at = jnp.array([150.0, 1 / 300.0, 4.0, 5.0])

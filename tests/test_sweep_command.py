@@ -14,23 +14,14 @@ import openpyxl
 import pyarrow
 import pyarrow.parquet as parquet
 import pytest
+from commands import FREE, SWEEP, assert_refused, call
 from report_page import assert_row, check_report
-from test_cli import FREE, assert_refused, call
 
 import jaxgear as jg
 from jaxgear.cli import devices, sweep_figures
+from jaxgear.cli import sweep as sweep_command
 from jaxgear.io import load_design, read_variants, sweep_request
-
-SWEEP = (  # two pairs cover the path of contact, and compile faster than four
-    FREE.replace("[optimize]\nstarts = 2\nsteps = 100\n", "").replace("positions = 8", "positions = 8\npairs = 2")
-    + """
-[sweep]
-sampling = "latin_hypercube"
-samples = 60
-part_rows = 25
-results = ["ppte", "effective_contact_ratio"]
-"""
-)
+from jaxgear.sweeps import evaluate
 
 
 def sweep(file, *arguments):
@@ -146,14 +137,25 @@ def test_a_list_of_variants_may_be_the_best_of_a_sweep(folder, tmp_path):
 
 def test_a_quick_sweep_is_coarse_short_and_says_so(folder, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "gear.toml").write_text(SWEEP.replace("samples = 60", "samples = 5000").replace("part_rows = 25", ""))
+    monkeypatch.setattr(sweep_command, "_QUICK_SAMPLES", 60)
+    fine = SWEEP.replace("positions = 16", "positions = 4096").replace("samples = 60", "samples = 5000")
+    (tmp_path / "gear.toml").write_text(fine)
     result = sweep("gear.toml", "--quick")
     assert result.code == 0 and "quick run" in result.out
-    assert len(jg.open_sweep("results/gear/sweep-quick/table")) == 4096
+    table = jg.open_sweep("results/gear/sweep-quick/table")
+    assert len(table) == 60
+    np.testing.assert_array_equal(table.column("ppte_um"), jg.open_sweep(folder[0] / "out" / "table").column("ppte_um"))
 
 
-def test_failed_variants_are_loud(folder, tmp_path):
-    (tmp_path / "gear.toml").write_text(SWEEP.replace("positions = 8", "positions = 8\nrtol = 1e-30"))
+def test_failed_variants_are_loud(folder, tmp_path, monkeypatch):
+    evaluated = evaluate._evaluate_few
+
+    def failed(*given):
+        values, converged = evaluated(*given)
+        return values, np.zeros_like(converged)
+
+    monkeypatch.setattr(evaluate, "_evaluate_few", failed)
+    (tmp_path / "gear.toml").write_text(SWEEP)
     result = sweep(tmp_path / "gear.toml", "-o", tmp_path / "out")
     assert result.code == 1 and "60 variants failed" in result.err
     assert len(jg.open_sweep(tmp_path / "out" / "table")) == 60

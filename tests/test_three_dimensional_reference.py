@@ -6,7 +6,9 @@ compared, the load factor, and the line loads.
 
 import numpy as np
 import pytest
+from catalogue import FACE
 
+import jaxgear as jg
 from benchmarks import face
 
 # K [%]: slope of a face of 6 and of 20 modules, crowning with and without it, end relief; line loads rms [%]
@@ -15,7 +17,7 @@ RMS = 5.0
 SHIFT, RIPPLE = 0.25, 0.3  # um
 
 
-@pytest.fixture(scope="module", params=["b18", pytest.param("b60", marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=["b18", "b60"])
 def found(request):
     return face.run(request.param)
 
@@ -24,6 +26,42 @@ def kind(case: face.FaceCase) -> str:
     return next(name for name in ("aligned", "endrelief", "crown", "slope") if case.name.startswith(name))
 
 
+def few(face_of):
+    """At every second position of the reference."""
+    return face.Face(face_of.line_load[..., ::2], face_of.transmission_error[::2], FACE.slices)
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    """Of slopes and crownings, which few slices show, what is found and what is true."""
+    mesh, both = jg.prepare(face.gear_pair("b18"), resolution=FACE), {}
+    for name in ("aligned_50Nm", "slope20_50Nm", "slope20_150Nm", "crown10_150Nm"):
+        case = face.FaceCase("b18", name)
+        numbers = face.inputs(case)
+        flank = jg.LeadSlope(numbers["lead_slope_um"]) + jg.LeadCrowning(numbers["lead_crowning_um"])
+        cycle = jg.solve(mesh, numbers["torque_Nm"], pinion=flank)
+        assert bool(cycle.converged.all())
+        load = np.pad(cycle.line_load, ((1, 1), (0, 0), (0, 0)))  # the reference carries four pairs along
+        made = face.Face(load, np.asarray(cycle.transmission_error), FACE.slices)
+        both[name] = made, few(face.reference(case, FACE.slices))
+    return both
+
+
+def test_few_slices_show_slope_and_crowning(coarse):
+    for name, (made, true) in coarse.items():
+        assert 100 * abs(made.factor / true.factor - 1) <= FACTOR["crown"]["b18"], name
+        error = np.linalg.norm(made.line_load - true.line_load) / np.linalg.norm(true.line_load)
+        assert 100 * error <= RMS, name
+    changes = [
+        np.subtract(*(measure(each.transmission_error) for each in faces))
+        for measure in (np.mean, np.ptp)
+        for faces in zip(coarse["slope20_50Nm"], coarse["aligned_50Nm"])
+    ]
+    shift, true_shift, ripple, true_ripple = changes
+    assert abs(shift - true_shift) <= SHIFT and abs(ripple - true_ripple) <= RIPPLE
+
+
+@pytest.mark.slow
 def test_load_factors_and_line_loads(found):
     for case, error in face.errors(found).items():
         if kind(case) != "aligned":
@@ -31,6 +69,7 @@ def test_load_factors_and_line_loads(found):
             assert error.rms <= RMS, case
 
 
+@pytest.mark.slow
 def test_change_of_the_transmission_error(found):
     errors = [error for error in face.errors(found).values() if error.shift is not None]
     assert errors
@@ -38,6 +77,7 @@ def test_change_of_the_transmission_error(found):
         assert abs(error.shift) <= SHIFT and abs(error.ppte) <= RIPPLE
 
 
+@pytest.mark.slow
 def test_aligned_pair_is_even(found):
     """The reference has 2 ... 4 % more line load at its free ends."""
     for case, of in found.items():

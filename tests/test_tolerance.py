@@ -5,10 +5,12 @@ import os
 import subprocess
 import sys
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from catalogue import FACE, LINE, gear_pair
 from scipy.stats.mstats import hdquantiles
 
 import jaxgear as jg
@@ -16,25 +18,23 @@ from jaxgear.sweeps.monte_carlo import _scatter
 from jaxgear.tolerance.deviation import Waviness
 
 TORQUE = 50.0
-SIZES = jg.Resolution(positions=16, pairs=3, patch_nodes=2)
-WIDE = jg.Resolution(positions=16, slices=3, pairs=3, patch_nodes=2)
+COUNT, MANY = 20, 20_000  # samples, the same numbers for all tests: every number is a program
 RELIEF = {"pinion": jg.TipRelief(7.0, 4.0), "wheel": jg.TipRelief(6.0, 4.0)}
 
 
 @pytest.fixture(scope="module")
 def pair():
-    pinion = jg.Gear(teeth=19, module=3.0, face_width=20.0, bore_diameter=24.0)
-    return jg.GearPair(pinion, jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=70.0))
+    return gear_pair()
 
 
 @pytest.fixture(scope="module")
 def mesh(pair):
-    return jg.prepare(pair, resolution=SIZES)
+    return jg.prepare(pair, resolution=LINE)
 
 
 @pytest.fixture(scope="module")
 def wide_mesh(pair):
-    return jg.prepare(pair, resolution=WIDE)
+    return jg.prepare(pair, resolution=FACE)
 
 
 @pytest.fixture(scope="module")
@@ -42,18 +42,21 @@ def tolerance(pair):
     return jg.Tolerance.from_class(pair, 5, misalignment=4.0)
 
 
-@pytest.fixture(scope="module")
-def solve(mesh):
+def solve(mesh, deviation, torque=TORQUE):
     """Cycle of one deviation of the relieved design."""
+    torque = jnp.asarray(torque)
+    removed = jg.tolerance.deviated_material(mesh, torque, deviation, **RELIEF)
+    return jg.contact.solve_removed(mesh, torque, removed)
 
-    def solve(deviation, torque=TORQUE, design=RELIEF):
-        return jg.contact.solve_removed(mesh, torque, jg.tolerance.deviated_material(mesh, torque, deviation, **design))
 
-    return jax.jit(solve)
+def sample(tolerance, mesh, seed=0, number=0):
+    """One deviation."""
+    many = jg.tolerance.sample_deviations(tolerance, mesh, COUNT, seed=seed)
+    return jax.tree.map(lambda leaf: leaf[number], many)
 
 
 def zero_deviation(mesh):
-    return jax.tree.map(lambda leaf: leaf[0], jg.tolerance.sample_deviations(jg.Tolerance(), mesh, 1, seed=0))
+    return jax.tree.map(jnp.zeros_like, sample(jg.Tolerance(), mesh))
 
 
 # Rows of the unrounded table for m = 3 mm, d = 150 mm, b = 20 mm, computed by hand from the formulas of the standard.
@@ -133,13 +136,19 @@ def test_one_slice_refuses_lead_deviations(pair, mesh, tolerance):
         lambda t, m, n, seed: jg.monte_carlo(m, TORQUE, tolerance=t, samples=n),
     ):
         with pytest.raises(ValueError, match="pinion helix_slope = 6 um must be None or 0 um on a mesh of 1 slice"):
-            call(tolerance, mesh, 4, 0)
+            call(tolerance, mesh, COUNT, 0)
         with pytest.raises(ValueError, match="misalignment = 4 um must be None or 0 um on a mesh of 1 slice"):
-            call(jg.Tolerance(misalignment=4.0), mesh, 4, 0)
+            call(jg.Tolerance(misalignment=4.0), mesh, COUNT, 0)
     with pytest.raises(ValueError, match="traced limit"):
-        jax.jit(lambda t: jg.tolerance.sample_deviations(t, mesh, 4, 0))(tolerance)
-    jg.tolerance.sample_deviations(tolerance.without_lead(), mesh, 4, 0)
-    jg.tolerance.sample_deviations(jg.Tolerance(misalignment=0.0), mesh, 4, 0)
+        jax.jit(lambda t: jg.tolerance.sample_deviations(t, mesh, COUNT, 0))(tolerance)
+    jg.tolerance.sample_deviations(tolerance.without_lead(), mesh, COUNT, 0)
+    jg.tolerance.sample_deviations(jg.Tolerance(misalignment=0.0), mesh, COUNT, 0)
+
+
+def of_every_kind(distribution):
+    """Limits of all kinds of deviations."""
+    gear = jg.tolerance.GearTolerance(profile_slope=4.0, profile_form=6.0, pitch=5.0, helix_slope=3.0)
+    return jg.Tolerance(gear, gear, misalignment=2.0, distribution=distribution)
 
 
 @pytest.mark.parametrize(
@@ -152,30 +161,29 @@ def test_one_slice_refuses_lead_deviations(pair, mesh, tolerance):
     ids=["normal", "uniform"],
 )
 def test_deviations_are_distributed_within_their_limits(wide_mesh, distribution, deviation):
-    gear = jg.tolerance.GearTolerance(profile_slope=4.0, profile_form=6.0, pitch=5.0, helix_slope=3.0)
-    tolerance = jg.Tolerance(gear, gear, misalignment=2.0, distribution=distribution)
-    samples = jg.tolerance.sample_deviations(tolerance, wide_mesh, 20_000, seed=3)
+    samples = jg.tolerance.sample_deviations(of_every_kind(distribution), wide_mesh, MANY, seed=3)
+    samples = jax.tree.map(np.asarray, samples)
     for values, limit in (
         (samples.pinion.profile_slope, 4.0),
         (samples.wheel.helix_slope, 3.0),
         (samples.misalignment, 2.0),
         (samples.wheel.pitch, 2.5),
     ):
-        assert float(jnp.max(jnp.abs(values))) <= limit
-        assert float(jnp.mean(values)) == pytest.approx(0.0, abs=0.03 * limit)
-        assert float(jnp.std(values)) == pytest.approx(deviation * limit, rel=0.02)
+        assert np.abs(values).max() <= limit
+        assert values.mean() == pytest.approx(0.0, abs=0.03 * limit)
+        assert values.std() == pytest.approx(deviation * limit, rel=0.02)
     # neighbouring teeth: variances add up, and no difference exceeds the tolerance of the single pitch
-    steps = jnp.diff(samples.pinion.pitch, axis=1)
-    assert float(jnp.std(steps)) == pytest.approx(np.sqrt(2) * deviation * 2.5, rel=0.02)
-    assert float(jnp.max(jnp.abs(steps))) <= 5.0
-    both = jnp.corrcoef(jnp.stack([samples.pinion.profile_slope, samples.wheel.profile_slope, samples.misalignment]))
+    steps = np.diff(samples.pinion.pitch, axis=1)
+    assert steps.std() == pytest.approx(np.sqrt(2) * deviation * 2.5, rel=0.02)
+    assert np.abs(steps).max() <= 5.0
+    both = np.corrcoef([samples.pinion.profile_slope, samples.wheel.profile_slope, samples.misalignment])
     np.testing.assert_allclose(both, np.eye(3), atol=0.03)
 
 
-def test_waviness_keeps_mean_line_and_form_tolerance(wide_mesh, pair):
+def test_waviness_keeps_mean_line_and_form_tolerance(wide_mesh):
     """Least-squares line through the deviation along the whole profile is zero; its height is the form deviation."""
-    tolerance = jg.Tolerance(pinion=jg.tolerance.GearTolerance(profile_form=6.0), distribution=jg.tolerance.Uniform())
-    waves = jg.tolerance.sample_deviations(tolerance, wide_mesh, 200, seed=1).pinion.waviness
+    tolerance = of_every_kind(jg.tolerance.Uniform())
+    waves = jg.tolerance.sample_deviations(tolerance, wide_mesh, MANY, seed=1).pinion.waviness[:200]
     flank = wide_mesh.flanks()[0]
     x = jnp.linspace(0.0, 1.0, 4001)
     length = flank.start_roll_length + x * (flank.tip_roll_length - flank.start_roll_length)
@@ -189,8 +197,11 @@ def test_waviness_keeps_mean_line_and_form_tolerance(wide_mesh, pair):
     assert heights.max() <= 6.0 * 1.005 and heights.max() > 5.5 and heights.min() < 0.5
 
 
-def test_deviated_material_is_the_sum_of_modifications(wide_mesh, tolerance):
-    deviation = jax.tree.map(lambda leaf: leaf[0], jg.tolerance.sample_deviations(tolerance, wide_mesh, 1, seed=5))
+def test_deviated_material_is_the_sum_of_modifications(pair, tolerance):
+    wider = eqx.tree_at(lambda pair: pair.pinion.face_width, pair, 1.1 * pair.wheel.face_width)
+    sizes = jg.Resolution(positions=4, slices=3, pairs=2, slide_steps=0, patch_nodes=1, coupled_slices=False)
+    wide_mesh = jg.prepare(wider, resolution=sizes)
+    deviation = sample(tolerance, wide_mesh, seed=5)
     sides = {}
     for side, design in RELIEF.items():
         flank = getattr(deviation, side)
@@ -205,27 +216,27 @@ def test_deviated_material_is_the_sum_of_modifications(wide_mesh, tolerance):
     )
 
 
-def test_zero_tolerance_is_the_nominal_design(mesh, solve):
+def test_zero_tolerance_is_the_nominal_design(mesh):
     zero, design = zero_deviation(mesh), jg.contact.removed_material(mesh, TORQUE, **RELIEF).amount
     # another compilation may round differently; within one, all samples are the same to the last bit
     np.testing.assert_allclose(jg.tolerance.deviated_material(mesh, TORQUE, zero, **RELIEF).amount, design, rtol=1e-13)
-    nominal = np.asarray(solve(zero).transmission_error)
-    scatter = jg.monte_carlo(mesh, TORQUE, tolerance=jg.Tolerance(), samples=20, **RELIEF)
+    nominal = np.asarray(solve(mesh, zero).transmission_error)
+    scatter = jg.monte_carlo(mesh, TORQUE, tolerance=jg.Tolerance(), samples=COUNT, **RELIEF)
     np.testing.assert_allclose(scatter.nominal_transmission_error, nominal, rtol=1e-13)
     assert (np.asarray(scatter.transmission_error_quantiles) == scatter.nominal_transmission_error[None]).all()
     assert (np.asarray(scatter.ppte) == scatter.nominal_ppte).all()
     assert float(scatter.std) < 1e-14 and scatter.converged_share == 1.0
 
 
-def test_a_displaced_tooth_shifts_the_transmission_error_where_it_carries_alone(mesh, solve):
+def test_a_displaced_tooth_shifts_the_transmission_error_where_it_carries_alone(mesh):
     zero, low_torque = zero_deviation(mesh), 5.0
-    nominal = solve(zero, low_torque)
+    nominal = solve(mesh, zero, low_torque)
     reference = mesh.resolution.leading
     share = np.asarray(jg.load_sharing(nominal))[reference]
     alone = np.isclose(share, 1.0)
     assert 2 < alone.sum() < 16
     for amount in (0.7, -0.7):
-        shifted = solve(with_pitch(zero, reference, amount), low_torque)
+        shifted = solve(mesh, with_pitch(zero, reference, amount), low_torque)
         difference = np.asarray(shifted.transmission_error - nominal.transmission_error)
         still_alone = alone & np.isclose(jg.load_sharing(shifted)[reference], 1.0)
         np.testing.assert_allclose(difference[still_alone], amount, rtol=1e-9)
@@ -233,10 +244,12 @@ def test_a_displaced_tooth_shifts_the_transmission_error_where_it_carries_alone(
         assert (np.sign(difference[share > 0.05]) == np.sign(amount)).all()
 
 
-def test_all_teeth_displaced_shift_the_whole_curve(mesh, solve):
+def test_all_teeth_displaced_shift_the_whole_curve(mesh):
     """On the path of contact nothing else changes; the corners, which open as the gears turn on, feel a little."""
     zero = zero_deviation(mesh)
-    difference = solve(with_pitch(zero, slice(None), 2.0)).transmission_error - solve(zero).transmission_error
+    difference = (
+        solve(mesh, with_pitch(zero, slice(None), 2.0)).transmission_error - solve(mesh, zero).transmission_error
+    )
     np.testing.assert_allclose(difference, 2.0, rtol=0.02)
 
 
@@ -250,51 +263,49 @@ def test_misalignment_of_either_sign_acts_alike(wide_mesh):
     """Both signs are mirror images of each other, and tilt load to one end of the face."""
     zero = zero_deviation(wide_mesh)
 
-    def solve(amount):
-        tilted = jg.tolerance.Deviation(zero.pinion, zero.wheel, jnp.asarray(amount))
-        return jg.contact.solve_removed(
-            wide_mesh, TORQUE, jg.tolerance.deviated_material(wide_mesh, TORQUE, tilted, **RELIEF)
-        )
+    def tilted(amount):
+        return solve(wide_mesh, jg.tolerance.Deviation(zero.pinion, zero.wheel, jnp.asarray(amount)))
 
-    plus, minus = solve(6.0), solve(-6.0)
+    plus, minus = tilted(6.0), tilted(-6.0)
     np.testing.assert_allclose(plus.transmission_error, minus.transmission_error, rtol=1e-10)
     np.testing.assert_allclose(plus.line_load, minus.line_load[:, ::-1], atol=1e-8)
-    assert float(jnp.sum(plus.line_load[:, 0])) > float(jnp.sum(plus.line_load[:, -1]))  # material is left there
+    line_load = np.asarray(plus.line_load)
+    assert line_load[:, 0].sum() > line_load[:, -1].sum()  # material is left there
 
 
 def test_samples_depend_on_seed_and_number_only(mesh, tolerance):
     tolerance = tolerance.without_lead()
-    few, many = (jg.tolerance.sample_deviations(tolerance, mesh, samples, seed=7) for samples in (5, 9))
-    jax.tree.map(lambda a, b: np.testing.assert_array_equal(a, b[:5]), few, many)
+    few, many = (jg.tolerance.sample_deviations(tolerance, mesh, samples, seed=7) for samples in (5, COUNT))
+    jax.tree.map(lambda a, b: np.testing.assert_array_equal(a, b[:5]), few, jax.tree.map(np.asarray, many))
     compiled = jax.jit(lambda t, seed: jg.tolerance.sample_deviations(t, mesh, 5, seed))(tolerance, 7)
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12), few, compiled)
-    other = jg.tolerance.sample_deviations(tolerance, mesh, 5, seed=8)
-    assert not np.any(np.asarray(few.pinion.pitch) == np.asarray(other.pinion.pitch))
+    other = jg.tolerance.sample_deviations(tolerance, mesh, COUNT, seed=8)
+    assert not np.any(np.asarray(many.pinion.pitch) == np.asarray(other.pinion.pitch))
 
 
 def test_common_random_numbers_scale_with_the_limits(mesh, tolerance):
     """Twice the tolerance is twice the same deviation: designs and tolerances are compared on the same gears."""
     once = tolerance.without_lead()
     twice = jg.Tolerance(*(jax.tree.map(lambda limit: 2 * limit, gear) for gear in (once.pinion, once.wheel)))
-    for a, b in zip(*(jax.tree.leaves(jg.tolerance.sample_deviations(t, mesh, 6, seed=2)) for t in (once, twice))):
-        np.testing.assert_allclose(2 * a, b, rtol=1e-12)
+    for a, b in zip(*(jax.tree.leaves(jg.tolerance.sample_deviations(t, mesh, COUNT, seed=2)) for t in (once, twice))):
+        np.testing.assert_allclose(2 * np.asarray(a), b, rtol=1e-12)
 
 
-def test_monte_carlo_holds_the_samples_of_its_seed(mesh, tolerance, solve):
+def test_monte_carlo_holds_the_samples_of_its_seed(mesh, tolerance):
     tolerance = tolerance.without_lead()
     scatter = jg.monte_carlo(
-        mesh, TORQUE, tolerance=tolerance, samples=20, seed=11, quantiles=(0.5, 0.0, 1.0), **RELIEF
+        mesh, TORQUE, tolerance=tolerance, samples=COUNT, seed=11, quantiles=(0.5, 0.0, 1.0), **RELIEF
     )
-    deviations = jg.tolerance.sample_deviations(tolerance, mesh, 20, seed=11)
-    every = [jax.tree.map(lambda leaf, i=i: leaf[i], deviations) for i in range(20)]
-    curves = np.stack([solve(one).transmission_error for one in every])
+    deviations = jg.tolerance.sample_deviations(tolerance, mesh, COUNT, seed=11)
+    every = [jax.tree.map(lambda leaf, i=i: np.asarray(leaf)[i], deviations) for i in range(COUNT)]
+    curves = np.stack([solve(mesh, jax.tree.map(jnp.asarray, one)).transmission_error for one in every])
     np.testing.assert_allclose(scatter.ppte, np.ptp(curves, axis=1), rtol=1e-9)
     assert float(scatter.mean) == pytest.approx(np.ptp(curves, axis=1).mean())
     assert float(scatter.std) == pytest.approx(np.ptp(curves, axis=1).std(ddof=1))
     np.testing.assert_allclose(scatter.quantiles, [0.0, 0.5, 1.0])
     ends = [curves.min(axis=0), curves.max(axis=0)]
     np.testing.assert_allclose(scatter.transmission_error_quantiles[::2], ends, rtol=1e-9)
-    again = jg.monte_carlo(mesh, TORQUE, tolerance=tolerance, samples=20, seed=11, **RELIEF)
+    again = jg.monte_carlo(mesh, TORQUE, tolerance=tolerance, samples=COUNT, seed=11, **RELIEF)
     np.testing.assert_array_equal(again.ppte, scatter.ppte)
     assert str(scatter).startswith("Scatter of 20 samples, 0 failed")
 
@@ -307,7 +318,7 @@ def test_one_compilation_serves_every_number(mesh, tolerance, nothing_compiled, 
     for amount in (1.0, 2.0, 3.0):
         design = {"pinion": jg.TipRelief(amount, 3.0), "wheel": jg.TipRelief(5.0, 3.0)}
         limits = jg.Tolerance(gear, jg.tolerance.GearTolerance(amount, 2 * amount, 3 * amount))
-        jg.monte_carlo(mesh, 40.0 + amount, tolerance=limits, samples=20, seed=int(amount), **design)
+        jg.monte_carlo(mesh, 40.0 + amount, tolerance=limits, samples=COUNT, seed=int(amount), **design)
     assert 0 < len(traces) <= 2  # a loop is traced for its shapes too
 
 
@@ -373,15 +384,18 @@ def test_gradients_of_the_mean_scatter_agree_with_differences(mesh, tolerance):
 
 @pytest.mark.slow
 def test_two_devices_give_the_samples_of_one(mesh, tolerance):
-    one = jg.monte_carlo(mesh, TORQUE, tolerance=tolerance.without_lead(), samples=20, seed=1, **RELIEF)
+    one = jg.monte_carlo(mesh, TORQUE, tolerance=tolerance.without_lead(), samples=COUNT, seed=1, **RELIEF)
     program = """
 import jax
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_num_cpu_devices", 2)
 import jaxgear as jg
-pinion = jg.Gear(teeth=19, module=3.0, face_width=20.0, bore_diameter=24.0)
-pair = jg.GearPair(pinion, jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=70.0))
-mesh = jg.prepare(pair, resolution=jg.Resolution(positions=16, pairs=3, patch_nodes=2))
+gears = [
+    jg.Gear(z, 3.0, profile_shift=0.0, face_width=18.0, bore_diameter=bore, tip_diameter=3.0 * (z + 2), addendum=1.0)
+    for z, bore in ((19, 24.0), (48, 70.0))
+]
+pair = jg.GearPair(*gears)
+mesh = jg.prepare(pair, resolution=jg.Resolution(positions=16, pairs=2, slide_steps=0))
 tolerance = jg.Tolerance.from_class(pair, 5).without_lead()
 relief = {"pinion": jg.TipRelief(7.0, 4.0), "wheel": jg.TipRelief(6.0, 4.0)}
 scatter = jg.monte_carlo(mesh, 50.0, tolerance=tolerance, samples=20, seed=1, **relief)

@@ -7,9 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from test_clearance import stage
-from test_shafts import PINION, TILTED, WHEEL, two_stages
-from test_supported_contact import PAIR, gearbox
+from gearboxes import PAIR, PINION, TILTED, WHEEL, gearbox, stage, two_stages
 
 import jaxgear as jg
 from jaxgear.layout import Endurance, WoehlerLine, damage, level_load
@@ -121,50 +119,70 @@ def test_what_is_refused_is_not_valid_and_what_is_taken_is():
             _ = [replace(shaft) for shaft in box.shafts]
 
 
-def test_a_batch_keeps_its_good_members():
-    """Load, damage and bearing forces of shafts that cannot be are NaN beside one that can."""
-    box = gearbox()
+# stiffness of the first bearing and profile shift of the pinion: two that can be, shafts that cannot, and a pointed and
+# an undercut pinion
+RADIAL = np.array([150.0, 300.0, -100.0, 0.0, np.nan, 150.0, 150.0])
+SHIFT = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 2.0, -0.8])
+GOOD, BAD_SHAFTS, BAD_GEARS = slice(0, 2), slice(2, 5), slice(5, 7)
+
+
+@pytest.fixture(scope="module")
+def batch():
+    """What shafts do to the load, in one batch of those that can be and those that cannot."""
     load = jg.LoadSpectrum.from_hours([0.0, 50.0], [5.0, 10.0], 500.0)
     endurance = Endurance(WoehlerLine(1500.0, 13.2, 5e7), WoehlerLine(900.0, 8.7, 3e6))
 
-    def of(radial):
-        held = support(eqx.tree_at(lambda of: of.shafts[0].bearings[0].radial, box, radial))
-        face = annex_e(held, stations=STATIONS)
-        spent = damage(held, load, endurance, stations=STATIONS)
-        force = bearing_reactions(held.gearbox).force[0, 1]
-        numbers = face.face_load_factor, face.approach, spent.life, spent.largest, spent.face_load_factor[1], force
-        return jnp.stack(numbers), jnp.append(spent.converged, face.converged), spent.pitting
-
-    numbers, converged, pitting = jax.jit(jax.vmap(of))(jnp.array([-100.0, 150.0, 0.0, np.nan]))
-    bad = jnp.array([0, 2, 3])
-    assert np.isfinite(numbers[1]).all() and float(numbers[1, 0]) > 1.1
-    assert np.isnan(numbers[bad]).all()
-    # idle loads do no damage whatever holds the gears
-    np.testing.assert_array_equal(converged, [[True, good, good] for good in (False, True, False, False)])
-    np.testing.assert_array_equal(pitting[..., 0], 0.0)
-    assert np.isnan(pitting[bad, :, 1]).all() and (pitting[1, :, 1] > 0).all()
-
-
-def test_gears_that_cannot_run_carry_no_load_whatever_holds_them():
-    """Traced ones with a pointed or an undercut pinion: not converged, as in the contact, and NaN."""
-
-    def of(shift):
-        box = eqx.tree_at(lambda box: box.shafts[0].gears[0].gear.profile_shift, gearbox(), shift)
-        pair = box.pair(0)
+    def of(radial, shift):
+        box = eqx.tree_at(
+            lambda of: (of.shafts[0].bearings[0].radial, of.shafts[0].gears[0].gear.profile_shift),
+            gearbox(),
+            (radial, shift),
+        )
+        held, pair = support(box), box.pair(0)
         table = TabulatedSupport(pair, jnp.zeros((STATIONS, STATIONS)))
-        faces = [annex_e(each, torque=50.0, stations=STATIONS) for each in (RigidSupport(pair), table)]
-        faces.append(annex_e(support(box), stations=STATIONS))
-        loads = jnp.stack([jnp.append(face.line_load, face.approach) for face in faces])
-        slope = level_load(RigidSupport(pair), torque=50.0, stations=STATIONS).slope
-        return jg.margins(pair).valid, jnp.stack([face.converged for face in faces]), loads, slope
+        faces = [annex_e(held, stations=STATIONS)]
+        faces += [annex_e(each, torque=50.0, stations=STATIONS) for each in (RigidSupport(pair), table)]
+        spent = damage(held, load, endurance, stations=STATIONS)
+        return {
+            "valid": jg.margins(pair).valid,
+            "loads": jnp.stack([jnp.append(face.line_load, face.approach) for face in faces]),
+            "factors": jnp.stack([face.face_load_factor for face in faces]),
+            "converged": jnp.stack([face.converged for face in faces]),
+            "slope": level_load(RigidSupport(pair), torque=50.0, stations=STATIONS).slope,
+            "spent": jnp.stack([spent.life, spent.largest, spent.face_load_factor[1]]),
+            "found": spent.converged,
+            "pitting": spent.pitting,
+            "force": bearing_reactions(held.gearbox).force[0, 1],
+        }
 
-    valid, converged, loads, slopes = jax.jit(jax.vmap(of))(jnp.array([0.0, 2.0, -0.8]))
-    np.testing.assert_array_equal(valid, [True, False, False])
-    np.testing.assert_array_equal(converged, np.repeat(valid[:, None], 3, axis=1))
-    assert np.isfinite(loads[0]).all() and np.isnan(loads[1:]).all()
-    assert np.isfinite(slopes[0]) and np.isnan(slopes[1:]).all()
+    found = jax.jit(jax.vmap(of))(RADIAL, SHIFT)
+    return {name: np.asarray(part) for name, part in found.items()}
 
 
+def test_a_batch_keeps_its_good_members(batch):
+    """Load, damage and bearing forces of shafts that cannot be are NaN beside those that can."""
+    assert (batch["factors"][GOOD, 0] > 1.1).all() and np.isfinite(batch["loads"][GOOD]).all()
+    assert np.isfinite(batch["spent"][GOOD]).all() and np.isfinite(batch["force"][GOOD]).all()
+    # a gearbox and what it does at the stations carry the load alike
+    np.testing.assert_allclose(batch["spent"][GOOD, 2], batch["factors"][GOOD, 0], rtol=1e-9)
+    assert np.isnan(batch["loads"][BAD_SHAFTS, 0]).all() and np.isnan(batch["factors"][BAD_SHAFTS, 0]).all()
+    assert np.isnan(batch["spent"][BAD_SHAFTS]).all() and np.isnan(batch["force"][BAD_SHAFTS]).all()
+    assert batch["converged"][GOOD, 0].all() and not batch["converged"][BAD_SHAFTS, 0].any()
+    # idle loads do no damage whatever holds the gears
+    np.testing.assert_array_equal(batch["found"][:5], [[True, good] for good in (True, True, False, False, False)])
+    np.testing.assert_array_equal(batch["pitting"][:5, :, 0], 0.0)
+    assert np.isnan(batch["pitting"][BAD_SHAFTS, :, 1]).all() and (batch["pitting"][GOOD, :, 1] > 0).all()
+
+
+def test_gears_that_cannot_run_carry_no_load_whatever_holds_them(batch):
+    """Not converged, as in the contact, and NaN: rigid, by a table, and on shafts."""
+    np.testing.assert_array_equal(batch["valid"], np.arange(7) < 5)
+    assert batch["converged"][GOOD].all() and not batch["converged"][BAD_GEARS].any()
+    assert np.isnan(batch["loads"][BAD_GEARS]).all()
+    assert np.isfinite(batch["slope"][GOOD]).all() and np.isnan(batch["slope"][BAD_GEARS]).all()
+
+
+@pytest.mark.slow
 def test_a_shaft_afloat_carries_no_even_load():
     """A belt holds the one shaft in place; nothing does the other, whose clearance no torque takes up."""
     afloat = annex_e(support(stage(20.0, moment=0.0)), stations=STATIONS)

@@ -5,7 +5,7 @@ import re
 import equinox as eqx
 import numpy as np
 import pytest
-from catalogue import TWO_PAIRS, gear_pair, ppte
+from catalogue import LINE, gear_pair, ppte
 
 import jaxgear as jg
 from jaxgear.metrics import plausibility
@@ -27,13 +27,13 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def flat():
     """In plane stress, so that each gear has one table."""
-    return jg.prepare(gear_pair(), compliance=jg.default_compliance("stress"), resolution=TWO_PAIRS)
+    return jg.prepare(gear_pair(), compliance=jg.default_compliance("stress"), resolution=LINE)
 
 
 @pytest.fixture(scope="module")
 def tabulated(flat, folder):
     compliance = jg.finite_element_compliance(flat.pair, "stress", cache=folder)
-    return jg.prepare(flat.pair, compliance=compliance, resolution=TWO_PAIRS)
+    return jg.prepare(flat.pair, compliance=compliance, resolution=LINE)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_levelled_flanks_are_verified_too(flat, tabulated, folder):
 
 def test_a_contact_law_of_another_kind_is_verified_too(best, tabulated, folder):
     """Its prepared arrays are other ones, and no compiled program serves both."""
-    legacy = jg.prepare(tabulated.pair, compliance=jg.legacy_compliance(), resolution=TWO_PAIRS)
+    legacy = jg.prepare(tabulated.pair, compliance=jg.legacy_compliance(), resolution=LINE)
     found = jg.optimize.verification(legacy, jg.optimize.structure_for(legacy, cache=folder))
     cycle = jg.solve(legacy, 50.0, pinion=best.pinion, wheel=best.wheel)
     verified = found(cycle, {}, best.pinion, best.wheel)

@@ -10,9 +10,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from commands import call
 from pyarrow import parquet
 from report_page import check_report
-from test_cli import call
 
 import jaxgear as jg
 from jaxgear import plot
@@ -190,7 +190,8 @@ def test_loads_of_the_table_wear_one_flank_together(file):
     assert settings.loads is not None and settings.loads.weights.tolist() == [0.75, 0.25]
     mesh = load_design(file(PAIR)).mesh()
     spectrum = jg.LoadSpectrum([50.0, 150.0], [3.0, 1.0])
-    life = wear(mesh, spectrum, 2e7, coefficient=1e-18, blocks=4)
+    perfect = jnp.zeros((2, 1, 16))
+    life = wear(mesh, spectrum, 2e7, coefficient=1e-18, blocks=4, deviation=perfect)
     asked = sweep_request(design).results[1](jg.solve(mesh, 150.0).on(mesh))
     assert float(asked) == pytest.approx(float(wear_depth(life)[-1]), rel=1e-12)
 
@@ -261,8 +262,7 @@ TOLERANCE = "[tolerance]\nquality_class = 7\nsamples = 3\n"
 
 def scatter(design, flanks, kept):
     """Lives of the manufactured pairs of a file, with reliefs of one height."""
-    sizes = dataclasses.replace(design.resolution(), positions=8)  # of a program that compiles quickly
-    mesh, settings = design.mesh(sizes), wear_request(design).settings
+    mesh, settings = design.mesh(), wear_request(design).settings
     relief = jg.TipRelief(flanks, 2.0)
     designs = {"relieved": (relief, relief)}
     found = wear_scatter.scattered(design, settings, mesh, designs, tolerance_of(design), kept, quick=False)
@@ -286,7 +286,7 @@ def test_manufactured_pairs_live_as_their_deviations_let_them(file, tmp_path, mo
         life = wear_in_steps(mesh, 150.0, 2e7, coefficient=1e-18, blocks=4, deviation=off, **options)
         assert found["wear_depth"][number] == pytest.approx(float(wear_depth(life)[-1]), rel=1e-6)
         assert found["mean_ppte_over_life"][number] == pytest.approx(float(mean_over_life(life, "ppte")), rel=1e-6)
-    assert np.ptp(found["mean_ppte_over_life"]) > 1.0
+    assert np.ptp(found["mean_ppte_over_life"]) > 0.3
     _, _, finer = scatter(load_design(file(PAIR + TABLE + TOLERANCE.replace("7", "1"))), 5.0, kept)
     # an eighth of the limits, but for their rounding
     assert np.ptp(finer["mean_ppte_over_life"]) < 0.5 * np.ptp(found["mean_ppte_over_life"])
@@ -488,11 +488,14 @@ def test_blocks_on_the_disk_are_the_blocks(tmp_path):
 
 @pytest.fixture(scope="module")
 def skewed(tmp_path_factory):
-    """A life of flanks that wear unevenly over the face."""
+    """A life of flanks that wear unevenly over the face: that of one slice, and more of it on a second one."""
     path = tmp_path_factory.mktemp("skewed") / "design.toml"
-    path.write_text(PAIR.replace("pairs = 2", "pairs = 2\nslices = 2"))
-    mesh = load_design(path).mesh()
-    return wear_in_steps(mesh, 150.0, 2e7, coefficient=1e-18, blocks=2, pinion=jg.LeadSlope(5.0))
+    path.write_text(PAIR)
+    life = wear_in_steps(load_design(path).mesh(), 150.0, 2e7, coefficient=1e-18, blocks=2)
+    further = np.linspace(0.0, 0.5, 3)[:, None, None, None, None]
+    depth = np.concatenate([life.depth, life.depth + further], axis=3)
+    places = np.asarray(life.face_coordinate) + np.array([-5.0, 5.0])
+    return eqx.tree_at(lambda of: (of.depth, of.face_coordinate), life, (jnp.asarray(depth), jnp.asarray(places)))
 
 
 @pytest.mark.parametrize("name", ["flanks.csv", "flanks.parquet"])

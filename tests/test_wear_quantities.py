@@ -1,23 +1,26 @@
 """Quantities of worn flanks, and gradients of a life."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import gear_pair, prepare
+from catalogue import LINE, gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear.conditions import solve_case
 from jaxgear.wear import WEAR_QUANTITIES, Wear, life_to, life_to_depth, mean_over_life, over_life, wear, wear_depth
 
-SIZES = jg.Resolution(positions=16, pairs=2, slide_steps=0)
 TORQUE = 100.0
-SETTINGS = Wear(4e7, 1e-18, blocks=4, depth_limit=2.0, ppte_limit=6.0)
+BLOCKS = 2  # everywhere, so that one program serves all lives
+REVOLUTIONS = 1e7
+SETTINGS = Wear(REVOLUTIONS, 1e-18, blocks=BLOCKS, depth_limit=2.0, ppte_limit=6.0)
+NONE = jg.TipRelief(0.0, 2.0)
 
 
 @pytest.fixture(scope="module")
 def mesh():
-    return prepare(gear_pair((20, 30), face_width=20.0, bores=(None, None)), resolution=SIZES)
+    return prepare(gear_pair((20, 30), face_width=20.0, bores=(None, None)), resolution=LINE)
 
 
 def test_quantities_are_those_of_the_life(mesh):
@@ -35,7 +38,7 @@ def test_quantities_are_those_of_the_life(mesh):
         "wheel_wear_depth": wear_depth(life, "wheel")[-1],
         "wear_depth_error": life.error[-1],
         "life_to_depth": life_to_depth(life, 2.0),
-        "life_to_ppte": jnp.minimum(life_to(life, "ppte", 6.0), 4e7),
+        "life_to_ppte": jnp.minimum(life_to(life, "ppte", 6.0), REVOLUTIONS),
     }
     vibrating = {"worn_dynamic_factor", "max_dynamic_factor_over_life"}
     assert {*expected, *found, *vibrating} == {*WEAR_QUANTITIES}
@@ -45,19 +48,19 @@ def test_quantities_are_those_of_the_life(mesh):
 
 def test_a_limit_that_is_never_reached_is_no_failure(mesh):
     """Not finite values are those of failed contacts, which count as the worst of all."""
-    life = SETTINGS.life(mesh, TORQUE)
+    life = SETTINGS.life(mesh, TORQUE, pinion=NONE, wheel=NONE)
     assert np.isinf(life_to(life, "ppte", 1e3))
-    far = Wear(4e7, 1e-18, ppte_limit=1e3, depth_limit=1e6)
-    assert float(WEAR_QUANTITIES["life_to_ppte"].of(life, far)) == 4e7
-    idle = SETTINGS.life(mesh, 0.0)
+    far = Wear(REVOLUTIONS, 1e-18, ppte_limit=1e3, depth_limit=1e6)
+    assert float(WEAR_QUANTITIES["life_to_ppte"].of(life, far)) == REVOLUTIONS
+    idle = SETTINGS.life(mesh, 0.0, pinion=NONE, wheel=NONE)
     assert np.isinf(life_to_depth(idle, 1.0))
-    assert 4e7 < float(WEAR_QUANTITIES["life_to_depth"].of(idle, far)) < np.inf
+    assert REVOLUTIONS < float(WEAR_QUANTITIES["life_to_depth"].of(idle, far)) < np.inf
 
 
 def test_overlong_blocks_give_no_number_but_their_error(mesh):
     """Where flanks overshoot from block to block nobody knows what is left; the estimated error tells."""
-    cycle = jg.solve(mesh, TORQUE).on(mesh)
-    long, enough = (Wear(revolutions, 1e-18, blocks=2) for revolutions in (2e9, 2e7))
+    cycle = solve_case(mesh, TORQUE, NONE, NONE).on(mesh)
+    long, enough = (Wear(revolutions, 1e-18, blocks=BLOCKS) for revolutions in (2e9, REVOLUTIONS))
     assert np.isnan(float(long.quantity("wear_depth")(cycle)))
     assert float(long.quantity("wear_depth_error")(cycle)) > 1.0
     assert 0 < float(enough.quantity("wear_depth")(cycle)) < np.inf
@@ -71,14 +74,14 @@ def test_a_life_is_under_one_load(mesh):
 
 
 def test_equal_settings_make_equal_quantities():
-    again = Wear(4e7, 1e-18, blocks=4, depth_limit=2.0, ppte_limit=6.0)
-    assert SETTINGS.quantity("wear_depth") == again.quantity("wear_depth") != Wear(1e7, 1e-18).quantity("wear_depth")
+    again = Wear(REVOLUTIONS, 1e-18, blocks=BLOCKS, depth_limit=2.0, ppte_limit=6.0)
+    assert SETTINGS.quantity("wear_depth") == again.quantity("wear_depth") != Wear(2e7, 1e-18).quantity("wear_depth")
     assert SETTINGS.quantity("life_to_depth").better == "larger"
     np.testing.assert_array_equal(Wear(1e7, 1e-18, 3e-18).coefficients, [1e-18, 3e-18])
 
 
 def test_a_name_without_settings_says_what_it_needs(mesh):
-    cycle = jg.solve(mesh, TORQUE)
+    cycle = solve_case(mesh, TORQUE, NONE, NONE)
     for name in WEAR_QUANTITIES:
         with pytest.raises(ValueError, match=rf'{name}: needs settings, give jaxgear.wear.Wear\(...\).quantity\("'):
             jg.quantities[name](cycle)
@@ -110,24 +113,35 @@ def test_settings_that_are_traced_make_no_quantity():
         jax.jit(lambda n: Wear(n, 1e-18).quantity("wear_depth").sign)(1e7)
 
 
+class Power(eqx.Module):
+    """Wear that grows with a power of the pressure, whose slope is infinite without any."""
+
+    coefficient: jax.Array
+    exponent: jax.Array
+
+    def __call__(self, pressure, sliding, temperature):
+        return self.coefficient * (pressure / 1000.0) ** self.exponent
+
+
 def worn_ppte(mesh, design):
-    """After 20 blocks, by amount and length of the relief and by the coefficient of wear."""
+    """By amount and length of the relief, and by coefficient and exponent of wear."""
     relief = jg.TipRelief(design[0], design[1])
-    life = wear(mesh, TORQUE, 4e7, pinion=relief, wheel=relief, coefficient=1e-18 * design[2], blocks=20, points=9)
+    options = {"coefficient": Power(1e-18 * design[2], design[3]), "blocks": 8, "points": 9}
+    life = wear(mesh, jg.Operation(TORQUE, 1000.0), 4e7, pinion=relief, wheel=relief, **options)
     return over_life(life, "ppte")[-1]
 
 
-DESIGN = jnp.array([5.0, 2.0, 1.0])
+DESIGN = jnp.array([5.0, 2.0, 1.0, 0.5])
 
 
 def test_slopes_of_worn_ppte_are_those_of_differences(mesh):
     @jax.jit
     def with_slopes(design):
-        return jax.vmap(lambda way: jax.jvp(lambda at: worn_ppte(mesh, at), (design,), (way,)))(jnp.eye(3))
+        return jax.vmap(lambda way: jax.jvp(lambda at: worn_ppte(mesh, at), (design,), (way,)))(jnp.eye(4))
 
     step = 1e-4
     _, slopes = with_slopes(DESIGN)
-    moved = [[float(with_slopes(DESIGN + sign * step * way)[0][0]) for way in jnp.eye(3)] for sign in (1, -1)]
+    moved = [[float(with_slopes(DESIGN + sign * step * way)[0][0]) for way in jnp.eye(4)] for sign in (1, -1)]
     difference = (np.array(moved[0]) - np.array(moved[1])) / (2 * step)
     np.testing.assert_allclose(slopes, difference, rtol=1e-4)
     assert np.abs(difference).min() > 1e-3

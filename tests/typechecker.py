@@ -3,6 +3,7 @@
 The rest of an annotation is for mypy: an object of a wrong class has to meet the package's own message here.
 """
 
+import functools
 import inspect
 from typing import Any, get_args
 
@@ -18,7 +19,13 @@ def arrays(function):
     if not hints:  # most functions: beartype's own code for each would be what the checks cost
         return function
     function.__annotations__ = {name: hints.get(name, Any) for name in function.__annotations__}
-    return _check(function)
+    checked = functools.cache(lambda: _check(function))  # made when called: no test calls all of them
+
+    @functools.wraps(function)
+    def run(*args, **options):
+        return checked()(*args, **options)
+
+    return run
 
 
 def _speaks_of_arrays(hint) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import jax
 
-from ..numerics.durable import Kept, user_folder
+from ..numerics.durable import Kept, forget_the_oldest, user_folder
 from ..numerics.programs import Store, keep
 
 _MOST = 256 << 20  # bytes of all that is kept
@@ -26,7 +26,7 @@ def enable_cache() -> Path | None:
     if folder is None:
         return None
     try:
-        _forget_the_oldest(folder)
+        forget_the_oldest(folder, _MOST)
     except OSError:
         return None
     keep(Store(Files(folder)))
@@ -60,13 +60,3 @@ def _processor() -> str:
     except OSError:
         return f"{platform.machine()} {platform.processor()}"
     return "".join(sorted({line for line in lines if line.startswith(("model name", "flags", "Features"))}))
-
-
-def _forget_the_oldest(folder: Path) -> None:
-    """Removes what has not been used for the longest time where there is too much."""
-    files = sorted(((file.stat(), file) for file in folder.iterdir()), key=lambda each: -each[0].st_mtime)
-    total = 0
-    for status, file in files:
-        total += status.st_size
-        if total > _MOST:
-            file.unlink(missing_ok=True)

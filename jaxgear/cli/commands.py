@@ -10,9 +10,8 @@ import numpy as np
 from ..geometry import GearPair
 from ..io import DesignFile, DesignFileError, optimize_request
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import program
+from ..numerics import compile_quickly, program
 from ..sizing import iso_relief
-from .devices import compile_quickly
 from .document import document
 from .progress import Stages
 from .run import default_folder, opened, run

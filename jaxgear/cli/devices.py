@@ -1,25 +1,10 @@
-"""How the programs of a command are compiled, and the processor cores and processes that a sweep spreads over."""
+"""The processor cores and processes that a sweep spreads over."""
 
 import os
-from importlib.metadata import version
 
 import jax
 
-from ..numerics.quick import OPTIONS, TRIED
-
 _DEVICES_FLAG = "xla_force_host_platform_device_count"
-
-
-def compile_quickly() -> None:
-    """Lets XLA compile in a third of the time to programs that run half as long again, unless the user has said how.
-
-    For commands whose kernels too take longer to compile than to run; before JAX runs anything. A version that does not
-    know a flag ends the process.
-    """
-    given = os.environ.get("XLA_FLAGS", "")
-    if version("jaxlib").startswith(TRIED) and not any(flag in given for flag in OPTIONS):
-        flags = (f"--{flag}={str(value).lower()}" for flag, value in OPTIONS.items())
-        os.environ["XLA_FLAGS"] = " ".join((given, *flags)).strip()
 
 
 def use_all_cores() -> None:

@@ -10,9 +10,9 @@ from typing import Any, Generic, TypeVar
 import rich.table
 
 from ..io import DesignFile, result_folder, write_summary
+from ..numerics import compile_quickly
 from . import interrupt, report
 from .commands import import_ahead
-from .devices import compile_quickly
 from .document import Found, document
 from .progress import Stages
 from .run import default_folder, opened

@@ -41,6 +41,7 @@ from .programs import kernel as kernel
 from .programs import program as program
 from .progress import Callback as Callback
 from .quadrature import gauss_legendre as gauss_legendre
+from .quick import compile_quickly as compile_quickly
 from .quick import quick_jit as quick_jit
 from .risk import AbstractMeasure as AbstractMeasure
 from .risk import CVaR as CVaR

@@ -63,6 +63,18 @@ class Kept:
         return self._folder / _sum(self._here + made_of).hexdigest()
 
 
+def forget_the_oldest(folder: Path, most: int) -> None:
+    """Removes the files of a folder that have not been used for the longest time, where there are more bytes."""
+    files = sorted(
+        ((file.stat(), file) for file in folder.iterdir() if file.is_file()), key=lambda each: -each[0].st_mtime
+    )
+    total = 0
+    for status, file in files:
+        total += status.st_size
+        if total > most:
+            file.unlink(missing_ok=True)
+
+
 def user_folder(*names: str) -> Path | None:
     """A folder below the user's cache directory that nobody else can write to; None where there can be none."""
     try:

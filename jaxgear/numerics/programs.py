@@ -12,13 +12,12 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.experimental.serialize_executable import deserialize_and_load, serialize
 
-from .quick import is_eager, quick_jit, quick_options
+from .quick import is_eager, is_quick, quick_jit, quick_options
 
 _Given = ParamSpec("_Given")
 _Found = TypeVar("_Found")
@@ -106,7 +105,7 @@ class Store:
             return None
         if known is None:
             known = self._programs[key] = self._made(
-                function, jax.tree.unflatten(tree, fixed), str(precision), quick_options() if quick else None
+                function, jax.tree.unflatten(tree, fixed), str(precision), quick_options() if is_quick(quick) else None
             )
         return known, [leaf for leaf, shape in zip(leaves, fixed) if isinstance(shape, _Shape)]
 
@@ -156,7 +155,7 @@ def program(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
 
 
 def _compiled(function: Callable[_Given, _Found], *, quick: bool) -> Callable[_Given, _Found]:
-    jitted = quick_jit(function) if quick else eqx.filter_jit(function)
+    jitted = quick_jit(function, always=quick)
 
     @functools.wraps(function)
     def run(*args: _Given.args, **options: _Given.kwargs) -> _Found:
