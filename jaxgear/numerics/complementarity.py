@@ -124,10 +124,7 @@ def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
     start = [jnp.maximum(q, LOAD_FLOOR) for q in start]
     rate = [jnp.clip(k - c, -_STEEPEST * c, _STEEPEST * c) for k, c in zip(slopes_under(shared, start, secant), secant)]
 
-    def with_secants(_, state):
-        return _newton(problem, state[0], secant, secant)
-
-    def with_logarithms(_, state):
+    def with_logarithms(state, rate):
         grown = [jnp.log(jnp.clip(q / q0, _LEAST, _MOST)) for q, q0 in zip(carried_by(state[0]), start)]
         followed = [c + k * x for c, k, x in zip(secant, rate, grown)]
         return _newton(problem, state[0], followed, [c + k for c, k in zip(followed, rate)])
@@ -137,10 +134,16 @@ def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
         exact = secants_under(problem, load)
         return _newton(problem, state[0], exact, slopes_under(problem, load, exact))
 
-    state = jax.lax.fori_loop(0, _SECANT_STEPS, with_secants, (v, jnp.zeros_like(problem.lever[0])))
-    state = jax.lax.fori_loop(0, _LOGARITHM_STEPS, with_logarithms, state)
+    state = v, jnp.zeros_like(problem.lever[0])
     if problem.coupling is None:
+        state = jax.lax.fori_loop(0, _SECANT_STEPS, lambda _, s: _newton(problem, s[0], secant, secant), state)
+        state = jax.lax.fori_loop(0, _LOGARITHM_STEPS, lambda _, s: with_logarithms(s, rate), state)
         return with_laws(0, state)
+
+    def first_constant(i, state):  # one loop for both: the elimination of coupled slices is most of a program
+        return with_logarithms(state, [jnp.where(i < _SECANT_STEPS, 0.0, k) for k in rate])
+
+    state = jax.lax.fori_loop(0, _SECANT_STEPS + _LOGARITHM_STEPS, first_constant, state)
     return jax.lax.fori_loop(0, _LAW_STEPS_COUPLED, with_laws, state)
 
 

@@ -94,11 +94,16 @@ def inverse_of(factors: Factors) -> list[Rows]:
 
 
 def small_inverse(matrix: Float[Array, "pairs pairs positions"]) -> Float[Array, "pairs pairs positions"]:
-    """Of a symmetric, positive definite matrix at every position."""
-    count = len(matrix)
-    none = jnp.zeros_like(matrix[0, 0])[None]
-    factors = factorize(matrix, matrix[0], [none == none] * count, [none] * count)
-    return jnp.stack([jnp.concatenate(row) for row in inverse_of(factors)])
+    """Of a symmetric, positive definite matrix at every position: of its first row and column, then bordered by others."""
+    rows = [[1 / matrix[0, 0]]]
+    for k in range(1, len(matrix)):
+        border = [matrix[k, j] for j in range(k)]
+        across = [sum(a * b for a, b in zip(row, border)) for row in rows]
+        last = 1 / (matrix[k, k] - sum(a * b for a, b in zip(across, border)))
+        beside = [-a * last for a in across]
+        rows = [[*(a - x * b for a, x in zip(row, across)), b] for row, b in zip(rows, beside)] + [[*beside, last]]
+    whole = jnp.stack([jnp.stack(row) for row in rows])
+    return whole / unit(whole)
 
 
 def product(weight: Float[Array, " slices"], factors: Factors, first: Rows, second: Rows) -> Curve:
