@@ -47,8 +47,8 @@ def _before_the_workers():
     if "XLA_FLAGS" not in os.environ:
         wanted = {**quick.OPTIONS, "xla_cpu_parallel_codegen_split_count": 1}
         del wanted[OPTIMIZATION]  # the configuration says it, which a test can change
-        known = (f"--{name}={str(value).lower()}" for name, value in wanted.items() if quick.is_known(name, value))
-        os.environ["XLA_FLAGS"] = " ".join(known)
+        flags = (f"--{name}={str(value).lower()}" for name, value in quick.known_of(wanted).items())
+        os.environ["XLA_FLAGS"] = " ".join(flags)
 
 
 @pytest.hookimpl(trylast=True)

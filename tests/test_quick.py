@@ -55,8 +55,8 @@ def test_what_runs_for_long_is_quickly_compiled_where_all_is(compiler):
 
 
 def test_the_compiler_is_asked_what_it_knows(monkeypatch):
-    assert quick.is_known("xla_backend_optimization_level", 0)
-    assert not quick.is_known("xla_of_another_version", True)
+    known = {"xla_backend_optimization_level": 0}
+    assert quick.known_of(known) == quick.known_of({**known, "xla_of_another_version": True}) == known
     monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_enable_fast_math=false")
     found = quick.quick_options.__wrapped__()
     assert found["xla_backend_optimization_level"] == 0 and set(found) <= set(quick.OPTIONS)

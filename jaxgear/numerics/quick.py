@@ -67,13 +67,19 @@ def quick_options() -> dict[str, Any] | None:
     given = os.environ.get("XLA_FLAGS", "")
     if jax.default_backend() != "cpu" or any(option in given for option in OPTIONS):
         return None
-    return {name: value for name, value in OPTIONS.items() if is_known(name, value)}
+    return known_of(OPTIONS)
 
 
-def is_known(name: str, value: Any) -> bool:
-    """Whether the compiler knows an option: it refuses every program with one that it does not know."""
+def known_of(options: dict[str, Any]) -> dict[str, Any]:
+    """Those of the options that the compiler knows: it refuses every program with one that it does not know."""
+    if _compiles(options):
+        return options
+    return {name: value for name, value in options.items() if _compiles({name: value})}
+
+
+def _compiles(options: dict[str, Any]) -> bool:
     try:
-        jax.jit(lambda: 0.0).lower().compile({name: value})
+        jax.jit(lambda: 0.0).lower().compile(options)
     except jax.errors.JaxRuntimeError:
         return False
     return True
