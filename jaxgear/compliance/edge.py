@@ -245,7 +245,7 @@ def cut_off(distance: Real, squared: Real) -> Patch:
     length = jnp.maximum(2 / 3 * (distance + root), _SHORTEST)
     # without distance^2 / 2 beyond the corner, where the corner gap accounts for it
     sagitta = 0.5 * length * (0.25 * length - distance) + 0.5 * inside**2
-    # of full contacts alone: of others, powers of it overflow single precision, and reverse mode multiplies them by zero
+    # of full contacts alone: of others, its powers overflow single precision, and reverse mode multiplies them by zero
     relative = jnp.where(cut, 1.0, root * (1 / jnp.maximum(inside, _SHORTEST)))
     full_mean = inside * polynomial(_FULL_MEAN, relative)
     return Patch(
