@@ -1,6 +1,7 @@
 """The accuracy benchmark: its quick mode passes, and it fails when it should."""
 
 import json
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -19,8 +20,14 @@ def test_quick_mode_holds_the_recorded_bounds(capsys):
     assert "42 mesh cycles" in capsys.readouterr().out
 
 
-def test_a_worse_model_fails(capsys):
-    assert accuracy.main(["--quick", "--cases", "A"], models=(models.LEGACY,)) == 1
+(NO_CORNERS,) = (model for model in models.MODELS if model.name == "no corner contact")  # by the same programs
+
+
+@pytest.mark.parametrize(
+    "model", [NO_CORNERS, pytest.param(models.LEGACY, marks=pytest.mark.slow)], ids=lambda model: model.name
+)
+def test_a_worse_model_fails(capsys, model):
+    assert accuracy.main(["--quick", "--cases", "A"], models=(model,)) == 1
     assert "Worse than recorded" in capsys.readouterr().out
 
 
@@ -218,9 +225,15 @@ def test_solution_is_that_of_the_public_functions():
     np.testing.assert_allclose(curves.pressure[flank], expected.pressure[flank], rtol=1e-6)
 
 
-def test_figures_are_written(tmp_path):
-    from benchmarks.figures import write_figures
+@pytest.mark.parametrize(
+    "second",
+    [replace(NO_CORNERS, name="legacy"), pytest.param(models.LEGACY, marks=pytest.mark.slow)],
+    ids=["stand-in", "legacy"],
+)
+def test_figures_are_written(tmp_path, monkeypatch, second):
+    from benchmarks import figures
 
-    results = accuracy.compare((models.DEFAULT, models.LEGACY), [CASE])
-    (path,) = write_figures(tmp_path, results)
+    monkeypatch.setattr(figures, "LEGACY", second)
+    results = accuracy.compare((models.DEFAULT, second), [CASE])
+    (path,) = figures.write_figures(tmp_path, results)
     assert path.stat().st_size > 20_000

@@ -18,7 +18,7 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
-from commands import FIXED, FREE, assert_refused, call
+from commands import FIXED, FREE, LINE, assert_refused, call
 from report_page import check_report
 
 import jaxgear as jg
@@ -36,12 +36,30 @@ pytestmark = pytest.mark.usefixtures("no_cache")
 
 STAGES = "finite-element tables", "searching", "verifying"  # in this order
 EARLIER = '{"versions": {"jaxgear": "0.1.0"}}'  # the summary of an earlier run
+# on which gears of one slice do not stand
+SHAFTS = """
+[layout]
+quality_class = 6
+[[shafts]]
+name = "in"
+sections = [{ length = 160.0, diameter = 40.0 }]
+bearings = [{ name = "A", position = 60.0, radial = 250.0 }, { name = "B", position = 140.0, radial = 250.0 }]
+gears = [{ name = "pinion", position = 20.0, integral = true }]
+couplings = [{ position = 160.0, torque = 50.0 }]
+[[shafts]]
+name = "out"
+sections = [{ length = 190.0, diameter = 45.0 }]
+bearings = [{ name = "C", position = 20.0, radial = 300.0 }, { name = "D", position = 130.0, radial = 300.0 }]
+gears = [{ name = "wheel", position = 45.0, integral = true }]
+couplings = [{ position = 190.0 }]
+"""
 
 
 @pytest.fixture(scope="module", autouse=True)
 def few_torques():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run, "_TORQUES", 5)
+        patch.setattr(run, "_QUICK_TORQUES", 5)
         yield
 
 
@@ -49,32 +67,69 @@ def few_torques():
 def folder(tmp_path_factory):
     """Design files, and the results of one run of each command."""
     folder = tmp_path_factory.mktemp("cli")
-    (folder / "fixed.toml").write_text(FIXED + "[tolerance]\nquality_class = 5\nsamples = 8\n")
-    (folder / "free.toml").write_text(FREE)
+    fixed = FIXED.replace(LINE, f"{LINE}\nslices = 1") + SHAFTS
+    (folder / "fixed.toml").write_text(fixed + "[tolerance]\nquality_class = 5\nsamples = 8\n")
+    (folder / "plain.toml").write_text(FIXED)
+    (folder / "free.toml").write_text(FREE + 'te_iteration = { start = "unmodified" }\n')
     return folder
 
 
 @pytest.fixture(scope="module")
 def analyzed(folder):
     """The involute is manufactured as a relief of no height: one program for both designs."""
+    made = []  # what was asked for and found, of every design
 
     def scatter(mesh, torque, *, pinion, wheel, **options):
         bare = jg.TipRelief(0.0, 5.0)
         pinion, wheel = (bare if isinstance(flank, NoModification) else flank for flank in (pinion, wheel))
-        return jg.monte_carlo(mesh, torque, pinion=pinion, wheel=wheel, **options)
+        found = jg.monte_carlo(mesh, torque, pinion=pinion, wheel=wheel, **options)
+        made.append(({"torque": torque, "pinion": pinion, "wheel": wheel, **options}, found))
+        return found
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("JAXGEAR_NO_CACHE", "1")
         patch.setattr(manufactured, "monte_carlo", scatter)
         result = call("analyze", folder / "fixed.toml", "-o", folder / "analyzed", "--no-figures", "--report")
-    return SimpleNamespace(**vars(result), summary=json.loads((folder / "analyzed" / "summary.json").read_text()))
+    summary = json.loads((folder / "analyzed" / "summary.json").read_text())
+    return SimpleNamespace(**vars(result), summary=summary, made=made)
+
+
+def optimization(folder, name, *options):
+    """One run of the command on the free file, and what it has written."""
+    os.environ["JAXGEAR_NO_CACHE"] = "1"
+    target = folder / name
+    typed = "optimize", folder / "free.toml", *options, "--output", target, "--report"
+    result = vars(call(*typed))
+    summary = json.loads((target / "summary.json").read_text())
+    return SimpleNamespace(**result, summary=summary, typed=typed, target=target, quick="--quick" in options)
 
 
 @pytest.fixture(scope="module")
-def optimized(folder):
-    os.environ["JAXGEAR_NO_CACHE"] = "1"
-    result = call("optimize", folder / "free.toml", "--no-figures", "--output", folder / "optimized", "--report")
-    return SimpleNamespace(**vars(result), summary=json.loads((folder / "optimized" / "summary.json").read_text()))
+def searched(folder):
+    """A quick run, which ends on the mesh on which it begins."""
+    return optimization(folder, "searched", "--quick", "--no-figures")
+
+
+@pytest.fixture(scope="module")
+def minimized(folder):
+    """A run that ends on a finer mesh."""
+    return optimization(folder, "minimized", "--no-figures")
+
+
+@pytest.fixture(scope="module")
+def iterated(folder):
+    """A run of a method that needs no variables, on the mesh of the file."""
+    return optimization(folder, "iterated", "-m", "te_iteration")
+
+
+@pytest.fixture(scope="module", params=["searched", pytest.param("minimized", marks=pytest.mark.slow)])
+def optimized(request):
+    return request.getfixturevalue(request.param)
+
+
+@pytest.fixture(scope="module", params=["iterated", pytest.param("minimized", marks=pytest.mark.slow)])
+def verified(request):
+    return request.getfixturevalue(request.param)
 
 
 def test_analyze_gives_what_the_library_gives(folder, analyzed):
@@ -103,7 +158,9 @@ def test_designs_of_a_file_with_tolerances_are_manufactured(folder, analyzed):
     file = load_design(folder / "fixed.toml")
     pinion, wheel = file.design({})
     tolerance = jg.Tolerance.from_class(file.pair(), 5).without_lead()
-    scatter = jg.monte_carlo(file.mesh(), 50.0, tolerance=tolerance, pinion=pinion, wheel=wheel, samples=8)
+    wanted = {"torque": 50.0, "pinion": pinion, "wheel": wheel, "tolerance": tolerance, "samples": 8, "seed": 0}
+    asked, scatter = analyzed.made[1]
+    assert asked.keys() == wanted.keys() and eqx.tree_equal(asked, wanted)
     found = analyzed.summary["designs"]["modified"]["manufactured"]
     assert found["pairs"] == 8 and found["failed"] == 0
     assert found["nominal_ppte_um"] == pytest.approx(analyzed.summary["designs"]["modified"]["ppte_um"], rel=1e-6)
@@ -124,6 +181,15 @@ def test_the_summary_says_what_was_computed(analyzed):
     assert "bores: pinion 24.75 mm (half the root diameter, as none is given), wheel" in analyzed.out
     assert all(design["doubts"] == [] for design in analyzed.summary["designs"].values())
     assert "please check" not in analyzed.out
+
+
+def test_shafts_that_an_analysis_leaves_out_are_told(folder, analyzed):
+    """On stderr, in the summary and in the report."""
+    line = load_design(folder / "fixed.toml").left_out
+    assert line.startswith("shafts and bearings are not part of this analysis") and "resolution.slices = 1" in line
+    assert line in analyzed.err and analyzed.summary["left_out"] == line
+    report = (folder / "analyzed" / "report.html").read_text("utf-8")
+    assert line[1:] in report and "Shafts, bearings and housing are those of the design file" not in report
 
 
 def test_what_is_not_usual_is_said_once_of_all_designs_it_concerns():
@@ -149,7 +215,7 @@ def test_optimize_compares_three_designs_and_improves(optimized):
     height = optimized.summary["optimum"]["parameters"]["height_um"]
     assert designs["optimum"]["pinion_modification"][0]["amount"] == height
     assert 2.0 < height < 15.0
-    assert optimized.summary["quick"] is False
+    assert optimized.summary["quick"] is optimized.quick
     assert optimized.summary["versions"]["jax"] == jax.__version__
 
 
@@ -171,19 +237,17 @@ def test_the_reports_hold_what_was_found(folder, analyzed, optimized):
     told = [design["manufactured"]["q95_ppte_um"] for design in analyzed.summary["designs"].values()]
     assert page.rows[made] == ["95 % quantile [um]", *(f"{value:.3f}" for value in told)]
     assert ["tolerances / quality class", "5"] in page.rows
-    file, target = folder / "free.toml", folder / "optimized"
-    page = check_report(target, file, "optimize", file, "--no-figures", "--output", target, "--report")
+    page = check_report(optimized.target, folder / "free.toml", *optimized.typed)
     printed = [row for row in page.rows if row[0] == "PPTE [um]"]
     ppte = [f"{design['ppte_um']:.3f}" for design in optimized.summary["designs"].values()]
     assert printed == [["PPTE [um]", *ppte]]
-    text = (folder / "optimized" / "report.html").read_text("utf-8")
+    text = (optimized.target / "report.html").read_text("utf-8")
     assert "a [small] pair" in text and "contact analyses by method minimax" in text
 
 
 def test_all_result_files_are_there(folder, analyzed, optimized, iterated):
-    file, target = folder / "free.toml", folder / "iterated"
-    typed = "optimize", file, "--quick", "-m", "te_iteration", "-o", target, "--report"
-    assert "img" in check_report(target, file, *typed).tags
+    target = iterated.target
+    assert "img" in check_report(target, folder / "free.toml", *iterated.typed).tags
     of_others = {"ppte_distribution.png"}  # no tolerances
     of_others |= {"front.csv", "front.png"}
     # one slice shows nothing over the face
@@ -197,14 +261,14 @@ def test_all_result_files_are_there(folder, analyzed, optimized, iterated):
     of_others |= {"ppte_over_life.png", "depth_over_life.png", "dynamic_factor_over_life.png"}  # of `jaxgear wear`
     of_others |= {"life_ppte_distribution.png"}
     assert {path.name for path in target.iterdir()} == RESULT_FILES - of_others
-    for name in ("optimized", "analyzed"):
-        assert {path.name for path in (folder / name).iterdir()} == {"summary.json", "flanks.csv", "report.html"}
+    for other in (optimized.target, folder / "analyzed"):
+        assert {path.name for path in other.iterdir()} == {"summary.json", "flanks.csv", "report.html"}
     for path in target.glob("*.png"):
         assert path.read_bytes().startswith(b"\x89PNG")
 
 
-def test_flanks_hold_the_tip_values_of_the_designs(folder, optimized):
-    with (folder / "optimized" / "flanks.csv").open() as file:
+def test_flanks_hold_the_tip_values_of_the_designs(optimized):
+    with (optimized.target / "flanks.csv").open() as file:
         rows = list(csv.DictReader(file))
     for name, design in optimized.summary["designs"].items():
         for gear in ("pinion", "wheel"):
@@ -262,8 +326,12 @@ def test_a_quick_run_is_coarse_and_short(folder, tmp_path, monkeypatch):
 def test_the_numbers_are_those_of_the_mesh_on_which_the_search_ended(optimized):
     """16 positions fit the flanks to themselves; no design is judged by other positions than the rest."""
     optimum, designs = optimized.summary["optimum"], optimized.summary["designs"]
-    assert optimum["positions"] == optimized.summary["resolution"]["positions"] >= 512
-    assert f"searched at 16 positions, evaluated at {optimum['positions']} positions" in optimized.out
+    assert optimum["positions"] == optimized.summary["resolution"]["positions"]
+    if optimized.quick:  # it ends where it began
+        assert optimum["positions"] == 16
+    else:
+        assert optimum["positions"] >= 512
+        assert f"searched at 16 positions, evaluated at {optimum['positions']} positions" in optimized.out
     assert designs["optimum"]["ppte_um"] == pytest.approx(optimum["ppte_um"], rel=1e-9)
     assert optimum["objective"] == pytest.approx(optimum["ppte_um"], rel=1e-6)
     for design in designs.values():
@@ -271,23 +339,25 @@ def test_the_numbers_are_those_of_the_mesh_on_which_the_search_ended(optimized):
     assert "ppte [um]" not in optimized.out  # the row above says it
 
 
-def test_every_design_is_verified_by_finite_elements(folder, optimized):
-    designs = optimized.summary["designs"]
+def test_every_design_is_verified_by_finite_elements(folder, verified):
+    designs, judged = verified.summary["designs"], verified.summary["optimum"]["method"] == "minimax"  # by an objective
     found = {name: design["verified"] for name, design in designs.items()}
-    for name, verified in found.items():
-        assert verified["structure"] == "finite_element" and 1e-4 < abs(verified["ppte_um"] - designs[name]["ppte_um"])
-        assert verified["objectives"] == {"ppte [um]": pytest.approx(verified["ppte_um"], rel=1e-6)}
-    (row,) = (line for line in optimized.out.splitlines() if line.startswith("│   by finite elements"))
-    assert all(f"{verified['ppte_um']:.3f}" in row for verified in found.values())
+    for name, second in found.items():
+        assert second["structure"] == "finite_element" and 1e-4 < abs(second["ppte_um"] - designs[name]["ppte_um"])
+        wanted = {"ppte [um]": pytest.approx(second["ppte_um"], rel=1e-6)} if judged else {}
+        assert second.get("objectives", {}) == wanted
+    (row,) = (line for line in verified.out.splitlines() if line.startswith("│   by finite elements"))
+    assert all(f"{second['ppte_um']:.3f}" in row for second in found.values())
     before, after = (found[name]["ppte_um"] for name in ("unmodified", "optimum"))
     fall = 100 * (1 - after / before)
-    assert f"by finite elements {before:.3f} -> {after:.3f} um: {fall:.1f} % less than unmodified" in optimized.out
+    assert f"by finite elements {before:.3f} -> {after:.3f} um: {fall:.1f} % less than unmodified" in verified.out
     file = load_design(folder / "free.toml")
+    positions = verified.summary["resolution"]["positions"]
     compliance = jg.finite_element_compliance(file.pair())
-    mesh = jg.prepare(file.pair(), compliance=compliance, resolution=replace(file.resolution(), positions=512))
+    mesh = jg.prepare(file.pair(), compliance=compliance, resolution=replace(file.resolution(), positions=positions))
     cycle = jg.solve(mesh, 50.0)
     assert before == pytest.approx(float(jg.peak_to_peak(cycle.transmission_error)), rel=1e-6)
-    stages = optimized.err.splitlines()
+    stages = verified.err.splitlines()
     tables, search, second = (next(i for i, line in enumerate(stages) if word in line) for word in STAGES)
     assert tables < search < second
 
@@ -368,19 +438,10 @@ def test_a_limit_that_no_design_keeps_is_no_success(robust):
     assert "constraints are not met" in robust.err
 
 
-@pytest.fixture(scope="module")
-def iterated(folder):
-    """A quick run of another method on the same file."""
-    os.environ["JAXGEAR_NO_CACHE"] = "1"
-    typed = "optimize", folder / "free.toml", "--quick", "-m", "te_iteration", "-o", folder / "iterated", "--report"
-    result = call(*typed)
-    return SimpleNamespace(**vars(result), summary=json.loads((folder / "iterated" / "summary.json").read_text()))
-
-
 def test_another_method_reports_like_every_other(iterated):
-    assert iterated.code == 0 and "quick run" in iterated.out
+    assert iterated.code == 0 and "quick run" not in iterated.out
     optimum, designs = iterated.summary["optimum"], iterated.summary["designs"]
-    assert iterated.summary["quick"] is True and optimum["method"] == "te_iteration"
+    assert iterated.summary["quick"] is False and optimum["method"] == "te_iteration"
     assert list(designs) == ["unmodified", "rule-based", "optimum", "as cubic"]
     assert designs["optimum"]["ppte_um"] == pytest.approx(optimum["ppte_um"])
     assert designs["as cubic"]["ppte_um"] == pytest.approx(optimum["projection"]["ppte_um"])
@@ -388,12 +449,22 @@ def test_another_method_reports_like_every_other(iterated):
     assert f"{len(optimum['iterations'])} contact analyses by method te_iteration" in iterated.out
 
 
-def test_a_quick_run_verifies_nothing(iterated):
-    assert "finite" not in iterated.out + iterated.err
-    assert not any("verified" in design for design in iterated.summary["designs"].values())
+@pytest.mark.slow
+def test_the_iteration_may_start_from_a_relief_of_low_pressure(folder, tmp_path):
+    path = tmp_path / "free.toml"
+    path.write_text(FREE)
+    result = call("optimize", path, "--quick", "-m", "te_iteration", "-o", tmp_path / "out", "--no-figures")
+    optimum = json.loads((tmp_path / "out" / "summary.json").read_text())["optimum"]
+    assert result.code == 0 and optimum["method"] == "te_iteration"
+    assert optimum["iterations"][0]["max_relief"] > 1.0
 
 
-def test_an_optimum_that_keeps_not_its_limits_is_no_success(folder, tmp_path, monkeypatch, iterated):
+def test_a_quick_run_verifies_nothing(searched):
+    assert "quick run" in searched.out and "finite" not in searched.out + searched.err
+    assert not any("verified" in design for design in searched.summary["designs"].values())
+
+
+def test_an_optimum_that_keeps_not_its_limits_is_no_success(folder, tmp_path, monkeypatch, searched):
     request = importlib.import_module("jaxgear.io.optimize_request").OptimizeRequest
     search, limit = request.__call__, optimum_result.Limit(432.1, None, 100.0, "MPa", False)
 
@@ -401,7 +472,7 @@ def test_an_optimum_that_keeps_not_its_limits_is_no_success(folder, tmp_path, mo
         return replace(search(self, *arguments), constraints={"max_flank_pressure": limit}, violation=3.321)
 
     monkeypatch.setattr(request, "__call__", passing)
-    options = "--quick", "--no-figures", "-m", "te_iteration"
+    options = "--quick", "--no-figures"
     result = call("optimize", folder / "free.toml", *options, "-o", tmp_path / "out")
     assert result.code == 1 and "constraints are not met" in result.err
     assert "max_flank_pressure 432.1 MPa, NOT MET: at most 100" in result.out and "NOT FEASIBLE" in result.out
@@ -413,9 +484,9 @@ def test_results_of_an_earlier_run_are_replaced_and_figures_are_optional(folder,
     target = tmp_path / "out"
     target.mkdir()
     (target / "k_chart.png").write_text("from an earlier run")
-    assert_refused(call("analyze", folder / "fixed.toml", "-o", target), "other files than results of jaxgear (k_chart")
+    assert_refused(call("analyze", folder / "plain.toml", "-o", target), "other files than results of jaxgear (k_chart")
     (target / "summary.json").write_text(EARLIER)
-    assert call("analyze", folder / "fixed.toml", "-o", target, "--no-figures").code == 0
+    assert call("analyze", folder / "plain.toml", "-o", target, "--no-figures").code == 0
     assert {path.name for path in target.iterdir()} == {"summary.json", "flanks.csv"}
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
     assert stat.S_IMODE(target.stat().st_mode) & 0o500 == 0o500
@@ -423,9 +494,9 @@ def test_results_of_an_earlier_run_are_replaced_and_figures_are_optional(folder,
 
 def test_results_go_beside_the_caller_by_default(folder, tmp_path, monkeypatch, analyzed):
     monkeypatch.chdir(tmp_path)
-    result = call("analyze", folder / "fixed.toml", "--no-figures")
-    assert result.code == 0 and (tmp_path / "results" / "fixed" / "analyze" / "summary.json").is_file()
-    assert "results in results/fixed/analyze/" in result.out
+    result = call("analyze", folder / "plain.toml", "--no-figures")
+    assert result.code == 0 and (tmp_path / "results" / "plain" / "analyze" / "summary.json").is_file()
+    assert "results in results/plain/analyze/" in result.out
 
 
 def test_no_two_commands_share_a_folder():

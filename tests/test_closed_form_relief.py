@@ -50,7 +50,7 @@ def relieved(mesh, depth, extent, load=1.0, curve=(1.0, 0.0)):
 
 
 def ppte(cycle):
-    assert bool(jnp.all(cycle.converged))
+    assert np.all(cycle.converged)
     return float(jg.peak_to_peak(cycle.transmission_error)) / DELTA0
 
 
@@ -62,7 +62,7 @@ def test_unmodified_pair(mesh):
     """Half of delta0 between one and two pairs; rms (delta0 / 2) sqrt(L (1 - L))."""
     cycle = solve(mesh, torque(mesh, 1.0))
     assert ppte(cycle) == pytest.approx(0.5, rel=1e-12)
-    assert float(jnp.std(cycle.transmission_error)) / DELTA0 == pytest.approx(0.5 * np.sqrt(L * (1 - L)), rel=1e-12)
+    assert np.std(cycle.transmission_error) / DELTA0 == pytest.approx(0.5 * np.sqrt(L * (1 - L)), rel=1e-12)
     assert float(jg.effective_contact_ratio(cycle)) == pytest.approx(CONTACT_RATIO, abs=1.01 / POSITIONS)
 
 
@@ -100,6 +100,7 @@ def test_depth_error(mesh, relative, error):
     assert ppte(cycle) == pytest.approx(0.5 * abs(error) * (2 - L / extent), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_variance_without_loss_of_contact(fine):
     """L/2 <= G <= L, E <= delta0: the closed-form variance of the trapezoidal variation."""
     for relative in (0.5, 0.75, 1.0):
@@ -111,15 +112,18 @@ def test_variance_without_loss_of_contact(fine):
         assert std**2 == pytest.approx(variance, rel=3e-3)
 
 
-def test_relief_that_reaches_into_single_contact(fine):
+@pytest.mark.parametrize("meshes", ["mesh", pytest.param("fine", marks=pytest.mark.slow)])
+def test_relief_that_reaches_into_single_contact(meshes, request):
     """G > L: the best PPTE is delta0 (G - L) / (2 G - L); the extreme stands at the end of single contact."""
+    mesh = request.getfixturevalue(meshes)
     for relative in (1.1, 1.25):
         extent = relative * L
         depth = 1 / (2 - L / extent)
-        per_position = depth / extent / 1024
-        assert ppte(relieved(fine, depth, extent)) == pytest.approx((extent - L) / (2 * extent - L), abs=per_position)
+        per_position = depth / extent / mesh.path.shape[-1]
+        assert ppte(relieved(mesh, depth, extent)) == pytest.approx((extent - L) / (2 * extent - L), abs=per_position)
 
 
+@pytest.mark.slow
 def test_parabolic_relief(fine):
     """Pure parabola over the double-contact zone: PPTE is least, delta0 / 8, at twice the depth; 1/4 at delta0."""
     values = [ppte(relieved(fine, depth, L, curve=(0.0, 1.0))) for depth in (1.0, 1.8, 2.0, 2.2)]
@@ -178,6 +182,6 @@ def test_two_and_three_pairs_in_contact():
     mesh = constant_stiffness_mesh(pair, STIFFNESS, jg.Resolution(positions=POSITIONS, patch_nodes=1))
     cycle = solve(mesh, torque(mesh, 1.0))
     assert ppte(cycle) == pytest.approx(1 / 2 - 1 / 3, rel=1e-12)
-    loaded = jnp.sum(cycle.line_load[:, 0] > 0, axis=0)
-    assert set(np.asarray(loaded).tolist()) == {2, 3}
-    np.testing.assert_allclose(cycle.transmission_error, DELTA0 / np.asarray(loaded), rtol=1e-12)
+    loaded = np.sum(np.asarray(cycle.line_load)[:, 0] > 0, axis=0)
+    assert set(loaded.tolist()) == {2, 3}
+    np.testing.assert_allclose(cycle.transmission_error, DELTA0 / loaded, rtol=1e-12)

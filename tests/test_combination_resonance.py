@@ -77,6 +77,7 @@ def test_a_pair_of_multipliers_leaves_and_enters_the_circle_about_the_sum_of_bot
         np.testing.assert_allclose(twice - 2 * pair.real * once + abs(pair) ** 2 * found.direction, 0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_gradient_of_a_neimark_sacker_point(branch):
     found = branch.bifurcations[0]
 

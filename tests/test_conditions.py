@@ -48,6 +48,16 @@ def test_every_torque_meets_the_same_gears(mesh, tolerance):
     np.testing.assert_allclose(np.ptp(cases.removed[0] - cases.removed[1], axis=0).max(), 0.0, atol=0.5)
 
 
+def test_every_case_weighs_as_its_torque(mesh, tolerance):
+    """Three parts of the time at the first torque, one at the second: so does every gear that runs under them."""
+    load = jg.LoadSpectrum(TORQUES, [3.0, 1.0])
+    cases = conditions("test", mesh, load, tolerance=tolerance, samples=3, seed=7).on(mesh)
+    torques, weights = np.asarray(cases.each(lambda operation, removed: operation.torque)), np.asarray(cases.weights)
+    assert weights.shape == torques.shape == (6,)
+    for torque, share in zip(TORQUES, (3 / 4, 1 / 4)):
+        np.testing.assert_allclose(weights[torques == torque], share / 3, rtol=1e-12)
+
+
 def test_one_quantile_in_every_engine(tolerance):
     mesh = constant_stiffness_mesh(gear_pair(), 300.0, LINE)  # of which every program is a small one
     made = {"tolerance": tolerance, "samples": 6, "seed": 3}

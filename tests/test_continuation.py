@@ -100,6 +100,11 @@ def test_orbits_of_two_cycles_join_both_flips(parametric, doubled):
     assert doubled.ended == "joined"
     upper = parametric.bifurcations[1].parameter
     np.testing.assert_allclose(doubled.parameter[-1], upper, rtol=1e-4)
+    assert all(near(doubled, omega, True) for omega in (1.70, 1.90))
+
+
+@pytest.mark.slow
+def test_orbits_of_two_cycles_are_the_exact_ones(doubled):
     for omega, factor in ((1.70, 4.168459), (1.90, 3.658612)):
         (orbit,) = near(doubled, omega, True)
         polished = find_orbit(rectangular(), frequency(omega), orbit.start, periods=2, steps=4000)
@@ -122,8 +127,6 @@ def test_a_family_over_any_parameter():
     within = frequency(0.6), frequency(1.0)
     branch = follow_orbits(dead_zone, start, parameter=speed, within=within, direction="down", step=0.02, steps=STEPS)
     assert branch.ended == "range" and [found.kind for found in branch.bifurcations] == ["fold", "fold"]
-    again = bifurcation_of(dead_zone, branch.bifurcations[0], steps=STEPS)
-    np.testing.assert_allclose(again.parameter, branch.bifurcations[0].parameter, rtol=1e-5)
     (orbit,) = near(branch, 0.80, False)
     orbit = find_orbit(*dead_zone(jnp.asarray(frequency(0.80))), orbit.start, steps=STEPS)
     turn = np.exp(-1j * TWO_PI * np.asarray(orbit.phase))
@@ -131,6 +134,16 @@ def test_a_family_over_any_parameter():
     assert bool(orbit.converged) and not bool(orbit.stable)
     # one harmonic is 3 % off on the stable branch, and more where the flanks only just part
     assert abs(orbit.approach_mean - 1.085105) < 0.01 and abs(amplitude - 0.156748) < 0.02
+
+
+@pytest.mark.slow
+def test_a_fold_of_a_family_is_found_again():
+    moving, speed = dead_zone(jnp.asarray(frequency(0.9)))
+    start = find_orbit(moving, speed, ([0.863], [0.08]), steps=STEPS)
+    within = frequency(0.6), frequency(1.0)
+    branch = follow_orbits(dead_zone, start, parameter=speed, within=within, direction="down", step=0.02, steps=STEPS)
+    again = bifurcation_of(dead_zone, branch.bifurcations[0], steps=STEPS)
+    np.testing.assert_allclose(again.parameter, branch.bifurcations[0].parameter, rtol=1e-5)
 
 
 def finer(orbit, changes):
@@ -170,6 +183,7 @@ def test_the_gradient_of_a_fold(resonance):
     check_gradient(resonance.bifurcations[1], changes=2)
 
 
+@pytest.mark.slow
 def test_the_gradient_of_a_flip(parametric):
     """Where the period doubles, of an orbit that keeps contact."""
     check_gradient(parametric.bifurcations[0], changes=0)

@@ -47,16 +47,29 @@ def batch(mesh):
 
 
 def one_of(batch, index):
-    return jax.tree.map(lambda leaf: leaf[index], batch)
+    return jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)[index]), batch)
 
 
-@pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS)
-def test_a_metric_of_many_cycles_is_that_of_each(batch, metric):
+@eqx.filter_jit
+def every_metric(cycles):
+    """By one program for a batch, and one for a cycle."""
+    return {name: jax.tree.leaves(metric(cycles)) for name, metric in METRICS.items()}
+
+
+@pytest.fixture(scope="module")
+def measured(batch):
+    """Metrics of the batch and of every cycle."""
+    together, alone = every_metric(batch), {index: every_metric(one_of(batch, index)) for index in np.ndindex(2, 3)}
+    return jax.tree.map(np.asarray, (together, alone))
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_a_metric_of_many_cycles_is_that_of_each(measured, name):
     """Whether it is taken of the batch or of every cycle, over two batch axes."""
-    together, each = jax.tree.leaves(metric(batch)), eqx.filter_jit(metric)
-    for index in np.ndindex(2, 3):
-        alone = jax.tree.leaves(each(one_of(batch, index)))
-        for whole, part in zip(together, alone, strict=True):
+    together, alone = measured
+    assert together[name]
+    for index, parts in alone.items():
+        for whole, part in zip(together[name], parts[name], strict=True):
             assert whole.shape == (2, 3, *part.shape)
             np.testing.assert_allclose(whole[index], part, rtol=1e-12, atol=1e-12)
 
@@ -150,6 +163,7 @@ def test_what_is_wrong_is_said_in_one_line(mesh, call, error, message):
         eqx.filter_jit(call)(mesh)
 
 
+@pytest.mark.slow
 def test_modifications_are_taken_in_the_precision_of_the_mesh(mesh):
     """Double-precision reliefs on a mesh in single precision: converged, and within its accuracy of the exact curve."""
     single = jax.tree.map(lambda leaf: leaf.astype(jnp.float32) if eqx.is_inexact_array(leaf) else leaf, mesh)

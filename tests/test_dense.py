@@ -133,7 +133,16 @@ def over_tables(x):
     return interpolate(jnp.linspace(0.0, 3.0, 9), jnp.arange(4.0), x * jnp.array([0.0, 1.0, 0.5, 2.0]), "cubic2")
 
 
-@pytest.mark.parametrize("designs", [over_meshes, over_lines, over_tables])
+def test_traced_code_has_no_other_equations():
+    """What runs over many designs side by side solves, inverts and factorizes by `jaxgear.numerics.dense` alone."""
+    calls = re.compile(r"(?:jnp|jsp|jax\.numpy|jax\.scipy)\.linalg\.(?:solve|inv|pinv|lstsq|cho|lu|qr|tensorsolve)\w*")
+    folder = Path(jg.__file__).parent
+    texts = {path.name: path.read_text(encoding="utf-8") for path in folder.rglob("*.py")}
+    assert "solve_dense" in texts["dense.py"]
+    assert {name: found for name, text in texts.items() if (found := calls.findall(text))} == {}
+
+
+@pytest.mark.parametrize("designs", [pytest.param(over_meshes, marks=pytest.mark.slow), over_lines, over_tables])
 def test_a_sweep_calls_no_lapack(designs):
     """Its calls of many designs at once would wait for each other's threads (see `jaxgear.numerics.dense`)."""
     program = jax.jit(jax.vmap(designs)).lower(jnp.linspace(1.0, 1.1, 3)).as_text()

@@ -79,6 +79,54 @@ def oscillator_of(mesh, height):
     return SETTINGS.oscillator(mesh, TORQUE, pinion=relief, wheel=relief)
 
 
+@eqx.filter_jit
+def along(oscillator, way):
+    """Numbers of what vibrates, and the slopes of two of them along a change of its own numbers."""
+    moving, rest = eqx.partition(oscillator, eqx.is_inexact_array)
+
+    def of(moving):
+        found = SETTINGS.numbers(eqx.combine(moving, rest))
+        return jnp.stack([found.dynamic_factor, found.approach_rms]), found
+
+    return jax.jvp(of, (moving,), (way,), has_aux=True)
+
+
+STEP = 1e-3
+
+
+@pytest.fixture(scope="module")
+def nearby(mesh):
+    """What vibrates with a little more relief and with a little less, and how it changes with the relief."""
+    several = [oscillator_of(mesh, HEIGHT + side) for side in (STEP, -STEP)]
+    above, below = (eqx.filter(each, eqx.is_inexact_array) for each in several)
+    way = jax.tree.map(lambda a, b: jnp.asarray((np.asarray(a) - np.asarray(b)) / (2 * STEP)), above, below)
+    return several, way
+
+
+def test_slopes_along_a_change_of_what_vibrates_are_those_of_differences(mesh, nearby):
+    """Of the mesh force by the relief, at every speed of every run."""
+    several, way = nearby
+    _, slopes, found = along(oscillator_of(mesh, HEIGHT), way)
+    above, below = (np.asarray(along(each, way)[0]) for each in several)
+    assert np.asarray(found.exact).all()
+    assert np.asarray(slopes) == pytest.approx((above - below) / (2 * STEP), rel=1e-4, abs=1e-6)
+    assert np.abs(slopes).max() > 1e-2
+
+
+def test_a_quantity_is_the_number_of_the_sweep(mesh, nearby, monkeypatch):
+    """The whole chain, cycle, mesh, force and oscillator, against the steps done by hand."""
+    monkeypatch.setattr(Dynamics, "numbers", lambda _, oscillator: along(oscillator, nearby[1])[2])
+    relief = jg.TipRelief(HEIGHT, 3.2)
+    cycle = jg.solve(mesh, TORQUE, pinion=relief, wheel=relief).on(mesh)
+    values = [float(SETTINGS.quantity(f"worst_{name}")(cycle)) for name in ("dynamic_factor", "approach_rms")]
+    runs = SETTINGS.runs(oscillator_of(mesh, HEIGHT))
+    assert list(runs) == ["up", "down"]
+    swept = [max(getattr(run, name).max() for run in runs.values()) for name in ("dynamic_factor", "approach_rms")]
+    np.testing.assert_allclose(values, swept, rtol=2e-3)
+    assert values[0] > 1.1
+
+
+@pytest.mark.slow
 def test_an_objective_is_the_number_of_the_sweep(mesh):
     """The whole chain, cycle, mesh, force and oscillator, against the steps done by hand; and its slope."""
     objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_approach_rms")]
@@ -163,7 +211,7 @@ def test_quantities_of_the_same_settings_share_a_sweep(mesh, monkeypatch):
     for times in (1, 2):  # a second trace has nothing of the first one
         eqx.filter_eval_shape(problem.score, jnp.asarray([0.3]))
         assert len(traced) == times
-    cycle = jg.solve(mesh, jg.Operation(TORQUE, speed=3000.0)).on(mesh)
+    cycle = dataclasses.replace(jg.solve(mesh, TORQUE), operation=jg.Operation(TORQUE, speed=3000.0)).on(mesh)
     names = "dynamic_factor", "approach_rms", "worst_approach_rms"
     jax.eval_shape(lambda: [SETTINGS.quantity(name)(cycle) for name in names])
     assert len(traced) == 4
@@ -193,7 +241,7 @@ def test_a_cycle_without_its_mesh_is_refused(mesh):
         SETTINGS.quantity("worst_approach_rms")(cycle)
     with pytest.raises(ValueError, match="^dynamic_factor: needs a speed"):
         SETTINGS.quantity("dynamic_factor")(cycle.on(mesh))
-    many = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]) if eqx.is_array(leaf) else leaf, cycle)
+    many = jax.tree.map(lambda leaf: np.stack([leaf, leaf]) if eqx.is_array(leaf) else leaf, cycle)
     with pytest.raises(ValueError, match="batch axes"):
         many.on(mesh)
 

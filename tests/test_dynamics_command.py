@@ -1,8 +1,11 @@
 """The command `jaxgear dynamics` and the table [dynamics]: what it writes and says, and one line for what is wrong."""
 
 import csv
+import dataclasses
 import json
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from commands import LINE, call
@@ -10,7 +13,7 @@ from report_page import check_report
 
 from jaxgear.cli import interrupt
 from jaxgear.cli.kept import Kept, SpeedResponses
-from jaxgear.dynamics import Oscillator, RectangularStiffness, speed_sweep
+from jaxgear.dynamics import Oscillator, RectangularStiffness, SpeedResponse
 from jaxgear.io import DesignFileError, dynamics_request, load_design, sweep_request
 from jaxgear.io.folder import RESULT_FILES
 
@@ -158,17 +161,25 @@ def test_kept_responses_are_not_made_again(tmp_path):
     """After Ctrl-C the command goes on: by what they are made of, and by nothing else."""
     oscillator = Oscillator(RectangularStiffness(1.4, 0.8, 0.4), [1.0], [1.0], [1.0], mesh_damping=0.1, newton=1.0)
     made = []
+    shapes = {"force_harmonics": (2, 3), "velocity_harmonics": (2, 3)}  # of two speeds, three orders and four points
+    shapes |= {"poincare_approach": (2, 4), "poincare_velocity": (2, 4)}
+    kinds = {"period": int, "settled": bool}
 
     def sweep():
+        """Stands for a sweep that takes long."""
         made.append(1)
-        return speed_sweep(oscillator, [0.1, 0.2], steps=32, points=4)
+        numbers = np.random.default_rng(0)
+        names = [field.name for field in dataclasses.fields(SpeedResponse)][:14]
+        given = {name: numbers.uniform(1, 9, shapes.get(name, 2)).astype(kinds.get(name, float)) for name in names}
+        given["state"] = numbers.uniform(size=(2, 1)), numbers.uniform(size=(2, 1))
+        return SpeedResponse(**jax.tree.map(jnp.asarray, given), orders=(1.0, 2.0, 0.5), direction="up")
 
     first = Kept(tmp_path / ".runs", SpeedResponses(), 2)((oscillator, "up"), sweep)
     assert "1 of 2 runs are kept" in interrupt.state.written
     again = Kept(tmp_path / ".runs", SpeedResponses(), 2)((oscillator, "up"), sweep)
     assert len(made) == 1
-    for one, other in zip((first.dynamic_factor, *first.state), (again.dynamic_factor, *again.state)):
-        assert np.array_equal(one, other)
+    for one, other in zip(jax.tree.leaves(first), jax.tree.leaves(again), strict=True):
+        assert np.array_equal(one, other) and one.dtype == other.dtype
     assert (again.direction, again.orders) == (first.direction, first.orders)
     kept = Kept(tmp_path / ".runs", SpeedResponses(), 2)
     kept((oscillator, "down"), sweep)

@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from gearboxes import PINION, WHEEL, two_stages
+from gearboxes import PINION, WHEEL, gearbox
 
 import jaxgear as jg
 from jaxgear.numerics import press
@@ -26,11 +26,13 @@ PAIR = jg.GearPair(PINION, WHEEL)
 TORQUE, STIFFNESS, STATIONS = 150.0, 16.0, 41
 WIDTH = 18.0
 MEAN = 1e3 * TORQUE / float(PINION.base_radius) / WIDTH
+pressed = jax.jit(press)
 
 
-def rigid(misalignment=0.0, **options):
+def rigid(misalignment=0.0, *, slope=0.0, torque=TORQUE, stiffness=STIFFNESS):
+    """With a flank line of the wheel, so that one program serves them all."""
     given = RigidSupport(PAIR, Misalignment(direct=misalignment))
-    return annex_e(given, torque=TORQUE, stiffness=STIFFNESS, stations=STATIONS, **options)
+    return annex_e(given, torque=torque, stiffness=stiffness, stations=STATIONS, wheel=jg.LeadSlope(slope))
 
 
 @pytest.mark.parametrize("misalignment", [0.0, 10.0, -25.0, 90.0])
@@ -39,7 +41,7 @@ def test_load_of_a_skewed_rigid_pair_is_a_straight_line(misalignment):
     found = rigid(misalignment)
     assert found.converged
     y = np.asarray(found.face_coordinate)
-    np.testing.assert_allclose(found.line_load.mean(), MEAN, rtol=1e-12)
+    np.testing.assert_allclose(np.mean(found.line_load), MEAN, rtol=1e-12)
     straight = STIFFNESS * np.maximum(float(found.approach) - misalignment * y / WIDTH, 0.0)
     np.testing.assert_allclose(found.line_load, straight, rtol=1e-12, atol=1e-12 * MEAN)
     end = np.abs(misalignment) * (1 - 1 / STATIONS) * STIFFNESS / (2 * MEAN)
@@ -51,9 +53,8 @@ def test_load_of_a_skewed_rigid_pair_is_a_straight_line(misalignment):
 
 
 def test_slope_of_the_flank_line_levels_its_misalignment():
-    slope = jg.LeadSlope
-    np.testing.assert_allclose(rigid(20.0, wheel=slope(-20.0)).face_load_factor, 1.0, rtol=1e-12)
-    np.testing.assert_allclose(rigid(20.0).line_load, rigid(-20.0).line_load[::-1], rtol=1e-12)
+    np.testing.assert_allclose(rigid(20.0, slope=-20.0).face_load_factor, 1.0, rtol=1e-12)
+    np.testing.assert_allclose(rigid(20.0).line_load, np.asarray(rigid(-20.0).line_load)[::-1], rtol=1e-12)
 
 
 def test_misalignment_turns_into_the_plane_of_action():
@@ -74,10 +75,10 @@ def test_wind_up_of_the_benchmark():
     """
     n = 100
     x = (np.arange(n) + 0.5) / n
-    flank = jnp.eye(n) * n / 16.70
+    flank = jnp.asarray(np.eye(n) * n / 16.70)
 
     def factor_of(gap):
-        return face_load_factor(press(flank, jnp.asarray(41.8 * gap), jnp.asarray(1319.34)).force)
+        return face_load_factor(pressed(flank, jnp.asarray(41.8 * gap), jnp.asarray(1319.34)).force)
 
     np.testing.assert_allclose(factor_of(2 * x - x**2), 1.36, rtol=0.01)
     np.testing.assert_allclose(factor_of(x), 1 + 41.8 * 16.70 / (2 * 1319.34), rtol=0.01)
@@ -88,13 +89,12 @@ def test_wind_up_of_the_benchmark():
 def test_points_that_all_feel_each_other_meet_every_condition():
     """Random compliances far from diagonal: forces and openings are not negative, and one of them is zero."""
     random = np.random.default_rng(0)
-    solve = jax.jit(press)
     touching = []
     for softness in (0.01, 0.1, 1.0) * 8:
         part = random.normal(size=(21, 21))
         matrix, gap = part @ part.T / 21 + softness * np.eye(21), 3 * random.normal(size=21)
         load = 10.0 ** random.uniform(-1.0, 2.0)
-        found = solve(jnp.asarray(matrix), jnp.asarray(gap), jnp.asarray(load))
+        found = pressed(jnp.asarray(matrix), jnp.asarray(gap), jnp.asarray(load))
         assert found.solved
         force = np.asarray(found.force)
         opening = matrix @ force + gap - float(found.approach)
@@ -103,7 +103,7 @@ def test_points_that_all_feel_each_other_meet_every_condition():
         np.testing.assert_allclose(force * opening, 0.0, atol=1e-8)
         touching.append(int(found.in_contact.sum()))
     assert min(touching) < 5 and max(touching) > 12
-    idle = solve(jnp.eye(3), jnp.array([1.0, -2.0, 0.5]), jnp.asarray(0.0))
+    idle = pressed(jnp.eye(3), jnp.array([1.0, -2.0, 0.5]), jnp.asarray(0.0))
     np.testing.assert_array_equal(idle.force, 0.0)
     np.testing.assert_allclose([idle.approach, *idle.opening], [-2.0, 3.0, 0.0, 2.5])
 
@@ -117,7 +117,7 @@ def test_factor_of_given_line_loads():
     np.testing.assert_allclose(face_load_factor(jnp.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]])), [1.5, 1.0])
     np.testing.assert_allclose(face_load_factor(jnp.array([4.0, 1.0]), jnp.array([1.0, 2.0])), 2.0)
     assert np.isnan(face_load_factor(jnp.array([jnp.nan, 1.0])))  # not found is not level
-    idle = annex_e(RigidSupport(PAIR, Misalignment(direct=10.0)), torque=0.0, stations=5)
+    idle = rigid(10.0, torque=0.0, stiffness=None)
     assert float(idle.face_load_factor) == 1.0 and bool(idle.converged)
 
 
@@ -135,15 +135,15 @@ def test_method_c_of_a_stiff_pair_meets_the_one_dimensional_analysis():
 def test_default_stiffness_is_that_of_the_standard():
     expected = 0.85 * 19.0448
     np.testing.assert_allclose(mesh_stiffness(PAIR, 200.0), expected, rtol=1e-4)
-    found = annex_e(RigidSupport(PAIR, Misalignment(direct=10.0)), torque=TORQUE, stations=STATIONS)
+    found = rigid(10.0, stiffness=None)
     np.testing.assert_allclose(found.face_load_factor, rigid(10.0 * expected / STIFFNESS).face_load_factor, rtol=1e-4)
 
 
-BOX = two_stages()
+BOX = gearbox()
 
 
 def perturbed(values):
-    """The reducer with another bearing A, middle shaft, and skew of its first mesh."""
+    """The stage with another bearing A, wheel shaft, and skew of its mesh."""
     radial, diameter, skew = values
     return eqx.tree_at(
         lambda box: (
@@ -165,7 +165,7 @@ def factor(values):
 
 
 def test_derivatives_are_central_differences():
-    at = np.array([500.0, 36.0, 6.0, 4.0, 5.0])
+    at = np.array([150.0, 40.0, 6.0, 4.0, 5.0])
     there, found = factor(at)
     assert float(there) > 1.05
     for index, value in enumerate(at):

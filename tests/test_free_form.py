@@ -43,8 +43,8 @@ def rolls(mesh, count):
     """Roll lengths of pinion and wheel from the pitch point to the tip [mm]."""
     contact, pair = mesh.path_of_contact, mesh.pair
     return (
-        jnp.linspace(contact.pinion_pitch_roll_length, pair.pinion.tip_roll_length, count),
-        jnp.linspace(contact.wheel_pitch_roll_length, pair.wheel.tip_roll_length, count),
+        jnp.asarray(np.linspace(float(contact.pinion_pitch_roll_length), float(pair.pinion.tip_roll_length), count)),
+        jnp.asarray(np.linspace(float(contact.wheel_pitch_roll_length), float(pair.wheel.tip_roll_length), count)),
     )
 
 
@@ -62,6 +62,7 @@ def test_beats_the_best_named_curve(mesh, named, optimum):
     assert ppte(mesh, TORQUE, optimum.pinion, optimum.wheel) == pytest.approx(optimum.ppte, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_is_level_between_its_own_positions_too(named, optimum):
     """On a mesh four times as fine."""
     fine = jg.prepare(gear_pair(), resolution=replace(LINE, positions=64))
@@ -135,7 +136,7 @@ def distances(mesh, first, second):
     far = 0.0
     for index, roll in enumerate(rolls(mesh, 1001)):
         one, other = (removed_at(mesh.sides[index], flanks[index], roll) for flanks in (first, second))
-        far = max(far, float(jnp.abs(one - other).max()))
+        far = max(far, np.abs(np.asarray(one) - np.asarray(other)).max())
     return far
 
 
@@ -148,9 +149,15 @@ def test_projection_says_what_it_costs(mesh, optimum):
     expected = distances(mesh, (made.pinion, made.wheel), (optimum.pinion, optimum.wheel))
     assert made.misfit == pytest.approx(expected, rel=0.02)
     assert made.misfit < 0.2 * tables(optimum).max()
-    # every cubic can be a quadratic, and that a line
-    misfits = [jg.optimize.project(optimum, curve).misfit for curve in ("cubic", "quadratic", "linear")]
-    assert misfits[0] < misfits[1] < misfits[2]
+
+
+@pytest.mark.parametrize(
+    "curves", [("quadratic", "linear"), pytest.param(("cubic", "quadratic", "linear"), marks=pytest.mark.slow)]
+)
+def test_a_curve_of_more_terms_fits_better(optimum, curves):
+    """Every cubic can be a quadratic, and that a line."""
+    misfits = [jg.optimize.project(optimum, curve).misfit for curve in curves]
+    assert (np.diff(misfits) > 0).all()
 
 
 def test_projection_of_a_named_curve_is_that_curve(mesh, named):

@@ -1,6 +1,7 @@
 """Housing: limits, an exact frame, files and what is refused."""
 
 import importlib
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -8,11 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.sparse
-from gearboxes import two_stages
+from gearboxes import gearbox
 
 import jaxgear as jg
 from jaxgear.shafts import (
     Housing,
+    ShaftLoad,
     annex_e,
     condense,
     read_housing,
@@ -23,10 +25,16 @@ from jaxgear.shafts import (
 )
 from jaxgear.shafts.equilibrium import Patterns, solve, system
 
-SEATS = "ABCDEF"
+SEATS = "ABCD"
 NODES = tuple(f"{seat}.{way}" for seat in SEATS for way in "xyz")
 Y = jnp.linspace(-8.0, 8.0, 5)
-MESH = 1
+
+
+def stage(housing=None):
+    """One stage, whose wheel shaft carries a belt too."""
+    box = gearbox(housing=housing)
+    into, out = box.shafts
+    return replace(box, shafts=(into, replace(out, loads=(ShaftLoad(100.0, (900.0, 200.0, 0.0)),))))
 
 
 def stiffness(factor=1.0):
@@ -38,24 +46,25 @@ def stiffness(factor=1.0):
 
 @pytest.fixture(scope="module")
 def housed():
-    return two_stages(housing=Housing(NODES, stiffness()))
+    return stage(Housing(NODES, stiffness()))
 
 
 def test_no_compliance_is_no_housing(housed):
     """Exactly with a compliance of zero, in the limit with a stiffness that grows."""
-    bare = two_stages()
-    zero = two_stages(housing=Housing(NODES, np.zeros((18, 18)), "compliance"))
-    for ask in (lambda box: support(box, MESH).influence(Y), lambda box: support(box, MESH).gap(Y)):
+    bare = stage()
+    zero = stage(Housing(NODES, np.zeros((12, 12)), "compliance"))
+    for ask in (lambda box: support(box).influence(Y), lambda box: support(box).gap(Y)):
         np.testing.assert_allclose(ask(zero), ask(bare), rtol=1e-12)
-    stiff = two_stages(housing=Housing(NODES, stiffness(1e9)))
-    np.testing.assert_allclose(support(stiff, MESH).influence(Y), support(bare, MESH).influence(Y), rtol=1e-6)
-    soft, rigid = (np.asarray(support(box, MESH).influence(Y)) for box in (housed, bare))
+        assert np.abs(ask(bare)).max() > 1e-3
+    stiff = stage(Housing(NODES, stiffness(1e9)))
+    np.testing.assert_allclose(support(stiff).influence(Y), support(bare).influence(Y), rtol=1e-6)
+    soft, rigid = (np.asarray(support(box).influence(Y)) for box in (housed, bare))
     assert np.linalg.eigvalsh(soft - rigid)[0] > -1e-12 and np.all(np.diag(soft) > np.diag(rigid))
 
 
 def test_stiffness_and_its_inverse_are_the_same_housing(housed):
-    inverse = two_stages(housing=Housing(NODES, np.linalg.inv(stiffness()), "compliance"))
-    np.testing.assert_allclose(support(inverse, MESH).influence(Y), support(housed, MESH).influence(Y), rtol=1e-10)
+    inverse = stage(Housing(NODES, np.linalg.inv(stiffness()), "compliance"))
+    np.testing.assert_allclose(support(inverse).influence(Y), support(housed).influence(Y), rtol=1e-10)
 
 
 def test_seats_move_by_the_compliance_under_the_bearing_forces(housed):
@@ -63,8 +72,8 @@ def test_seats_move_by_the_compliance_under_the_bearing_forces(housed):
     forces = np.asarray(inside.force)[:, :3].ravel()
     np.testing.assert_allclose(np.asarray(inside.seat)[:, :3].ravel(), np.linalg.solve(stiffness(), forces), rtol=1e-9)
     np.testing.assert_array_equal(bare.seat, 0.0)
-    assert np.abs(inside.force).sum() > 0 and str(inside).count("\n") == 6
-    rows = zip(inside.names, "ABCDEF")
+    assert np.abs(inside.force).sum() > 0 and str(inside).count("\n") == 4
+    rows = zip(inside.names, SEATS, strict=True)
     assert all(name == seat for name, seat in rows)
 
 
@@ -72,7 +81,7 @@ def test_maxwell_reciprocity_through_the_housing(housed):
     """The deflection of one shaft under a force on another one is that of the other way round."""
     first, second = np.zeros((2, 1, 5, 2))
     first[0, 0, 0] = second[0, 1, 1] = 1.0
-    given = (np.array([120.0]), first), (np.zeros(0), np.zeros((0, 5, 2))), (np.array([30.0]), second)
+    given = (np.array([120.0]), first), (np.array([30.0]), second)
 
     @eqx.filter_jit
     def moved(box, given):
@@ -213,11 +222,11 @@ def test_other_files_are_refused_in_one_line(tmp_path):
 
 def test_node_maps_must_fit_the_gearbox():
     with pytest.raises(ValueError, match='^Gearbox: seat of the housing "G" is not known, must be one of A, B, C'):
-        two_stages(housing=Housing(("G.x",), np.eye(1)))
+        stage(Housing(("G.x",), np.eye(1)))
     with pytest.raises(ValueError, match='^Gearbox: the housing has no seat for bearing "B"$'):
-        two_stages(housing=Housing(("A.x",), np.eye(1)))
+        stage(Housing(("A.x",), np.eye(1)))
     with pytest.raises(ValueError, match="^with_and_without_housing: gearbox has no housing$"):
-        with_and_without_housing(two_stages())
+        with_and_without_housing(stage())
 
 
 @pytest.mark.slow

@@ -202,11 +202,19 @@ def test_the_file_is_the_script(file):
     assert request.supports["rigid seats"].gearbox.housing is None
     turned = FILE.replace("[layout]", '[[meshes]]\npinion = "pinion"\nwheel = "wheel"\nangle = 70.0\n[layout]')
     other = layout_request(load_design(file(turned)))
-    slopes = [
-        float(layout_flank_lines(one.supports["housing"], one.tolerances, **one.options).line.slope)
-        for one in (request, other)
-    ]
+    bent = [np.asarray(at_stations(one.supports["housing"], 150.0, stations=6).bent) for one in (request, other)]
     # of the soft corner in x alone, whatever lies in the line of action: cos of its angle with the plane
+    tilts = [each[-1] - each[0] for each in bent]
+    assert abs(tilts[0] - tilts[1]) > 0.1
+
+
+@pytest.mark.slow
+def test_the_flank_line_follows_the_plane_of_action(file):
+    turned = FILE.replace("[layout]", '[[meshes]]\npinion = "pinion"\nwheel = "wheel"\nangle = 70.0\n[layout]')
+    requests = [layout_request(load_design(file(text))) for text in (FILE, turned)]
+    slopes = [
+        float(layout_flank_lines(one.supports["housing"], one.tolerances, **one.options).line.slope) for one in requests
+    ]
     assert abs(slopes[0] - slopes[1]) > 0.1
 
 
@@ -254,18 +262,19 @@ def test_the_bearing_span_of_a_drawing_matters(file):
     assert float(parallel.tolerances["maximum"].misalignment) == 0.0
 
 
-def test_an_analysis_stands_on_the_shafts_of_the_file(file):
+def test_an_analysis_stands_on_the_shafts_of_the_file(file, monkeypatch):
     """What they do holds at every torque: the mesh of the file is that of its gearbox, at any."""
     design = load_design(file(FILE))
     mesh = design.mesh()
     assert design.left_out == "" and mesh.support_torque is None
     own = layout_request(design).supports["housing"]
     for torque in (75.0, 150.0):
-        held = at_stations(own, torque, stations=6)
-        y = mesh.face_coordinate
+        held, y = at_stations(own, torque, stations=6), mesh.face_coordinate
         np.testing.assert_allclose(mesh.support.influence(y), held.influence(y), rtol=1e-9)
         np.testing.assert_allclose(mesh.support.gap(y), held.gap(y), atol=1e-12)
-    assert design.mesh(rigid=True).support is None
+    with monkeypatch.context() as patch:  # without preparing one more
+        patch.setattr("jaxgear.io.design_file.prepare", lambda pair, **options: SimpleNamespace(**options))
+        assert design.mesh(rigid=True).support is None
     # shafts bend where no number of slices is said either
     assert load_design(file(replaced("slices = 6\n", ""))).resolution().slices == 11
 
@@ -300,15 +309,22 @@ def test_what_an_analysis_leaves_out_has_a_reason(file, text, why):
     assert why in line and line.endswith("jaxgear layout takes them")
 
 
+AXIS = '[[meshes]]\npinion = "pinion"\nwheel = "wheel"\nmisalignment = { direct = 5.0 }\n[layout]'
+BARE = replaced(FACE, f"{LINE}\nslices = 1").replace("[layout]", AXIS)
+
+
+def test_axes_that_an_analysis_leaves_out_are_named(file):
+    line = load_design(file(BARE)).left_out
+    assert line.startswith("shafts, bearings, housing and the misalignment of [[meshes]] are not part")
+
+
+@pytest.mark.slow
 def test_an_analysis_says_what_it_leaves_out(file, tmp_path):
     """On stderr, in the summary and in the report; nothing of it where the file has no shafts."""
-    axes = '[[meshes]]\npinion = "pinion"\nwheel = "wheel"\nmisalignment = { direct = 5.0 }\n[layout]'
-    text = replaced(FACE, f"{LINE}\nslices = 1").replace("[layout]", axes)
     folder = tmp_path / "out"
-    done = call("analyze", str(file(text)), "--output", str(folder), "--report", "--no-figures")
+    done = call("analyze", str(file(BARE)), "--output", str(folder), "--report", "--no-figures")
     assert done.code == 0
-    line = load_design(file(text)).left_out
-    assert line.startswith("shafts, bearings, housing and the misalignment of [[meshes]] are not part")
+    line = load_design(file(BARE)).left_out
     assert line in done.err and json.loads((folder / "summary.json").read_text())["left_out"] == line
     report = (folder / "report.html").read_text("utf-8")
     assert line[1:] in report and "Shafts, bearings and housing are those of the design file" not in report

@@ -15,22 +15,26 @@ from jaxgear.contact.loaded_width import loaded_material
 from jaxgear.contact.slide import slid_material
 from jaxgear.optimize.problem import make_problem
 
-TORQUE = 50.0
-AMOUNT, LENGTH = 15.0, 1.2
+CASE = cases.Case("L", "stress", 300.0, "linshort")  # a steep relief on stub teeth
+TORQUE, AMOUNT, LENGTH = CASE.torque, 15.0, 1.2
 
 
 def reliefs(amount=AMOUNT):
-    return {"pinion": jg.TipRelief(amount, LENGTH), "wheel": jg.TipRelief(AMOUNT, LENGTH)}
-
-
-def pair(bores=(20.0, 40.0)):
-    return jg.GearPair(*(jg.Gear(z, 3.0, face_width=18.0, bore_diameter=bore) for z, bore in zip((19, 48), bores)))
+    """Those of the case."""
+    return {"pinion": jg.TipRelief(amount, LENGTH, jg.Linear()), "wheel": jg.TipRelief(AMOUNT, LENGTH, jg.Linear())}
 
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory):
-    compliance = jg.finite_element_compliance(pair(), "stress", cache=tmp_path_factory.mktemp("tables"))
-    return jg.prepare(pair(), compliance=compliance, resolution=SLIDING)
+    pair = cases.gear_pair(CASE.pair)
+    compliance = jg.finite_element_compliance(pair, "stress", cache=tmp_path_factory.mktemp("tables"))
+    return jg.prepare(pair, compliance=compliance, resolution=SLIDING)
+
+
+@pytest.fixture(scope="module")
+def default(mesh):
+    """The same mesh, of a model that averages over the width of the full load."""
+    return replace(mesh, compliance=jg.default_compliance())
 
 
 @pytest.fixture(scope="module")
@@ -38,27 +42,33 @@ def cycle(mesh):
     return jg.solve(mesh, TORQUE, **reliefs())
 
 
-def test_a_steep_relief_on_stub_teeth_is_that_of_the_reference(tmp_path):
+def test_a_steep_relief_on_stub_teeth_is_that_of_the_reference(cycle):
     """Over the width of the full load the PPTE is 7 % too small."""
-    case = cases.Case("L", "stress", 300.0, "linshort")
-    gears = cases.gear_pair("L")
-    compliance = jg.finite_element_compliance(gears, "stress", cache=tmp_path)
-    mesh = jg.prepare(gears, compliance=compliance, resolution=jg.Resolution(positions=128, pairs=4))
-    pinion, wheel = cases.modifications(case)
-    found = jg.solve(mesh, case.torque, pinion=pinion, wheel=wheel)
-    true = np.ptp(cases.reference(case).transmission_error)
+    true = np.ptp(cases.reference(CASE).transmission_error[::4])
+    assert bool(cycle.converged.all())
+    assert np.ptp(cycle.transmission_error) == pytest.approx(true, rel=0.02)
+
+
+@pytest.mark.slow
+def test_a_steep_relief_on_stub_teeth_is_that_of_the_reference_at_every_position(mesh):
+    fine = jg.prepare(mesh.pair, compliance=mesh.compliance, resolution=jg.Resolution(positions=128, pairs=4))
+    pinion, wheel = cases.modifications(CASE)
+    found = jg.solve(fine, TORQUE, pinion=pinion, wheel=wheel)
+    true = np.ptp(cases.reference(CASE).transmission_error)
     assert bool(found.converged.all())
     assert float(jg.peak_to_peak(found.transmission_error)) == pytest.approx(true, rel=0.02)
 
 
-def test_contacts_are_as_wide_as_their_loads(mesh, cycle):
+# at the torque of the case one contact carries in the first solution only, which makes its width
+@pytest.mark.parametrize("torque", [100.0, 150.0, 200.0])
+def test_contacts_are_as_wide_as_their_loads(mesh, default, torque):
     """One pair that carries all meets what it does over the width of the full load, one without load its point."""
-    default = jg.prepare(mesh.pair, resolution=mesh.resolution)
+    cycle = jg.solve(mesh, torque, **reliefs())
     found, wide, narrow = (
-        np.asarray(removed_material(each, torque, **reliefs()).amount)
-        for each, torque in ((mesh, TORQUE), (default, TORQUE), (default, 0.0))
+        np.asarray(removed_material(each, load, **reliefs()).amount)
+        for each, load in ((mesh, torque), (default, torque), (default, 0.0))
     )
-    share = np.asarray(cycle.pair_force / cycle.force)[:, None]
+    share = np.asarray(cycle.pair_force)[:, None] / float(cycle.force)
     alone, open_, between = share == 1, share == 0, (share > 0.1) & (share < 0.9)
     assert alone.any() and open_.any() and between.any()
     np.testing.assert_allclose(found[alone], wide[alone], rtol=1e-7, atol=1e-9)
@@ -66,9 +76,8 @@ def test_contacts_are_as_wide_as_their_loads(mesh, cycle):
     assert np.abs(found - wide)[between].max() > 0.02
 
 
-def test_other_models_take_one_solution_over_the_width_of_the_full_load(mesh):
+def test_other_models_take_one_solution_over_the_width_of_the_full_load(default):
     """Nothing asks for loads, and the material is what it was."""
-    default = jg.prepare(mesh.pair, resolution=mesh.resolution)
     task = jnp.asarray(TORQUE), *reliefs().values()
 
     def none(removed):
@@ -82,8 +91,10 @@ def test_other_models_take_one_solution_over_the_width_of_the_full_load(mesh):
 
 def test_where_the_first_solution_failed_nothing_converges(mesh):
     task = jnp.asarray(TORQUE), *reliefs().values()
-    residual = jnp.zeros(16).at[3].set(1.0).at[5].set(jnp.nan)
-    found = loaded_material(mesh, *task, lambda removed: (jnp.full((2, 1, 16), 50.0), residual))
+    residual = np.zeros(16)
+    residual[[3, 5]] = 1.0, np.nan
+    given = jnp.full((2, 1, 16), 50.0), jnp.asarray(residual)
+    found = loaded_material(mesh, *task, lambda removed: given)
     assert isinstance(found, RemovedMaterial)
     np.testing.assert_array_equal(np.isnan(found.amount).all(axis=(0, 1)), np.isin(np.arange(16), (3, 5)))
     cycle = jg.contact.solve_removed(mesh, TORQUE, found)
@@ -103,21 +114,27 @@ def batch(mesh):
     def along(at, way):
         return jax.jvp(lambda amount, torque: error(mesh, amount, torque), tuple(at), tuple(way))
 
-    return along(jnp.asarray([[AMOUNT, TORQUE], [AMOUNT, TORQUE], [0.0, TORQUE]]), jnp.eye(3, 2))
+    found = along(np.asarray([[AMOUNT, TORQUE], [AMOUNT, TORQUE], [0.0, TORQUE]]), np.eye(3, 2))
+    return [np.asarray(part) for part in found]
 
 
 def test_derivatives_go_through_the_first_solution(mesh, batch):
-    """Central differences of the whole chain; both modes."""
-    point, step = (jnp.asarray(AMOUNT), jnp.asarray(TORQUE)), 1e-5
-    weights = jnp.cos(jnp.arange(16.0))
-    backward = jax.jit(jax.grad(lambda *at: weights @ error(mesh, *at), (0, 1)))(*point)
+    """Central differences of the whole chain."""
+    point = AMOUNT, TORQUE
     for place, slope in enumerate(batch[1][:2]):
+        step = 1e-6 * point[place]
         low, high = (
             [value + sign * step * (number == place) for number, value in enumerate(point)] for sign in (-1, 1)
         )
-        central = (error(mesh, *high) - error(mesh, *low)) / (2 * step)
+        central = np.subtract(error(mesh, *high), error(mesh, *low)) / (2 * step)
         np.testing.assert_allclose(slope, central, rtol=1e-6, atol=1e-8)
-        assert float(backward[place]) == pytest.approx(float(weights @ slope), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_gradients_go_through_the_first_solution(mesh, batch):
+    weights = np.cos(np.arange(16.0))
+    backward = jax.jit(jax.grad(lambda *at: weights @ error(mesh, *at), (0, 1)))(AMOUNT, TORQUE)
+    np.testing.assert_allclose(backward, batch[1][:2] @ weights, rtol=1e-9)
 
 
 def test_batches_are_their_members(batch, cycle):
@@ -137,13 +154,31 @@ def test_slopes_of_a_linearization_are_those_of_the_curve(mesh):
     np.testing.assert_allclose(pieces.slope[0, :, 0], 10 * slope, rtol=1e-8, atol=1e-10)
 
 
-def test_every_slice_has_its_own_width(mesh):
+def test_every_slice_has_its_own_width(mesh, cycle):
     """Equal slices are one; where a crowning leaves a slice without load it meets the relief at its point."""
+    sizes = replace(mesh.resolution, slices=3, coupled_slices=False)
+    width = jnp.full(3, float(mesh.pair.face_width) / 3)
+    sliced = replace(mesh, kinematics=replace(mesh.kinematics, resolution=sizes), slice_width=width)
+
+    def flanks(crowning):
+        return reliefs() | {"wheel": reliefs()["wheel"] + jg.LeadCrowning(crowning)}
+
+    flat, crowned = (jg.solve(sliced, TORQUE, **flanks(crowning)) for crowning in (0.0, 200.0))
+    np.testing.assert_allclose(flat.transmission_error, cycle.transmission_error, rtol=1e-9)
+    load = np.asarray(crowned.line_load)
+    assert bool(crowned.converged.all()) and not load[:, 0].any() and load[:, 1].any()
+    found, narrow = (np.asarray(removed_material(sliced, torque, **flanks(200.0)).amount) for torque in (TORQUE, 0.0))
+    np.testing.assert_allclose(found[:, 0], narrow[:, 0], rtol=1e-9, atol=1e-12)
+    assert np.abs(found[:, 1] - narrow[:, 1]).max() > 0.02
+
+
+@pytest.mark.slow
+def test_slices_that_feel_each_other_have_their_own_widths(mesh, cycle):
     sizes = replace(FACE, patch_nodes=SLIDING.patch_nodes, slide_steps=SLIDING.slide_steps)
     sliced = jg.prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes)
     flat = jg.solve(sliced, TORQUE, **reliefs())
-    np.testing.assert_allclose(flat.transmission_error, error(mesh, AMOUNT, TORQUE)[::2], rtol=1e-9)
-    flanks = reliefs() | {"wheel": reliefs()["wheel"] + jg.LeadCrowning(60.0)}
+    np.testing.assert_allclose(flat.transmission_error, cycle.transmission_error[::2], rtol=1e-9)
+    flanks = reliefs() | {"wheel": reliefs()["wheel"] + jg.LeadCrowning(200.0)}
     crowned = jg.solve(sliced, TORQUE, **flanks)
     assert bool(crowned.converged.all()) and not np.any(crowned.line_load[:, 0]) and np.any(crowned.line_load[:, 2])
     found, narrow = (removed_material(sliced, torque, **flanks).amount for torque in (TORQUE, 0.0))

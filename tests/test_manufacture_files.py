@@ -4,6 +4,7 @@ import csv
 import sys
 from dataclasses import replace
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -13,12 +14,20 @@ import jaxgear as jg
 from jaxgear import io, manufacture
 from jaxgear.contact.kinematics import kinematics
 
+_kinematics = eqx.filter_jit(kinematics)
+
 
 @pytest.fixture(scope="module")
-def side():
-    """Pinion of the 50/50 pair of contact ratio 1.37."""
+def moving():
+    """The 50/50 pair of contact ratio 1.37."""
     pair = jg.GearPair(kahraman_gear(), kahraman_gear())
-    return kinematics(pair, jnp.asarray(0.0), COARSE, "strain").sides[0]
+    return _kinematics(pair, jnp.asarray(0.0), COARSE, "strain")
+
+
+@pytest.fixture(scope="module")
+def side(moving):
+    """Its pinion."""
+    return moving.sides[0]
 
 
 @pytest.fixture(scope="module")
@@ -124,14 +133,13 @@ def test_excess_material_is_what_is_not_removed(tmp_path):
     assert float(flank.amount[2, 2]) == 7.0 and flank.varies_along_face
 
 
-def test_flanks_csv_is_read_again(side, tmp_path):
+def test_flanks_csv_is_read_again(moving, side, tmp_path):
     """The flanks of a run: either gear of any design, profiles and flanks that vary over the face."""
-    mesh = kinematics(jg.GearPair(kahraman_gear(), kahraman_gear()), jnp.asarray(0.0), COARSE, "strain")
     designs = {
         "plain": (jg.TipRelief(6.0, 3.0), jg.NoModification()),
         "crowned": (jg.TipRelief(6.0, 3.0) + jg.LeadCrowning(4.0), jg.TipRelief(2.0, 1.0)),
     }
-    io.write_flanks(tmp_path / "flanks.csv", mesh, designs)
+    io.write_flanks(tmp_path / "flanks.csv", moving, designs)
     for name, flanks in designs.items():
         for gear, design in zip(("pinion", "wheel"), flanks):
             read = io.read_flank(tmp_path / "flanks.csv", gear=gear, design=name)
@@ -263,7 +271,7 @@ def test_a_flank_of_another_gear_or_place_is_refused(side, tmp_path, rolls, face
 def test_flanks_are_told_where_the_mate_meets_the_face(tmp_path):
     """Gears of other widths: a table over the common face is a flank, one over the middle of the wider gear is none."""
     pair = jg.GearPair(kahraman_gear(), replace(kahraman_gear(), face_width=40.0), axial_offset=9.0)
-    wheel = kinematics(pair, jnp.asarray(0.0), COARSE, "strain").sides[1]
+    wheel = _kinematics(pair, jnp.asarray(0.0), COARSE, "strain").sides[1]
     start, tip = float(wheel.start_roll_length), float(wheel.gear.tip_roll_length)
     for faces, fine in (((-19.0, 1.0), True), ((-5.0, 15.0), False)):
         path = written(tmp_path, HEAD + "\n".join(f"{roll},{face},0.5" for face in faces for roll in (start, tip)))

@@ -1,5 +1,7 @@
 """Margins tell traced gears that cannot run, by the rules that refuse concrete ones, and hold a search by gradients."""
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -40,9 +42,30 @@ def numbers(x):
 
 
 NAMES = tuple(fields_of(jg.geometry.Margins))
-jacobian = jax.jit(jax.vmap(jax.jacfwd(numbers)))
-values = jax.jit(jax.vmap(numbers))
-held = jax.jit(jax.vmap(lambda x: (jg.margins(pair_of(x)).valid, jg.margins(pair_of(x)).held)))
+MANY = 60  # points side by side, so that one program looks at all
+
+
+class Looked(NamedTuple):
+    """Margins, their derivatives by every number of the pair, and whether the rules are kept."""
+
+    values: np.ndarray
+    slopes: np.ndarray
+    valid: np.ndarray
+    held: dict[str, np.ndarray]
+
+
+@jax.jit
+@jax.vmap
+def _looked(x):
+    margins = jg.margins(pair_of(x))
+    return Looked(numbers(x), jax.jacfwd(numbers)(x), margins.valid, margins.held)
+
+
+def looked(points) -> Looked:
+    """At up to `MANY` points."""
+    points = np.asarray(points)
+    filled = np.concatenate([points, np.broadcast_to(SOUND, (MANY - len(points), len(SOUND)))])
+    return jax.tree.map(lambda leaf: np.asarray(leaf)[: len(points)], _looked(filled))
 
 
 def test_margins_of_a_pair_in_closed_form():
@@ -82,7 +105,7 @@ def test_backlash_is_the_operating_pitch_less_both_thicknesses(extra):
 
 
 def test_each_rule_has_its_impossible_pair():
-    valid, rules = held(jnp.asarray([SOUND, *IMPOSSIBLE.values()]))
+    _, _, valid, rules = looked([SOUND, *IMPOSSIBLE.values()])
     assert bool(valid[0]) and not bool(valid[1:].any())
     for place, name in enumerate(IMPOSSIBLE, start=1):
         assert not bool(rules[name][place]), name
@@ -97,7 +120,7 @@ def test_a_pair_is_refused_exactly_where_its_margins_flag_it():
     generator = np.random.default_rng(5)
     low, high = np.array([-0.6, -0.6, 0.8, 99.0, 60.0, 20.0]), np.array([0.8, 0.6, 1.2, 104.0, 67.0, 50.0])
     points = low + (high - low) * generator.random((60, 6))
-    valid = np.asarray(held(jnp.asarray(points))[0])
+    valid = looked(points).valid
     assert 5 < valid.sum() < 55
 
     def accepted(x):
@@ -132,9 +155,9 @@ def test_two_micrometres_of_the_form_diameter_are_the_accuracy_of_the_outline():
 
 def test_derivatives_of_the_margins_of_sound_and_impossible_gears():
     points, step = np.asarray([SOUND, *IMPOSSIBLE.values()]), 1e-6
-    exact = np.asarray(jacobian(points))
+    exact = looked(points).slopes
     for i, move in enumerate(np.eye(points.shape[1]) * step):
-        difference = (values(points + move) - values(points - move)) / (2 * step)
+        difference = (looked(points + move).values - looked(points - move).values) / (2 * step)
         np.testing.assert_allclose(exact[:, :, i], difference, rtol=1e-5, atol=1e-5)
     # each violated margin knows a way back
     for place, name in enumerate(IMPOSSIBLE, start=1):
@@ -144,8 +167,10 @@ def test_derivatives_of_the_margins_of_sound_and_impossible_gears():
 def test_absurd_traced_gears_have_finite_margins_and_derivatives():
     generator = np.random.default_rng(3)
     low, high = np.array([-3.0, -3.0, -1.0, 40.0, 1.0, 0.0]), np.array([4.0, 4.0, 4.0, 150.0, 150.0, 150.0])
-    points = jnp.asarray(low + (high - low) * generator.random((500, 6)))
-    assert bool(jnp.all(jnp.isfinite(values(points)))) and bool(jnp.all(jnp.isfinite(jacobian(points))))
+    points = low + (high - low) * generator.random((500, 6))
+    for some in np.array_split(points, -(-len(points) // MANY)):
+        found = looked(some)
+        assert np.isfinite(found.values).all() and np.isfinite(found.slopes).all()
 
 
 def test_a_search_by_gradients_is_held_by_the_margins():
@@ -163,18 +188,28 @@ def test_a_search_by_gradients_is_held_by_the_margins():
         # a tip as thick as engineers ask for, and backlash in a unit near 1
         return jnp.stack(rows).at[0].add(-0.6).at[1].add(-0.6) * jnp.asarray([1.0] * 11 + [0.01, 1.0, 1.0])
 
-    objective = jax.jit(jax.value_and_grad(lambda x: -jg.path_of_contact(pair(x)).contact_ratio))
-    rule, slope, valid = jax.jit(rules), jax.jit(jax.jacrev(rules)), jax.jit(lambda x: jg.margins(pair(x)).valid)
+    def all_of(x):
+        """What is to be least, and the rules; whether all of them are kept."""
+        ratio = jg.path_of_contact(pair(x)).contact_ratio
+        found = jnp.append(-ratio, rules(x))
+        return found, (found, jg.margins(pair(x)).valid)
+
+    sloped = jax.jit(jax.jacrev(all_of, has_aux=True))
+
+    def told(x):
+        slopes, (found, valid) = jax.tree.map(np.asarray, sloped(x))
+        return found[0], slopes[0], found[1:], slopes[1:], bool(valid)
+
     start, box = np.array([0.2, 0.9, 101.5]), [(-0.8, 1.2), (0.6, 1.6), (97.0, 104.0)]
-    held_by = {"type": "ineq", "fun": lambda x: np.asarray(rule(x)), "jac": lambda x: np.asarray(slope(x))}
-    run = {"x0": start, "fun": lambda x: tuple(map(np.asarray, objective(x))), "jac": True, "bounds": box}
+    held_by = {"type": "ineq", "fun": lambda x: told(x)[2], "jac": lambda x: told(x)[3]}
+    run = {"x0": start, "fun": lambda x: told(x)[:2], "jac": True, "bounds": box}
     free = minimize(method="SLSQP", **run)
     bound = minimize(method="SLSQP", constraints=held_by, **run)
-    assert not bool(valid(free.x))
-    assert bound.success and np.asarray(rule(bound.x)).min() > -1e-6
-    assert -bound.fun > 1.2 * -float(objective(start)[0])
+    assert not told(free.x)[4]
+    assert bound.success and told(bound.x)[2].min() > -1e-6
+    assert -bound.fun > 1.2 * -told(start)[0]
     assert bool(jg.margins(pair(bound.x + np.array([0.0, 0.0, 1e-6]))).valid)
-    assert np.asarray(rule(bound.x)).min() < 1e-6, "margins end the search"
+    assert told(bound.x)[2].min() < 1e-6, "margins end the search"
     assert all(low + 0.1 < value < high - 0.1 for value, (low, high) in zip(bound.x, box)), "and not the box"
 
 

@@ -2,13 +2,13 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from catalogue import (
     FACE,
     FINITE_ELEMENT_CASES,
-    LINE,
     TWO_PAIRS,
     flank,
     gear_pair,
@@ -19,6 +19,8 @@ from catalogue import (
 )
 
 import jaxgear as jg
+from jaxgear.compliance.toothload import tooth_load
+from jaxgear.geometry import outline
 
 CASES = pytest.mark.parametrize("name", [case.name for case in FINITE_ELEMENT_CASES])
 
@@ -39,20 +41,20 @@ def test_forces_balance_the_torque(name, solved):
     force = 1e3 * case.torque / float(cycle.kinematics.pair.pinion.base_radius)
     assert float(cycle.force) == pytest.approx(force, rel=1e-14)
     assert force / case.face_width == pytest.approx(case.line_load, abs=6e-3)
-    np.testing.assert_allclose(jnp.sum(cycle.pair_force, axis=0), force, rtol=1e-13)
-    np.testing.assert_allclose(jnp.sum(jg.load_sharing(cycle), axis=0), 1.0, rtol=1e-13)
-    assert bool(jnp.all(cycle.converged)) and cycle.converged.dtype == bool
+    np.testing.assert_allclose(np.sum(cycle.pair_force, axis=0), force, rtol=1e-13)
+    np.testing.assert_allclose(np.sum(jg.load_sharing(cycle), axis=0), 1.0, rtol=1e-13)
+    assert np.all(cycle.converged) and cycle.converged.dtype == bool
 
 
 @CASES
 def test_contact_conditions(name, solved):
     """No tension, no penetration, no load across a gap; loads and gaps exclude each other."""
     _, cycle = solved[name]
-    assert float(cycle.line_load.min()) >= 0.0
-    loaded = cycle.line_load > 0
-    assert float(jnp.max(jnp.where(loaded, cycle.opening, -1.0))) < 0
-    assert float(jnp.min(jnp.where(loaded, 1.0, cycle.opening))) > -1e-12
-    assert float(cycle.residual.max()) < 1e-13
+    load, opening = np.asarray(cycle.line_load), np.asarray(cycle.opening)
+    assert load.min() >= 0.0
+    assert opening[load > 0].max() < 0
+    assert opening[load == 0].min() > -1e-12
+    assert np.max(cycle.residual) < 1e-13
 
 
 @CASES
@@ -88,48 +90,71 @@ def test_equal_gears_are_symmetric_about_the_pitch_point():
     def mirrored(curve):
         return np.asarray(curve)[..., 1:][..., ::-1]
 
-    np.testing.assert_allclose(mirrored(cycle.transmission_error), cycle.transmission_error[1:], rtol=1e-12)
-    unloaded = cycle.unloaded_transmission_error
+    error, unloaded = np.asarray(cycle.transmission_error), np.asarray(cycle.unloaded_transmission_error)
+    np.testing.assert_allclose(mirrored(error), error[1:], rtol=1e-12)
     np.testing.assert_allclose(mirrored(unloaded), unloaded[1:], atol=1e-12)
     # pair i at phase psi stands where pair 1 - i stands at 1 - psi, on the other side of the pitch point
     share = np.asarray(jg.load_sharing(cycle))
     np.testing.assert_allclose(mirrored(share[::-1]), share[:, 1:], atol=1e-10)
     # the modification on one gear only does the same as on the other only, mirrored
-    one, other = solve(mesh, 200.0, pinion=relief), solve(mesh, 200.0, wheel=relief)
-    np.testing.assert_allclose(mirrored(other.transmission_error), one.transmission_error[1:], rtol=1e-12)
+    one, other = (np.asarray(solve(mesh, 200.0, **{on: relief}).transmission_error) for on in ("pinion", "wheel"))
+    np.testing.assert_allclose(mirrored(other), one[1:], rtol=1e-12)
+
+
+@eqx.filter_jit
+def structure_and_hub(compliance, mesh):
+    """What a compliance makes of the bodies and teeth of a mesh."""
+    loads = [tooth_load(outline(side.gear), side.contact_roll_length) for side in mesh.sides]
+    return jnp.sum(compliance.structure(*loads), axis=0), jnp.sum(compliance.hub(*loads))
 
 
 @CASES
 def test_hub_windup_shifts_the_mean_and_nothing_else(name, solved):
     case, cycle = solved[name]
-    rigid = solve(prepare(case.pair(), jg.default_compliance(hub_windup=False)), case.torque)
+    mesh = prepare(case.pair())
+    structure, hub = structure_and_hub(jg.default_compliance(hub_windup=False), mesh)
+    np.testing.assert_allclose(structure, mesh.structure, rtol=1e-12)
+    assert float(hub) == 0.0 < float(mesh.hub)
+    rigid = solve(dataclasses.replace(mesh, hub=hub), case.torque)
     c_hub = 0.0
     for z, bore in zip(case.teeth, case.bores):
         root = case.module * (z - 2.5)
         base = case.module * z * np.cos(np.deg2rad(20.0))
         c_hub += 1.3 * ((root / bore) ** 2 - 1) / (2 * np.pi * 206e3) * (base / root) ** 2
-    shift = cycle.transmission_error - rigid.transmission_error
+    shift = np.subtract(cycle.transmission_error, rigid.transmission_error)
     np.testing.assert_allclose(shift, 1e3 * c_hub * case.line_load, rtol=1e-4)
-    assert float(jg.peak_to_peak(shift)) < 1e-12
+    assert np.ptp(shift) < 1e-12
     np.testing.assert_allclose(cycle.pair_force, rigid.pair_force, rtol=1e-11, atol=1e-9)
-    np.testing.assert_allclose(
-        1 / cycle.tangent_stiffness - 1 / rigid.tangent_stiffness, 1e3 * c_hub / case.face_width, rtol=1e-6
-    )
+    with_hub, without = (1 / np.asarray(each.tangent_stiffness) for each in (cycle, rigid))
+    np.testing.assert_allclose(with_hub - without, 1e3 * c_hub / case.face_width, rtol=1e-6)
+
+
+@pytest.mark.slow
+@CASES
+def test_a_mesh_without_hub_windup_has_no_hub_and_the_same_structure(name, solved):
+    case, cycle = solved[name]
+    mesh = prepare(case.pair(), jg.default_compliance(hub_windup=False))
+    assert float(mesh.hub) == 0.0
+    rigid = solve(mesh, case.torque)
+    assert np.ptp(np.subtract(cycle.transmission_error, rigid.transmission_error)) < 1e-12
+    np.testing.assert_allclose(cycle.pair_force, rigid.pair_force, rtol=1e-11, atol=1e-9)
 
 
 def test_slices_without_lead_modification_are_all_alike(mesh, sliced):
     one, many = solve(mesh, 50.0), solve(sliced, 50.0)
-    np.testing.assert_allclose(many.transmission_error, one.transmission_error[::4], rtol=1e-12)
-    alike = jnp.broadcast_to(one.line_load[1:3, :, ::4], (2, 6, 8))  # those of four pairs beside the pitch point
+    error, load = np.asarray(one.transmission_error), np.asarray(one.line_load)
+    np.testing.assert_allclose(many.transmission_error, error[::4], rtol=1e-12)
+    alike = np.repeat(load[1:3, :, ::4], 6, axis=1)  # those of four pairs beside the pitch point
     np.testing.assert_allclose(many.line_load, alike, rtol=1e-10, atol=1e-10)
-    assert float(jnp.abs(one.line_load[jnp.array([0, 3])]).max()) == 0.0
+    assert not load[[0, 3]].any()
 
 
 def test_lead_slope_of_either_sign_gives_mirror_images(sliced):
     up, down = (solve(sliced, 50.0, flank(lead_slope=amount)) for amount in (8.0, -8.0))
     np.testing.assert_allclose(up.transmission_error, down.transmission_error, rtol=1e-12)
-    np.testing.assert_allclose(up.line_load, down.line_load[:, ::-1], atol=1e-9)
-    assert float(up.line_load[0, 0, 0]) > float(up.line_load[0, -1, 0]), "material is gone at positive face coordinates"
+    load = np.asarray(up.line_load)
+    np.testing.assert_allclose(load, np.asarray(down.line_load)[:, ::-1], atol=1e-9)
+    assert load[0, 0, 0] > load[0, -1, 0], "material is gone at positive face coordinates"
 
 
 def resliced(mesh, slices):
@@ -171,9 +196,14 @@ def test_fewer_pairs_suffice_for_a_short_path(mesh):
     np.testing.assert_allclose(three.line_load, four.line_load[:3], atol=1e-9)
 
 
-def test_fewest_pairs_give_the_same_results(mesh):
-    few = jg.fewest_pairs(mesh.pair, deflection=40.0)
+def test_fewest_pairs():
+    """Of two pairs `test_slices_without_lead_modification_are_all_alike` finds what four give."""
+    few = jg.fewest_pairs(gear_pair(), deflection=40.0)
     assert few == 2 and jg.fewest_pairs(high_contact_ratio_pair(), deflection=40.0) > few
+
+
+@pytest.mark.slow
+def test_fewest_pairs_give_the_same_results(mesh):
     narrow = prepare(mesh.pair, resolution=TWO_PAIRS)
     relief = flank(tip=15.0, tip_length=4.0)
     wide, same = (solve(m, 100.0, pinion=relief, wheel=relief) for m in (mesh, narrow))
@@ -181,21 +211,20 @@ def test_fewest_pairs_give_the_same_results(mesh):
     np.testing.assert_allclose(same.transmission_error, wide.transmission_error, atol=1e-9)
 
 
-def test_contact_beyond_the_pairs_carried_along_is_not_converged(mesh):
-    narrow = prepare(mesh.pair, resolution=TWO_PAIRS)
-    torque = 50.0 * float(narrow.outer_gap.min()) / 4.0  # 4 um is less than the deflection at 50 N m
-    cycle = solve(narrow, torque)
-    assert not bool(jnp.all(cycle.converged)) and float(jnp.max(cycle.residual)) < 1e-10
-    assert bool(jnp.all(solve(mesh, torque).converged))
+def test_contact_beyond_the_pairs_carried_along_is_not_converged(mesh, sliced):
+    torque = 50.0 * float(np.min(sliced.outer_gap)) / 4.0  # 4 um is less than the deflection at 50 N m
+    cycle = solve(sliced, torque)  # of two pairs
+    assert not np.all(cycle.converged) and np.max(cycle.residual) < 1e-10
+    assert np.all(solve(mesh, torque).converged)
 
 
 def test_high_contact_ratio_needs_three_pairs():
     cycle = solve(prepare(high_contact_ratio_pair()), 60.0)
-    loaded = jnp.sum(cycle.line_load[:, 0] > 0, axis=0)
-    assert int(loaded.min()) == 2 and int(loaded.max()) == 3
-    assert bool(jnp.all(cycle.converged))
+    loaded = np.sum(np.asarray(cycle.line_load)[:, 0] > 0, axis=0)
+    assert loaded.min() == 2 and loaded.max() == 3
+    assert np.all(cycle.converged)
     normal = solve(prepare(gear_pair((40, 60), 2.0, bores=(40.0, 60.0))), 60.0)
-    assert float(jg.peak_to_peak(cycle.transmission_error)) < float(jg.peak_to_peak(normal.transmission_error))
+    assert np.ptp(cycle.transmission_error) < np.ptp(normal.transmission_error)
 
 
 def test_unloaded_transmission_error_is_the_limit_of_light_load(mesh):
@@ -204,16 +233,16 @@ def test_unloaded_transmission_error_is_the_limit_of_light_load(mesh):
     np.testing.assert_allclose(light.transmission_error, light.unloaded_transmission_error, atol=1e-5)
     np.testing.assert_allclose(none.transmission_error, none.unloaded_transmission_error, atol=1e-13)
     np.testing.assert_allclose(none.pair_force, 0.0, atol=1e-12)
-    assert bool(jnp.all(none.converged)) and bool(jnp.all(light.converged))
-    smallest = jnp.min(none.gap / mesh.lever[:, None], axis=(0, 1))
+    assert np.all(none.converged) and np.all(light.converged)
+    smallest = np.min(np.asarray(none.gap) / np.asarray(mesh.lever)[:, None], axis=(0, 1))
     np.testing.assert_allclose(none.unloaded_transmission_error, smallest, rtol=1e-14)
 
 
 def test_common_material_removal_shifts_the_transmission_error(mesh):
     """A constant thickness off a whole flank: the wheel lags by it where no corner is in contact."""
     plain, thin = solve(mesh, 50.0), solve(mesh, 50.0, wheel=flank(constant=7.0))
-    corner = jnp.any((thin.line_load[:, 0] > 0) & (mesh.outside > 0), axis=0)
-    shift = np.asarray(thin.transmission_error - plain.transmission_error)[~np.asarray(corner)]
+    corner = np.any((np.asarray(thin.line_load)[:, 0] > 0) & (np.asarray(mesh.outside) > 0), axis=0)
+    shift = np.subtract(thin.transmission_error, plain.transmission_error)[~corner]
     assert 8 < shift.size < 32
     np.testing.assert_allclose(shift, 7.0, atol=1e-11)
 
@@ -221,25 +250,31 @@ def test_common_material_removal_shifts_the_transmission_error(mesh):
 def test_more_torque_deflects_and_presses_more(mesh):
     cycles = [solve(mesh, torque, flank(tip=6.0, tip_length=4.0)) for torque in (5.0, 20.0, 80.0)]
     for light, heavy in zip(cycles, cycles[1:]):
-        assert bool(jnp.all(heavy.transmission_error > light.transmission_error))
-        assert float(heavy.contact_pressure.max()) > float(light.contact_pressure.max())
+        assert np.all(np.asarray(heavy.transmission_error) > np.asarray(light.transmission_error))
+        assert np.max(heavy.contact_pressure) > np.max(light.contact_pressure)
         assert float(jg.effective_contact_ratio(heavy)) > float(jg.effective_contact_ratio(light))
 
 
+@pytest.fixture(scope="module")
+def in_plane(mesh):
+    """Meshes by plane."""
+    known = {plane: prepare(gear_pair(), jg.default_compliance(plane)) for plane in ("stress", "strain")}
+    return known | {"auto": mesh}
+
+
 @pytest.mark.parametrize("plane", ["auto", "stress", "strain"])
-def test_structure_matrix_is_symmetric_positive_definite(plane):
-    structure = np.asarray(prepare(gear_pair(), jg.default_compliance(plane), LINE).structure).transpose(2, 0, 1)
+def test_structure_matrix_is_symmetric_positive_definite(plane, in_plane):
+    structure = np.asarray(in_plane[plane].structure).transpose(2, 0, 1)
     np.testing.assert_allclose(structure, structure.transpose(0, 2, 1), rtol=1e-10, atol=1e-16)
     assert np.linalg.eigvalsh(structure).min() > 0
 
 
-def test_plane_strain_is_stiffer_and_a_gear_lies_between():
+def test_plane_strain_is_stiffer_and_a_gear_lies_between(in_plane):
     stress, strain, between = (
-        solve(prepare(gear_pair(), jg.default_compliance(plane), LINE), 50.0).transmission_error
-        for plane in ("stress", "strain", "auto")
+        np.asarray(solve(in_plane[plane], 50.0).transmission_error) for plane in ("stress", "strain", "auto")
     )
-    assert bool(jnp.all((stress / strain > 1.02) & (stress / strain < 1.10)))
-    assert bool(jnp.all((strain < between) & (between < stress)))
+    assert np.all((stress / strain > 1.02) & (stress / strain < 1.10))
+    assert np.all((strain < between) & (between < stress))
 
 
 def test_nan_never_passes_for_a_good_design(mesh):
@@ -248,7 +283,7 @@ def test_nan_never_passes_for_a_good_design(mesh):
     removed = jnp.zeros((4, 1, 32)).at[1, 0, 3].set(jnp.nan)
     broken = solve_removed(mesh, 50.0, removed)
     assert bool(broken.converged[2]) and not bool(broken.converged[3])
-    assert bool(jnp.isnan(jg.peak_to_peak(broken.transmission_error)))
+    assert np.isnan(jg.peak_to_peak(broken.transmission_error))
 
 
 def test_defaults(mesh):

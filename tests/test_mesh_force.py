@@ -306,7 +306,7 @@ def test_wrong_input_is_named(mesh, given, message):
 
 def test_coast_flanks_are_a_pair_of_modifications(mesh):
     with pytest.raises(TypeError, match=r"coast is TipRelief\(.*must be a tuple \(pinion, wheel\)"):
-        mesh_force(mesh, torque=TORQUE, coast=jg.TipRelief(1.0, 2.0))
+        mesh_force(mesh, torque=TORQUE, **RELIEFS, **COARSE, coast=jg.TipRelief(1.0, 2.0))
 
 
 def test_thinner_teeth_leave_their_arc_on_the_line_of_action_as_backlash():

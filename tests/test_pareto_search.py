@@ -104,16 +104,15 @@ def test_every_design_of_the_front_has_first_order_evidence(searched, volume_per
     assert front.compromise.decrease_left == front.decrease_left[front.chosen]
 
 
+def three_within(known, most, **options):
+    """A front of three objectives, the pinion's relief at most so much larger than the wheel's [um]."""
+    limit = jg.Constraint({"pinion": 1.0, "wheel": -1.0}, high=most)
+    method = jg.optimize.Pareto(points=12, **options)
+    return known.pareto(known.parabolas, BOX, objectives=(*VOLUME, "max_relief"), constraints=[limit], method=method)
+
+
 def test_three_objectives_within_a_limit(known, volume_per_amount):
-    limit = jg.Constraint({"pinion": 1.0, "wheel": -1.0}, high=-4.0)
-    result = known.pareto(
-        known.parabolas,
-        BOX,
-        objectives=(*VOLUME, "max_relief"),
-        constraints=[limit],
-        method=jg.optimize.Pareto(points=12),
-    )
-    front = result
+    result = front = three_within(known, -4.0)
     assert front.values.shape[1] == 3
     assert not dominated(front.values).any()
     assert np.all(np.diff(front.values[:, 0]) >= 0)
@@ -134,11 +133,8 @@ def test_four_objectives(known):
 
 
 def test_limits_that_no_design_keeps(known):
-    limit = jg.Constraint({"pinion": 1.0}, low=41.0)
     with pytest.raises(RuntimeError, match="keeps the constraints"):
-        known.pareto(
-            known.parabolas, BOX, objectives=VOLUME, constraints=[limit], method=jg.optimize.Pareto(points=4, steps=2)
-        )
+        three_within(known, -41.0, steps=2)
 
 
 @pytest.mark.parametrize(("options", "words"), [({"points": 1}, "points = 1"), ({"steps": 0}, "steps = 0")])

@@ -14,15 +14,16 @@ from jaxgear.optimize.linearizer import Linearizer
 from jaxgear.optimize.problem import make_problem
 
 TORQUE, COARSE, COUNT = 50.0, 8, LINE.positions // 8
-RELIEF = jg.TipRelief(8.0, 4.0)
 
 
 def mesh_of(positions):
     return prepare(gear_pair(), resolution=replace(LINE, positions=positions))
 
 
-def solved(mesh):
-    return jg.solve(mesh, TORQUE, pinion=RELIEF, wheel=RELIEF)
+def solved(mesh, relief=8.0, crowning=0.0, torque=TORQUE):
+    """Both gears alike."""
+    flank = jg.TipRelief(relief, 4.0) + jg.ProfileCrowning(crowning)
+    return jg.solve(mesh, torque, pinion=flank, wheel=flank)
 
 
 @pytest.fixture(scope="module")
@@ -30,31 +31,46 @@ def fine():
     return mesh_of(COUNT * COARSE)
 
 
+@pytest.fixture(scope="module")
+def half():
+    """A mesh of every second position of the fine one."""
+    return mesh_of(COARSE)
+
+
 def test_parts_together_are_the_mesh(fine):
     whole, divided = solved(fine), [solved(part) for part in parts(fine, COARSE)]
     assert len(divided) == COUNT
     for first, part in enumerate(divided):
-        assert bool(jnp.all(part.converged))
-        np.testing.assert_allclose(part.phase, whole.phase[first::COUNT], rtol=1e-14)
+        assert np.all(part.converged)
+        np.testing.assert_allclose(part.phase, np.asarray(whole.phase)[first::COUNT], rtol=1e-14)
         for name in ("transmission_error", "pair_force", "contact_pressure", "corner_pressure"):
-            expected = getattr(whole, name)[..., first::COUNT]
+            expected = np.asarray(getattr(whole, name))[..., first::COUNT]
             np.testing.assert_allclose(getattr(part, name), expected, rtol=1e-9, atol=1e-9, err_msg=name)
 
 
-def test_a_mesh_half_a_position_later_doubles_the_positions(fine):
-    twice, later = mesh_of(2 * COUNT * COARSE), half_way(fine)
-    for mesh, first in ((fine, 0), (later, 1)):
-        np.testing.assert_allclose(mesh.phase, twice.phase[first::2], atol=1e-15)
-        error = solved(mesh).transmission_error
-        np.testing.assert_allclose(error, solved(twice).transmission_error[first::2], rtol=1e-9)
+def assert_doubled(mesh, twice):
+    """The mesh, and the one half a position later, are the one of twice the positions."""
+    phase, error = np.asarray(twice.phase), np.asarray(solved(twice).transmission_error)
+    for each, first in ((mesh, 0), (half_way(mesh), 1)):
+        np.testing.assert_allclose(each.phase, phase[first::2], atol=1e-15)
+        np.testing.assert_allclose(solved(each).transmission_error, error[first::2], rtol=1e-9)
+
+
+def test_a_mesh_half_a_position_later_doubles_the_positions(half, fine):
+    assert_doubled(half, fine)
+
+
+@pytest.mark.slow
+def test_a_finer_mesh_half_a_position_later_doubles_the_positions(fine):
+    assert_doubled(fine, mesh_of(2 * COUNT * COARSE))
 
 
 def test_parts_do_not_converge_where_the_next_pair_touches(fine):
     """Its gap is that of the fine mesh, and what falls off at the edge falls as far per mm."""
-    deep = jg.ProfileCrowning(400.0)
-    whole = np.asarray(jg.solve(fine, TORQUE, pinion=deep, wheel=deep).converged)
+    whole = np.asarray(solved(fine, relief=0.0, crowning=50.0, torque=3000.0).converged)
+    assert 0 < whole.sum() < whole.size
     for first, part in enumerate(parts(fine, COARSE)):
-        found = np.asarray(jg.solve(part, TORQUE, pinion=deep, wheel=deep).converged)
+        found = np.asarray(solved(part, relief=0.0, crowning=50.0, torque=3000.0).converged)
         np.testing.assert_array_equal(found, whole[first::COUNT])
 
 
@@ -76,22 +92,39 @@ def problem_on(mesh, objective="ppte"):
 
 
 @pytest.fixture(scope="module")
-def coarse():
+def coarse(half):
     """Linearizer compiled for two points on a coarse mesh."""
-    return Linearizer(problem_on(mesh_of(COARSE)), 2)
+    return Linearizer(problem_on(half), 2)
 
 
-def test_a_problem_is_linearized_on_the_parts(fine, coarse):
-    point = np.array([[0.3, 0.6]])
-    posed = problem_on(fine)
-    by_parts, whole = coarse.on(posed)(point)[0], posed.linearize(jnp.asarray(point[0]))
+POINT = np.array([[0.3, 0.6]])
+
+
+@pytest.fixture(scope="module")
+def whole(fine):
+    """The problem linearized on the fine mesh as it is."""
+    return Linearizer(problem_on(fine), 1)(POINT)[0]
+
+
+def test_a_problem_is_linearized_on_the_parts(fine, coarse, whole):
+    by_parts = coarse.on(problem_on(fine))(POINT)[0]
     assert bool(by_parts.fine)
     for found, expected in zip((*by_parts.objectives, *by_parts.limits), (*whole.objectives, *whole.limits)):
         np.testing.assert_allclose(found.value, expected.value, rtol=1e-9)
         order, known = np.argsort(found.upper[0]), np.argsort(np.asarray(expected.upper)[0])
         np.testing.assert_allclose(found.slope[0][order], np.asarray(expected.slope)[0][known], rtol=1e-6, atol=1e-6)
-    twice = coarse.on(posed).at_twice_the_positions()(point)[0]
-    expected = problem_on(mesh_of(2 * COUNT * COARSE)).score(jnp.asarray(point[0]))
+
+
+def test_at_twice_the_positions_a_problem_is_that_of_the_finer_mesh(coarse, whole):
+    twice = coarse.at_twice_the_positions()(POINT)[0]
+    for found, expected in zip((*twice.objectives, *twice.limits), (*whole.objectives, *whole.limits)):
+        np.testing.assert_allclose(found.value, expected.value, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_at_twice_the_positions_of_parts_a_problem_is_that_of_the_finer_mesh(fine, coarse):
+    twice = coarse.on(problem_on(fine)).at_twice_the_positions()(POINT)[0]
+    expected = problem_on(mesh_of(2 * COUNT * COARSE)).score(jnp.asarray(POINT[0]))
     assert float(twice.objectives[0].value[0]) == pytest.approx(float(expected.value[0]), rel=1e-9)
 
 

@@ -47,7 +47,9 @@ def test_share_of_plane_stress_at_known_face_widths(teeth, chord, shares):
     np.testing.assert_allclose(plane_stress_share(tooth, jnp.asarray([6.0, 18.0, 60.0])), shares, atol=1e-6)
 
 
-@pytest.mark.parametrize("dtype, precision", [(jnp.float64, 1e-13), (jnp.float32, 5e-6)])
+@pytest.mark.parametrize(
+    "dtype, precision", [(jnp.float64, 1e-13), pytest.param(jnp.float32, 5e-6, marks=pytest.mark.slow)]
+)
 def test_the_share_is_smooth_down_to_no_width(dtype, precision):
     """tanh(x) / x and two derivatives: closed forms where they do not cancel, the series 1 - x^2/3 + 2 x^4/15 else."""
     x = np.asarray([0.0, 1e-30, 1e-5, 1e-3, 0.3, 0.999, 1.0, 1.001, 3.0, 40.0])
@@ -86,6 +88,14 @@ def test_a_wider_face_is_stiffer_per_width(structures):
     assert np.linalg.eigvalsh(matrices).min() > 0
 
 
+def loads_of(sides):
+    return (tooth_load(outline(side.gear), side.contact_roll_length) for side in sides)
+
+
+hubs_of = eqx.filter_jit(lambda compliance, sides: compliance.hub(*loads_of(sides)))
+structure_of = eqx.filter_jit(lambda compliance, sides: jnp.sum(compliance.structure(*loads_of(sides)), axis=0))
+
+
 def test_each_gear_lies_between_by_its_own_root_chord():
     """Element by element, tooth and body, over its own face width, of which the wheel's overhangs the load by 6 mm at
     both ends and helps to carry it. The contact is in plane strain."""
@@ -106,18 +116,35 @@ def test_each_gear_lies_between_by_its_own_root_chord():
         return face_kernel(18.0, chord, 1, (overhang, overhang))[0, 0] * between
 
     chord = sum(outline(gear).root_chord for gear in pair.gears) / 2
-    expected = sum(by_hand(*given) for given in zip(mesh.sides, jnp.asarray([1, -1]), jnp.asarray([0.0, 6.0])))
+    expected = sum(np.asarray(by_hand(*given)) for given in zip(mesh.sides, (1, -1), (0.0, 6.0)))
     np.testing.assert_allclose(mesh.structure, expected, rtol=1e-10)
     # another program, which a compiler may round differently
     assert eqx.tree_equal(mesh.law, strain.law, rtol=1e-12) and mesh.kinematics.plane == "strain"
-    hubs = mesh.compliance.hub(*(tooth_load(outline(side.gear), side.contact_roll_length) for side in mesh.sides))
+    hubs = np.asarray(hubs_of(mesh.compliance, mesh.sides))
     np.testing.assert_allclose([mesh.hub, strain.hub], [hubs[0] + 18.0 / 30.0 * hubs[1], hubs.sum()], rtol=1e-12)
-    assert jg.prepare(pair, compliance=jg.legacy_compliance(), resolution=LINE).kinematics.plane == "stress"
+    legacy = eqx.filter_eval_shape(jg.prepare, pair, compliance=jg.legacy_compliance(), resolution=LINE)
+    assert legacy.kinematics.plane == "stress"
 
 
 def test_gradient_over_the_face_width_through_the_contact():
     """Line load, contact, plane state and what overhangs the load: against central differences."""
 
+    def mean_error(widths):
+        gears = [eqx.tree_at(lambda g: g.face_width, g, w) for g, w in zip((pair.pinion, pair.wheel), widths)]
+        cycle = jg.solve(jg.prepare(jg.GearPair(*gears), resolution=LINE), 50.0)
+        return jnp.mean(cycle.transmission_error)
+
+    along = jax.jit(lambda widths, way: jax.jvp(mean_error, (widths,), (way,)))
+    pair, widths, ways = gear_pair(), np.asarray([18.0, 20.0]), np.eye(2)
+    slope = [float(along(widths, way)[1]) for way in ways]
+    for own, step in zip(slope, 1e-3 * ways):
+        central = (along(widths + step, step)[0] - along(widths - step, step)[0]) / 2e-3
+        assert own == pytest.approx(float(central), rel=1e-6)
+    assert slope[0] < slope[1] < 0
+
+
+@pytest.mark.slow
+def test_gradient_over_the_face_width_in_reverse():
     @jax.jit
     @jax.value_and_grad
     def mean_error(widths):
@@ -125,13 +152,10 @@ def test_gradient_over_the_face_width_through_the_contact():
         cycle = jg.solve(jg.prepare(jg.GearPair(*gears), resolution=LINE), 50.0)
         return jnp.mean(cycle.transmission_error)
 
-    pair = gear_pair()
-    widths = jnp.asarray([18.0, 20.0])
-    slope = mean_error(widths)[1]
-    for own, step in zip(slope, 1e-3 * jnp.eye(2)):
+    pair, widths = gear_pair(), np.asarray([18.0, 20.0])
+    for own, step in zip(mean_error(widths)[1], 1e-3 * np.eye(2)):
         central = (mean_error(widths + step)[0] - mean_error(widths - step)[0]) / 2e-3
         assert float(own) == pytest.approx(float(central), rel=1e-6)
-    assert slope[0] < slope[1] < 0
 
 
 def reference_rows():
@@ -218,12 +242,24 @@ class Stub(jg.compliance.AbstractTooth):
         return jnp.full_like(load.angle, 3.0 if plane == "stress" else 1.0)
 
 
+def assert_shares(structure, pair):
+    shares = [float(plane_stress_share(outline(g), jnp.asarray(18.0))) for g in (pair.pinion, pair.wheel)]
+    np.testing.assert_allclose(structure[0, 1], 0.1 * sum(shares), rtol=1e-12)
+    np.testing.assert_allclose(structure[0, 0], 2 + 2.1 * sum(shares), rtol=1e-12)
+
+
 def test_models_of_a_user_see_one_plane_at_a_time():
     pair = gear_pair()
+    mesh = jg.prepare(pair, compliance=jg.default_compliance("strain"), resolution=LINE)
+    compliance = jg.Compliance(tooth=Stub(), body=Rigid())
+    assert_shares(np.asarray(structure_of(compliance, mesh.sides)), pair)
+
+
+@pytest.mark.slow
+def test_meshes_of_models_of_a_user_see_one_plane_at_a_time():
+    pair = gear_pair()
     mesh = jg.prepare(pair, compliance=jg.Compliance(tooth=Stub(), body=Rigid()), resolution=LINE)
-    shares = [float(plane_stress_share(outline(g), jnp.asarray(18.0))) for g in (pair.pinion, pair.wheel)]
-    np.testing.assert_allclose(mesh.structure[0, 1], 0.1 * sum(shares), rtol=1e-12)
-    np.testing.assert_allclose(mesh.structure[0, 0], 2 + 2.1 * sum(shares), rtol=1e-12)
+    assert_shares(np.asarray(mesh.structure), pair)
 
 
 @pytest.mark.parametrize("constant", [plane_modulus, plane_poisson])

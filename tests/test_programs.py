@@ -119,39 +119,50 @@ def test_errors_are_those_of_the_function(shelf):
         refuse(jnp.ones(2))
 
 
-def test_a_contact_that_was_begun_compiles_nothing_more(shelf, traced):
-    pair, compliance = gear_pair(), jg.default_compliance()
+@pytest.fixture(scope="module")
+def of_contacts():
+    """What the contacts of this file are solved with."""
+    return Shelf()
+
+
+@pytest.fixture
+def contacts(of_contacts):
+    keep(Store(of_contacts))
+    yield
+    keep(None)
+
+
+CONTACT = "_arrays_of", "slid_material", "_solve_removed"
+
+
+def test_a_contact_compiles_what_it_has_not_begun_and_what_its_programs_read(contacts, traced):
+    pair, compliance, relief = gear_pair(), jg.default_compliance(), jg.TipRelief(5.0, 3.0)
     begin_contact(pair, compliance, LINE, LINE)
     before = [name for name in traced if name in ("_arrays_of", "_solve_removed")]
     jg.solve(jg.prepare(pair, compliance=compliance, resolution=LINE), 50.0)
     assert [name for name in traced if name in before] == before == ["_arrays_of", "_solve_removed"]
-
-
-def test_gears_share_programs_whether_their_diameters_are_given_or_not(shelf, traced):
-    """What None stands for is a number to the programs, and None to everybody who reads the gears."""
-    found = []
+    # gears share programs whether their diameters are given or not: what None stands for is a number to the programs,
+    # and None to everybody who reads the gears
+    found, bare = [], traced.count("slid_material")
     for tips, bores in (((None, None), (None, None)), ((63.0, 150.0), (24.75, None))):
         gears = zip((19, 48), tips, bores)
         pair = jg.GearPair(*(jg.Gear(z, 3.0, face_width=18.0, tip_diameter=t, bore_diameter=b) for z, t, b in gears))
         mesh = jg.prepare(pair, resolution=LINE)
-        cycle = jg.solve(mesh, 50.0, pinion=jg.TipRelief(5.0, 3.0))
+        cycle = jg.solve(mesh, 50.0, pinion=relief)
         for held in (mesh.pair.gears, cycle.kinematics.pair.gears):
             assert [gear.tip_diameter is None for gear in held] == [tip is None for tip in tips]
             assert [gear.bore_diameter is None for gear in held] == [bore is None for bore in bores]
         found.append(np.asarray(cycle.transmission_error))
     np.testing.assert_allclose(found[1], found[0], rtol=1e-12)
-    assert [traced.count(name) for name in ("_arrays_of", "slid_material", "_solve_removed")] == [1, 1, 1]
-
-
-def test_sizes_that_a_program_does_not_read_make_no_other_one(shelf, traced):
-    pair = gear_pair()
+    assert [traced.count(name) for name in CONTACT] == [1, bare + 1, 1]
+    # nor do sizes that a program does not read make another one
     for given in ({}, {"slide_steps": 0}, {"face_modes": 3, "newton_steps": 6}):
         sizes = replace(SLIDING, **given)
         mesh = jg.prepare(pair, resolution=sizes)
-        cycle = jg.solve(mesh, 50.0, pinion=jg.TipRelief(5.0, 3.0))
+        cycle = jg.solve(mesh, 50.0, pinion=relief)
         assert mesh.resolution == sizes == cycle.kinematics.resolution
     # contacts that slide and that do not; 8 and 6 steps
-    assert [traced.count(name) for name in ("_arrays_of", "slid_material", "_solve_removed")] == [1, 2, 2]
+    assert [traced.count(name) for name in CONTACT] == [1, bare + 2, 2]
 
 
 def test_a_function_that_can_change_without_a_word_is_not_kept(shelf):
@@ -248,7 +259,7 @@ slide_steps = 0
 """
 
 
-def test_a_second_command_with_another_number_compiles_nothing_and_finds_the_same(tmp_path):
+def test_a_second_command_with_another_number_compiles_nothing_and_finds_the_same(tmp_path, contacts):
     # without optimization it compiles in a quarter of the time
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "JAX_DISABLE_MOST_OPTIMIZATIONS": "1"}
     for name in ("JAX_COMPILATION_CACHE_DIR", "JAXGEAR_NO_CACHE"):

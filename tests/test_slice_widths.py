@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
@@ -39,10 +40,24 @@ def mesh_of(widths=UNEVEN, slices=None, pair=None, support=None, **sizes):
     return jg.prepare(pair_of() if pair is None else pair, resolution=resolution, support=support)
 
 
+class Bent(RigidSupport):
+    """Tilts and bends under the load [um/N], or not at all: one program for both."""
+
+    softness: jax.Array = eqx.field(default_factory=lambda: jnp.asarray(1e-3))
+
+    def influence(self, y):
+        share = y / WIDTH
+        return self.softness * (1.0 + share[:, None] * share[None] + 0.5 * (share**2)[:, None] * (share**2)[None])
+
+
+def level():
+    return Bent(pair_of(), Misalignment(), jnp.zeros(()))
+
+
 @pytest.fixture(scope="module")
 def mesh():
     """On a support that does not give way, whose contact the program of one that does finds."""
-    return mesh_of(support=RigidSupport(pair_of()))
+    return mesh_of(support=level())
 
 
 def kernel(slices):
@@ -79,19 +94,19 @@ def test_kernel_is_one_of_mean_deflections_under_even_loads():
     np.testing.assert_allclose(uneven_kernel((1,) * 7)[0], kernel(7), atol=1e-15)
 
 
-def test_merged_parts_deflect_as_fine_slices_do_under_a_smooth_load():
+@pytest.mark.parametrize(("count", "most"), [(12, 4e-3), pytest.param(24, 1e-3, marks=pytest.mark.slow)])
+def test_merged_parts_deflect_as_fine_slices_do_under_a_smooth_load(count, most):
     """Twice as wide slices in the middle against fine ones all over, and the kernel of as wide slices itself."""
-    for count, most in ((12, 4e-3), (24, 1e-3)):
-        parts = (1,) * (count // 4) + (2,) * (count // 4) + (1,) * (count // 4)
-        edges = np.cumsum([0, *parts]) / count - 0.5
-        fine = (np.arange(count) + 0.5) / count - 0.5
-        load, over = (np.exp(x) * (1 - 2 * x**2) for x in (fine, 0.5 * (edges[1:] + edges[:-1])))
-        merged = uneven_kernel(parts)[0] @ over
-        averaged = slice_basis(parts).T @ (kernel(count) @ load) / np.sqrt(parts)
-        assert 1e-6 < np.abs(merged - averaged).max() < most
-        double, equal = uneven_kernel((2,) * (count // 2))[0], kernel(count // 2)
-        smooth = np.exp((np.arange(count // 2) + 0.5) / (count // 2))
-        np.testing.assert_allclose(double @ smooth, equal @ smooth, rtol=4 * most)
+    parts = (1,) * (count // 4) + (2,) * (count // 4) + (1,) * (count // 4)
+    edges = np.cumsum([0, *parts]) / count - 0.5
+    fine = (np.arange(count) + 0.5) / count - 0.5
+    load, over = (np.exp(x) * (1 - 2 * x**2) for x in (fine, 0.5 * (edges[1:] + edges[:-1])))
+    merged = uneven_kernel(parts)[0] @ over
+    averaged = slice_basis(parts).T @ (kernel(count) @ load) / np.sqrt(parts)
+    assert 1e-6 < np.abs(merged - averaged).max() < most
+    double, equal = uneven_kernel((2,) * (count // 2))[0], kernel(count // 2)
+    smooth = np.exp((np.arange(count // 2) + 0.5) / (count // 2))
+    np.testing.assert_allclose(double @ smooth, equal @ smooth, rtol=4 * most)
 
 
 @pytest.mark.parametrize("ends", [False, True])
@@ -183,35 +198,53 @@ def test_approach_of_a_load_brings_that_load_and_its_stiffness():
     np.testing.assert_allclose(stiffness_at(given, found), (more.load - less.load) / (2 * step), rtol=1e-5)
 
 
+def with_equal_widths():
+    return [replace(FACE, slice_widths=widths) for widths in ((3,) * 6, None)]
+
+
 def test_equal_widths_are_none():
-    given, none = jg.Resolution(slices=6, slice_widths=(3,) * 6), jg.Resolution(slices=6)
+    """All that arrays depend on is the same, and none of it is of widths."""
+    given, none = with_equal_widths()
     assert given.parts is None and given.slice_weights is None
     np.testing.assert_array_equal(given.slice_edges, none.slice_edges)
-    meshes = [jg.prepare(pair_of(), resolution=replace(FACE, slice_widths=widths)) for widths in ((3,) * 6, None)]
-    assert meshes[0].coupling.weight is None
+    for sizes in ("of_arrays", "of_material", "of_contact"):
+        assert getattr(given, sizes) == getattr(none, sizes)
+    assert eqx.filter_eval_shape(jg.prepare, pair_of(), resolution=given).coupling.weight is None
+
+
+@pytest.mark.slow
+def test_meshes_of_equal_widths_are_those_of_none():
+    meshes = [jg.prepare(pair_of(), resolution=sizes) for sizes in with_equal_widths()]
     for one, other in zip(*map(jax.tree.leaves, meshes), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
+def test_uniform_flanks_load_all_slices_alike(mesh):
+    many = jg.solve(mesh, TORQUE)
+    assert bool(many.converged.all())
+    load = np.asarray(many.line_load)
+    np.testing.assert_allclose(load, np.repeat(load[:, :1], 6, axis=1), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(face_load_factors(many), 1.0, rtol=1e-9)
+
+
+@pytest.mark.slow
 def test_uniform_flanks_are_one_slice(mesh):
     many, one = jg.solve(mesh, TORQUE), jg.solve(jg.prepare(mesh.pair, resolution=LINE), TORQUE)
     error, load, stiffness = (x[..., ::4] for x in (one.transmission_error, one.line_load, one.tangent_stiffness))
-    assert bool(many.converged.all())
     np.testing.assert_allclose(many.transmission_error, error, rtol=1e-12)
     np.testing.assert_allclose(many.line_load, np.repeat(load, 6, axis=1), rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(many.tangent_stiffness, stiffness, rtol=1e-9)
-    np.testing.assert_allclose(face_load_factors(many), 1.0, rtol=1e-9)
 
 
 @pytest.mark.parametrize("coupled", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_mirrored_slices_and_misalignment_mirror_the_load(mesh, coupled):
     sizes = {} if coupled else {"coupled_slices": False}
-    given = RigidSupport(mesh.pair) if coupled else None
+    given = level() if coupled else None
     one, other = (mesh_of(widths, support=given, **sizes) for widths in (UNEVEN, UNEVEN[::-1]))
     here = jg.solve(one, TORQUE, pinion=jg.LeadSlope(20.0))
     there = jg.solve(other, TORQUE, pinion=jg.LeadSlope(-20.0))
     assert bool(here.converged.all()) and float(face_load_factor(here)) > 1.5
-    np.testing.assert_allclose(there.line_load, here.line_load[:, ::-1], rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(there.line_load, np.asarray(here.line_load)[:, ::-1], rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(there.transmission_error, here.transmission_error, rtol=1e-10)
     force = np.einsum("psx,s,px->x", here.line_load, one.slice_width, one.lever)
     np.testing.assert_allclose(force, here.force, rtol=1e-10)
@@ -240,21 +273,14 @@ def test_plots_have_the_slices(mesh):
     plt.close("all")
 
 
-class Bent(RigidSupport):
-    """Tilts and bends under the load [um/N]."""
-
-    def influence(self, y):
-        share = y / WIDTH
-        return 1e-3 * (1.0 + share[:, None] * share[None] + 0.5 * (share**2)[:, None] * (share**2)[None])
-
-
 def test_support_gives_way_under_the_forces_of_the_slices():
     """A parabola over the face, which three polynomials hold exactly."""
     given = Bent(pair_of(), Misalignment(direct=20.0))
-    mesh, load = mesh_of(support=given), jnp.asarray(np.random.default_rng(0).uniform(size=(2, 6, 4)))
-    force = jnp.sum(mesh.lever[:, None] * load, axis=0) * mesh.slice_width[:, None]
-    bent = mesh.coupling.support_deflection(mesh.lever, list(load))
-    np.testing.assert_allclose(bent, given.influence(mesh.face_coordinate) @ force, rtol=1e-12)
+    mesh, load = mesh_of(support=given), np.random.default_rng(0).uniform(size=(2, 6, 4))
+    force = np.sum(np.asarray(mesh.lever)[:, None] * load, axis=0) * np.asarray(mesh.slice_width)[:, None]
+    under = jax.jit(lambda held, lever, load: held.support_deflection(lever, list(load)))
+    bent = under(mesh.coupling, mesh.lever, load)
+    np.testing.assert_allclose(bent, given.influence(np.asarray(mesh.face_coordinate)) @ force, rtol=1e-12)
     np.testing.assert_allclose(mesh.support_gap, 20.0 / WIDTH * np.asarray(mesh.face_coordinate), rtol=1e-12)
 
 

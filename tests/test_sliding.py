@@ -15,13 +15,19 @@ from jaxgear.contact.slide import nominal_material
 from jaxgear.geometry import reduced_radius
 from jaxgear.microgeometry import NoModification
 
-SLICED = replace(SLIDING, slices=3)
 TORQUE = 50.0
 
 
 @pytest.fixture(scope="module")
 def mesh():
     return jg.prepare(gear_pair(), resolution=SLIDING)
+
+
+@pytest.fixture(scope="module")
+def sliced(mesh):
+    """The same arrays for three slices: what is removed of them asks for no more."""
+    sizes = replace(mesh.kinematics, resolution=replace(SLIDING, slices=3))
+    return replace(mesh, kinematics=sizes, slice_width=jnp.full(3, 6.0))
 
 
 def radius(mesh):
@@ -60,14 +66,15 @@ def test_a_slope_lets_the_gap_fall_by_half_its_square_times_the_radius(mesh):
     assert expected[here].min() > 0.04
 
 
-def test_nothing_slides_without_a_slope(mesh):
+def test_nothing_slides_without_a_slope(mesh, sliced):
     """Unmodified flanks, a constant, and modifications along the face alone."""
-    sliced = jg.prepare(gear_pair(), resolution=SLICED)
-    constant = flank(constant=4.0)
-    for prepared, pinion in ((mesh, None), (mesh, constant), (sliced, jg.LeadCrowning(5.0) + jg.LeadSlope(3.0))):
-        found = removed_material(prepared, TORQUE, pinion=pinion, wheel=None if pinion is None else flank())
-        assert float(jnp.abs(found.shift).max()) < 1e-12 and float(jnp.abs(found.bend).max()) < 1e-10
-    assert float(jnp.ptp(removed_material(mesh, TORQUE, pinion=constant, wheel=flank()).amount)) < 1e-12
+    lead = jg.LeadCrowning(5.0) + jg.LeadSlope(3.0)
+    given = (mesh, None, None), (mesh, flank(constant=4.0), flank()), (sliced, lead, None)
+    for prepared, pinion, wheel in given:
+        found = removed_material(prepared, TORQUE, pinion=pinion, wheel=wheel)
+        assert np.abs(found.shift).max() < 1e-12 and np.abs(found.bend).max() < 1e-10
+        amount = np.asarray(found.amount)
+        assert np.ptp(amount, axis=(0, 2)).max() < 1e-12 and (amount.max() > 1.0) == (pinion is not None)
 
 
 def search(mesh, pinion, wheel):
@@ -88,8 +95,12 @@ def _least(mesh, gap, pinion, wheel, nodes=12):
 
     def at(place):
         place = jnp.clip(place, -jnp.maximum(inside[1], 0.0), jnp.maximum(inside[0], 0.0))
-        points = [mesh.flanks(place + float(x) * half) for x in np.cos(angle)]
-        mean = sum(float(w) * (pinion(p) + wheel(q)) for w, (p, q) in zip(weights, points))[:, 0]
+
+        def both(x):
+            p, q = mesh.flanks(place + x * half)
+            return (pinion(p) + wheel(q))[:, 0]
+
+        mean = jnp.tensordot(weights, jax.vmap(both)(jnp.asarray(np.cos(angle))), 1)
         return 1e3 * ((place - centre) ** 2 - centre**2) / (2 * gap) + mean
 
     return jax.lax.map(at, jnp.linspace(-0.8, 0.8, 1601)).min(axis=0)
@@ -110,7 +121,9 @@ FLANKS = {
 }
 
 
-@pytest.mark.parametrize("name", FLANKS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "table" else name for name in FLANKS]
+)
 def test_the_gap_is_the_least_of_a_fine_search(mesh, name):
     """On the path and beyond it, as far as corners touch under usual loads (gaps up to 40 um)."""
     pinion, wheel, tolerance = FLANKS[name]
@@ -122,6 +135,7 @@ def test_the_gap_is_the_least_of_a_fine_search(mesh, name):
     assert (nominal - found)[near].max() > 4 * tolerance
 
 
+@pytest.mark.slow
 def test_more_steps_go_on_towards_the_search(mesh):
     """A relief as steep as they come: 15 um over a millimetre."""
     steep = linear(15.0, 1.0)
@@ -158,9 +172,9 @@ def test_a_concave_or_convex_flank_changes_the_pressure(mesh):
 
 def test_the_corner_law_sees_where_the_contact_has_moved(mesh):
     """Moving towards the pinion tip is towards its corner and away from that of the wheel."""
-    law, load = mesh.law, jnp.full((2, 1, 16), 100.0)
-    moved = law.moved(jnp.full((2, 1, 16), 0.05))
-    change = np.asarray(moved.deflection(load) - law.deflection(load))[:, 0]
+    law, field = mesh.law, np.ones((2, 1, 16))
+    more = eqx.filter_jit(lambda law, load, way: law.moved(way).deflection(load) - law.deflection(load))
+    change = np.asarray(more(law, 100.0 * field, 0.05 * field))[:, 0]
     pinion = np.asarray(law.edge.side)[:, 0] > 0
     close = np.abs(np.asarray(law.edge.distance)[:, 0]) < 0.3
     assert (change[close & pinion] > 0).all() and (change[close & ~pinion] < 0).all()
@@ -173,6 +187,13 @@ def curves(mesh, curve, x):
 
 
 # the parabolic and the linear curve, written as two of one class, share these programs
+CURVES = jg.Quadratic(0.0, 0.44, 0.56), jg.Quadratic(0.0, 1.0, 0.0)
+EACH_CURVE = pytest.mark.parametrize("curve", CURVES, ids=["parabolic", "linear"])
+UNITS = np.eye(5)
+# nothing removed, over no length, under no load
+EDGES = (0.0, 3.0, 50.0), (5.0, 0.0, 50.0), (5.0, 3.0, 0.0), (0.0, 0.0, 0.0)
+
+
 @jax.jit
 def forward(mesh, curve, x, way):
     """The curve, and its derivative in one direction."""
@@ -186,43 +207,63 @@ def backward(mesh, curve, x, weights, way):
     return jax.jvp(slopes, (x,), (way,))
 
 
-@pytest.mark.parametrize(
-    "curve", [jg.Quadratic(0.0, 0.44, 0.56), jg.Quadratic(0.0, 1.0, 0.0)], ids=["parabolic", "linear"]
-)
-def test_derivatives_are_those_of_the_numbers(mesh, curve):
-    """Of the whole curve by amount, length and torque, and second derivatives by the first amount."""
-    x, units = jnp.asarray([7.3, 3.37, 6.1, 2.91, 50.0]), jnp.eye(5)
-    found = np.stack([forward(mesh, curve, x, unit)[1] for unit in units], axis=1)
+def at_usual_reliefs(mesh, curve):
+    """Where reliefs and torque are, derivatives of the whole curve there, and how far off differences they are."""
+    x = np.asarray([7.3, 3.37, 6.1, 2.91, 50.0])
+    found = np.stack([forward(mesh, curve, x, unit)[1] for unit in UNITS], axis=1)
     central = np.empty_like(found)
-    for place, step in enumerate(1e-5 * np.asarray(x)):
-        high, low = (forward(mesh, curve, x + sign * step * units[place], units[0])[0] for sign in (1.0, -1.0))
+    for place, step in enumerate(1e-5 * x):
+        high, low = (np.asarray(forward(mesh, curve, x + sign * step * UNITS[place], UNITS[0])[0]) for sign in (1, -1))
         central[:, place] = (high - low) / (2 * step)
+    return x, found, np.abs(found - central).max(axis=1) / np.abs(central).max()
+
+
+@EACH_CURVE
+def test_derivatives_are_those_of_the_numbers(mesh, curve):
+    """Of the whole curve by amount, length and torque."""
+    _, found, off = at_usual_reliefs(mesh, curve)
     # a position whose contact has a node right at the start of a relief has two slopes
-    off = np.abs(found - central).max(axis=1) / np.abs(central).max()
     assert np.sort(off)[-3] < 1e-6
+    assert np.abs(found).max(axis=0).min() > 1e-3  # each of the five matters
+
+
+@pytest.mark.slow
+@EACH_CURVE
+def test_gradients_are_derivatives_and_have_derivatives_themselves(mesh, curve):
+    """Second derivatives by the first amount."""
+    x, found, off = at_usual_reliefs(mesh, curve)
     weights = np.cos(np.arange(16.0))
     weights[np.argsort(off)[-2:]] = 0.0
-    weights = jnp.asarray(weights)
-    slopes, second = backward(mesh, curve, x, weights, units[0])
+    slopes, second = backward(mesh, curve, x, weights, UNITS[0])
     np.testing.assert_allclose(slopes, weights @ found, rtol=1e-9)
-    high, low = (backward(mesh, curve, x + sign * 1e-4 * units[0], weights, units[0])[0] for sign in (1.0, -1.0))
+    high, low = (backward(mesh, curve, x + sign * 1e-4 * UNITS[0], weights, UNITS[0])[0] for sign in (1.0, -1.0))
     expected = np.asarray(high - low) / 2e-4
     np.testing.assert_allclose(second, expected, atol=1e-5 * np.abs(expected).max())
 
 
+def at_edges():
+    for amount, length, torque in EDGES:
+        x = np.asarray([amount, length, amount, length, torque])
+        for way in UNITS:
+            yield x, way
+
+
 def test_nothing_and_no_load_leave_finite_derivatives(mesh):
-    curve, ones = jg.Quadratic(0.0, 0.44, 0.56), jnp.ones(16)
-    for amount, length, torque in ((0.0, 3.0, 50.0), (5.0, 0.0, 50.0), (5.0, 3.0, 0.0), (0.0, 0.0, 0.0)):
-        x = jnp.asarray([amount, length, amount, length, torque])
-        for way in jnp.eye(5):
-            slopes, second = backward(mesh, curve, x, ones, way)
-            assert np.isfinite(slopes).all() and np.isfinite(second).all(), x
+    for x, way in at_edges():
+        value, slope = forward(mesh, CURVES[0], x, way)
+        assert np.isfinite(value).all() and np.isfinite(slope).all(), x
 
 
-def test_slices_slide_on_their_own(mesh):
+@pytest.mark.slow
+def test_nothing_and_no_load_leave_finite_gradients_and_second_derivatives(mesh):
+    for x, way in at_edges():
+        slopes, second = backward(mesh, CURVES[0], x, np.ones(16), way)
+        assert np.isfinite(slopes).all() and np.isfinite(second).all(), x
+
+
+def test_slices_slide_on_their_own(mesh, sliced):
     """A flank that is twisted: every slice is that of a flank of its own profile."""
-    sliced = jg.prepare(gear_pair(), resolution=SLICED)
-    roll = np.linspace(3.0, 16.0, 14)
+    roll = np.linspace(3.0, 15.0, 13)  # as many points as of `ROUGH`
     columns = np.outer((roll - 9.0) ** 2 / 10, [0.2, 1.0, 2.0])
     twisted = jg.TabulatedFlank(roll, sliced.face_coordinate, columns, "cubic2")
     found = removed_material(sliced, TORQUE, pinion=twisted)
@@ -233,6 +274,7 @@ def test_slices_slide_on_their_own(mesh):
             np.testing.assert_allclose(mine, theirs, atol=1e-9)
 
 
+@pytest.mark.slow  # of one relief `test_prescribed` finds them every time
 def test_a_prescribed_error_gives_the_forces_of_the_cycle(mesh):
     flanks = {"pinion": RELIEF, "wheel": linear(9.0, 2.0)}
     cycle = jg.solve(mesh, TORQUE, **flanks)

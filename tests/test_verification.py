@@ -1,6 +1,7 @@
 """Optima by a second structure: the numbers are those of a mesh made with it, and claims beyond a model are doubted."""
 
 import re
+from dataclasses import replace
 
 import equinox as eqx
 import numpy as np
@@ -64,6 +65,13 @@ def test_the_measure_is_that_of_the_search(best, verified, flat, tabulated):
     assert re.search(rf"^worst ppte \[um\] .*{best.objective:.4g} .* {worst:.4g}$", str(verified), re.MULTILINE)
 
 
+def test_flanks_without_an_objective_are_verified_too(best, verified, folder):
+    found = jg.optimize.verify(replace(best, problem=None), cache=folder)
+    assert found.objectives == found.claimed_objectives == {}
+    assert found.ppte == verified.ppte and found.claimed == verified.claimed
+
+
+@pytest.mark.slow
 def test_levelled_flanks_are_verified_too(flat, tabulated, folder):
     level = jg.optimize.iterate_transmission_error(flat, 50.0, steps=1)
     found = jg.optimize.verify(level, cache=folder)
@@ -71,6 +79,7 @@ def test_levelled_flanks_are_verified_too(flat, tabulated, folder):
     assert found.ppte == pytest.approx(ppte(tabulated, 50.0, level.pinion, level.wheel), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_contact_law_of_another_kind_is_verified_too(best, tabulated, folder):
     """Its prepared arrays are other ones, and no compiled program serves both."""
     legacy = jg.prepare(tabulated.pair, compliance=jg.legacy_compliance(), resolution=LINE)

@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import importlib
 import json
 from types import SimpleNamespace
 
@@ -17,7 +18,7 @@ from report_page import check_report
 import jaxgear as jg
 from jaxgear import plot
 from jaxgear.cli import wear_scatter
-from jaxgear.cli.compared import sought
+from jaxgear.cli.compared import compared, sought
 from jaxgear.cli.kept import Kept, Marches
 from jaxgear.contact import removed_material
 from jaxgear.io import (
@@ -35,7 +36,26 @@ from jaxgear.io.folder import RESULT_FILES
 from jaxgear.tolerance import deviated_material, sample_deviations
 from jaxgear.wear import March, mean_over_life, over_life, wear, wear_depth, wear_in_steps
 
-pytestmark = pytest.mark.usefixtures("no_cache")
+pytestmark = pytest.mark.usefixtures("no_cache", "involute_as_relief")
+
+
+def relief(amount, length=2.0):
+    """Of the kind that the command makes by rule: one program wears all flanks of one kind."""
+    return jg.TipRelief(amount, length)
+
+
+@pytest.fixture
+def involute_as_relief(request, monkeypatch):
+    """The default tests compare the rule-based relief with one of no height: one program for both designs."""
+
+    def alike(*arguments, **options):
+        mesh, designs = compared(*arguments, **options)
+        bare = relief(0.0)
+        return mesh, {name: (bare, bare) if name == "unmodified" else flanks for name, flanks in designs.items()}
+
+    if request.node.get_closest_marker("slow") is None:
+        monkeypatch.setattr(importlib.import_module("jaxgear.cli.wear"), "compared", alike)
+
 
 GEAR = """
 teeth = 30
@@ -182,12 +202,35 @@ constraint = [{ of = "life_to_depth", low = 7.2e9 }]
         optimize_request(load_design(file(PAIR + VARIABLES + beyond)))
 
 
-def test_loads_of_the_table_wear_one_flank_together(file):
-    """As `wear` under the spectrum; the quantities have it too, whatever the load of the case."""
-    table = TABLE + "torques = [50.0, 150.0]\nweights = [3.0, 1.0]\n"
-    design = load_design(file(PAIR + SWEEP.format(name="wear_depth") + table))
+LOADS = TABLE + "torques = [50.0, 150.0]\nweights = [3.0, 1.0]\n"
+
+
+def test_loads_of_the_table_wear_one_flank_together(file, monkeypatch):
+    """The quantities wear it under the spectrum, whatever the load of the case."""
+    asked = {}
+
+    class Worn(Exception):
+        pass
+
+    def recorded(mesh, load, revolutions, **options):
+        asked.update(options, load=load, revolutions=revolutions)
+        raise Worn
+
+    design = load_design(file(PAIR + SWEEP.format(name="wear_depth") + LOADS))
     settings = wear_request(design).settings
     assert settings.loads is not None and settings.loads.weights.tolist() == [0.75, 0.25]
+    monkeypatch.setattr(importlib.import_module("jaxgear.wear.settings"), "wear", recorded)
+    mesh = load_design(file(PAIR)).mesh()
+    with pytest.raises(Worn):
+        sweep_request(design).results[1](jg.solve(mesh, 150.0).on(mesh))
+    assert asked["load"].torques.tolist() == [50.0, 150.0] and asked["load"].weights.tolist() == [0.75, 0.25]
+    assert (float(asked["revolutions"]), asked["blocks"]) == (2e7, 4)
+    np.testing.assert_array_equal(asked["coefficient"], 1e-18)
+
+
+@pytest.mark.slow
+def test_a_quantity_under_loads_is_that_of_their_life(file):
+    design = load_design(file(PAIR + SWEEP.format(name="wear_depth") + LOADS))
     mesh = load_design(file(PAIR)).mesh()
     spectrum = jg.LoadSpectrum([50.0, 150.0], [3.0, 1.0])
     perfect = jnp.zeros((2, 1, 16))
@@ -263,35 +306,32 @@ TOLERANCE = "[tolerance]\nquality_class = 7\nsamples = 3\n"
 def scatter(design, flanks, kept):
     """Lives of the manufactured pairs of a file, with reliefs of one height."""
     mesh, settings = design.mesh(), wear_request(design).settings
-    relief = jg.TipRelief(flanks, 2.0)
-    designs = {"relieved": (relief, relief)}
+    designs = {"relieved": (relief(flanks), relief(flanks))}
     found = wear_scatter.scattered(design, settings, mesh, designs, tolerance_of(design), kept, quick=False)
-    return mesh, relief, found["relieved"]
+    return mesh, found["relieved"]
 
 
 def test_manufactured_pairs_live_as_their_deviations_let_them(file, tmp_path, monkeypatch):
     """Each is the life of the gears that `sample_deviations` draws; finer gears scatter less."""
     design = load_design(file(PAIR + TABLE + TOLERANCE))
     kept = Kept(tmp_path / ".runs", wear_scatter.Arrays())
-    mesh, relief, found = scatter(design, 5.0, kept)
+    mesh, found = scatter(design, 5.0, kept)
     assert list(found) == ["mean_ppte_over_life", "wear_depth", "life_to_depth"]
     drawn = sample_deviations(tolerance_of(design), mesh, 3, seed=0)
-    options = {"pinion": relief, "wheel": relief}
+    options = {"pinion": relief(5.0), "wheel": relief(5.0)}
+    nominal = np.asarray(removed_material(mesh, 150.0, **options).amount)
     for number in range(3):
-        deviation = jax.tree.map(lambda leaf, number=number: leaf[number], drawn)
-        off = (
-            deviated_material(mesh, 150.0, deviation, **options).amount
-            - removed_material(mesh, 150.0, **options).amount
-        )
+        deviation = jax.tree.map(lambda leaf, number=number: jnp.asarray(np.asarray(leaf)[number]), drawn)
+        off = np.asarray(deviated_material(mesh, 150.0, deviation, **options).amount) - nominal
         life = wear_in_steps(mesh, 150.0, 2e7, coefficient=1e-18, blocks=4, deviation=off, **options)
         assert found["wear_depth"][number] == pytest.approx(float(wear_depth(life)[-1]), rel=1e-6)
         assert found["mean_ppte_over_life"][number] == pytest.approx(float(mean_over_life(life, "ppte")), rel=1e-6)
     assert np.ptp(found["mean_ppte_over_life"]) > 0.3
-    _, _, finer = scatter(load_design(file(PAIR + TABLE + TOLERANCE.replace("7", "1"))), 5.0, kept)
+    _, finer = scatter(load_design(file(PAIR + TABLE + TOLERANCE.replace("7", "1"))), 5.0, kept)
     # an eighth of the limits, but for their rounding
     assert np.ptp(finer["mean_ppte_over_life"]) < 0.5 * np.ptp(found["mean_ppte_over_life"])
     monkeypatch.setattr(wear_scatter, "_numbers", None)  # after Ctrl-C nothing is worn again
-    _, _, again = scatter(design, 5.0, kept)
+    _, again = scatter(design, 5.0, kept)
     assert list(again) == list(found)
     assert all((again[name] == found[name]).all() for name in found)
 
@@ -406,7 +446,7 @@ def test_a_search_that_is_for_the_life_already_has_no_other(file):
 def test_kept_blocks_are_not_worn_again(tmp_path, file):
     """After Ctrl-C the command goes on, and what comes out is what would have."""
     mesh = load_design(file(PAIR)).mesh()
-    options = {"coefficient": 1e-18, "blocks": 4}
+    options = {"coefficient": 1e-18, "blocks": 4, "pinion": relief(0.0), "wheel": relief(0.0)}
 
     class Stop(Exception):
         pass
@@ -432,6 +472,11 @@ def test_kept_blocks_are_not_worn_again(tmp_path, file):
     np.testing.assert_array_equal(over_life(again, "ppte"), over_life(whole, "ppte"))
 
 
+def prepared(pair, *, resolution, compliance=None, support=None):
+    """Stands for a mesh of other sizes."""
+    return SimpleNamespace(pair=pair, resolution=resolution, compliance=compliance, support=support)
+
+
 class Search:
     """Stands for a search that takes long."""
 
@@ -442,13 +487,14 @@ class Search:
 
     def __call__(self, mesh, callback):
         self.run += 1
-        finer = jg.prepare(mesh.pair, resolution=dataclasses.replace(mesh.resolution, positions=24))
-        relief = jg.TipRelief(12.3, 2.1)
-        return SimpleNamespace(parameters=self.parameters, mesh=finer, pinion=relief, wheel=relief)
+        finer = prepared(mesh.pair, resolution=dataclasses.replace(mesh.resolution, positions=24))
+        flanks = {"pinion": relief(12.3, 2.1), "wheel": relief(12.3, 2.1)}
+        return SimpleNamespace(parameters=self.parameters, mesh=finer, **flanks)
 
 
-def test_what_a_search_has_found_is_not_sought_again(tmp_path, file):
+def test_what_a_search_has_found_is_not_sought_again(tmp_path, file, monkeypatch):
     """The mesh on which it ended, and the flanks, come from a few numbers beside the results."""
+    monkeypatch.setattr(importlib.import_module("jaxgear.cli.compared"), "prepare", prepared)
     mesh, stages = load_design(file(PAIR)).mesh(), SimpleNamespace(step=None)
     search = Search({"amount": 12.3, "length": 2.1})
 
@@ -463,7 +509,8 @@ def test_what_a_search_has_found_is_not_sought_again(tmp_path, file):
     assert search.run == 1
     for ended, (pinion, wheel) in (first, again):
         assert ended.resolution.positions == 24 and str(pinion) == str(wheel) == str(jg.TipRelief(12.3, 2.1))
-    assert eqx.tree_equal(first, again)
+        assert eqx.tree_equal(ended.pair, mesh.pair) and eqx.tree_equal(ended.compliance, mesh.compliance)
+    assert eqx.tree_equal(first[1], again[1]) and first[0].resolution == again[0].resolution
     found("optimum over life")
     found(text='[optimize]\nmethod = "genetic"\n')
     found(oil=30.0)
@@ -491,7 +538,8 @@ def skewed(tmp_path_factory):
     """A life of flanks that wear unevenly over the face: that of one slice, and more of it on a second one."""
     path = tmp_path_factory.mktemp("skewed") / "design.toml"
     path.write_text(PAIR)
-    life = wear_in_steps(load_design(path).mesh(), 150.0, 2e7, coefficient=1e-18, blocks=2)
+    flanks = {"pinion": relief(0.0), "wheel": relief(0.0)}
+    life = wear_in_steps(load_design(path).mesh(), 150.0, 2e7, coefficient=1e-18, blocks=2, **flanks)
     further = np.linspace(0.0, 0.5, 3)[:, None, None, None, None]
     depth = np.concatenate([life.depth, life.depth + further], axis=3)
     places = np.asarray(life.face_coordinate) + np.array([-5.0, 5.0])

@@ -40,7 +40,9 @@ def verdict(
         yield f"{name} {limit}"
     if not optimum.feasible:
         passed = f"the nearest passes one by {100 * optimum.violation:.2g} %"
-        yield f"NOT FEASIBLE: the search met no design within all limits, {passed}"
+        alone = optimum.problem is not None and len(optimum.problem.objectives) == 1
+        sought = ", not by their violation alone either" if alone else ""
+        yield f"NOT FEASIBLE: the search met no design within all limits{sought}; {passed}"
     for step, state in enumerate(optimum.iterations):
         yield (
             f"iteration {step}: PPTE {state.ppte:.3f} um (lower limit {state.limit:.3f}), up to "

@@ -16,14 +16,16 @@ from ..numerics import Checked, check, optional_real
 Scalar = Float[Array, ""]
 Objective = str | Quantity | Callable[[MeshCycle], Any]
 
-# A constraint counts as kept up to this part of its limit (of 1 where the limit is zero).
-FEASIBLE = 1e-3
+# Searches aim at this part of a limit (of 1 where the limit is zero) inside it, and count an excess from there: what is
+# found at the positions of one mesh keeps the limit between them, too.
+FEASIBLE = 5e-4
+_KEPT = 0.5 * FEASIBLE  # up to this excess a design of a search counts as one that keeps its limits
 
 
 def counted(violation):
     """A violation as designs are compared by it: one within the tolerance is none."""
     where = jnp.where if isinstance(violation, jax.Array) else np.where
-    return where(violation <= FEASIBLE, 0.0, violation)
+    return where(violation <= _KEPT, 0.0, violation)
 
 
 class Constraint(Checked):
@@ -83,9 +85,20 @@ class Constraint(Checked):
         """Its limits, each with 1 for an upper and -1 for a lower one."""
         return [(sign, limit) for sign, limit in ((1, self.high), (-1, self.low)) if limit is not None]
 
+    def margin(self, limit: Scalar, dtype) -> Scalar | float:
+        """How far inside a limit a search aims, relative to it: not at all where a free parameter is limited."""
+        if self.quantity is None:
+            return 0.0
+        if self.low is None or self.high is None:
+            return FEASIBLE
+        return jnp.minimum(FEASIBLE, 0.25 * (self.high - self.low) / scale_of(limit, dtype)).astype(dtype)
+
     def excess(self, value) -> list[Scalar]:
-        """By how much each limit is passed, relative to the limit; negative inside."""
-        return [sign * (value - limit.astype(value.dtype)) / scale_of(limit, value.dtype) for sign, limit in self.sides]
+        """By how much what is aimed at is missed at each limit, relative to the limit; negative inside."""
+        return [
+            sign * (value - limit.astype(value.dtype)) / scale_of(limit, value.dtype) + self.margin(limit, value.dtype)
+            for sign, limit in self.sides
+        ]
 
 
 def scale_of(limit: Scalar, dtype) -> Scalar:

@@ -57,6 +57,19 @@ class AbstractScalarization(ABC):
         return scaled.max(axis=-1) + self.part * scaled.sum(axis=-1)
 
 
+class NoObjective(AbstractScalarization):
+    """Nothing but the violation of the limits is left to be made small."""
+
+    part = 0.0
+
+    def __init__(self, objectives: int):
+        self._none = np.zeros(objectives)
+
+    def scales(self) -> tuple[np.ndarray, np.ndarray]:
+        """Zeros."""
+        return self._none, self._none
+
+
 class Model:
     """A linearization on the host with what the problem says about it.
 

@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from ..numerics.fields import Checked, count, number
+from .goal import FEASIBLE
 from .linear_model import AbstractScalarization, Model
 from .linearizer import Linearizer
 from .problem import Problem
@@ -107,7 +108,8 @@ class Search:
             return False
         step, self._predicted = self._model.best_step(self._radius)
         self.trial = self._point + step
-        return self._predicted > rtol * abs(self._model.value)
+        # a violation that nobody notices is worth no step either
+        return self._predicted > rtol * max(abs(self._model.value), FEASIBLE * self._model.penalty)
 
     def take(self, model: Model) -> None:
         """Goes to the trial point if it is as good as its model says, and adapts the radius."""

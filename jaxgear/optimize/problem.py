@@ -188,7 +188,8 @@ class Problem(eqx.Module):
                     pieces = self._linear_pieces(x, limit, sign)
                 else:
                     pieces = pieces_of(limit.quantity, found[limit.quantity], sign)
-                limits.append(pieces.scaled(scale_of(bound, x.dtype), sign * bound.astype(x.dtype)))
+                scale, margin = scale_of(bound, x.dtype), limit.margin(bound, x.dtype)
+                limits.append(pieces.scaled(scale, sign * bound.astype(x.dtype) - margin * scale))
         known = jnp.stack([jnp.sum(leaf) for leaf in jax.tree.leaves((objectives, limits))])
         return Linearization(objectives, tuple(limits), jnp.all(fine) & jnp.all(jnp.isfinite(known)))
 

@@ -9,7 +9,6 @@ from ..contact import Mesh, MeshCycle
 from ..metrics.plausibility import doubt_of_claim
 from ..microgeometry import AbstractModification
 from ..numerics import Checked
-from .goal import FEASIBLE
 from .problem import Problem
 
 PENALIZED = " with curvature penalty"  # what the name of an objective says of it
@@ -90,7 +89,7 @@ class Optimum(eqx.Module):
             and where the slopes are not finite.
         active_bounds: which parameters ended at their "lower" or "upper" bound.
         constraints: the limits, by name, each with its value and whether it is kept.
-        violation: largest relative excess over a constraint.
+        violation: largest relative excess over a constraint; 0 where all are kept.
         evaluations: contact analyses spent, one per design, torque and manufactured gear; one with its gradient
             counts as three, each further gradient as two.
         history: best objective after every look at the search.
@@ -127,7 +126,7 @@ class Optimum(eqx.Module):
     @property
     def feasible(self) -> bool:
         """Whether every constraint is kept."""
-        return self.violation <= FEASIBLE
+        return self.violation == 0.0
 
     def __str__(self) -> str:
         lines = [f"Optimum by {self.method}"]

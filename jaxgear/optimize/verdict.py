@@ -58,7 +58,7 @@ def optimum_of(
         decrease_left=left,
         active_bounds=_active_bounds(problem.names, record.point),
         constraints=_limits(problem, x),
-        violation=record.violation,
+        violation=max(record.violation - FEASIBLE, 0.0),  # as an excess is counted from inside a limit
         evaluations=record.evaluations,
         history=sign * np.asarray([value for _, value in record.history]),
         history_evaluations=np.asarray([spent for spent, _ in record.history]),
