@@ -686,6 +686,21 @@ def test_the_cache_is_a_private_folder_and_never_an_obstacle(tmp_path, monkeypat
     assert stat.S_IMODE(folder.stat().st_mode) & 0o077 == 0
     folder.chmod(0o777)  # others could place programs here
     assert cache.enable_cache() is None
+    folder.chmod(0o700)
+    tmp_path.chmod(0o777)  # and here another folder of this name
+    assert cache.enable_cache() is None
+    tmp_path.chmod(0o1777)  # but not one that is not theirs
+    assert cache.enable_cache() == folder
+    tmp_path.chmod(0o700)
+    kept.clear()
+    before = os.umask(0)
+    try:
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "new" / "cache"))
+        made = cache.enable_cache()
+    finally:
+        os.umask(before)
+    ways = [part for part in made.parents if part != tmp_path and part.is_relative_to(tmp_path)]
+    assert len(ways) == 3 and all(stat.S_IMODE(part.stat().st_mode) == 0o700 for part in ways)
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     assert cache.enable_cache() is None

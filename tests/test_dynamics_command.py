@@ -184,6 +184,12 @@ def test_kept_responses_are_not_made_again(tmp_path):
     kept = Kept(tmp_path / ".runs", SpeedResponses(), 2)
     kept((oscillator, "down"), sweep)
     assert len(made) == 2
-    next((tmp_path / ".runs").iterdir()).write_bytes(b"torn")
+    for file in (tmp_path / ".runs").iterdir():  # one bit, anywhere
+        whole = bytearray(file.read_bytes())
+        whole[len(whole) // 2] ^= 1
+        file.write_bytes(bytes(whole))
+    for direction in ("up", "down"):
+        kept((oscillator, direction), sweep)
+    assert len(made) == 4
     kept.remove()
     assert not (tmp_path / ".runs").exists()

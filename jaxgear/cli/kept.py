@@ -2,12 +2,12 @@
 
 import dataclasses
 import hashlib
+import io
 import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
-from zipfile import BadZipFile
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +15,7 @@ import numpy as np
 
 from ..dynamics import SpeedResponse
 from ..io import writing
+from ..numerics.durable import sealed, unsealed, write_durably
 from ..wear import March
 from . import interrupt
 from .version import version
@@ -53,7 +54,7 @@ class Kept(Generic[_Found]):
             made_of: a pytree of all that it depends on.
             make: makes it.
         """
-        path = self._folder / f"{_digest(made_of)}.npz"
+        path = self._folder / _digest(made_of)
         found = self._read(path)
         if found is None:
             found = jax.block_until_ready(make())
@@ -67,18 +68,20 @@ class Kept(Generic[_Found]):
         return found
 
     def _write(self, path: Path, found: _Found) -> None:
-        temporary = path.with_suffix(".part")
-        with temporary.open("wb") as file:
-            arrays: dict[str, Any] = {name: np.asarray(value) for name, value in self._codec.arrays(found).items()}
-            np.savez(file, **arrays)
-        temporary.replace(path)
+        arrays: dict[str, Any] = {name: np.asarray(value) for name, value in self._codec.arrays(found).items()}
+        content = io.BytesIO()
+        np.savez(content, **arrays)
+        write_durably(path, lambda file: file.write(sealed(content.getvalue())))
 
     def _read(self, path: Path) -> _Found | None:
         try:
-            with np.load(path) as file:
-                return self._codec.result(dict(file))
-        except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):  # not there, or torn
+            content = unsealed(path.read_bytes())
+        except OSError:  # not there
             return None
+        if content is None:  # torn, or no longer what was written
+            return None
+        with np.load(io.BytesIO(content)) as file:
+            return self._codec.result(dict(file))
 
     def remove(self) -> None:
         """All is in the results now."""

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import stat
 import sys
 import uuid
 from pathlib import Path
@@ -30,6 +31,17 @@ def write_durably(path: Path, write) -> None:
             os.close(folder)
 
 
+def sealed(content: bytes) -> bytes:
+    """A content with its checksum."""
+    return content + _sum(content).digest()
+
+
+def unsealed(kept: bytes) -> bytes | None:
+    """The content; None where it is damaged."""
+    content = kept[: -_sum().digest_size]
+    return content if kept == sealed(content) else None
+
+
 class Kept:
     """Bytes as files of a folder, named by all that they depend on.
 
@@ -49,13 +61,12 @@ class Kept:
             os.utime(file)  # the oldest are forgotten
         except OSError:
             return None
-        content = kept[: -_sum().digest_size]
-        return content if kept == content + _sum(content).digest() else None
+        return unsealed(kept)
 
     def write(self, made_of: bytes, content: bytes) -> None:
         """Keeps something, if the disk allows it."""
         try:
-            write_durably(self._file(made_of), lambda file: file.write(content + _sum(content).digest()))
+            write_durably(self._file(made_of), lambda file: file.write(sealed(content)))
         except OSError:  # a full disk: the next process makes it again
             return
 
@@ -78,8 +89,9 @@ def forget_the_oldest(folder: Path, most: int) -> None:
 def user_folder(*names: str) -> Path | None:
     """A folder below the user's cache directory that nobody else can write to; None where there can be none."""
     try:
-        folder = _user_cache().joinpath(*names)
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        folder = _user_cache().absolute().joinpath(*names)
+        for part in (*reversed(folder.parents), folder):  # `parents=True` would make those above by the umask
+            part.mkdir(mode=0o700, exist_ok=True)
         return folder if _is_private(folder) else None
     except (OSError, RuntimeError):  # RuntimeError: no home directory
         return None
@@ -96,10 +108,22 @@ def _user_cache() -> Path:
 
 
 def _is_private(folder: Path) -> bool:
-    """What is kept may be executed: nobody else may be able to place it."""
+    """What is kept may be executed: nobody else may be able to place it, or a folder or link on the way to it."""
     if not os.access(folder, os.W_OK):
         return False
     if sys.platform == "win32":
         return True
-    status = folder.stat()
-    return status.st_uid == os.getuid() and not status.st_mode & 0o022
+    status, real = folder.stat(), folder.resolve()
+    own = status.st_uid == os.getuid() and not status.st_mode & 0o022
+    return own and all(map(_is_out_of_reach, {*folder.parents, *real.parents}))
+
+
+def _is_out_of_reach(folder: Path) -> bool:
+    """Whether nobody but the user and the system can replace what is in a folder, or where it leads."""
+    link, status = folder.lstat(), folder.stat()
+    if {link.st_uid, status.st_uid} - {0, os.getuid()}:
+        return False
+    if status.st_mode & stat.S_ISVTX:  # everybody writes there, and replaces what is theirs
+        return True
+    private = status.st_gid == status.st_uid  # the group of one user, which many systems make
+    return not status.st_mode & (0o002 if private else 0o022)
