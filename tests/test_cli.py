@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import dataclasses
 import errno
 import importlib
 import json
@@ -151,6 +152,13 @@ def test_analyze_gives_what_the_library_gives(folder, analyzed):
         float(jg.peak_to_peak(jg.solve(mesh, 60.0, pinion=pinion, wheel=wheel).transmission_error))
     )
     assert table["unmodified_um"] == sorted(table["unmodified_um"])  # without relief PPTE grows with the torque
+    finer = file.mesh(dataclasses.replace(mesh.resolution, positions=2 * mesh.resolution.positions))
+    twice = jg.peak_to_peak(jg.solve(finer, 50.0, pinion=pinion, wheel=wheel).transmission_error)
+    change = written["ppte_change_at_twice_the_positions_um"]
+    assert change == pytest.approx(float(twice) - written["ppte_um"], abs=1e-9)
+    assert (
+        "twice as many change PPTE: unmodified by" in analyzed.out and f"modified by {change:+.2g} um" in analyzed.out
+    )
 
 
 def test_designs_of_a_file_with_tolerances_are_manufactured(folder, analyzed):

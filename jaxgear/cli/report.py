@@ -135,6 +135,13 @@ def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
         yield f"please check: {others}{doubt}"
 
 
+def grid(evaluations: Evaluations) -> str:
+    """How fine the mesh was, and what a finer one would change."""
+    positions = next(iter(evaluations.values())).cycle.kinematics.resolution.positions
+    changes = ", ".join(f"{name} by {evaluation.ppte_change:+.2g} um" for name, evaluation in evaluations.items())
+    return f"evaluated at {positions} positions; twice as many change PPTE: {changes}"
+
+
 def bores(file: DesignFile) -> str:
     """Both bores, since the body is held there, and whether anybody has asked for them."""
     gears = (("pinion", file.pair().pinion), ("wheel", file.pair().wheel))

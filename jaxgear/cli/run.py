@@ -191,6 +191,8 @@ class Run:
         if self._optimum is not None:
             found = self._optimum, self._projection, self._evaluations
             yield from optimum_report.verdict(self.design, *found, searched_at=self._searched_at)
+        else:
+            yield report.grid(self._evaluations)
         if self._front is not None:
             yield from optimum_report.front_lines(self._front)
         yield from manufactured.lines(self.design, self._evaluations)

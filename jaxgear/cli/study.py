@@ -8,6 +8,7 @@ import jax
 import numpy as np
 
 from ..contact import Mesh, MeshCycle, Operation
+from ..contact.parts import half_way
 from ..io import DesignFile, quantities_of_tables
 from ..metrics import face_load_factor, quantities, summary
 from ..metrics.settings import of_tables
@@ -30,6 +31,7 @@ class Evaluation:
         transmission_error: over the torques, shape (torques, positions) [um].
         ppte: peak-to-peak transmission error over the torques [um].
         objectives: what an optimization made small, by name and unit, of this design; empty without one.
+        ppte_change: by how much PPTE at the design torque changes at twice the positions [um].
         failed_torques: torques without a converged contact solution [N m], the design torque included.
         seconds: what finding and evaluating it took, without compilation of the latter [s].
         verified: what it is worth with the finite-element structure; None where nobody asked.
@@ -43,6 +45,7 @@ class Evaluation:
     metrics: dict[str, float | bool]
     transmission_error: np.ndarray
     ppte: np.ndarray
+    ppte_change: float
     failed_torques: list[float]
     seconds: float
     objectives: dict[str, float] = field(default_factory=dict)
@@ -60,6 +63,7 @@ def evaluate(
     began = time.perf_counter()
     cycles = over_torques(mesh, every, pinion=pinion, wheel=wheel)
     seconds = time.perf_counter() - began
+    between = over_torques(half_way(mesh), every[:1], pinion=pinion, wheel=wheel)[0].transmission_error
     curves = np.asarray([cycle.transmission_error for cycle in cycles])
     converged = np.asarray([cycle.converged for cycle in cycles]) & np.isfinite(curves)
     # without the flanks: one program serves every kind of them
@@ -76,6 +80,7 @@ def evaluate(
         metrics={name: value.item() for name, value in metrics.items()},
         transmission_error=curves[1:],
         ppte=np.ptp(curves[1:], axis=1),
+        ppte_change=float(np.ptp(np.concatenate([curves[0], np.asarray(between)])) - np.ptp(curves[0])),
         failed_torques=sorted({float(torque) for torque in every[~converged.all(axis=1)]}),
         seconds=seconds,
         face_load=_face_load(cycles[1:]),
