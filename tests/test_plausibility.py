@@ -44,6 +44,12 @@ def test_a_usual_design_raises_no_doubt(cycle):
     assert plausibility(cycle, oil_friction=0.06, bulk_temperature=95.0) == ()
 
 
+def test_tip_edges_that_dig_in_are_asked_about(mesh):
+    """Under the full load those of unmodified gears do, beyond what any flank endures; without load nothing does."""
+    assert names(jg.solve(mesh, 50.0)) == {("corner pressure", "")}
+    assert names(jg.solve(mesh, 1.0)) == set()
+
+
 @pytest.mark.parametrize(
     "options, expected",
     [

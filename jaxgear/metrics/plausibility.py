@@ -64,6 +64,9 @@ LIMITS = {
     "PPTE": Limit(0.1, np.inf, "um", "finer than the model can claim of modified flanks"),
     "PPTE by finite elements": Limit(0.03, np.inf, "um", "finer than a model in two dimensions can claim"),
     "flank pressure": Limit(0.0, 1650.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
+    "corner pressure": Limit(
+        0.0, 1650.0, "MPa", "tip edges dig into the mates, which no flank endures: relieve the tips"
+    ),
     "root stress": Limit(0.0, 1050.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
     "effective contact ratio": Limit(1.0, np.inf, "", "the teeth lose contact, and shocks follow"),
 }
@@ -203,6 +206,7 @@ def _numbers(cycle: MeshCycle):
     results = [
         ("mean transmission error in modules", "", 1e-3 * jnp.mean(cycle.transmission_error) / module),
         ("flank pressure", "", jnp.max(cycle.contact_pressure)),
+        ("corner pressure", "", jnp.max(cycle.corner_pressure)),
         ("root stress", "pinion", jnp.max(stress.pinion)),
         ("root stress", "wheel", jnp.max(stress.wheel)),
         ("effective contact ratio", "", effective_contact_ratio(cycle)),
