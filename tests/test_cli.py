@@ -461,7 +461,7 @@ def test_another_method_reports_like_every_other(iterated):
 @pytest.mark.slow
 def test_the_iteration_may_start_from_a_relief_of_low_pressure(folder, tmp_path):
     path = tmp_path / "free.toml"
-    path.write_text(FREE)
+    path.write_text(FREE + 'te_iteration = { start = "low_pressure" }\n')
     result = call("optimize", path, "--quick", "-m", "te_iteration", "-o", tmp_path / "out", "--no-figures")
     optimum = json.loads((tmp_path / "out" / "summary.json").read_text())["optimum"]
     assert result.code == 0 and optimum["method"] == "te_iteration"
