@@ -2,9 +2,10 @@
 
 Every case runs in processes of its own: cold, with an empty cache of compiled programs, and warm, with what the cold
 run left there. Counted are the functions that JAX traced and the programs that it compiled or took from its cache;
-those that a command has kept are not among them. Cases called new or own count from where the like of them was solved,
-the gradient from its call, and so do their times. Exit code 1 when a count has grown past `latency_bounds.json`, or a
-time past three times its bound: times depend on what else the machine does.
+those that a command has kept are not among them, but the one is by which it asks what options the compiler knows. Cases
+called new or own count from where the like of them was solved, the gradient from its call, and so do their times. Exit
+code 1 when a count has grown past `latency_bounds.json`, or a time past three times its bound: times depend on what
+else the machine does.
 """
 
 import argparse
