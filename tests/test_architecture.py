@@ -217,3 +217,16 @@ def test_no_function_shadows_a_package():
 
 def test_the_version_is_that_of_the_installed_package():
     assert jaxgear.__version__ == importlib.metadata.version("jaxgear")
+
+
+def test_tests_share_sizes_and_import_no_other_test():
+    """What several tests need is in modules of its own; every other size of arrays compiles programs of its own."""
+    sizes = set()
+    for path in Path(__file__).parent.glob("test_*.py"):
+        for node in nodes(path)[0]:
+            modules = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            modules += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            assert not any(name.startswith("test_") for name in modules), path
+            if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("Resolution"):
+                sizes.add(ast.unparse(node))
+    assert len(sizes) <= 50, sorted(sizes)
