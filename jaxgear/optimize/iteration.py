@@ -4,16 +4,15 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 
-import jax.numpy as jnp
 import numpy as np
 
 from ..conditions import Design, solve_case, solved
 from ..contact import Mesh, MeshCycle
 from ..metrics import max_relief as largest_relief
-from ..metrics import removed_at
-from ..microgeometry import AbstractModification, NoModification, TabulatedProfile
+from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Callback, check, whole
 from .goal import Constraint
+from .iterated_flanks import Flanks
 from .minimax import Minimax
 from .minimize import minimize
 from .result import Iterate, Limit, Optimum
@@ -85,7 +84,7 @@ def iterate_transmission_error(
     check("iterate_transmission_error", "rtol", rtol, "", low=0.0, open_low=True)
     whole("iterate_transmission_error", "steps", steps, 1)
     began = time.perf_counter()
-    flanks = _Flanks(mesh, pinion or NoModification(), wheel or NoModification(), float(max_relief))
+    flanks = Flanks(mesh, pinion or NoModification(), wheel or NoModification(), float(max_relief))
     limit = np.inf if max_pressure is None else float(max_pressure)
     cycles: list[MeshCycle] = []
     iterates: list[Iterate] = []
@@ -191,7 +190,7 @@ def _best(iterates: list[Iterate], limit: float) -> int:
 
 
 def _least_slant(
-    mesh: Mesh, torque, flanks: "_Flanks", limit: float
+    mesh: Mesh, torque, flanks: Flanks, limit: float
 ) -> tuple[AbstractModification, AbstractModification, MeshCycle, int]:
     """Both flanks with the least slant that keeps the pressure, or else the least pressure; solved, by how many."""
     tried: dict[float, tuple] = {}
@@ -218,64 +217,6 @@ def _ended(iterates: list[Iterate], rtol: float) -> bool:
     if last.ppte - last.limit <= rtol * last.limit:
         return True
     return len(iterates) > 2 and iterates[-2].ppte - last.ppte < rtol * iterates[-2].ppte
-
-
-class _Flanks:
-    """Both flanks: the modifications of the start, and what is taken off beside them in the contact points."""
-
-    def __init__(self, mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, most: float):
-        contact = mesh.path_of_contact
-        pitch, self._most = float(contact.base_pitch), most
-        start, end = float(contact.start), float(contact.end)
-        positions = mesh.resolution.positions
-        first, last = np.ceil(start / pitch * positions), np.floor(end / pitch * positions)
-        # the profile points are those that touch at a mesh position, and the ends of the path
-        number = np.arange(first, last + 1)
-        self._path = np.unique(np.concatenate([[start], number * pitch / positions, [end]]))
-        self._phase = np.asarray(mesh.phase)
-        # part of the way from the first double contact to either tip
-        double = max(end - start - pitch, np.finfo(float).tiny)
-        self._way = tuple(np.clip((tip + double) / double, 0.0, 1.0) for tip in (self._path - end, start - self._path))
-        self._pitch, self._start = pitch, (pinion, wheel)
-        self._roll = (
-            np.asarray(contact.pinion_roll_length(jnp.asarray(self._path))),
-            np.asarray(contact.wheel_roll_length(jnp.asarray(self._path))),
-        )
-        self._given = tuple(
-            np.asarray(removed_at(side, modification, jnp.asarray(roll)))
-            for side, modification, roll in zip(mesh.sides, self._start, self._roll)
-        )
-        self._extra = [np.zeros_like(self._path), np.zeros_like(self._path)]
-
-    def modifications(self, slant: float = 0.0) -> tuple[AbstractModification, AbstractModification]:
-        """Of pinion and wheel, with what is taken off slanted towards the tips."""
-        made = []
-        for index, (given, roll) in enumerate(zip(self._start, self._roll)):
-            before = self._given[index]
-            slanted = self._extra[index] * np.maximum(1 + slant * (2 * self._way[index] - 1), 0.0)
-            extra = np.clip(before + slanted, 0.0, self._most) - before
-            order = np.argsort(roll)
-            table = TabulatedProfile(jnp.asarray(roll[order]), jnp.asarray(extra[order]))
-            made.append(table if isinstance(given, NoModification) else given + table)
-        return made[0], made[1]
-
-    def take_off(self, missing: np.ndarray, alone: np.ndarray) -> None:
-        """Takes off what is missing to the level at every position [um]; where there is too much, gives back."""
-        at_path = np.interp(self._path / self._pitch, self._phase, missing, period=1.0)
-        for index, outwards in enumerate((1.0, -1.0)):
-            depth = outwards * self._path
-            outer = depth >= self._onset(missing, alone, outwards)
-            total = np.clip(self._given[index] + self._extra[index] + at_path, 0.0, self._most)
-            self._extra[index] = np.where(outer, total - self._given[index], self._extra[index])
-
-    def _onset(self, missing: np.ndarray, alone: np.ndarray, outwards: float) -> float:
-        """Distance from the pitch point at which the transmission error leaves its extreme in single contact [mm]."""
-        # phases as distances on the way out, half a base pitch to either side of the pitch point
-        distance = outwards * ((self._phase + 0.5) % 1 - 0.5) * self._pitch
-        side = alone & (distance >= 0)
-        if not side.any():
-            return 0.0
-        return float(distance[side][np.argmin(missing[side])])
 
 
 def _solve(mesh: Mesh, torque, pinion: AbstractModification, wheel: AbstractModification) -> MeshCycle:
