@@ -491,7 +491,7 @@ application_factor = 1.2
 constraint = [{ of = "max_contact_pressure", high = 900.0 }, { variables = { height = 1.0 }, low = 1.0 }]
 minimax = { rounds = 2 }
 free_form = { points = 20, max_relief = 10.0, curvature = 0.01 }
-te_iteration = { start = "unmodified", max_relief = 8.0 }
+te_iteration = { start = "unmodified", max_relief = 8.0, max_pressure = 2000.0 }
 factorial = { levels = { height = 3 } }
 genetic = { population = 20, crossover = 0.4 }
 [sweep]

@@ -122,6 +122,48 @@ def test_a_relief_to_start_from_also_softens_the_entry(nominal, relieved):
     assert best.max_relief <= 7.0 + 1e-9
 
 
+@pytest.fixture(scope="module")
+def slanted(mesh):
+    """Within 2 GPa, what the study allows: the height at the tip is left to the pressure."""
+    return jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=12.0, max_pressure=2000.0)
+
+
+def test_a_relief_that_rises_to_the_tip_is_as_level_and_keeps_the_tip_edges_out(mesh, nominal, slanted):
+    """Of the reliefs that level two pairs alike, the plateau leaves the edges as they are, the slanted one unloads them
+    as it comes to the deflection of a single pair: twice the height of the plateau."""
+    plateau, _ = nominal
+    pressure = jg.quantities["max_contact_pressure"]
+    assert float(pressure(plateau.cycle)) > 4000.0
+    assert float(pressure(slanted.cycle)) <= 2000.0 and slanted.feasible
+    assert slanted.ppte <= plateau.ppte
+    for state in slanted.iterations[1:]:
+        assert max(state.max_corner_pressure, state.max_flank_pressure) <= 2000.0
+    top = max(state.max_relief for state in plateau.iterations)
+    assert 1.6 * top < slanted.constraints["max_relief"].value < 2.4 * top
+    # towards the tip it rises all the way, where the other one is level
+    pinion, wheel = (np.asarray(relief) for relief in jg.metrics.profile_relief(mesh, slanted.pinion, slanted.wheel))
+    np.testing.assert_allclose(pinion, wheel, atol=1e-9)
+    assert np.all(np.diff(pinion[pinion > 0.5]) > 0) and pinion.argmax() == pinion.size - 1
+    strength = jg.metrics.Strength(pressure=2000.0)
+    assert float(strength.quantity("pressure_safety")(slanted.cycle)) >= 1.0
+
+
+def test_a_limit_of_the_pressure_that_holds_anyway_changes_nothing(nominal, mesh):
+    result, _ = nominal
+    free = jg.optimize.iterate_transmission_error(mesh, TORQUE, max_pressure=1e5)
+    assert [state.ppte for state in free.iterations] == [state.ppte for state in result.iterations]
+    assert free.evaluations == result.evaluations
+
+
+def test_a_limit_of_the_pressure_that_no_slant_keeps_is_no_success(mesh):
+    """With 2 um at the tips the edges dig in however the relief is spread."""
+    low = jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=2.0, max_pressure=2000.0, steps=1)
+    limit = low.constraints["max_contact_pressure"]
+    assert not low.feasible and not limit.kept and "MPa, NOT MET: at most 2000" in str(limit)
+    assert low.violation == pytest.approx(limit.value / 2000.0 - 1) and low.violation > 0.5
+    assert low.constraints["max_relief"].kept
+
+
 def test_a_loose_tolerance_ends_early(mesh, nominal):
     result, _ = nominal
     hasty = jg.optimize.iterate_transmission_error(mesh, TORQUE, rtol=20.0)
@@ -137,6 +179,7 @@ def test_a_loose_tolerance_ends_early(mesh, nominal):
         (0.0, {}, "torque"),
         (float("nan"), {}, "torque"),
         (TORQUE, {"max_relief": 0.0}, "max_relief"),
+        (TORQUE, {"max_pressure": 0.0}, "max_pressure"),
         (TORQUE, {"rtol": -0.1}, "rtol"),
         (TORQUE, {"steps": 0}, "steps = 0"),
         (TORQUE, {"steps": 2.5}, "steps = 2.5"),

@@ -265,6 +265,7 @@ class FactorialOptions(Section):
 class IterationOptions(Section):
     start: Annotated[str, choice("unmodified", "given", "low_pressure")] = "unmodified"
     max_relief: Annotated[float, positive("um")] = 7.0
+    max_pressure: Annotated[float | None, positive("MPa")] = None
     rtol: Annotated[float | None, positive("")] = None
     steps: Annotated[int | None, count(1, 1000)] = None
     curve: Annotated[str | None, text()] = None

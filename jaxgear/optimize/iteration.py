@@ -4,16 +4,15 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 
-import jax.numpy as jnp
 import numpy as np
 
 from ..conditions import Design, solve_case, solved
 from ..contact import Mesh, MeshCycle
 from ..metrics import max_relief as largest_relief
-from ..metrics import removed_at
-from ..microgeometry import AbstractModification, NoModification, TabulatedProfile
+from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Callback, check, whole
 from .goal import Constraint
+from .iterated_flanks import Flanks
 from .minimax import Minimax
 from .minimize import minimize
 from .result import Iterate, Limit, Optimum
@@ -21,6 +20,8 @@ from .search import AbstractMethod
 
 _UNTOUCHED = 0.05  # [um]: a flank with less relief than this counts as unmodified
 _LOADED = 1e-6  # a pair with less than this share of the force carries none
+_STEEPEST = 2.0  # slant of a relief that begins a quarter of the way to the tip, and is three times as high there
+_HALVINGS = 5  # of the range of slants: the slant is the least one within 1/16
 
 
 def iterate_transmission_error(
@@ -30,6 +31,7 @@ def iterate_transmission_error(
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
     max_relief: float = 7.0,
+    max_pressure: float | None = None,
     rtol: float = 0.1,
     steps: int = 5,
     callback: Callback | None = None,
@@ -49,18 +51,27 @@ def iterate_transmission_error(
     since the single contact of unmodified flanks does not change; the study takes its lower limit of the PPTE from
     there as well.
 
+    Of equal reliefs on both pairs, a plateau up to the tip is left: the tip edges meet the mates as before. But the
+    gears lag by the sum of both gaps, weighted by the stiffnesses of the pairs, so that any other share between the
+    pair that leaves and the one that enters is as level ("infinite solutions with equal peak-to-peak transmission
+    error"). With `max_pressure`, the relief is slanted: from the first double contact (u = 0) to the tip (u = 1) it is
+    multiplied by 1 + t (2 u - 1), not less than 0, with the least slant t from 0 to 2 that keeps the pressure of flanks
+    and tip edges within that limit. The height at the tip follows from the pressure, as it does in the study.
+
     Args:
         mesh: prepared mesh.
         torque: on the pinion, at which the transmission error is levelled [N m].
         pinion, wheel: modifications to start from (the study's type 2); None for the nominal involute (its type 1).
         max_relief: most that is left removed anywhere [um].
+        max_pressure: largest pressure of flanks and tip edges [MPa]; None for no limit.
         rtol: ends the iteration where PPTE is within this part of its lower limit, or has fallen by less than
             this part of itself.
         steps: most steps.
         callback: called as callback(step, steps, best PPTE).
 
     Returns:
-        the state with the least PPTE; `iterations` has all of them.
+        the state with the least PPTE of those within the limit of the pressure, or else with the least pressure;
+        `iterations` has all of them.
 
     Raises:
         ValueError: for numbers outside their range.
@@ -68,27 +79,38 @@ def iterate_transmission_error(
     """
     check("iterate_transmission_error", "torque", torque, "N m", low=0.0, open_low=True)
     check("iterate_transmission_error", "max_relief", max_relief, "um", low=0.0, open_low=True)
+    if max_pressure is not None:
+        check("iterate_transmission_error", "max_pressure", max_pressure, "MPa", low=0.0, open_low=True)
     check("iterate_transmission_error", "rtol", rtol, "", low=0.0, open_low=True)
     whole("iterate_transmission_error", "steps", steps, 1)
     began = time.perf_counter()
-    flanks = _Flanks(mesh, pinion or NoModification(), wheel or NoModification(), float(max_relief))
+    flanks = Flanks(mesh, pinion or NoModification(), wheel or NoModification(), float(max_relief))
+    limit = np.inf if max_pressure is None else float(max_pressure)
     cycles: list[MeshCycle] = []
     iterates: list[Iterate] = []
+    spent: list[int] = []
+    reached: list[float] = []
     level = float("nan")
     for step in range(steps + 1):
-        pinion, wheel = flanks.modifications()
-        cycles.append(cycle := _solve(mesh, torque, pinion, wheel))
+        pinion, wheel, cycle, solves = _least_slant(mesh, torque, flanks, limit if step else np.inf)
+        cycles.append(cycle)
+        spent.append(solves)
         error, alone = np.asarray(cycle.transmission_error), _alone(cycle)
         iterates.append(_iterate(mesh, cycle, alone, pinion, wheel))
+        reached.append(iterates[_best(iterates, limit)].ppte)
         if callback is not None:
-            callback(step, steps, min(iterate.ppte for iterate in iterates))
+            callback(step, steps, reached[-1])
         if step == 0:
             level = float(error[alone].max())
         if step == steps or _ended(iterates, rtol):
             break
         flanks.take_off(level - error, alone)
-    number = int(np.argmin([iterate.ppte for iterate in iterates]))
+    number = _best(iterates, limit)
     best = iterates[number]
+    limits = {"max_relief": Limit(best.max_relief, None, float(max_relief), "um", True)}
+    excess = max(best.max_pressure / limit - 1, 0.0)
+    if max_pressure is not None:
+        limits["max_contact_pressure"] = Limit(best.max_pressure, None, limit, "MPa", excess == 0.0)
     return Optimum(
         method="te_iteration",
         objective_name="ppte",
@@ -104,11 +126,11 @@ def iterate_transmission_error(
         grid_change=float("nan"),
         decrease_left=float("nan"),
         active_bounds={},
-        constraints={"max_relief": Limit(best.max_relief, None, float(max_relief), "um", True)},
-        violation=0.0,
-        evaluations=len(cycles),
-        history=np.minimum.accumulate([iterate.ppte for iterate in iterates]),
-        history_evaluations=np.arange(1, len(cycles) + 1),
+        constraints=limits,
+        violation=excess,
+        evaluations=sum(spent),
+        history=np.asarray(reached),
+        history_evaluations=np.cumsum(spent),
         seconds=time.perf_counter() - began,
         iterations=tuple(iterates),
     )
@@ -161,63 +183,40 @@ def iterate_from_low_pressure(
     )
 
 
+def _best(iterates: list[Iterate], limit: float) -> int:
+    """Number of the state with the least PPTE within the limit of the pressure, else of the one with the least."""
+    excess = [max(state.max_pressure - limit, 0.0) for state in iterates]
+    return min(range(len(iterates)), key=lambda number: (excess[number], iterates[number].ppte))
+
+
+def _least_slant(
+    mesh: Mesh, torque, flanks: Flanks, limit: float
+) -> tuple[AbstractModification, AbstractModification, MeshCycle, int]:
+    """Both flanks with the least slant that keeps the pressure, or else the least pressure; solved, by how many."""
+    tried: dict[float, tuple] = {}
+
+    def kept(slant: float) -> bool:
+        pinion, wheel = flanks.modifications(slant)
+        cycle = _solve(mesh, torque, pinion, wheel)
+        # a contact is on the flank or at the tip edge, and zero in the other field
+        pressure = float(np.max(np.asarray(cycle.contact_pressure) + np.asarray(cycle.corner_pressure)))
+        tried[slant] = (pinion, wheel, cycle, pressure)
+        return tried[slant][-1] <= limit
+
+    low, high = 0.0, _STEEPEST
+    if not kept(low) and kept(high):
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if kept(middle) else (middle, high)
+    slant = min(tried, key=lambda slant: (max(tried[slant][-1] - limit, 0.0), slant))
+    return *tried[slant][:3], len(tried)
+
+
 def _ended(iterates: list[Iterate], rtol: float) -> bool:
     last = iterates[-1]
     if last.ppte - last.limit <= rtol * last.limit:
         return True
     return len(iterates) > 2 and iterates[-2].ppte - last.ppte < rtol * iterates[-2].ppte
-
-
-class _Flanks:
-    """Both flanks: the modifications of the start, and what is taken off beside them in the contact points."""
-
-    def __init__(self, mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, most: float):
-        contact = mesh.path_of_contact
-        pitch, self._most = float(contact.base_pitch), most
-        start, end = float(contact.start), float(contact.end)
-        positions = mesh.resolution.positions
-        first, last = np.ceil(start / pitch * positions), np.floor(end / pitch * positions)
-        # the profile points are those that touch at a mesh position, and the ends of the path
-        number = np.arange(first, last + 1)
-        self._path = np.unique(np.concatenate([[start], number * pitch / positions, [end]]))
-        self._phase = np.asarray(mesh.phase)
-        self._pitch, self._start = pitch, (pinion, wheel)
-        self._roll = (
-            np.asarray(contact.pinion_roll_length(jnp.asarray(self._path))),
-            np.asarray(contact.wheel_roll_length(jnp.asarray(self._path))),
-        )
-        self._given = tuple(
-            np.asarray(removed_at(side, modification, jnp.asarray(roll)))
-            for side, modification, roll in zip(mesh.sides, self._start, self._roll)
-        )
-        self._extra = [np.zeros_like(self._path), np.zeros_like(self._path)]
-
-    def modifications(self) -> tuple[AbstractModification, AbstractModification]:
-        """Of pinion and wheel."""
-        made = []
-        for given, roll, extra in zip(self._start, self._roll, self._extra):
-            order = np.argsort(roll)
-            table = TabulatedProfile(jnp.asarray(roll[order]), jnp.asarray(extra[order]))
-            made.append(table if isinstance(given, NoModification) else given + table)
-        return made[0], made[1]
-
-    def take_off(self, missing: np.ndarray, alone: np.ndarray) -> None:
-        """Takes off what is missing to the level at every position [um]; where there is too much, gives back."""
-        at_path = np.interp(self._path / self._pitch, self._phase, missing, period=1.0)
-        for index, outwards in enumerate((1.0, -1.0)):
-            depth = outwards * self._path
-            outer = depth >= self._onset(missing, alone, outwards)
-            total = np.clip(self._given[index] + self._extra[index] + at_path, 0.0, self._most)
-            self._extra[index] = np.where(outer, total - self._given[index], self._extra[index])
-
-    def _onset(self, missing: np.ndarray, alone: np.ndarray, outwards: float) -> float:
-        """Distance from the pitch point at which the transmission error leaves its extreme in single contact [mm]."""
-        # phases as distances on the way out, half a base pitch to either side of the pitch point
-        distance = outwards * ((self._phase + 0.5) % 1 - 0.5) * self._pitch
-        side = alone & (distance >= 0)
-        if not side.any():
-            return 0.0
-        return float(distance[side][np.argmin(missing[side])])
 
 
 def _solve(mesh: Mesh, torque, pinion: AbstractModification, wheel: AbstractModification) -> MeshCycle:

@@ -12,7 +12,7 @@ CAPTIONS = {
     "value (PPTE).",
     "transmission_error_orders": "Amplitudes of the transmission error at the orders of the mesh frequency.",
     "load_sharing": "Share of the load that one tooth pair carries on its way along the path of contact.",
-    "pressure": "Largest flank pressure of one tooth pair along the path of contact.",
+    "pressure": "Largest pressure of one tooth pair along the path of contact, of flanks and tip corners (dots).",
     "pressure_map": "Pressure over path of contact and face width.",
     "contact_pattern": "Contact pattern: largest pressure of every place of the flank over a whole mesh.",
     "line_load": "Load per length over the face.",
