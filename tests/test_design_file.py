@@ -450,6 +450,12 @@ MALFORMED = {
         "wheel.tip_diameter: tip diameter = 30 mm must be greater than",
     ),
     "bore of the file": (text(wheel="bore_diameter = 140.0"), "wheel.bore_diameter: 140 mm must be less than 136.5"),
+    "bore of nothing": (
+        text(wheel="bore_diameter = 0.01"),
+        "wheel.bore_diameter: 0.01 mm must be at least 2.73 mm, 2 %",
+    ),
+    "key of absurd depth": ("a = 1\n" + "a." * 3000 + "b = 1", "line 2: a key has more than 32 parts between dots"),
+    "table of absurd depth": ("[" + '"a" . ' * 40 + "'b']", "line 1: a key has more than 32 parts between dots"),
     "nested absurdly": ("a = " + "[" * 100_000, "tables or lists are nested too deeply"),
     "number beyond all bounds": (text().replace("module = 3.0", "module = 1" + "0" * 400), "pinion.module: "),
     "empty": ("", "pinion: missing, this key is required"),

@@ -52,6 +52,11 @@ def test_units_and_ranges_stand_in_the_fields():
         ({"rate": 0.0}, "Probe: rate = 0 must be greater than 0"),
         ({"side": "top"}, 'Probe: side = \'top\' must be "left", "right" or "both"'),
         ({"switch": "no"}, "Probe: switch = 'no' must be True or False"),
+        ({"amount": True}, "Probe: amount = True must be a number"),
+        ({"amount": 50 + 1j}, "Probe: amount = (50+1j) must be a real number"),
+        ({"amount": "2.5"}, "Probe: amount = '2.5' must be a number"),
+        ({"amount": None}, "Probe: amount = None must be a number"),
+        ({"values": [[1.0], [1.0, 2.0]]}, "Probe: values = ((1), (1, 2)) must be a number"),
         ({"amount": [1.0, 2.0]}, "Probe: amount has shape (2,), must be a single number; make many with jax.vmap"),
     ],
 )

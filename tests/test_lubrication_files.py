@@ -103,6 +103,10 @@ def test_tables_bring_the_quantities_that_they_tell_of(load):
             PAIR.replace("3000.0", '"n"') + OIL + "[variables]\nn = { low = 0.0, high = 3000.0 }",
             "pair.toml: variables.n.low: 0 rpm must be greater than 0 rpm with [lubricant]",
         ),
+        (
+            PAIR.replace("3000.0", "1e-9") + OIL,
+            "pair.toml: load.speed: 1e-09 rpm must be at least 0.001 rpm and at most 1e+07 rpm with [lubricant]",
+        ),
         (PAIR + OIL + 'friction = "xu"', 'lubricant.friction: "xu" is not known'),
         (PAIR + "friction = 0.05" + OIL + 'friction = "schlenk"', "lubricant.friction: has no effect beside load.fric"),
         (

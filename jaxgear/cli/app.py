@@ -259,21 +259,36 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         given = sys.argv[1:] if arguments is None else list(arguments)
         code = app(args=given, obj=given, prog_name="jaxgear", standalone_mode=False)
+        sys.stdout.flush()  # what cannot be written is known here, not when the interpreter ends
         if code == INTERRUPTED or interrupt.state.asked:
             return _say_interrupted()
     except (KeyboardInterrupt, typer.Abort):
         return _say_interrupted()
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # keeps the flush at exit quiet
+        _forget_output()
         return OK
+    except SystemExit as end:  # of typer, where nobody reads its help to the end
+        if isinstance(end.__context__, BrokenPipeError):
+            return OK
+        raise
     except Exception as error:  # noqa: BLE001 - a user never sees a traceback
         if os.environ.get("JAXGEAR_DEBUG"):
             raise
         if interrupt.state.asked:  # a library has made something else of it
             return _say_interrupted()
         print(f"jaxgear: error: {_one_line(error)}", file=sys.stderr)
+        if isinstance(error, OSError):
+            _forget_output()
         return FAILED
     return code or OK
+
+
+def _forget_output() -> None:
+    """Keeps the flush at exit quiet where standard output takes nothing."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _say_interrupted() -> int:
@@ -287,4 +302,6 @@ def _one_line(error: Exception) -> str:
     message = " ".join(str(error).split())
     if isinstance(error, ValueError | RuntimeError) and message:
         return message
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or 'standard output'}: {error.strerror}"
     return f"unexpected {type(error).__name__}: {message} (JAXGEAR_DEBUG=1 shows where)"

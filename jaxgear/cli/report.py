@@ -104,7 +104,7 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
 def doubts(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, tuple[Doubt, ...]]:
     """What is not usual of every design."""
     options: dict[str, Any] = {"torque_range": file.torque_range, "speed": file.speed, "friction": file.friction}
-    options["compliance"] = mesh.compliance
+    options |= {"compliance": mesh.compliance, "lubricant": file.lubricant}
     found = {}
     for name, design in evaluations.items():
         options |= {"pinion": design.pinion, "wheel": design.wheel}

@@ -15,6 +15,12 @@ S = TypeVar("S", bound=BaseModel)
 # pydantic's own errors about the containers of values; what is wrong with a value, its kind says itself
 _CONTAINERS = {"list_type": "a list", "dict_type": "a table", "model_type": "a table"}
 
+# Parts of a dotted key: a design file nests its tables three deep, and time and memory of the parser grow with the
+# square of this number.
+_MOST_PARTS = 32
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{_MOST_PARTS}}}")
+
 
 def content(path: Path) -> bytes:
     """What a file holds.
@@ -42,6 +48,9 @@ def read(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         line = held.count(b"\n", 0, error.start) + 1
         raise DesignFileError("", f"line {line}: not UTF-8 text") from None
+    if long_key := _LONG_KEY.search(text):
+        line = text.count("\n", 0, long_key.start()) + 1
+        raise DesignFileError("", f"line {line}: a key has more than {_MOST_PARTS} parts between dots")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -62,7 +62,7 @@ def number(unit: str, *, default: Any = MISSING, kw_only: bool = False, **limits
         limits: the other fields of `Number`.
     """
     kind = Number(unit, **limits)
-    converter = _plain if kind.static else optional_real if kind.optional else real
+    converter = _plain if kind.static else _real_or_given
     given = {} if default is MISSING else {"default": default}
     return eqx.field(metadata={_KEY: kind}, kw_only=kw_only, converter=converter, static=kind.static, **given)
 
@@ -119,26 +119,51 @@ def changed(module: _Module, **fields) -> _Module:
     return made
 
 
-def real(value) -> Float[Array, "..."]:
+def real(value, what: str = "") -> Float[Array, "..."]:
     """Converts to an inexact array: arrays of floats keep their dtype, everything else takes JAX's default float.
 
     Numbers stay concrete inside traced functions, so that they are checked there too.
+
+    Args:
+        value: number, or array or nested list of numbers.
+        what: name of the value, for the message.
+
+    Raises:
+        ValueError: for anything else: a truth value or a text is no number, and of a complex one half would be lost.
     """
-    if any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value)):
-        return _inexact(value)
-    given = np.asarray(value)
-    with jax.ensure_compile_time_eval():
-        if given.dtype.kind not in "biuf":
+    try:
+        if any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value)):
             return _inexact(value)
-        # neither NumPy's conversion nor the transfer compiles anything
-        return jax.device_put(given if given.dtype.kind == "f" else given.astype(jnp.result_type(float)))
+        given = np.asarray(value)
+        with jax.ensure_compile_time_eval():
+            if given.dtype.kind not in "iuf":
+                return _inexact(value)
+            # neither NumPy's conversion nor the transfer compiles anything
+            return jax.device_put(given if given.dtype.kind == "f" else given.astype(jnp.result_type(float)))
+    except (TypeError, ValueError):  # lists of unequal length are none either
+        raise ValueError(_no_number(what, value)) from None
 
 
 def _inexact(value) -> Float[Array, "..."]:
     array = jnp.asarray(value)
+    if array.dtype.kind in "bc":
+        raise TypeError
     dtype = array.dtype if jnp.issubdtype(array.dtype, jnp.inexact) else jnp.result_type(float)
     # the conversion also drops the weak type of Python numbers, which would retrace where an array did not
     return jax.lax.convert_element_type(array, dtype)
+
+
+def _real_or_given(value):
+    """A number field's value: what is no number stays as it is for the check, which knows its name."""
+    try:
+        return optional_real(value)
+    except ValueError:
+        return value
+
+
+def _no_number(what: str, value) -> str:
+    wanted = "a real number" if getattr(value, "dtype", np.dtype(type(value))).kind == "c" else "a number"
+    return f"{what}{' = ' if what else ''}{_shown(value)} must be {wanted}"
 
 
 def optional_real(value) -> Float[Array, "..."] | None:
@@ -233,6 +258,8 @@ def _check_number(owner: str, name: str, value, kind: Number) -> None:
         if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
             raise ValueError(f"{owner}: {name} = {value!r} must be a number")
     else:
+        if not isinstance(value, jax.Array) or value.dtype.kind in "bc":  # the converter has left it as it was
+            raise ValueError(f"{owner}: {_no_number(name, value)}")
         _check_shape(owner, name, value.shape, kind)
     check(owner, name, value, kind.unit, low=kind.low, high=kind.high, open_low=kind.open_low, open_high=kind.open_high)
     if kind.limits and (known := concrete(value)) is not None and known.ndim and not known[0] <= known[1]:
