@@ -462,6 +462,89 @@ MALFORMED = {
 }
 
 
+FREE = text(pinion=RELIEF, load="speed = 3000.0", tail=VARIABLE)
+SWEPT = FREE + "[sweep]\nsamples = 8\n"
+# of a table that a command passes over -> content, and what every command says of it
+OF_OTHER_COMMANDS = {
+    "option of a method": (
+        FREE + '[optimize.te_iteration]\nsteps = "abc"',
+        "optimize.te_iteration.steps: must be a whole number, not a string",
+    ),
+    "option misspelt": (FREE + "[optimize.genetic]\npopulaton = 9", "optimize.genetic.populaton: unknown key, did you"),
+    "curve of a method": (FREE + '[optimize.free_form]\ncurve = "x"', 'optimize.free_form.curve: "x" is not known'),
+    "levels of a method": (
+        FREE + "[optimize.factorial]\nlevels = { h = 2 }",
+        "optimize.factorial.levels: must name all",
+    ),
+    "method": (FREE + '[optimize]\nmethod = "simplex"', 'optimize.method: "simplex" is not known'),
+    "objective": (FREE + '[optimize]\nobjective = "noise"', 'optimize.objective: "noise" is not known'),
+    "objective without its table": (
+        FREE + '[optimize]\nobjective = "mean_ppte_over_life"',
+        'optimize.objective: "mean_ppte_over_life" needs the table [wear]',
+    ),
+    "constraint": (FREE + "[optimize]\nconstraint = [{ off = 1 }]", "optimize.constraint[0].off: unknown key, did you"),
+    "measure": (FREE + '[optimize]\nmeasure = "worst"', "optimize.measure: has no effect on a single case"),
+    "weights": (FREE + "[optimize]\ntorques = [9.0]\nweights = [1.0, 2.0]", "optimize.weights: "),
+    "manufactured": (FREE + "[optimize]\nmanufactured = 4", "optimize.manufactured: needs the table [tolerance]"),
+    "results": (SWEPT + 'results = ["ppte", "noise"]', 'sweep.results[1]: "noise" is not known'),
+    "sampling": (SWEPT + "levels = 3", 'sweep.levels: has no effect with sampling = "sobol"'),
+    "levels": (
+        SWEPT.replace("samples = 8", 'sampling = "full_factorial"\nlevels = { width = 3 }'),
+        "sweep.levels: levels must be",
+    ),
+    "speeds": (text(tail="[dynamics]\nnumber = 9"), "dynamics: needs either mesh_frequencies or speeds"),
+    "wear": (
+        text(tail="[wear]\nrevolutions = 1e6\ncoefficient = 1e-18\nweights = [1.0]"),
+        "wear.weights: has no effect",
+    ),
+}
+SHAFTS = """
+[layout]
+quality_class = 6
+[[shafts]]
+name = "in"
+sections = [{ length = 160.0, diameter = 40.0 }]
+bearings = [{ name = "A", position = 60.0, radial = 250.0 }, { name = "B", position = 140.0, radial = 250.0 }]
+gears = [{ name = "pinion", position = 20.0, integral = true }]
+couplings = [{ position = 160.0, torque = 50.0 }]
+[[shafts]]
+name = "out"
+sections = [{ length = 190.0, diameter = 45.0 }]
+bearings = [{ name = "C", position = 20.0, radial = 300.0 }, { name = "D", position = 130.0, radial = 300.0 }]
+gears = [{ name = "wheel", position = 45.0, integral = true }]
+couplings = [{ position = 190.0 }]
+"""
+LAYOUTS = {
+    "[layout.misalignment]\nskew = nan\nbearing_span = 80.0": "layout.misalignment.skew: nan must be finite",
+    "[layout.misalignment]\nskw = 9.0\nbearing_span = 80.0": "layout.misalignment.skw: unknown key, did you mean",
+    "[layout.profile]\npinion_amounts = [1.0, 1.0]": "layout.profile.pinion_amounts: must all be different",
+    "[layout.pitting]\nendurance = 900.0": "layout.pitting: has no effect without layout.torques",
+}
+
+
+@pytest.mark.parametrize("case", OF_OTHER_COMMANDS)
+def test_a_file_is_wrong_whatever_the_command(load, case):
+    content, expected = OF_OTHER_COMMANDS[case]
+    with pytest.raises(DesignFileError) as caught:
+        load(content)
+    assert f"gear.toml: {expected}" in str(caught.value)
+
+
+def test_tables_of_a_layout_are_looked_into(load):
+    assert load(text(tail=SHAFTS)).layout is not None
+    for tail, expected in LAYOUTS.items():
+        with pytest.raises(DesignFileError) as caught:
+            load(text(tail=SHAFTS + tail))
+        assert f"gear.toml: {expected}" in str(caught.value)
+
+
+def test_what_options_of_a_command_can_change_is_left_to_it(load):
+    load(FREE + '[optimize]\nobjective = ["ppte", "mean_te"]')  # --method pareto
+    load(FREE + "[optimize]\nlevel = 0.5\nmeasure = 'cvar'\ntorques = [40.0, 50.0]\nstarts = 3\n[optimize.genetic]")
+    load(FREE + "[sweep]")  # --samples
+    load(FREE + '[sweep]\nsampling = "list"\nfile = "not_made_yet.csv"')
+
+
 @pytest.mark.parametrize("case", MALFORMED)
 def test_a_malformed_file_is_one_line_that_names_file_and_key(load, tmp_path, case):
     content, expected = MALFORMED[case]

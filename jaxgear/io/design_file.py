@@ -193,16 +193,12 @@ def _single_deflection(pair: GearPair, torque) -> Float[Array, ""]:
     return line_load / iso_stiffness(pair, line_load).single
 
 
-def load_design(path: str | Path) -> DesignFile:
-    """Reads and checks a design file.
-
-    Args:
-        path: TOML file; examples/spur_19_48.toml shows and lists what it can say.
+def read_design(file: Path) -> DesignFile:
+    """Reads a design file and checks all but what only the tables of its commands say, see `load_design`.
 
     Raises:
         DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
     """
-    file = Path(path)
     with naming(file):
         says = read(file)
         return _checked(file, json.dumps(says, sort_keys=True, default=str), decode("", says, schema.FileSection))
