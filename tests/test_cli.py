@@ -686,6 +686,14 @@ def test_help_and_version_need_no_file():
     assert call("--version").out.startswith("jaxgear ")
 
 
+def test_the_compiler_raises_what_is_wrong_and_says_nothing_else(monkeypatch):
+    """Of XLA's messages on stderr only fatal ones: its alarm over a long compilation asks for a bug report."""
+    monkeypatch.setenv("TF_CPP_MIN_LOG_LEVEL", "")
+    monkeypatch.delenv("TF_CPP_MIN_LOG_LEVEL")
+    call("--version")
+    assert os.environ["TF_CPP_MIN_LOG_LEVEL"] == "3"
+
+
 def test_output_that_nobody_takes():
     """`jaxgear --help | head -1` is no error, a full disk behind `>` is one."""
     reader, writer = os.pipe()

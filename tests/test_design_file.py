@@ -3,6 +3,7 @@
 import functools
 import json
 import math
+import os
 import re
 from pathlib import Path
 
@@ -30,6 +31,7 @@ from jaxgear.io import (
     sweep_request,
     write_summary,
 )
+from jaxgear.io.cases import tolerance_of
 from jaxgear.io.layout import family, section_of
 from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, ParabolicLinear
@@ -245,8 +247,8 @@ MALFORMED = {
     "unknown table": (text(tail="[lode]\ntorque = 1.0"), 'lode: unknown key, did you mean "load"?'),
     "unknown gear key": (text(pinion="face_widht = 3.0"), 'pinion.face_widht: unknown key, did you mean "face_width"?'),
     "unknown material key": (
-        text(wheel="material = { young = 206000.0 }"),
-        "wheel.material.young: unknown key, must be one of density, elastic_modulus,",
+        text(wheel="material = { stiff = 206000.0 }"),
+        "wheel.material.stiff: unknown key, must be one of density, elastic_modulus,",
     ),
     "unknown load key": (text(load="torqe = 3"), 'load.torqe: unknown key, did you mean "torque"?'),
     "unknown modification key": (
@@ -450,6 +452,27 @@ MALFORMED = {
         "wheel.tip_diameter: tip diameter = 30 mm must be greater than",
     ),
     "bore of the file": (text(wheel="bore_diameter = 140.0"), "wheel.bore_diameter: 140 mm must be less than 136.5"),
+    "symbol of the field": (text().replace("teeth = 19", "z = 19"), 'pinion.z: unknown key, did you mean "teeth"?'),
+    "symbol with an index": (text(pinion="d_a1 = 60.0"), 'pinion.d_a1: unknown key, did you mean "tip_diameter"?'),
+    "symbol of two tables": (text(load="m = 3.0"), 'load.m: unknown key, did you mean "torque"?'),
+    "helical gear": (text(pinion="helix_angle = 10.0"), "pinion.helix_angle: unknown key, the gears are spur gears"),
+    "unit with a number": (
+        text().replace("torque = 50.0", 'torque = "250 Nm"'),
+        'load.torque: "250 Nm" must be a number in N m alone',
+    ),
+    "decimal comma": (text(wheel='profile_shift = "0,5"'), 'wheel.profile_shift: "0,5" must be a number in x module'),
+    "curve without type": (
+        text(pinion=RELIEF.replace('"height"', "1.0") + 'curve = { typx = "linear" }'),
+        'pinion.modification[0].curve.typx: unknown key, did you mean "type"?',
+    ),
+    "centre distance of another pair": (
+        text(tail="[pair]\ncenter_distance = 1311.0"),
+        "pair.center_distance: 1311 mm must be less than 106.5 mm, the sum of both tip radii",
+    ),
+    "centre distance too large": (
+        text(tail="[pair]\ncenter_distance = 104.5"),
+        "pair.center_distance: 104.5 mm leaves a contact ratio of 0.",
+    ),
     "bore of nothing": (
         text(wheel="bore_diameter = 0.01"),
         "wheel.bore_diameter: 0.01 mm must be at least 2.73 mm, 2 %",
@@ -558,6 +581,53 @@ def test_a_malformed_file_is_one_line_that_names_file_and_key(load, tmp_path, ca
 def test_a_torque_in_newton_millimetres_is_named_as_one(load):
     with pytest.raises(DesignFileError, match=r"load\.torque: 50000 N m deflects a pair of teeth of module 3 mm by"):
         load(text().replace("torque = 50.0", "torque = 50000.0") + "torque_range = [49999.0, 50000.0]").resolution()
+
+
+def test_a_modulus_in_another_unit_is_named_as_one(load):
+    for pinion, key in (
+        ("material = { elastic_modulus = 206.0 }", "pinion.material.elastic_modulus"),
+        ('material = "s"', "materials.s.elastic_modulus"),
+    ):
+        with pytest.raises(DesignFileError, match=rf"{key}: 206 MPa is less than 500 MPa \(.*GPa.*100 N m deflects"):
+            load(text(pinion=pinion, tail="[materials.s]\nelastic_modulus = 206.0")).resolution()
+
+
+def test_a_gear_for_which_no_tolerances_are_made_is_named(load):
+    file = load(text(tail="[tolerance]\nquality_class = 5").replace("face_width = 18.0", "face_width = 2.0"))
+    with pytest.raises(DesignFileError, match=r"^wheel\.face_width: 2 mm must be at least 4 mm and at most 1200 mm"):
+        tolerance_of(file)
+
+
+# tables that refer to a file, and what stands before its name
+REFERRING = {
+    "pinion.modification[0].file": '[[pinion.modification]]\ntype = "file"\nfile = "FILE"\n',
+    "lubricant.file": 'lubricant = { file = "FILE", temperature = 50.0 }\n',
+    "strength.file": 'strength = { file = "FILE" }\n',
+    "sweep.file": f'{RELIEF}{VARIABLE}[sweep]\nsampling = "list"\nfile = "FILE"\n',
+    "housing.file": SHAFTS + '[housing]\nfile = "FILE"\n',
+    "model.wheel_table": '[model]\nstructure = "finite_element"\nwheel_table = "FILE"\n',
+}
+
+
+@pytest.mark.parametrize("key", REFERRING)
+def test_a_file_that_cannot_be_read_is_named_by_its_key(load, tmp_path, key):
+    """A pipe or a device would be read for ever."""
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "folder.csv").mkdir()
+    (tmp_path / "link.csv").symlink_to("/dev/zero")
+    for name, problem in (
+        ("pipe.csv", "is not a regular file"),
+        ("link.csv", "is not a regular file"),
+        ("folder.csv", "is a folder, not a file"),
+        ("none.csv", "No such file or directory"),
+        ("a\\u0000.csv", "embedded null byte"),
+        (f"{'a' * 300}.csv", "File name too long"),
+    ):
+        table = REFERRING[key].replace("FILE", name)
+        content = f"{table}{text()}" if table.startswith(("lubricant", "strength")) else text(tail=table)
+        with pytest.raises(DesignFileError) as caught:
+            sweep_request(load(content))
+        assert re.search(rf"/gear\.toml: {re.escape(key)}: a*.*\.csv: {problem}$", str(caught.value)), caught.value
 
 
 WRONG = [
@@ -672,7 +742,7 @@ def test_variables_stand_for_numbers_of_gears_pair_and_load(load):
         ("results", "torques = [30.0]\nresults", 'sweep.torques: has no effect, load.torque is "t"'),
         ("high = 0.2", "high = 3.0", "variables.x.high: 3 x module must be at least -1.5 x module and at most 2"),
         ('[pair]\ncenter_distance = "a"', "", "variables.a: is declared but used nowhere"),
-        ("high = 101.8", "high = 301.8", "pair: contact ratio = -14.52 must be at least 1"),
+        ("high = 101.8", "high = 301.8", "pair.center_distance: 201.6 mm must be less than 106.8 mm"),
     ):
         with pytest.raises(DesignFileError, match=re.escape(problem)):
             sweep_request(load(whole.replace(old, new)))

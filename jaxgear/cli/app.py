@@ -231,8 +231,14 @@ def convert(
     return OK
 
 
+def _silence_compiler() -> None:
+    """XLA writes alarms to stderr that ask for a bug report where it compiles for long; what fails, it raises."""
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # fatal ones alone
+
+
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Entry point of the command `jaxgear`; every failure is one line on stderr."""
+    _silence_compiler()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a title beyond the terminal's alphabet is no reason to fail

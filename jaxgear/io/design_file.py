@@ -13,6 +13,7 @@ from ..compliance import AbstractCompliance
 from ..contact import Mesh, Operation, Resolution, begin_contact, fewest_pairs, prepare
 from ..geometry import GearPair
 from ..metrics import Lubricant, Strength
+from ..metrics.plausibility import LIMITS
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
@@ -122,8 +123,15 @@ class DesignFile:
         try:
             pairs = fewest_pairs(self._middle, deflection=deflection)
         except ValueError:
-            given = f"{torque:g} N m deflects a pair of teeth of module {float(self._middle.pinion.module):g} mm by"
-            problem = f"{given} {deflection / times:.3g} um: give the torque in N m, elastic moduli in MPa"
+            given = f"deflects a pair of teeth of module {float(self._middle.pinion.module):g} mm by"
+            given = f"{torque:g} N m {given} {deflection / times:.3g} um"
+            for name, gear in (("pinion", self._middle.pinion), ("wheel", self._middle.wheel)):
+                modulus, usual = float(gear.material.elastic_modulus), LIMITS["elastic modulus"]
+                if modulus < usual.low:
+                    material = self._pair.fields[name].fields["material"]
+                    problem = f"{modulus:g} MPa is less than {usual.low:g} MPa ({usual.remark}), and {given}"
+                    raise DesignFileError(f"{material.key}.elastic_modulus", problem, self.path) from None
+            problem = f"{given}: give the torque in N m"
             raise DesignFileError("load.torque", problem, self.path) from None
         if self._pair.free():  # other variants can have a larger contact ratio
             pairs = max(pairs, _OPEN_PAIRS)

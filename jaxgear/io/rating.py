@@ -6,7 +6,7 @@ from typing import Annotated, Any, TypeVar
 
 from ..metrics import Lubricant, Strength
 from ..numerics import Number
-from .errors import DesignFileError, naming
+from .errors import DesignFileError, referring
 from .kinds import text
 from .layout import Section, section_of
 from .ranges import outside
@@ -89,7 +89,7 @@ def _whole(key: str, table: Tables, section: type[S], folder: Path) -> S:
     if name is None:
         return decode(key, table, section)
     path = folder / name
-    with naming(path):
+    with referring(f"{key}.{_FILE}", name):
         held: dict[str, Any] = read(path)
     for twice in held.keys() & table.keys():
         raise DesignFileError(join(key, twice), f"stands in {name} too")
@@ -98,5 +98,5 @@ def _whole(key: str, table: Tables, section: type[S], folder: Path) -> S:
     except DesignFileError as error:
         own = error.key.removeprefix(f"{key}.")
         if own.partition("[")[0] in held:
-            raise DesignFileError(own, error.problem, path) from None
+            raise DesignFileError(f"{key}.{_FILE}", f"{name}: {own}: {error.problem}") from None
         raise

@@ -13,7 +13,7 @@ from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
-from .errors import DesignFileError, naming, refuse_given, refused
+from .errors import DesignFileError, naming, referring, refuse_given, refused
 from .named import quantity_named
 from .schema_sweep import SweepSection
 from .variants import read_variants
@@ -142,7 +142,8 @@ def _plan(design: DesignFile, section: SweepSection) -> AbstractPlan:
         raise DesignFileError(f"sweep.{needed}", f'missing, sampling = "{kind}" needs it')
     bounds, seed = design.bounds, section.seed or 0
     if kind == "list":
-        return read_variants(design.path.parent / str(section.file), bounds, design.units)
+        with referring("sweep.file", str(section.file)):
+            return read_variants(design.path.parent / str(section.file), bounds, design.units)
     if kind == "full_factorial":
         return refused("sweep.levels", FullFactorial, bounds, section.levels or 0)
     make = Sobol if kind == "sobol" else LatinHypercube

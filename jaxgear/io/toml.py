@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from .errors import DesignFileError, suggestion
+from .errors import DesignFileError, check_file, suggestion
 from .kinds import TAGS, not_of_kind
 
 S = TypeVar("S", bound=BaseModel)
@@ -28,12 +28,11 @@ def content(path: Path) -> bytes:
     Raises:
         DesignFileError: when it cannot be read.
     """
+    check_file(path)
     try:
-        if path.exists() and not path.is_file():
-            raise ValueError("is a folder, not a file" if path.is_dir() else "is not a regular file")
         return path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: also a path with a null byte
-        raise DesignFileError("", getattr(error, "strerror", None) or error) from None
+    except OSError as error:
+        raise DesignFileError("", error.strerror or error) from None
 
 
 def read(path: Path) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..sweeps import VariantList
-from .errors import DesignFileError, naming
+from .errors import DesignFileError, check_file, naming
 
 _HEADING = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^]]*)\])?")  # as tables of sweeps are exported
 _LENGTHS = {"nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "m": 1.0}  # with micro sign and with mu
@@ -35,6 +35,7 @@ def read_variants(
 
     names, rows = list(bounds), 0
     with naming(path), tempfile.TemporaryFile() as scratch:  # the array on it outlives it
+        check_file(path)
         try:
             for piece in (_parquet if path.suffix.lower() == ".parquet" else _csv)(path, names, units or {}):
                 _check_bounds(piece, bounds, rows)
