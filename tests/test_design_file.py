@@ -29,12 +29,13 @@ from jaxgear.io import (
     schema,
     schema_sweep,
     sweep_request,
+    write_design,
     write_summary,
 )
 from jaxgear.io.cases import tolerance_of
 from jaxgear.io.layout import family, section_of
 from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
-from jaxgear.microgeometry import AbstractCurve, AbstractModification, ParabolicLinear
+from jaxgear.microgeometry import AbstractCurve, AbstractModification, NoModification, ParabolicLinear
 from jaxgear.numerics import number
 
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.toml"))
@@ -336,7 +337,7 @@ MALFORMED = {
         text(
             pinion=RELIEF.replace("3.4", '"height"').replace('amount = "height"', "amount = 1.0"), tail=VARIABLE
         ).replace("low = 0.0", "low = -1.0"),
-        "variables.height.low: -1 mm must be at least 0 mm as pinion.modification[0].length",
+        "variables.height.low: -1 mm must be at least 0 mm and at most 1000 mm as pinion.modification[0].length",
     ),
     "table that does not increase": (
         text(wheel='[[wheel.modification]]\ntype = "tabulated_profile"\nposition = [2, 1]\namount = [1.0, 2.0]'),
@@ -443,7 +444,7 @@ MALFORMED = {
     ),
     "bound of a length below zero": (
         text(pinion=RELIEF.replace("3.4", '"l"'), tail=VARIABLE + "l = { low = -1.0, high = 3.0 }"),
-        "variables.l.low: -1 mm must be at least 0 mm as pinion.modification[0].length",
+        "variables.l.low: -1 mm must be at least 0 mm and at most 1000 mm as pinion.modification[0].length",
     ),
     "teeth absurd": (text().replace("teeth = 19", f"teeth = {2**70}"), "pinion.teeth: a whole number of about 22"),
     "teeth too few": (text().replace("teeth = 19", "teeth = 3"), "pinion.teeth: 3 must be at least 5"),
@@ -472,6 +473,22 @@ MALFORMED = {
     "centre distance too large": (
         text(tail="[pair]\ncenter_distance = 104.5"),
         "pair.center_distance: 104.5 mm leaves a contact ratio of 0.",
+    ),
+    "escape in a title": (
+        'title = "\\u001b[2J"' + text(),
+        "title: contains the control character U+001B, leave it out",
+    ),
+    "override in a list": (
+        text(pinion=RELIEF, tail=VARIABLE + '[optimize]\nobjective = ["a\\u202Eb"]'),
+        "optimize.objective[0]: contains the control character U+202E, leave it out",
+    ),
+    "escape in a name": (
+        text(tail='[variables]\n"\\u009bA" = { low = 0.0, high = 1.0 }'),
+        "variables.\\x9bA: contains the control character U+009B, leave it out",
+    ),
+    "relief of metres": (
+        text(pinion=RELIEF.replace('"height"', "20.0").replace("3.4", "5000.0")),
+        "pinion.modification[0].length: 5000 mm must be at least 0 mm and at most 1000 mm",
     ),
     "bore of nothing": (
         text(wheel="bore_diameter = 0.01"),
@@ -620,14 +637,16 @@ def test_a_file_that_cannot_be_read_is_named_by_its_key(load, tmp_path, key):
         ("link.csv", "is not a regular file"),
         ("folder.csv", "is a folder, not a file"),
         ("none.csv", "No such file or directory"),
-        ("a\\u0000.csv", "embedded null byte"),
+        ("a\\u0000.csv", "contains the control character U+0000, leave it out"),
         (f"{'a' * 300}.csv", "File name too long"),
     ):
         table = REFERRING[key].replace("FILE", name)
         content = f"{table}{text()}" if table.startswith(("lubricant", "strength")) else text(tail=table)
         with pytest.raises(DesignFileError) as caught:
             sweep_request(load(content))
-        assert re.search(rf"/gear\.toml: {re.escape(key)}: a*.*\.csv: {problem}$", str(caught.value)), caught.value
+        message = str(caught.value)
+        assert f"/gear.toml: {key}: " in message and message.endswith(problem)
+        assert f"{name}: " in message or "U+0000" in message
 
 
 WRONG = [
@@ -820,6 +839,19 @@ def test_files_that_cannot_be_read(tmp_path):
         load_design(tmp_path)
     with pytest.raises(DesignFileError, match="null byte"):
         load_design("gear\0.toml")
+
+
+def test_what_a_terminal_would_obey_is_shown_instead(tmp_path):
+    path = tmp_path / "a\x1b[2Jb.toml"
+    path.write_text(text())
+    assert load_design(path).title == "a\\x1b[2Jb"
+    path.write_text("")
+    with pytest.raises(DesignFileError, match=r"a\\x1b\[2Jb\.toml: pinion: missing") as caught:
+        load_design(path)
+    assert "\x1b" not in str(caught.value)
+    plain = NoModification()
+    write_design(path, load_design(EXAMPLES[0]).pair(), torque=50.0, pinion=plain, wheel=plain, title="\u202egears")
+    assert load_design(path).title == "\\u202egears"
 
 
 def test_a_byte_order_mark_and_carriage_returns_are_no_error(load):

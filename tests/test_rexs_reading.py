@@ -241,6 +241,15 @@ def test_gears_that_count_along_their_faces_in_opposite_directions_are_refused(w
     assert read_rexs(written.path).torque == 50.0
 
 
+def test_a_file_without_units_is_taken_in_those_of_the_standard_with_a_word(written, caplog):
+    written.path.write_text(written.text)
+    assert read_rexs(written.path) and caplog.messages == []
+    written.path.write_text(re.sub(r' unit="[^"]*"', "", written.text))
+    assert float(read_rexs(written.path).pair.pinion.face_width) == 20.0
+    (line,) = caplog.messages
+    assert re.search(r"names no units, those of the REXS standard are taken: .* \d+: \w+ in .*, the first of", line)
+
+
 def test_names_and_units_of_earlier_versions(written):
     text = written.text.replace('version="2.0.0"', 'version="1.4"').replace(
         "tip_corner_radius_factor_reference_profile", "tip_radius_factor"

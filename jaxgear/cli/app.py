@@ -253,11 +253,13 @@ def _warnings() -> Iterator[None]:
     lines = logging.StreamHandler()
     lines.setLevel(logging.WARNING)
     lines.setFormatter(logging.Formatter("jaxgear: warning: %(message)s"))
-    logger = logging.getLogger("jaxgear")
+    logger, unusual = logging.getLogger("jaxgear"), logging.getLogger("jaxgear.unusual")
     logger.addHandler(lines)
+    before, unusual.disabled = unusual.disabled, True  # commands ask about the numbers of their designs themselves
     try:
         yield
     finally:
+        unusual.disabled = before
         logger.removeHandler(lines)
 
 

@@ -19,7 +19,7 @@ from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
 from . import held, rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, sections, template
 from .as_function import FileDesign, FileMesh
-from .errors import DesignFileError, naming, refused
+from .errors import DesignFileError, naming, printable, refused
 from .flanks import check_files
 from .gearbox import layout_of, support_of
 from .gears import both_classes, gear_of, materials_of, pair_of, quality_of
@@ -255,7 +255,7 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
     return DesignFile(
         path=file,
         says=says,
-        title=top.title or file.stem,
+        title=top.title or printable(file.stem),
         torque=torque,
         torque_range=(low, high),
         speed=None if usual.speed is None else float(usual.speed),

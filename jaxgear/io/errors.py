@@ -45,6 +45,8 @@ _SYMBOLS = {
     "temperature": "t theta thetaoil",
     "roughness": "ra",
 }
+# Control characters, but for tabs and line ends, and those that turn the order of what follows (Unicode TR 36).
+_OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 _OF_HELICAL_GEARS = "helixangle", "helix", "beta"
 
 
@@ -54,7 +56,18 @@ class DesignFileError(ValueError):
     def __init__(self, key: str, problem: object, file: object = ""):
         self.key, self.problem, self.file = key, str(problem), str(file)
         parts = [self.file, key, self.problem]
-        super().__init__(" ".join(": ".join(part for part in parts if part).split()))
+        super().__init__(printable(" ".join(": ".join(part for part in parts if part).split())))
+
+
+def printable(text: str) -> str:
+    """A text with escape sequences in place of the characters that a terminal would obey instead of showing them."""
+    return _OBEYED.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def obeyed(text: str) -> str:
+    """The first character of a text that a terminal would obey, as U+001B; "" without one."""
+    found = _OBEYED.search(text)
+    return f"U+{ord(found[0]):04X}" if found else ""
 
 
 @contextmanager

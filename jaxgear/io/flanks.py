@@ -14,6 +14,7 @@ import numpy as np
 from ..contact import Side
 from ..geometry import GearPair
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
+from ..microgeometry.base import AMOUNTS
 from ..numerics import check, real
 from . import schema, template
 from .errors import DesignFileError, naming, referring
@@ -132,6 +133,8 @@ def _table(
     if not profile:
         raise DesignFileError("", "holds a helix alone, must hold a profile")
     roll, face, removed = _grid(profile, amount, base_radius)
+    if amount == MEASURED and 0 < (spread := float(np.ptp(removed))) < AMOUNTS.low:
+        raise DesignFileError("", f"has {MEASURED} within {spread:.3g} um, {AMOUNTS.remark}")
     if len(face) > 1 and helix:
         raise DesignFileError("", f"has a helix beside profiles at {len(face)} face coordinates, must be one profile")
     if helix:

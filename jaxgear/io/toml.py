@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from .errors import DesignFileError, check_file, suggestion
+from .errors import DesignFileError, check_file, obeyed, suggestion
 from .kinds import TAGS, not_of_kind
 
 S = TypeVar("S", bound=BaseModel)
@@ -51,13 +51,15 @@ def read(path: Path) -> dict[str, Any]:
         line = text.count("\n", 0, long_key.start()) + 1
         raise DesignFileError("", f"line {line}: a key has more than {_MOST_PARTS} parts between dots")
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise DesignFileError("", _syntax(str(error), text)) from None
     except ValueError:  # of int()
         raise DesignFileError("", "a whole number has more than 4300 digits") from None
     except RecursionError:
         raise DesignFileError("", "tables or lists are nested too deeply") from None
+    _check_texts("", data)
+    return data
 
 
 def decode(key: str, data: Any, section: type[S]) -> S:
@@ -74,6 +76,19 @@ def decode(key: str, data: Any, section: type[S]) -> S:
     if first["type"] == "missing":  # often it is there, misspelt
         first = next((problem for problem in problems if problem["type"] == "extra_forbidden"), first)
     raise DesignFileError(join(key, _dotted(first["loc"])), _worded(first, section))
+
+
+def _check_texts(key: str, value: Any) -> None:
+    """Refuses names and texts that would do something to a terminal, or to a page, when they are printed there."""
+    if isinstance(value, dict):
+        for name, item in value.items():
+            _check_texts(join(key, name), name)
+            _check_texts(join(key, name), item)
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            _check_texts(f"{key}[{index}]", item)
+    elif isinstance(value, str) and (found := obeyed(value)):
+        raise DesignFileError(key, f"contains the control character {found}, leave it out")
 
 
 def join(key: str, name: str) -> str:

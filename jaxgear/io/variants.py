@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..sweeps import VariantList
+from ..sweeps.headings import from_text
 from .errors import DesignFileError, check_file, naming
 
 _HEADING = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^]]*)\])?")  # as tables of sweeps are exported
@@ -56,7 +57,7 @@ def _csv(path: Path, names: Sequence[str], units: Mapping[str, str]) -> Iterator
     from pyarrow import csv
 
     with path.open(encoding="utf-8-sig", newline="") as file:
-        headings = [heading.strip() for heading in next(text.reader(file), [])]
+        headings = [from_text(heading.strip()) for heading in next(text.reader(file), [])]
     places, factors = _columns([_parts(heading) for heading in headings], names, units)
     numbered = [str(place) for place in range(len(headings))]  # headings that nobody asks for may be there twice
     wanted = [numbered[place] for place in places]

@@ -7,14 +7,16 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ..compliance import AbstractCompliance, TabulatedCompliance
 from ..contact import MeshCycle, Resolution
+from ..geometry import Material
 from ..microgeometry import AbstractModification, EndRelief, NoModification, RootRelief, TipRelief
-from ..numerics import program
+from ..numerics import fields_of, program
 from .flank import flank_surface
 from .load import effective_contact_ratio
 from .lubricant import Lubricant
@@ -36,10 +38,18 @@ class Limit(NamedTuple):
     remark: str
 
 
+def _of_field(cls: type[eqx.Module], name: str) -> Limit:
+    """What a class says is usual of its field."""
+    field = fields_of(cls)[name]
+    assert field.usual is not None
+    low, high, remark = field.usual
+    return Limit(low, high, field.unit, remark)
+
+
 LIMITS = {
     "torque": Limit(0.0, np.inf, "N m", "the design torque lies outside the range of torques that is looked at"),
     "module": Limit(0.05, 100.0, "mm", "ISO 54 lists 1 to 50 mm, fine mechanics goes down to 0.1 mm"),
-    "elastic modulus": Limit(500.0, 700_000.0, "MPa", "plastics 1000 to 10000, steel 206000 MPa: is it in GPa or Pa?"),
+    "elastic modulus": _of_field(Material, "elastic_modulus"),
     "density": Limit(500.0, 25_000.0, "kg/m^3", "steel 7850 kg/m^3: is it in g/cm^3?"),
     "bore to root diameter": Limit(0.1, 0.95, "", "the body is a ring held at its bore, which is hardly one"),
     "face width in modules, plane stress": Limit(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
@@ -61,7 +71,7 @@ LIMITS = {
     "contact ratio": Limit(1.0, 2.0, "", "nominal contact stress and pitting safety are made for 1 to 2 (ISO 6336-2)"),
     "pitch line velocity": Limit(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
     "amount of the modification": Limit(0.0, np.inf, "um", "negative: material is added; positive removes it"),
-    "depth of the modification": Limit(0.1, np.inf, "um", "less than flanks can be measured to: is it in mm?"),
+    "depth of the modification": _of_field(TipRelief, "amount"),
     "depth of the modification in modules": Limit(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
     "length of the modification": Limit(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
     "length of the end relief": Limit(0.0, np.inf, "mm", "less than the gear is wider than its mate: it has no effect"),

@@ -14,6 +14,7 @@ from .extremes import minimum as minimum
 from .extremes import spread as spread
 from .fields import Checked as Checked
 from .fields import Number as Number
+from .fields import Usual as Usual
 from .fields import changed as changed
 from .fields import check as check
 from .fields import concrete as concrete

@@ -5,8 +5,9 @@ therefore goes through `real`. Ranges are checked on concrete values only, trace
 """
 
 import dataclasses
+import logging
 from dataclasses import MISSING
-from typing import Any, Literal, TypeVar, dataclass_transform, get_args, get_origin
+from typing import Any, Literal, NamedTuple, TypeVar, dataclass_transform, get_args, get_origin
 
 import equinox as eqx
 import jax
@@ -18,7 +19,22 @@ _Module = TypeVar("_Module", bound=eqx.Module)
 
 _MOST = 2**53  # whole numbers up to here are exact as floating-point numbers too, in every reader of a table
 _KEY = "number"  # of a `Number` in the metadata of its field
+_LOG = logging.getLogger("jaxgear.unusual")
+_asked: set[tuple[str, str]] = set()  # classes and fields that were warned of: a search makes thousands of objects
 _SHOWN = 6  # numbers of an array that are printed; of a longer one its range is
+
+
+class Usual(NamedTuple):
+    """What is usual of the size of a number; zero always is.
+
+    Attributes:
+        low, high: of the size, in the unit of the number.
+        remark: what is likely meant by another one.
+    """
+
+    low: float
+    high: float
+    remark: str
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,6 +52,7 @@ class Number:
         limits: lower and upper limit, shape (2,), may stand for a single number.
         static: a Python number that is part of the structure, not a leaf; with a shape, a tuple of whole numbers.
         checked: False for a result, which may hold anything, NaN included.
+        usual: beyond which a number is asked about: one warning of the logger "jaxgear.unusual" per field and program.
     """
 
     unit: str = ""
@@ -50,6 +67,7 @@ class Number:
     limits: bool = False
     static: bool = False
     checked: bool = True
+    usual: Usual | None = None
 
 
 def number(unit: str, *, default: Any = MISSING, kw_only: bool = False, **limits) -> Any:
@@ -266,10 +284,25 @@ def _check_number(owner: str, name: str, value, kind: Number) -> None:
         unit = f" {kind.unit}" if kind.unit else ""
         limits = f"{float(known[1]):g}{unit} must be at least the lower one, {float(known[0]):g}{unit}"
         raise ValueError(f"{owner}: {name}: upper limit {limits}")
+    if kind.usual is not None:
+        _ask(owner, name, value, kind.unit, kind.usual)
     known = concrete(value) if kind.whole else None
     if known is not None and (known != known.round()).any():
         shown = float(known[known != known.round()].flat[0])
         raise ValueError(f"{owner}: {name} = {shown:g} must be a whole number")
+
+
+def _ask(owner: str, name: str, value, unit: str, usual: Usual) -> None:
+    known = concrete(value)
+    if known is None or (owner, name) in _asked:
+        return
+    size = np.abs(known)
+    unusual = (size > 0) & ((size < usual.low) | (size > usual.high))
+    if unusual.any():
+        _asked.add((owner, name))
+        shown = float(known[unusual].flat[0] if known.ndim else known)
+        bound = f"less than {usual.low:g}" if abs(shown) < usual.low else f"more than {usual.high:g}"
+        _LOG.warning("%s: %s = %g %s is %s %s (%s)", owner, name, shown, unit, bound, unit, usual.remark)
 
 
 def _check_shape(owner: str, name: str, shape: tuple[int, ...], kind: Number) -> None:
