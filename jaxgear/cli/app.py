@@ -3,17 +3,15 @@
 JAX and the library are imported when a command runs: help, version and what is wrong with the options need neither.
 """
 
-import logging
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal, NoReturn
 
 import typer
 
-from . import interrupt
+from . import interrupt, streams
 from .options import File, NoCache, NoFigures, Quick, Reported, output_option, typed
 from .version import version as own_version
 
@@ -231,36 +229,15 @@ def convert(
     return OK
 
 
-def _silence_compiler() -> None:
-    """XLA writes alarms to stderr that ask for a bug report where it compiles for long; what fails, it raises."""
-    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # fatal ones alone
-
-
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Entry point of the command `jaxgear`; every failure is one line on stderr."""
-    _silence_compiler()
+    streams.silence_compiler()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a title beyond the terminal's alphabet is no reason to fail
-    with interrupt.listening(), _warnings():
+    with interrupt.listening(), streams.warnings():
         code = _run(arguments)
     sys.exit(code)
-
-
-@contextmanager
-def _warnings() -> Iterator[None]:
-    """Shows what the library warns of as lines on stderr."""
-    lines = logging.StreamHandler()
-    lines.setLevel(logging.WARNING)
-    lines.setFormatter(logging.Formatter("jaxgear: warning: %(message)s"))
-    logger, unusual = logging.getLogger("jaxgear"), logging.getLogger("jaxgear.unusual")
-    logger.addHandler(lines)
-    before, unusual.disabled = unusual.disabled, True  # commands ask about the numbers of their designs themselves
-    try:
-        yield
-    finally:
-        unusual.disabled = before
-        logger.removeHandler(lines)
 
 
 def _run(arguments: Sequence[str] | None) -> int:
@@ -273,7 +250,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except (KeyboardInterrupt, typer.Abort):
         return _say_interrupted()
     except BrokenPipeError:
-        _forget_output()
+        streams.forget_output()
         return OK
     except SystemExit as end:  # of typer, where nobody reads its help to the end
         if isinstance(end.__context__, BrokenPipeError):
@@ -284,32 +261,13 @@ def _run(arguments: Sequence[str] | None) -> int:
             raise
         if interrupt.state.asked:  # a library has made something else of it
             return _say_interrupted()
-        print(f"jaxgear: error: {_one_line(error)}", file=sys.stderr)
+        print(f"jaxgear: error: {streams.one_line(error)}", file=sys.stderr)
         if isinstance(error, OSError):
-            _forget_output()
+            streams.forget_output()
         return FAILED
     return code or OK
-
-
-def _forget_output() -> None:
-    """Keeps the flush at exit quiet where standard output takes nothing."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _say_interrupted() -> int:
     print(f"jaxgear: interrupted, {interrupt.state.written}", file=sys.stderr)
     return INTERRUPTED
-
-
-def _one_line(error: Exception) -> str:
-    if hasattr(error, "format_message"):  # usage errors of typer
-        return f"{' '.join(error.format_message().split())} (jaxgear --help shows the usage)"
-    message = " ".join(str(error).split())
-    if isinstance(error, ValueError | RuntimeError) and message:
-        return message
-    if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename or 'standard output'}: {error.strerror}"
-    return f"unexpected {type(error).__name__}: {message} (JAXGEAR_DEBUG=1 shows where)"

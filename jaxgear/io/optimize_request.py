@@ -12,30 +12,26 @@ from ..optimize import (
     Constraint,
     Front,
     Optimum,
-    Pareto,
     free_form,
     iterate_from_low_pressure,
     iterate_transmission_error,
     minimize,
     pareto,
 )
-from ..optimize.projection import CURVES
 from ..optimize.refine import POSITIONS
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import LIVES_AHEAD
 from . import schema
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
-from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
-from .layout import Section
+from .errors import DesignFileError, naming, refuse_given, refused, suggestion
 from .named import quantity_named
+from .optimize_method import CURVE, PARETO, check_method, check_options, made_by, options_of, tables
 from .ranges import outside
 from .toml import decode
 
 _DEFAULT_METHOD = "minimax"
-_CURVE = "cubic"  # on which flanks without parameters are projected
 _FRONT = ("ppte", "max_contact_pressure")  # of a Pareto front where the file names no objectives
-_PARETO = "pareto"
 _MEASURES: Mapping[str, Callable[..., AbstractMeasure]] = {
     "mean": Mean,
     "worst": Worst,
@@ -101,7 +97,7 @@ class OptimizeRequest:
             return free_form(mesh, callback=callback, **self._common)
         if self.method == "te_iteration":
             return self._iterate(mesh, callback)
-        if self.method == _PARETO:
+        if self.method == PARETO:
             return pareto(design.design, design.bounds, mesh=mesh, callback=callback, **self._common)
         return minimize(design.design, design.bounds, mesh=mesh, callback=callback, **self._common)
 
@@ -136,10 +132,10 @@ def check_optimize(design: DesignFile) -> None:
         DesignFileError: for anything that is wrong with it, in one line that names the key.
     """
     section = design.optimize
-    _check_method(section.method or _DEFAULT_METHOD)
-    for name, options in _tables(section).items():
+    check_method(section.method or _DEFAULT_METHOD)
+    for name, options in tables(section).items():
         if options.model_fields_set:
-            _check_options(design, name, options.given())
+            check_options(design, name, options.given())
     _objectives(design, section)
     _measure(section)
     _constraints(design, section)
@@ -152,14 +148,14 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
     section = design.optimize
     name = method or section.method or _DEFAULT_METHOD
     flanks_alone = name in schema.METHODS_WITHOUT_VARIABLES
-    _check_method(name)
+    check_method(name)
     if not design.bounds and not flanks_alone:
         raise DesignFileError("variables", "missing, nothing to optimize; use jaxgear analyze")
     for free in design.open_case:
         raise DesignFileError(free.key, f'"{free.name}" is a variable, which a sweep alone can vary here')
-    options = _options(section, name, of_the_file=method is None)
-    _check_options(design, name, options)
-    curve = options.pop("curve", _CURVE) if flanks_alone else None
+    options = options_of(section, name, of_the_file=method is None)
+    check_options(design, name, options)
+    curve = options.pop("curve", CURVE) if flanks_alone else None
     verify = False if quick else section.verify
     common = _common(design, section, name, quick)
     fewer = _QUICK.get(name, {}) if quick else {}
@@ -171,49 +167,10 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
     if name == "free_form":
         common |= options | fewer
     else:
-        common["method"] = _make(name)(**options | fewer)
-    if quick and name != _PARETO:  # a quick look stays on its mesh
+        common["method"] = made_by(name)(**options | fewer)
+    if quick and name != PARETO:  # a quick look stays on its mesh
         common["positions"] = None
     return OptimizeRequest(name, curve, verify, design, common)
-
-
-def _check_method(name: str) -> None:
-    check_known("optimize.method", name, (*METHODS, _PARETO, *schema.METHODS_WITHOUT_VARIABLES))
-
-
-def _make(name: str) -> type[Any]:
-    return Pareto if name == _PARETO else METHODS[name]
-
-
-def _check_options(design: DesignFile, name: str, options: Mapping[str, Any]) -> None:
-    """Whether a method with variables can be made of its options, and a method without them of its curve."""
-    if name in schema.METHODS_WITHOUT_VARIABLES:
-        check_known(f"optimize.{name}.curve", options.get("curve", _CURVE), CURVES)
-        return
-    levels = options.get("levels")
-    if isinstance(levels, dict) and set(levels) != set(design.bounds):
-        problem = f"must name all variables and nothing else: {', '.join(design.bounds)}"
-        raise DesignFileError("optimize.factorial.levels", problem)
-    refused(f"optimize.{name}", _make(name), **options)
-
-
-def _tables(section: schema.OptimizeSection) -> dict[str, Section]:
-    """The tables of all methods, decoded."""
-    layouts = schema.method_options().items()
-    return {key: decode(f"optimize.{key}", getattr(section, key) or {}, layout) for key, layout in layouts}
-
-
-def _options(section: schema.OptimizeSection, name: str, *, of_the_file: bool) -> dict[str, Any]:
-    """The options of a method; the file may name others where it is not the file that asks for the method."""
-    options = {key: value for key, value in _tables(section).get(name, ()) if value is not None}
-    shared = {"starts": section.starts, "steps": section.steps, "seed": section.seed or 0}
-    taken = {field.name for field in dataclasses.fields(METHODS[name])} if name in METHODS else set()
-    if of_the_file:
-        why = f' with method "{name}"'
-        refuse_given("optimize", section, [key for key in ("starts", "steps") if key not in taken], why)
-        if "seed" not in taken and section.manufactured is None:
-            refuse_given("optimize", section, ["seed"], f"{why} and perfect gears")
-    return options | {key: value for key, value in shared.items() if key in taken and value is not None}
 
 
 def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
@@ -243,15 +200,15 @@ def _objectives(
 
 def _objective(design: DesignFile, section: schema.OptimizeSection, name: str) -> dict[str, Any]:
     """What the function of a method takes for the objective; nothing where it knows its own."""
-    objectives = _objectives(design, section, _FRONT if name == _PARETO else ("ppte",))
-    if (len(objectives) > 1) != (name == _PARETO):
+    objectives = _objectives(design, section, _FRONT if name == PARETO else ("ppte",))
+    if (len(objectives) > 1) != (name == PARETO):
         problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
         raise DesignFileError("optimize.objective", problem)
     if name in schema.METHODS_WITHOUT_VARIABLES:
         if objectives != ("ppte",):
             raise DesignFileError("optimize.objective", f'must be "ppte" with method "{name}"')
         return {}
-    return {"objectives": objectives} if name == _PARETO else {"objective": objectives[0]}
+    return {"objectives": objectives} if name == PARETO else {"objective": objectives[0]}
 
 
 def _measure(section: schema.OptimizeSection) -> AbstractMeasure:

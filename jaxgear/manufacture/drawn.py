@@ -64,15 +64,15 @@ class ToothThickness(Checked):
         Raises:
             ValueError: for a measure that is not one of this gear, or of a tooth thicker than the rack makes it.
         """
-        if self.span is not None:
+        if (measured := self.span) is not None:
             teeth = self.teeth_spanned
             assert teeth is not None  # or it would not have been made
             of = partial(allowance_of_span, gear, teeth), partial(span, _without_allowance(gear), teeth)
-            return _named("span", lambda: _rounded(self.span, *of), teeth_spanned=teeth)
-        if self.over_balls is not None:
+            return _named("span", lambda: _rounded(measured, *of), teeth_spanned=teeth)
+        if (over := self.over_balls) is not None:
             ball = self.ball_diameter
             of = partial(allowance_of_balls, gear, ball), partial(over_balls, _without_allowance(gear), ball)
-            return _named("over_balls", lambda: _rounded(self.over_balls, *of), ball_diameter=ball)
+            return _named("over_balls", lambda: _rounded(over, *of), ball_diameter=ball)
         assert self.tooth_thickness_allowance is not None
         return self.tooth_thickness_allowance
 
