@@ -5,6 +5,7 @@ import csv
 import dataclasses
 import errno
 import importlib
+import io
 import json
 import os
 import re
@@ -683,6 +684,29 @@ def test_help_and_version_need_no_file():
     assert "optimize" in call("--help").out and call("--help").code == 0
     assert "Design file" in call("optimize", "--help").out
     assert call("--version").out.startswith("jaxgear ")
+
+
+def test_the_compiler_raises_what_is_wrong_and_says_nothing_else(monkeypatch):
+    """Of XLA's messages on stderr only fatal ones: its alarm over a long compilation asks for a bug report."""
+    monkeypatch.setenv("TF_CPP_MIN_LOG_LEVEL", "")
+    monkeypatch.delenv("TF_CPP_MIN_LOG_LEVEL")
+    call("--version")
+    assert os.environ["TF_CPP_MIN_LOG_LEVEL"] == "3"
+
+
+def test_output_that_nobody_takes():
+    """`jaxgear --help | head -1` is no error, a full disk behind `>` is one."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    for stream, code, line in (
+        (open(writer, "w"), 0, ""),
+        (open("/dev/full", "w"), 2, "jaxgear: error: standard output: No space left on device\n"),
+    ):
+        err = io.StringIO()
+        with contextlib.redirect_stdout(stream), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as exit_:
+            main(["--help"])
+        assert (exit_.value.code, err.getvalue()) == (code, line)
+        stream.close()
 
 
 def test_the_cache_is_a_private_folder_and_never_an_obstacle(tmp_path, monkeypatch):

@@ -3,6 +3,7 @@
 import functools
 import json
 import math
+import os
 import re
 from pathlib import Path
 
@@ -28,11 +29,13 @@ from jaxgear.io import (
     schema,
     schema_sweep,
     sweep_request,
+    write_design,
     write_summary,
 )
+from jaxgear.io.cases import tolerance_of
 from jaxgear.io.layout import family, section_of
 from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
-from jaxgear.microgeometry import AbstractCurve, AbstractModification, ParabolicLinear
+from jaxgear.microgeometry import AbstractCurve, AbstractModification, NoModification, ParabolicLinear
 from jaxgear.numerics import number
 
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.toml"))
@@ -245,8 +248,8 @@ MALFORMED = {
     "unknown table": (text(tail="[lode]\ntorque = 1.0"), 'lode: unknown key, did you mean "load"?'),
     "unknown gear key": (text(pinion="face_widht = 3.0"), 'pinion.face_widht: unknown key, did you mean "face_width"?'),
     "unknown material key": (
-        text(wheel="material = { young = 206000.0 }"),
-        "wheel.material.young: unknown key, must be one of density, elastic_modulus,",
+        text(wheel="material = { stiff = 206000.0 }"),
+        "wheel.material.stiff: unknown key, must be one of density, elastic_modulus,",
     ),
     "unknown load key": (text(load="torqe = 3"), 'load.torqe: unknown key, did you mean "torque"?'),
     "unknown modification key": (
@@ -334,7 +337,7 @@ MALFORMED = {
         text(
             pinion=RELIEF.replace("3.4", '"height"').replace('amount = "height"', "amount = 1.0"), tail=VARIABLE
         ).replace("low = 0.0", "low = -1.0"),
-        "variables.height.low: -1 mm must be at least 0 mm as pinion.modification[0].length",
+        "variables.height.low: -1 mm must be at least 0 mm and at most 1000 mm as pinion.modification[0].length",
     ),
     "table that does not increase": (
         text(wheel='[[wheel.modification]]\ntype = "tabulated_profile"\nposition = [2, 1]\namount = [1.0, 2.0]'),
@@ -441,7 +444,7 @@ MALFORMED = {
     ),
     "bound of a length below zero": (
         text(pinion=RELIEF.replace("3.4", '"l"'), tail=VARIABLE + "l = { low = -1.0, high = 3.0 }"),
-        "variables.l.low: -1 mm must be at least 0 mm as pinion.modification[0].length",
+        "variables.l.low: -1 mm must be at least 0 mm and at most 1000 mm as pinion.modification[0].length",
     ),
     "teeth absurd": (text().replace("teeth = 19", f"teeth = {2**70}"), "pinion.teeth: a whole number of about 22"),
     "teeth too few": (text().replace("teeth = 19", "teeth = 3"), "pinion.teeth: 3 must be at least 5"),
@@ -450,10 +453,136 @@ MALFORMED = {
         "wheel.tip_diameter: tip diameter = 30 mm must be greater than",
     ),
     "bore of the file": (text(wheel="bore_diameter = 140.0"), "wheel.bore_diameter: 140 mm must be less than 136.5"),
+    "symbol of the field": (text().replace("teeth = 19", "z = 19"), 'pinion.z: unknown key, did you mean "teeth"?'),
+    "symbol with an index": (text(pinion="d_a1 = 60.0"), 'pinion.d_a1: unknown key, did you mean "tip_diameter"?'),
+    "symbol of two tables": (text(load="m = 3.0"), 'load.m: unknown key, did you mean "torque"?'),
+    "helical gear": (text(pinion="helix_angle = 10.0"), "pinion.helix_angle: unknown key, the gears are spur gears"),
+    "unit with a number": (
+        text().replace("torque = 50.0", 'torque = "250 Nm"'),
+        'load.torque: "250 Nm" must be a number in N m alone',
+    ),
+    "decimal comma": (text(wheel='profile_shift = "0,5"'), 'wheel.profile_shift: "0,5" must be a number in x module'),
+    "curve without type": (
+        text(pinion=RELIEF.replace('"height"', "1.0") + 'curve = { typx = "linear" }'),
+        'pinion.modification[0].curve.typx: unknown key, did you mean "type"?',
+    ),
+    "centre distance of another pair": (
+        text(tail="[pair]\ncenter_distance = 1311.0"),
+        "pair.center_distance: 1311 mm must be less than 106.5 mm, the sum of both tip radii",
+    ),
+    "centre distance too large": (
+        text(tail="[pair]\ncenter_distance = 104.5"),
+        "pair.center_distance: 104.5 mm leaves a contact ratio of 0.",
+    ),
+    "escape in a title": (
+        'title = "\\u001b[2J"' + text(),
+        "title: contains the control character U+001B, leave it out",
+    ),
+    "override in a list": (
+        text(pinion=RELIEF, tail=VARIABLE + '[optimize]\nobjective = ["a\\u202Eb"]'),
+        "optimize.objective[0]: contains the control character U+202E, leave it out",
+    ),
+    "escape in a name": (
+        text(tail='[variables]\n"\\u009bA" = { low = 0.0, high = 1.0 }'),
+        "variables.\\x9bA: contains the control character U+009B, leave it out",
+    ),
+    "relief of metres": (
+        text(pinion=RELIEF.replace('"height"', "20.0").replace("3.4", "5000.0")),
+        "pinion.modification[0].length: 5000 mm must be at least 0 mm and at most 1000 mm",
+    ),
+    "bore of nothing": (
+        text(wheel="bore_diameter = 0.01"),
+        "wheel.bore_diameter: 0.01 mm must be at least 2.73 mm, 2 %",
+    ),
+    "key of absurd depth": ("a = 1\n" + "a." * 3000 + "b = 1", "line 2: a key has more than 32 parts between dots"),
+    "table of absurd depth": ("[" + '"a" . ' * 40 + "'b']", "line 1: a key has more than 32 parts between dots"),
     "nested absurdly": ("a = " + "[" * 100_000, "tables or lists are nested too deeply"),
     "number beyond all bounds": (text().replace("module = 3.0", "module = 1" + "0" * 400), "pinion.module: "),
     "empty": ("", "pinion: missing, this key is required"),
 }
+
+
+FREE = text(pinion=RELIEF, load="speed = 3000.0", tail=VARIABLE)
+SWEPT = FREE + "[sweep]\nsamples = 8\n"
+# of a table that a command passes over -> content, and what every command says of it
+OF_OTHER_COMMANDS = {
+    "option of a method": (
+        FREE + '[optimize.te_iteration]\nsteps = "abc"',
+        "optimize.te_iteration.steps: must be a whole number, not a string",
+    ),
+    "option misspelt": (FREE + "[optimize.genetic]\npopulaton = 9", "optimize.genetic.populaton: unknown key, did you"),
+    "curve of a method": (FREE + '[optimize.free_form]\ncurve = "x"', 'optimize.free_form.curve: "x" is not known'),
+    "levels of a method": (
+        FREE + "[optimize.factorial]\nlevels = { h = 2 }",
+        "optimize.factorial.levels: must name all",
+    ),
+    "method": (FREE + '[optimize]\nmethod = "simplex"', 'optimize.method: "simplex" is not known'),
+    "objective": (FREE + '[optimize]\nobjective = "noise"', 'optimize.objective: "noise" is not known'),
+    "objective without its table": (
+        FREE + '[optimize]\nobjective = "mean_ppte_over_life"',
+        'optimize.objective: "mean_ppte_over_life" needs the table [wear]',
+    ),
+    "constraint": (FREE + "[optimize]\nconstraint = [{ off = 1 }]", "optimize.constraint[0].off: unknown key, did you"),
+    "measure": (FREE + '[optimize]\nmeasure = "worst"', "optimize.measure: has no effect on a single case"),
+    "weights": (FREE + "[optimize]\ntorques = [9.0]\nweights = [1.0, 2.0]", "optimize.weights: "),
+    "manufactured": (FREE + "[optimize]\nmanufactured = 4", "optimize.manufactured: needs the table [tolerance]"),
+    "results": (SWEPT + 'results = ["ppte", "noise"]', 'sweep.results[1]: "noise" is not known'),
+    "sampling": (SWEPT + "levels = 3", 'sweep.levels: has no effect with sampling = "sobol"'),
+    "levels": (
+        SWEPT.replace("samples = 8", 'sampling = "full_factorial"\nlevels = { width = 3 }'),
+        "sweep.levels: levels must be",
+    ),
+    "speeds": (text(tail="[dynamics]\nnumber = 9"), "dynamics: needs either mesh_frequencies or speeds"),
+    "wear": (
+        text(tail="[wear]\nrevolutions = 1e6\ncoefficient = 1e-18\nweights = [1.0]"),
+        "wear.weights: has no effect",
+    ),
+}
+SHAFTS = """
+[layout]
+quality_class = 6
+[[shafts]]
+name = "in"
+sections = [{ length = 160.0, diameter = 40.0 }]
+bearings = [{ name = "A", position = 60.0, radial = 250.0 }, { name = "B", position = 140.0, radial = 250.0 }]
+gears = [{ name = "pinion", position = 20.0, integral = true }]
+couplings = [{ position = 160.0, torque = 50.0 }]
+[[shafts]]
+name = "out"
+sections = [{ length = 190.0, diameter = 45.0 }]
+bearings = [{ name = "C", position = 20.0, radial = 300.0 }, { name = "D", position = 130.0, radial = 300.0 }]
+gears = [{ name = "wheel", position = 45.0, integral = true }]
+couplings = [{ position = 190.0 }]
+"""
+LAYOUTS = {
+    "[layout.misalignment]\nskew = nan\nbearing_span = 80.0": "layout.misalignment.skew: nan must be finite",
+    "[layout.misalignment]\nskw = 9.0\nbearing_span = 80.0": "layout.misalignment.skw: unknown key, did you mean",
+    "[layout.profile]\npinion_amounts = [1.0, 1.0]": "layout.profile.pinion_amounts: must all be different",
+    "[layout.pitting]\nendurance = 900.0": "layout.pitting: has no effect without layout.torques",
+}
+
+
+@pytest.mark.parametrize("case", OF_OTHER_COMMANDS)
+def test_a_file_is_wrong_whatever_the_command(load, case):
+    content, expected = OF_OTHER_COMMANDS[case]
+    with pytest.raises(DesignFileError) as caught:
+        load(content)
+    assert f"gear.toml: {expected}" in str(caught.value)
+
+
+def test_tables_of_a_layout_are_looked_into(load):
+    assert load(text(tail=SHAFTS)).layout is not None
+    for tail, expected in LAYOUTS.items():
+        with pytest.raises(DesignFileError) as caught:
+            load(text(tail=SHAFTS + tail))
+        assert f"gear.toml: {expected}" in str(caught.value)
+
+
+def test_what_options_of_a_command_can_change_is_left_to_it(load):
+    load(FREE + '[optimize]\nobjective = ["ppte", "mean_te"]')  # --method pareto
+    load(FREE + "[optimize]\nlevel = 0.5\nmeasure = 'cvar'\ntorques = [40.0, 50.0]\nstarts = 3\n[optimize.genetic]")
+    load(FREE + "[sweep]")  # --samples
+    load(FREE + '[sweep]\nsampling = "list"\nfile = "not_made_yet.csv"')
 
 
 @pytest.mark.parametrize("case", MALFORMED)
@@ -469,6 +598,55 @@ def test_a_malformed_file_is_one_line_that_names_file_and_key(load, tmp_path, ca
 def test_a_torque_in_newton_millimetres_is_named_as_one(load):
     with pytest.raises(DesignFileError, match=r"load\.torque: 50000 N m deflects a pair of teeth of module 3 mm by"):
         load(text().replace("torque = 50.0", "torque = 50000.0") + "torque_range = [49999.0, 50000.0]").resolution()
+
+
+def test_a_modulus_in_another_unit_is_named_as_one(load):
+    for pinion, key in (
+        ("material = { elastic_modulus = 206.0 }", "pinion.material.elastic_modulus"),
+        ('material = "s"', "materials.s.elastic_modulus"),
+    ):
+        with pytest.raises(DesignFileError, match=rf"{key}: 206 MPa is less than 500 MPa \(.*GPa.*100 N m deflects"):
+            load(text(pinion=pinion, tail="[materials.s]\nelastic_modulus = 206.0")).resolution()
+
+
+def test_a_gear_for_which_no_tolerances_are_made_is_named(load):
+    file = load(text(tail="[tolerance]\nquality_class = 5").replace("face_width = 18.0", "face_width = 2.0"))
+    with pytest.raises(DesignFileError, match=r"^wheel\.face_width: 2 mm must be at least 4 mm and at most 1200 mm"):
+        tolerance_of(file)
+
+
+# tables that refer to a file, and what stands before its name
+REFERRING = {
+    "pinion.modification[0].file": '[[pinion.modification]]\ntype = "file"\nfile = "FILE"\n',
+    "lubricant.file": 'lubricant = { file = "FILE", temperature = 50.0 }\n',
+    "strength.file": 'strength = { file = "FILE" }\n',
+    "sweep.file": f'{RELIEF}{VARIABLE}[sweep]\nsampling = "list"\nfile = "FILE"\n',
+    "housing.file": SHAFTS + '[housing]\nfile = "FILE"\n',
+    "model.wheel_table": '[model]\nstructure = "finite_element"\nwheel_table = "FILE"\n',
+}
+
+
+@pytest.mark.parametrize("key", REFERRING)
+def test_a_file_that_cannot_be_read_is_named_by_its_key(load, tmp_path, key):
+    """A pipe or a device would be read for ever."""
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "folder.csv").mkdir()
+    (tmp_path / "link.csv").symlink_to("/dev/zero")
+    for name, problem in (
+        ("pipe.csv", "is not a regular file"),
+        ("link.csv", "is not a regular file"),
+        ("folder.csv", "is a folder, not a file"),
+        ("none.csv", "No such file or directory"),
+        ("a\\u0000.csv", "contains the control character U+0000, leave it out"),
+        (f"{'a' * 300}.csv", "File name too long"),
+    ):
+        table = REFERRING[key].replace("FILE", name)
+        content = f"{table}{text()}" if table.startswith(("lubricant", "strength")) else text(tail=table)
+        with pytest.raises(DesignFileError) as caught:
+            sweep_request(load(content))
+        message = str(caught.value)
+        assert f"/gear.toml: {key}: " in message and message.endswith(problem)
+        assert f"{name}: " in message or "U+0000" in message
 
 
 WRONG = [
@@ -583,7 +761,7 @@ def test_variables_stand_for_numbers_of_gears_pair_and_load(load):
         ("results", "torques = [30.0]\nresults", 'sweep.torques: has no effect, load.torque is "t"'),
         ("high = 0.2", "high = 3.0", "variables.x.high: 3 x module must be at least -1.5 x module and at most 2"),
         ('[pair]\ncenter_distance = "a"', "", "variables.a: is declared but used nowhere"),
-        ("high = 101.8", "high = 301.8", "pair: contact ratio = -14.52 must be at least 1"),
+        ("high = 101.8", "high = 301.8", "pair.center_distance: 201.6 mm must be less than 106.8 mm"),
     ):
         with pytest.raises(DesignFileError, match=re.escape(problem)):
             sweep_request(load(whole.replace(old, new)))
@@ -661,6 +839,19 @@ def test_files_that_cannot_be_read(tmp_path):
         load_design(tmp_path)
     with pytest.raises(DesignFileError, match="null byte"):
         load_design("gear\0.toml")
+
+
+def test_what_a_terminal_would_obey_is_shown_instead(tmp_path):
+    path = tmp_path / "a\x1b[2Jb.toml"
+    path.write_text(text())
+    assert load_design(path).title == "a\\x1b[2Jb"
+    path.write_text("")
+    with pytest.raises(DesignFileError, match=r"a\\x1b\[2Jb\.toml: pinion: missing") as caught:
+        load_design(path)
+    assert "\x1b" not in str(caught.value)
+    plain = NoModification()
+    write_design(path, load_design(EXAMPLES[0]).pair(), torque=50.0, pinion=plain, wheel=plain, title="\u202egears")
+    assert load_design(path).title == "\\u202egears"
 
 
 def test_a_byte_order_mark_and_carriage_returns_are_no_error(load):

@@ -311,7 +311,7 @@ REFUSED = {
         "",
         "pinion.tooth_thickness_allowance: cannot stand beside span: either says how thick",
     ),
-    "no teeth": ("span = 23.0", "", "pinion: teeth_spanned: missing, span needs it"),
+    "no teeth": ("span = 23.0", "", "pinion.teeth_spanned: missing, span needs it"),
     "no span": ("teeth_spanned = 3", "", "pinion.teeth_spanned: has no effect without span"),
     "no span, with a tolerance": (
         "teeth_spanned = 3\ntooth_thickness_tolerance = 20.0",
@@ -328,8 +328,18 @@ REFUSED = {
         "",
         "pinion.ball_diameter: has no effect without over_balls",
     ),
-    "no ball": ("over_balls = 65.0", "", "pinion: ball_diameter: missing, over_balls needs it"),
+    "no ball": ("over_balls = 65.0", "", "pinion.ball_diameter: missing, over_balls needs it"),
     "too long": ("span = 23.5\nteeth_spanned = 3", "", "pinion.span: 23.5 mm must be at most 23.144"),
+    "over a tooth less": (
+        "span = 22.9\nteeth_spanned = 2",
+        "",
+        "pinion.span: 22.9 mm must be at most 14.28812 mm, as the rack makes the tooth, with teeth_spanned = 2",
+    ),
+    "over a tooth more": (
+        "span = 22.9\nteeth_spanned = 4",
+        "",
+        "pinion.span: measured = 22.9 mm must be at least 23.1445 mm and at most 40.8573 mm, with teeth_spanned = 4",
+    ),
     "of another gear": ("span = 35.0\nteeth_spanned = 3", "", "pinion.span: measured = 35 mm must be at least 14"),
     "missed by the anvils": (
         "span = 70.0\nteeth_spanned = 9",
@@ -366,7 +376,7 @@ REFUSED = {
     "material of nothing": (
         "",
         "[materials.cast]\nyoung = 1.0",
-        "materials.cast.young: unknown key, must be one of density",
+        'materials.cast.young: unknown key, did you mean "elastic_modulus"',
     ),
     "another steel": ("", "[materials.STEEL]\ndensity = 7800.0", "materials.STEEL: is a material of the library"),
     "class of one gear": ("quality_class = 6", "", "wheel.quality_class: missing, the other gear has one"),

@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxgear.numerics import Checked, Number, count, fields_of, number
+import jaxgear as jg
+from jaxgear.numerics import Checked, Number, count, fields, fields_of, number
 
 
 class Inner(Checked):
@@ -31,10 +32,10 @@ class Probe(Checked):
 
 
 def test_units_and_ranges_stand_in_the_fields():
-    fields = fields_of(Probe)
-    assert list(fields) == ["amount", "length", "teeth", "limit", "values", "steps", "rate"]
-    assert fields["length"] == Number("mm", low=0.0)
-    assert fields["steps"].low == 1 and fields["steps"].high == 100 and fields["steps"].whole
+    known = fields_of(Probe)
+    assert list(known) == ["amount", "length", "teeth", "limit", "values", "steps", "rate"]
+    assert known["length"] == Number("mm", low=0.0)
+    assert known["steps"].low == 1 and known["steps"].high == 100 and known["steps"].whole
 
 
 @pytest.mark.parametrize(
@@ -52,6 +53,11 @@ def test_units_and_ranges_stand_in_the_fields():
         ({"rate": 0.0}, "Probe: rate = 0 must be greater than 0"),
         ({"side": "top"}, 'Probe: side = \'top\' must be "left", "right" or "both"'),
         ({"switch": "no"}, "Probe: switch = 'no' must be True or False"),
+        ({"amount": True}, "Probe: amount = True must be a number"),
+        ({"amount": 50 + 1j}, "Probe: amount = (50+1j) must be a real number"),
+        ({"amount": "2.5"}, "Probe: amount = '2.5' must be a number"),
+        ({"amount": None}, "Probe: amount = None must be a number"),
+        ({"values": [[1.0], [1.0, 2.0]]}, "Probe: values = ((1), (1, 2)) must be a number"),
         ({"amount": [1.0, 2.0]}, "Probe: amount has shape (2,), must be a single number; make many with jax.vmap"),
     ],
 )
@@ -59,6 +65,23 @@ def test_what_is_refused(given, message):
     with pytest.raises(ValueError) as error:
         Probe(**{"amount": 1.0, **given})
     assert str(error.value) == message
+
+
+def test_what_is_hardly_meant_is_asked_about_once(monkeypatch, caplog):
+    """Lengths in mm for amounts in um, moduli in GPa: they can be computed, so that they are no error."""
+    monkeypatch.setattr(fields, "_asked", set())
+    for amount in (0.0, 0.1, -20.0):
+        jg.TipRelief(amount, 5.0)
+    assert caplog.messages == []
+    for _ in range(2):
+        jg.TipRelief(0.02, 5.0), jg.Material(206.0)
+    assert caplog.messages == [
+        "TipRelief: amount = 0.02 um is less than 0.1 um (less than flanks can be measured to: is it in mm?)",
+        "Material: elastic_modulus = 206 MPa is less than 500 MPa (plastics 1000 to 10000, steel 206000 MPa: is it in "
+        "GPa or Pa?)",
+    ]
+    with pytest.raises(ValueError, match="TipRelief: length = 5000 mm must be at least 0 mm and at most 1000 mm"):
+        jg.TipRelief(20.0, 5000.0)
 
 
 def test_a_class_where_an_object_is_meant_is_refused():

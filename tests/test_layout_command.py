@@ -351,9 +351,12 @@ WRONG = [
     (replaced(AXES, '"clas"'), 'layout.misalignment: "clas" is not known, did you mean "class"?'),
     (
         replaced("position = 140.0, radial", "position = 240.0, radial"),
-        'shafts[0]: Shaft "in": bearing "B" at 240 mm must lie within',
+        'shafts[0].bearings[1].position: bearing "B" at 240 mm must lie within',
     ),
-    (replaced("radial = 250.0 },\n]", "radial = 0.0 },\n]"), 'shafts[0]: Shaft "in": bearings "A", "B" do not hold it'),
+    (
+        replaced("radial = 250.0 },\n]", "radial = 0.0 },\n]"),
+        'shafts[0].bearings: bearings "A", "B" do not hold it',
+    ),
     (
         replaced('name = "pinion", position = 20.0, integral = true', 'name = "19", position = 20.0'),
         "shafts[0].gears[0].gear: missing",
@@ -374,7 +377,10 @@ WRONG = [
         replaced("[{ position = 190.0 }]", "[{ position = 190.0, torque = 3.0 }]"),
         "couplings have no torque of their own",
     ),
-    (replaced('name = "D"', 'name = "A"'), 'shafts: bearing "A" is given twice'),
+    (
+        replaced('name = "D"', 'name = "A"'),
+        'shafts[1].bearings[1].name: "A" is given twice, first as shafts[0].bearings[0].name',
+    ),
     (
         replaced("radial = 250.0, axial = 80.0", "stiffness = [[1.0, 0.0], [0.0]]"),
         "shafts[0].bearings[0].stiffness: row 1 has 1 numbers, must have 2 as the first",
@@ -383,6 +389,17 @@ WRONG = [
     (replaced('name = "in"', 'name = "in"\nmaterial = "stel"'), 'shafts[0].material: "stel" is not known'),
     (replaced("radial = 250.0, axial", "radial = -250.0, axial"), "bearings[0].radial: -250 N/um must be at least 0"),
     (replaced("position = 60.0, radial", "position = 140.0, radial"), 'bearings "A", "B" do not hold it'),
+    (
+        replaced("couplings = [{ position = 160.0,", "couplings = [{ position = 500.0,"),
+        "shafts[0].couplings[0].position: coupling 0 at 500 mm must lie within",
+    ),
+    (
+        replaced(
+            '[{ name = "wheel", position',
+            '[{ name = "pinion", position = 9.0, body_diameter = 900.0 }, { name = "wheel", position',
+        ),
+        'shafts[1].gears[0].name: "pinion" is given twice, first as shafts[0].gears[0].name',
+    ),
     (replaced("position = 20.0, integral", "position = 5.0, integral"), 'gear "pinion" at -4 to 14 mm must lie within'),
     (replaced("torque = 150.0 }]", "torque = -150.0 }]"), "the pinion of a mesh drives its wheel"),
     (FILE + LIFE.replace("[1000.0, 50.0]", "[1000.0, -50.0]"), "layout.hours[1]: -50 h must be at least 0 h"),
@@ -408,7 +425,7 @@ WRONG = [
         'meshes: none is that of "pinion"',
     ),
     (replaced("[layout]", '[[meshes]]\npinion = "x"\nwheel = "wheel"\n[layout]'), "meshes: none is that of"),
-    (FILE.replace("housing.csv", "none.csv"), "none.csv: no such file"),
+    (FILE.replace("housing.csv", "none.csv"), "housing.file: none.csv: No such file"),
 ]
 WRONG_HOUSINGS = [
     (HOUSING.replace("D.x", "G.x"), 'housing.file: seat of the housing "G" is not known'),

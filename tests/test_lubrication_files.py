@@ -55,6 +55,7 @@ constraint = [{ of = "scuffing_safety", low = 1.5 }]
 samples = 2
 results = ["loss_power", "scuffing_safety", "pinion_root_safety"]
 """
+UNLIMITED = RELIEF.replace('[optimize]\nconstraint = [{ of = "scuffing_safety", low = 1.5 }]\n', "")
 SHEET = "viscosity_40 = 100.0\nviscosity_100 = 11.0\nscuffing_temperature = 250.0\n"
 
 
@@ -102,6 +103,10 @@ def test_tables_bring_the_quantities_that_they_tell_of(load):
         (
             PAIR.replace("3000.0", '"n"') + OIL + "[variables]\nn = { low = 0.0, high = 3000.0 }",
             "pair.toml: variables.n.low: 0 rpm must be greater than 0 rpm with [lubricant]",
+        ),
+        (
+            PAIR.replace("3000.0", "1e-9") + OIL,
+            "pair.toml: load.speed: 1e-09 rpm must be at least 0.001 rpm and at most 1e+07 rpm with [lubricant]",
         ),
         (PAIR + OIL + 'friction = "xu"', 'lubricant.friction: "xu" is not known'),
         (PAIR + "friction = 0.05" + OIL + 'friction = "schlenk"', "lubricant.friction: has no effect beside load.fric"),
@@ -152,10 +157,10 @@ def test_a_constraint_and_a_column_need_their_table(load):
         with pytest.raises(DesignFileError, match=re.escape(message)):
             optimize_request(load(text))
     for text, message in (
-        (PAIR + RELIEF, 'sweep.results[0]: "loss_power" needs load.friction or the table [lubricant]'),
-        (PAIR.replace("speed = 3000.0", "") + RELIEF, 'sweep.results[0]: "loss_power" needs load.speed'),
-        (PAIR + OIL + RELIEF, 'sweep.results[2]: "pinion_root_safety" needs the table [strength]'),
-        (PAIR + OIL + "[strength]\npressure = 1e3" + RELIEF, "needs strength.bending"),
+        (PAIR + UNLIMITED, 'sweep.results[0]: "loss_power" needs load.friction or the table [lubricant]'),
+        (PAIR.replace("speed = 3000.0", "") + UNLIMITED, 'sweep.results[0]: "loss_power" needs load.speed'),
+        (PAIR + OIL + UNLIMITED, 'sweep.results[2]: "pinion_root_safety" needs the table [strength]'),
+        (PAIR + OIL + "[strength]\npressure = 1e3" + UNLIMITED, "needs strength.bending"),
     ):
         with pytest.raises(DesignFileError, match=re.escape(message)):
             sweep_request(load(text))

@@ -204,6 +204,10 @@ HEAD = "roll_length_mm,face_coordinate_mm,measured_um\n"
             "roll_length_mm,amount\n1,2\n",
             "has no column measured_um, modification_um, wear_depth_um, design_um, must have one",
         ),
+        (
+            HEAD + "20,0,0.002\n21,0,0.02\n",
+            "has measured_um within 0.018 um, less than flanks can be measured to",
+        ),
         (HEAD + "20,0,1\n21,0,x\n", 'measured_um of point 2 is "x", must be a number'),
         (HEAD + "20,0,1\n21,0\n", 'measured_um of point 2 is "", must be a number'),
         (HEAD + "20,0,1\n21,0,nan\n", 'measured_um of point 2 is "nan", must be a number'),

@@ -9,11 +9,15 @@ from catalogue import LINE, gear_pair, high_contact_ratio_pair
 
 import jaxgear as jg
 from jaxgear.contact.kinematics import kinematics
-from jaxgear.metrics import plausibility
+from jaxgear.metrics import Lubricant, plausibility
 
 
 def names(cycle, **options):
     return {(doubt.name, doubt.where) for doubt in plausibility(cycle, **options)}
+
+
+def oil(**values):
+    return Lubricant(**{"viscosity_40": 100.0, "viscosity_100": 11.1, "temperature": 90.0, "roughness": 0.5, **values})
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +45,8 @@ def replaced(cycle, where, **values):
 
 def test_a_usual_design_raises_no_doubt(cycle):
     assert plausibility(cycle, torque_range=(25.0, 100.0), speed=3000.0, friction=0.06) == ()
-    assert plausibility(cycle, oil_friction=0.06, bulk_temperature=95.0) == ()
+    assert plausibility(cycle, oil_friction=0.06, bulk_temperature=95.0, lubricant=oil()) == ()
+    assert names(cycle, pinion=jg.ProfileSlope(-4.0) + jg.LeadCrowning(-4.0)) == set()  # which may have either sign
 
 
 def test_tip_edges_that_dig_in_are_asked_about(mesh):
@@ -57,6 +62,10 @@ def test_tip_edges_that_dig_in_are_asked_about(mesh):
         ({"wheel": jg.TipRelief(0.007, 3.4)}, ("depth of the modification", "wheel")),
         ({"wheel": jg.TipRelief(7.0, 34.0)}, ("length of the modification", "wheel")),
         ({"pinion": jg.TipRelief(7.0, 3.0) + jg.RootRelief(7.0, 30.0)}, ("length of the modification", "pinion")),
+        ({"pinion": jg.TipRelief(-7.0, 3.4)}, ("amount of the modification", "pinion")),
+        ({"pinion": jg.ProfileCrowning(3.0) + jg.EndRelief(-7.0, 2.0)}, ("amount of the modification", "pinion")),
+        ({"lubricant": oil(temperature=-50.0)}, ("temperature of the oil", "")),
+        ({"lubricant": oil(cooling_factor=1e-300)}, ("cooling factor", "")),
         ({"pinion": jg.EndRelief(7.0, 15.0)}, ("length of the modification", "pinion")),
         ({"friction": 3.7}, ("coefficient of friction", "")),
         ({"oil_friction": 0.3}, ("coefficient of friction of the oil", "")),

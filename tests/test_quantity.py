@@ -69,6 +69,12 @@ def test_both_spellings_and_the_nearest_name():
         quantities.add(Quantity("ppte", lambda cycle: cycle.transmission_error))
 
 
+def test_an_unknown_name_is_a_key_error_with_the_nearest_one():
+    with pytest.raises(KeyError, match='quantities: "max_pressure" is not known, did you mean "max_flank_pressure"'):
+        quantities["max_pressure"]
+    assert "max_pressure" not in quantities and quantities.get("max_pressure") is None
+
+
 def test_the_vocabulary_is_the_same_whatever_was_imported_first():
     """A name of a package that nobody has imported is known, and tables and guides list all in one order."""
     code = (

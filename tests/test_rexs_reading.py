@@ -3,6 +3,7 @@
 import base64
 import contextlib
 import io
+import os
 import random
 import re
 from dataclasses import replace
@@ -238,6 +239,15 @@ def test_gears_that_count_along_their_faces_in_opposite_directions_are_refused(w
         read_rexs(written.path)
     written.path.write_text(text.replace("-1.0</c>", "1.0</c>"))
     assert read_rexs(written.path).torque == 50.0
+
+
+def test_a_file_without_units_is_taken_in_those_of_the_standard_with_a_word(written, caplog):
+    written.path.write_text(written.text)
+    assert read_rexs(written.path) and caplog.messages == []
+    written.path.write_text(re.sub(r' unit="[^"]*"', "", written.text))
+    assert float(read_rexs(written.path).pair.pinion.face_width) == 20.0
+    (line,) = caplog.messages
+    assert re.search(r"names no units, those of the REXS standard are taken: .* \d+: \w+ in .*, the first of", line)
 
 
 def test_names_and_units_of_earlier_versions(written):
@@ -616,15 +626,22 @@ def test_the_command_refuses_in_one_line_and_writes_nothing(tmp_path):
     rexs, free, there = tmp_path / "pair.rexs", tmp_path / "free.toml", tmp_path / "there.toml"
     write_rexs(rexs, PAIR)
     there.write_text("# mine\n")
+    (tmp_path / "link.toml").symlink_to("nowhere.toml")
     free.write_text(
         "[pinion]\nteeth = 19\nmodule = 3.0\nface_width = 20.0\n[wheel]\nteeth = 48\nmodule = 3.0\nface_width = 18.0\n"
         '[[wheel.modification]]\ntype = "lead_slope"\namount = "free"\n[load]\ntorque = 50.0\n'
         "[variables]\nfree = { low = 0.0, high = 9.0 }\n"
     )
-    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def everything():
+        return {path: os.readlink(path) if path.is_symlink() else path.read_bytes() for path in tmp_path.iterdir()}
+
+    before = everything()
     for arguments, wanted in (
         ((rexs, tmp_path / "new.toml"), "names no torque of the pinion, give it with --torque"),
         ((rexs, there, "--torque", "50"), "there.toml: exists already, choose another name"),
+        ((rexs, tmp_path / "link.toml", "--torque", "50"), "link.toml: exists already, choose another name"),
+        ((rexs, tmp_path / f"{'a' * 300}.toml", "--torque", "50"), "aaa.toml: cannot be written: File name too long"),
         (
             (rexs, tmp_path / "new.txt"),
             "pair.rexs to new.txt: one name must end in .toml, the other in .rexs or .rexsj",
@@ -636,5 +653,5 @@ def test_the_command_refuses_in_one_line_and_writes_nothing(tmp_path):
     ):
         done = call("convert", *arguments)
         assert done.code == 2 and done.out == "" and wanted in done.err and done.err.count("\n") == 1
-        assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+        assert everything() == before
     assert call("convert", rexs, tmp_path / "new.toml", "--torque", "50").code == 0

@@ -1,5 +1,6 @@
 """The command `jaxgear sweep`: what it prints and writes, how it resumes, and that every failure is one line."""
 
+import csv
 import os
 import signal
 import subprocess
@@ -21,7 +22,8 @@ import jaxgear as jg
 from jaxgear.cli import devices, sweep_figures
 from jaxgear.cli import sweep as sweep_command
 from jaxgear.io import load_design, read_variants, sweep_request
-from jaxgear.sweeps import evaluate
+from jaxgear.sweeps import SweepTable, evaluate
+from jaxgear.sweeps.columns import Column
 
 
 def sweep(file, *arguments):
@@ -334,6 +336,19 @@ BOX = {"a": (0.0, 20.0), "l": (1.0, 6.0)}
 def listed(path, content, encoding="utf-8"):
     path.write_text(content, encoding=encoding)
     return read_variants(path, BOX, {"a": "um", "l": "mm"}).rows(0, 1).tolist()
+
+
+def test_headings_are_no_formulas_and_read_back(tmp_path):
+    """Names are the user's: quotes within them, and what a spreadsheet would calculate or run."""
+    names = ['a"b', "=cmd|' /C calc'!A0", "+1", "@x", "plain", "'quoted"]
+    path = tmp_path / "list.csv"
+    SweepTable("", [Column(name, "um", "parameter") for name in names], (), None).to_csv(path)
+    (headings,) = csv.reader(path.read_text().splitlines())
+    assert [heading[0] for heading in headings] == ["a", "'", "'", "'", "p", "'"]
+    with path.open("a") as file:
+        file.write("0,1,2,3,4,5\n")
+    box, units = dict.fromkeys(names, (0.0, 9.0)), dict.fromkeys(names, "um")
+    assert read_variants(path, box, units).rows(0, 1).tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]]
 
 
 def test_a_list_in_other_units_is_converted_or_refused(tmp_path):

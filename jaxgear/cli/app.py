@@ -3,17 +3,15 @@
 JAX and the library are imported when a command runs: help, version and what is wrong with the options need neither.
 """
 
-import logging
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal, NoReturn
 
 import typer
 
-from . import interrupt
+from . import interrupt, streams
 from .options import File, NoCache, NoFigures, Quick, Reported, output_option, typed
 from .version import version as own_version
 
@@ -233,45 +231,39 @@ def convert(
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Entry point of the command `jaxgear`; every failure is one line on stderr."""
+    streams.silence_compiler()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a title beyond the terminal's alphabet is no reason to fail
-    with interrupt.listening(), _warnings():
+    with interrupt.listening(), streams.warnings():
         code = _run(arguments)
     sys.exit(code)
-
-
-@contextmanager
-def _warnings() -> Iterator[None]:
-    """Shows what the library warns of as lines on stderr."""
-    lines = logging.StreamHandler()
-    lines.setLevel(logging.WARNING)
-    lines.setFormatter(logging.Formatter("jaxgear: warning: %(message)s"))
-    logger = logging.getLogger("jaxgear")
-    logger.addHandler(lines)
-    try:
-        yield
-    finally:
-        logger.removeHandler(lines)
 
 
 def _run(arguments: Sequence[str] | None) -> int:
     try:
         given = sys.argv[1:] if arguments is None else list(arguments)
         code = app(args=given, obj=given, prog_name="jaxgear", standalone_mode=False)
+        sys.stdout.flush()  # what cannot be written is known here, not when the interpreter ends
         if code == INTERRUPTED or interrupt.state.asked:
             return _say_interrupted()
     except (KeyboardInterrupt, typer.Abort):
         return _say_interrupted()
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # keeps the flush at exit quiet
+        streams.forget_output()
         return OK
+    except SystemExit as end:  # of typer, where nobody reads its help to the end
+        if isinstance(end.__context__, BrokenPipeError):
+            return OK
+        raise
     except Exception as error:  # noqa: BLE001 - a user never sees a traceback
         if os.environ.get("JAXGEAR_DEBUG"):
             raise
         if interrupt.state.asked:  # a library has made something else of it
             return _say_interrupted()
-        print(f"jaxgear: error: {_one_line(error)}", file=sys.stderr)
+        print(f"jaxgear: error: {streams.one_line(error)}", file=sys.stderr)
+        if isinstance(error, OSError):
+            streams.forget_output()
         return FAILED
     return code or OK
 
@@ -279,12 +271,3 @@ def _run(arguments: Sequence[str] | None) -> int:
 def _say_interrupted() -> int:
     print(f"jaxgear: interrupted, {interrupt.state.written}", file=sys.stderr)
     return INTERRUPTED
-
-
-def _one_line(error: Exception) -> str:
-    if hasattr(error, "format_message"):  # usage errors of typer
-        return f"{' '.join(error.format_message().split())} (jaxgear --help shows the usage)"
-    message = " ".join(str(error).split())
-    if isinstance(error, ValueError | RuntimeError) and message:
-        return message
-    return f"unexpected {type(error).__name__}: {message} (JAXGEAR_DEBUG=1 shows where)"

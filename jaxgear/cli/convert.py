@@ -1,5 +1,6 @@
 """What the command `convert` does: a design file as a REXS file, and the other way round."""
 
+import os
 from pathlib import Path
 from typing import Literal
 
@@ -25,7 +26,7 @@ def convert(
 ) -> None:
     """Converts a file by the ends of both names; a file that is there is never replaced."""
     jax.config.update("jax_enable_x64", True)
-    if target.exists():
+    if os.path.lexists(target):  # a link that leads nowhere is there too
         raise ValueError(f"{target}: exists already, choose another name")
     if source.suffix in _REXS and target.suffix in _DESIGN:
         found = read_rexs(source, stage=stage, flank=flank, load_case=load_case)

@@ -14,6 +14,7 @@ from ..contact import Mesh
 from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.cases import quality_classes
+from ..io.errors import printable
 from ..io.results import unit_of
 from ..metrics import Doubt, plausibility
 from ..numerics import program
@@ -104,7 +105,7 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
 def doubts(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, tuple[Doubt, ...]]:
     """What is not usual of every design."""
     options: dict[str, Any] = {"torque_range": file.torque_range, "speed": file.speed, "friction": file.friction}
-    options["compliance"] = mesh.compliance
+    options |= {"compliance": mesh.compliance, "lubricant": file.lubricant}
     found = {}
     for name, design in evaluations.items():
         options |= {"pinion": design.pinion, "wheel": design.wheel}
@@ -267,12 +268,12 @@ def console(*, stderr: bool = False) -> Console:
 def say(*lines: str) -> None:
     """Prints lines that the terminal may break."""
     for line in lines:
-        console().print(line, soft_wrap=True)
+        console().print(printable(line), soft_wrap=True)
 
 
 def warn(line: str) -> None:
     """Prints a warning on stderr."""
-    console(stderr=True).print(f"jaxgear: warning: {line}", style="bold red", soft_wrap=True)
+    console(stderr=True).print(f"jaxgear: warning: {printable(line)}", style="bold red", soft_wrap=True)
 
 
 def _flank_cells(evaluation: Evaluation) -> Iterator[tuple[str, str]]:

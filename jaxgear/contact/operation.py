@@ -32,7 +32,7 @@ def operation_of(owner: str, torque, dtype) -> Operation:
         ValueError: for a negative or non-finite torque, or an array of torques; the message names the owner.
     """
     if not isinstance(torque, Operation):
-        torque = real(torque)
+        torque = real(torque, f"{owner}: torque")
         if torque.ndim:
             raise ValueError(
                 f"{owner}: torque has shape {torque.shape}, must be a single number; solve for many with jax.vmap"

@@ -17,6 +17,9 @@ Real = Float[Array, "*gears"]  # one number of each gear, where `jax.vmap` made 
 # these limits, which also hold every basic rack in use (ISO 53, AGMA fine pitch, stub and high-contact-ratio racks).
 _PRESSURE_ANGLES = 10.0, 35.0
 _RACK_HEIGHTS = 0.5, 2.0
+# The wind-up of the ring grows with the square of root over bore diameter: below this share of the root diameter no
+# bore passes a torque on that the teeth could carry, and the number is a slip.
+_LEAST_BORE = 0.02
 # by how much the tip form circle may lie outside the tip circle [mm], which a drawing rounds
 CHAMFER_ACCURACY = 1e-3
 
@@ -52,7 +55,7 @@ class Gear(Checked):
     Raises:
         ValueError: for a number outside its range or an array of numbers, a pointed tooth, a tip inside the base
             circle, a tip form circle outside the tip circle or inside the base circle, or a bore that reaches the root
-            circle; the message names the parameter, its value and what is allowed.
+            circle or is less than 2 % of it; the message names the parameter, its value and what is allowed.
             While being traced only shapes are checked: `margins` of the pair tell then.
     """
 
@@ -212,6 +215,9 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
         )
     if not rim > 0:
         faults.append(f"Gear: bore_diameter = {bore:g} mm must be less than {root:g} mm")
+    elif bore < _LEAST_BORE * root:
+        least = f"{_LEAST_BORE * root:.4g} mm, {100 * _LEAST_BORE:g} % of the root diameter"
+        faults.append(f"Gear: bore_diameter = {bore:g} mm must be at least {least}")
     return tuple(faults)
 
 

@@ -195,10 +195,7 @@ def faults_between(
             f"{reach:g} mm, half the sum of both face widths: the faces do not overlap"
         )
     if "contact_ratio_margin" in missed:
-        faults.append(
-            f"GearPair: contact ratio = {float(margins.contact_ratio_margin) + 1:.4g} must be at least 1: raise a "
-            "tip_diameter or addendum, or lower center_distance"
-        )
+        faults.append(_contact_ratio_fault(pinion, wheel, center_distance, float(margins.contact_ratio_margin) + 1))
     for name, mate, gear in (("pinion", "wheel", pinion), ("wheel", "pinion", wheel)):
         if f"{name}_form_clearance" in missed:
             faults.append(_form_fault(name, mate, gear, float(getattr(margins, f"{name}_form_clearance"))))
@@ -217,6 +214,16 @@ def _backlash_fault(pinion: Gear, wheel: Gear, center_distance) -> str:
     free = float(both / jnp.cos(angle)) * (1 - _DISTANCE_ACCURACY)
     unit = "mm (backlash-free)"
     return f"GearPair: center_distance = {float(center_distance):g} {unit} must be at least {free:g} {unit}"
+
+
+def _contact_ratio_fault(pinion: Gear, wheel: Gear, center_distance, contact_ratio: float) -> str:
+    remedy = "raise a tip_diameter or addendum"
+    if center_distance is None:
+        return f"GearPair: contact ratio = {contact_ratio:.4g} must be at least 1: {remedy}"
+    given, reach = f"GearPair: center_distance = {float(center_distance):g} mm", pinion.tip_radius + wheel.tip_radius
+    if not float(center_distance) < float(reach):
+        return f"{given} must be less than {float(reach):g} mm, the sum of both tip radii: the teeth do not meet"
+    return f"{given} leaves a contact ratio of {contact_ratio:.4g}, must be at least 1: lower it, or {remedy}"
 
 
 def _form_fault(name: str, mate: str, gear: Gear, clearance: float) -> str:

@@ -2,9 +2,11 @@
 
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, number
+from ..numerics import Checked, Usual, number
 
 Scalar = Float[Array, ""]
+
+_MODULI = Usual(500.0, 700_000.0, "plastics 1000 to 10000, steel 206000 MPa: is it in GPa or Pa?")
 
 
 class Material(Checked):
@@ -18,7 +20,7 @@ class Material(Checked):
             temperature (ISO/TS 6336-20).
     """
 
-    elastic_modulus: Scalar = number("MPa", low=0.0, open_low=True, default=206_000.0)
+    elastic_modulus: Scalar = number("MPa", low=0.0, open_low=True, default=206_000.0, usual=_MODULI)
     poisson_ratio: Scalar = number("", low=0.0, high=0.5, open_high=True, default=0.3)
     density: Scalar = number("kg/m^3", low=0.0, open_low=True, default=7850.0)
     thermal_contact_coefficient: Scalar = number("N/(m s^0.5 K)", low=0.0, open_low=True, default=13_800.0)

@@ -1,7 +1,6 @@
 """Files: design files (TOML) in, results (JSON, CSV) out, gear pairs to and from other programs (REXS)."""
 
 from .design_file import DesignFile as DesignFile
-from .design_file import load_design as load_design
 from .dynamics_request import DynamicsRequest as DynamicsRequest
 from .dynamics_request import dynamics_request as dynamics_request
 from .errors import DesignFileError as DesignFileError
@@ -10,6 +9,7 @@ from .folder import result_folder as result_folder
 from .folder import writing as writing
 from .layout_request import LayoutRequest as LayoutRequest
 from .layout_request import layout_request as layout_request
+from .load import load_design as load_design
 from .named import quantities_of_tables as quantities_of_tables
 from .optimize_request import OptimizeRequest as OptimizeRequest
 from .optimize_request import optimize_request as optimize_request

@@ -3,7 +3,7 @@
 from ..conditions import LoadSpectrum
 from ..tolerance import Tolerance, ToleranceClass
 from .design_file import DesignFile
-from .errors import DesignFileError, refuse_given, refused
+from .errors import DesignFileError, problem, refuse_given, refused
 from .schema import OptimizeSection
 from .schema_sweep import SweepSection
 
@@ -33,8 +33,17 @@ def quality_classes(design: DesignFile) -> tuple[ToleranceClass, ToleranceClass]
     if design.quality_classes is None:
         return None
     first, second = design.quality_classes
-    pair = design.pair()
-    return ToleranceClass.of(pair.pinion, first), ToleranceClass.of(pair.wheel, second)
+    return _class_of(design, "pinion", first), _class_of(design, "wheel", second)
+
+
+def _class_of(design: DesignFile, name: str, quality: int) -> ToleranceClass:
+    gear = getattr(design.pair(), name)
+    try:
+        return ToleranceClass.of(gear, quality)
+    except ValueError as error:
+        field, _, text = problem(error).partition(" = ")
+        key, text = (f"{name}.{field}", text) if hasattr(gear, field) else (name, problem(error))
+        raise DesignFileError(key, f"{text} for tolerances of ISO 1328-1") from None
 
 
 def tolerance_of(design: DesignFile) -> Tolerance | None:
@@ -42,11 +51,12 @@ def tolerance_of(design: DesignFile) -> Tolerance | None:
     section = design.tolerance
     if section is None:
         return None
+    quality_classes(design)  # which names the gear that no class is made for
     given = {"quality_class": section.quality_class, "misalignment": section.misalignment}
     tolerance = refused("tolerance", Tolerance.from_class, design.pair(), **given)
     if design.resolution().slices > 1:
         return tolerance
     if section.misalignment is not None:
-        problem = "needs resolution.slices of at least 2, one slice cannot show it"
-        raise DesignFileError("tolerance.misalignment", problem)
+        needed = "needs resolution.slices of at least 2, one slice cannot show it"
+        raise DesignFileError("tolerance.misalignment", needed)
     return tolerance.without_lead()

@@ -13,12 +13,13 @@ from ..compliance import AbstractCompliance
 from ..contact import Mesh, Operation, Resolution, begin_contact, fewest_pairs, prepare
 from ..geometry import GearPair
 from ..metrics import Lubricant, Strength
+from ..metrics.plausibility import LIMITS
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
 from . import held, rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, sections, template
 from .as_function import FileDesign, FileMesh
-from .errors import DesignFileError, naming, refused
+from .errors import DesignFileError, naming, printable, refused
 from .flanks import check_files
 from .gearbox import layout_of, support_of
 from .gears import both_classes, gear_of, materials_of, pair_of, quality_of
@@ -122,8 +123,15 @@ class DesignFile:
         try:
             pairs = fewest_pairs(self._middle, deflection=deflection)
         except ValueError:
-            given = f"{torque:g} N m deflects a pair of teeth of module {float(self._middle.pinion.module):g} mm by"
-            problem = f"{given} {deflection / times:.3g} um: give the torque in N m, elastic moduli in MPa"
+            given = f"deflects a pair of teeth of module {float(self._middle.pinion.module):g} mm by"
+            given = f"{torque:g} N m {given} {deflection / times:.3g} um"
+            for name, gear in (("pinion", self._middle.pinion), ("wheel", self._middle.wheel)):
+                modulus, usual = float(gear.material.elastic_modulus), LIMITS["elastic modulus"]
+                if modulus < usual.low:
+                    material = self._pair.fields[name].fields["material"]
+                    problem = f"{modulus:g} MPa is less than {usual.low:g} MPa ({usual.remark}), and {given}"
+                    raise DesignFileError(f"{material.key}.elastic_modulus", problem, self.path) from None
+            problem = f"{given}: give the torque in N m"
             raise DesignFileError("load.torque", problem, self.path) from None
         if self._pair.free():  # other variants can have a larger contact ratio
             pairs = max(pairs, _OPEN_PAIRS)
@@ -193,16 +201,12 @@ def _single_deflection(pair: GearPair, torque) -> Float[Array, ""]:
     return line_load / iso_stiffness(pair, line_load).single
 
 
-def load_design(path: str | Path) -> DesignFile:
-    """Reads and checks a design file.
-
-    Args:
-        path: TOML file; examples/spur_19_48.toml shows and lists what it can say.
+def read_design(file: Path) -> DesignFile:
+    """Reads a design file and checks all but what only the tables of its commands say, see `load_design`.
 
     Raises:
         DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
     """
-    file = Path(path)
     with naming(file):
         says = read(file)
         return _checked(file, json.dumps(says, sort_keys=True, default=str), decode("", says, schema.FileSection))
@@ -251,7 +255,7 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
     return DesignFile(
         path=file,
         says=says,
-        title=top.title or file.stem,
+        title=top.title or printable(file.stem),
         torque=torque,
         torque_range=(low, high),
         speed=None if usual.speed is None else float(usual.speed),

@@ -2,11 +2,52 @@
 
 import difflib
 import re
+import stat
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TypeVar
 
 T = TypeVar("T")
+
+# Symbols and names of ISO 21771, ISO 53, ISO 6336 and drawings that a user may write for a key, without underscores and
+# the index of the gear; of keys with one symbol the first that its table knows is meant.
+_SYMBOLS = {
+    "teeth": "z toothnumber numberofteeth",
+    "module": "m mn mt modul",
+    "pressure_angle": "alpha alphan alphap alpha0",
+    "profile_shift": "x xstar",
+    "face_width": "b width",
+    "addendum": "ha hap",
+    "dedendum": "hf hfp",
+    "root_radius": "rho rhof rhofp",
+    "tip_diameter": "da dk",
+    "tip_form_diameter": "dfa dna",
+    "bore_diameter": "di bore",
+    "tooth_thickness_allowance": "esn esns asne as",
+    "tooth_thickness_tolerance": "tsn ts",
+    "span": "wk w",
+    "teeth_spanned": "k",
+    "over_balls": "mdk mdr mr",
+    "ball_diameter": "dm",
+    "center_distance": "a aw centredistance axisdistance",
+    "backlash": "j jn jbn jt",
+    "torque": "t m",
+    "speed": "n rpm",
+    "friction": "mu",
+    "elastic_modulus": "e youngsmodulus young",
+    "poisson_ratio": "nu",
+    "density": "rho",
+    "amount": "ca caa caf cb calpha cbeta",
+    "length": "lca lcaa lc",
+    "viscosity_40": "nu40",
+    "viscosity_100": "nu100",
+    "temperature": "t theta thetaoil",
+    "roughness": "ra",
+}
+# Control characters, but for tabs and line ends, and those that turn the order of what follows (Unicode TR 36).
+_OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+_OF_HELICAL_GEARS = "helixangle", "helix", "beta"
 
 
 class DesignFileError(ValueError):
@@ -15,7 +56,18 @@ class DesignFileError(ValueError):
     def __init__(self, key: str, problem: object, file: object = ""):
         self.key, self.problem, self.file = key, str(problem), str(file)
         parts = [self.file, key, self.problem]
-        super().__init__(" ".join(": ".join(part for part in parts if part).split()))
+        super().__init__(printable(" ".join(": ".join(part for part in parts if part).split())))
+
+
+def printable(text: str) -> str:
+    """A text with escape sequences in place of the characters that a terminal would obey instead of showing them."""
+    return _OBEYED.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def obeyed(text: str) -> str:
+    """The first character of a text that a terminal would obey, as U+001B; "" without one."""
+    found = _OBEYED.search(text)
+    return f"U+{ord(found[0]):04X}" if found else ""
 
 
 @contextmanager
@@ -27,12 +79,37 @@ def naming(file: object) -> Iterator[None]:
         raise DesignFileError(error.key, error.problem, error.file or file) from None
 
 
+@contextmanager
+def referring(key: str, name: str) -> Iterator[None]:
+    """Says at which key a file stands that is refused in a block."""
+    try:
+        yield
+    except DesignFileError as error:
+        parts = name, error.key, error.problem
+        raise DesignFileError(key, ": ".join(part for part in parts if part)) from None
+
+
+def check_file(path: Path) -> None:
+    """Refuses what is no regular file: a pipe or a device may never come to its end.
+
+    Raises:
+        DesignFileError: without key, in the words of the system.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError) as error:  # ValueError: a path with a null byte
+        raise DesignFileError("", getattr(error, "strerror", None) or error) from None
+    if not stat.S_ISREG(mode):
+        raise DesignFileError("", "is a folder, not a file" if stat.S_ISDIR(mode) else "is not a regular file")
+
+
 def refused(key: str, make: Callable[..., T], *args, **kwargs) -> T:
     """What `make` returns; what it refuses is wrong with the key of the design file."""
     try:
         return make(*args, **kwargs)
     except (ValueError, OverflowError) as error:
-        raise DesignFileError(key, problem(error)) from None
+        part = getattr(error, "part", "")
+        raise DesignFileError(f"{key}.{part}" if part else key, problem(error)) from None
 
 
 def refuse_given(table: str, section: object, keys: Iterable[str], why: str) -> None:
@@ -50,7 +127,7 @@ def check_known(key: str, name: str, names: Collection[str]) -> None:
 
 def problem(error: Exception) -> str:
     """What the library refuses, without the class that refuses it: a design file has keys."""
-    return re.sub(r"\A[A-Z]\w*: ", "", str(error))
+    return re.sub(r"\A[A-Z]\w*( \"[^\"]*\")?: ", "", str(error))
 
 
 def not_known(name: object, names: Iterable[str]) -> str:
@@ -61,7 +138,11 @@ def not_known(name: object, names: Iterable[str]) -> str:
 def suggestion(name: object, valid: Iterable[str]) -> str:
     """What to write instead of a name: the nearest valid one, or all of them where none is near."""
     names = sorted(valid)
-    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    plain = str(name).replace("_", "").lower()
+    if plain in _OF_HELICAL_GEARS and "teeth" in names:
+        return "the gears are spur gears"
+    meant = [key for key, symbols in _SYMBOLS.items() if key in names and plain.rstrip("12") in symbols.split()]
+    near = meant or difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     if near:
         return f'did you mean "{near[0]}"?'
     return f"must be one of {', '.join(names)}" if names else "nothing is allowed here"

@@ -14,9 +14,10 @@ import numpy as np
 from ..contact import Side
 from ..geometry import GearPair
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
+from ..microgeometry.base import AMOUNTS
 from ..numerics import check, real
 from . import schema, template
-from .errors import DesignFileError, naming
+from .errors import DesignFileError, naming, referring
 from .flank_range import FlankRange, starts
 from .rows import Rows, read_rows
 from .toml import decode
@@ -79,7 +80,7 @@ def flank_part(key: str, table: Mapping[str, Any], folder: Path) -> template.Par
     given = {name: value for name, value in table.items() if name != "type"}
     section = decode(key, given, schema.FlankFileSection)
     path = folder / section.file
-    try:
+    with referring(f"{key}.file", path.name):
         rows = read_rows(path)
         gear = section.gear
         if gear is None and _GEAR in rows[0]:
@@ -87,8 +88,6 @@ def flank_part(key: str, table: Mapping[str, Any], folder: Path) -> template.Par
         method: Any = section.method
         rows = _at_life(_chosen(rows, {_GEAR: gear, "design": section.design}), section.revolutions)
         flank, reach = _table(rows, None, method)
-    except DesignFileError as error:
-        raise DesignFileError(f"{key}.file", f"{path.name}: {error.problem}") from None
     return template.Part(_FromFile(path.name, reach), {"flank": flank}, key)
 
 
@@ -102,10 +101,8 @@ def check_files(parts: Mapping[str, Sequence[template.Part]], pair: GearPair) ->
         for part in several:
             if isinstance(part.make, _FromFile):
                 start, middle = starts(pair)[name], pair.face_middles[name == "wheel"]
-                try:
+                with referring(f"{part.key}.file", part.make.name):
                     part.make.reach.check_on(getattr(pair, name), start, pair.face_width, middle)
-                except DesignFileError as error:
-                    raise DesignFileError(f"{part.key}.file", f"{part.make.name}: {error.problem}") from None
 
 
 @dataclass(frozen=True)
@@ -136,6 +133,8 @@ def _table(
     if not profile:
         raise DesignFileError("", "holds a helix alone, must hold a profile")
     roll, face, removed = _grid(profile, amount, base_radius)
+    if amount == MEASURED and 0 < (spread := float(np.ptp(removed))) < AMOUNTS.low:
+        raise DesignFileError("", f"has {MEASURED} within {spread:.3g} um, {AMOUNTS.remark}")
     if len(face) > 1 and helix:
         raise DesignFileError("", f"has a helix beside profiles at {len(face)} face coordinates, must be one profile")
     if helix:

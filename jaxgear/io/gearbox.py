@@ -1,6 +1,6 @@
 """The gearbox that the tables [[shafts]], [[meshes]] and [housing] of a design file describe."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from ..shafts import (
 )
 from ..shafts import Section as ShaftPart
 from . import schema_shafts as schema
-from .errors import DesignFileError, refuse_given, refused
+from .errors import DesignFileError, check_file, referring, refuse_given, refused
 from .gears import Materials, fixed_gear, fixed_material, with_quality
 from .layout import section_of
 from .schema import FileSection
@@ -80,6 +80,7 @@ def support_of(
         return None
     if not top.shafts:
         raise DesignFileError("layout", "has no effect without [[shafts]]")
+    _check_names(top.shafts)
     made = [_shaft(f"shafts[{i}]", each, pair, materials) for i, each in enumerate(top.shafts)]
     names = [gear.name for shaft in made for gear in shaft.gears]
     for name in _OWN:
@@ -96,9 +97,24 @@ def support_of(
         raise DesignFileError("load.torque", f"{torque:g} N m must be {brought:g} N m, which the couplings bring")
     if top.housing is not None:
         section = decode("housing", top.housing, schema.HousingSection)
+        with referring("housing.file", section.file):
+            check_file(folder / section.file)
         seats = refused("housing.file", read_housing, folder / section.file)
         box = refused("housing.file", replace, box, housing=seats)
     return support(box, own[0])
+
+
+def _check_names(shafts: Sequence[Mapping[str, Any]]) -> None:
+    """Refuses a name that is given twice, before anything is made of the second: that would be wrong for its place."""
+    for kind in ("", "bearings", "gears"):
+        first: dict[Any, str] = {}
+        for i, shaft in enumerate(shafts):
+            parts = shaft.get(kind) if kind else [shaft]
+            for j, part in enumerate(parts if isinstance(parts, list) else []):
+                key = f"shafts[{i}].{kind}[{j}].name" if kind else f"shafts[{i}].name"
+                name = part.get("name") if isinstance(part, dict) else None
+                if isinstance(name, str) and first.setdefault(name, key) != key:
+                    raise DesignFileError(key, f'"{name}" is given twice, first as {first[name]}')
 
 
 def _shaft(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materials) -> Shaft:

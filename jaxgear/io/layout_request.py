@@ -79,11 +79,22 @@ def layout_request(design: DesignFile, *, quick: bool = False) -> LayoutRequest:
         }
         housed = support.gearbox.housing is not None
         supports = {"housing": support, "rigid seats": without_housing(support)} if housed else {"rigid seats": support}
-        profile = None if section.profile is None else decode("layout.profile", section.profile, ProfileSection)
+        profile = _profile(section, quick)
         range_of_file = np.linspace(*design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
         torques = np.union1d(range_of_file, section.torques or [])
         torque = _profile_torque(design, profile)
-        return LayoutRequest(supports, tolerances, options, torques, _profile(profile, quick), torque)
+        return LayoutRequest(supports, tolerances, options, torques, profile, torque)
+
+
+def check_layout(design: DesignFile, section: LayoutSection) -> None:
+    """Checks the table [layout] for commands that do not need it.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it, in one line that names the key.
+    """
+    _axes(section.misalignment, float(design.pair().face_width))
+    _life(section)
+    _profile(section, quick=False)
 
 
 def _check_open(design: DesignFile) -> None:
@@ -138,9 +149,10 @@ def _woehler(name: str, table) -> WoehlerLine:
     return part_of(key, decode(key, table, WoehlerSection), WoehlerLine).build({})
 
 
-def _profile(section: ProfileSection | None, quick: bool) -> ProfileSection | None:
-    if section is None:
+def _profile(layout: LayoutSection, quick: bool) -> ProfileSection | None:
+    if layout.profile is None:
         return None
+    section = decode("layout.profile", layout.profile, ProfileSection)
     if section.type == "profile_crowning" and section.length is not None:
         raise DesignFileError("layout.profile.length", 'has no effect with type = "profile_crowning"')
     amounts = {

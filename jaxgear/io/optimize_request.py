@@ -12,29 +12,26 @@ from ..optimize import (
     Constraint,
     Front,
     Optimum,
-    Pareto,
     free_form,
     iterate_from_low_pressure,
     iterate_transmission_error,
     minimize,
     pareto,
 )
-from ..optimize.projection import CURVES
 from ..optimize.refine import POSITIONS
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import LIVES_AHEAD
 from . import schema
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
-from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
+from .errors import DesignFileError, naming, refuse_given, refused, suggestion
 from .named import quantity_named
+from .optimize_method import CURVE, PARETO, check_method, check_options, made_by, options_of, tables
 from .ranges import outside
 from .toml import decode
 
 _DEFAULT_METHOD = "minimax"
-_CURVE = "cubic"  # on which flanks without parameters are projected
 _FRONT = ("ppte", "max_contact_pressure")  # of a Pareto front where the file names no objectives
-_PARETO = "pareto"
 _MEASURES: Mapping[str, Callable[..., AbstractMeasure]] = {
     "mean": Mean,
     "worst": Worst,
@@ -100,7 +97,7 @@ class OptimizeRequest:
             return free_form(mesh, callback=callback, **self._common)
         if self.method == "te_iteration":
             return self._iterate(mesh, callback)
-        if self.method == _PARETO:
+        if self.method == PARETO:
             return pareto(design.design, design.bounds, mesh=mesh, callback=callback, **self._common)
         return minimize(design.design, design.bounds, mesh=mesh, callback=callback, **self._common)
 
@@ -128,19 +125,37 @@ def optimize_request(design: DesignFile, *, method: str | None = None, quick: bo
         return _request(design, method, quick)
 
 
+def check_optimize(design: DesignFile) -> None:
+    """Checks the table [optimize] for commands that do not need it, whatever method the command line asks for.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it, in one line that names the key.
+    """
+    section = design.optimize
+    check_method(section.method or _DEFAULT_METHOD)
+    for name, options in tables(section).items():
+        if options.model_fields_set:
+            check_options(design, name, options.given())
+    _objectives(design, section)
+    _measure(section)
+    _constraints(design, section)
+    load_of(design, "optimize", section)
+    if section.manufactured is not None and design.tolerance is None:
+        raise DesignFileError("optimize.manufactured", "needs the table [tolerance]")
+
+
 def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeRequest:
     section = design.optimize
     name = method or section.method or _DEFAULT_METHOD
     flanks_alone = name in schema.METHODS_WITHOUT_VARIABLES
-    check_known("optimize.method", name, (*METHODS, _PARETO, *schema.METHODS_WITHOUT_VARIABLES))
+    check_method(name)
     if not design.bounds and not flanks_alone:
         raise DesignFileError("variables", "missing, nothing to optimize; use jaxgear analyze")
     for free in design.open_case:
         raise DesignFileError(free.key, f'"{free.name}" is a variable, which a sweep alone can vary here')
-    options = _options(section, name, of_the_file=method is None)
-    curve = options.pop("curve", _CURVE) if flanks_alone else None
-    if curve is not None:
-        check_known(f"optimize.{name}.curve", curve, CURVES)
+    options = options_of(section, name, of_the_file=method is None)
+    check_options(design, name, options)
+    curve = options.pop("curve", CURVE) if flanks_alone else None
     verify = False if quick else section.verify
     common = _common(design, section, name, quick)
     fewer = _QUICK.get(name, {}) if quick else {}
@@ -152,31 +167,10 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
     if name == "free_form":
         common |= options | fewer
     else:
-        levels = options.get("levels")
-        if isinstance(levels, dict) and set(levels) != set(design.bounds):
-            problem = f"must name all variables and nothing else: {', '.join(design.bounds)}"
-            raise DesignFileError("optimize.factorial.levels", problem)
-        make: type[Any] = Pareto if name == _PARETO else METHODS[name]
-        refused(f"optimize.{name}", make, **options)
-        common["method"] = make(**options | fewer)
-    if quick and name != _PARETO:  # a quick look stays on its mesh
+        common["method"] = made_by(name)(**options | fewer)
+    if quick and name != PARETO:  # a quick look stays on its mesh
         common["positions"] = None
     return OptimizeRequest(name, curve, verify, design, common)
-
-
-def _options(section: schema.OptimizeSection, name: str, *, of_the_file: bool) -> dict[str, Any]:
-    """The options of a method; the file may name others where it is not the file that asks for the method."""
-    layouts = schema.method_options().items()
-    tables = {key: decode(f"optimize.{key}", getattr(section, key) or {}, layout) for key, layout in layouts}
-    options = {key: value for key, value in tables.get(name, ()) if value is not None}
-    shared = {"starts": section.starts, "steps": section.steps, "seed": section.seed or 0}
-    taken = {field.name for field in dataclasses.fields(METHODS[name])} if name in METHODS else set()
-    if of_the_file:
-        why = f' with method "{name}"'
-        refuse_given("optimize", section, [key for key in ("starts", "steps") if key not in taken], why)
-        if "seed" not in taken and section.manufactured is None:
-            refuse_given("optimize", section, ["seed"], f"{why} and perfect gears")
-    return options | {key: value for key, value in shared.items() if key in taken and value is not None}
 
 
 def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
@@ -185,7 +179,7 @@ def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quic
         **_objective(design, section, name),
         "torque": load_of(design, "optimize", section),
         "measure": _measure(section),
-        "constraints": tuple(_constraint(design, number, each) for number, each in enumerate(section.constraint)),
+        "constraints": _constraints(design, section),
         "seed": section.seed or 0,
     }
     if section.manufactured is not None:
@@ -196,19 +190,25 @@ def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quic
     return found
 
 
+def _objectives(
+    design: DesignFile, section: schema.OptimizeSection, default: tuple[str, ...] = ()
+) -> tuple[str | Quantity, ...]:
+    asked = section.objective or default
+    named = (asked,) if isinstance(asked, str) else tuple(asked)
+    return tuple(quantity_named(design, "optimize.objective", each) for each in named)
+
+
 def _objective(design: DesignFile, section: schema.OptimizeSection, name: str) -> dict[str, Any]:
     """What the function of a method takes for the objective; nothing where it knows its own."""
-    asked = section.objective or (_FRONT if name == _PARETO else "ppte")
-    named = (asked,) if isinstance(asked, str) else tuple(asked)
-    objectives = tuple(quantity_named(design, "optimize.objective", each) for each in named)
-    if (len(objectives) > 1) != (name == _PARETO):
+    objectives = _objectives(design, section, _FRONT if name == PARETO else ("ppte",))
+    if (len(objectives) > 1) != (name == PARETO):
         problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
         raise DesignFileError("optimize.objective", problem)
     if name in schema.METHODS_WITHOUT_VARIABLES:
         if objectives != ("ppte",):
             raise DesignFileError("optimize.objective", f'must be "ppte" with method "{name}"')
         return {}
-    return {"objectives": objectives} if name == _PARETO else {"objective": objectives[0]}
+    return {"objectives": objectives} if name == PARETO else {"objective": objectives[0]}
 
 
 def _measure(section: schema.OptimizeSection) -> AbstractMeasure:
@@ -219,6 +219,10 @@ def _measure(section: schema.OptimizeSection) -> AbstractMeasure:
     if kind not in _WITH_LEVEL:
         refuse_given("optimize", section, ["level"], f' with measure = "{kind}"')
     return _MEASURES[kind]() if section.level is None else _MEASURES[kind](section.level)
+
+
+def _constraints(design: DesignFile, section: schema.OptimizeSection) -> tuple[Constraint, ...]:
+    return tuple(_constraint(design, number, each) for number, each in enumerate(section.constraint))
 
 
 def _constraint(design: DesignFile, number: int, table: schema.Tables) -> Constraint:

@@ -5,9 +5,11 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from ..metrics import Lubricant, Strength
-from .errors import DesignFileError, naming
+from ..numerics import Number
+from .errors import DesignFileError, referring
 from .kinds import text
 from .layout import Section, section_of
+from .ranges import outside
 from .schema import LoadSection, Tables
 from .template import part_of
 from .toml import decode, join, read
@@ -15,6 +17,7 @@ from .toml import decode, join, read
 S = TypeVar("S", bound=Section)
 
 _FILE = "file"
+_SPEED = Number("rpm", low=0.0, open_low=True)
 
 
 class FileKey(Section):
@@ -57,10 +60,8 @@ def lubricant_of(
     key, slowest = "load.speed", load.speed
     if isinstance(slowest, str):
         key, slowest = f"variables.{slowest}.low", bounds[slowest][0]
-    if not slowest > 0:
-        raise DesignFileError(
-            key, f"{slowest:g} rpm must be greater than 0 rpm with [lubricant]: no film without motion"
-        )
+    if too_slow := outside(_SPEED, slowest):
+        raise DesignFileError(key, f"{too_slow} with [lubricant]: no film without motion")
     if load.friction is not None:
         for name in ("friction", "friction_factor"):
             if getattr(section, name) is not None:
@@ -88,7 +89,7 @@ def _whole(key: str, table: Tables, section: type[S], folder: Path) -> S:
     if name is None:
         return decode(key, table, section)
     path = folder / name
-    with naming(path):
+    with referring(f"{key}.{_FILE}", name):
         held: dict[str, Any] = read(path)
     for twice in held.keys() & table.keys():
         raise DesignFileError(join(key, twice), f"stands in {name} too")
@@ -97,5 +98,5 @@ def _whole(key: str, table: Tables, section: type[S], folder: Path) -> S:
     except DesignFileError as error:
         own = error.key.removeprefix(f"{key}.")
         if own.partition("[")[0] in held:
-            raise DesignFileError(own, error.problem, path) from None
+            raise DesignFileError(f"{key}.{_FILE}", f"{name}: {own}: {error.problem}") from None
         raise

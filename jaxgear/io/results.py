@@ -16,6 +16,7 @@ from ..metrics import flank_surface
 from ..microgeometry import AbstractModification, NoModification, Sum
 from ..numerics import fields_of
 from ..optimize import Front
+from ..sweeps.headings import as_text
 from .layout import family, snake
 
 Designs = Mapping[str, tuple[AbstractModification, AbstractModification]]
@@ -81,7 +82,7 @@ def write_front(path: Path, front: Front) -> None:
     columns = [*front.values.T, *front.parameters.values()]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow([*names, *front.parameters])
+        writer.writerow(map(as_text, [*names, *front.parameters]))
         writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns))
 
 

@@ -3,7 +3,7 @@
 import csv
 from pathlib import Path
 
-from .errors import DesignFileError
+from .errors import DesignFileError, check_file
 
 Rows = list[dict[str, str]]
 
@@ -16,6 +16,7 @@ def read_rows(path: Path) -> Rows:
     Raises:
         DesignFileError: when the file cannot be read, is no table or has no rows.
     """
+    check_file(path)
     return _read_parquet(path) if path.suffix == PARQUET else _read_csv(path)
 
 
@@ -49,8 +50,6 @@ def _read_csv(path: Path) -> Rows:
         raise DesignFileError("", "is not text in UTF-8") from None
     except OSError as error:
         raise DesignFileError("", error.strerror or str(error)) from None
-    except ValueError as error:  # a name that no file can have
-        raise DesignFileError("", error) from None
     except csv.Error as error:
         raise DesignFileError("", f"is no CSV file: {error}") from None
     if not rows:

@@ -5,7 +5,7 @@ from pathlib import Path
 from ..compliance import AbstractCompliance, Compliance, finite_element_compliance, legacy_compliance
 from ..geometry import GearPair
 from . import schema, template
-from .errors import DesignFileError, refuse_given, refused
+from .errors import DesignFileError, check_file, referring, refuse_given, refused
 
 FINITE_ELEMENTS = "finite_element"
 _TABLES = "pinion_table", "wheel_table"
@@ -61,6 +61,9 @@ def with_tables(
             problem = f'cannot be a variable with model.structure = "{FINITE_ELEMENTS}", whose tables are of one shape'
             raise DesignFileError(free.key, problem)
     paths = {name: folder / path for name in _TABLES if (path := getattr(section, name)) is not None}
+    for name, path in paths.items():
+        with referring(f"model.{name}", path.name):
+            check_file(path)
     tabulated = refused("model", finite_element_compliance, middle, section.plane or "auto", **paths)
     return template.Part(_as_it_is, {"compliance": tabulated}, "model")
 

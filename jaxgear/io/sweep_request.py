@@ -13,19 +13,19 @@ from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
-from .errors import DesignFileError, naming, refuse_given, refused
+from .errors import DesignFileError, naming, referring, refuse_given, refused
 from .named import quantity_named
 from .schema_sweep import SweepSection
 from .variants import read_variants
 
-# The keys that a kind of sampling takes; what another kind takes has no effect and is refused.
+# The keys that a kind of sampling takes, the first of which it needs; what another kind takes has no effect and is
+# refused.
 _KEYS = {
     "sobol": ("samples", "seed"),
     "latin_hypercube": ("samples", "seed"),
     "full_factorial": ("levels",),
     "list": ("file",),
 }
-_OPTIONAL = ("seed",)
 _RESULTS = ("ppte", "max_flank_pressure", "effective_contact_ratio")
 
 
@@ -79,23 +79,42 @@ def _request(design: DesignFile, samples: int | None, most: int | None) -> Sweep
         section = section.model_copy(update={"samples": samples})
     if most is not None and section.samples is not None:
         section = section.model_copy(update={"samples": min(section.samples, most)})
-    wanted, results = section.results or _RESULTS, []
-    for index, name in enumerate(wanted):
-        results.append(quantity_named(design, f"sweep.results[{index}]", name))
-        if name in wanted[:index]:
-            raise DesignFileError(f"sweep.results[{index}]", f'"{name}" is there twice')
+    results = _results(design, section)
     tolerance = design.tolerance
     load, highest = _load(design, section)
     return SweepRequest(
         plan=_plan(design, section),
         load=load,
         highest_torque=highest,
-        results=tuple(results),
+        results=results,
         part_rows=section.part_rows,
         tolerance=tolerance_of(design),
         samples=None if tolerance is None else tolerance.samples,
         seed=0 if tolerance is None else tolerance.seed,
     )
+
+
+def check_sweep(design: DesignFile, section: SweepSection) -> None:
+    """Checks the table [sweep] for commands that do not need it, but for a file of variants.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it, in one line that names the key.
+    """
+    _results(design, section)
+    _load(design, section)
+    _check_keys(section)
+    needed = _KEYS[section.sampling][0]  # the command line may give it
+    if section.sampling != "list" and getattr(section, needed) is not None:
+        _plan(design, section)
+
+
+def _results(design: DesignFile, section: SweepSection) -> tuple[str | Quantity, ...]:
+    wanted, results = section.results or _RESULTS, []
+    for index, name in enumerate(wanted):
+        results.append(quantity_named(design, f"sweep.results[{index}]", name))
+        if name in wanted[:index]:
+            raise DesignFileError(f"sweep.results[{index}]", f'"{name}" is there twice')
+    return tuple(results)
 
 
 def _load(design: DesignFile, section: SweepSection):
@@ -110,16 +129,21 @@ def _load(design: DesignFile, section: SweepSection):
     return design.operation, design.torque if torque is None else design.bounds[torque][1]
 
 
+def _check_keys(section: SweepSection) -> None:
+    others = [key for key in ("samples", "seed", "levels", "file") if key not in _KEYS[section.sampling]]
+    refuse_given("sweep", section, others, f' with sampling = "{section.sampling}"')
+
+
 def _plan(design: DesignFile, section: SweepSection) -> AbstractPlan:
     kind = section.sampling
-    for key in ("samples", "seed", "levels", "file"):
-        if key not in _KEYS[kind]:
-            refuse_given("sweep", section, [key], f' with sampling = "{kind}"')
-        elif getattr(section, key) is None and key not in _OPTIONAL:
-            raise DesignFileError(f"sweep.{key}", f'missing, sampling = "{kind}" needs it')
+    _check_keys(section)
+    needed = _KEYS[kind][0]
+    if getattr(section, needed) is None:
+        raise DesignFileError(f"sweep.{needed}", f'missing, sampling = "{kind}" needs it')
     bounds, seed = design.bounds, section.seed or 0
     if kind == "list":
-        return read_variants(design.path.parent / str(section.file), bounds, design.units)
+        with referring("sweep.file", str(section.file)):
+            return read_variants(design.path.parent / str(section.file), bounds, design.units)
     if kind == "full_factorial":
         return refused("sweep.levels", FullFactorial, bounds, section.levels or 0)
     make = Sobol if kind == "sobol" else LatinHypercube

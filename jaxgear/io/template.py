@@ -1,5 +1,6 @@
 """Objects of the library with named free parameters: what a design file holds before the parameters have values."""
 
+import difflib
 import inspect
 import re
 from collections.abc import Callable, Mapping
@@ -18,7 +19,7 @@ from .layout import Section, family, modules_of, section_of
 from .toml import decode, join
 
 # `tip_diameter = 3 mm must be`, `wheel module = 4 mm must be`: what the library says of a field
-_FIELD = re.compile(r"((?P<part>\w+) )?(?P<name>\w+)( =|:) ")
+_FIELD = re.compile(r"((?P<part>\w+) )?(?P<name>\w+)(( =|:) | (?=has shape ))")
 
 
 @dataclass(frozen=True)
@@ -60,8 +61,10 @@ class Part(eqx.Module):
             text = problem(error)
             field = _FIELD.match(text)
             owner = self.fields.get(field["part"]) if field and field["part"] else self
-            if field and isinstance(owner, Part) and field["name"] in owner.fields:
-                raise DesignFileError(join(owner.key, field["name"]), text[field.end() :]) from error
+            if field and isinstance(owner, Part):
+                said = text[field.end() :]
+                if field["name"] in owner.fields or said.startswith("missing"):
+                    raise DesignFileError(join(owner.key, field["name"]), said) from error
             raise DesignFileError(self.key, text) from error
 
     def free(self) -> list[Free]:
@@ -86,6 +89,9 @@ def parse(key: str, table: Mapping[str, Any] | str, cls: type[eqx.Module]) -> Pa
             check_known(key, table, known)
             table = {"type": table}
         name = table.get("type")
+        misspelt = difflib.get_close_matches("type", table, n=1)
+        if name is None and misspelt:
+            raise DesignFileError(join(key, misspelt[0]), 'unknown key, did you mean "type"?')
         if name is None:
             raise DesignFileError(join(key, "type"), f"missing, must be one of {', '.join(known)}")
         if not isinstance(name, str) or name not in known:

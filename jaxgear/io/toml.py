@@ -7,13 +7,19 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from .errors import DesignFileError, suggestion
+from .errors import DesignFileError, check_file, obeyed, suggestion
 from .kinds import TAGS, not_of_kind
 
 S = TypeVar("S", bound=BaseModel)
 
 # pydantic's own errors about the containers of values; what is wrong with a value, its kind says itself
 _CONTAINERS = {"list_type": "a list", "dict_type": "a table", "model_type": "a table"}
+
+# Parts of a dotted key: a design file nests its tables three deep, and time and memory of the parser grow with the
+# square of this number.
+_MOST_PARTS = 32
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{_MOST_PARTS}}}")
 
 
 def content(path: Path) -> bytes:
@@ -22,12 +28,11 @@ def content(path: Path) -> bytes:
     Raises:
         DesignFileError: when it cannot be read.
     """
+    check_file(path)
     try:
-        if path.exists() and not path.is_file():
-            raise ValueError("is a folder, not a file" if path.is_dir() else "is not a regular file")
         return path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: also a path with a null byte
-        raise DesignFileError("", getattr(error, "strerror", None) or error) from None
+    except OSError as error:
+        raise DesignFileError("", error.strerror or error) from None
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -42,14 +47,19 @@ def read(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         line = held.count(b"\n", 0, error.start) + 1
         raise DesignFileError("", f"line {line}: not UTF-8 text") from None
+    if long_key := _LONG_KEY.search(text):
+        line = text.count("\n", 0, long_key.start()) + 1
+        raise DesignFileError("", f"line {line}: a key has more than {_MOST_PARTS} parts between dots")
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise DesignFileError("", _syntax(str(error), text)) from None
     except ValueError:  # of int()
         raise DesignFileError("", "a whole number has more than 4300 digits") from None
     except RecursionError:
         raise DesignFileError("", "tables or lists are nested too deeply") from None
+    _check_texts("", data)
+    return data
 
 
 def decode(key: str, data: Any, section: type[S]) -> S:
@@ -66,6 +76,19 @@ def decode(key: str, data: Any, section: type[S]) -> S:
     if first["type"] == "missing":  # often it is there, misspelt
         first = next((problem for problem in problems if problem["type"] == "extra_forbidden"), first)
     raise DesignFileError(join(key, _dotted(first["loc"])), _worded(first, section))
+
+
+def _check_texts(key: str, value: Any) -> None:
+    """Refuses names and texts that would do something to a terminal, or to a page, when they are printed there."""
+    if isinstance(value, dict):
+        for name, item in value.items():
+            _check_texts(join(key, name), name)
+            _check_texts(join(key, name), item)
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            _check_texts(f"{key}[{index}]", item)
+    elif isinstance(value, str) and (found := obeyed(value)):
+        raise DesignFileError(key, f"contains the control character {found}, leave it out")
 
 
 def join(key: str, name: str) -> str:

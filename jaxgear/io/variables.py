@@ -1,11 +1,14 @@
 """The table [variables]: numbers of the file that are left open."""
 
+import re
 from collections.abc import Iterable
 
 from . import schema, template
 from .errors import DesignFileError, suggestion
 from .ranges import outside
 from .toml import decode
+
+_QUANTITY = re.compile(r"\s*[-+]?[.,]?\d")
 
 
 def read_variables(
@@ -22,6 +25,8 @@ def read_variables(
     for free in open_numbers:
         unit = free.number.unit
         if free.name not in bounds:
+            if _QUANTITY.match(free.name):  # "250 Nm", or 2,5
+                raise DesignFileError(free.key, f'"{free.name}" must be a number{f" in {unit}" if unit else ""} alone')
             known = suggestion(free.name, bounds) if bounds else "there is no [variables] table"
             raise DesignFileError(free.key, f'"{free.name}" is not a variable, {known}')
         other = units.setdefault(free.name, unit)

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from ..sweeps import VariantList
-from .errors import DesignFileError, naming
+from ..sweeps.headings import from_text
+from .errors import DesignFileError, check_file, naming
 
 _HEADING = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^]]*)\])?")  # as tables of sweeps are exported
 _LENGTHS = {"nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "m": 1.0}  # with micro sign and with mu
@@ -35,6 +36,7 @@ def read_variants(
 
     names, rows = list(bounds), 0
     with naming(path), tempfile.TemporaryFile() as scratch:  # the array on it outlives it
+        check_file(path)
         try:
             for piece in (_parquet if path.suffix.lower() == ".parquet" else _csv)(path, names, units or {}):
                 _check_bounds(piece, bounds, rows)
@@ -55,7 +57,7 @@ def _csv(path: Path, names: Sequence[str], units: Mapping[str, str]) -> Iterator
     from pyarrow import csv
 
     with path.open(encoding="utf-8-sig", newline="") as file:
-        headings = [heading.strip() for heading in next(text.reader(file), [])]
+        headings = [from_text(heading.strip()) for heading in next(text.reader(file), [])]
     places, factors = _columns([_parts(heading) for heading in headings], names, units)
     numbered = [str(place) for place in range(len(headings))]  # headings that nobody asks for may be there twice
     wanted = [numbered[place] for place in places]

@@ -11,6 +11,7 @@ from ..geometry import Gear, GearPair
 from ..microgeometry import AbstractModification
 from ..numerics import check, fields_of
 from ..numerics.durable import write_durably
+from .errors import printable
 from .folder import writing
 from .results import describe, unit_of
 
@@ -41,7 +42,7 @@ def write_design(
         ValueError: for a torque that is not positive, or where the file cannot be written.
     """
     check("write_design", "torque", torque, "N m", low=0.0, open_low=True)
-    lines = [f"title = {_text(title)}", ""] if title else []
+    lines = [f"title = {_text(printable(title))}", ""] if title else []
     for name, quality in zip(("pinion", "wheel"), quality_classes or (None, None)):
         classes = [] if quality is None else [f"quality_class = {quality}  # ISO 1328-1"]
         lines += [f"[{name}]", *_gear(getattr(pair, name)), *classes, ""]

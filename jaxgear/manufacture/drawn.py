@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import jax.numpy as jnp
@@ -18,6 +19,7 @@ Limits = Float[Array, "..."]  # one number, or lower and upper limit
 # which is up to half of that on a span and less over balls.
 _ROUNDED = 1.0
 _WAYS = "span", "over_balls", "tooth_thickness_allowance"
+_BESIDE = {"span": "teeth_spanned", "over_balls": "ball_diameter"}  # what a measure needs
 
 
 class ToothThickness(Checked):
@@ -45,7 +47,7 @@ class ToothThickness(Checked):
 
     def check_together(self) -> None:
         given = [name for name in _WAYS if getattr(self, name) is not None]
-        for name, other in (("teeth_spanned", "span"), ("ball_diameter", "over_balls")):
+        for other, name in _BESIDE.items():
             if getattr(self, name) is not None and other not in given:
                 raise ValueError(f"ToothThickness: {name}: has no effect without {other}")
             if other in given and getattr(self, name) is None:
@@ -62,15 +64,15 @@ class ToothThickness(Checked):
         Raises:
             ValueError: for a measure that is not one of this gear, or of a tooth thicker than the rack makes it.
         """
-        if self.span is not None:
+        if (measured := self.span) is not None:
             teeth = self.teeth_spanned
             assert teeth is not None  # or it would not have been made
-            found = _named("span", lambda: allowance_of_span(gear, teeth, self.span))
-            return _rounded("span", self.span, found, lambda: span(_without_allowance(gear), teeth))
-        if self.over_balls is not None:
+            of = partial(allowance_of_span, gear, teeth), partial(span, _without_allowance(gear), teeth)
+            return _named("span", lambda: _rounded(measured, *of), teeth_spanned=teeth)
+        if (over := self.over_balls) is not None:
             ball = self.ball_diameter
-            found = _named("over_balls", lambda: allowance_of_balls(gear, ball, self.over_balls))
-            return _rounded("over_balls", self.over_balls, found, lambda: over_balls(_without_allowance(gear), ball))
+            of = partial(allowance_of_balls, gear, ball), partial(over_balls, _without_allowance(gear), ball)
+            return _named("over_balls", lambda: _rounded(over, *of), ball_diameter=ball)
         assert self.tooth_thickness_allowance is not None
         return self.tooth_thickness_allowance
 
@@ -103,7 +105,11 @@ def with_thickness(gear: Gear, thickness: ToothThickness) -> Gear:
     low, high = (allowance[0], allowance[1]) if allowance.ndim else (allowance, allowance)
     # limits that were traced may be the wrong way round: such a gear is none, and nothing made with it converges
     tolerance = jnp.where(high >= low, high - low, jnp.nan)
-    return replace(gear, tooth_thickness_allowance=high, tooth_thickness_tolerance=tolerance)
+    thinned = partial(replace, gear, tooth_thickness_allowance=high, tooth_thickness_tolerance=tolerance)
+    for name, other in _BESIDE.items():
+        if getattr(thickness, name) is not None:
+            return _named(name, thinned, **{other: getattr(thickness, other)})
+    return thinned()
 
 
 def _without_allowance(gear: Gear) -> Gear:
@@ -111,18 +117,21 @@ def _without_allowance(gear: Gear) -> Gear:
     return replace(gear, tooth_thickness_allowance=zero, tooth_thickness_tolerance=zero)
 
 
-def _named(name: str, found: Callable[[], Limits]) -> Limits:
-    """What is found, refused under the name of what was given."""
+def _named(name: str, found: Callable[[], Any], **beside: Any) -> Any:
+    """What is found, refused under the name of what was given, with the value of what was given beside it."""
     try:
         return found()
     except ValueError as error:
-        raise ValueError(f"ToothThickness: {name}: {str(error).partition(': ')[2]}") from error
+        shown = [f"with {key} = {value:g}" for key, value in beside.items() if concrete(value) is not None]
+        text = ", ".join([str(error).partition(": ")[2], *shown])
+        raise ValueError(f"ToothThickness: {name}: {text}") from error
 
 
-def _rounded(name: str, measured: Limits, allowance: Limits, largest: Callable[[], Limits]) -> Limits:
-    """An allowance, without the micrometre that a rounded measure may make of none."""
+def _rounded(measured: Limits, allowance_of: Callable[..., Limits], largest: Callable[[], Limits]) -> Limits:
+    """The allowance of a measure, without the micrometre that a rounded one may make of none."""
+    allowance = allowance_of(measured)
     known = concrete(allowance)
     if known is not None and known.max() > _ROUNDED:
         most = f"{float(largest()):.7g} mm, as the rack makes the tooth"
-        raise ValueError(f"ToothThickness: {name} = {float(jnp.max(measured)):.7g} mm must be at most {most}")
+        raise ValueError(f"ToothThickness: {float(jnp.max(measured)):.7g} mm must be at most {most}")
     return jnp.where(allowance <= _ROUNDED, jnp.minimum(allowance, 0.0), allowance)

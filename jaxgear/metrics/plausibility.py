@@ -7,16 +7,19 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ..compliance import AbstractCompliance, TabulatedCompliance
 from ..contact import MeshCycle, Resolution
-from ..microgeometry import AbstractModification, EndRelief, NoModification
-from ..numerics import program
+from ..geometry import Material
+from ..microgeometry import AbstractModification, EndRelief, NoModification, RootRelief, TipRelief
+from ..numerics import fields_of, program
 from .flank import flank_surface
 from .load import effective_contact_ratio
+from .lubricant import Lubricant
 from .root_stress import root_stress
 
 
@@ -35,10 +38,18 @@ class Limit(NamedTuple):
     remark: str
 
 
+def _of_field(cls: type[eqx.Module], name: str) -> Limit:
+    """What a class says is usual of its field."""
+    field = fields_of(cls)[name]
+    assert field.usual is not None
+    low, high, remark = field.usual
+    return Limit(low, high, field.unit, remark)
+
+
 LIMITS = {
     "torque": Limit(0.0, np.inf, "N m", "the design torque lies outside the range of torques that is looked at"),
     "module": Limit(0.05, 100.0, "mm", "ISO 54 lists 1 to 50 mm, fine mechanics goes down to 0.1 mm"),
-    "elastic modulus": Limit(500.0, 700_000.0, "MPa", "plastics 1000 to 10000, steel 206000 MPa: is it in GPa or Pa?"),
+    "elastic modulus": _of_field(Material, "elastic_modulus"),
     "density": Limit(500.0, 25_000.0, "kg/m^3", "steel 7850 kg/m^3: is it in g/cm^3?"),
     "bore to root diameter": Limit(0.1, 0.95, "", "the body is a ring held at its bore, which is hardly one"),
     "face width in modules, plane stress": Limit(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
@@ -53,9 +64,14 @@ LIMITS = {
     "bulk temperature": Limit(
         -np.inf, 180.0, "degC", "case-hardened steel softens there, and mineral oil ages above 120"
     ),
+    "temperature of the oil": Limit(
+        -30.0, np.inf, "degC", "mineral gear oils stop flowing at -10 to -30 degC, synthetic ones at -30 to -60"
+    ),
+    "cooling factor": Limit(0.2, 1.2, "", "ISO/TS 6336-20: X_S is 0.2 for submerged teeth, 1 for dip, 1.2 for spray"),
     "contact ratio": Limit(1.0, 2.0, "", "nominal contact stress and pitting safety are made for 1 to 2 (ISO 6336-2)"),
     "pitch line velocity": Limit(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
-    "depth of the modification": Limit(0.1, np.inf, "um", "less than flanks can be measured to: is it in mm?"),
+    "amount of the modification": Limit(0.0, np.inf, "um", "negative: material is added; positive removes it"),
+    "depth of the modification": _of_field(TipRelief, "amount"),
     "depth of the modification in modules": Limit(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
     "length of the modification": Limit(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
     "length of the end relief": Limit(0.0, np.inf, "mm", "less than the gear is wider than its mate: it has no effect"),
@@ -70,6 +86,8 @@ LIMITS = {
     "root stress": Limit(0.0, 1050.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
     "effective contact ratio": Limit(1.0, np.inf, "", "the teeth lose contact, and shocks follow"),
 }
+
+_RELIEFS = TipRelief, RootRelief, EndRelief
 
 
 class Doubt(NamedTuple):
@@ -104,6 +122,7 @@ def plausibility(
     friction: float | None = None,
     oil_friction: float | None = None,
     bulk_temperature: float | None = None,
+    lubricant: Lubricant | None = None,
     compliance: AbstractCompliance | None = None,
     verified: float | None = None,
     given_way: float = 0.0,
@@ -118,6 +137,7 @@ def plausibility(
         friction: coefficient of friction; None for that of the cycle.
         oil_friction: coefficient of friction that a law gives; None without a lubricant.
         bulk_temperature: of the teeth [degC]; None without a lubricant.
+        lubricant: the oil; None without one.
         compliance: by which it was solved, which the cycle does not tell; None for one that is composed of models.
         verified: PPTE of the same design by the finite-element structure, where it is known [um].
         given_way: mean transmission error that is that of shafts, bearings and housing, not of the teeth [um].
@@ -150,6 +170,9 @@ def plausibility(
         numbers.append(_doubt("coefficient of friction of the oil", "", oil_friction))
     if bulk_temperature is not None:
         numbers.append(_doubt("bulk temperature", "", bulk_temperature))
+    if lubricant is not None:
+        numbers.append(_doubt("temperature of the oil", "", lubricant.temperature))
+        numbers.append(_doubt("cooling factor", "", lubricant.cooling_factor))
     if torque_range is not None:
         low, high = torque_range
         numbers.append(_doubt("torque", "", cycle.torque, low=low, high=high))
@@ -225,8 +248,17 @@ def _of_flanks(sides, flanks) -> Iterator[Doubt]:
             yield _doubt("depth of the modification", where, depth)
         yield _doubt("depth of the modification in modules", where, depth / 1e3 / float(side.gear.module))
         start, *_, tip = np.asarray(surface.roll_length)
+        for amount in _amounts(modification):
+            yield _doubt("amount of the modification", where, amount)
         for length, longest in _lengths(modification, tip - start, 0.5 * float(side.face_width)):
             yield _doubt("length of the modification", where, length, high=longest)
+
+
+def _amounts(modification: AbstractModification) -> Iterator[float]:
+    """Amounts of all reliefs, which are meant to remove material; slopes and crownings may have either sign."""
+    for term in jax.tree.leaves(modification, is_leaf=lambda part: isinstance(part, _RELIEFS)):
+        if isinstance(term, _RELIEFS):
+            yield float(term.amount)
 
 
 def _lengths(modification: AbstractModification, profile: float, half_face: float) -> Iterator[tuple[float, float]]:

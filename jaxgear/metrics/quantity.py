@@ -117,7 +117,7 @@ class Vocabulary(Mapping[str, Quantity]):
             self._read_all()
         found = self._find(name)
         if found is None:
-            raise KeyError(name)
+            raise KeyError(f"quantities: {self.not_known(name)}")
         return found
 
     def __iter__(self) -> Iterator[str]:
@@ -127,6 +127,13 @@ class Vocabulary(Mapping[str, Quantity]):
     def __len__(self) -> int:
         self._read_all()
         return sum(map(len, self._by_package.values()))
+
+    def not_known(self, name: object) -> str:
+        """That a name is not known, with the nearest known one."""
+        known = [*self, *(each.key for each in self.values())]
+        near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.5)
+        hint = f'did you mean "{near[0]}"?' if near else f"must be one of {', '.join(self)}"
+        return f'"{name}" is not known, {hint}'
 
     def _find(self, name: str) -> Quantity | None:
         for known in self._by_package.values():
@@ -164,7 +171,4 @@ def quantity_of(of: str | Quantity | Callable[[MeshCycle], Any], owner: str = "q
         return Quantity(getattr(of, "__name__", type(of).__name__), of)
     if of in quantities:
         return quantities[of]
-    known = [*quantities, *(each.key for each in quantities.values())]
-    near = difflib.get_close_matches(str(of), known, n=1, cutoff=0.5)
-    hint = f'did you mean "{near[0]}"?' if near else f"must be one of {', '.join(quantities)}"
-    raise ValueError(f'{owner}: "{of}" is not known, {hint}')
+    raise ValueError(f"{owner}: {quantities.not_known(of)}")

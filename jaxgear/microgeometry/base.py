@@ -7,7 +7,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, concrete, number, real, result
+from ..numerics import Checked, Usual, concrete, number, real, result
+
+AMOUNTS = Usual(0.1, np.inf, "less than flanks can be measured to: is it in mm?")  # um, of every modification
+# mm, of reliefs along profile and face: ISO 1328-1 ends at modules of 70 mm, whose active profile is some 350 mm long,
+# and at face widths of 1200 mm
+LONGEST = 1000.0
 
 
 class Flank(Checked):

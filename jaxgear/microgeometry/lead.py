@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import number
-from .base import AbstractModification, Flank, acts
+from .base import AMOUNTS, LONGEST, AbstractModification, Flank, acts
 from .curves import AbstractCurve, Linear
 from .profile import relief
 
@@ -19,7 +19,7 @@ from .profile import relief
 class LeadCrowning(AbstractModification):
     """Lead crowning C_beta: parabola with zero in the middle of the face and `amount` at both ends."""
 
-    amount: Float[Array, ""] = number("um")
+    amount: Float[Array, ""] = number("um", usual=AMOUNTS)
 
     @property
     def varies_along_face(self) -> bool:
@@ -33,7 +33,7 @@ class LeadSlope(AbstractModification):
     """Lead slope C_H_beta: straight line over the face, `amount` from end to end, zero in the middle, removing material
     at positive face coordinates."""
 
-    amount: Float[Array, ""] = number("um")
+    amount: Float[Array, ""] = number("um", usual=AMOUNTS)
 
     @property
     def varies_along_face(self) -> bool:
@@ -50,8 +50,8 @@ class EndRelief(AbstractModification):
         side: "both", "negative" or "positive" (the end with negative or positive face coordinate).
     """
 
-    amount: Float[Array, ""] = number("um")
-    length: Float[Array, ""] = number("mm", low=0.0)
+    amount: Float[Array, ""] = number("um", usual=AMOUNTS)
+    length: Float[Array, ""] = number("mm", low=0.0, high=LONGEST)
     curve: AbstractCurve = eqx.field(default_factory=Linear)
     side: Literal["both", "negative", "positive"] = eqx.field(default="both", static=True)
 

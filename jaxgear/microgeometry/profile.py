@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import number, safe_divide
-from .base import AbstractModification, Flank
+from .base import AMOUNTS, LONGEST, AbstractModification, Flank
 from .curves import AbstractCurve, Linear, Parabolic
 
 
@@ -24,8 +24,8 @@ class TipRelief(AbstractModification):
     A length of zero means no relief.
     """
 
-    amount: Float[Array, ""] = number("um")
-    length: Float[Array, ""] = number("mm", low=0.0)
+    amount: Float[Array, ""] = number("um", usual=AMOUNTS)
+    length: Float[Array, ""] = number("mm", low=0.0, high=LONGEST)
     curve: AbstractCurve = eqx.field(default_factory=Parabolic)
 
     varies_along_face = False
@@ -37,8 +37,8 @@ class TipRelief(AbstractModification):
 class RootRelief(AbstractModification):
     """Root relief C_alpha_f: `amount` at the start of the active profile, over the first `length`."""
 
-    amount: Float[Array, ""] = number("um")
-    length: Float[Array, ""] = number("mm", low=0.0)
+    amount: Float[Array, ""] = number("um", usual=AMOUNTS)
+    length: Float[Array, ""] = number("mm", low=0.0, high=LONGEST)
     curve: AbstractCurve = eqx.field(default_factory=Linear)
 
     varies_along_face = False
@@ -50,7 +50,7 @@ class RootRelief(AbstractModification):
 class ProfileCrowning(AbstractModification):
     """Profile crowning C_alpha: parabola with zero in the middle of the active profile and `amount` at its ends."""
 
-    amount: Float[Array, ""] = number("um")
+    amount: Float[Array, ""] = number("um", usual=AMOUNTS)
 
     varies_along_face = False
 
@@ -62,7 +62,7 @@ class ProfileSlope(AbstractModification):
     """Profile slope C_H_alpha: straight line, half the `amount` removed at the tip, half added at the start of the
     active profile, so that the middle stays."""
 
-    amount: Float[Array, ""] = number("um")
+    amount: Float[Array, ""] = number("um", usual=AMOUNTS)
 
     varies_along_face = False
 

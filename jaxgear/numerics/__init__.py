@@ -4,6 +4,9 @@ from .complementarity import solve_contact as solve_contact
 from .complementarity import tangent_stiffness as tangent_stiffness
 from .contact_problem import ContactProblem as ContactProblem
 from .contact_problem import ContactSolution as ContactSolution
+from .conversion import concrete as concrete
+from .conversion import optional_real as optional_real
+from .conversion import real as real
 from .coupling import Coupling as Coupling
 from .coupling import Other as Other
 from .dense import positive_definite as positive_definite
@@ -14,14 +17,12 @@ from .extremes import minimum as minimum
 from .extremes import spread as spread
 from .fields import Checked as Checked
 from .fields import Number as Number
+from .fields import Usual as Usual
 from .fields import changed as changed
 from .fields import check as check
-from .fields import concrete as concrete
 from .fields import count as count
 from .fields import fields_of as fields_of
 from .fields import number as number
-from .fields import optional_real as optional_real
-from .fields import real as real
 from .fields import result as result
 from .fields import whole as whole
 from .frozen import Frozen as Frozen

@@ -5,20 +5,35 @@ therefore goes through `real`. Ranges are checked on concrete values only, trace
 """
 
 import dataclasses
+import logging
 from dataclasses import MISSING
-from typing import Any, Literal, TypeVar, dataclass_transform, get_args, get_origin
+from typing import Any, Literal, NamedTuple, TypeVar, dataclass_transform, get_args, get_origin
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+
+from .conversion import concrete, no_number, real_or_given, shown
 
 _Module = TypeVar("_Module", bound=eqx.Module)
 
 _MOST = 2**53  # whole numbers up to here are exact as floating-point numbers too, in every reader of a table
 _KEY = "number"  # of a `Number` in the metadata of its field
-_SHOWN = 6  # numbers of an array that are printed; of a longer one its range is
+_LOG = logging.getLogger(f"{__name__.partition('.')[0]}.unusual")
+_asked: set[tuple[str, str]] = set()  # classes and fields that were warned of: a search makes thousands of objects
+
+
+class Usual(NamedTuple):
+    """What is usual of the size of a number; zero always is.
+
+    Attributes:
+        low, high: of the size, in the unit of the number.
+        remark: what is likely meant by another one.
+    """
+
+    low: float
+    high: float
+    remark: str
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,6 +51,7 @@ class Number:
         limits: lower and upper limit, shape (2,), may stand for a single number.
         static: a Python number that is part of the structure, not a leaf; with a shape, a tuple of whole numbers.
         checked: False for a result, which may hold anything, NaN included.
+        usual: beyond which a number is asked about: the logger of the package, ".unusual", warns once per field.
     """
 
     unit: str = ""
@@ -50,6 +66,7 @@ class Number:
     limits: bool = False
     static: bool = False
     checked: bool = True
+    usual: Usual | None = None
 
 
 def number(unit: str, *, default: Any = MISSING, kw_only: bool = False, **limits) -> Any:
@@ -62,7 +79,7 @@ def number(unit: str, *, default: Any = MISSING, kw_only: bool = False, **limits
         limits: the other fields of `Number`.
     """
     kind = Number(unit, **limits)
-    converter = _plain if kind.static else optional_real if kind.optional else real
+    converter = _plain if kind.static else real_or_given
     given = {} if default is MISSING else {"default": default}
     return eqx.field(metadata={_KEY: kind}, kw_only=kw_only, converter=converter, static=kind.static, **given)
 
@@ -107,7 +124,7 @@ class Checked(eqx.Module):
 
     def __repr__(self) -> str:
         fields = [(field, getattr(self, field.name)) for field in dataclasses.fields(self) if field.repr]
-        parts = [f"{field.name}={_shown(value, field.metadata.get(_KEY, Number()).unit)}" for field, value in fields]
+        parts = [f"{field.name}={shown(value, field.metadata.get(_KEY, Number()).unit)}" for field, value in fields]
         return f"{type(self).__name__}({', '.join(parts)})"
 
 
@@ -117,38 +134,6 @@ def changed(module: _Module, **fields) -> _Module:
     for field in dataclasses.fields(module):
         object.__setattr__(made, field.name, fields.get(field.name, getattr(module, field.name)))
     return made
-
-
-def real(value) -> Float[Array, "..."]:
-    """Converts to an inexact array: arrays of floats keep their dtype, everything else takes JAX's default float.
-
-    Numbers stay concrete inside traced functions, so that they are checked there too.
-    """
-    if any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value)):
-        return _inexact(value)
-    given = np.asarray(value)
-    with jax.ensure_compile_time_eval():
-        if given.dtype.kind not in "biuf":
-            return _inexact(value)
-        # neither NumPy's conversion nor the transfer compiles anything
-        return jax.device_put(given if given.dtype.kind == "f" else given.astype(jnp.result_type(float)))
-
-
-def _inexact(value) -> Float[Array, "..."]:
-    array = jnp.asarray(value)
-    dtype = array.dtype if jnp.issubdtype(array.dtype, jnp.inexact) else jnp.result_type(float)
-    # the conversion also drops the weak type of Python numbers, which would retrace where an array did not
-    return jax.lax.convert_element_type(array, dtype)
-
-
-def optional_real(value) -> Float[Array, "..."] | None:
-    """`real`, with None kept as None."""
-    return None if value is None else real(value)
-
-
-def concrete(value) -> np.ndarray | None:
-    """The value as a NumPy array, or None while it is being traced."""
-    return None if isinstance(value, jax.core.Tracer) else np.asarray(value)
 
 
 def check(
@@ -213,7 +198,7 @@ def _check_field(owner: str, field: dataclasses.Field, value) -> None:
         given = value.__name__ if isinstance(value, type) else type(value).__name__
         # most often the class where an object of it is meant
         made = f": write {given}(...)" if isinstance(value, type) and issubclass(value, field.type) else ""
-        raise TypeError(f"{owner}: {field.name} is {_shown(value)}, must be of type {field.type.__name__}{made}")
+        raise TypeError(f"{owner}: {field.name} is {shown(value)}, must be of type {field.type.__name__}{made}")
 
 
 def _check_number(owner: str, name: str, value, kind: Number) -> None:
@@ -233,16 +218,33 @@ def _check_number(owner: str, name: str, value, kind: Number) -> None:
         if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
             raise ValueError(f"{owner}: {name} = {value!r} must be a number")
     else:
+        if not isinstance(value, jax.Array) or value.dtype.kind in "bc":  # the converter has left it as it was
+            raise ValueError(f"{owner}: {no_number(name, value)}")
         _check_shape(owner, name, value.shape, kind)
     check(owner, name, value, kind.unit, low=kind.low, high=kind.high, open_low=kind.open_low, open_high=kind.open_high)
     if kind.limits and (known := concrete(value)) is not None and known.ndim and not known[0] <= known[1]:
         unit = f" {kind.unit}" if kind.unit else ""
         limits = f"{float(known[1]):g}{unit} must be at least the lower one, {float(known[0]):g}{unit}"
         raise ValueError(f"{owner}: {name}: upper limit {limits}")
+    if kind.usual is not None:
+        _ask(owner, name, value, kind.unit, kind.usual)
     known = concrete(value) if kind.whole else None
     if known is not None and (known != known.round()).any():
         shown = float(known[known != known.round()].flat[0])
         raise ValueError(f"{owner}: {name} = {shown:g} must be a whole number")
+
+
+def _ask(owner: str, name: str, value, unit: str, usual: Usual) -> None:
+    known = concrete(value)
+    if known is None or (owner, name) in _asked:
+        return
+    size = np.abs(known)
+    unusual = (size > 0) & ((size < usual.low) | (size > usual.high))
+    if unusual.any():
+        _asked.add((owner, name))
+        shown = float(known[unusual].flat[0] if known.ndim else known)
+        bound = f"less than {usual.low:g}" if abs(shown) < usual.low else f"more than {usual.high:g}"
+        _LOG.warning("%s: %s = %g %s is %s %s (%s)", owner, name, shown, unit, bound, unit, usual.remark)
 
 
 def _check_shape(owner: str, name: str, shape: tuple[int, ...], kind: Number) -> None:
@@ -269,26 +271,3 @@ def _range(low, high, open_low, open_high, unit_text) -> str:
     if high is not None:
         parts.append(f"{'less than' if open_high else 'at most'} {float(high):g}{unit_text}")
     return "must be " + " and ".join(parts)
-
-
-def _shown(value, unit: str = "") -> str:
-    """A value as text: numbers with their unit, of many numbers the range, of a tracer its type."""
-    if isinstance(value, jax.core.Tracer):
-        return eqx.tree_pformat(value)
-    if isinstance(value, tuple | list):
-        return f"({', '.join(_shown(item, unit) for item in value)})"
-    if not isinstance(value, jax.Array | np.ndarray | np.generic | float):
-        return repr(value)
-    value = np.asarray(value)
-    if value.dtype == bool:
-        return str(value) if value.ndim == 0 else f"{value.sum()} of {value.size} true"
-    if value.ndim == 0:
-        text = f"{value:.6g}"
-    elif value.ndim == 1 and value.size <= _SHOWN:
-        text = f"[{', '.join(f'{item:.6g}' for item in value)}]"
-    elif value.size:
-        size = " x ".join(str(length) for length in value.shape)
-        text = f"[{size} numbers from {value.min():.6g} to {value.max():.6g}]"
-    else:
-        return "[]"
-    return f"{text} {unit}" if unit else text

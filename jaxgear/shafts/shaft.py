@@ -57,7 +57,7 @@ class Shaft(Checked):
     def check_together(self) -> None:
         for kind, parts in (("sections", self.sections), ("bearings", self.bearings)):
             if not parts:
-                raise ValueError(f'Shaft "{self.name}": {kind} must not be empty')
+                raise ShaftError(kind, f'Shaft "{self.name}": {kind} must not be empty')
         _check(self)
 
     @property
@@ -87,14 +87,26 @@ class Shaft(Checked):
         """Whether such a shaft can be; concrete ones that cannot are refused, traced ones flagged."""
         return _holds(facts_of(self))
 
-    def _named(self) -> tuple[str, ...]:
-        """What is on the shaft, in the order of `ShaftFacts.low`."""
+    def _named(self) -> tuple[tuple[str, str], ...]:
+        """Places and names of what is on the shaft, in the order of `ShaftFacts.low`."""
         return (
-            *(f'bearing "{item.name}"' for item in self.bearings),
-            *(f'gear "{item.name}"' for item in self.gears),
-            *(f"coupling {index}" for index in range(len(self.couplings))),
-            *(f"load {index}" for index in range(len(self.loads))),
+            *((f"bearings[{index}]", f'bearing "{item.name}"') for index, item in enumerate(self.bearings)),
+            *((f"gears[{index}]", f'gear "{item.name}"') for index, item in enumerate(self.gears)),
+            *((f"couplings[{index}]", f"coupling {index}") for index in range(len(self.couplings))),
+            *((f"loads[{index}]", f"load {index}") for index in range(len(self.loads))),
         )
+
+
+class ShaftError(ValueError):
+    """A shaft that cannot be.
+
+    Attributes:
+        part: what of the shaft is wrong, as `bearings[1].position`; "" where it is no single part.
+    """
+
+    def __init__(self, part: str, problem: str):
+        self.part = part
+        super().__init__(problem)
 
 
 class ShaftFacts(NamedTuple):
@@ -190,36 +202,38 @@ def _check(shaft: Shaft) -> None:
     if isinstance(facts.length, jax.core.Tracer):  # within a trace of something else
         return
     facts = jax.tree.map(np.asarray, facts)
-    for fault in _faults(shaft, facts):
-        raise ValueError(f'Shaft "{shaft.name}": {fault}')
+    for part, fault in _faults(shaft, facts):
+        raise ShaftError(part, f'Shaft "{shaft.name}": {fault}')
 
 
-def _faults(shaft: Shaft, facts: ShaftFacts) -> Iterator[str]:
-    for what, first, last, inside in zip(shaft._named(), facts.low, facts.high, facts.inside):
+def _faults(shaft: Shaft, facts: ShaftFacts) -> Iterator[tuple[str, str]]:
+    """Parts that are wrong, and why."""
+    for (part, what), first, last, inside in zip(shaft._named(), facts.low, facts.high, facts.inside):
         if not inside:
             place = f"{first:g} mm" if first == last else f"{first:g} to {last:g} mm"
-            yield f"{what} at {place} must lie within 0 and {facts.length:g} mm"
-    for mounted, thin, thick, body, tip in zip(shaft.gears, facts.thinnest, facts.thickest, facts.body, facts.tip):
-        gear = f'gear "{mounted.name}"'
+            yield f"{part}.position", f"{what} at {place} must lie within 0 and {facts.length:g} mm"
+    for index, (mounted, thin, thick, body, tip) in enumerate(
+        zip(shaft.gears, facts.thinnest, facts.thickest, facts.body, facts.tip)
+    ):
+        part, gear = f"gears[{index}].body_diameter", f'gear "{mounted.name}"'
         if not thick < tip:
-            yield f"its diameter under {gear} is {thick:g} mm, must be less than {tip:g} mm, the tip diameter"
-        if not body < tip:
-            yield f"body_diameter of {gear} = {body:g} mm must be less than {tip:g} mm, the tip diameter"
-        if mounted.body_diameter is not None and body <= thin:
             yield (
-                f"body_diameter of {gear} = {body:g} mm has no effect on a shaft of {thin:g} mm: it must be more, or "
-                "left out"
+                f"gears[{index}]",
+                f"its diameter under {gear} is {thick:g} mm, must be less than {tip:g} mm, the tip diameter",
             )
+        if not body < tip:
+            yield part, f"body_diameter of {gear} = {body:g} mm must be less than {tip:g} mm, the tip diameter"
+        if mounted.body_diameter is not None and body <= thin:
+            problem = f"= {body:g} mm has no effect on a shaft of {thin:g} mm: it must be more, or left out"
+            yield part, f"body_diameter of {gear} {problem}"
     first = len(shaft.bearings)
     faces = [f"{low:g} to {high:g} mm" for low, high in zip(facts.low[first:], facts.high[first:])]
     for pair in np.argwhere(facts.overlap):
         places = [f'"{shaft.gears[index].name}" at {faces[index]}' for index in pair]
-        yield f"gears {' and '.join(places)} must not overlap"
+        yield "gears", f"gears {' and '.join(places)} must not overlap"
     if not facts.held:
         names = ", ".join(f'"{item.name}"' for item in shaft.bearings)
-        yield (
-            f"bearings {names} do not hold it: it needs two that are radially stiff and apart, or one that is stiff "
-            "against tilting too"
-        )
+        problem = "needs two that are radially stiff and apart, or one that is stiff against tilting too"
+        yield "bearings", f"bearings {names} do not hold it: it {problem}"
     if not facts.axial:
-        yield "an axial load needs a bearing of axial stiffness"
+        yield "bearings", "an axial load needs a bearing of axial stiffness"

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..numerics.durable import write_durably
 from .columns import CONVERGED, VARIANT, Column
+from .headings import as_text
 from .selection import front, smallest
 from .store import Store, load_manifest
 
@@ -187,7 +188,8 @@ class SweepTable:
         """Writes all rows as CSV with the units in the header; cells of failed results are empty."""
         from pyarrow import csv
 
-        header = ",".join(f'"{heading}"' for heading in self.headings.values())
+        quoted = (as_text(heading).replace('"', '""') for heading in self.headings.values())
+        header = ",".join(f'"{heading}"' for heading in quoted)
 
         def write(file):
             file.write(f"{header}\n".encode())

@@ -69,6 +69,7 @@ class Component:
     type: str
     name: str = ""
     attributes: dict[str, Attribute] = field(default_factory=dict)
+    without_unit: list[str] = field(default_factory=list)  # what was taken in the unit of the standard
 
     def where(self, attribute: str = "") -> str:
         """`cylindrical_gear 15: face_width`."""
@@ -126,6 +127,8 @@ class Component:
         if attribute not in self.attributes:
             return None
         held = self.attributes[attribute]
+        if held.unit is None and unit != "none":
+            self.without_unit.append(f"{self.where(attribute)} in {unit}")
         if held.unit is not None and held.unit != unit and held.unit not in _ALSO.get(unit, ()):
             raise self.refuse(attribute, f'unit "{held.unit}" must be "{unit}"')
         if held.value is None:

@@ -1,5 +1,6 @@
 """Reads a gear pair with its modifications and its load from a REXS file."""
 
+import logging
 from codecs import BOM_UTF8
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -20,6 +21,7 @@ from .model import Component, Model
 from .parse import parse
 from .read_flank import read_modification
 
+_LOG = logging.getLogger("jaxgear")
 _OLDEST, _NEWEST = (1, 4), (2,)
 _ALIKE = 1e-9  # um
 _ALONG, _ACROSS = "position_of_profile_modification", "diameter_of_helix_modification"
@@ -81,7 +83,13 @@ def read_rexs(
     with naming(file):
         held = content(file)
         model = parse_json(held) if held.removeprefix(BOM_UTF8).lstrip()[:1] == b"{" else parse(held)
-        return _read(model, stage, flank, load_case)
+        found = _read(model, stage, flank, load_case)
+    said = (part for several in (model.components, *model.cases.values()) for part in several.values())
+    silent = list(dict.fromkeys(place for part in said for place in part.without_unit))
+    if silent:
+        shown = f"{silent[0]}, the first of {len(silent)}" if len(silent) > 1 else silent[0]
+        _LOG.warning("%s: names no units, those of the REXS standard are taken: %s", file, shown)
+    return found
 
 
 def _read(model: Model, stage: int | None, flank: str | None, load_case: int | None) -> RexsPair:

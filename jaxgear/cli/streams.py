@@ -1,0 +1,51 @@
+"""What a command says beside its results: warnings, failures in one line, and an output that takes nothing.
+
+Imports nothing of the library: help and what is wrong with the options need none of it.
+"""
+
+import logging
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+def silence_compiler() -> None:
+    """XLA writes alarms to stderr that ask for a bug report where it compiles for long; what fails, it raises."""
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # fatal ones alone
+
+
+@contextmanager
+def warnings() -> Iterator[None]:
+    """Shows what the library warns of as lines on stderr."""
+    lines = logging.StreamHandler()
+    lines.setLevel(logging.WARNING)
+    lines.setFormatter(logging.Formatter("jaxgear: warning: %(message)s"))
+    logger, unusual = logging.getLogger("jaxgear"), logging.getLogger("jaxgear.unusual")
+    logger.addHandler(lines)
+    before, unusual.disabled = unusual.disabled, True  # commands ask about the numbers of their designs themselves
+    try:
+        yield
+    finally:
+        unusual.disabled = before
+        logger.removeHandler(lines)
+
+
+def one_line(error: Exception) -> str:
+    """What has failed, in one line."""
+    if hasattr(error, "format_message"):  # usage errors of typer
+        return f"{' '.join(error.format_message().split())} (jaxgear --help shows the usage)"
+    message = " ".join(str(error).split())
+    if isinstance(error, ValueError | RuntimeError) and message:
+        return message
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or 'standard output'}: {error.strerror}"
+    return f"unexpected {type(error).__name__}: {message} (JAXGEAR_DEBUG=1 shows where)"
+
+
+def forget_output() -> None:
+    """Keeps the flush at exit quiet where standard output takes nothing."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

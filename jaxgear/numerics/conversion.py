@@ -1,0 +1,90 @@
+"""Numbers as JAX takes them, and as text."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+_SHOWN = 6  # numbers of an array that are printed; of a longer one its range is
+
+
+def real(value, what: str = "") -> Float[Array, "..."]:
+    """Converts to an inexact array: arrays of floats keep their dtype, everything else takes JAX's default float.
+
+    Numbers stay concrete inside traced functions, so that they are checked there too.
+
+    Args:
+        value: number, or array or nested list of numbers.
+        what: name of the value, for the message.
+
+    Raises:
+        ValueError: for anything else: a truth value or a text is no number, and of a complex one half would be lost.
+    """
+    try:
+        if any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value)):
+            return _inexact(value)
+        given = np.asarray(value)
+        with jax.ensure_compile_time_eval():
+            if given.dtype.kind not in "iuf":
+                return _inexact(value)
+            # neither NumPy's conversion nor the transfer compiles anything
+            return jax.device_put(given if given.dtype.kind == "f" else given.astype(jnp.result_type(float)))
+    except (TypeError, ValueError):  # lists of unequal length are none either
+        raise ValueError(no_number(what, value)) from None
+
+
+def _inexact(value) -> Float[Array, "..."]:
+    array = jnp.asarray(value)
+    if array.dtype.kind in "bc":
+        raise TypeError
+    dtype = array.dtype if jnp.issubdtype(array.dtype, jnp.inexact) else jnp.result_type(float)
+    # the conversion also drops the weak type of Python numbers, which would retrace where an array did not
+    return jax.lax.convert_element_type(array, dtype)
+
+
+def real_or_given(value):
+    """A number field's value: what is no number stays as it is for the check, which knows its name."""
+    try:
+        return optional_real(value)
+    except ValueError:
+        return value
+
+
+def no_number(what: str, value) -> str:
+    """That a value is no number, in words."""
+    wanted = "a real number" if getattr(value, "dtype", np.dtype(type(value))).kind == "c" else "a number"
+    return f"{what}{' = ' if what else ''}{shown(value)} must be {wanted}"
+
+
+def optional_real(value) -> Float[Array, "..."] | None:
+    """`real`, with None kept as None."""
+    return None if value is None else real(value)
+
+
+def concrete(value) -> np.ndarray | None:
+    """The value as a NumPy array, or None while it is being traced."""
+    return None if isinstance(value, jax.core.Tracer) else np.asarray(value)
+
+
+def shown(value, unit: str = "") -> str:
+    """A value as text: numbers with their unit, of many numbers the range, of a tracer its type."""
+    if isinstance(value, jax.core.Tracer):
+        return eqx.tree_pformat(value)
+    if isinstance(value, tuple | list):
+        return f"({', '.join(shown(item, unit) for item in value)})"
+    if not isinstance(value, jax.Array | np.ndarray | np.generic | float):
+        return repr(value)
+    value = np.asarray(value)
+    if value.dtype == bool:
+        return str(value) if value.ndim == 0 else f"{value.sum()} of {value.size} true"
+    if value.ndim == 0:
+        text = f"{value:.6g}"
+    elif value.ndim == 1 and value.size <= _SHOWN:
+        text = f"[{', '.join(f'{item:.6g}' for item in value)}]"
+    elif value.size:
+        size = " x ".join(str(length) for length in value.shape)
+        text = f"[{size} numbers from {value.min():.6g} to {value.max():.6g}]"
+    else:
+        return "[]"
+    return f"{text} {unit}" if unit else text
