@@ -18,6 +18,7 @@ from ..io.results import unit_of
 from ..metrics import Doubt, plausibility
 from ..numerics import program
 from ..optimize import Verified
+from ..report import Table as Block
 from .study import Evaluation
 
 Evaluations = Mapping[str, Evaluation]
@@ -56,7 +57,9 @@ _ROWS = {
     "micropitting_safety": ("micropitting safety S_lambda", ".2f"),
     "scuffing_safety": ("scuffing safety S_B", ".2f"),
 }
+_UNITS = {metric.rpartition("_")[2] for metric, (label, _) in _ROWS.items() if label.endswith("]")}
 _BY_FINITE_ELEMENTS = "  by finite elements"
+PLEASE_CHECK = "please check: "
 _HARRIS_CURVES = 7
 _ORDERS = 8  # of the transmission error that are drawn
 _TITLE = 9.0  # [pt]
@@ -69,17 +72,22 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
     result.add_column("")
     for name in evaluations:
         result.add_column(name, justify="right", no_wrap=True)
-    for metric, (label, form) in _ROWS.items():
+    first = next(iter(evaluations.values()))
+    second = verified(evaluations)
+    asked = [metric for metric in _ROWS if _objective(metric) in first.objectives]
+    for label in objectives(evaluations):
+        result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
+        if second:
+            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.objectives[label], ".4g") for each in second))
+    for metric in dict.fromkeys([*asked, *_ROWS]):  # what was asked for stands first
+        label, form = _ROWS[metric]
         cells = [evaluation.metrics.get(metric) for evaluation in evaluations.values()]
         if None not in cells:
             result.add_row(label, *(format(cell, form) for cell in cells))
-        if metric == "ppte_um" and verified(evaluations):
-            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.ppte, form) for each in verified(evaluations)))
-    for label in objectives(evaluations):
-        result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
-        if verified(evaluations):
-            cells = [each.objectives[label] for each in verified(evaluations)]
-            result.add_row(_BY_FINITE_ELEMENTS, *(format(cell, ".4g") for cell in cells))
+        if second and metric == "ppte_um":
+            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.ppte, form) for each in second))
+        elif second and metric in asked:
+            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.objectives[_objective(metric)], form) for each in second))
     result.add_section()
     flanks = [dict(_flank_cells(evaluation)) for evaluation in evaluations.values()]
     for label in dict.fromkeys(label for cells in flanks for label in cells):
@@ -132,7 +140,7 @@ def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
     for same in grouped.values():
         design, doubt = list(same.items())[-1]  # the last is the one that the run is about
         others = "" if len(same) == len(found) else f"{', '.join(same)}: "
-        yield f"please check: {others}{doubt}"
+        yield f"{PLEASE_CHECK}{others}{doubt}"
 
 
 def grid(evaluations: Evaluations) -> str:
@@ -160,8 +168,14 @@ def diameters(gear: Gear):
 
 def objectives(evaluations: Evaluations) -> list[str]:
     """What an optimization made small, without what is a row of the table anyhow."""
-    known = {name.rpartition("_")[0] + f" [{name.rpartition('_')[2]}]" for name in _ROWS}
-    return [label for label in next(iter(evaluations.values())).objectives if label not in known | set(_ROWS)]
+    known = {_objective(metric) for metric in _ROWS}
+    return [label for label in next(iter(evaluations.values())).objectives if label not in known]
+
+
+def _objective(metric: str) -> str:
+    """What a row of the table is called as an objective: "ppte [um]" for "ppte_um"."""
+    name, _, unit = metric.rpartition("_")
+    return f"{name} [{unit}]" if unit in _UNITS else metric
 
 
 def verified(evaluations: Evaluations) -> list[Verified]:
@@ -177,10 +191,11 @@ def reduction(evaluations: Evaluations) -> float:
 
 def main(evaluations: Evaluations) -> Evaluation:
     """The design that the run is about: the optimum where there is one, else the last."""
-    return evaluations[_main_name(evaluations)]
+    return evaluations[main_name(evaluations)]
 
 
-def _main_name(evaluations: Evaluations) -> str:
+def main_name(evaluations: Evaluations) -> str:
+    """What the main design is called."""
     return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
 
 
@@ -204,7 +219,7 @@ def write_figures(
             torques, {name: evaluation.ppte for name, evaluation in evaluations.items()}, design_torque=file.torque
         ),
         "harris_map": plot.harris_map(
-            mesh.phase, torques[few], main(evaluations).transmission_error[few], design=_main_name(evaluations)
+            mesh.phase, torques[few], main(evaluations).transmission_error[few], design=main_name(evaluations)
         ),
         "k_chart": plot.k_chart(mesh, flanks(evaluations), **_band(file, evaluations)),
     }
@@ -217,7 +232,7 @@ def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: 
     """Figures of what several slices show; those of one design are of the main one."""
     from .. import plot
 
-    cycle, name = main(evaluations).cycle, _main_name(evaluations)
+    cycle, name = main(evaluations).cycle, main_name(evaluations)
     maps = {"pressure_map": plot.pressure_map(cycle), "contact_pattern": plot.contact_pattern(cycle)}
     for drawn in maps.values():
         np.ravel(drawn)[0].set_title(name, loc="left", fontsize=_TITLE)
@@ -241,7 +256,7 @@ def _orders(mesh: Mesh) -> int:
 def _band(file: DesignFile, evaluations: Evaluations) -> dict[str, Any]:
     """The tolerance band of a chart about the main design, where the file names a quality class."""
     classes = quality_classes(file)
-    return {} if classes is None else {"tolerance": classes, "about": _main_name(evaluations)}
+    return {} if classes is None else {"tolerance": classes, "about": main_name(evaluations)}
 
 
 def save_figures(folder: Path, axes: Mapping[str, Any]) -> list[Path]:
@@ -262,6 +277,14 @@ def console(*, stderr: bool = False) -> Console:
     if not made.is_terminal:
         made.width = _WIDTH
     return made
+
+
+def say_rows(block: Block) -> None:
+    """Prints a table of two columns as lines under its title, which the terminal may break."""
+    out, width = console(), max(len(label) for label, _ in block.rows)
+    out.print(block.title, style="bold", soft_wrap=True)
+    for label, text in block.rows:
+        out.print(f"  {label:<{width}}  {text}", soft_wrap=True)
 
 
 def say(*lines: str) -> None:
