@@ -225,7 +225,7 @@ def write_figures(
     }
     if mesh.resolution.slices > 1:
         axes |= _over_face(file, mesh, evaluations, torques)
-    return save_figures(folder, axes)
+    return save_figures(folder, axes, bold=main_name(evaluations))
 
 
 def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
@@ -259,11 +259,14 @@ def _band(file: DesignFile, evaluations: Evaluations) -> dict[str, Any]:
     return {} if classes is None else {"tolerance": classes, "about": main_name(evaluations)}
 
 
-def save_figures(folder: Path, axes: Mapping[str, Any]) -> list[Path]:
-    """Writes the figures that hold the axes, each under its name; gives the files."""
+def save_figures(folder: Path, axes: Mapping[str, Any], *, bold: str | None = None) -> list[Path]:
+    """Writes the figures that hold the axes, each under its name, the lines of one design bold; gives the files."""
     from .. import plot
 
-    return [plot.save(np.ravel(drawn)[0].figure, folder / f"{name}.png") for name, drawn in axes.items()]
+    figures = {name: np.ravel(drawn)[0].figure for name, drawn in axes.items()}
+    for figure in figures.values() if bold is not None else ():
+        plot.emphasize(figure, bold)
+    return [plot.save(figure, folder / f"{name}.png") for name, figure in figures.items()]
 
 
 def flanks(evaluations: Evaluations):

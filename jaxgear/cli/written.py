@@ -12,6 +12,7 @@ import numpy as np
 from ..contact import Mesh, Resolution
 from ..geometry import Gear
 from ..io import DesignFile, describe
+from ..io.layout import snake
 from ..metrics import Doubt
 from ..numerics import Number, fields_of
 from ..optimize import Verified
@@ -122,9 +123,9 @@ def sizes(of: Resolution) -> dict[str, Any]:
     return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
 
 
-def model(mesh: Mesh) -> dict[str, str]:
-    """The compliance and its plane state in words."""
-    return {"compliance": _words(mesh.compliance), "plane": mesh.compliance.plane}
+def model(mesh: Mesh) -> dict[str, Any]:
+    """The compliance by the names of its parts, with their options, and its plane state."""
+    return {"compliance": _options(mesh.compliance), "plane": mesh.compliance.plane}
 
 
 def _misalignment(mesh: Mesh) -> dict[str, float]:
@@ -134,11 +135,18 @@ def _misalignment(mesh: Mesh) -> dict[str, float]:
     return {"misalignment_um": float(mesh.support.misalignment.over_face(mesh.pair))}
 
 
-def _words(part: eqx.Module) -> str:
-    """A model by the names of its parts and switches."""
-    values = (getattr(part, field.name) for field in dataclasses.fields(part))
-    inner = [_words(value) if isinstance(value, eqx.Module) else str(value) for value in values]
-    return f"{type(part).__name__}({', '.join(inner)})"
+def _options(part: eqx.Module) -> dict[str, Any]:
+    """The type of a part and its options, in the words of a design file; of tables their sizes."""
+    data: dict[str, Any] = {"type": snake(type(part).__name__)}
+    for field in dataclasses.fields(part):
+        value = getattr(part, field.name)
+        if isinstance(value, eqx.Module):
+            data[field.name] = _options(value)
+        elif np.ndim(value):
+            data[field.name] = " x ".join(map(str, np.shape(value))) + " values"
+        elif value is not None and field.name != "plane":
+            data[field.name] = value if isinstance(value, str | bool | int) else np.asarray(value)
+    return data
 
 
 def doubt_data(doubt: Doubt) -> dict[str, Any]:
