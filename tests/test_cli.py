@@ -27,7 +27,7 @@ from jaxgear import plot
 from jaxgear.cli import app, cache, main, manufactured, report, run, study
 from jaxgear.cli.front import front_rows, front_table
 from jaxgear.cli.gains import gains
-from jaxgear.io import load_design
+from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
 from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
 from jaxgear.metrics import Doubt
@@ -753,6 +753,26 @@ def test_help_and_version_need_no_file():
     assert "optimize" in call("--help").out and call("--help").code == 0
     assert "Design file" in call("optimize", "--help").out
     assert call("--version").out.startswith("jaxgear ")
+
+
+def test_a_new_design_file_runs_as_it_is(tmp_path):
+    """With the reliefs of the rule as values; what is there already is not replaced, and gears are checked."""
+    file, options = tmp_path / "pair.toml", ("--teeth", 19, 48, "--module", 3, "--torque", 50, "--face-width", 18)
+    done = call("new", file, *options)
+    assert done.code == 0 and "19/48 teeth" in done.out
+    written = file.read_text("utf-8")
+    assert_refused(call("new", file, *options), "pair.toml: exists already")
+    assert file.read_text("utf-8") == written
+    assert_refused(call("new", tmp_path / "b.toml", *options[:-1], -18), "face_width = -18 mm must be greater than 0")
+    assert_refused(call("new", tmp_path / "b.txt", *options), "b.txt: the name of a design file must end in .toml")
+    assert [path.name for path in tmp_path.iterdir()] == ["pair.toml"]
+    design = load_design(file)
+    rule = jg.iso_relief(design.pair(), 50.0)
+    assert design.values["wheel_amount"] == pytest.approx(float(rule.amount), abs=0.05)
+    assert optimize_request(design).method == "minimax"
+    file.write_text(f"{written}[resolution]\n{LINE}\n")
+    result = call("analyze", file, "-o", tmp_path / "out", "--no-figures")
+    assert result.code == 0 and "modified" in result.out
 
 
 def test_the_cache_is_a_private_folder_and_never_an_obstacle(tmp_path, monkeypatch):

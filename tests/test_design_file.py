@@ -560,6 +560,33 @@ def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
     assert guide.read_text(encoding="utf-8") == text, "python -m jaxgear.io.reference > examples/guides/design_files.md"
 
 
+def test_the_shortest_file_of_the_guide_is_one(load):
+    (shortest,) = re.findall(r"^```toml\n(.*?)^```", reference(), flags=re.DOTALL | re.MULTILINE)
+    file = load(shortest)
+    assert len(shortest.split("\n\n")) == 3 and file.torque == 50.0 and not file.bounds
+    assert (int(file.pair().pinion.teeth), int(file.pair().wheel.teeth)) == (19, 48)
+
+
+def test_the_contents_of_the_reference_lead_to_its_tables():
+    """GitHub makes the anchor of a heading of its letters, digits, hyphens and underscores."""
+    text = reference()
+    linked = re.findall(r"^- \[(.+)\]\(#(.+)\)$", text, flags=re.MULTILINE)
+    headings = re.findall(r"^## (.+)$", text, flags=re.MULTILINE)
+    assert [title for title, _ in linked] == headings and len(set(anchor for _, anchor in linked)) == len(headings)
+    assert all(re.sub(r"[^\w -]", "", title).lower().replace(" ", "-") == anchor for title, anchor in linked)
+    assert not any("--" in anchor for _, anchor in linked), "which the site would make one hyphen of"
+
+
+def test_a_variable_may_name_the_value_that_an_analysis_takes(load):
+    free = text(tail='[variables]\nheight = { low = 0.0, high = 9.0, value = 4.0, unit = "um" }\n', pinion="").replace(
+        "[wheel]", '[[pinion.modification]]\ntype = "tip_relief"\namount = "height"\nlength = 3.0\n[wheel]'
+    )
+    assert load(free).values == {"height": 4.0}
+    assert load(free.replace("value = 4.0, ", "")).values == {}
+    with pytest.raises(DesignFileError, match=r"variables\.height\.value: 11 must be at least 0 and at most 9"):
+        load(free.replace("value = 4.0", "value = 11.0"))
+
+
 def open_case():
     """Profile shift, centre distance and torque are variables of a sweep."""
     variables = "[variables]\nx = { low = 0.0, high = 0.2 }\na = { low = 101.4, high = 101.8 }\n"

@@ -52,6 +52,7 @@ class DesignFile:
         quality_classes: flank tolerance classes of pinion and wheel, of the gears or of [tolerance]; None without.
         bounds: (low, high) of every free parameter, in its unit.
         units: unit of every free parameter, "" for a pure number.
+        values: of the free parameters that name one, which `jaxgear analyze` takes.
         optimize: the table of that name; `optimize_request` makes sense of it.
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
@@ -75,6 +76,7 @@ class DesignFile:
     quality_classes: tuple[int, int] | None
     bounds: dict[str, tuple[float, float]]
     units: dict[str, str]
+    values: dict[str, float]
     optimize: schema.OptimizeSection
     sweep: schema_sweep.SweepSection | None
     tolerance: schema_sweep.ToleranceSection | None
@@ -225,7 +227,7 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
     )
     open_case = [*pair.free(), *model.free(), *axes.free(), *operation.free()]
     open_flanks = [free for part in flanks for free in part.free()]
-    bounds, units = read_variables(top.variables or {}, [*open_flanks, *open_case])
+    bounds, units, values = read_variables(top.variables or {}, [*open_flanks, *open_case])
     ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
     usual_pair = pair.build(middle)
@@ -259,6 +261,7 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
         quality_classes=None if classes is None else both_classes(classes),
         bounds=bounds,
         units=units,
+        values=values,
         optimize=optimize,
         sweep=sweep,
         tolerance=tolerance,

@@ -196,11 +196,13 @@ class VariableSection(Section):
     Attributes:
         low: least value, in the unit of the number that it stands for.
         high: greatest value.
+        value: between both, for `jaxgear analyze`, which needs numbers.
         unit: checked against its use.
     """
 
     low: Annotated[float, _BOUND]
     high: Annotated[float, _BOUND]
+    value: Annotated[float | None, _BOUND] = None
     unit: Annotated[str | None, text(empty=True)] = None
 
 
@@ -209,7 +211,8 @@ class OptimizeSection(Section):
 
     Attributes:
         method: name of the method; "minimax" without it.
-        objective: a quantity to be made small, or several for method "pareto"; "ppte" without it.
+        objective: a quantity to be made as good as can be, small or large by what is better of it, or several for
+            method "pareto"; "ppte" without it.
         measure: joins the cases of several torques or manufactured gears into one number; "mean" without it.
         level: of the measures "quantile" and "cvar".
         torques: on the pinion; the design torque alone without it.
