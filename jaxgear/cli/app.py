@@ -3,11 +3,9 @@
 JAX and the library are imported when a command runs: help, version and what is wrong with the options need neither.
 """
 
-import logging
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal, NoReturn
 
@@ -16,6 +14,7 @@ import typer
 from . import interrupt
 from .options import File, NoCache, NoFigures, Quick, Reported, output_option, typed
 from .version import version as own_version
+from .warnings import warnings_on_stderr
 
 # of `optimize.METHODS` and of the search for flanks without parameters, as a test makes sure
 METHODS = "minimax, adam, lbfgs, genetic, cma_es, differential_evolution, factorial, te_iteration, free_form"
@@ -256,23 +255,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a title beyond the terminal's alphabet is no reason to fail
-    with interrupt.listening(), _warnings():
+    with interrupt.listening(), warnings_on_stderr():
         code = _run(arguments)
     sys.exit(code)
-
-
-@contextmanager
-def _warnings() -> Iterator[None]:
-    """Shows what the library warns of as lines on stderr."""
-    lines = logging.StreamHandler()
-    lines.setLevel(logging.WARNING)
-    lines.setFormatter(logging.Formatter("jaxgear: warning: %(message)s"))
-    logger = logging.getLogger("jaxgear")
-    logger.addHandler(lines)
-    try:
-        yield
-    finally:
-        logger.removeHandler(lines)
 
 
 def _run(arguments: Sequence[str] | None) -> int:

@@ -7,7 +7,6 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from rich.console import Console
 from rich.table import Table
 
 from ..contact import Mesh
@@ -18,8 +17,11 @@ from ..io.results import unit_of
 from ..metrics import Doubt, plausibility
 from ..numerics import program
 from ..optimize import Verified
-from ..report import Table as Block
 from .study import Evaluation
+from .terminal import console as console
+from .terminal import say as say
+from .terminal import say_rows as say_rows
+from .terminal import warn as warn
 
 Evaluations = Mapping[str, Evaluation]
 
@@ -63,7 +65,6 @@ PLEASE_CHECK = "please check: "
 _HARRIS_CURVES = 7
 _ORDERS = 8  # of the transmission error that are drawn
 _TITLE = 9.0  # [pt]
-_WIDTH = 120  # of a file [characters]
 
 
 def table(file: DesignFile, evaluations: Evaluations) -> Table:
@@ -272,33 +273,6 @@ def save_figures(folder: Path, axes: Mapping[str, Any], *, bold: str | None = No
 def flanks(evaluations: Evaluations):
     """The modifications of every design."""
     return {name: (evaluation.pinion, evaluation.wheel) for name, evaluation in evaluations.items()}
-
-
-def console(*, stderr: bool = False) -> Console:
-    """A console that takes brackets literally; wide enough for the table when it writes into a file."""
-    made = Console(stderr=stderr, markup=False, highlight=False, emoji=False)
-    if not made.is_terminal:
-        made.width = _WIDTH
-    return made
-
-
-def say_rows(block: Block) -> None:
-    """Prints a table of two columns as lines under its title, which the terminal may break."""
-    out, width = console(), max(len(label) for label, _ in block.rows)
-    out.print(block.title, style="bold", soft_wrap=True)
-    for label, text in block.rows:
-        out.print(f"  {label:<{width}}  {text}", soft_wrap=True)
-
-
-def say(*lines: str) -> None:
-    """Prints lines that the terminal may break."""
-    for line in lines:
-        console().print(line, soft_wrap=True)
-
-
-def warn(line: str) -> None:
-    """Prints a warning on stderr."""
-    console(stderr=True).print(f"jaxgear: warning: {line}", style="bold red", soft_wrap=True)
 
 
 def _flank_cells(evaluation: Evaluation) -> Iterator[tuple[str, str]]:

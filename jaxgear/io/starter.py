@@ -10,10 +10,7 @@ from ..sizing import iso_relief
 from .folder import writing
 
 _SHORTEST = 0.3  # of a relief that is searched, in modules
-_MOST, _LEAST_MOST = (
-    3.0,
-    20.0,
-)  # largest amount that is searched: so many times that of the rule, and at least this [um]
+_MOST, _LEAST_MOST = 3.0, 20.0  # largest amount that is searched, relative to that of the rule and at least [um]
 
 _TEXT = """# {title}
 #
