@@ -272,5 +272,6 @@ def run(design: DesignFile, target: Path, stages: Stages) -> Iterator[Run]:
     """Opens the result folder; the results appear when the block ends without an exception."""
     with ExitStack() as putting_in_place:
         with result_folder(target) as folder:
+            stages.replaces(target)
             yield Run(design, target, folder, stages)
             putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))

@@ -194,8 +194,7 @@ class VariableSection(Section):
     """A number of the file that is left open: it is named in place of a number.
 
     Attributes:
-        low: least value, in the unit of the number that it stands for.
-        high: greatest value.
+        low, high: least and greatest value, in the unit of the number that it stands for.
         value: between both, for `jaxgear analyze`, which needs numbers.
         unit: checked against its use.
     """
@@ -211,8 +210,7 @@ class OptimizeSection(Section):
 
     Attributes:
         method: name of the method; "minimax" without it.
-        objective: a quantity to be made as good as can be, small or large by what is better of it, or several for
-            method "pareto"; "ppte" without it.
+        objective: a quantity to be made small, or large where that is better; several for "pareto"; "ppte" without it.
         measure: joins the cases of several torques or manufactured gears into one number; "mean" without it.
         level: of the measures "quantile" and "cvar".
         torques: on the pinion; the design torque alone without it.
