@@ -187,10 +187,12 @@ def test_the_summary_says_what_was_computed(analyzed):
     assert (pinion["teeth"], pinion["module_mm"], pinion["face_width_mm"]) == (19, 3.0, 20.0)
     assert pinion["bore_diameter_mm"] == pytest.approx(24.75) and pinion["bore_given"] is False
     assert pinion["tip_diameter_mm"] == pytest.approx(63.0) and pinion["elastic_modulus_MPa"] == 206_000.0
+    assert pinion["material"] == "STEEL" and "span_mm" not in pinion
     assert analyzed.summary["center_distance_mm"] == pytest.approx(100.5)
     model = analyzed.summary["model"]
     assert model["plane"] == "auto" and model["compliance"]["body"]["type"] == "elastic_ring"
     assert "bores: pinion 24.75 mm (half the root diameter, as none is given), wheel" in analyzed.out
+    assert "; centre distance 100.5 mm, backlash on the line of action 0 um\n" in analyzed.out
     doubts = {name: [doubt["name"] for doubt in of["doubts"]] for name, of in analyzed.summary["designs"].items()}
     assert doubts == {"unmodified": ["corner pressure"], "modified": []}
     assert analyzed.out.count("please check") == 1

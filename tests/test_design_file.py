@@ -567,6 +567,14 @@ def test_the_shortest_file_of_the_guide_is_one(load):
     assert (int(file.pair().pinion.teeth), int(file.pair().wheel.teeth)) == (19, 48)
 
 
+def test_material_and_measured_thickness_are_known_by_what_the_file_says(load):
+    both = "[materials.case_hardened]\nelastic_modulus = 206000.0\npoisson_ratio = 0.3\n"
+    measured = 'material = "case_hardened"\nspan = [22.85, 22.90]\nteeth_spanned = 3'
+    file = load(text(pinion=measured, tail=both))
+    assert file.drawn["pinion"] == {"material": "case_hardened", "span_mm": [22.85, 22.90], "teeth_spanned": 3}
+    assert file.drawn["wheel"] == {"material": "STEEL"}
+
+
 def test_the_contents_of_the_reference_lead_to_its_tables():
     """GitHub makes the anchor of a heading of its letters, digits, hyphens and underscores."""
     text = reference()

@@ -173,7 +173,7 @@ def _figures(files: Iterable[Path]) -> list[Section]:
     pictures = [figure(path) for path in files]
     if not pictures:
         return []
-    return [Section("Figures", figures=pictures, new_page=True)]
+    return [Section("Figures", figures=pictures)]
 
 
 def _validity(found: Found, data: Mapping[str, Any]) -> Section:
@@ -201,7 +201,7 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
         if key in optimum
     ]
     tables = [Table(("", "value"), tuple(checks), "checks")] if checks else []
-    return Section("Convergence and validity", lines, found.warnings, found.doubts or (), tables, new_page=True)
+    return Section("Convergence and validity", lines, found.warnings, found.doubts or (), tables)
 
 
 def _inputs(design: DesignFile, data: Mapping[str, Any], found: Found) -> Section:

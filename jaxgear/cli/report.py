@@ -151,16 +151,6 @@ def grid(evaluations: Evaluations) -> str:
     return f"evaluated at {positions} positions; twice as many change PPTE: {changes}"
 
 
-def bores(file: DesignFile) -> str:
-    """Both bores, since the body is held there, and whether anybody has asked for them."""
-    gears = (("pinion", file.pair().pinion), ("wheel", file.pair().wheel))
-    texts = []
-    for name, gear in gears:
-        guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
-        texts.append(f"{name} {float(diameters(gear)[-1]):.4g} mm{guess}")
-    return f"bores: {', '.join(texts)}"
-
-
 @program
 def diameters(gear: Gear):
     """Diameters of tip, tip form circle and bore [mm]."""

@@ -42,6 +42,7 @@ from . import interrupt, manufactured, optimum_report, report, written
 from .cache import enable_cache
 from .document import Document, Found
 from .front import COMPROMISE, front_table
+from .geometry import mounting
 from .progress import Stages
 from .study import Evaluation, evaluate
 
@@ -218,7 +219,7 @@ class Run:
         """The results in words, where there is no optimum that says them first."""
         if self._optimum is None:
             yield from (report.grid(self._evaluations), *self._notes())
-        yield report.bores(self.design)
+        yield mounting(self.design)
 
     def _notes(self) -> Iterator[str]:
         yield from manufactured.lines(self.design, self._evaluations)

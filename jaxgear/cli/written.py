@@ -40,7 +40,7 @@ def summary(
         "torque_range_Nm": file.torque_range,
         "speed_rpm": file.speed,
         "friction": file.friction,
-        "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
+        "gears": {name: _gear(getattr(mesh.pair, name)) | _drawn(drawn) for name, drawn in file.drawn.items()},
         "center_distance_mm": shape["pair"]["center_distance_mm"],
         **_misalignment(mesh),
         **manufactured.tolerances(file),
@@ -89,6 +89,11 @@ def _gear(gear: Gear) -> dict[str, Any]:
             data[_key(name, field)] = np.asarray(derived.get(name, getattr(part, name)))
     data["bore_given"] = gear.bore_diameter is not None
     return data
+
+
+def _drawn(given: Mapping[str, Any]) -> dict[str, Any]:
+    """What the file gives beside the numbers of the gear, whose names stay those of the numbers that it means."""
+    return {f"drawn_{name}" if name.startswith("tooth_thickness") else name: value for name, value in given.items()}
 
 
 def _numbers(part: eqx.Module) -> dict[str, Any]:

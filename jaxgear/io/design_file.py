@@ -21,7 +21,7 @@ from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, refused
 from .flanks import check_files
 from .gearbox import layout_of, support_of
-from .gears import both_classes, gear_of, materials_of, pair_of, quality_of
+from .gears import both_classes, drawing_of, gear_of, materials_of, pair_of, quality_of
 from .sizes import resolution_of
 from .stiffness import model_part, with_tables
 from .toml import decode, read
@@ -52,6 +52,7 @@ class DesignFile:
         quality_classes: flank tolerance classes of pinion and wheel, of the gears or of [tolerance]; None without.
         bounds: (low, high) of every free parameter, in its unit.
         units: unit of every free parameter, "" for a pure number.
+        drawn: of pinion and wheel, what the file gives as name of the material and as measures of the tooth thickness.
         values: of the free parameters that name one, which `jaxgear analyze` takes.
         optimize: the table of that name; `optimize_request` makes sense of it.
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
@@ -76,6 +77,7 @@ class DesignFile:
     quality_classes: tuple[int, int] | None
     bounds: dict[str, tuple[float, float]]
     units: dict[str, str]
+    drawn: dict[str, dict[str, Any]]
     values: dict[str, float]
     optimize: schema.OptimizeSection
     sweep: schema_sweep.SweepSection | None
@@ -261,6 +263,7 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
         quality_classes=None if classes is None else both_classes(classes),
         bounds=bounds,
         units=units,
+        drawn={"pinion": drawing_of(pinion_says), "wheel": drawing_of(wheel_says)},
         values=values,
         optimize=optimize,
         sweep=sweep,
