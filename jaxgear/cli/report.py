@@ -255,8 +255,9 @@ def save_figures(folder: Path, axes: Mapping[str, Any], *, bold: str | None = No
     from .. import plot
 
     figures = {name: np.ravel(drawn)[0].figure for name, drawn in axes.items()}
-    for figure in figures.values() if bold is not None else ():
-        plot.emphasize(figure, bold)
+    if bold is not None:
+        for figure in figures.values():
+            plot.emphasize(figure, bold)
     return [plot.save(figure, folder / f"{name}.png") for name, figure in figures.items()]
 
 

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from ..geometry import Gear, GearPair
-from ..numerics import check, compile_quickly
+from ..numerics import check, compile_quickly, real
 from ..numerics.durable import write_durably
 from ..sizing import iso_relief
 from .folder import writing
@@ -96,7 +96,8 @@ def write_starter(
     if speed is not None:
         check("new", "speed", speed, "rpm", low=0.0, open_low=True)
     compile_quickly()
-    pair = GearPair(*(Gear(count, module, face_width=face_width) for count in teeth))
+    pinion, wheel = (Gear(real(count), real(module), face_width=real(face_width)) for count in teeth)
+    pair = GearPair(pinion, wheel)
     rule = iso_relief(pair, torque)
     amount, length = float(rule.amount), float(rule.length)
     text = _TEXT.format(

@@ -45,8 +45,8 @@ def optimum_front(
                 f"{value:.3g} {unit_text(unit)}".strip() for value, unit in zip(front.values[chosen], front.units)
             ]
             front_star(ax, front.values[chosen], f"chosen: {', '.join(values)}")
-        for index, (name, values) in enumerate((others or {}).items()):
-            ax.plot(*values[:2], zorder=5, label=name, **point_style(index + _STYLES_OF_FRONT))
+        for index, (name, other) in enumerate((others or {}).items()):
+            ax.plot(*other[:2], zorder=5, label=name, **point_style(index + _STYLES_OF_FRONT))
         ax.set(xlabel=labels[0], ylabel=wrapped(labels[1]))
         legend_above(ax)
     return ax

@@ -99,7 +99,9 @@ def _parabolic(first: AbstractModification, second: AbstractModification) -> Abs
         return None
     amount = float(first.amount) + float(second.amount)
     linear = (powers(Parabolic()) or {})[1] * amount
-    if not np.allclose([first.length, first.amount], [second.length, linear], rtol=_SAME, atol=0.0):
+    if not np.allclose(
+        [float(first.length), float(first.amount)], [float(second.length), linear], rtol=_SAME, atol=0.0
+    ):
         return None
     return type(first)(real(amount), first.length, Parabolic())
 
