@@ -22,6 +22,12 @@ def on_files(files, config):
     return files
 
 
+def on_page_markdown(markdown, page, **_):
+    """Links the report from the page that names it, where it is: in the site."""
+    name = Path(DESIGN).with_suffix(".html").name
+    return markdown.replace(f"`{name}`", f"[{name}]({name})") if page.file.src_uri == "reports.md" else markdown
+
+
 def calculated() -> str:
     """The report of the command, which runs where the example lies."""
     examples = Path(__file__).parent

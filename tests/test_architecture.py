@@ -92,7 +92,7 @@ HEAVY = {
     "jaxgear.plot",
 }
 # so do the commands, and their help without any of the library
-_NAMES = "commands", "convert", "devices", "dynamics", "layout", "sweep", "wear"
+_NAMES = "commands", "convert", "devices", "dynamics", "layout", "new", "sweep", "wear"
 COMMANDS = {f"jaxgear.cli.{name}" for name in _NAMES}
 
 

@@ -21,18 +21,21 @@ import jax
 import numpy as np
 import pytest
 from commands import FIXED, FREE, LINE, assert_refused, call
-from report_page import check_report
+from report_page import Page, check_report
 
 import jaxgear as jg
 from jaxgear import plot
 from jaxgear.cli import app, cache, main, manufactured, report, run, study
-from jaxgear.io import load_design
+from jaxgear.cli.front import front_rows, front_table
+from jaxgear.cli.gains import gains
+from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
-from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
+from jaxgear.io.schema_optimize import METHODS_WITHOUT_VARIABLES
 from jaxgear.metrics import Doubt
 from jaxgear.metrics.plausibility import Limit
 from jaxgear.microgeometry import NoModification
 from jaxgear.optimize import result as optimum_result
+from jaxgear.report import read_table
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -185,9 +188,12 @@ def test_the_summary_says_what_was_computed(analyzed):
     assert (pinion["teeth"], pinion["module_mm"], pinion["face_width_mm"]) == (19, 3.0, 20.0)
     assert pinion["bore_diameter_mm"] == pytest.approx(24.75) and pinion["bore_given"] is False
     assert pinion["tip_diameter_mm"] == pytest.approx(63.0) and pinion["elastic_modulus_MPa"] == 206_000.0
+    assert pinion["material"] == "STEEL" and "span_mm" not in pinion
     assert analyzed.summary["center_distance_mm"] == pytest.approx(100.5)
-    assert analyzed.summary["model"]["plane"] == "auto" and "ElasticRing" in analyzed.summary["model"]["compliance"]
+    model = analyzed.summary["model"]
+    assert model["plane"] == "auto" and model["compliance"]["body"]["type"] == "elastic_ring"
     assert "bores: pinion 24.75 mm (half the root diameter, as none is given), wheel" in analyzed.out
+    assert "; centre distance 100.5 mm, backlash on the line of action 0 um\n" in analyzed.out
     doubts = {name: [doubt["name"] for doubt in of["doubts"]] for name, of in analyzed.summary["designs"].items()}
     assert doubts == {"unmodified": ["corner pressure"], "modified": []}
     assert analyzed.out.count("please check") == 1
@@ -299,9 +305,73 @@ def test_the_table_lines_up_and_shows_what_was_asked(optimized):
     for label in ("mesh loss factor", "pinion tip relief, amount [um]", "max flash temperature [K]", "time [s]"):
         assert label in optimized.out
     assert "a [small] pair, 50 N m on the pinion" in optimized.out
-    assert "decrease left at the optimum" in optimized.out and "no variable is at a bound" in optimized.out
+    assert "first-order optimality: " in optimized.out and "no variable is at a bound" in optimized.out
     ppte = optimized.summary["designs"]["optimum"]["ppte_um"]
     assert re.search(rf"PPTE \[um\].* {ppte:.3f} ", optimized.out)
+
+
+def test_the_first_screen_says_what_to_grind_what_it_gains_and_whether_to_trust_it(optimized):
+    """Before the table, in the words of a drawing; how the search has gone comes last."""
+    parts = ["What to grind: optimum", "What it gains at 50 N m", "Whether to trust it", "┏", "contact analyses by"]
+    places = [optimized.out.index(part) for part in parts]
+    assert places == sorted(places)
+    before, rule, after = (design["ppte_um"] for design in optimized.summary["designs"].values())
+    than_rule = f"{abs(100 * (after / rule - 1)):.1f} % {'less' if after < rule else 'more (worse)'} than rule-based"
+    gain = f"{before:.3f} -> {after:.3f} um: {100 * (1 - after / before):.1f} % less than unmodified, {than_rule}"
+    assert re.search(rf"  PPTE +{re.escape(gain)} \({rule:.3f}\)", optimized.out)
+    (relief,) = optimized.summary["designs"]["optimum"]["pinion_modification"]
+    base = 0.5 * 57.0 * np.cos(np.deg2rad(20.0))
+    begins = np.sqrt(31.5**2 - base**2) - relief["length"]
+    diameter = 2 * np.hypot(base, begins)
+    ground = f"tip relief {relief['amount']:.2f} um over {relief['length']:.3f} mm of roll length, parabolic"
+    assert f"  pinion  {ground}, from diameter {diameter:.3f} mm (roll angle" in optimized.out
+    rows = [row for row in Page((optimized.target / "report.html").read_text("utf-8")).rows if len(row) == 2]
+    assert next(row for row in rows if row[0] == "pinion")[1].startswith(ground)
+
+
+def judged(objective, *values, ppte, verified=None):
+    """Designs with an objective, as a command compares them."""
+    names = "unmodified", "rule-based", "optimum"
+    return {
+        name: SimpleNamespace(objectives={objective: value}, metrics={"ppte_um": of}, verified=verified)
+        for name, value, of in zip(names, values, ppte, strict=True)
+    }
+
+
+def test_gains_lead_with_the_objective_and_say_what_became_worse():
+    """Less loss, bought with PPTE; a safety is to be large; a temperature has no percentages."""
+    problem = SimpleNamespace(objectives=[SimpleNamespace(sign=1)])
+    found = list(gains(judged("loss_power [W]", 290.0, 210.0, 199.7, ppte=(2.0, 0.5, 3.0)), problem))
+    assert found == [
+        ("loss power", "290 -> 199.7 W: 31.1 % less than unmodified, 4.9 % less than rule-based (210)"),
+        (
+            "PPTE",
+            "2.000 -> 3.000 um: 50.0 % more (worse) than unmodified, 500.0 % more (worse) than rule-based (0.500)",
+        ),
+    ]
+    large = SimpleNamespace(objectives=[SimpleNamespace(sign=-1)])
+    (safety, _) = gains(judged("root_safety", 2.0, 2.2, 2.1, ppte=(2.0, 0.5, 3.0)), large)
+    assert safety[1] == "2 -> 2.1: 5.0 % more than unmodified, 4.5 % less (worse) than rule-based (2.2)"
+    (hot, _) = gains(judged("bulk_temperature [degC]", 80.0, 75.0, 70.0, ppte=(2.0, 0.5, 3.0)), problem)
+    assert hot[1] == "80 -> 70 degC: -10 degC against unmodified, -5 degC against rule-based (75)"
+
+
+def test_a_front_is_tabulated_and_compared():
+    values = np.array([[0.5, 400.0], [1.0, 380.0], [3.0, 350.0]])
+    parameters = {"height": np.array([1.0, 2.0, 3.0])}
+    front = SimpleNamespace(
+        objectives=("ppte", "loss_power"), units=("um", "W"), values=values, parameters=parameters, chosen=1
+    )
+    both = {"unmodified": [4.0, 500.0], "rule-based": [1.2, 390.0], "compromise": [1.0, 380.0]}
+    designs = {name: SimpleNamespace(objectives=dict(zip("ab", of))) for name, of in both.items()}
+    rows = read_table(front_table(front, designs)).rows
+    assert rows[1] == ("2, compromise", "1", "380", "2") and rows[-1] == ("rule-based", "1.2", "390", "-")
+    told = dict(reversed([*front_rows(front, [1, 1], designs)]))
+    assert "worst distance" in told["compromise"]
+    assert [text for label, text in front_rows(front, [1, 1], designs) if label == "front"] == [
+        "better than unmodified in every objective: all of its 3 designs",
+        "better than rule-based in every objective: 2 of its 3 designs",
+    ]
 
 
 def test_stages_are_lines_where_there_is_no_terminal(optimized):
@@ -360,7 +430,8 @@ def test_every_design_is_verified_by_finite_elements(folder, verified):
     assert all(f"{second['ppte_um']:.3f}" in row for second in found.values())
     before, after = (found[name]["ppte_um"] for name in ("unmodified", "optimum"))
     fall = 100 * (1 - after / before)
-    assert f"by finite elements {before:.3f} -> {after:.3f} um: {fall:.1f} % less than unmodified" in verified.out
+    told = f"by finite elements  {before:.3f} -> {after:.3f} um: {fall:.1f} % less than unmodified"
+    assert told in verified.out
     file = load_design(folder / "free.toml")
     positions = verified.summary["resolution"]["positions"]
     compliance = jg.finite_element_compliance(file.pair())
@@ -422,7 +493,8 @@ def test_table_and_verdict_are_of_one_torque_and_one_measure(folder, robust):
     optimum, designs = robust.summary["optimum"], robust.summary["designs"]
     before, after = designs["unmodified"], designs["optimum"]
     assert optimum["ppte_um"] == pytest.approx(after["ppte_um"], rel=1e-9)
-    assert f"PPTE at 50 N m {before['ppte_um']:.3f} -> {after['ppte_um']:.3f} um" in robust.out
+    assert "What it gains at 50 N m" in robust.out
+    assert re.search(rf"  PPTE +{before['ppte_um']:.3f} -> {after['ppte_um']:.3f} um", robust.out)
     mesh = load_design(folder / "robust.toml").mesh()
     relief = designs["rule-based"]["pinion_modification"][0]
     tip = jg.TipRelief(relief["amount"], relief["length"])
@@ -435,7 +507,7 @@ def test_table_and_verdict_are_of_one_torque_and_one_measure(folder, robust):
     (row,) = (line for line in robust.out.splitlines() if "worst ppte [um]" in line and "->" not in line)
     assert all(f"{design['objectives']['worst ppte [um]']:.4g}" in row for design in designs.values())
     both = [design["objectives"]["worst ppte [um]"] for design in (before, after)]
-    assert f"worst ppte [um] {both[0]:.4g} -> {both[1]:.4g}" in robust.out
+    assert re.search(rf"  worst PPTE +{both[0]:.3f} -> {both[1]:.3f} um", robust.out)
 
 
 @pytest.mark.slow
@@ -496,7 +568,11 @@ def test_results_of_an_earlier_run_are_replaced_and_figures_are_optional(folder,
     (target / "k_chart.png").write_text("from an earlier run")
     assert_refused(call("analyze", folder / "plain.toml", "-o", target), "other files than results of jaxgear (k_chart")
     (target / "summary.json").write_text(EARLIER)
-    assert call("analyze", folder / "plain.toml", "-o", target, "--no-figures").code == 0
+    (target / "summary.json").write_text(EARLIER.replace("}}", '}, "title": "other", "torque_Nm": 70.0}'))
+    replaced = call("analyze", folder / "plain.toml", "-o", target, "--no-figures")
+    assert replaced.code == 0
+    assert f"replaces the results in {target}/ ('other' at 70 N m, 1 figures); --output keeps them" in replaced.err
+    assert "replaces" not in analyzed.err
     assert {path.name for path in target.iterdir()} == {"summary.json", "flanks.csv"}
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
     assert stat.S_IMODE(target.stat().st_mode) & 0o500 == 0o500
@@ -647,7 +723,7 @@ def test_interruption_leaves_earlier_results_alone(folder, tmp_path, monkeypatch
     name = {"analyze": "fixed", "optimize": "free"}[command]
     result = call(command, folder / f"{name}.toml", "-o", target)
     assert result.code == 130
-    assert result.err == "jaxgear: interrupted, nothing was written\n"
+    assert result.err.splitlines()[1:] == ["jaxgear: interrupted, nothing was written"]
     assert (target / "summary.json").read_text() == EARLIER
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
@@ -707,6 +783,26 @@ def test_output_that_nobody_takes():
             main(["--help"])
         assert (exit_.value.code, err.getvalue()) == (code, line)
         stream.close()
+
+
+def test_a_new_design_file_runs_as_it_is(tmp_path):
+    """With the reliefs of the rule as values; what is there already is not replaced, and gears are checked."""
+    file, options = tmp_path / "pair.toml", ("--teeth", 19, 48, "--module", 3, "--torque", 50, "--face-width", 18)
+    done = call("new", file, *options)
+    assert done.code == 0 and "19/48 teeth" in done.out
+    written = file.read_text("utf-8")
+    assert_refused(call("new", file, *options), "pair.toml: exists already")
+    assert file.read_text("utf-8") == written
+    assert_refused(call("new", tmp_path / "b.toml", *options[:-1], -18), "face_width = -18 mm must be greater than 0")
+    assert_refused(call("new", tmp_path / "b.txt", *options), "b.txt: the name of a design file must end in .toml")
+    assert [path.name for path in tmp_path.iterdir()] == ["pair.toml"]
+    design = load_design(file)
+    rule = jg.iso_relief(design.pair(), 50.0)
+    assert design.values["wheel_amount"] == pytest.approx(float(rule.amount), abs=0.05)
+    assert optimize_request(design).method == "minimax"
+    file.write_text(f"{written}[resolution]\n{LINE}\n")
+    result = call("analyze", file, "-o", tmp_path / "out", "--no-figures")
+    assert result.code == 0 and "modified" in result.out
 
 
 def test_the_cache_is_a_private_folder_and_never_an_obstacle(tmp_path, monkeypatch):

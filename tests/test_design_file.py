@@ -27,6 +27,7 @@ from jaxgear.io import (
     reference,
     result_folder,
     schema,
+    schema_optimize,
     schema_sweep,
     sweep_request,
     write_design,
@@ -34,7 +35,7 @@ from jaxgear.io import (
 )
 from jaxgear.io.cases import tolerance_of
 from jaxgear.io.layout import family, section_of
-from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
+from jaxgear.io.schema_optimize import METHODS_WITHOUT_VARIABLES
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, NoModification, ParabolicLinear
 from jaxgear.numerics import number
 
@@ -726,8 +727,8 @@ def test_whatever_is_written_in_a_file_it_is_read_or_refused_in_one_line(load, t
 def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
     text = reference()
     sections = [schema.FileSection, schema.GearSection, schema.LoadSection, schema.ModelSection]
-    sections.append(schema.optimize_section())
-    sections += [*schema.method_options().values(), schema_sweep.SweepSection, schema_sweep.ToleranceSection]
+    sections.append(schema_optimize.optimize_section())
+    sections += [*schema_optimize.method_options().values(), schema_sweep.SweepSection, schema_sweep.ToleranceSection]
     sections += [section_of(cls) for cls in (*family(AbstractModification, users=False).values(), jg.Material)]
     for section in sections:
         assert not [name for name in section.model_fields if f"| `{name}` | " not in text]
@@ -736,6 +737,41 @@ def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
     assert '| `side` | one of "both", "negative", "positive" |  |  | `"both"` | ' in text
     guide = Path(__file__).parent.parent / "examples" / "guides" / "design_files.md"
     assert guide.read_text(encoding="utf-8") == text, "python -m jaxgear.io.reference > examples/guides/design_files.md"
+
+
+def test_the_shortest_file_of_the_guide_is_one(load):
+    (shortest,) = re.findall(r"^```toml\n(.*?)^```", reference(), flags=re.DOTALL | re.MULTILINE)
+    file = load(shortest)
+    assert len(shortest.split("\n\n")) == 3 and file.torque == 50.0 and not file.bounds
+    assert (int(file.pair().pinion.teeth), int(file.pair().wheel.teeth)) == (19, 48)
+
+
+def test_material_and_measured_thickness_are_known_by_what_the_file_says(load):
+    both = "[materials.case_hardened]\nelastic_modulus = 206000.0\npoisson_ratio = 0.3\n"
+    measured = 'material = "case_hardened"\nspan = [22.85, 22.90]\nteeth_spanned = 3'
+    file = load(text(pinion=measured, tail=both))
+    assert file.drawn["pinion"] == {"material": "case_hardened", "span_mm": [22.85, 22.90], "teeth_spanned": 3}
+    assert file.drawn["wheel"] == {"material": "STEEL"}
+
+
+def test_the_contents_of_the_reference_lead_to_its_tables():
+    """GitHub makes the anchor of a heading of its letters, digits, hyphens and underscores."""
+    text = reference()
+    linked = re.findall(r"^- \[(.+)\]\(#(.+)\)$", text, flags=re.MULTILINE)
+    headings = re.findall(r"^## (.+)$", text, flags=re.MULTILINE)
+    assert [title for title, _ in linked] == headings and len(set(anchor for _, anchor in linked)) == len(headings)
+    assert all(re.sub(r"[^\w -]", "", title).lower().replace(" ", "-") == anchor for title, anchor in linked)
+    assert not any("--" in anchor for _, anchor in linked), "which the site would make one hyphen of"
+
+
+def test_a_variable_may_name_the_value_that_an_analysis_takes(load):
+    free = text(tail='[variables]\nheight = { low = 0.0, high = 9.0, value = 4.0, unit = "um" }\n', pinion="").replace(
+        "[wheel]", '[[pinion.modification]]\ntype = "tip_relief"\namount = "height"\nlength = 3.0\n[wheel]'
+    )
+    assert load(free).values == {"height": 4.0}
+    assert load(free.replace("value = 4.0, ", "")).values == {}
+    with pytest.raises(DesignFileError, match=r"variables\.height\.value: 11 must be at least 0 and at most 9"):
+        load(free.replace("value = 4.0", "value = 11.0"))
 
 
 def open_case():

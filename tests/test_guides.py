@@ -26,3 +26,10 @@ def test_code_of_the_guides_is_marked_as_what_it_is():
     for page in (ROOT / "README.md", *GUIDES.glob("*.md")):
         outside = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
         assert not re.search(r"^    .*\b(import jax|jg\.|def \w+\()", outside, flags=re.MULTILINE), page.name
+
+
+def test_links_of_the_guides_lead_to_files_that_are_there():
+    for page in GUIDES.glob("*.md"):
+        targets = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+        missing = [name for name in targets if "://" not in name and not (GUIDES / name).exists()]
+        assert not missing, page.name

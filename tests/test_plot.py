@@ -308,6 +308,15 @@ def test_ppte_over_torque_marks_the_design_torque(curves):
     assert ax.texts[0].xy[0] == TORQUE
 
 
+def test_the_design_that_a_figure_is_about_is_the_boldest(curves):
+    """Its line and its mark in the legend; a design whose name begins alike is another one."""
+    ax = plot.ppte_over_torque([50.0, 100.0], {"best": [1.0, 2.0], "best 2": [2.0, 3.0], "worst": [3.0, 4.0]})
+    plot.emphasize(ax.figure, "best")
+    for lines in (ax.lines, ax.get_legend().legend_handles):
+        assert lines[0].get_linestyle() == "-" and lines[0].get_linewidth() > 1.5 * lines[1].get_linewidth()
+        assert lines[1].get_linewidth() == lines[2].get_linewidth() == line_style(1)["linewidth"]
+
+
 def test_harris_map_labels_every_curve_even_if_they_meet():
     phase, torques = np.arange(8) / 8, [60.0, 5.0, 6.0, 7.0]
     te = np.array([9.0, 1.00, 1.01, 1.02])[:, None] + 0.1 * np.sin(2 * np.pi * phase)

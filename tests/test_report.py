@@ -87,6 +87,14 @@ def test_a_table_is_the_one_that_is_printed():
     assert table == report.Table(("", "a"), (("x", "1"), ("y", "2")), "title", "note", (0,))
 
 
+def test_figures_are_numbered_through_all_sections(tmp_path):
+    picture = report.Figure("a", "What it shows.", "data:image/png;base64,AAAA", 100.0)
+    sections = [report.Section("one", figures=[picture, picture]), report.Section("two", figures=[picture])]
+    report.write_report(tmp_path / "page.html", report.Report("t", "s", FACTS, sections))
+    page = (tmp_path / "page.html").read_text("utf-8")
+    assert [page.count(f"Figure {number}. What it shows.") for number in range(1, 5)] == [1, 1, 1, 0]
+
+
 @pytest.mark.parametrize("width", [100.0, 250.0])
 def test_a_picture_has_its_own_size_on_paper(tmp_path, width):
     with plot.figure.report_figure(width, 60.0) as figure:

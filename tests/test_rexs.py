@@ -10,7 +10,7 @@ from catalogue import LINE, gear_pair, prepare
 from rexs_schema import FOLDER, faults
 
 import jaxgear as jg
-from jaxgear.io import read_rexs, write_rexs
+from jaxgear.io import describe, read_rexs, write_rexs
 from jaxgear.io.layout import family
 from jaxgear.io.rexs.frame import frames
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, TabulatedFlank
@@ -113,11 +113,28 @@ def test_a_pair_comes_back_as_it_was(tmp_path):
         assert getattr(found.pair.pinion, name) == getattr(PINION, name)
     for name in ("elastic_modulus", "poisson_ratio", "density", "thermal_contact_coefficient"):
         assert getattr(found.pair.pinion.material, name) == getattr(PINION.material, name)
-    np.testing.assert_allclose(found.pair.pinion.tooth_thickness_allowance, -41.3, rtol=1e-12)
-    np.testing.assert_allclose(found.pair.pinion.tooth_thickness_tolerance, 27.1, rtol=1e-12)
+    # to every digit, and with no further ones
+    allowance = found.pair.pinion.tooth_thickness_allowance, found.pair.pinion.tooth_thickness_tolerance
+    assert tuple(map(float, allowance)) == (-41.3, 27.1)
     assert found.pair.center_distance == 101.2 and found.pair.wheel.bore_diameter is None
     assert (found.torque, found.speed, found.title) == (51.7, 2987.3, 'a <pair> & "more"')
     assert found.quality_classes == (6, 11)
+
+
+def test_materials_have_their_names(tmp_path):
+    write_rexs(tmp_path / "pair.rexs", PAIR, materials=("18CrNiMo7-6", None))
+    written = (tmp_path / "pair.rexs").read_text("utf-8")
+    assert 'name="18CrNiMo7-6"' in written and 'name="wheel material"' in written
+
+
+def test_a_parabolic_relief_comes_back_as_one(tmp_path):
+    """REXS has a linear and a quadratic part of it; parts of other shares or lengths stay apart."""
+    apart = jg.TipRelief(2.0, 3.0, jg.Linear()) + jg.TipRelief(3.0, 3.0, jg.Power(2.0))
+    found = again(tmp_path / "pair.rexs", pinion=jg.TipRelief(6.5, 3.0) + jg.ProfileSlope(1.0), wheel=apart)
+    first, second = describe(found.pinion)
+    assert (first["type"], first["curve"], second["type"]) == ("tip_relief", {"type": "parabolic"}, "profile_slope")
+    assert (first["amount"], first["length"]) == pytest.approx((6.5, 3.0), rel=1e-9)
+    assert [part["curve"]["type"] for part in describe(found.wheel)] == ["linear", "power"]
 
 
 def test_what_a_pair_leaves_open_comes_back_as_the_number_it_means(tmp_path):

@@ -25,7 +25,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Flank design of spur gears by loaded tooth contact analysis. Exit codes: 0 success, 1 a contact solution did "
     "not converge or a constraint is not met (results are written and flagged), 2 error (nothing is written), "
-    "130 interrupted (a sweep resumes).",
+    "130 interrupted (a sweep resumes). Begin with jaxgear new. Guides: examples/guides/index.md of the source; "
+    "python -m jaxgear.io.reference prints every table and key of a design file.",
 )
 
 
@@ -42,6 +43,25 @@ def root(
     ] = False,
 ) -> None:
     """Options of the command itself."""
+
+
+@app.command()
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="Design file to write.", show_default=False)],
+    teeth: Annotated[tuple[int, int], typer.Option(metavar="Z1 Z2", help="Teeth of pinion and wheel.")],
+    module: Annotated[float, typer.Option(metavar="MM", help="Module in mm.", show_default=False)],
+    torque: Annotated[float, typer.Option(metavar="NM", help="Torque on the pinion in N m.", show_default=False)],
+    face_width: Annotated[float, typer.Option(metavar="MM", help="Face width in mm.", show_default=False)],
+    speed: Annotated[float | None, typer.Option(metavar="RPM", help="Speed of the pinion in rpm.")] = None,
+) -> int:
+    """Write a commented design file for a pair, which analyze and optimize take as it is.
+
+    A file that is there is never replaced.
+    """
+    with interrupt.importing():
+        from .new import new
+    new(file, teeth, module=module, torque=torque, face_width=face_width, speed=speed)
+    return OK
 
 
 @app.command()

@@ -30,15 +30,16 @@ def analyze(
     compile_quickly()
     with Stages() as stages:
         design = opened(file, cache=cache)
-        if design.bounds:
-            free = ", ".join(design.bounds)
-            problem = f"analyze needs numbers, these are free: {free}; use jaxgear optimize"
+        free = [name for name in design.bounds if design.open_case or name not in design.values]
+        if free:
+            says = "give each a value or use jaxgear optimize"
+            problem = f"analyze needs numbers, these are free: {', '.join(free)}; {says}"
             raise DesignFileError("variables", problem, file)
         with run(design, output or default_folder(file, "analyze"), stages) as current:
             import_ahead(*_FIGURES * figures)
             current.prepare()
             current.evaluate("unmodified", NoModification(), NoModification())
-            pinion, wheel = design.design({})
+            pinion, wheel = design.design(design.values)
             if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
                 current.evaluate("modified", pinion, wheel)
             current.write(figures=figures, document=asked)

@@ -8,7 +8,7 @@ import jax
 
 from ..contact import Mesh, prepare
 from ..io import DesignFile, OptimizeRequest, optimize_request
-from ..io.schema import METHODS_WITHOUT_VARIABLES
+from ..io.schema_optimize import METHODS_WITHOUT_VARIABLES
 from ..microgeometry import AbstractModification, NoModification
 from ..optimize import Front, Optimum
 from .commands import rule_based

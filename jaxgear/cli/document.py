@@ -67,6 +67,8 @@ class Found:
         pages: further parts.
         assumptions: of this command, beside those of every contact analysis.
         left_out: what of the file is not part of it.
+        first: tables of what is read first.
+        details: how it was found, said last.
     """
 
     lines: Sequence[str]
@@ -77,6 +79,8 @@ class Found:
     pages: Sequence[Section] = ()
     assumptions: Sequence[str] = ()
     left_out: str = ""
+    first: Sequence[Table] = ()
+    details: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -114,7 +118,7 @@ class Document:
         """
         versions = ("made by", ", ".join(f"{name} {version}" for name, version in data["versions"].items()))
         sections = [
-            Section("Results", found.lines, found.warnings, tables=[read_table(table) for table in found.tables]),
+            Section("Results", found.lines, found.warnings, tables=[*found.first, *map(read_table, found.tables)]),
             *found.pages,
             *_figures(found.figures),
             _validity(found, data),
@@ -169,7 +173,7 @@ def _figures(files: Iterable[Path]) -> list[Section]:
     pictures = [figure(path) for path in files]
     if not pictures:
         return []
-    return [Section("Figures", figures=pictures, new_page=True)]
+    return [Section("Figures", figures=pictures)]
 
 
 def _validity(found: Found, data: Mapping[str, Any]) -> Section:
@@ -181,6 +185,7 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
         lines.append("Quick run: coarse positions and a short search, not a result to build on.")
     if found.doubts is not None and not found.doubts:
         lines.append("Inputs and results lie within the usual ranges.")
+    lines += found.details
     checks = []
     for name, design in data.get("designs", {}).items():
         checks += [
@@ -196,7 +201,7 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
         if key in optimum
     ]
     tables = [Table(("", "value"), tuple(checks), "checks")] if checks else []
-    return Section("Convergence and validity", lines, found.warnings, found.doubts or (), tables, new_page=True)
+    return Section("Convergence and validity", lines, found.warnings, found.doubts or (), tables)
 
 
 def _inputs(design: DesignFile, data: Mapping[str, Any], found: Found) -> Section:

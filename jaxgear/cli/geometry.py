@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Gear, GearPair, PathOfContact, diameter, margins, outline, path_of_contact
+from ..io import DesignFile
 from ..numerics import program
 
 # the names of ISO 21771 with the unit, in the order of their numbers below
@@ -64,6 +65,20 @@ def geometry(pair: GearPair) -> dict[str, dict[str, Any]]:
         "wheel": dict(zip(_GEAR, wheel, strict=True)),
         "pair": dict(zip(_PAIR, together, strict=True)),
     }
+
+
+def mounting(file: DesignFile) -> str:
+    """Both bores, where the bodies are held, and whether anybody has asked for them; how the gears are mounted."""
+    gears = (("pinion", file.pair().pinion), ("wheel", file.pair().wheel))
+    shape = geometry(file.pair())
+    texts = []
+    for name, gear in gears:
+        guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
+        texts.append(f"{name} {float(shape[name]['bore_diameter_mm']):.4g} mm{guess}")
+    pair = shape["pair"]
+    mounted = f"centre distance {float(pair['center_distance_mm']):.6g} mm"
+    backlash = round(float(pair["backlash_on_line_of_action_um"]), 3) + 0.0  # rounding leaves no -0
+    return f"bores: {', '.join(texts)}; {mounted}, backlash on the line of action {backlash:g} um"
 
 
 @program

@@ -1,6 +1,6 @@
 """What a run says and writes about its optimum, alike for every method."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -8,41 +8,60 @@ import numpy as np
 
 from ..contact import Mesh
 from ..io import DesignFile, describe
-from ..optimize import Front, Optimum, Projection, Verified
+from ..optimize import Front, Optimum, Projection
 from ..optimize.result import PENALIZED
+from ..report import Table
 from . import report
+from .front import front_rows, others_of
+from .gains import gains
+from .grinding import to_grind
 from .study import response_surface
 
 _SHOWN_BOUNDS = 8
 
 
-def verdict(
+def first_screen(
     file: DesignFile,
     optimum: Optimum,
+    front: Front | None,
     projection: Projection | None,
     evaluations: report.Evaluations,
     *,
     searched_at: int,
-) -> Iterator[str]:
-    """Lines under the table of an optimization, from its numbers; it began at so many positions."""
-    before, after = next(iter(evaluations.values())), report.main(evaluations)
-    ppte = [evaluation.metrics["ppte_um"] for evaluation in (before, after)]
-    fall = report.reduction(evaluations)
-    yield f"PPTE at {file.torque:g} N m {ppte[0]:.3f} -> {ppte[1]:.3f} um: {fall:.1f} % less than unmodified"
-    for label in report.objectives(evaluations):
-        yield f"{label} {before.objectives[label]:.4g} -> {after.objectives[label]:.4g}"
-    if before.verified is not None and after.verified is not None:
-        yield from _verified(report.objectives(evaluations), before.verified, after.verified)
+    trust: Iterable[tuple[str, str]],
+) -> Iterator[Table]:
+    """What an engineer looks for first: what to grind, what it gains and whether to trust it.
+
+    Args:
+        file: the design file.
+        optimum: what the search has found.
+        front: of which it is the compromise; None without.
+        projection: of it on a curve.
+        evaluations: designs by their names, the first of which is unmodified.
+        searched_at: positions at which the search began.
+        trust: further rows about the last, such as what is not usual.
+    """
+    name, best = report.main_name(evaluations), report.main(evaluations)
+    rows = [*to_grind(optimum.mesh, best.pinion, best.wheel)]
+    if projection is not None:
+        rows += to_grind(optimum.mesh, projection.pinion, projection.wheel, f"as {projection.curve}")
+    yield Table(("", ""), tuple(rows), f"What to grind: {name} of {file.title}")
+    gained = [*gains(evaluations, optimum.problem)]
+    if front is not None and optimum.problem is not None:
+        gained += front_rows(front, [of.sign for of in optimum.problem.objectives], evaluations)
+    yield Table(("", ""), tuple(gained), f"What it gains at {file.torque:g} N m: unmodified -> {name}")
+    judged_by = (
+        *_feasibility(optimum),
+        *_bounds(file, optimum),
+        ("grid", _positions(optimum, evaluations, searched_at)),
+    )
+    yield Table(("", ""), (*judged_by, *trust), "Whether to trust it")
+
+
+def search_lines(optimum: Optimum, front: Front | None, projection: Projection | None) -> Iterator[str]:
+    """How the search has gone, for who wants to know."""
     if optimum.objective_name.endswith(PENALIZED):  # no other design pays it
         yield f"{optimum.objective_name}: {optimum.objective:.4g}"
-    yield from _bounds(file, optimum)
-    for name, limit in optimum.constraints.items():
-        yield f"{name} {limit}"
-    if not optimum.feasible:
-        passed = f"the nearest passes one by {100 * optimum.violation:.2g} %"
-        alone = optimum.problem is not None and len(optimum.problem.objectives) == 1
-        sought = ", not by their violation alone either" if alone else ""
-        yield f"NOT FEASIBLE: the search met no design within all limits{sought}; {passed}"
     for step, state in enumerate(optimum.iterations):
         yield (
             f"iteration {step}: PPTE {state.ppte:.3f} um (lower limit {state.limit:.3f}), up to "
@@ -51,9 +70,14 @@ def verdict(
         )
     if projection is not None:
         yield from str(projection).splitlines()
-    yield _positions(optimum, searched_at)
-    if np.isfinite(optimum.decrease_left):
-        yield f"decrease left at the optimum {optimum.decrease_left:.2g} per full range of the variables"
+    left = optimum.decrease_left if front is None else float(np.nanmax(front.decrease_left, initial=0.0))
+    if np.isfinite(left):
+        of = (
+            f"{left:.2g} {optimum.objective_unit}".rstrip()
+            if front is None
+            else f"at most {left:.2g} of the front's span"
+        )
+        yield f"first-order optimality: {of}, the largest predicted decrease over the full range of a variable"
     price = "one with gradient counts as three, each further gradient as two"
     yield f"{optimum.evaluations} contact analyses by method {optimum.method} ({price})"
 
@@ -79,22 +103,17 @@ def summary(file: DesignFile, optimum: Optimum, projection: Projection | None) -
     return data
 
 
-def front_lines(front: Front) -> Iterator[str]:
-    """Lines about a front, whose compromise is the optimum of the run."""
-    yield f"{len(front.values)} designs on the Pareto front, in front.csv; the optimum is the compromise"
-    left = float(np.nanmax(front.decrease_left, initial=0.0))
-    yield f"no step improves all objectives of one of them by more than {left:.2g} spans per full range"
-
-
-def write_figures(folder: Path, mesh: Mesh, torque: float, optimum: Optimum, front: Front | None) -> list[Path]:
+def write_figures(
+    folder: Path, mesh: Mesh, torque: float, optimum: Optimum, front: Front | None, evaluations: report.Evaluations
+) -> list[Path]:
     """Writes the figures of the search and of the optimum over all loads; gives the files."""
     from .. import plot
 
     torques, errors = response_surface(mesh, torque, optimum.pinion, optimum.wheel)
-    unloaded = optimum.cycle.unloaded_transmission_error
+    unloaded, name = optimum.cycle.unloaded_transmission_error, report.main_name(evaluations)
     axes: dict[str, Any] = {
         "response_surface": plot.response_surface(
-            mesh.phase, torques, errors, unloaded, design_torque=float(optimum.cycle.torque), design="optimum"
+            mesh.phase, torques, errors, unloaded, design_torque=float(optimum.cycle.torque), design=name
         ),
     }
     if front is None:  # the compromise of a front is measured by the front so far, which moves
@@ -103,40 +122,48 @@ def write_figures(folder: Path, mesh: Mesh, torque: float, optimum: Optimum, fro
         axes["iterations_relief"] = plot.iterations_relief(mesh, optimum)
         axes["iterations_transmission_error"] = plot.iterations_transmission_error(optimum, mesh.phase)
     if front is not None:
-        axes["front"] = plot.optimum_front(front, chosen=front.chosen)
+        axes["front"] = plot.optimum_front(front, chosen=front.chosen, others=others_of(front, evaluations))
     return report.save_figures(folder, axes)
 
 
-def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[str]:
+def _feasibility(optimum: Optimum) -> Iterator[tuple[str, str]]:
+    label = "limits"
+    for name, limit in optimum.constraints.items():
+        yield label, f"{name} {limit}"
+        label = ""
+    if not optimum.feasible:
+        passed = f"the nearest passes one by {100 * optimum.violation:.2g} %"
+        alone = optimum.problem is not None and len(optimum.problem.objectives) == 1
+        sought = ", not by their violation alone either" if alone else ""
+        yield label, f"NOT FEASIBLE: the search met no design within all limits{sought}; {passed}"
+
+
+def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:
     active = optimum.active_bounds
     if not optimum.parameters:
         return
+    label = "variables"
     if set(optimum.parameters) != set(file.bounds):
-        yield f"{len(optimum.parameters)} values of the flanks, {len(active)} of them at a bound"
+        yield label, f"{len(optimum.parameters)} values of the flanks, {len(active)} of them at a bound"
         return
     for name, side in list(active.items())[:_SHOWN_BOUNDS]:
         bound = file.bounds[name][side == "upper"]
-        yield f"{name} is at its {side} bound {bound:g} {file.units[name]}".rstrip()
+        yield label, f"{name} is at its {side} bound {bound:g} {file.units[name]}".rstrip()
+        label = ""
     if len(active) > _SHOWN_BOUNDS:
-        yield f"and {len(active) - _SHOWN_BOUNDS} more variables are at a bound"
+        yield label, f"and {len(active) - _SHOWN_BOUNDS} more are at a bound"
     if not active:
-        yield "no variable is at a bound"
+        yield label, "no variable is at a bound"
 
 
-def _verified(labels: list[str], before: Verified, after: Verified) -> Iterator[str]:
-    """The same lines by finite elements."""
-    fall = f": {100 * (1 - after.ppte / before.ppte):.1f} % less than unmodified" if before.ppte else ""
-    yield f"PPTE by finite elements {before.ppte:.3f} -> {after.ppte:.3f} um{fall}"
-    for label in labels:
-        yield f"{label} by finite elements {before.objectives[label]:.4g} -> {after.objectives[label]:.4g}"
-
-
-def _positions(optimum: Optimum, searched_at: int) -> str:
+def _positions(optimum: Optimum, evaluations: report.Evaluations, searched_at: int) -> str:
+    if not np.isfinite(optimum.grid_change):
+        return report.grid(evaluations)
     said = f"searched at {searched_at} positions, " if searched_at != optimum.positions else ""
     said += f"evaluated at {optimum.positions} positions"
-    if np.isfinite(optimum.grid_change):
-        said += f"; twice as many change the objective by {optimum.grid_change:+.2g} {optimum.objective_unit}".rstrip()
-    return said
+    return (
+        said + f"; twice as many change the objective by {optimum.grid_change:+.2g} {optimum.objective_unit}".rstrip()
+    )
 
 
 def _with_unit(file: DesignFile, name: str) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from ..io.folder import earlier
 from . import interrupt, report
 
 _LINES = 10  # of a sweep, where there is no terminal
@@ -40,6 +41,13 @@ class Stages(_Bar):
         interrupt.check()
         self.update(self._task, description=stage, total=None, completed=0, note="")
         self._say(stage)
+
+    def replaces(self, target: Path) -> None:
+        """Says which earlier results a command is about to replace, as long as it can still be stopped."""
+        held = earlier(target)
+        if held:
+            line = f"jaxgear: replaces the results in {target}{os.sep} ({held}); --output keeps them"
+            self.console.print(line, soft_wrap=True)
 
     def step(self, step: int, total: int, best: float | None) -> None:
         """Callback of the search."""

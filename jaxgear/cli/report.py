@@ -7,19 +7,21 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from rich.console import Console
 from rich.table import Table
 
 from ..contact import Mesh
 from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.cases import quality_classes
-from ..io.errors import printable
 from ..io.results import unit_of
 from ..metrics import Doubt, plausibility
 from ..numerics import program
 from ..optimize import Verified
 from .study import Evaluation
+from .terminal import console as console
+from .terminal import say as say
+from .terminal import say_rows as say_rows
+from .terminal import warn as warn
 
 Evaluations = Mapping[str, Evaluation]
 
@@ -57,11 +59,12 @@ _ROWS = {
     "micropitting_safety": ("micropitting safety S_lambda", ".2f"),
     "scuffing_safety": ("scuffing safety S_B", ".2f"),
 }
+_UNITS = {metric.rpartition("_")[2] for metric, (label, _) in _ROWS.items() if label.endswith("]")}
 _BY_FINITE_ELEMENTS = "  by finite elements"
+PLEASE_CHECK = "please check: "
 _HARRIS_CURVES = 7
 _ORDERS = 8  # of the transmission error that are drawn
 _TITLE = 9.0  # [pt]
-_WIDTH = 120  # of a file [characters]
 
 
 def table(file: DesignFile, evaluations: Evaluations) -> Table:
@@ -70,17 +73,22 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
     result.add_column("")
     for name in evaluations:
         result.add_column(name, justify="right", no_wrap=True)
-    for metric, (label, form) in _ROWS.items():
+    first = next(iter(evaluations.values()))
+    second = verified(evaluations)
+    asked = [metric for metric in _ROWS if _objective(metric) in first.objectives]
+    for label in objectives(evaluations):
+        result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
+        if second:
+            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.objectives[label], ".4g") for each in second))
+    for metric in dict.fromkeys([*asked, *_ROWS]):  # what was asked for stands first
+        label, form = _ROWS[metric]
         cells = [evaluation.metrics.get(metric) for evaluation in evaluations.values()]
         if None not in cells:
             result.add_row(label, *(format(cell, form) for cell in cells))
-        if metric == "ppte_um" and verified(evaluations):
-            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.ppte, form) for each in verified(evaluations)))
-    for label in objectives(evaluations):
-        result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
-        if verified(evaluations):
-            cells = [each.objectives[label] for each in verified(evaluations)]
-            result.add_row(_BY_FINITE_ELEMENTS, *(format(cell, ".4g") for cell in cells))
+        if second and metric == "ppte_um":
+            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.ppte, form) for each in second))
+        elif second and metric in asked:
+            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.objectives[_objective(metric)], form) for each in second))
     result.add_section()
     flanks = [dict(_flank_cells(evaluation)) for evaluation in evaluations.values()]
     for label in dict.fromkeys(label for cells in flanks for label in cells):
@@ -133,7 +141,7 @@ def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
     for same in grouped.values():
         design, doubt = list(same.items())[-1]  # the last is the one that the run is about
         others = "" if len(same) == len(found) else f"{', '.join(same)}: "
-        yield f"please check: {others}{doubt}"
+        yield f"{PLEASE_CHECK}{others}{doubt}"
 
 
 def grid(evaluations: Evaluations) -> str:
@@ -141,16 +149,6 @@ def grid(evaluations: Evaluations) -> str:
     positions = next(iter(evaluations.values())).cycle.kinematics.resolution.positions
     changes = ", ".join(f"{name} by {evaluation.ppte_change:+.2g} um" for name, evaluation in evaluations.items())
     return f"evaluated at {positions} positions; twice as many change PPTE: {changes}"
-
-
-def bores(file: DesignFile) -> str:
-    """Both bores, since the body is held there, and whether anybody has asked for them."""
-    gears = (("pinion", file.pair().pinion), ("wheel", file.pair().wheel))
-    texts = []
-    for name, gear in gears:
-        guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
-        texts.append(f"{name} {float(diameters(gear)[-1]):.4g} mm{guess}")
-    return f"bores: {', '.join(texts)}"
 
 
 @program
@@ -161,8 +159,14 @@ def diameters(gear: Gear):
 
 def objectives(evaluations: Evaluations) -> list[str]:
     """What an optimization made small, without what is a row of the table anyhow."""
-    known = {name.rpartition("_")[0] + f" [{name.rpartition('_')[2]}]" for name in _ROWS}
-    return [label for label in next(iter(evaluations.values())).objectives if label not in known | set(_ROWS)]
+    known = {_objective(metric) for metric in _ROWS}
+    return [label for label in next(iter(evaluations.values())).objectives if label not in known]
+
+
+def _objective(metric: str) -> str:
+    """What a row of the table is called as an objective: "ppte [um]" for "ppte_um"."""
+    name, _, unit = metric.rpartition("_")
+    return f"{name} [{unit}]" if unit in _UNITS else metric
 
 
 def verified(evaluations: Evaluations) -> list[Verified]:
@@ -178,10 +182,11 @@ def reduction(evaluations: Evaluations) -> float:
 
 def main(evaluations: Evaluations) -> Evaluation:
     """The design that the run is about: the optimum where there is one, else the last."""
-    return evaluations[_main_name(evaluations)]
+    return evaluations[main_name(evaluations)]
 
 
-def _main_name(evaluations: Evaluations) -> str:
+def main_name(evaluations: Evaluations) -> str:
+    """What the main design is called."""
     return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
 
 
@@ -205,20 +210,20 @@ def write_figures(
             torques, {name: evaluation.ppte for name, evaluation in evaluations.items()}, design_torque=file.torque
         ),
         "harris_map": plot.harris_map(
-            mesh.phase, torques[few], main(evaluations).transmission_error[few], design=_main_name(evaluations)
+            mesh.phase, torques[few], main(evaluations).transmission_error[few], design=main_name(evaluations)
         ),
         "k_chart": plot.k_chart(mesh, flanks(evaluations), **_band(file, evaluations)),
     }
     if mesh.resolution.slices > 1:
         axes |= _over_face(file, mesh, evaluations, torques)
-    return save_figures(folder, axes)
+    return save_figures(folder, axes, bold=main_name(evaluations))
 
 
 def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
     """Figures of what several slices show; those of one design are of the main one."""
     from .. import plot
 
-    cycle, name = main(evaluations).cycle, _main_name(evaluations)
+    cycle, name = main(evaluations).cycle, main_name(evaluations)
     maps = {"pressure_map": plot.pressure_map(cycle), "contact_pattern": plot.contact_pattern(cycle)}
     for drawn in maps.values():
         np.ravel(drawn)[0].set_title(name, loc="left", fontsize=_TITLE)
@@ -242,38 +247,23 @@ def _orders(mesh: Mesh) -> int:
 def _band(file: DesignFile, evaluations: Evaluations) -> dict[str, Any]:
     """The tolerance band of a chart about the main design, where the file names a quality class."""
     classes = quality_classes(file)
-    return {} if classes is None else {"tolerance": classes, "about": _main_name(evaluations)}
+    return {} if classes is None else {"tolerance": classes, "about": main_name(evaluations)}
 
 
-def save_figures(folder: Path, axes: Mapping[str, Any]) -> list[Path]:
-    """Writes the figures that hold the axes, each under its name; gives the files."""
+def save_figures(folder: Path, axes: Mapping[str, Any], *, bold: str | None = None) -> list[Path]:
+    """Writes the figures that hold the axes, each under its name, the lines of one design bold; gives the files."""
     from .. import plot
 
-    return [plot.save(np.ravel(drawn)[0].figure, folder / f"{name}.png") for name, drawn in axes.items()]
+    figures = {name: np.ravel(drawn)[0].figure for name, drawn in axes.items()}
+    if bold is not None:
+        for figure in figures.values():
+            plot.emphasize(figure, bold)
+    return [plot.save(figure, folder / f"{name}.png") for name, figure in figures.items()]
 
 
 def flanks(evaluations: Evaluations):
     """The modifications of every design."""
     return {name: (evaluation.pinion, evaluation.wheel) for name, evaluation in evaluations.items()}
-
-
-def console(*, stderr: bool = False) -> Console:
-    """A console that takes brackets literally; wide enough for the table when it writes into a file."""
-    made = Console(stderr=stderr, markup=False, highlight=False, emoji=False)
-    if not made.is_terminal:
-        made.width = _WIDTH
-    return made
-
-
-def say(*lines: str) -> None:
-    """Prints lines that the terminal may break."""
-    for line in lines:
-        console().print(printable(line), soft_wrap=True)
-
-
-def warn(line: str) -> None:
-    """Prints a warning on stderr."""
-    console(stderr=True).print(f"jaxgear: warning: {printable(line)}", style="bold red", soft_wrap=True)
 
 
 def _flank_cells(evaluation: Evaluation) -> Iterator[tuple[str, str]]:

@@ -37,14 +37,18 @@ from ..optimize import (
     structure_for,
     verification,
 )
+from ..report import Table as Block
 from . import interrupt, manufactured, optimum_report, report, written
 from .cache import enable_cache
 from .document import Document, Found
+from .front import COMPROMISE, front_table
+from .geometry import mounting
 from .progress import Stages
 from .study import Evaluation, evaluate
 
 _TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
 _QUICK_POSITIONS = 16
+_USUAL = "nothing: inputs and results lie within the usual ranges"
 
 Modifications = tuple[AbstractModification, AbstractModification]
 
@@ -119,9 +123,10 @@ class Run:
         self._mesh, self._problem = optimum.mesh, optimum.problem
         for name, modifications in beside.items():
             self.evaluate(name, *modifications)
-        self.evaluate("optimum", optimum.pinion, optimum.wheel)
-        evaluated = dataclasses.replace(self._evaluations["optimum"], seconds=spent)
-        self._evaluations["optimum"] = evaluated
+        name = "optimum" if self._front is None else COMPROMISE
+        self.evaluate(name, optimum.pinion, optimum.wheel)
+        evaluated = dataclasses.replace(self._evaluations[name], seconds=spent)
+        self._evaluations[name] = evaluated
         # of several torques it shows another one than the table does
         ppte = float(evaluated.metrics["ppte_um"])
         self._optimum = optimum = dataclasses.replace(optimum, cycle=evaluated.cycle, ppte=ppte)
@@ -160,47 +165,73 @@ class Run:
             write_front(self._folder / "front.csv", self._front)
         files = self._draw() if figures else []
         if document is not None:
-            said = list(self._lines()), self._failures(), list(self._doubt_lines()), [self._table()]
+            first = list(self._first())
+            said = list(self._lines()), self._failures(), list(self._doubt_lines()), list(self._tables())
             pages = manufactured.pages(self.design, self._evaluations)
-            found = Found(*said, files, pages, left_out=self.design.left_out)
+            details = list(self._details())
+            found = Found(*said, files, pages, left_out=self.design.left_out, first=first, details=details)
             document.write(self._folder, self.design, data, found)
 
     def _draw(self) -> list[Path]:
         files = report.write_figures(self._folder, self.design, self._mesh, self._evaluations, self._torques)
         files += manufactured.write_figures(self._folder, self._evaluations)
         if self._optimum is not None:
-            of = self._mesh, self.design.torque, self._optimum, self._front
+            of = self._mesh, self.design.torque, self._optimum, self._front, self._evaluations
             files += optimum_report.write_figures(self._folder, *of)
         return files
 
     def show(self) -> bool:
         """Prints the comparison, after the results are in place; False when a solution or a constraint failed."""
-        report.console().print(self._table())
-        report.say(*self._lines(), *self._doubt_lines())
+        first = list(self._first())
+        for block in first:
+            report.say_rows(block)
+        for table in self._tables():
+            report.console().print(table)
+        doubts = [] if first else self._doubt_lines()
+        report.say(*self._lines(), *doubts, *self._details())
         report.say(f"results in {self._target}{os.sep}, {self._stages.elapsed:.1f} s")
         failures = self._failures()
         for line in [self.design.left_out] * bool(self.design.left_out) + failures:
             report.warn(line)
         return not failures
 
-    def _table(self) -> Table:
-        return report.table(self.design, self._evaluations)
+    def _tables(self) -> Iterator[Table]:
+        yield report.table(self.design, self._evaluations)
+        if self._front is not None:
+            yield front_table(self._front, self._evaluations)
+
+    def _first(self) -> Iterator[Block]:
+        """What an optimization says before its tables."""
+        if self._optimum is not None:
+            found = self._optimum, self._front, self._projection, self._evaluations
+            yield from optimum_report.first_screen(
+                self.design, *found, searched_at=self._searched_at, trust=self._trust()
+            )
+
+    def _trust(self) -> Iterator[tuple[str, str]]:
+        for line in (*report.failures(self._evaluations), *manufactured.failures(self._evaluations)):
+            yield "failed", line
+        yield from (("note", line) for line in self._notes())
+        doubts = [line.removeprefix(report.PLEASE_CHECK) for line in self._doubt_lines()]
+        yield from ((report.PLEASE_CHECK.rstrip(": "), line) for line in doubts or [_USUAL])
 
     def _lines(self) -> Iterator[str]:
-        """The results in words."""
-        if self._optimum is not None:
-            found = self._optimum, self._projection, self._evaluations
-            yield from optimum_report.verdict(self.design, *found, searched_at=self._searched_at)
-        else:
-            yield report.grid(self._evaluations)
-        if self._front is not None:
-            yield from optimum_report.front_lines(self._front)
+        """The results in words, where there is no optimum that says them first."""
+        if self._optimum is None:
+            yield from (report.grid(self._evaluations), *self._notes())
+        yield mounting(self.design)
+
+    def _notes(self) -> Iterator[str]:
         yield from manufactured.lines(self.design, self._evaluations)
         if self._quick:
             yield "quick run: coarse positions and a short search, not a result to build on"
         if self._unverified:
             yield f"not verified by finite elements: {self._unverified}"
-        yield report.bores(self.design)
+
+    def _details(self) -> Iterator[str]:
+        """How a search has gone."""
+        if self._optimum is not None:
+            yield from optimum_report.search_lines(self._optimum, self._front, self._projection)
 
     def _doubt_lines(self) -> Iterator[str]:
         return report.doubt_lines(self._doubts)
@@ -242,5 +273,6 @@ def run(design: DesignFile, target: Path, stages: Stages) -> Iterator[Run]:
     """Opens the result folder; the results appear when the block ends without an exception."""
     with ExitStack() as putting_in_place:
         with result_folder(target) as folder:
+            stages.replaces(target)
             yield Run(design, target, folder, stages)
             putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))

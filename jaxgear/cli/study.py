@@ -63,7 +63,6 @@ def evaluate(
     began = time.perf_counter()
     cycles = over_torques(mesh, every, pinion=pinion, wheel=wheel)
     seconds = time.perf_counter() - began
-    between = over_torques(half_way(mesh), every[:1], pinion=pinion, wheel=wheel)[0].transmission_error
     curves = np.asarray([cycle.transmission_error for cycle in cycles])
     converged = np.asarray([cycle.converged for cycle in cycles]) & np.isfinite(curves)
     # without the flanks: one program serves every kind of them
@@ -80,11 +79,19 @@ def evaluate(
         metrics={name: value.item() for name, value in metrics.items()},
         transmission_error=curves[1:],
         ppte=np.ptp(curves[1:], axis=1),
-        ppte_change=float(np.ptp(np.concatenate([curves[0], np.asarray(between)])) - np.ptp(curves[0])),
+        ppte_change=ppte_change(mesh, file.torque, pinion, wheel, curves[0]),
         failed_torques=sorted({float(torque) for torque in every[~converged.all(axis=1)]}),
         seconds=seconds,
         face_load=_face_load(cycles[1:]),
     )
+
+
+def ppte_change(
+    mesh: Mesh, torque: float, pinion: AbstractModification, wheel: AbstractModification, curve: np.ndarray
+) -> float:
+    """By how much the PPTE of a transmission error [um], shape (positions,), changes at twice the positions [um]."""
+    between = over_torques(half_way(mesh), np.asarray([torque]), pinion=pinion, wheel=wheel)[0].transmission_error
+    return float(np.ptp(np.concatenate([curve, np.asarray(between)])) - np.ptp(curve))
 
 
 def response_surface(mesh: Mesh, torque: float, pinion: AbstractModification, wheel: AbstractModification):

@@ -77,6 +77,7 @@ class StudyCommand(Generic[S]):
             left_out = [line for line in (held, omitted) if line]
             target = output or default_folder(file, self.name, quick=quick)
             with ExitStack() as putting_in_place, result_folder(target) as folder:
+                stages.replaces(target)
                 if figures:
                     import_ahead("matplotlib.pyplot")
                 study, finish = make(target, stages)

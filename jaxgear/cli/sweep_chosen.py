@@ -5,16 +5,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import jax
+import numpy as np
 import rich.table
 
 from ..contact import Mesh, Resolution
 from ..io import DesignFile
 from ..microgeometry import NoModification
-from ..sweeps import SweepTable
+from ..sweeps import SweepTable, over_torques
 from . import report
 from .progress import Stages
 from .run import Modifications, torques_of
-from .study import evaluate
+from .study import evaluate, ppte_change
 
 CHOSEN = 3  # variants
 
@@ -24,7 +25,7 @@ class Chosen:
     """What was found of the best variants.
 
     Attributes:
-        tables: side by side with the unmodified pair, the best one last.
+        tables: side by side with the unmodified pair, best first.
         figures: files of their pictures.
         pages: those of each variant alone, by its name.
         doubts: what is not usual of them; None where they are not evaluated.
@@ -70,7 +71,21 @@ def evaluate_best(
         drawn = report.write_figures(folder, design, mesh, found, torques) if figures else []
         pages = _alone(folder, mesh, found) if figures else {}
     doubts = report.doubt_lines(report.doubts(design, mesh, found))
-    return Chosen([report.table(design, found)], drawn, pages, list(doubts), list(report.failures(found)))
+    best_first = {name: found[name] for name in ("unmodified", *reversed(list(found)))}
+    return Chosen([report.table(design, best_first)], drawn, pages, list(doubts), list(report.failures(found)))
+
+
+def grid_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> str:
+    """How fine the mesh of a sweep was, and by how much the PPTE of its best variant changes on a finer one."""
+    parameters = best.take([0]).designs()[0]
+    made = design.sweep_mesh(size)
+    mesh = made if isinstance(made, Mesh) else made(parameters)
+    torque = float(design.operation(parameters).torque)
+    pinion, wheel = design.design(parameters)
+    (cycle,) = over_torques(mesh, np.asarray([torque]), pinion=pinion, wheel=wheel)
+    change = ppte_change(mesh, torque, pinion, wheel, np.asarray(cycle.transmission_error))
+    name = f"variant {best.column('variant')[0]} by {change:+.2g} um at {torque:g} N m"
+    return f"evaluated at {size.positions} positions; twice as many change PPTE: {name}"
 
 
 def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, list[Path]]:
@@ -85,5 +100,6 @@ def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, lis
             "transmission_error": plot.transmission_error({one: of.cycle for one, of in both.items()}),
             "k_chart": plot.k_chart(mesh, report.flanks(both)),
         }
-        pages[name] = report.save_figures(folder, {f"{kind}_{name.replace(' ', '_')}": ax for kind, ax in axes.items()})
+        named = {f"{kind}_{name.replace(' ', '_')}": ax for kind, ax in axes.items()}
+        pages[name] = report.save_figures(folder, named, bold=name)
     return pages

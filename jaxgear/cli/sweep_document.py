@@ -33,6 +33,7 @@ def write(
     *,
     size: Resolution,
     quick: bool,
+    grid: str,
 ) -> None:
     """Writes the workbook, the page of variants and the report.
 
@@ -47,6 +48,7 @@ def write(
         results: that the sweep was asked for.
         size: array sizes of a mesh.
         quick: whether the run was a quick one.
+        grid: what a finer mesh would change.
     """
     release = versions()
     facts = [*asked.facts, *release.items()]
@@ -58,6 +60,7 @@ def write(
     lines = [
         f"{len(table)} variants, ranked by {table.results[0]}; the best {len(best)} and the table are in {WORKBOOK}, "
         f"with units and filters; {PAGE} is for looking around among them.",
+        grid,
         *chosen.lines,
     ]
     warnings = [*chosen.failures, *([f"{failed} variants failed and have no results"] if failed else [])]

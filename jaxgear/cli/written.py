@@ -12,6 +12,7 @@ import numpy as np
 from ..contact import Mesh, Resolution
 from ..geometry import Gear
 from ..io import DesignFile, describe
+from ..io.layout import snake
 from ..metrics import Doubt
 from ..numerics import Number, fields_of
 from ..optimize import Verified
@@ -39,7 +40,7 @@ def summary(
         "torque_range_Nm": file.torque_range,
         "speed_rpm": file.speed,
         "friction": file.friction,
-        "gears": {"pinion": _gear(mesh.pair.pinion), "wheel": _gear(mesh.pair.wheel)},
+        "gears": {name: _gear(getattr(mesh.pair, name)) | _drawn(drawn) for name, drawn in file.drawn.items()},
         "center_distance_mm": shape["pair"]["center_distance_mm"],
         **_misalignment(mesh),
         **manufactured.tolerances(file),
@@ -90,6 +91,11 @@ def _gear(gear: Gear) -> dict[str, Any]:
     return data
 
 
+def _drawn(given: Mapping[str, Any]) -> dict[str, Any]:
+    """What the file gives beside the numbers of the gear, whose names stay those of the numbers that it means."""
+    return {f"drawn_{name}" if name.startswith("tooth_thickness") else name: value for name, value in given.items()}
+
+
 def _numbers(part: eqx.Module) -> dict[str, Any]:
     """Numbers and choices that a part has, by name and unit."""
     given = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
@@ -122,9 +128,9 @@ def sizes(of: Resolution) -> dict[str, Any]:
     return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
 
 
-def model(mesh: Mesh) -> dict[str, str]:
-    """The compliance and its plane state in words."""
-    return {"compliance": _words(mesh.compliance), "plane": mesh.compliance.plane}
+def model(mesh: Mesh) -> dict[str, Any]:
+    """The compliance by the names of its parts, with their options, and its plane state."""
+    return {"compliance": _options(mesh.compliance), "plane": mesh.compliance.plane}
 
 
 def _misalignment(mesh: Mesh) -> dict[str, float]:
@@ -134,11 +140,18 @@ def _misalignment(mesh: Mesh) -> dict[str, float]:
     return {"misalignment_um": float(mesh.support.misalignment.over_face(mesh.pair))}
 
 
-def _words(part: eqx.Module) -> str:
-    """A model by the names of its parts and switches."""
-    values = (getattr(part, field.name) for field in dataclasses.fields(part))
-    inner = [_words(value) if isinstance(value, eqx.Module) else str(value) for value in values]
-    return f"{type(part).__name__}({', '.join(inner)})"
+def _options(part: eqx.Module) -> dict[str, Any]:
+    """The type of a part and its options, in the words of a design file; of tables their sizes."""
+    data: dict[str, Any] = {"type": snake(type(part).__name__)}
+    for field in dataclasses.fields(part):
+        value = getattr(part, field.name)
+        if isinstance(value, eqx.Module):
+            data[field.name] = _options(value)
+        elif np.ndim(value):
+            data[field.name] = " x ".join(map(str, np.shape(value))) + " values"
+        elif value is not None and field.name != "plane":
+            data[field.name] = value if isinstance(value, str | bool | int) else np.asarray(value)
+    return data
 
 
 def doubt_data(doubt: Doubt) -> dict[str, Any]:

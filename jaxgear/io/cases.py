@@ -4,7 +4,7 @@ from ..conditions import LoadSpectrum
 from ..tolerance import Tolerance, ToleranceClass
 from .design_file import DesignFile
 from .errors import DesignFileError, problem, refuse_given, refused
-from .schema import OptimizeSection
+from .schema_optimize import OptimizeSection
 from .schema_sweep import SweepSection
 
 

@@ -17,12 +17,23 @@ from ..metrics.plausibility import LIMITS
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
-from . import held, rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, sections, template
+from . import (
+    held,
+    rating,
+    schema,
+    schema_dynamics,
+    schema_optimize,
+    schema_shafts,
+    schema_sweep,
+    schema_wear,
+    sections,
+    template,
+)
 from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, printable, refused
 from .flanks import check_files
 from .gearbox import layout_of, support_of
-from .gears import both_classes, gear_of, materials_of, pair_of, quality_of
+from .gears import both_classes, drawing_of, gear_of, materials_of, pair_of, quality_of
 from .sizes import resolution_of
 from .stiffness import model_part, with_tables
 from .toml import decode, read
@@ -53,6 +64,8 @@ class DesignFile:
         quality_classes: flank tolerance classes of pinion and wheel, of the gears or of [tolerance]; None without.
         bounds: (low, high) of every free parameter, in its unit.
         units: unit of every free parameter, "" for a pure number.
+        drawn: of pinion and wheel, what the file gives as name of the material and as measures of the tooth thickness.
+        values: of the free parameters that name one, which `jaxgear analyze` takes.
         optimize: the table of that name; `optimize_request` makes sense of it.
         sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
         tolerance: likewise, see `sweep_request`.
@@ -76,7 +89,9 @@ class DesignFile:
     quality_classes: tuple[int, int] | None
     bounds: dict[str, tuple[float, float]]
     units: dict[str, str]
-    optimize: schema.OptimizeSection
+    drawn: dict[str, dict[str, Any]]
+    values: dict[str, float]
+    optimize: schema_optimize.OptimizeSection
     sweep: schema_sweep.SweepSection | None
     tolerance: schema_sweep.ToleranceSection | None
     dynamics: schema_dynamics.DynamicsSection | None
@@ -229,7 +244,7 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
     )
     open_case = [*pair.free(), *model.free(), *axes.free(), *operation.free()]
     open_flanks = [free for part in flanks for free in part.free()]
-    bounds, units = read_variables(top.variables or {}, [*open_flanks, *open_case])
+    bounds, units, values = read_variables(top.variables or {}, [*open_flanks, *open_case])
     ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
     usual_pair = pair.build(middle)
@@ -263,6 +278,8 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
         quality_classes=None if classes is None else both_classes(classes),
         bounds=bounds,
         units=units,
+        drawn={"pinion": drawing_of(pinion_says), "wheel": drawing_of(wheel_says)},
+        values=values,
         optimize=optimize,
         sweep=sweep,
         tolerance=tolerance,

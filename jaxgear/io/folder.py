@@ -91,6 +91,18 @@ def result_folder(target: str | Path) -> Iterator[Path]:
         raise
 
 
+def earlier(target: str | Path) -> str:
+    """What of an earlier run a result folder holds, in words; "" for nothing."""
+    try:
+        held = json.loads((Path(target) / "summary.json").read_text(encoding="utf-8"))
+        torque = held.get("torque_Nm")
+        load = f" at {torque:g} N m" if isinstance(torque, int | float) else ""
+        figures = len(list(Path(target).glob("*.png")))
+        return f"{str(held.get('title', 'no title'))!r}{load}, {figures} figures"
+    except (OSError, ValueError, AttributeError):
+        return ""
+
+
 @contextmanager
 def writing(path: str | Path) -> Iterator[None]:
     """Names what is being written when the disk is full, or refuses for another reason.

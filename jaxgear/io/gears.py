@@ -48,6 +48,19 @@ def gear_of(
     return section, _gear(key, section, materials), flank
 
 
+def drawing_of(section: schema.GearSection) -> dict[str, Any]:
+    """What a file gives of a gear that its numbers do not tell: the name of the material, the measured tooth thickness.
+
+    By name and unit; lower and upper limit as a list of both.
+    """
+    given, units = section.given(), fields_of(ToothThickness)
+    found: dict[str, Any] = {} if isinstance(section.material, dict) else {"material": section.material or _STEEL}
+    for name in units:
+        if name in given and not isinstance(given[name], str):
+            found[f"{name}_{units[name].unit}" if units[name].unit else name] = given[name]
+    return found
+
+
 def fixed_gear(key: str, table: schema.Tables, materials: Materials) -> Gear:
     """A gear of numbers, whose flanks do not count."""
     section = decode(key, table, schema.GearSection)

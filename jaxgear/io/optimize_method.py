@@ -6,7 +6,7 @@ from typing import Any
 
 from ..optimize import METHODS, Pareto
 from ..optimize.projection import CURVES
-from . import schema
+from . import schema_optimize
 from .design_file import DesignFile
 from .errors import DesignFileError, check_known, refuse_given, refused
 from .layout import Section
@@ -18,7 +18,7 @@ PARETO = "pareto"
 
 def check_method(name: str) -> None:
     """Refuses a name that is no method."""
-    check_known("optimize.method", name, (*METHODS, PARETO, *schema.METHODS_WITHOUT_VARIABLES))
+    check_known("optimize.method", name, (*METHODS, PARETO, *schema_optimize.METHODS_WITHOUT_VARIABLES))
 
 
 def made_by(name: str) -> type[Any]:
@@ -28,7 +28,7 @@ def made_by(name: str) -> type[Any]:
 
 def check_options(design: DesignFile, name: str, options: Mapping[str, Any]) -> None:
     """Whether a method with variables can be made of its options, and a method without them of its curve."""
-    if name in schema.METHODS_WITHOUT_VARIABLES:
+    if name in schema_optimize.METHODS_WITHOUT_VARIABLES:
         check_known(f"optimize.{name}.curve", options.get("curve", CURVE), CURVES)
         return
     levels = options.get("levels")
@@ -38,13 +38,13 @@ def check_options(design: DesignFile, name: str, options: Mapping[str, Any]) -> 
     refused(f"optimize.{name}", made_by(name), **options)
 
 
-def tables(section: schema.OptimizeSection) -> dict[str, Section]:
+def tables(section: schema_optimize.OptimizeSection) -> dict[str, Section]:
     """The tables of all methods, decoded."""
-    layouts = schema.method_options().items()
+    layouts = schema_optimize.method_options().items()
     return {key: decode(f"optimize.{key}", getattr(section, key) or {}, layout) for key, layout in layouts}
 
 
-def options_of(section: schema.OptimizeSection, name: str, *, of_the_file: bool) -> dict[str, Any]:
+def options_of(section: schema_optimize.OptimizeSection, name: str, *, of_the_file: bool) -> dict[str, Any]:
     """The options of a method; the file may name others where it is not the file that asks for the method."""
     options = {key: value for key, value in tables(section).get(name, ()) if value is not None}
     shared = {"starts": section.starts, "steps": section.steps, "seed": section.seed or 0}

@@ -21,7 +21,7 @@ from ..optimize import (
 from ..optimize.refine import POSITIONS
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import LIVES_AHEAD
-from . import schema
+from . import schema_optimize
 from .cases import load_of, tolerance_of
 from .design_file import DesignFile
 from .errors import DesignFileError, naming, refuse_given, refused, suggestion
@@ -86,7 +86,7 @@ class OptimizeRequest:
         if self.method not in METHODS or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
             return None
         kept = {name: value for name, value in self._common.items() if name in ("constraints", "seed")}
-        kept |= {"torque": load_of(self._design, "optimize", schema.OptimizeSection()), "positions": None}
+        kept |= {"torque": load_of(self._design, "optimize", schema_optimize.OptimizeSection()), "positions": None}
         kept |= {"objective": settings.quantity(_LASTING), "method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE)}
         return dataclasses.replace(self, method=_DEFAULT_METHOD, _common=kept)
 
@@ -147,7 +147,7 @@ def check_optimize(design: DesignFile) -> None:
 def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeRequest:
     section = design.optimize
     name = method or section.method or _DEFAULT_METHOD
-    flanks_alone = name in schema.METHODS_WITHOUT_VARIABLES
+    flanks_alone = name in schema_optimize.METHODS_WITHOUT_VARIABLES
     check_method(name)
     if not design.bounds and not flanks_alone:
         raise DesignFileError("variables", "missing, nothing to optimize; use jaxgear analyze")
@@ -173,7 +173,7 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
     return OptimizeRequest(name, curve, verify, design, common)
 
 
-def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
+def _common(design: DesignFile, section: schema_optimize.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
     """Objective, cases and constraints."""
     found: dict[str, Any] = {
         **_objective(design, section, name),
@@ -191,27 +191,27 @@ def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quic
 
 
 def _objectives(
-    design: DesignFile, section: schema.OptimizeSection, default: tuple[str, ...] = ()
+    design: DesignFile, section: schema_optimize.OptimizeSection, default: tuple[str, ...] = ()
 ) -> tuple[str | Quantity, ...]:
     asked = section.objective or default
     named = (asked,) if isinstance(asked, str) else tuple(asked)
     return tuple(quantity_named(design, "optimize.objective", each) for each in named)
 
 
-def _objective(design: DesignFile, section: schema.OptimizeSection, name: str) -> dict[str, Any]:
+def _objective(design: DesignFile, section: schema_optimize.OptimizeSection, name: str) -> dict[str, Any]:
     """What the function of a method takes for the objective; nothing where it knows its own."""
     objectives = _objectives(design, section, _FRONT if name == PARETO else ("ppte",))
     if (len(objectives) > 1) != (name == PARETO):
         problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
         raise DesignFileError("optimize.objective", problem)
-    if name in schema.METHODS_WITHOUT_VARIABLES:
+    if name in schema_optimize.METHODS_WITHOUT_VARIABLES:
         if objectives != ("ppte",):
             raise DesignFileError("optimize.objective", f'must be "ppte" with method "{name}"')
         return {}
     return {"objectives": objectives} if name == PARETO else {"objective": objectives[0]}
 
 
-def _measure(section: schema.OptimizeSection) -> AbstractMeasure:
+def _measure(section: schema_optimize.OptimizeSection) -> AbstractMeasure:
     kind = section.measure or "mean"
     if section.torques is None and section.manufactured is None:
         why = " on a single case: give optimize.torques or optimize.manufactured"
@@ -221,13 +221,13 @@ def _measure(section: schema.OptimizeSection) -> AbstractMeasure:
     return _MEASURES[kind]() if section.level is None else _MEASURES[kind](section.level)
 
 
-def _constraints(design: DesignFile, section: schema.OptimizeSection) -> tuple[Constraint, ...]:
+def _constraints(design: DesignFile, section: schema_optimize.OptimizeSection) -> tuple[Constraint, ...]:
     return tuple(_constraint(design, number, each) for number, each in enumerate(section.constraint))
 
 
-def _constraint(design: DesignFile, number: int, table: schema.Tables) -> Constraint:
+def _constraint(design: DesignFile, number: int, table: schema_optimize.Tables) -> Constraint:
     key = f"optimize.constraint[{number}]"
-    section = decode(key, table, schema.ConstraintSection)
+    section = decode(key, table, schema_optimize.ConstraintSection)
     of: Any = section.variables if section.of is None else section.of
     unit = ""
     if of is None or (section.of is not None and section.variables is not None):
@@ -258,7 +258,7 @@ def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: floa
         raise DesignFileError(key, f"{low:g} must be at most {most}: wear.revolutions = {looked_at:g}")
 
 
-def _check_iteration(design: DesignFile, start: str, section: schema.OptimizeSection) -> None:
+def _check_iteration(design: DesignFile, start: str, section: schema_optimize.OptimizeSection) -> None:
     """The iteration levels the transmission error at the design torque and knows nothing else."""
     keys = ("measure", "level", "torques", "weights", "manufactured", "constraint")
     refuse_given("optimize", section, keys, ' with method "te_iteration"')

@@ -4,9 +4,10 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
-from . import schema, schema_sweep
+from . import schema, schema_optimize, schema_sweep
 from .errors import DesignFileError
 from .gears import with_quality
+from .schema_optimize import METHODS_WITHOUT_VARIABLES
 from .stiffness import FINITE_ELEMENTS
 from .toml import decode
 from .variables import increasing
@@ -30,8 +31,8 @@ def load_of(table: schema.Tables) -> schema.LoadSection:
 
 def optimize_of(top: schema.FileSection, stiffness: schema.ModelSection) -> Any:
     """The search, with its defaults where the file has no such table."""
-    optimize = decode("optimize", top.optimize or {}, schema.optimize_section())
-    if top.optimize is not None and not top.variables and optimize.method not in schema.METHODS_WITHOUT_VARIABLES:
+    optimize = decode("optimize", top.optimize or {}, schema_optimize.optimize_section())
+    if top.optimize is not None and not top.variables and optimize.method not in METHODS_WITHOUT_VARIABLES:
         raise DesignFileError("optimize", "has no effect without [variables]")
     if optimize.verify and stiffness.structure == FINITE_ELEMENTS:
         raise DesignFileError("optimize.verify", f'has no effect with model.structure = "{FINITE_ELEMENTS}"')

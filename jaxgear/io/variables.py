@@ -13,15 +13,21 @@ _QUANTITY = re.compile(r"\s*[-+]?[.,]?\d")
 
 def read_variables(
     tables: schema.Tables, open_numbers: Iterable[template.Free]
-) -> tuple[dict[str, tuple[float, float]], dict[str, str]]:
-    """Bounds and units of the free parameters, each declared once and used at least once."""
+) -> tuple[dict[str, tuple[float, float]], dict[str, str], dict[str, float]]:
+    """Bounds, units and, where they are given, values of the free parameters, each declared once and used."""
     bounds: dict[str, tuple[float, float]] = {}
     units: dict[str, str] = {}
+    values: dict[str, float] = {}
     for name, table in tables.items():
         key = f"variables.{name}"
         variable = decode(key, table, schema.VariableSection)
         increasing(f"{key}.high", variable.low, variable.high)
         bounds[name] = (variable.low, variable.high)
+        if variable.value is not None:
+            values[name] = variable.value
+            if not variable.low <= variable.value <= variable.high:
+                problem = f"{variable.value:g} must be at least {variable.low:g} and at most {variable.high:g}"
+                raise DesignFileError(f"{key}.value", problem)
     for free in open_numbers:
         unit = free.number.unit
         if free.name not in bounds:
@@ -42,7 +48,7 @@ def read_variables(
         unit = table.get("unit")
         if unit is not None and unit != units[name]:
             raise DesignFileError(f"variables.{name}.unit", f'"{unit}" must be "{units[name]}" as it is used')
-    return bounds, {name: units[name] for name in bounds}
+    return bounds, {name: units[name] for name in bounds}, values
 
 
 def _quantity(unit: str) -> str:

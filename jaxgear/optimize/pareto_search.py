@@ -27,6 +27,7 @@ _ROUNDS = 3
 _RTOL = 1e-3  # a search ends where the predicted decrease is below this part of its distance from the ideal
 _END = 1e-6  # weight of the other objectives at the ends of the front: too small to bend the way there
 _SUM = 0.05  # part of the plain sum in the scalarization, which keeps weakly dominated designs away
+_NEAR = 0.01  # spans of the front; designs that are nearer to each other in every objective count as one
 _SPAN = 1e-3  # least span of an objective over the designs, relative to its ideal
 
 
@@ -40,7 +41,7 @@ class Pareto(Checked):
     that has been met for its weight.
 
     Attributes:
-        points: designs that are sought on the front.
+        points: designs that are sought, and the most that the front has.
         steps: most steps of every one in each round.
     """
 
@@ -71,6 +72,7 @@ class Pareto(Checked):
             follow(linearizer, met, searches, steps=self.steps, rtol=_RTOL, round_of=(number, _ROUNDS))
         if not met.found:
             raise RuntimeError("pareto: no design that the search for a front has met keeps the constraints")
+        met.thin(self.points)
         record.offer(*met.compromise(), 0.0)
         return met
 
@@ -147,6 +149,20 @@ class Met:
             return np.full(self._points.shape[1], 0.5), np.inf
         best = int(_Chebyshev(np.ones_like(self._low), self.frame).join(self._values).argmin())
         return self._points[best], float(((self._values[best] - self._low) / self._span).max())
+
+    def thin(self, most: int) -> None:
+        """Keeps at most so many designs: the best of every objective, the compromise, and ever the farthest from those.
+
+        A design that hardly differs from a kept one goes.
+        """
+        scaled = (self._values - self._low) / self._span
+        compromise = int(np.abs(self._points - self.compromise()[0]).max(axis=1).argmin())
+        kept = list(dict.fromkeys([*scaled.argmin(axis=0).tolist(), compromise]))[:most]
+        distance = np.stack([np.abs(scaled - scaled[one]).max(axis=1) for one in kept]).min(axis=0)
+        while len(kept) < most and distance.max() > _NEAR:
+            kept.append(int(distance.argmax()))
+            distance = np.minimum(distance, np.abs(scaled - scaled[kept[-1]]).max(axis=1))
+        self._points, self._values = self._points[kept], self._values[kept]
 
     def rows(self) -> tuple[np.ndarray, np.ndarray]:
         """Points and values, ascending in the first objective; equal designs once."""

@@ -15,6 +15,7 @@ from .face import line_load as line_load
 from .fan import fan as fan
 from .fan import ppte_distribution as ppte_distribution
 from .fan import ppte_histogram as ppte_histogram
+from .figure import emphasize as emphasize
 from .figure import save as save
 from .grinding import tooth_space as tooth_space
 from .grinding import volumes as volumes

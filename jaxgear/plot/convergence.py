@@ -13,8 +13,9 @@ from .objectives import ANALYSES_LABEL, logarithmic, objective_label, wrapped
 def convergence(optima: Mapping[str, Optimum], ax: Axes | None = None) -> Axes:
     """Best objective met over the contact analyses spent, with a mark at the end of every search.
 
-    Both axes are logarithmic, the ordinate only where all objectives are positive. What was known before the first
-    analysis stands at one analysis; as long as no design was valid there is no curve.
+    A curve rises where its search goes on to a finer grid, on which the best design is judged anew. Both axes are
+    logarithmic, the ordinate only where all objectives are positive. What was known before the first analysis stands at
+    one analysis; as long as no design was valid there is no curve.
 
     Args:
         optima: results by the name of their method, of the same objective; up to eight differ in style.

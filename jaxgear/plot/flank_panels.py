@@ -11,7 +11,7 @@ from ..tolerance import ToleranceClass
 from .figure import ABOVE, HEIGHT, PALE, legend_above, legend_over_panels, line_style, report_axes
 
 WIDTH = 150.0  # of the two panels together [mm]
-_BAND = "tolerance of the class"
+_BAND = "tolerance about "  # the name of the design
 
 Design = tuple[AbstractModification | None, AbstractModification | None]
 Tolerances = tuple[ToleranceClass | None, ToleranceClass | None]
@@ -59,9 +59,10 @@ def flank_panels(
                 panel.set_xlim(abscissa[0], abscissa[-1])
             quality = tolerance[index] if tolerance else None
             if band is not None and quality is not None:
-                middle = designs[next(iter(designs)) if about is None else about][index] or NoModification()
+                name = next(iter(designs)) if about is None else about
+                middle = designs[name][index] or NoModification()
                 place, low, high = band(side, middle, quality)
-                panel.fill_between(place, low, high, color=PALE, zorder=0.4, linewidth=0, label=_BAND)
+                panel.fill_between(place, low, high, color=PALE, zorder=0.4, linewidth=0, label=f"{_BAND}{name}")
             frame(panel, side, title)
         panels[0].set_ylabel("material removed [µm]")
         _downwards(panels)

@@ -82,7 +82,7 @@ def harris_map(phase, torques, te, ax: Axes | None = None, *, design: str | None
             ax.set_title(design, loc="left", fontsize=ax.xaxis.label.get_fontsize())
         heights = _spread(curves[:, -1], _line_height(ax))
         for torque, height, colour in zip(torques, heights, colours):
-            text = f"{torque:g} N m"
+            text = f"{torque:.4g} N m"
             ax.annotate(text, (2, height), xytext=(4, 0), textcoords="offset points", va="center", color=colour)
     return ax
 

@@ -18,15 +18,16 @@ CAPTIONS = {
     "line_load": "Load per length over the face.",
     "face_gap": "Gap over the face before the load closes it.",
     "k_chart": "Profile modification of both gears over the roll angle, material removed downwards (K-chart). A shaded "
-    "band is the total profile tolerance of the quality class.",
+    "band is the total profile tolerance of the quality class about the design that the legend names.",
     "lead_chart": "Modification across the face, at the pitch point. A shaded band is the total helix tolerance of the "
-    "quality class.",
+    "quality class about the design that the legend names.",
     "ppte_over_torque": "PPTE over the torque.",
     "ppte_distribution": "Share of the manufactured pairs whose PPTE stays below a value.",
     "harris_map": "Harris map: transmission error over two base pitches at several torques.",
     "response_surface": "Transmission error over phase and torque.",
     "face_load_over_torque": "Face load factor over the torque.",
-    "convergence": "Course of the search: best objective over the contact analyses spent.",
+    "convergence": "Course of the search: best objective over the contact analyses spent. It rises where the "
+    "search goes on to a finer grid, on which the best design is judged anew.",
     "front": "Pareto front: designs of which none is better in every objective.",
     "iterations_relief": "Relief after every iteration of the search.",
     "iterations_transmission_error": "Transmission error after every iteration of the search.",

@@ -31,6 +31,7 @@ _NOT_HERE = (
     ("rack_shaped_tool", "relative_machining_allowance_din_3972_1952", "none"),
     ("cylindrical_gear_manufacturing_settings", "machining_allowance", "mm"),
 )
+_ALLOWANCE_DIGITS = 6  # of an allowance [um] behind the point: further ones are of the way through chord or span
 _CLOSE = 1e-9  # relative difference of numbers that mean the same
 _ALIKE = 2e-3  # mm, by which diameters on a drawing are rounded
 
@@ -126,7 +127,9 @@ def read_quality(gear: Component) -> int | None:
     return int(gear.choice(QUALITY, None, [str(number) for number in range(1, 12)]))
 
 
-def write_gear(model: Model, gear: Gear, name: str, quality: int | None) -> tuple[Component, list[Component]]:
+def write_gear(
+    model: Model, gear: Gear, name: str, quality: int | None, material_name: str | None = None
+) -> tuple[Component, list[Component]]:
     """Writes a gear; returns its component and those of its left and right flank."""
     upper, tolerance = float(gear.tooth_thickness_allowance), float(gear.tooth_thickness_tolerance)
     limits = (upper, upper - tolerance) if upper or tolerance else (None, None)
@@ -149,7 +152,7 @@ def write_gear(model: Model, gear: Gear, name: str, quality: int | None) -> tupl
     )
     material = model.add(
         "material",
-        f"{name} material",
+        material_name or f"{name} material",
         elastic_modulus=(gear.material.elastic_modulus, "MPa"),
         poisson_ratio=(gear.material.poisson_ratio, "none"),
         density=(shifted(gear.material.density, -3), "kg / dm^3"),
@@ -257,7 +260,9 @@ def _thickness(gear: Component, made: Gear) -> dict[str, Any]:
             raise gear.refuse(names[1], f"{given[-1]:g} must be at most the upper one, {given[0]:g}")
         if high > 0:
             raise gear.refuse(names[0], f"{given[0]:g} makes the tooth {high:.4g} um thicker, must be at most 0")
-        return {"tooth_thickness_allowance": real(high), "tooth_thickness_tolerance": real(high - low)}
+        high, low = round(high, _ALLOWANCE_DIGITS), round(low, _ALLOWANCE_DIGITS)
+        tolerance = round(high - low, _ALLOWANCE_DIGITS)
+        return {"tooth_thickness_allowance": real(high), "tooth_thickness_tolerance": real(tolerance)}
     return {}
 
 

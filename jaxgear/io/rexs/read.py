@@ -20,6 +20,7 @@ from .json_form import parse_json
 from .model import Component, Model
 from .parse import parse
 from .read_flank import read_modification
+from .terms import joined
 
 _LOG = logging.getLogger("jaxgear")
 _OLDEST, _NEWEST = (1, 4), (2,)
@@ -228,7 +229,7 @@ def _modification(model: Model, gear: Component, flank: Component, frame: Frame)
 
 
 def _sum(parts: list[Component], frame: Frame) -> AbstractModification:
-    terms = [term for part in parts for term in read_modification(part, frame)]
+    terms = joined(term for part in parts for term in read_modification(part, frame))
     return reduce(add, terms) if terms else NoModification()
 
 

@@ -1,8 +1,9 @@
 """Modifications as REXS has them: a sum of parts, each with an amount of its own."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import equinox as eqx
+import numpy as np
 
 from ...microgeometry import (
     AbstractCurve,
@@ -26,7 +27,9 @@ from ...microgeometry import (
     TabulatedProfile,
     TipRelief,
 )
+from ...numerics import real
 
+_SAME = 1e-6  # relative difference that files of fewer digits leave
 # their amounts are proportional to what they remove
 _PROPORTIONAL = (
     TipRelief,
@@ -76,6 +79,31 @@ def powers(curve: AbstractCurve) -> dict[int, float] | None:
         case Polynomial():
             return _of_coefficients(curve.coefficients)
     return None
+
+
+def joined(found: Iterable[AbstractModification]) -> list[AbstractModification]:
+    """Modifications with one parabolic relief in place of the linear and the quadratic part that REXS has of it."""
+    result: list[AbstractModification] = []
+    for term in found:
+        if result and (one := _parabolic(result[-1], term)) is not None:
+            result[-1] = one
+        else:
+            result.append(term)
+    return result
+
+
+def _parabolic(first: AbstractModification, second: AbstractModification) -> AbstractModification | None:
+    if not (isinstance(first, TipRelief | RootRelief) and isinstance(second, type(first))):
+        return None
+    if powers(first.curve) != {1: 1.0} or powers(second.curve) != {2: 1.0}:
+        return None
+    amount = float(first.amount) + float(second.amount)
+    linear = (powers(Parabolic()) or {})[1] * amount
+    if not np.allclose(
+        [float(first.length), float(first.amount)], [float(second.length), linear], rtol=_SAME, atol=0.0
+    ):
+        return None
+    return type(first)(real(amount), first.length, Parabolic())
 
 
 def _of_coefficients(coefficients) -> dict[int, float] | None:

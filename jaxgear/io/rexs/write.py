@@ -36,6 +36,7 @@ def write_rexs(
     cycle: MeshCycle | None = None,
     friction: float | None = None,
     quality_classes: tuple[int, int] | None = None,
+    materials: tuple[str | None, str | None] | None = None,
     title: str = "",
     error: float = 0.01,
 ) -> None:
@@ -55,6 +56,7 @@ def write_rexs(
             velocity and flash temperature; its modifications, torque and speed are those of the file.
         friction: mean coefficient of friction for the flash temperature; None for that of the cycle, or the library's.
         quality_classes: flank tolerance classes of pinion and wheel (ISO 1328-1:2013).
+        materials: names of the materials of pinion and wheel.
         title: free text.
         error: by how much the points that stand for a curve unknown to REXS may be off it [um].
 
@@ -82,8 +84,10 @@ def write_rexs(
     model.relate("assembly", assembly=unit, part=stage)
     gears, flanks = zip(
         *(
-            write_gear(model, getattr(pair, name), name, quality)
-            for name, quality in zip(("pinion", "wheel"), quality_classes or (None, None))
+            write_gear(model, getattr(pair, name), name, quality, material)
+            for name, quality, material in zip(
+                ("pinion", "wheel"), quality_classes or (None, None), materials or (None, None)
+            )
         )
     )
     model.relate("stage", stage=stage, gear_1=gears[0], gear_2=gears[1])
