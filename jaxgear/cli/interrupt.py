@@ -1,8 +1,8 @@
 """Ctrl-C and SIGTERM: they always end the command, and what the command then says of its files is true.
 
-Either raises KeyboardInterrupt wherever Python happens to be. In a callback that JAX or a destructor runs, the exception
-is printed and lost, and the command would go on; so it is kept in mind, raised again where that is safe, and asked for
-before anything is put in place.
+Either raises KeyboardInterrupt wherever Python happens to be. In a callback that JAX or a destructor runs, the
+exception is printed and lost, and the command would go on; so it is kept in mind, raised again where that is safe, and
+asked for before anything is put in place.
 """
 
 import _thread
