@@ -1,4 +1,4 @@
-"""A genetic algorithm of bit strings: roulette-wheel selection, one-point crossover, mutation (Goldberg 1989)."""
+"""A genetic algorithm of bit strings: roulette selection, one-point crossover, mutation (Goldberg 1989)."""
 
 from typing import Any
 

@@ -11,19 +11,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ...microgeometry import Linear, Polynomial, Power, Quadratic
-from ...numerics import (
-    Checked,
-    check,
-    concrete,
-    decoded,
-    kernel,
-    next_generation,
-    random_strings,
-    real,
-    result,
-    spread,
-    whole,
-)
+from ...numerics import Checked, check, concrete, kernel, real, result, spread, whole
+from ...numerics.genetic import decoded, next_generation, random_strings
 from .model import DimensionlessModel, with_relief
 from .relief import CycleRelief
 from .settle import _settle, at_rest
