@@ -13,6 +13,7 @@ from jaxgear.dynamics.dimensionless import (
     CycleRelief,
     DimensionlessForce,
     PolynomialClearance,
+    cycle_relief,
     dimensionless_model,
     dynamic_profile_modification,
     from_mesh,
@@ -22,11 +23,13 @@ from jaxgear.dynamics.dimensionless import (
     operating_conditions,
     rectangular_harmonics,
     settled_vibration,
+    tip_relief,
     with_relief,
 )
 from jaxgear.dynamics.integrate import cycle_of
-from jaxgear.metrics import secant_stiffness
-from jaxgear.microgeometry import Linear, Parabolic, Power
+from jaxgear.geometry import path_of_contact
+from jaxgear.metrics import removed_at, secant_stiffness
+from jaxgear.microgeometry import Linear, Parabolic, Power, TipRelief
 
 FITTED = {3: (0.172840, 0.064015), 5: (-0.053498, 0.181375, -0.011736), 7: (-0.155744, 0.283620, -0.036729, 0.001719)}
 
@@ -309,12 +312,53 @@ def test_dynamic_optimum_beats_the_static_one_where_a_displacement_excites():
     assert min(scan) > 0.99 * dynamic
 
 
+def test_flanks_take_off_what_a_cycle_relief_says():
+    """At the contact of a pair anywhere on its path, from the tips of both gears; and back again."""
+    mesh, half, known = prepare(gear_pair(), resolution=TWO_PAIRS), 40.0, TipRelief(6.0, 4.0, Power(1.5))
+    path = path_of_contact(mesh.pair)
+    cycle = cycle_relief(known, mesh.pair, half)
+    flank = tip_relief(cycle, mesh.pair, half)
+    assert np.isclose(flank.amount, 6.0) and np.isclose(flank.length, 4.0) and flank.curve.exponent == 1.5
+
+    at = jnp.linspace(path.start, path.end, 41)
+    rolls = path.pinion_roll_length(at), path.wheel_roll_length(at)
+    lost = sum(removed_at(side, flank, roll, jnp.zeros(1))[0] for side, roll in zip(mesh.sides, rolls))
+    assert np.allclose(lost, half * jax.vmap(cycle.of_pair)((at - path.start) / path.base_pitch), atol=1e-9)
+    # at mesh position 0 a pair touches at the pitch point
+    assert np.isclose(cycle(jnp.array(0.0)), 0.0) and np.isclose(cycle.of_pair(-path.start / path.base_pitch), 0.0)
+    position = 0.5 * (path.inner_single + path.start) / path.base_pitch
+    both = [cycle.of_pair(position - path.start / path.base_pitch + later) for later in (0, 1)]
+    assert np.isclose(cycle(position), 0.5 * sum(both)) and sum(both) > 0
+
+    with pytest.raises(ValueError, match="tip_relief: contact_ratio = 1.37 of the relief must be that of the pair"):
+        tip_relief(relief(), mesh.pair, half)
+    with pytest.raises(ValueError, match="cycle_relief: half_clearance = 0 um must be greater than 0 um"):
+        cycle_relief(known, mesh.pair, 0.0)
+
+
 def test_what_cannot_be_optimized_is_refused():
     model = model_of(PolynomialClearance.published())
     with pytest.raises(ValueError, match="must name"):
         dynamic_profile_modification(model, 0.9, relief(), free=("depth",))
     with pytest.raises(ValueError, match="Parabolic has no coefficients to optimize"):
         dynamic_profile_modification(model, 0.9, relief(curve=Parabolic()), free=("curve",))
+
+
+@pytest.mark.slow
+def test_the_genetic_algorithm_finds_the_optimum_without_gradients():
+    model = model_of(PolynomialClearance.published(), displacement=0.05)
+    given = relief(0.2, begin=-0.185)
+
+    def found(**how):
+        return dynamic_profile_modification(model, 0.9, given, free=("amount",), **how)
+
+    gradient, genetic, again = found(iterations=25), *(found(iterations=15, method="genetic") for _ in range(2))
+    # within a few of the steps that ten bits make of 0 to 4 F_m
+    assert genetic.dynamic.amount == pytest.approx(float(gradient.dynamic.amount), abs=4 * 4 * 0.5 / 1023)
+    assert genetic.amplitude[2] < 0.5 * genetic.amplitude[1]
+    assert genetic.dynamic.amount == again.dynamic.amount
+    with pytest.raises(ValueError, match="method = \"newton\" must be|method = 'newton' must be"):
+        found(method="newton")
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -12,10 +13,16 @@ import pytest
 from commands import FIXED, call
 
 from jaxgear.cli import interrupt, launcher, run
+from jaxgear.io.folder import result_folder
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
 NOTHING = "jaxgear: interrupted, nothing was written\n"
+DYNAMICS = """
+[dynamics]
+mesh_frequencies = [500.0, 1000.0]
+damping_ratio = 0.05
+"""
 # raises the signal when a module is asked for
 AT_IMPORT = """
 import os, runpy, signal, sys
@@ -119,3 +126,43 @@ def test_at_any_moment(gear):
         assert "Traceback" not in err and process.returncode == (130 if "interrupted" in err else 0), err
         assert there == (NOTHING not in err), err
         assert {path.name for path in gear.parent.iterdir()} <= {"gear.toml", "out"}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_leaves_no_folder_behind(gear, tmp_path, monkeypatch, number):
+    monkeypatch.setattr(run.Run, "prepare", lambda self, **_: signal.raise_signal(number))
+    before = signal.getsignal(signal.SIGTERM)
+    result = call("analyze", gear, "-o", tmp_path / "out")
+    assert (result.code, result.err) == (130, NOTHING)
+    assert [path.name for path in tmp_path.iterdir()] == ["gear.toml"]
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+@pytest.mark.skipif(os.name != "posix", reason="other systems cannot be asked whether a process runs")
+def test_what_a_killed_process_left_is_removed_by_the_next_of_the_same_name(tmp_path):
+    """Its own folders alone, and no earlier result that was being replaced while there is no other."""
+    make = "import os, signal, sys; from pathlib import Path; from jaxgear.io.folder import result_folder as f\n"
+    kill = "with f(Path('out')) as made: (made / 'half').touch(); os.kill(os.getpid(), signal.SIGKILL)"
+    subprocess.run([sys.executable, "-c", make + kill], cwd=tmp_path, env=environment(), check=False)
+    (left,) = tmp_path.iterdir()
+    assert left.name.startswith(".out.") and left.name.endswith(".tmp")
+    earlier = tmp_path / f"{left.name}.earlier"
+    alive = tmp_path / re.sub(r"-\d+\.", f"-{os.getpid()}.", left.name)
+    others = [earlier, alive, tmp_path / ".out.tmp", tmp_path / left.name.replace(".out.", ".other.")]
+    for path in others:
+        path.mkdir()
+    with result_folder(tmp_path / "out"):
+        assert not left.exists() and all(path.exists() for path in others)
+    with result_folder(tmp_path / "out"):
+        assert not earlier.exists()
+
+
+def test_kept_runs_are_told_of_before_the_first_result(tmp_path, monkeypatch):
+    kept = tmp_path / ".out.runs"
+    kept.mkdir()
+    (kept / "0123").touch()
+    (tmp_path / "gear.toml").write_text(FIXED + DYNAMICS)
+    monkeypatch.setattr("jaxgear.cli.dynamics.compared", lambda *_, **__: signal.raise_signal(signal.SIGINT))
+    result = call("dynamics", tmp_path / "gear.toml", "-o", tmp_path / "out", "--quick")
+    line = f"jaxgear: interrupted, 1 runs are kept in {kept}{os.sep}, go on with the same command\n"
+    assert result.code == 130 and result.err.endswith(line)

@@ -1,6 +1,7 @@
 """Search for the best modification: known optima, constraints, several loads and gears, honest reports, refusals."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from known_optimum import DELTA0, Known, depth, grid, ppte_of, ppte_of_parabolas
 
 import jaxgear as jg
 from jaxgear.conditions import conditions
+from jaxgear.numerics import decoded, next_generation
 from jaxgear.tolerance import GearTolerance
 
 TORQUE = 50.0
@@ -131,6 +133,7 @@ METHODS = [
     pytest.param(jg.optimize.CMAES(population=32, generations=15), marks=pytest.mark.slow),
     pytest.param(jg.optimize.DifferentialEvolution(population=32, generations=25), marks=pytest.mark.slow),
     jg.optimize.Genetic(population=32, generations=30),
+    jg.optimize.BinaryGenetic(population=32, generations=150),
 ]
 
 
@@ -148,12 +151,36 @@ def test_every_method_finds_the_same_optimum(known, best, method):
         assert len(result.history) == method.generations
 
 
-def test_chance_is_seeded(known):
-    genetic = jg.optimize.Genetic(population=32, generations=2)
-    first, again = (known.minimize(known.parabolas, TALL, method=genetic) for _ in range(2))
-    other = known.minimize(known.parabolas, TALL, method=jg.optimize.Genetic(population=32, generations=2, seed=1))
+@pytest.mark.parametrize("make", [jg.optimize.Genetic, jg.optimize.BinaryGenetic])
+def test_chance_is_seeded(known, make):
+    first, again, other = (
+        known.minimize(known.parabolas, TALL, method=make(population=32, generations=2, seed=seed))
+        for seed in (0, 0, 1)
+    )
     assert first.parameters == again.parameters
     assert first.parameters != other.parameters
+
+
+def test_strings_of_bits_are_numbers_and_the_fitter_ones_multiply():
+    """Selection alone: a string has children in proportion to its fitness; the last generation is of bits on."""
+    strings = jnp.asarray(np.random.default_rng(0).integers(0, 2, (400, 6)), bool)
+    assert np.allclose(decoded(strings[:5], 3), np.asarray(strings[:5]).reshape(5, 2, 3) @ [4, 2, 1] / 7)
+    counted = next_generation(jax.random.key(1), strings, jnp.where(strings[:, 0], 3.0, 1.0), 0.0, 0.0)
+    before, after = (float(jnp.mean(part[:, 0])) for part in (strings, counted))
+    assert after == pytest.approx(3 * before / (1 + 2 * before), abs=0.07)
+    for seed in range(30):
+        fitness = jnp.sum(strings, axis=1).astype(float) ** 4
+        strings = next_generation(jax.random.key(seed), strings, fitness, 0.5, 0.05)
+    assert jnp.mean(strings) > 0.9
+
+
+def test_parameters_of_bits_lie_on_their_steps_and_a_negative_objective_is_refused(known):
+    method = jg.optimize.BinaryGenetic(population=32, generations=2, bits=3)
+    result = known.minimize(known.parabolas, TALL, method=method)
+    steps = np.array(list(result.parameters.values())) / 40.0 * 7
+    assert np.allclose(steps, np.round(steps))
+    with pytest.raises(ValueError, match="binary_genetic: needs an objective that is positive"):
+        known.minimize(known.parabolas, TALL, method=method, objective=lambda cycle: -cycle.pinion.amount - 1.0)
 
 
 def test_a_table_of_variants_is_searched_whole(known):

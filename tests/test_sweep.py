@@ -190,6 +190,30 @@ def test_the_size_of_the_parts_changes_nothing(mesh, table, folder):
     assert_same(table, jg.open_sweep(folder))
 
 
+def test_an_interruption_costs_a_small_share_of_a_sweep(mesh, table, tmp_path, monkeypatch):
+    """Without a size the parts are as small as the devices work well with; a resumed sweep keeps those that are there,
+    whatever its devices would like."""
+    sizes = {}
+    for batch in (4, 7):
+        monkeypatch.setattr("jaxgear.sweeps.run.side_by_side", lambda *_, batch=batch: batch)
+        assert_same(table, run(mesh, part_rows=None, output=tmp_path / "out"))
+        sizes[batch] = [path.name for path in parts_of(tmp_path / "out")]
+        parts_of(tmp_path / "out")[1].unlink()
+    assert sizes[4] == sizes[7] and len(sizes[4]) == -(-40 // (8 * len(jax.local_devices())))
+    assert 64 * _part_rows_of(10**6) >= 10**6 > 60 * _part_rows_of(10**6)
+    assert -(-20_000 // _part_rows_of(20_000)) == 64
+
+
+def _part_rows_of(variants):
+    """As a sweep of few variants side by side chooses them."""
+    from types import SimpleNamespace
+
+    from jaxgear.sweeps.run import _part_rows
+
+    made = SimpleNamespace(mesh_shape=lambda _: None, conditions=SimpleNamespace(count=1))
+    return _part_rows(made, None, variants, "not there")
+
+
 def test_a_design_is_traced_once_for_all_parts(mesh, table):
     before = sum(traced)
     assert before > 0 and len(run(mesh, torque=40.0, part_rows=5)) == len(table)

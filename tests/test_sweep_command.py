@@ -20,7 +20,7 @@ from commands import FREE, SWEEP, assert_refused, call
 from report_page import assert_row, check_report
 
 import jaxgear as jg
-from jaxgear.cli import devices, sweep_figures
+from jaxgear.cli import devices, progress, sweep_figures
 from jaxgear.cli import sweep as sweep_command
 from jaxgear.io import load_design, read_variants, sweep_request
 from jaxgear.sweeps import SweepTable, evaluate
@@ -176,6 +176,17 @@ def test_failed_variants_are_loud(folder, tmp_path, monkeypatch):
     result = sweep(tmp_path / "gear.toml", "-o", tmp_path / "out")
     assert result.code == 1 and "60 variants failed" in result.err
     assert len(jg.open_sweep(tmp_path / "out" / "table")) == 60
+
+
+def test_a_slow_sweep_tells_how_far_it_is_before_the_next_tenth(tmp_path, monkeypatch, capsys):
+    clock = [0.0]
+    monkeypatch.setattr(progress.time, "perf_counter", lambda: clock[0])
+    meter = progress.Meter(tmp_path)
+    for done in range(0, 6):
+        meter(done, 1000, None)
+        clock[0] += 20.0
+    lines = [line for line in capsys.readouterr().err.splitlines() if "of 1,000 variants" in line]
+    assert [line.split()[1] for line in lines] == ["2", "4"]
 
 
 def test_interrupted_while_drawing_it_says_what_is_there(folder, monkeypatch):

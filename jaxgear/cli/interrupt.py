@@ -1,8 +1,8 @@
-"""Ctrl-C: it always ends the command, and what the command then says of its files is true.
+"""Ctrl-C and SIGTERM: they always end the command, and what the command then says of its files is true.
 
-Python raises KeyboardInterrupt wherever it happens to be. In a callback that JAX or a destructor runs, the exception is
-printed and lost, and the command would go on; so it is kept in mind, raised again where that is safe, and asked for
-before anything is put in place.
+Either raises KeyboardInterrupt wherever Python happens to be. In a callback that JAX or a destructor runs, the
+exception is printed and lost, and the command would go on; so it is kept in mind, raised again where that is safe, and
+asked for before anything is put in place.
 """
 
 import _thread
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 NOTHING = "nothing was written"
+SIGNALS = signal.SIGINT, signal.SIGTERM  # of a person and of a job scheduler
 _SOON = 0.02  # seconds in which Python is out of the callback
 
 
@@ -22,10 +23,10 @@ _SOON = 0.02  # seconds in which Python is out of the callback
 class State:
     """What has happened in the command that runs."""
 
-    asked: bool = False  # Ctrl-C was pressed
+    asked: bool = False  # a signal came
     held: bool = False  # it has to wait
     written: str = NOTHING  # what is on the disk
-    before: Any = None  # what Ctrl-C did before `listening`, None where nothing listens
+    before: Any = None  # what the signals did before `listening`, None where nothing listens
 
 
 state = State()
@@ -33,31 +34,32 @@ state = State()
 
 @contextmanager
 def listening() -> Iterator[None]:
-    """Takes care of Ctrl-C for a block; nothing changes outside the main thread."""
+    """Takes care of both signals for a block; nothing changes outside the main thread."""
     state.asked, state.held, state.written, state.before = False, False, NOTHING, None
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    state.before, hook = signal.signal(signal.SIGINT, _interrupted), sys.unraisablehook
+    state.before, hook = [signal.signal(each, _interrupted) for each in SIGNALS], sys.unraisablehook
     sys.unraisablehook = _lost
     try:
         yield
     finally:
         sys.unraisablehook = hook
-        signal.signal(signal.SIGINT, state.before)
+        _restore()
 
 
 @contextmanager
 def importing() -> Iterator[None]:
-    """Lets Ctrl-C do in a block what it did before `listening`: an exception could be lost in a module that starts."""
+    """Lets both signals do in a block what they did before: an exception could be lost in a module that starts."""
     if state.before is None:
         yield
         return
-    signal.signal(signal.SIGINT, state.before)
+    _restore()
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, _interrupted)
+        for each in SIGNALS:
+            signal.signal(each, _interrupted)
 
 
 def note(written: str) -> None:
@@ -74,7 +76,7 @@ def check() -> None:
 
 @contextmanager
 def held(then: str) -> Iterator[None]:
-    """Lets Ctrl-C wait for the end of a block that must not be left half done; `then` is what is on the disk."""
+    """Lets both signals wait for the end of a block that must not be left half done; `then` is what is on the disk."""
     check()
     state.held = True
     try:
@@ -83,6 +85,11 @@ def held(then: str) -> Iterator[None]:
     finally:
         state.held = False
     check()
+
+
+def _restore() -> None:
+    for each, before in zip(SIGNALS, state.before):
+        signal.signal(each, before)
 
 
 def _interrupted(*_) -> None:

@@ -63,8 +63,7 @@ class Kept(Generic[_Found]):
                 self._write(path, found)
         self._done += 1
         of_all = "" if self._total is None else f" of {self._total}"
-        there = f"{self._done}{of_all} runs are kept in {self._folder}{os.sep}"
-        interrupt.note(f"{there}, go on with the same command")
+        _note(f"{self._done}{of_all}", self._folder)
         return found
 
     def _write(self, path: Path, found: _Found) -> None:
@@ -91,6 +90,19 @@ class Kept(Generic[_Found]):
 def runs_beside(target: Path) -> Path:
     """Where results are kept until those of a folder are there."""
     return target.with_name(f".{target.name}.runs")
+
+
+def note_runs(target: Path) -> None:
+    """Tells of the results that an interrupted command has kept for a folder, where there are any."""
+    folder = runs_beside(target)
+    with writing(folder):
+        there = sum(not path.name.startswith(".") for path in folder.iterdir()) if folder.is_dir() else 0
+    if there:
+        _note(str(there), folder)
+
+
+def _note(count: str, folder: Path) -> None:
+    interrupt.note(f"{count} runs are kept in {folder}{os.sep}, go on with the same command")
 
 
 def _digest(tree: Any) -> str:

@@ -1,4 +1,4 @@
-"""Starts the command `jaxgear`: listens to Ctrl-C before the imports, which take a second.
+"""Starts the command `jaxgear`: listens to Ctrl-C and SIGTERM before the imports, which take a second.
 
 Installed as a module beside the package (pyproject.toml), since whatever lies in a package imports all of it first.
 """
@@ -17,13 +17,16 @@ def main() -> None:
         os.write(2, b"jaxgear: interrupted, nothing was written\n")
         os._exit(_INTERRUPTED)
 
-    signal.signal(signal.SIGINT, leave)
+    signals = signal.SIGINT, signal.SIGTERM
+    for each in signals:
+        signal.signal(each, leave)
     from jaxgear.cli import main as command
 
     try:
         command()
     except SystemExit as end:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said and done
+        for each in signals:
+            signal.signal(each, signal.SIG_IGN)  # all is said and done
         if end.code == _INTERRUPTED:
             # a thread that still compiles would fall over what the interpreter takes down: a segmentation fault
             sys.stdout.flush()

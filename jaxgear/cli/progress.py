@@ -9,7 +9,8 @@ from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeE
 from ..io.folder import earlier
 from . import interrupt, report
 
-_LINES = 10  # of a sweep, where there is no terminal
+_LINES = 10  # of a sweep, where there is no terminal, and more
+_QUIET = 30.0  # seconds after which there is a line anyway
 
 
 class _Bar(Progress):
@@ -72,7 +73,7 @@ class Meter(_Bar):
         super().__init__(*columns, TimeRemainingColumn(), doing="", note="preparing")
         self.done: int | None = None
         self._target = target
-        self._first, self._since, self._lines = 0, self._began, 0
+        self._first, self._since, self._lines, self._said = 0, self._began, 0, self._began
 
     def __call__(self, done: int, total: int, best: float | None) -> None:
         if self.done is None:
@@ -84,8 +85,8 @@ class Meter(_Bar):
         interrupt.note(f"{there} are in {self._target}{os.sep}, resume with the same command")
         note = there + (f", {self.rate:,.0f}/s" if self.rate else "")
         self.update(self._task, completed=done, total=total, note=note)
-        if done * _LINES // total > self._lines:
-            self._lines = done * _LINES // total
+        if done * _LINES // total > self._lines or time.perf_counter() - self._said > _QUIET:
+            self._lines, self._said = done * _LINES // total, time.perf_counter()
             self._say(note)
 
     @property

@@ -14,6 +14,7 @@ from ..numerics import compile_quickly
 from . import interrupt, report
 from .commands import import_ahead
 from .document import Found, document
+from .kept import note_runs
 from .progress import Stages
 from .run import default_folder, opened
 
@@ -76,6 +77,7 @@ class StudyCommand(Generic[S]):
             omitted = "" if self.omits is None else self.omits(design)
             left_out = [line for line in (held, omitted) if line]
             target = output or default_folder(file, self.name, quick=quick)
+            note_runs(target)
             with ExitStack() as putting_in_place, result_folder(target) as folder:
                 stages.replaces(target)
                 if figures:

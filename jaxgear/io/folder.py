@@ -2,6 +2,8 @@
 
 import json
 import os
+import platform
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -64,7 +66,7 @@ def result_folder(target: str | Path) -> Iterator[Path]:
     """A temporary folder beside `target` that takes its place when the block ends without an exception.
 
     An earlier result in `target` is replaced. After an exception or an interruption nothing is left behind and an
-    earlier result is untouched.
+    earlier result is untouched. What a killed process left of the same target is removed by the next one.
 
     Args:
         target: folder of the results.
@@ -81,7 +83,9 @@ def result_folder(target: str | Path) -> Iterator[Path]:
     try:
         with writing(target):
             parent.mkdir(parents=True, exist_ok=True)
-            temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".tmp", dir=parent))
+            _remove_leftovers(parent, target)
+            mine = f".{target.name}.{_host()}-{os.getpid()}."
+            temporary = Path(tempfile.mkdtemp(prefix=mine, suffix=".tmp", dir=parent))
             yield temporary
             _replace(temporary, target)
     except BaseException:
@@ -101,6 +105,33 @@ def earlier(target: str | Path) -> str:
         return f"{str(held.get('title', 'no title'))!r}{load}, {figures} figures"
     except (OSError, ValueError, AttributeError):
         return ""
+
+
+def _remove_leftovers(parent: Path, target: Path) -> None:
+    """Removes temporary folders of a target whose process is gone; those of other machines nobody here can judge."""
+    named = re.compile(rf"\.{re.escape(target.name)}\.{re.escape(_host())}-(\d+)\.[^.]+\.tmp(\.earlier)?")
+    for path in parent.iterdir():
+        match = named.fullmatch(path.name)
+        # an earlier result that was being replaced is the only one until there is another
+        if match and not _is_alive(int(match[1])) and (match[2] is None or target.exists()):
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _host() -> str:
+    return re.sub(r"[^A-Za-z0-9_]", "_", platform.node())
+
+
+def _is_alive(process: int) -> bool:
+    """Whether a process of this machine runs; True where asking would end it."""
+    if os.name != "posix":
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OverflowError):  # somebody else's, or no number of a process
+        return True
+    return True
 
 
 @contextmanager

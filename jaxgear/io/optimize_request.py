@@ -45,6 +45,7 @@ _QUICK: Mapping[str, dict[str, Any]] = {
     "adam": {"starts": 4, "steps": 40},
     "lbfgs": {"starts": 4, "steps": 30},
     "genetic": {"population": 20, "generations": 10},
+    "binary_genetic": {"population": 20, "generations": 10},
     "cma_es": {"population": 8, "generations": 20},
     "differential_evolution": {"population": 20, "generations": 10},
     "factorial": {"levels": 3},

@@ -11,6 +11,7 @@ from .layout import Section, section_of
 
 Tables = dict[str, Any]
 
+_NUMBER = real()
 _NAMES = either(text(), list_of(text()), "a string or a list of strings")
 _SHARE = real(Number(low=0.0, high=1.0, open_low=True, open_high=True))
 _TABLES = list_of(table(), empty=True)

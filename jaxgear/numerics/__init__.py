@@ -26,6 +26,9 @@ from .fields import number as number
 from .fields import result as result
 from .fields import whole as whole
 from .frozen import Frozen as Frozen
+from .genetic import decoded as decoded
+from .genetic import next_generation as next_generation
+from .genetic import random_strings as random_strings
 from .leading import on_both as on_both
 from .leading import over_batch as over_batch
 from .limits import within_limits as within_limits

@@ -11,6 +11,7 @@ from .evolution import Genetic as Genetic
 from .factorial import Factorial as Factorial
 from .first_order import Adam as Adam
 from .free_form import free_form as free_form
+from .genetic import BinaryGenetic as BinaryGenetic
 from .goal import Constraint as Constraint
 from .iteration import iterate_from_low_pressure as iterate_from_low_pressure
 from .iteration import iterate_transmission_error as iterate_transmission_error

@@ -67,8 +67,7 @@ class Genetic(_Evolution):
     """Genetic algorithm with real genes (evosax.SimpleGA): uniform crossover, Gaussian mutation, the better half mates.
 
     The defaults are the population, the generations and the crossover rate of the genetic-algorithm study of the 19/48
-    pair, which coded its genes in bits; its mutation rate of one half per individual is a random search, so that
-    mutation shrinks here instead.
+    pair, whose own algorithm codes its genes in bits (`BinaryGenetic`). Mutation shrinks here over the generations.
 
     Attributes:
         crossover: share of the genes that come from the second parent.

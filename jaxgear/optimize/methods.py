@@ -5,6 +5,7 @@ from dataclasses import fields
 from .evolution import CMAES, DifferentialEvolution, Genetic
 from .factorial import Factorial
 from .first_order import Adam
+from .genetic import BinaryGenetic
 from .minimax import Minimax
 from .quasi_newton import LBFGS
 from .search import AbstractMethod
@@ -16,6 +17,7 @@ METHODS: dict[str, type[AbstractMethod]] = {
     "adam": Adam,
     "lbfgs": LBFGS,
     "genetic": Genetic,
+    "binary_genetic": BinaryGenetic,
     "cma_es": CMAES,
     "differential_evolution": DifferentialEvolution,
     "factorial": Factorial,

@@ -18,7 +18,7 @@ from .columns import CONVERGED, result_columns
 
 # A loop of one step is unrolled by the compiler and rounds differently: with two or more, the rows do not depend on how
 # many devices share them.
-_LEAST_STEPS = 2
+LEAST_STEPS = 2
 # Contact analyses up to which a program that is compiled in a third of the time, to run half as fast, is done sooner.
 FEW = 256
 
@@ -68,7 +68,7 @@ class Evaluator:
         self._devices = local_devices()
         mesh = variants.mesh_shape(example)
         batch = side_by_side(mesh, conditions.count)
-        steps = max(-(-rows // (batch * self._devices.size)), _LEAST_STEPS)
+        steps = max(-(-rows // (batch * self._devices.size)), LEAST_STEPS)
         self.capacity = steps * batch * self._devices.size
         arrays, rest = eqx.partition((variants, tuple(measures)), eqx.is_array)
         self._evaluate = _evaluate_few if few else _evaluate

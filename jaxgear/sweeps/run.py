@@ -16,17 +16,20 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..conditions import Conditions, Design, Parameters, Variants, check_used, label, variants
+from ..conditions.batches import side_by_side
 from ..contact import Mesh, solve
 from ..metrics import Quantity, quantities, quantity_of
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
 from ..tolerance import Tolerance
 from .columns import CONVERGED, VARIANT, Column, parameter_columns
-from .evaluate import FEW, Evaluator
+from .evaluate import FEW, LEAST_STEPS, Evaluator
 from .plan import AbstractPlan
-from .store import MANIFEST, Manifest, Store
+from .store import MANIFEST, Manifest, Store, load_manifest
 from .table import SweepTable, in_memory, open_sweep
 
-PART_ROWS = 2**17
+PART_ROWS = 2**17  # most variants of a part that nobody has asked for
+_PARTS = 64  # so many of a sweep: an interruption costs a small share of it
+_SHARED_ROWS = 1024  # least of a part where several processes, of any devices, have to agree
 _IN_FLIGHT = 2  # parts: one that the devices work on while the host writes the other
 _POLL = 0.2  # seconds between two looks for the parts of other processes
 
@@ -43,7 +46,7 @@ def sweep(
     tolerance: Tolerance | None = None,
     samples: int | None = None,
     seed: int = 0,
-    part_rows: int = PART_ROWS,
+    part_rows: int | None = None,
     title: str = "sweep",
     units: Mapping[str, str] | None = None,
     callback: Callback | None = None,
@@ -80,7 +83,9 @@ def sweep(
         tolerance: evaluates every variant with the same manufactured gears; None for the nominal design.
         samples: manufactured gears; None for 64 with a tolerance.
         seed: of the deviations.
-        part_rows: variants per file.
+        part_rows: variants per file, of which an interruption costs those under way; None for 64 files of at most
+            131072 variants and at least as many as the devices evaluate at once, or for those of the sweep that is
+            resumed. The rows do not depend on it.
         title: of the table.
         units: of the parameters, for the table.
         callback: called as callback(variants done, variants of this process, None) before the first part, when those of
@@ -94,7 +99,8 @@ def sweep(
         ValueError: for arguments out of range, unknown results, variables on which nothing depends, and an output
             folder that cannot be used or holds a sweep of other settings.
     """
-    whole("sweep", "part_rows", part_rows)
+    if part_rows is not None:
+        whole("sweep", "part_rows", part_rows)
     example = plan.rows(0, 1)[0]
     made = variants(
         "sweep",
@@ -112,6 +118,8 @@ def sweep(
     wanted = [quantity_of(of, "sweep") for of in results]
     joins = _measures(made.conditions, measures)
     few = plan.size * made.conditions.count <= FEW
+    if part_rows is None:
+        part_rows = _part_rows(made, example, plan.size, output)
     rows = min(part_rows, plan.size)
     evaluator = Evaluator(made, example, results=wanted, measures=joins, rows=rows, few=few)
     columns = _columns(plan, units or {}, evaluator)
@@ -135,6 +143,17 @@ def sweep(
     store = Store(output, manifest)
     _fill(evaluator, plan, store, callback)
     return open_sweep(output)
+
+
+def _part_rows(made: Variants, example: np.ndarray, variants: int, output: str | Path | None) -> int:
+    """Variants per part where nobody says: those of the sweep that is there, or of so many parts."""
+    if output is None:
+        return PART_ROWS
+    if (Path(output) / MANIFEST).is_file():
+        return int(load_manifest(Path(output)).settings["part_rows"])
+    batch = side_by_side(made.mesh_shape(example), made.conditions.count)
+    least = LEAST_STEPS * batch * len(jax.local_devices()) if jax.process_count() == 1 else _SHARED_ROWS
+    return min(max(-(-variants // _PARTS), least), PART_ROWS)
 
 
 def _fill(evaluator: Evaluator, plan: AbstractPlan, store: Store, callback: Callback | None) -> None:

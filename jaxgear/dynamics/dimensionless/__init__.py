@@ -2,7 +2,7 @@
 
 from_mesh (a pair's numbers) -> DimensionlessModel -> Oscillator, for every tool of `jaxgear.dynamics`
                                                   -> LoadedMean -> resonances in closed form
-                                                  -> settled_vibration -> dynamic_profile_modification
+                                                  -> settled_vibration -> dynamic_profile_modification -> tip_relief
 """
 
 from .clearance import PUBLISHED as PUBLISHED
@@ -24,7 +24,9 @@ from .optimum import dynamic_profile_modification as dynamic_profile_modificatio
 from .optimum import modification_table as modification_table
 from .optimum import operating_conditions as operating_conditions
 from .relief import CycleRelief as CycleRelief
+from .relief import cycle_relief as cycle_relief
 from .relief import largest_relief as largest_relief
+from .relief import tip_relief as tip_relief
 from .resonances import Backbone as Backbone
 from .resonances import Resonance as Resonance
 from .resonances import combination_forcing as combination_forcing

@@ -12,6 +12,7 @@ from jaxtyping import Array, Bool, Float
 
 from ...microgeometry import Linear, Polynomial, Power, Quadratic
 from ...numerics import Checked, check, concrete, kernel, real, result, spread, whole
+from ...numerics.genetic import decoded, next_generation, random_strings
 from .model import DimensionlessModel, with_relief
 from .relief import CycleRelief
 from .settle import _settle, at_rest
@@ -24,6 +25,8 @@ _LAST_SETTLING = 400  # cycles, of the amplitudes that are reported
 _POSITIONS = 128  # of the static curve
 _KICK = 0.5  # velocity over F_m of the second start, which finds a detached branch
 _STATIC_ITERATIONS = 300
+# Of the genetic algorithm: strings per generation and bits per number; probabilities of crossover and mutation.
+_POPULATION, _BITS, _CROSSOVER, _MUTATION = 40, 10, 0.5, 0.5
 _RATE, _LAST_RATE = 0.05, 0.02  # first step over the width of the bounds, and the last one over the first
 
 
@@ -91,14 +94,16 @@ def dynamic_profile_modification(
     free: Sequence[Free] = ("amount", "curve"),
     bounds: Mapping[str, tuple[Any, Any]] | None = None,
     iterations: int = 60,
+    method: Literal["adam", "genetic"] = "adam",
+    seed: int = 0,
 ) -> DynamicModification:
     """The coefficients of a relief that minimize the largest amplitude of a model at one frequency.
 
-    The amplitude is that of the study, half of the range of x in the settled vibration; its gradient is exact (implicit
-    function theorem of the periodic orbit) and is followed by Adam with projection onto the bounds, from four designs:
-    the given one, the static optimum, twice its numbers, and none as far as what is
-    free allows. The static optimum minimizes the range of x
-    at vanishing speed within the same parameters.
+    The amplitude is that of the study, half of the range of x in the settled vibration. Its gradient is exact (implicit
+    function theorem of the periodic orbit), and Adam follows it with projection onto the bounds, from four designs: the
+    given one, the static optimum, twice its numbers, and none as far as what is free allows. The study's genetic
+    algorithm needs no gradient; the best design that it meets competes with the same four. The static optimum minimizes
+    the range of x at vanishing speed within the same parameters.
 
     Without torque fluctuation and displacement a relief that keeps the static x constant keeps x constant at every
     speed: then static and dynamic optimum are the same, but for a parametric instability about it. Beyond the clearance
@@ -112,10 +117,15 @@ def dynamic_profile_modification(
         bounds: of each; None or left out for `amount` 0 to 4 F_m [half clearances], `length` from a fifth of contact
             ratio - 1 to half of the contact ratio, `curve` 0.5 to 4 for an exponent and -4 to 4 for coefficients, of a
             polynomial all but b_0, which stays. A bound of a curve may be a list, one number per coefficient.
-        iterations: steps of Adam.
+        iterations: steps of Adam, or generations of 40 designs.
+        method: "adam" or "genetic", of bit strings.
+        seed: of the random numbers of "genetic".
     """
     check("dynamic_profile_modification", "frequency", frequency, "", low=0.0, open_low=True)
     whole("dynamic_profile_modification", "iterations", iterations)
+    if method not in ("adam", "genetic"):
+        raise ValueError(f'dynamic_profile_modification: method = {method!r} must be "adam" or "genetic"')
+    whole("dynamic_profile_modification", "seed", seed, 0)
     names = tuple(free)
     if not names or set(names) - {"amount", "length", "curve"}:
         raise ValueError(f'dynamic_profile_modification: free = {names!r} must name "amount", "length" or "curve"')
@@ -128,7 +138,10 @@ def dynamic_profile_modification(
     further = jnp.clip(2 * static, 0.0, 1.0)
     none_free = jnp.clip(-low / width, 0.0, 1.0)  # no relief, where the free numbers reach it
     starts = jnp.stack([unit, static, further, none_free])
-    ends = _dynamic_search(model, relief, names, low, high, at, starts, iterations)
+    if method == "adam":
+        ends = _dynamic_search(model, relief, names, low, high, at, starts, iterations)
+    else:
+        ends = _genetic_search(model, relief, names, low, high, at, jax.random.key(seed), iterations)[None]
     # near a threshold vibrations settle slowly: who wins is decided after many more cycles than the search takes
     candidates = jnp.concatenate([ends, starts])
     last = [_amplitude(model, _made(relief, names, low + width * x), at, _LAST_SETTLING)[0] for x in candidates]
@@ -236,6 +249,30 @@ def _dynamic_search(model, relief, free, low, high, frequency, units, iterations
         return _amplitude(model, _made(relief, free, low + (high - low) * x), frequency)[0]
 
     return jax.vmap(lambda unit: _adam(value, unit, iterations)[0])(units)
+
+
+@kernel
+def _genetic_search(model, relief, free, low, high, frequency, key, generations):
+    """The best point of the unit box that generations of bit strings meet; the fitness is 1 / amplitude."""
+
+    def value(x):
+        return _amplitude(model, _made(relief, free, low + (high - low) * x), frequency)[0]
+
+    def step(carry, key):
+        strings, best, least = carry
+        points = decoded(strings, _BITS).astype(low.dtype)
+        found = jax.vmap(value)(points)
+        found = jnp.where(jnp.isfinite(found), found, jnp.inf)
+        first = jnp.argmin(found)
+        best = jnp.where(found[first] < least, points[first], best)
+        strings = next_generation(key, strings, 1 / found, _CROSSOVER, _MUTATION)
+        return (strings, best, jnp.minimum(least, found[first])), None
+
+    begin, key = jax.random.split(key)
+    strings = random_strings(begin, _POPULATION, len(low), _BITS)
+    start = strings, jnp.full_like(low, 0.5), jnp.full((), jnp.inf, low.dtype)
+    (_, best, _), _ = jax.lax.scan(step, start, jax.random.split(key, generations))
+    return best
 
 
 def _adam(value, start, iterations: int):

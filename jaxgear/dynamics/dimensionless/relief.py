@@ -4,10 +4,13 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...microgeometry import AbstractCurve, Linear
+from ...geometry import GearPair, path_of_contact
+from ...microgeometry import AbstractCurve, Linear, TipRelief
 from ...numerics import Checked, check, concrete, number, real
 
 Scalar = Float[Array, ""]
+
+_SAME_RATIO = 1e-3  # by which two contact ratios may differ and still be those of one pair
 
 
 class CycleRelief(Checked):
@@ -61,6 +64,53 @@ class CycleRelief(Checked):
         """Mesh positions where the number of pairs changes [base pitches], in [0, 1)."""
         ends = jnp.stack([self.begin, self.begin + self.contact_ratio - 1])
         return ends - jnp.floor(ends)
+
+
+def cycle_relief(relief: TipRelief, pair: GearPair, half_clearance) -> CycleRelief:
+    """What one tip relief on both gears takes off the approach of their mesh.
+
+    Args:
+        relief: of either gear.
+        pair: pinion and wheel, with a contact ratio from 1 to 2.
+        half_clearance: b, half of the backlash on the line of action [um].
+
+    Raises:
+        ValueError: for a half clearance that is not positive, or a relief without length or longer than half of the
+            path of contact.
+    """
+    check("cycle_relief", "half_clearance", half_clearance, "um", low=0.0, open_low=True)
+    path = path_of_contact(pair)
+    # at mesh position 0 a pair touches at the pitch point, and one later it is a base pitch further on
+    begin = path.start / path.base_pitch
+    return CycleRelief(
+        relief.amount / real(half_clearance),
+        relief.length / path.base_pitch,
+        path.contact_ratio,
+        relief.curve,
+        begin - jnp.floor(begin),
+    )
+
+
+def tip_relief(relief: CycleRelief, pair: GearPair, half_clearance) -> TipRelief:
+    """The tip relief of either gear that takes a modification of the mesh cycle off its flanks.
+
+    The last step of a dynamic profile modification: the distance on the line of action is one of roll length, which
+    over the base radius is a roll angle (`manufacture.profile_trace` tabulates the flank over either).
+
+    Args:
+        relief: C, as `dynamic_profile_modification` finds it.
+        pair: pinion and wheel that it was found for.
+        half_clearance: b, half of the backlash on the line of action [um].
+
+    Raises:
+        ValueError: for a half clearance that is not positive, or another contact ratio than that of the pair.
+    """
+    check("tip_relief", "half_clearance", half_clearance, "um", low=0.0, open_low=True)
+    path = path_of_contact(pair)
+    ratio, own = concrete(relief.contact_ratio), concrete(path.contact_ratio)
+    if ratio is not None and own is not None and abs(ratio - own) > _SAME_RATIO:
+        raise ValueError(f"tip_relief: contact_ratio = {ratio:.4g} of the relief must be that of the pair, {own:.4g}")
+    return TipRelief(relief.amount * real(half_clearance), relief.length * path.base_pitch, relief.curve)
 
 
 def largest_relief(load, torque_fluctuation, displacement, least_stiffness) -> Scalar:
