@@ -32,8 +32,8 @@ SMOOTH = (
     "contact goes on beyond the path."
 )
 DETACHED = (
-    "The orbit of two mesh cycles at point 3 hangs together with no other below 5 kHz: it is found by a kick at the "
-    "highest speed."
+    "The orbit of two mesh cycles at point 3 hangs together with no other below 5 kHz: only flanks that are thrown "
+    "apart come to it."
 )
 RELIEVED = (
     "What jaxgear's relief leaves of the excitation no longer takes the flanks apart at 200 N m, so that no orbit with "

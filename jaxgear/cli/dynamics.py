@@ -61,7 +61,7 @@ def _study(
             runs = responses[name][torque] = {}
             for run in settings.run_names:
                 stages.count(done, total, f"{name}, {torque:g} N m, {run}")
-                made_of = oscillator, settings.mesh_frequencies, settings.kick
+                made_of = oscillator, settings.mesh_frequencies, settings.kick, settings.kicks
                 runs[run] = kept((made_of, run, steps), partial(settings.run, oscillator, run, steps=steps))
                 done += 1
     stages.begin("following the orbits of the unmodified design")

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from typing import Literal, NamedTuple
 
 import jax
@@ -25,6 +26,9 @@ ORDERS = tuple(half / 2 for half in range(1, 13))
 # Steps over a period of the approach's natural frequency and of the highest one, which no more than has to be stable,
 # and over a cycle: dynamic factor and rms are then within 0.1 % of those of many more.
 _STEPS_PER_PERIOD, _STEPS_PER_HIGHEST_PERIOD, _FEWEST_STEPS = 40, 8, 64
+# By how much the dynamic factor of another motion must be larger before it takes the place of the one carried on: two
+# records of one orbit differ by less.
+_STRONGER = 1e-3
 
 
 class _Sizes(NamedTuple):
@@ -51,6 +55,7 @@ def speed_sweep(
     most_periods: int = 4,
     points: int = 32,
     orders: Sequence[float] = ORDERS,
+    kicks: Sequence[float] = (),
 ) -> SpeedResponse:
     """Steady state at every mesh frequency, gone through upwards or downwards.
 
@@ -65,9 +70,8 @@ def speed_sweep(
         direction: "up" begins at the first, "down" at the last.
         start: coordinates and velocities at mesh position 0 at which the sweep begins, each of shape (coordinates,);
             None for the static equilibrium.
-        kick: dynamic factor, greater than 1, with which the flanks meet after they have been thrown apart, about
-            (`kick.kicked`). It finds orbits that hang together with no other, such as those of two mesh cycles below
-            twice the natural frequency: 3.1 does from 1.6 times of it on. None for no kick.
+        kick: dynamic factor, greater than 1, with which the flanks meet after they have been thrown apart before the
+            sweep begins, about (`kick.kicked`). None for no kick.
         carry: whether each speed begins with the state of the one before; otherwise each begins as the first one does.
         steps: of the integrator per mesh cycle, even, one number or one for each speed, each a divisor of the largest;
             None for as many as the natural frequencies need, which have to be known then: where the oscillator is being
@@ -78,6 +82,10 @@ def speed_sweep(
         most_periods: largest number of mesh cycles of an orbit that is looked for.
         points: mesh cycles that are recorded where no orbit was found, and Poincare points.
         orders: of the harmonics, multiples of the mesh frequency.
+        kicks: dynamic factors, at least 1, with which the flanks are thrown apart at every speed, besides the motion
+            that is carried on. The orbit with the largest dynamic factor of them all is recorded and carried on. They
+            find orbits that hang together with no other, such as those of two mesh cycles below twice the natural
+            frequency; `settings.KICKS` are such. Each takes as long as a sweep.
 
     Returns:
         the response; speeds in the order of `mesh_frequencies`.
@@ -91,6 +99,7 @@ def speed_sweep(
     sizes, limits = prepared(
         "speed_sweep", oscillator, frequencies, direction=direction, kick=kick, carry=carry, steps=steps,
         tolerance=tolerance, most_cycles=most_cycles, most_periods=most_periods, points=points, orders=orders,
+        kicks=kicks,
     )  # fmt: skip
     found = swept(oscillator, frequencies, start_of("speed_sweep", oscillator, start), limits, sizes)
     return dataclasses.replace(found, direction=direction)
@@ -148,11 +157,12 @@ class _Limits(NamedTuple):
     tolerance: Scalar
     most_cycles: Int[Array, ""]
     kick: Scalar
+    kicks: Float[Array, " kicks"]  # 1 for none
 
 
 def prepared(
     owner, oscillator, frequencies, *, direction="up", kick=None, carry=True, steps=None, tolerance=None,
-    most_cycles=500, most_periods=4, points=32, orders=ORDERS,
+    most_cycles=500, most_periods=4, points=32, orders=ORDERS, kicks=(),
 ) -> tuple[_Sizes, _Limits]:  # fmt: skip
     """Options of a sweep, checked: what is static and what is not."""
     if direction not in ("up", "down"):
@@ -162,9 +172,12 @@ def prepared(
     dtype = frequencies.dtype
     precision = float(jnp.finfo(dtype).eps)
     tolerance = real(precision**0.5 if tolerance is None else tolerance)
-    kick = real(1.0 if kick is None else kick)
+    kick, kicks = real(1.0 if kick is None else kick), real(kicks)
     check(owner, "tolerance", tolerance, "", low=precision, high=0.1)
     check(owner, "kick", kick, "", low=1.0)
+    if kicks.ndim != 1:
+        raise ValueError(f"{owner}: kicks has shape {kicks.shape}, must be a list of numbers")
+    check(owner, "kicks", kicks, "", low=1.0)
     orders = tuple(float(order) for order in np.atleast_1d(np.asarray(orders, float)))
     check(owner, "orders", np.asarray(orders), "", low=0.0, open_low=True)
     most_cycles = whole(owner, "most_cycles", most_cycles)
@@ -179,6 +192,7 @@ def prepared(
         tolerance.astype(dtype),
         jnp.asarray(most_cycles),
         kick.astype(dtype),
+        kicks.astype(dtype),
     )
 
 
@@ -219,6 +233,9 @@ def swept(
     rest, static = at_rest(oscillator, jnp.zeros((), frequencies.dtype)), static_force(oscillator)
     begin = (rest.coordinates, jnp.zeros_like(rest.coordinates)) if start is None else start
     kick = kick_of(oscillator, rest, limits.kick)
+    # the motion carried on, then the kicks; those that are none come last and are not gone through
+    factors = jnp.concatenate([jnp.ones(1, frequencies.dtype), -jnp.sort(-limits.kicks)])
+    starts = 1 + jnp.sum(limits.kicks > 1)
     cycle = cycle_of(oscillator, sizes.most_steps)
     waves = waves_of(jnp.asarray(sizes.orders, frequencies.dtype), cycle.nodes)
 
@@ -226,7 +243,24 @@ def swept(
         frequency, steps = speed
         first = kicked(oscillator, begin, kick, frequency) if sizes.fresh else y
         at = Speed(frequency, cycle, steps, sizes.most_steps)
-        found = _steady(oscillator, first, at, limits, sizes, static, waves)
+
+        def from_start(start):
+            return _steady(oscillator, start, at, limits, sizes, static, waves)
+
+        if not len(limits.kicks):
+            found = from_start(first)
+            return found.state, found
+
+        def stronger(number, best):
+            thrown = kicked(oscillator, begin, kick_of(oscillator, rest, factors[number]), frequency)
+            other = from_start(jax.tree.map(partial(jnp.where, number == 0), first, thrown))
+            most = (1 + _STRONGER) * best.numbers.dynamic_factor
+            better = (number == 0) | (other.period > 0) & (other.numbers.dynamic_factor > most)
+            return jax.tree.map(partial(jnp.where, better), other, best)
+
+        # in one loop, so that the motion at one speed is compiled once
+        nothing = jax.tree.map(lambda of: jnp.zeros(of.shape, of.dtype), jax.eval_shape(from_start, first))
+        found = jax.lax.fori_loop(0, starts, stronger, nothing)
         return found.state, found
 
     def turned(parts):
