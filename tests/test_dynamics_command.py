@@ -75,6 +75,7 @@ def test_the_command_writes_what_it_says(file, tmp_path):
             assert run["max_dynamic_factor"] == pytest.approx(factors.max(), rel=1e-6)
             assert run["at_dynamic_factor_Hz"] == pytest.approx(float(of_run[factors.argmax()]["mesh_frequency_Hz"]))
             assert (factors > 0.99).all()  # the mean of the force over an orbit is the static one
+            assert 1500.0 < run["natural_frequency_Hz"] < 3500.0
     worst = {name: max(run["max_dynamic_factor"] for run in data["runs"]) for name, data in summary["designs"].items()}
     assert 1 < worst["rule-based"] < worst["unmodified"]
     assert f"unmodified {worst['unmodified']:.3f}, rule-based {worst['rule-based']:.3f}" in out
@@ -104,8 +105,11 @@ def check_branches(summary, rows):
     "text, message",
     [
         ("", "dynamics: missing, nothing says at which speeds the pair runs"),
-        ("[dynamics]\n", "dynamics: needs either mesh_frequencies or speeds"),
-        (TABLE + "speeds = [1.0, 2.0]\n", "dynamics: needs either mesh_frequencies or speeds"),
+        ("[dynamics]\n", "dynamics: needs mesh_frequencies [Hz] or speeds [rpm]"),
+        (TABLE + "speeds = [1.0, 2.0]\n", "dynamics: mesh_frequencies and speeds are both given"),
+        (TABLE + "damping_ratio = 2.0\n", "dynamics.damping_ratio: 2 must be at least 0 and at most 1"),
+        (TABLE + "kick = 1e6\n", "dynamics.kick: 1e+06 must be at least 1 and at most 50"),
+        (TABLE.replace("[1500.0, 3500.0]", "[1.0, 8.0]"), "dynamics.steps: 64 must be at least"),
         (TABLE.replace("3500.0", "1000.0"), "dynamics.mesh_frequencies[1]: 1000 Hz must be greater than 1500 Hz"),
         (TABLE.replace("3500.0", '"fast"'), "dynamics.mesh_frequencies[1]: must be a number, not a string"),
         (TABLE.replace("[1.0]", "[1.0, 1.0]"), "dynamics.torque_factors: must all be different"),

@@ -180,6 +180,12 @@ def test_an_undamped_start_never_settles():
     assert not found.settled.any() and int(found.period[0]) == 0 and np.isfinite(found.dynamic_factor).all()
 
 
+def test_flanks_that_a_cycle_hardly_moves_are_not_settled():
+    """Far above any resonance flanks thrown apart do not come back within the cycles: the state repeats, falling."""
+    found = speed_sweep(rectangular(), 1e9 * SPEEDS, kick=3.0, steps=STEPS, most_cycles=10)
+    assert (found.dynamic_factor < 0.5).all() and not found.settled.any()
+
+
 def test_slow_run_up_follows_the_steady_states():
     found = run_up(rectangular(), first=0.8 * SPEEDS[-3], last=SPEEDS[-3], duration=3e4, samples=200, steps=128)
     assert float(found.time[-1]) == pytest.approx(3e4, rel=0.05)

@@ -20,7 +20,7 @@ from .from_contact import Model, force_and_mesh
 from .oscillator import Oscillator
 from .response import SpeedResponse
 from .runs import Run, design_runs, speed_runs
-from .speed_sweep import speed_sweep
+from .speed_sweep import MOST_KICK, speed_sweep
 from .steady import SteadyForce, SteadyNumbers, differentiable, steady_force
 from .systems import inertia_of, on_bearings, torsional
 
@@ -67,7 +67,7 @@ class Dynamics(Checked):
     """
 
     mesh_frequencies: Float[Array, " speeds"] = number("Hz", low=0.0, open_low=True, shape=("speeds",))
-    damping_ratio: Scalar | None = number("", low=0.0, optional=True, default=None)
+    damping_ratio: Scalar | None = number("", low=0.0, high=1.0, optional=True, default=None)
     damping: Scalar | None = number("N s/um", low=0.0, optional=True, default=None)
     pinion_inertia: Scalar | None = number("kg m2", low=0.0, open_low=True, optional=True, default=None)
     wheel_inertia: Scalar | None = number("kg m2", low=0.0, open_low=True, optional=True, default=None)
@@ -78,9 +78,11 @@ class Dynamics(Checked):
     wheel_bearing_damping: Bearing | None = number("N s/um", low=0.0, shape=_AXES, optional=True, default=None)
     model: Model = "map"
     positions: int = count(low=16, high=4096, default=128)
-    kick: Scalar | None = number("", low=1.0, optional=True, default=None)
+    kick: Scalar | None = number("", low=1.0, high=MOST_KICK, optional=True, default=None)
     steps: int | None = count(low=32, high=65_536, optional=True, default=None)
-    kicks: Float[Array, " kicks"] | None = number("", low=1.0, shape=("kicks",), optional=True, default=None)
+    kicks: Float[Array, " kicks"] | None = number(
+        "", low=1.0, high=MOST_KICK, shape=("kicks",), optional=True, default=None
+    )
 
     def check_together(self) -> None:
         if self.damping_ratio is not None and self.damping is not None:
