@@ -12,7 +12,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..contact import Mesh
-from ..dynamics import Branch, Oscillator, SpeedResponse
+from ..dynamics import Branch, Oscillator, SpeedResponse, inertia_of
 from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
 from .geometry import geometry
@@ -120,6 +120,7 @@ def verdict(study: Study) -> Iterator[str]:
     others = [f"{name} {value:.3f} ({100 * (value / first - 1):+.0f} %)" for name, value in list(worst.items())[1:]]
     yield f"worst dynamic factor over all torques and speeds: unmodified {first:.3f}, {', '.join(others)}"
     yield from _far_from_resonance(study)
+    yield from _bodies(study)
     aperiodic = sum(int(np.sum(np.asarray(response.period) == 0)) for *_, response in study.rows())
     total = sum(len(response.mesh_frequency) for *_, response in study.rows())
     if aperiodic:
@@ -135,6 +136,19 @@ def _far_from_resonance(study: Study) -> Iterator[str]:
             f"PLEASE CHECK: all speeds lie at {low:.3g} to {high:.3g} times the natural frequency of {natural:.4g} Hz; "
             "see dynamics.pinion_inertia [kg m2], wheel_inertia and the speeds"
         )
+
+
+def _bodies(study: Study) -> Iterator[str]:
+    """A line for gears whose bore is left open, which is another for the compliance than for the inertia."""
+    settings, pair = study.request.settings, study.design.pair()
+    given = ("pinion", pair.pinion, settings.pinion_inertia), ("wheel", pair.wheel, settings.wheel_inertia)
+    for name, gear, inertia in given:
+        if gear.bore_diameter is None and inertia is None:
+            yield (
+                f"{name}: no bore_diameter, the inertia is of a solid disc, {float(inertia_of(gear)):.3g} kg m2, and "
+                f"the compliance that of a bore of {2 * float(gear.bore_radius):.3g} mm; give bore_diameter or "
+                f"dynamics.{name}_inertia"
+            )
 
 
 def failures(study: Study) -> Iterator[str]:
@@ -206,9 +220,14 @@ def write_responses(path: Path, study: Study) -> None:
     """Every speed of every run as CSV."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["design", "torque_Nm", "speed", "mesh_frequency_Hz", *_COLUMNS.values()])
+        begin = "design", "torque_Nm", "speed", "mesh_frequency_Hz", "pinion_speed_rpm"
+        orders = next(study.rows())[-1].orders
+        writer.writerow([*begin, *_COLUMNS.values(), *(f"force_order_{order:g}_N" for order in orders)])
+        per_hertz = 60 / float(study.mesh.pair.pinion.teeth)
         for name, torque, run, response in study.rows():
             columns = [np.asarray(getattr(response, field)) for field in _COLUMNS]
+            columns += list(np.asarray(response.force_harmonics).T)
             for frequency, *values in zip(np.asarray(response.mesh_frequency), *columns):
                 numbers = [int(value) if value.dtype.kind in "ib" else f"{value:.7g}" for value in values]
-                writer.writerow([name, f"{torque:g}", run, f"{frequency:.7g}", *numbers])
+                speed = f"{frequency:.7g}", f"{frequency * per_hertz:.7g}"
+                writer.writerow([name, f"{torque:g}", run, *speed, *numbers])

@@ -26,7 +26,7 @@ ORDERS = tuple(half / 2 for half in range(1, 13))
 # Steps over a period of the approach's natural frequency and of the highest one, which no more than has to be stable,
 # and over a cycle: dynamic factor and rms are then within 0.1 % of those of many more.
 _STEPS_PER_PERIOD, _STEPS_PER_HIGHEST_PERIOD, _FEWEST_STEPS = 40, 8, 64
-# Below so many steps over a period of the highest frequency the method of order four diverges: 2 pi over its limit 2.83.
+# With fewer steps over a period of the highest frequency the method of order four diverges: 2 pi over its limit, 2.83
 STABLE_STEPS = 2.23
 # By how much the dynamic factor of another motion must be larger before it takes the place of the one carried on: two
 # records of one orbit differ by less.
