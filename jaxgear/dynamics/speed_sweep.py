@@ -14,8 +14,9 @@ from ..numerics import check, concrete, kernel, real, whole
 from .integrate import cycle_of
 from .kick import kick_of, kicked
 from .oscillator import Oscillator, State
-from .response import Numbers, SpeedResponse, no_sums, numbers_of, waves_of, with_cycle, with_step
-from .settling import Speed, settled
+from .recording import steady_state
+from .response import SpeedResponse, waves_of
+from .settling import Speed
 from .static import at_rest, natural_frequencies, static_force
 
 Scalar = Float[Array, ""]
@@ -31,10 +32,6 @@ STABLE_STEPS = 2.23
 # By how much the dynamic factor of another motion must be larger before it takes the place of the one carried on: two
 # records of one orbit differ by less.
 _STRONGER = 1e-3
-# Least dynamic factor of a steady motion: over an orbit the mesh force has the mean of the static one, but for a small
-# share where springs beside the mesh carry some of the load. A motion so slow beside the mesh that a cycle hardly moves
-# it repeats within any tolerance, and is not steady.
-_BALANCED = 0.99
 MOST_KICK = 50.0  # dynamic factor: many times those that are met
 
 
@@ -252,7 +249,7 @@ def swept(
         at = Speed(frequency, cycle, steps, sizes.most_steps)
 
         def from_start(start):
-            return _steady(oscillator, start, at, limits, sizes, static, waves)
+            return steady_state(oscillator, start, at, limits, sizes, static, waves)
 
         if not len(limits.kicks):
             found = from_start(first)
@@ -288,49 +285,3 @@ def swept(
         orders=sizes.orders,
         direction="up",
     )
-
-
-class _Found(NamedTuple):
-    numbers: Numbers
-    period: Int[Array, ""]
-    approach: Float[Array, " points"]
-    velocity: Float[Array, " points"]
-    state: State
-
-
-def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, static: Scalar, waves) -> _Found:
-    """Steady state at one speed, and its record."""
-    frequency = speed.frequency
-    y, period = settled(oscillator, y, speed, limits.tolerance, limits.most_cycles, sizes.most_periods)
-    orders = jnp.asarray(sizes.orders, frequency.dtype)
-    zero = jnp.zeros((), frequency.dtype)
-    origin = oscillator.approach(zero, y[0])
-    cycles = jnp.where(period > 0, period, sizes.points)
-
-    def on(carry):
-        return carry[0] < cycles
-
-    def recorded(carry):
-        cycle, y, sums, approaches, velocities = carry
-        q, v = oscillator.approach(zero, y[0]), oscillator.approach_rate(zero, y[1], frequency)
-        # an orbit's points repeat, so that there are as many for every speed
-        here = jnp.arange(sizes.points) % cycles == cycle
-        approaches, velocities = jnp.where(here, q, approaches), jnp.where(here, v, velocities)
-
-        def more(carry, step, nodes):
-            y, sums = carry
-            return with_step(sums, oscillator, y, step, frequency, waves=waves[nodes], origin=origin)
-
-        nothing = no_sums(orders)
-        begin = sums._replace(force=nothing.force, approach=nothing.approach)
-        y, of_cycle = speed.over_cycle(more, (y, begin))
-        sums = with_cycle(sums, of_cycle, cycle, orders)
-        return cycle + 1, y, sums, approaches, velocities
-
-    nothing = jnp.zeros(sizes.points, frequency.dtype)
-    begin = jnp.zeros_like(cycles), y, no_sums(orders), nothing, nothing
-    _, y, sums, approaches, velocities = jax.lax.while_loop(on, recorded, begin)
-    count = cycles.astype(frequency.dtype)
-    numbers = numbers_of(sums, frequency, cycles=count, orders=orders, origin=origin, static_force=static)
-    period = jnp.where(numbers.dynamic_factor > _BALANCED, period, 0)
-    return _Found(numbers, period, approaches, velocities, y)
