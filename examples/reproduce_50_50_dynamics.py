@@ -33,8 +33,8 @@ SMOOTH = (
     "contact goes on beyond the path."
 )
 DETACHED = (
-    "The orbit of two mesh cycles at point 3 hangs together with no other below 5 kHz: it is found by a kick at the "
-    "highest speed."
+    "The orbit of two mesh cycles at point 3 hangs together with no other below 5 kHz: only flanks that are thrown "
+    "apart come to it."
 )
 # key of the result, text, published value, unit, where the difference comes from
 LINES = [

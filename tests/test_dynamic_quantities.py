@@ -10,7 +10,7 @@ import pytest
 from catalogue import LINE, gear_pair
 
 import jaxgear as jg
-from jaxgear.dynamics import DYNAMIC_QUANTITIES, Dynamics
+from jaxgear.dynamics import DYNAMIC_QUANTITIES, KICKED, Dynamics
 from jaxgear.dynamics.runs import Run, design_runs
 from jaxgear.optimize.problem import make_problem
 
@@ -255,6 +255,7 @@ def test_a_cycle_without_its_mesh_is_refused(mesh):
         ({"pinion_bearing": [1.0, 2.0, 3.0], "wheel_bearing": [1.0, 2.0]}, "has 3 numbers, must be two"),
         ({"mesh_frequencies": [2000.0, 1000.0]}, "must increase"),
         ({"kick": 0.5}, "kick = 0.5 must be at least 1"),
+        ({"kick": 3.0, "kicks": [3.0]}, "kick and kicks are both given"),
         ({"model": "springs"}, "model = 'springs' must be \"map\""),
     ],
 )
@@ -267,3 +268,13 @@ def test_bad_settings_are_one_line(given, message):
 def test_no_kick_saves_a_run():
     assert SETTINGS.run_names == ("up", "down")
     assert dataclasses.replace(SETTINGS, kick=3.0).run_names == ("up", "down", "down, kicked")
+
+
+def test_kicks_without_a_size_find_two_cycles_of_a_relieved_pair(mesh):
+    """Which kicks of 2.5 meet, and one of 3.1 does not."""
+    settings = dataclasses.replace(SETTINGS, mesh_frequencies=[5000.0, 5200.0], damping_ratio=0.03, kick=None)
+    moving = settings.oscillator(mesh, TORQUE, pinion=jg.TipRelief(HEIGHT, 3.2), wheel=jg.TipRelief(HEIGHT, 3.2))
+    one_size = dataclasses.replace(settings, kicks=[3.1, 3.1, 3.1]).run(moving, KICKED)
+    assert (np.asarray(one_size.period) == 1).all() and float(one_size.dynamic_factor.max()) < 1.3
+    found = settings.run(moving, KICKED)
+    assert (np.asarray(found.period) == 2).all() and float(found.dynamic_factor.min()) > 2.5

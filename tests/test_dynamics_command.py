@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
@@ -12,6 +13,7 @@ from commands import LINE, call
 from report_page import check_report
 
 from jaxgear.cli import interrupt
+from jaxgear.cli.dynamics_report import _bodies, _far_from_resonance
 from jaxgear.cli.kept import Kept, SpeedResponses
 from jaxgear.dynamics import Oscillator, RectangularStiffness, SpeedResponse
 from jaxgear.io import DesignFileError, dynamics_request, load_design, sweep_request
@@ -75,6 +77,9 @@ def test_the_command_writes_what_it_says(file, tmp_path):
             assert run["max_dynamic_factor"] == pytest.approx(factors.max(), rel=1e-6)
             assert run["at_dynamic_factor_Hz"] == pytest.approx(float(of_run[factors.argmax()]["mesh_frequency_Hz"]))
             assert (factors > 0.99).all()  # the mean of the force over an orbit is the static one
+            assert 1500.0 < run["natural_frequency_Hz"] < 3500.0
+            assert all(float(row["force_order_1_N"]) > 0 for row in of_run)
+            assert float(of_run[0]["pinion_speed_rpm"]) == pytest.approx(1800.0)  # 50 teeth, 60 s
     worst = {name: max(run["max_dynamic_factor"] for run in data["runs"]) for name, data in summary["designs"].items()}
     assert 1 < worst["rule-based"] < worst["unmodified"]
     assert f"unmodified {worst['unmodified']:.3f}, rule-based {worst['rule-based']:.3f}" in out
@@ -104,8 +109,11 @@ def check_branches(summary, rows):
     "text, message",
     [
         ("", "dynamics: missing, nothing says at which speeds the pair runs"),
-        ("[dynamics]\n", "dynamics: needs either mesh_frequencies or speeds"),
-        (TABLE + "speeds = [1.0, 2.0]\n", "dynamics: needs either mesh_frequencies or speeds"),
+        ("[dynamics]\n", "dynamics: needs mesh_frequencies [Hz] or speeds [rpm]"),
+        (TABLE + "speeds = [1.0, 2.0]\n", "dynamics: mesh_frequencies and speeds are both given"),
+        (TABLE + "damping_ratio = 2.0\n", "dynamics.damping_ratio: 2 must be at least 0 and at most 1"),
+        (TABLE + "kick = 1e6\n", "dynamics.kick: 1e+06 must be at least 1 and at most 50"),
+        (TABLE.replace("[1500.0, 3500.0]", "[1.0, 8.0]"), "dynamics.steps: 64 must be at least"),
         (TABLE.replace("3500.0", "1000.0"), "dynamics.mesh_frequencies[1]: 1000 Hz must be greater than 1500 Hz"),
         (TABLE.replace("3500.0", '"fast"'), "dynamics.mesh_frequencies[1]: must be a number, not a string"),
         (TABLE.replace("[1.0]", "[1.0, 1.0]"), "dynamics.torque_factors: must all be different"),
@@ -122,6 +130,27 @@ def test_what_is_wrong_with_the_table_is_one_line(file, tmp_path, text, message)
     assert code == 2 and out == ""
     assert message in lines[-1] and lines[-1].startswith("jaxgear: error: ")
     assert not (tmp_path / "out").exists()
+
+
+def test_masses_that_cannot_resonate_and_bores_left_open_are_said(file):
+    """In one line each, from what a study holds."""
+    wanted = {
+        "bore_diameter = 40.0\n": "",
+        "pinion_inertia = 7.8e-3\n": "",
+        "wheel_inertia = 7.8e-3": "wheel_inertia = 450.0",
+    }
+    text = PAIR + TABLE
+    for old, new in wanted.items():
+        text = text.replace(old, new)
+    design = load_design(file(text))
+    request = dynamics_request(design)
+    study = SimpleNamespace(
+        design=design, request=request, torque=200.0, natural_frequencies={"unmodified": {200.0: 20.0}}
+    )
+    (far,), (bore,) = _far_from_resonance(study), _bodies(study)
+    assert "all speeds lie at 75 to 175 times the natural frequency of 20 Hz" in far and "pinion_inertia" in far
+    assert bore.startswith("pinion: no bore_diameter, the inertia is of a solid disc, 0.00")
+    assert "a bore of 71.2 mm" in bore
 
 
 def test_speeds_of_the_pinion_are_mesh_frequencies(file):

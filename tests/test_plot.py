@@ -387,6 +387,17 @@ assert not changed, changed
     subprocess.run([sys.executable, "-c", program], check=True, timeout=300)
 
 
+@pytest.mark.parametrize("draw", [lambda runs: plot.speed_response({"unmodified": runs}), plot.bifurcation])
+def test_kicked_runs_are_told_from_falling_ones(draw):
+    at = np.linspace(500.0, 5000.0, 3)
+    numbers = {"mesh_frequency": at, "dynamic_factor": at / 500.0, "poincare_approach": at[:, None]}
+    response = SimpleNamespace(direction="down", **numbers)
+    ax = draw({"rising": response, "falling": response, "falling, kicked": response})
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert {"speed rising", "speed falling", "speed falling, kicked"} <= set(labels)
+    plt.close(ax.figure)
+
+
 def test_shared_axes_of_speed_responses_show_all_curves():
     frequency = np.linspace(500.0, 5000.0, 10)
     figure, both = plt.subplots(1, 2, sharey=True)

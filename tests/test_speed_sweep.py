@@ -9,19 +9,20 @@ import numpy as np
 import pytest
 from oscillators import DEAD_ZONE, MORE_DAMPED, RECTANGULAR, dead_zone_on_a_moving_base, rectangular
 
-from jaxgear.dynamics import DeadZone, Dynamics, run_up, speed_sweep, speed_sweeps, steps_for
+from jaxgear.dynamics import DeadZone, run_up, speed_sweep, speed_sweeps, steps_for
 from jaxgear.dynamics.runs import Run, speed_runs
+from jaxgear.dynamics.settings import KICKS
 
 STEPS = 512  # of every sweep here but those that reach the printed digits, so that there is one program
 SHARPER = 4096  # for six digits: contact is lost within a step, which leaves an error of the square of its length
 OMEGA = np.array(sorted({known.omega for known in RECTANGULAR} - {2.0}))  # where a way up or down ends on one of them
-USUAL = float(Dynamics([1.0]).kick)
 SPEEDS = OMEGA / (2 * np.pi)
 
 
 @cache
-def swept(direction="up", kick=None, carry=True, steps=STEPS):
-    return speed_sweep(rectangular(), SPEEDS, direction=direction, kick=kick, carry=carry, steps=steps)
+def swept(direction="up", kick=None, carry=True, steps=STEPS, kicks=()):
+    options = {"direction": direction, "kick": kick, "carry": carry, "steps": steps, "kicks": kicks}
+    return speed_sweep(rectangular(), SPEEDS, **options)
 
 
 def loaded(load):
@@ -66,7 +67,7 @@ def test_the_way_down_stays_on_the_upper_branch_until_its_fold():
 
 
 def test_a_kick_finds_the_orbit_of_two_cycles():
-    at_rest, kicked = (swept("up", kick, carry=False) for kick in (None, USUAL))
+    at_rest, kicked = (swept("up", carry=False, kicks=kicks) for kicks in ((1.0,) * len(KICKS), KICKS))
     i = list(OMEGA).index(1.7)
     assert (int(at_rest.period[i]), int(kicked.period[i])) == (1, 2)
     assert float(kicked.dynamic_factor[i]) == pytest.approx(4.168459, abs=1e-5)
@@ -76,9 +77,10 @@ def test_a_kick_finds_the_orbit_of_two_cycles():
 
 
 def test_runs_in_one_program_are_those_of_one_each():
-    runs = {"up": Run("up"), "down": Run("down"), "kicked": Run("down", 4.5)}
+    runs = {"up": Run("up"), "down": Run("down"), "kicked": Run("down", 4.5), "kicks": Run("down", None, KICKS)}
     found = speed_runs(rectangular(), SPEEDS, runs, steps=STEPS)
-    for name, alone in (("up", swept("up")), ("down", swept("down")), ("kicked", swept("down", 4.5))):
+    kicks = swept("down", kicks=KICKS)
+    for name, alone in (("up", swept("up")), ("down", swept("down")), ("kicked", swept("down", 4.5)), ("kicks", kicks)):
         assert found[name].direction == alone.direction
         assert jax.tree.all(jax.tree.map(lambda a, b: jnp.allclose(a, b, rtol=1e-9), found[name], alone))
     assert found["up"].dynamic_factor[3] < found["down"].dynamic_factor[3]
@@ -178,6 +180,12 @@ def test_an_undamped_start_never_settles():
     assert not found.settled.any() and int(found.period[0]) == 0 and np.isfinite(found.dynamic_factor).all()
 
 
+def test_flanks_that_a_cycle_hardly_moves_are_not_settled():
+    """Far above any resonance flanks thrown apart do not come back within the cycles: the state repeats, falling."""
+    found = speed_sweep(rectangular(), 1e9 * SPEEDS, kick=3.0, steps=STEPS, most_cycles=10)
+    assert (found.dynamic_factor < 0.5).all() and not found.settled.any()
+
+
 def test_slow_run_up_follows_the_steady_states():
     found = run_up(rectangular(), first=0.8 * SPEEDS[-3], last=SPEEDS[-3], duration=3e4, samples=200, steps=128)
     assert float(found.time[-1]) == pytest.approx(3e4, rel=0.05)
@@ -194,6 +202,8 @@ def test_slow_run_up_follows_the_steady_states():
         ({"mesh_frequencies": [2.0, 1.0]}, "must increase"),
         ({"direction": "sideways"}, "direction = 'sideways' must be"),
         ({"kick": 0.5}, "kick = 0.5 must be at least 1"),
+        ({"kicks": [2.0, 0.5]}, "kicks = .*0.5 must be at least 1"),
+        ({"kicks": 3.0}, "kicks has shape"),
         ({"steps": 9}, "steps = 9 must be even"),
         ({"steps": [8, 8]}, "must have one for each of 1 speeds"),
         ({"tolerance": 1.0}, "tolerance = 1 must be"),

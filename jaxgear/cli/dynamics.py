@@ -1,5 +1,6 @@
 """The command `jaxgear dynamics`: from a design file to the vibration of its designs over the speed."""
 
+import math
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -8,8 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..contact import Mesh
-from ..dynamics import Dynamics, Oscillator, steps_for
-from ..io import DesignFile, DynamicsRequest, dynamics_request
+from ..dynamics import Dynamics, Oscillator, natural_frequencies, steps_for
+from ..dynamics.speed_sweep import STABLE_STEPS
+from ..dynamics.static import Natural
+from ..io import DesignFile, DesignFileError, DynamicsRequest, dynamics_request
+from ..io.errors import naming
 from . import dynamics_figures, dynamics_report, manufactured
 from .compared import Modifications, compared, search_of
 from .dynamics_branches import branches_of
@@ -51,7 +55,12 @@ def _study(
         oscillators[name] = {
             torque: settings.oscillator(mesh, torque, pinion=pinion, wheel=wheel) for torque in request.torques
         }
-    steps = _steps(settings, oscillators)
+    natural = {
+        name: {torque: natural_frequencies(one) for torque, one in several.items()}
+        for name, several in oscillators.items()
+    }
+    with naming(design.path):
+        steps = _steps(settings, oscillators, natural)
     stages.begin("running through the speeds")
     responses: dict[str, dict[float, dict[str, Any]]] = {}
     total, done = _count(designs, request), 0
@@ -61,18 +70,32 @@ def _study(
             runs = responses[name][torque] = {}
             for run in settings.run_names:
                 stages.count(done, total, f"{name}, {torque:g} N m, {run}")
-                made_of = oscillator, settings.mesh_frequencies, settings.kick
+                made_of = oscillator, settings.mesh_frequencies, settings.kick, settings.kicks
                 runs[run] = kept((made_of, run, steps), partial(settings.run, oscillator, run, steps=steps))
                 done += 1
     stages.begin("following the orbits of the unmodified design")
     torque = next_to_design(design, request)
     branches = branches_of(oscillators["unmodified"][torque], responses["unmodified"][torque], steps)
-    return Study(design, request, mesh, designs, oscillators, responses, steps, tuple(branches))
+    frequencies = {
+        name: {torque: float(of.mesh) for torque, of in several.items()} for name, several in natural.items()
+    }
+    return Study(design, request, mesh, designs, oscillators, frequencies, responses, steps, tuple(branches))
 
 
-def _steps(settings: Dynamics, oscillators: Mapping[str, Mapping[float, Oscillator]]) -> tuple[int, ...]:
+def _steps(
+    settings: Dynamics,
+    oscillators: Mapping[str, Mapping[float, Oscillator]],
+    natural: Mapping[str, Mapping[float, Natural]],
+) -> tuple[int, ...]:
     """As many as the stiffest oscillator needs at every speed: one compiled program serves all."""
     if settings.steps is not None:
+        lowest = float(settings.mesh_frequencies[0])
+        highest = max(float(of.highest) for several in natural.values() for of in several.values())
+        fewest = math.ceil(STABLE_STEPS * highest / lowest)
+        if settings.steps < fewest:
+            at = f"{lowest:g} Hz and a natural frequency of {highest:.0f} Hz"
+            text = f"{settings.steps} must be at least {fewest} for {at}"
+            raise DesignFileError("dynamics.steps", f"{text}, with fewer the integration diverges")
         return (settings.steps,) * len(settings.mesh_frequencies)
     each = [steps_for(one, settings.mesh_frequencies) for several in oscillators.values() for one in several.values()]
     return tuple(int(count) for count in np.max(each, axis=0))

@@ -1,14 +1,16 @@
 """Pictures of a study of the vibration over the speed."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..dynamics import UP, Oscillator, SpeedResponse, motion
+from ..dynamics import DOWN, KICKED, UP, Oscillator, SpeedResponse, motion
 from . import report
 from .dynamics_report import Study, peak
 
+_RUNS = {UP: "rising", DOWN: "falling", KICKED: "falling, kicked"}
 _PANEL, _HEIGHT, _WIDE = 92.0, 84.0, 130.0  # [mm]
 
 
@@ -25,7 +27,7 @@ def write_figures(folder: Path, study: Study) -> list[Path]:
     for field in ("dynamic_factor", "approach_rms"):
         with plot.figure.report_axes(None, **size) as panels:
             for number, (panel, torque) in enumerate(zip(np.ravel(panels), torques)):
-                runs = {name: list(of[torque].values()) for name, of in study.responses.items()}
+                runs = {name: _called(of[torque]) for name, of in study.responses.items()}
                 plot.speed_response(runs, field, panel, title=f"{torque:g} N m")
                 panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
         axes[field] = panels
@@ -45,6 +47,11 @@ def write_figures(folder: Path, study: Study) -> list[Path]:
     return report.save_figures(folder, axes)
 
 
+def _called(runs: Mapping[str, SpeedResponse]) -> dict[str, SpeedResponse]:
+    """Runs by what figures say of them."""
+    return {_RUNS.get(name, name): response for name, response in runs.items()}
+
+
 def _draw(kind: str, panel, study: Study, name: str) -> None:
     from .. import plot
 
@@ -52,9 +59,13 @@ def _draw(kind: str, panel, study: Study, name: str) -> None:
     last = list(runs.values())[-1]
     title = f"{name}, {study.torque:g} N m"
     if kind == "waterfall":
-        plot.waterfall(last, "force", panel, title=title)
+        # one scale of colours for all panels; the means are not drawn
+        every = [list(of[study.torque].values())[-1] for of in study.responses.values()]
+        most = max(float(np.nanmax(np.asarray(of.force_harmonics)[:, np.asarray(of.orders) > 0])) for of in every)
+        plot.waterfall(last, "force", panel, title=f"{title}, {list(_called(runs))[-1]}", most=most)
     elif kind == "bifurcation":
-        plot.bifurcation([runs[UP], last], panel, title=title)
+        called = list(_called(runs).items())
+        plot.bifurcation(dict([called[0], called[-1]]), panel, title=title)
     else:
         worst = max(runs.values(), key=lambda response: peak(response, "dynamic_factor")[0])
         _portrait(panel, study, study.oscillators[name][study.torque], worst, name)

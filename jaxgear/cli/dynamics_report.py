@@ -12,7 +12,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..contact import Mesh
-from ..dynamics import Branch, Oscillator, SpeedResponse
+from ..dynamics import Branch, Oscillator, SpeedResponse, inertia_of
 from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
 from .geometry import geometry
@@ -31,6 +31,7 @@ _COLUMNS = {
 }
 
 
+_FAR = 20.0  # times the natural frequency, above which, or below its reciprocal, nothing of a mesh resonates
 ASSUMED = "Both gears are rigid masses that vibrate on the force of this contact, with the damping and bearings given."
 
 
@@ -44,6 +45,7 @@ class Study:
         mesh: on which the designs are compared.
         designs: their modifications (pinion, wheel) by name.
         oscillators: of every design, by torque [N m].
+        natural_frequencies: of the approach about the static one [Hz], of every design by torque [N m].
         responses: of every design, by torque [N m] and name of the run.
         steps: of the integrator per mesh cycle, at every speed.
         branches: of periodic orbits of the unmodified design, at `torque`.
@@ -54,6 +56,7 @@ class Study:
     mesh: Mesh
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]]
     oscillators: Mapping[str, Mapping[float, Oscillator]]
+    natural_frequencies: Mapping[str, Mapping[float, float]]
     responses: Mapping[str, Mapping[float, Mapping[str, SpeedResponse]]]
     steps: tuple[int, ...]
     branches: tuple[Branch, ...]
@@ -90,6 +93,7 @@ def table(study: Study) -> Table:
     result = Table(title=f"{study.design.title}: largest values over the speed", title_justify="left", box=SIMPLE_HEAD)
     result.add_column("design", no_wrap=True)
     result.add_column("torque [N m]", justify="right")
+    result.add_column("f_n [Hz]", justify="right", no_wrap=True)
     result.add_column("speed", no_wrap=True)
     for heading in ("K_v", "at [Hz]", "rms [um]", "at [Hz]", "no contact [%]"):
         result.add_column(heading, justify="right", no_wrap=True)
@@ -100,7 +104,8 @@ def table(study: Study) -> Table:
         (factor, at_factor), (rms, at_rms) = peak(response, "dynamic_factor"), peak(response, "approach_rms")
         apart = 100 * peak(response, "no_contact")[0]
         numbers = f"{factor:.3f}", f"{at_factor:.0f}", f"{rms:.2f}", f"{at_rms:.0f}", f"{apart:.1f}"
-        result.add_row(name, f"{torque:g}", run, *numbers)
+        natural = study.natural_frequencies[name][torque]
+        result.add_row(name, f"{torque:g}", f"{natural:.0f}", run, *numbers)
         before = name
     return result
 
@@ -114,10 +119,36 @@ def verdict(study: Study) -> Iterator[str]:
     first = next(iter(worst.values()))
     others = [f"{name} {value:.3f} ({100 * (value / first - 1):+.0f} %)" for name, value in list(worst.items())[1:]]
     yield f"worst dynamic factor over all torques and speeds: unmodified {first:.3f}, {', '.join(others)}"
+    yield from _far_from_resonance(study)
+    yield from _bodies(study)
     aperiodic = sum(int(np.sum(np.asarray(response.period) == 0)) for *_, response in study.rows())
     total = sum(len(response.mesh_frequency) for *_, response in study.rows())
     if aperiodic:
         yield f"no periodic motion was found at {aperiodic} of {total} speeds: their numbers are of a recorded time"
+
+
+def _far_from_resonance(study: Study) -> Iterator[str]:
+    """A line where every speed is far above or below what can resonate: then a mass is likely to be wrong."""
+    natural = study.natural_frequencies["unmodified"][study.torque]
+    low, high = (float(study.request.settings.mesh_frequencies[place]) / natural for place in (0, -1))
+    if low > _FAR or high < 1 / _FAR:
+        yield (
+            f"PLEASE CHECK: all speeds lie at {low:.3g} to {high:.3g} times the natural frequency of {natural:.4g} Hz; "
+            "see dynamics.pinion_inertia [kg m2], wheel_inertia and the speeds"
+        )
+
+
+def _bodies(study: Study) -> Iterator[str]:
+    """A line for gears whose bore is left open, which is another for the compliance than for the inertia."""
+    settings, pair = study.request.settings, study.design.pair()
+    given = ("pinion", pair.pinion, settings.pinion_inertia), ("wheel", pair.wheel, settings.wheel_inertia)
+    for name, gear, inertia in given:
+        if gear.bore_diameter is None and inertia is None:
+            yield (
+                f"{name}: no bore_diameter, the inertia is of a solid disc, {float(inertia_of(gear)):.3g} kg m2, and "
+                f"the compliance that of a bore of {2 * float(gear.bore_radius):.3g} mm; give bore_diameter or "
+                f"dynamics.{name}_inertia"
+            )
 
 
 def failures(study: Study) -> Iterator[str]:
@@ -139,7 +170,12 @@ def summary(study: Study) -> dict[str, Any]:
     designs: dict[str, Any] = {}
     for name, (pinion, wheel) in study.designs.items():
         runs = [
-            {"torque_Nm": torque, "speed": run, **_peaks(response)}
+            {
+                "torque_Nm": torque,
+                "speed": run,
+                "natural_frequency_Hz": study.natural_frequencies[name][torque],
+                **_peaks(response),
+            }
             for other, torque, run, response in study.rows()
             if other == name
         ]
@@ -184,9 +220,14 @@ def write_responses(path: Path, study: Study) -> None:
     """Every speed of every run as CSV."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["design", "torque_Nm", "speed", "mesh_frequency_Hz", *_COLUMNS.values()])
+        begin = "design", "torque_Nm", "speed", "mesh_frequency_Hz", "pinion_speed_rpm"
+        orders = next(study.rows())[-1].orders
+        writer.writerow([*begin, *_COLUMNS.values(), *(f"force_order_{order:g}_N" for order in orders)])
+        per_hertz = 60 / float(study.mesh.pair.pinion.teeth)
         for name, torque, run, response in study.rows():
             columns = [np.asarray(getattr(response, field)) for field in _COLUMNS]
+            columns += list(np.asarray(response.force_harmonics).T)
             for frequency, *values in zip(np.asarray(response.mesh_frequency), *columns):
                 numbers = [int(value) if value.dtype.kind in "ib" else f"{value:.7g}" for value in values]
-                writer.writerow([name, f"{torque:g}", run, f"{frequency:.7g}", *numbers])
+                speed = f"{frequency:.7g}", f"{frequency * per_hertz:.7g}"
+                writer.writerow([name, f"{torque:g}", run, *speed, *numbers])

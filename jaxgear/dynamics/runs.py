@@ -29,6 +29,7 @@ class Run(NamedTuple):
 
     direction: Direction = "up"
     kick: Any = None
+    kicks: Any = ()
 
 
 def speed_runs(oscillator: Oscillator, mesh_frequencies, runs: Mapping[str, Run], **options: Any) -> Responses:
@@ -105,7 +106,9 @@ def design_runs(
 
 def _prepared(owner: str, frequencies, runs: Mapping[str, Run], options: dict):
     """What is static in all runs, and numbers of each, with a leading axis (runs,)."""
-    each = [prepared(owner, None, frequencies, **run._asdict(), **options) for run in runs.values()]
+    most = max(len(run.kicks) for run in runs.values())
+    ways = [run._replace(kicks=(*run.kicks, *[1.0] * (most - len(run.kicks)))) for run in runs.values()]
+    each = [prepared(owner, None, frequencies, **run._asdict(), **options) for run in ways]
     return each[0][0], jax.tree.map(lambda *parts: jnp.stack(parts), *(limits for _, limits in each))
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from typing import Literal, NamedTuple
 
 import jax
@@ -13,8 +14,9 @@ from ..numerics import check, concrete, kernel, real, whole
 from .integrate import cycle_of
 from .kick import kick_of, kicked
 from .oscillator import Oscillator, State
-from .response import Numbers, SpeedResponse, no_sums, numbers_of, waves_of, with_cycle, with_step
-from .settling import Speed, settled
+from .recording import steady_state
+from .response import SpeedResponse, waves_of
+from .settling import Speed
 from .static import at_rest, natural_frequencies, static_force
 
 Scalar = Float[Array, ""]
@@ -25,6 +27,12 @@ ORDERS = tuple(half / 2 for half in range(1, 13))
 # Steps over a period of the approach's natural frequency and of the highest one, which no more than has to be stable,
 # and over a cycle: dynamic factor and rms are then within 0.1 % of those of many more.
 _STEPS_PER_PERIOD, _STEPS_PER_HIGHEST_PERIOD, _FEWEST_STEPS = 40, 8, 64
+# With fewer steps over a period of the highest frequency the method of order four diverges: 2 pi over its limit, 2.83
+STABLE_STEPS = 2.23
+# By how much the dynamic factor of another motion must be larger before it takes the place of the one carried on: two
+# records of one orbit differ by less.
+_STRONGER = 1e-3
+MOST_KICK = 50.0  # dynamic factor: many times those that are met
 
 
 class _Sizes(NamedTuple):
@@ -51,6 +59,7 @@ def speed_sweep(
     most_periods: int = 4,
     points: int = 32,
     orders: Sequence[float] = ORDERS,
+    kicks: Sequence[float] = (),
 ) -> SpeedResponse:
     """Steady state at every mesh frequency, gone through upwards or downwards.
 
@@ -65,9 +74,8 @@ def speed_sweep(
         direction: "up" begins at the first, "down" at the last.
         start: coordinates and velocities at mesh position 0 at which the sweep begins, each of shape (coordinates,);
             None for the static equilibrium.
-        kick: dynamic factor, greater than 1, with which the flanks meet after they have been thrown apart, about
-            (`kick.kicked`). It finds orbits that hang together with no other, such as those of two mesh cycles below
-            twice the natural frequency: 3.1 does from 1.6 times of it on. None for no kick.
+        kick: dynamic factor, greater than 1, with which the flanks meet after they have been thrown apart before the
+            sweep begins, about (`kick.kicked`). None for no kick.
         carry: whether each speed begins with the state of the one before; otherwise each begins as the first one does.
         steps: of the integrator per mesh cycle, even, one number or one for each speed, each a divisor of the largest;
             None for as many as the natural frequencies need, which have to be known then: where the oscillator is being
@@ -78,6 +86,10 @@ def speed_sweep(
         most_periods: largest number of mesh cycles of an orbit that is looked for.
         points: mesh cycles that are recorded where no orbit was found, and Poincare points.
         orders: of the harmonics, multiples of the mesh frequency.
+        kicks: dynamic factors, at least 1, with which the flanks are thrown apart at every speed, besides the motion
+            that is carried on. The orbit with the largest dynamic factor of them all is recorded and carried on. They
+            find orbits that hang together with no other, such as those of two mesh cycles below twice the natural
+            frequency; `settings.KICKS` are such. Each takes as long as a sweep.
 
     Returns:
         the response; speeds in the order of `mesh_frequencies`.
@@ -91,6 +103,7 @@ def speed_sweep(
     sizes, limits = prepared(
         "speed_sweep", oscillator, frequencies, direction=direction, kick=kick, carry=carry, steps=steps,
         tolerance=tolerance, most_cycles=most_cycles, most_periods=most_periods, points=points, orders=orders,
+        kicks=kicks,
     )  # fmt: skip
     found = swept(oscillator, frequencies, start_of("speed_sweep", oscillator, start), limits, sizes)
     return dataclasses.replace(found, direction=direction)
@@ -148,11 +161,12 @@ class _Limits(NamedTuple):
     tolerance: Scalar
     most_cycles: Int[Array, ""]
     kick: Scalar
+    kicks: Float[Array, " kicks"]  # 1 for none
 
 
 def prepared(
     owner, oscillator, frequencies, *, direction="up", kick=None, carry=True, steps=None, tolerance=None,
-    most_cycles=500, most_periods=4, points=32, orders=ORDERS,
+    most_cycles=500, most_periods=4, points=32, orders=ORDERS, kicks=(),
 ) -> tuple[_Sizes, _Limits]:  # fmt: skip
     """Options of a sweep, checked: what is static and what is not."""
     if direction not in ("up", "down"):
@@ -162,9 +176,12 @@ def prepared(
     dtype = frequencies.dtype
     precision = float(jnp.finfo(dtype).eps)
     tolerance = real(precision**0.5 if tolerance is None else tolerance)
-    kick = real(1.0 if kick is None else kick)
+    kick, kicks = real(1.0 if kick is None else kick), real(kicks)
     check(owner, "tolerance", tolerance, "", low=precision, high=0.1)
-    check(owner, "kick", kick, "", low=1.0)
+    check(owner, "kick", kick, "", low=1.0, high=MOST_KICK)
+    if kicks.ndim != 1:
+        raise ValueError(f"{owner}: kicks has shape {kicks.shape}, must be a list of numbers")
+    check(owner, "kicks", kicks, "", low=1.0, high=MOST_KICK)
     orders = tuple(float(order) for order in np.atleast_1d(np.asarray(orders, float)))
     check(owner, "orders", np.asarray(orders), "", low=0.0, open_low=True)
     most_cycles = whole(owner, "most_cycles", most_cycles)
@@ -179,6 +196,7 @@ def prepared(
         tolerance.astype(dtype),
         jnp.asarray(most_cycles),
         kick.astype(dtype),
+        kicks.astype(dtype),
     )
 
 
@@ -219,6 +237,9 @@ def swept(
     rest, static = at_rest(oscillator, jnp.zeros((), frequencies.dtype)), static_force(oscillator)
     begin = (rest.coordinates, jnp.zeros_like(rest.coordinates)) if start is None else start
     kick = kick_of(oscillator, rest, limits.kick)
+    # the motion carried on, then the kicks; those that are none come last and are not gone through
+    factors = jnp.concatenate([jnp.ones(1, frequencies.dtype), -jnp.sort(-limits.kicks)])
+    starts = 1 + jnp.sum(limits.kicks > 1)
     cycle = cycle_of(oscillator, sizes.most_steps)
     waves = waves_of(jnp.asarray(sizes.orders, frequencies.dtype), cycle.nodes)
 
@@ -226,7 +247,24 @@ def swept(
         frequency, steps = speed
         first = kicked(oscillator, begin, kick, frequency) if sizes.fresh else y
         at = Speed(frequency, cycle, steps, sizes.most_steps)
-        found = _steady(oscillator, first, at, limits, sizes, static, waves)
+
+        def from_start(start):
+            return steady_state(oscillator, start, at, limits, sizes, static, waves)
+
+        if not len(limits.kicks):
+            found = from_start(first)
+            return found.state, found
+
+        def stronger(number, best):
+            thrown = kicked(oscillator, begin, kick_of(oscillator, rest, factors[number]), frequency)
+            other = from_start(jax.tree.map(partial(jnp.where, number == 0), first, thrown))
+            most = (1 + _STRONGER) * best.numbers.dynamic_factor
+            better = (number == 0) | (other.period > 0) & (other.numbers.dynamic_factor > most)
+            return jax.tree.map(partial(jnp.where, better), other, best)
+
+        # in one loop, so that the motion at one speed is compiled once
+        nothing = jax.tree.map(lambda of: jnp.zeros(of.shape, of.dtype), jax.eval_shape(from_start, first))
+        found = jax.lax.fori_loop(0, starts, stronger, nothing)
         return found.state, found
 
     def turned(parts):
@@ -247,48 +285,3 @@ def swept(
         orders=sizes.orders,
         direction="up",
     )
-
-
-class _Found(NamedTuple):
-    numbers: Numbers
-    period: Int[Array, ""]
-    approach: Float[Array, " points"]
-    velocity: Float[Array, " points"]
-    state: State
-
-
-def _steady(oscillator, y, speed: Speed, limits: _Limits, sizes: _Sizes, static: Scalar, waves) -> _Found:
-    """Steady state at one speed, and its record."""
-    frequency = speed.frequency
-    y, period = settled(oscillator, y, speed, limits.tolerance, limits.most_cycles, sizes.most_periods)
-    orders = jnp.asarray(sizes.orders, frequency.dtype)
-    zero = jnp.zeros((), frequency.dtype)
-    origin = oscillator.approach(zero, y[0])
-    cycles = jnp.where(period > 0, period, sizes.points)
-
-    def on(carry):
-        return carry[0] < cycles
-
-    def recorded(carry):
-        cycle, y, sums, approaches, velocities = carry
-        q, v = oscillator.approach(zero, y[0]), oscillator.approach_rate(zero, y[1], frequency)
-        # an orbit's points repeat, so that there are as many for every speed
-        here = jnp.arange(sizes.points) % cycles == cycle
-        approaches, velocities = jnp.where(here, q, approaches), jnp.where(here, v, velocities)
-
-        def more(carry, step, nodes):
-            y, sums = carry
-            return with_step(sums, oscillator, y, step, frequency, waves=waves[nodes], origin=origin)
-
-        nothing = no_sums(orders)
-        begin = sums._replace(force=nothing.force, approach=nothing.approach)
-        y, of_cycle = speed.over_cycle(more, (y, begin))
-        sums = with_cycle(sums, of_cycle, cycle, orders)
-        return cycle + 1, y, sums, approaches, velocities
-
-    nothing = jnp.zeros(sizes.points, frequency.dtype)
-    begin = jnp.zeros_like(cycles), y, no_sums(orders), nothing, nothing
-    _, y, sums, approaches, velocities = jax.lax.while_loop(on, recorded, begin)
-    count = cycles.astype(frequency.dtype)
-    numbers = numbers_of(sums, frequency, cycles=count, orders=orders, origin=origin, static_force=static)
-    return _Found(numbers, period, approaches, velocities, y)

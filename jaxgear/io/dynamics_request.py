@@ -83,7 +83,9 @@ def _frequencies(design: DesignFile, section: DynamicsSection) -> tuple[float, f
     """Lowest and highest mesh frequency [Hz]."""
     given = [key for key in ("mesh_frequencies", "speeds") if getattr(section, key) is not None]
     if len(given) != 1:
-        raise DesignFileError("dynamics", "needs either mesh_frequencies or speeds")
+        both = "mesh_frequencies and speeds are both given, must be one of them"
+        missing = "needs mesh_frequencies [Hz] or speeds [rpm], the lowest and the highest of a range"
+        raise DesignFileError("dynamics", both if given else missing)
     low, high = getattr(section, given[0])
     increasing(f"dynamics.{given[0]}[1]", low, high, unit=" Hz" if given == ["mesh_frequencies"] else " rpm")
     if given == ["mesh_frequencies"]:

@@ -14,7 +14,8 @@ from .figure import GREY, legend_above, line_style, marker_style, report_axes
 FREQUENCY_LABEL = "mesh frequency [Hz]"
 _APPROACH_LABEL = "approach of the flanks [µm]"
 _RESPONSES = {"dynamic_factor": "dynamic factor $K_v$ [-]", "approach_rms": "rms of the approach [µm]"}
-_DIRECTIONS = {"up": "-", "down": (0, (4, 1.5))}
+_RUNS = ("-", (0, (4, 1.5)), (0, (1, 1)))  # lines of the runs of a design, in their order
+Runs = Mapping[str, SpeedResponse] | Sequence[SpeedResponse]  # by what a legend calls them, or by their directions
 _MARKS = 12  # on a curve
 _PAD, _LINE = 6.0, 13.0  # [pt] of a title over the Axes, and of a line of a legend between both
 _DECADES = 3.0  # of amplitudes that a spectrum shows
@@ -24,7 +25,7 @@ _BIFURCATIONS = {"fold": ("o", "#D55E00"), "flip": ("D", "#009E73"), "Neimark-Sa
 
 
 def speed_response(
-    responses: Mapping[str, Sequence[SpeedResponse]],
+    responses: Mapping[str, Runs],
     of: Literal["dynamic_factor", "approach_rms"] = "dynamic_factor",
     ax: Axes | None = None,
     *,
@@ -33,24 +34,25 @@ def speed_response(
     """A number of the steady states of several designs over the mesh frequency, speed rising and falling.
 
     Args:
-        responses: of every design, by its name: those of several runs, each with its direction.
+        responses: of every design, by its name: those of several runs, by what the legend says of each ("falling,
+            kicked"); in a sequence each has its direction.
         of: which number: the dynamic factor or the rms of the approach about its mean.
         ax: Axes to draw into; None for a new figure.
         title: over the Axes and the legend.
     """
-    seen: dict[str, None] = {}
+    seen: dict[str, Any] = {}
     with report_axes(ax) as ax:
         for index, (name, several) in enumerate(responses.items()):
             style = marker_style(index)
-            for number, response in enumerate(several):
+            for number, (run, response) in enumerate(_named(several)):
                 frequency = np.asarray(response.mesh_frequency)
                 every = max(len(frequency) // _MARKS, 1)
-                seen[response.direction] = None
-                dashes = {"linestyle": _DIRECTIONS[response.direction], "markevery": (index, every)}
+                line = seen.setdefault(run, _RUNS[len(seen) % len(_RUNS)])
+                dashes = {"linestyle": line, "markevery": (index, every)}
                 label = {"label": name} if number == 0 else {}
                 ax.plot(frequency, np.asarray(getattr(response, of)), **{**style, **dashes, **label})
-        for direction in seen if len(seen) > 1 else ():
-            ax.plot([], [], color=GREY, linestyle=_DIRECTIONS[direction], label=f"speed {_MOVES[direction]}")
+        for run, line in seen.items() if len(seen) > 1 else ():
+            ax.plot([], [], color=GREY, linestyle=line, label=f"speed {run}")
         _begin_at(ax, 1.0 if of == "dynamic_factor" else 0.0)
         ax.set(xlabel=FREQUENCY_LABEL, ylabel=_RESPONSES[of])
         _entitle(ax, title, legend_above(ax))
@@ -58,6 +60,12 @@ def speed_response(
 
 
 _MOVES = {"up": "rising", "down": "falling"}
+
+
+def _named(runs: Runs) -> list[tuple[str, SpeedResponse]]:
+    if isinstance(runs, Mapping):
+        return list(runs.items())
+    return [(_MOVES[response.direction], response) for response in runs]
 
 
 def _begin_at(ax: Axes, bottom: float) -> None:
@@ -68,7 +76,12 @@ def _begin_at(ax: Axes, bottom: float) -> None:
 
 
 def waterfall(
-    response: SpeedResponse, of: Literal["force", "velocity"] = "force", ax: Axes | None = None, *, title: str = ""
+    response: SpeedResponse,
+    of: Literal["force", "velocity"] = "force",
+    ax: Axes | None = None,
+    *,
+    title: str = "",
+    most: float | None = None,
 ) -> Axes:
     """Campbell diagram: amplitudes of the spectrum along the multiples of the mesh frequency, over the mesh frequency.
 
@@ -77,13 +90,15 @@ def waterfall(
         of: spectrum of the mesh force or of the velocity of approach.
         ax: Axes to draw into; None for a new figure.
         title: over the Axes and the legend.
+        most: amplitude at the upper end of the colours [N or mm/s], for Axes that are to be compared; None for the
+            largest of this response.
     """
     unit, scale = ("N", 1.0) if of == "force" else ("mm/s", 1e-3)
     frequency, orders = np.asarray(response.mesh_frequency), np.asarray(response.orders)
     amplitude = scale * np.asarray(getattr(response, f"{of}_harmonics"))
     varying = orders > 0
     orders, amplitude = orders[varying], amplitude[:, varying]
-    most = max(float(np.nanmax(amplitude)), np.finfo(float).tiny)
+    most = max(float(np.nanmax(amplitude)) if most is None else most, np.finfo(float).tiny)
     norm = LogNorm(most * 10**-_DECADES, most, clip=True)
     with report_axes(ax) as ax:
         for order, along in zip(orders, amplitude.T):
@@ -113,22 +128,22 @@ def _name_orders(ax: Axes, orders, highest: float) -> None:
             ax.annotate(f"{order:g}", (highest, order * highest), annotation_clip=False, **place)
 
 
-def bifurcation(responses: Sequence[SpeedResponse], ax: Axes | None = None, *, title: str = "") -> Axes:
+def bifurcation(responses: Runs, ax: Axes | None = None, *, title: str = "") -> Axes:
     """Bifurcation diagram: the approach once per mesh cycle over the mesh frequency.
 
     An orbit of one mesh cycle shows as one point, one of two as two, an aperiodic one as a cloud.
 
     Args:
-        responses: of one or several runs, each with its direction.
+        responses: of one or several runs, by what the legend says of each; in a sequence each has its direction.
         ax: Axes to draw into; None for a new figure.
         title: over the Axes and the legend.
     """
     with report_axes(ax) as ax:
-        for index, response in enumerate(responses):
+        for index, (run, response) in enumerate(_named(responses)):
             points = np.asarray(response.poincare_approach)
             frequency = np.broadcast_to(np.asarray(response.mesh_frequency)[:, None], points.shape)
             style = {"color": line_style(1 + index)["color"], "marker": "^v"[index % 2]}
-            label = f"speed {_MOVES[response.direction]}"
+            label = f"speed {run}"
             ax.plot(frequency.ravel(), points.ravel(), linestyle="", markersize=3.0, mew=0, label=label, **style)
         ax.set(xlabel=FREQUENCY_LABEL, ylabel="approach at mesh position 0 [µm]")
         _entitle(ax, title, legend_above(ax))
