@@ -376,19 +376,22 @@ def duty(torques, hours, speed):
 
 
 def test_damage_of_one_load_is_that_of_its_woehler_line():
-    """By hand: Hertz at the pitch point, ISO's root stress of the pinion at the outer point of single contact."""
+    """By hand: Hertz at the pitch point with Z_eps of ISO 6336-2 and Z_B, its root stress of the pinion."""
     torque, hours, speed = 100.0, 50.0, 600.0
     found = damage(flat(), duty([torque, 1.0, 0.0], [hours, 0.0, 0.0], speed), ENDURANCE, stations=STATIONS)
     line_load = 1e3 * torque / float(PINION.base_radius) / WIDTH
     radii = np.array([float(gear.pitch_radius) for gear in (PINION, WHEEL)]) * np.sin(np.deg2rad(20))
-    hertz = np.sqrt(line_load * 206e3 / (1 - 0.09) / 2 / np.pi / (radii.prod() / radii.sum()))
+    path = jg.path_of_contact(PAIR)
+    square = line_load * 206e3 / (1 - 0.09) / 2 / np.pi / (radii.prod() / radii.sum())
+    worse = float(path.reduced_radius(0.0) / path.reduced_radius(path.inner_single)), 1.0
+    assert worse[0] > 1.0  # Z_B; the outer point of single contact is not worse than the pitch point
+    hertz = np.sqrt(square * (4 - float(path.contact_ratio)) / 3 * np.array(worse))
     stress, root_stress, pitting, bending = (
         np.asarray(part)[..., 0] for part in (found.contact_stress, found.root_stress, found.pitting, found.bending)
     )
     np.testing.assert_allclose(stress, hertz, rtol=1e-9)
     cycles = 60 * hours * speed * np.array([1.0, 19 / 48])
     np.testing.assert_allclose(pitting, cycles / (5e7 * (1500.0 / hertz) ** 13.2), rtol=1e-9)
-    path = jg.path_of_contact(PAIR)
     factors = root_factors(PINION, path.pinion_roll_length(path.outer_single))
     root = line_load * np.cos(np.deg2rad(20)) / 3.0 * float(factors.form * factors.correction)
     np.testing.assert_allclose(root_stress[0], root, rtol=1e-9)
@@ -417,7 +420,7 @@ IDLE = [0.0, 120.0, 1.0], [5.0, 10.0, 0.0], 500.0
 def test_idle_loads_do_no_damage(bent):
     found = damage(bent, duty(*IDLE), ENDURANCE, stations=STATIONS)
     np.testing.assert_allclose(np.asarray(found.pitting)[:, [0, 2]], 0.0, atol=1e-100)
-    np.testing.assert_allclose(np.asarray(found.contact_stress)[0], 0.0, atol=1e-4)
+    np.testing.assert_allclose(np.asarray(found.contact_stress)[:, 0], 0.0, atol=1e-4)
     assert np.all(np.asarray(found.pitting)[:, 1] > 0) and 0 < float(found.life) < np.inf
 
 
