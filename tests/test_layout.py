@@ -260,7 +260,11 @@ def test_two_steps_keep_the_load_off_the_edges(layout):
     assert float(layout.after["statistical"].face_load_factor[0]) > 1.1  # what it costs without deviations
     np.testing.assert_allclose(layout.pinion.slope, layout.line.slope)
     np.testing.assert_allclose(layout.wheel.crowning, layout.further[1])
-    assert str(layout).count("*") == 8 + 1  # four cases of both kinds before step 2, and what the mark means
+    # unmodified flanks in the same cases, of which the first has no deviation
+    for of in layout.unmodified.values():
+        assert float(of.face_load_factor[0]) == pytest.approx(float(before), rel=1e-9)
+    edges = sum(int(of.edge_contact.sum()) for of in layout.unmodified.values())
+    assert str(layout).count("*") == edges + 8 + 1  # four cases of both kinds before step 2, and what the mark means
 
 
 def test_a_load_that_is_not_found_is_not_level(face):
@@ -292,13 +296,35 @@ def test_usual_shafts_raise_no_doubt_and_slips_of_a_unit_do(layout):
     bearings = {("radial stiffness", f'bearing "{name}"') for name in "CE"}
     moved = {("radial displacement in modules", f'bearing "{name}"') for name in "CE"}
     flank = {("K_Hbeta", "without modification"), ("slope and crowning in modules", "pinion")}
-    assert set(told) == bearings | moved | flank
+    # bearings that give way to every deviation leave nothing for the further crowning to save
+    idle = {("K_Hbeta of the worst case", "after step 2, tolerance deviations")}
+    assert set(told) == bearings | moved | flank | idle
     # nearly all of the load is on one of the stations
     few = told["K_Hbeta", "without modification"]
     assert few.value > 0.5 * STATIONS and few.limit.high == STATIONS / 4
     stiff = plausibility(layout, softened(5e5))
     assert {doubt.name for doubt in stiff} == {"radial stiffness", thick.name}
     assert str(stiff[0]).startswith('bearing "C", radial stiffness 5e+05 N/um is more than 2e+04 (')
+
+
+def test_crowning_that_costs_more_than_bending_raises_a_doubt():
+    """Of rigid axes, on which unmodified flanks carry evenly; the contact says the same, or worse."""
+    tolerance, lines = FlankLineTolerance(4.0, 2.0), (12.0, 12.0)
+    found = layout_flank_lines(rigid(), tolerance, torque=TORQUE, further=lines, stations=STATIONS)
+    (level, *_), (crowned, *_) = (of["tolerance"].face_load_factor for of in (found.unmodified, found.after))
+    assert float(level) == pytest.approx(1.0) and float(crowned) > 1.2 and float(found.needed) < 0.5 * sum(lines)
+    contact = {"unmodified": [1.176, 1.5], "step 1": [1.0, 1.45], "step 2": [1.856, 1.9]}
+    told = {(each.name, each.where): each for each in plausibility(found, rigid(), contact={"tolerance": contact})}
+    name, worst = "K_Hbeta without deviations", "K_Hbeta of the worst case"
+    of_contact = worst, "after step 2, tolerance deviations, contact analysis"
+    of_annex_e = worst, "after step 2, tolerance deviations"
+    assert set(told) == {(name, "after step 2"), (name, "after step 2, contact analysis"), of_annex_e, of_contact}
+    assert told[of_contact].limit.high == 1.45
+    assert str(told[name, "after step 2, contact analysis"]).startswith(
+        "after step 2, contact analysis, K_Hbeta without deviations 1.856 is more than 1.411 (more than 1.2 times that"
+    )
+    least = layout_flank_lines(rigid(), tolerance, torque=TORQUE, stations=STATIONS)
+    assert not plausibility(least, rigid(), contact={"tolerance": contact | {"step 2": [1.3, 1.4]}})
 
 
 def test_slips_that_the_load_does_not_show_raise_a_doubt(layout, monkeypatch):
@@ -470,9 +496,9 @@ def test_layout_for_a_duty_cycle_tells_relative_lives(bent):
     before, level, after = found.relative_life
     assert float(level) == 1.0 and float(before) < 0.9 and float(after) < 1.0
     # further crowning costs life where nothing deviates, and saves it in the worst case
-    np.testing.assert_allclose(found.lives["tolerance"][:, 0], [one.life for one in found.damage[1:]], rtol=1e-9)
-    uncrowned, crowned = found.worst_relative_life("tolerance")
-    assert float(uncrowned) < float(crowned) < float(after)
+    np.testing.assert_allclose(found.lives["tolerance"][:, 0], [one.life for one in found.damage], rtol=1e-9)
+    unmodified, uncrowned, crowned = found.worst_relative_life("tolerance")
+    assert float(unmodified) < float(uncrowned) < float(crowned) < float(after)
     # a life that is over before the hours are, and speeds of another unit
     worst = found.damage[-1]
     assert 0 < float(worst.largest) < 1

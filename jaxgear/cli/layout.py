@@ -25,7 +25,7 @@ from ..layout import (
 from ..numerics import real
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
 from . import layout_figures, layout_report, layout_tables, manufactured
-from .layout_study import STEPS, Study, designs, flank_lines
+from .layout_study import Study, designs, flank_lines
 from .progress import Stages
 from .run import coarse
 from .study_command import Make, StudyCommand
@@ -54,6 +54,7 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
     over_torque = _over_torque(request, next(iter(layouts.values())))
     meshes: dict[str, Mesh] = {}
     contacts: dict[str, dict[str, dict[str, float]]] = {}
+    cases: dict[str, dict[str, dict[str, np.ndarray]]] = {}
     factors: dict[str, dict[str, float]] = {}
     profiles: dict[str, ProfileLayout] = {}
     wanted = request.profile
@@ -67,14 +68,20 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
             stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
             meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
             if wanted.shafts:
-                contacts[name] = _contacts(request, mesh, layouts[name], profiles[name])
+                contacts[name], cases[name] = _contacts(request, mesh, layouts[name], profiles[name])
                 factors[name] = _factors(request, name, layouts[name], stations=size.slices)
     duty_cycle = request.options.get("duty_cycle")
     unusual = {
-        name: plausibility(layout, request.supports[name], duty_cycle=duty_cycle, profiles=profiles.get(name))
+        name: plausibility(
+            layout,
+            request.supports[name],
+            duty_cycle=duty_cycle,
+            profiles=profiles.get(name),
+            contact=cases.get(name),
+        )
         for name, layout in layouts.items()
     }
-    return Study(design, request, layouts, over_torque, meshes, contacts, factors, profiles, unusual)
+    return Study(design, request, layouts, over_torque, meshes, contacts, cases, factors, profiles, unusual)
 
 
 def _over_torque(request: LayoutRequest, layout: FlankLineLayout) -> dict[str, np.ndarray]:
@@ -89,17 +96,20 @@ def _over_torque(request: LayoutRequest, layout: FlankLineLayout) -> dict[str, n
 
 def _contacts(
     request: LayoutRequest, mesh: Mesh, layout: FlankLineLayout, profile: ProfileLayout
-) -> dict[str, dict[str, float]]:
-    """What the contact says of every step."""
-    first, second, last = STEPS
+) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, np.ndarray]]]:
+    """What the contact says of every step without deviations, and its K_Hbeta in the five cases by tolerance."""
     found = {}
-    for step in (first, second):
-        lines = flank_lines(layout)[step]
-        modifications = lines[0].modification, lines[1].modification
-        found[step] = flank_line_contact(mesh, request.profile_torque, modifications, kind=profile.kind)
-    for step, row in ((last, 0), ("step 3", profile.best)):
-        found[step] = {name: float(profile.table.column(name)[row]) for name in profile.table.results}
-    return found
+    cases: dict[str, dict[str, np.ndarray]] = {name: {} for name in request.tolerances}
+    deviations = np.concatenate([one.slopes for one in request.tolerances.values()])
+    for step, (pinion, wheel) in flank_lines(layout).items():
+        modifications = pinion.modification, wheel.modification
+        given = {"deviations": deviations, "kind": profile.kind}
+        all_cases = flank_line_contact(mesh, request.profile_torque, modifications, **given)
+        found[step] = {name: float(values[0]) for name, values in all_cases.items()}
+        for name, factors in zip(cases, all_cases["face_load_factor"].reshape(len(cases), -1)):
+            cases[name][step] = factors
+    found["step 3"] = {name: float(profile.table.column(name)[profile.best]) for name in profile.table.results}
+    return found, cases
 
 
 def _factors(request: LayoutRequest, name: str, layout: FlankLineLayout, *, stations: int) -> dict[str, float]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from . import report
-from .layout_study import Study
+from .layout_study import STEPS, Study
 
 _PANEL, _HEIGHT = 92.0, 90.0  # [mm]
 
@@ -21,16 +21,13 @@ def write_figures(folder: Path, study: Study) -> list[Path]:
     layout = study.main
     name = list(layout.after)[-1]
     axes: dict[str, Any] = {}
-    with plot.figure.report_axes(None, columns=2, width=2 * _PANEL, height=_HEIGHT) as panels:
-        for panel, of, title in zip(np.ravel(panels), (layout.before, layout.after), ("step 1", "step 2")):
+    with plot.figure.report_axes(None, columns=3, width=3 * _PANEL, height=_HEIGHT) as panels:
+        for panel, of, title in zip(np.ravel(panels), layout.cases, STEPS):
             plot.tolerance_line_load(of[name], panel, title=f"{title}, {name} deviations")
-        panels[1].set_ylabel("")
+        for panel in panels[1:]:
+            panel.set_ylabel("")
     axes["tolerance_cases"] = panels
-    shown = {
-        f"step {step}, {kind}": one
-        for step, of in enumerate((layout.before, layout.after), 1)
-        for kind, one in of.items()
-    }
+    shown = {f"{step}, {kind}": one for step, of in zip(STEPS, layout.cases) for kind, one in of.items()}
     axes["face_load_factors"] = plot.face_load_factors(shown)
     axes["face_load_over_torque"] = plot.face_load_over_torque(
         study.request.torques, study.over_torque, design_torque=study.design.torque
