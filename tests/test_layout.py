@@ -9,9 +9,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from catalogue import LINE
 from gearboxes import PINION, WHEEL, gearbox, two_stages
 
 import jaxgear as jg
+from jaxgear.contact.kinematics import kinematics
 from jaxgear.layout import (
     CASES,
     Endurance,
@@ -31,9 +33,11 @@ from jaxgear.layout import (
     longest_life,
     plausibility,
     tolerance_cases,
+    vary_profiles,
     without_housing,
 )
 from jaxgear.layout.life import damage_of, under_loads
+from jaxgear.metrics import removed_at
 from jaxgear.metrics.root_stress import root_factors
 from jaxgear.shafts import (
     Housing,
@@ -394,6 +398,29 @@ def test_crowning_grows_where_the_rule_does_not_suffice(face):
     np.testing.assert_allclose(given.further, given.needed * np.array([1.0, 2.0]) / 3.0)
     least = layout_flank_lines(face, tolerance, stations=STATIONS)
     np.testing.assert_allclose(least.further, 0.5 * given.needed)
+
+
+def test_flank_lines_are_varied_together_with_the_profiles(monkeypatch):
+    """All combinations, and the one chosen has the further slope and crowning on the wheel beside the tip relief."""
+    tried = {}
+
+    def table(design, plan, *, results, **others):
+        rows = np.asarray(plan.values)
+        tried.update({row: design(dict(zip(plan.names, row))) for row in map(tuple, rows)})
+        found = dict.fromkeys(results, np.ones(len(rows))) | dict(zip(plan.names, rows.T))
+        found["ppte"] = np.abs(rows - np.array([10.0, 5.0, -4.0, 3.0])).sum(axis=1)
+        return SimpleNamespace(column=found.get)
+
+    monkeypatch.setattr(importlib.import_module("jaxgear.layout.profiles"), "sweep", table)
+    mesh, lines = SimpleNamespace(pair=PAIR), (jg.LeadCrowning(1.0), jg.LeadSlope(2.0))
+    found = vary_profiles(mesh, TORQUE, lines, [0.0, 10.0], [5.0], slopes=[0.0, -4.0], crownings=[0.0, 3.0])
+    assert len(tried) == 1 + 2 * 2 * 2 and found.amounts == (10.0, 5.0) and found.further == (-4.0, 3.0)
+    side = kinematics(PAIR, jnp.zeros(()), LINE, "strain").sides[1]
+    ends = jnp.array([-0.5, 0.5]) * WIDTH  # at the pitch point, where a tip relief removes nothing
+    for wheel in (tried[10.0, 5.0, -4.0, 3.0][1], lines[1] + found.profiles[1]):
+        removed = removed_at(side, wheel, jnp.reshape(side.pitch_roll_length, (1,)), ends)
+        np.testing.assert_allclose(removed[:, 0], [-1.0 + 2.0 + 3.0, 1.0 - 2.0 + 3.0], atol=1e-9)
+    assert found.radar_variants()[1][1] == "10 and 5 µm, slope -4 µm, crowning +3 µm"
 
 
 def duty(torques, hours, speed):

@@ -175,7 +175,8 @@ def test_profiles_follow_the_flank_lines(file, tmp_path):
     assert "[tolerance] is not part" in done.err and "flank lines deviate by the limits of [layout]" in done.err
     names = {entry.name for entry in folder.iterdir()}
     figures = {"tolerance_cases.png", "face_load_factors.png", "face_load_over_torque.png", "shaft_deflection.png"}
-    figures |= {"radar.png"}
+    figures |= {"radar.png", "transmission_error.png", "load_sharing.png", "lead_chart.png"}
+    figures |= {"contact_pattern_unmodified.png", "contact_pattern_layout.png"}
     assert names == {"summary.json", "flanks.csv", "profiles.csv", *figures} and names <= RESULT_FILES
     found = json.loads((folder / "summary.json").read_text())
     assert found["quick"] and found["layouts"]["housing"]["face_load_factor"]["step_1"] < 1.01

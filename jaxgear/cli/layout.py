@@ -4,9 +4,10 @@ from functools import partial
 from pathlib import Path
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-from ..contact import Mesh, Resolution
+from ..contact import Mesh, MeshCycle, Resolution, solve
 from ..contact.kinematics import kinematics
 from ..io import DesignFile, LayoutRequest, layout_request, write_flanks
 from ..io.schema_shafts import ProfileSection
@@ -55,6 +56,7 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
     meshes: dict[str, Mesh] = {}
     contacts: dict[str, dict[str, dict[str, float]]] = {}
     cases: dict[str, dict[str, dict[str, np.ndarray]]] = {}
+    cycles: dict[str, MeshCycle] = {}
     factors: dict[str, dict[str, float]] = {}
     profiles: dict[str, ProfileLayout] = {}
     wanted = request.profile
@@ -69,6 +71,7 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
             meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
             if wanted.shafts:
                 contacts[name], cases[name] = _contacts(request, mesh, layouts[name], profiles[name])
+                cycles = cycles or _cycles(request, mesh, layouts[name], profiles[name])
                 factors[name] = _factors(request, name, layouts[name], stations=size.slices)
     duty_cycle = request.options.get("duty_cycle")
     unusual = {
@@ -81,7 +84,7 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
         )
         for name, layout in layouts.items()
     }
-    return Study(design, request, layouts, over_torque, meshes, contacts, cases, factors, profiles, unusual)
+    return Study(design, request, layouts, over_torque, meshes, contacts, cases, cycles, factors, profiles, unusual)
 
 
 def _over_torque(request: LayoutRequest, layout: FlankLineLayout) -> dict[str, np.ndarray]:
@@ -103,13 +106,28 @@ def _contacts(
     deviations = np.concatenate([one.slopes for one in request.tolerances.values()])
     for step, (pinion, wheel) in flank_lines(layout).items():
         modifications = pinion.modification, wheel.modification
-        given = {"deviations": deviations, "kind": profile.kind}
-        all_cases = flank_line_contact(mesh, request.profile_torque, modifications, **given)
+        all_cases = flank_line_contact(
+            mesh, request.profile_torque, modifications, deviations=deviations, kind=profile.kind
+        )
         found[step] = {name: float(values[0]) for name, values in all_cases.items()}
         for name, factors in zip(cases, all_cases["face_load_factor"].reshape(len(cases), -1)):
             cases[name][step] = factors
     found["step 3"] = {name: float(profile.table.column(name)[profile.best]) for name in profile.table.results}
     return found, cases
+
+
+def _cycles(
+    request: LayoutRequest, mesh: Mesh, layout: FlankLineLayout, profile: ProfileLayout
+) -> dict[str, MeshCycle]:
+    """The contact without modification and with all three steps."""
+    modified = tuple(line + own for line, own in zip(layout.modifications, profile.profiles))
+    # of zero amounts: one program serves both
+    nothing = jax.tree.map(jnp.zeros_like, modified)
+    torque = request.profile_torque
+    return {
+        name: solve(mesh, torque, pinion=pinion, wheel=wheel)
+        for name, (pinion, wheel) in (("unmodified", nothing), ("layout", modified))
+    }
 
 
 def _factors(request: LayoutRequest, name: str, layout: FlankLineLayout, *, stations: int) -> dict[str, float]:
@@ -142,6 +160,8 @@ def _profile(
         layout.modifications if wanted.shafts else left,
         wanted.pinion_amounts,
         wanted.wheel_amounts or wanted.pinion_amounts,
+        slopes=wanted.slopes or (0.0,),
+        crownings=wanted.crownings or (0.0,),
         kind="profile_crowning" if wanted.type == "profile_crowning" else "tip_relief",
         length=wanted.length,
         callback=lambda done, total, _: stages.count(done, total, "variants"),

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from . import report
-from .layout_study import STEPS, Study
+from .layout_study import STEPS, Study, designs
 
 _PANEL, _HEIGHT = 92.0, 90.0  # [mm]
 
 
 def write_figures(folder: Path, study: Study) -> list[Path]:
-    """Writes the figures of the cases, of K_Hbeta over the torque, of shafts and of profiles; gives the files."""
+    """Writes the figures of the cases, K_Hbeta over the torque, shafts, profiles and the contact; gives the files."""
     import matplotlib
 
     matplotlib.use("Agg")  # the command line never shows a window
@@ -33,6 +33,13 @@ def write_figures(folder: Path, study: Study) -> list[Path]:
         study.request.torques, study.over_torque, design_torque=study.design.torque
     )
     axes["shaft_deflection"] = plot.shaft_deflection(next(iter(study.request.supports.values())).gearbox)
+    if study.cycles:
+        axes["transmission_error"] = plot.transmission_error(study.cycles)
+        axes["load_sharing"] = plot.load_sharing(study.cycles)
+        for step, cycle in study.cycles.items():
+            axes[f"contact_pattern_{step}"] = plot.contact_pattern(cycle)
+        mesh = next(iter(study.meshes.values()))
+        axes["lead_chart"] = plot.lead_chart(mesh, designs(study))
     if study.profile is not None:
         rows, names = study.profile.radar_variants()
         results = ["ppte_um", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure_MPa"]

@@ -39,6 +39,9 @@ def _profile_verdict(study: Study, profile: ProfileLayout, where: str) -> Iterat
     first, second = profile.amounts
     torque = study.request.profile_torque
     yield f"step 3 at {torque:g} N m{where}: {words} {first:g} um on the pinion, {second:g} um on the wheel"
+    if any(profile.further):
+        slope, crowning = profile.further
+        yield f"  on top of the flank lines, over the common face: slope {slope:+g} um, crowning {crowning:+g} um"
     ratio = profile.table.column("effective_contact_ratio")
     yield (
         f"  PPTE {profile.change('ppte'):+.0f} %, loss {profile.change('mesh_loss_factor'):+.0f} %; effective contact "
@@ -179,6 +182,7 @@ def _profile(study: Study, profile: ProfileLayout) -> dict[str, Any]:
         "torque_Nm": study.request.profile_torque,
         "variants": len(profile.table),
         "amounts_um": profile.amounts,
+        "further_slope_and_crowning_um": profile.further,
         "contact_ratio": profile.contact_ratio,
         "unmodified": {name: column[0] for name, column in values.items()},
         "best": {name: column[profile.best] for name, column in values.items()},

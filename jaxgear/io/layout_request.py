@@ -146,6 +146,8 @@ def _profile(section: ProfileSection | None, quick: bool) -> ProfileSection | No
     amounts = {
         "pinion_amounts": section.pinion_amounts,
         "wheel_amounts": section.wheel_amounts or section.pinion_amounts,
+        "slopes": section.slopes or [0.0],
+        "crownings": section.crownings or [0.0],
     }
     for key, values in amounts.items():
         if len(set(values)) != len(values):

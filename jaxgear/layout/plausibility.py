@@ -71,6 +71,7 @@ LIMITS = {
 
 # K_Hbeta of the five cases by the names of tolerance and step
 ContactCases = Mapping[str, Mapping[str, np.ndarray]]
+_Factors = dict[str, list]  # of every step, by the deviations
 
 
 def plausibility(
@@ -120,8 +121,10 @@ def _of_load(layout: FlankLineLayout) -> Iterator[Doubt]:
 
 def _of_crowning(layout: FlankLineLayout, contact: ContactCases) -> Iterator[Doubt]:
     """What step 2 costs without deviations, and whether it saves anything in the worst case, by both analyses."""
-    by_annex_e = {f"{name} deviations": [of[name].face_load_factor for of in layout.cases] for name in layout.before}
-    by_contact = {
+    by_annex_e: _Factors = {
+        f"{name} deviations": [of[name].face_load_factor for of in layout.cases] for name in layout.before
+    }
+    by_contact: _Factors = {
         f"{name} deviations, contact analysis": [steps[step] for step in ("unmodified", "step 1", "step 2")]
         for name, steps in contact.items()
     }

@@ -161,10 +161,10 @@ def vary_profiles(
     table = sweep(design, plan, output=output, callback=callback, title="profile modifications", **given)
     theoretical = float(path_of_contact(mesh.pair).contact_ratio)
     best = _best(table, theoretical)
-    first, second, *further = rows[best]
+    first, second, slope, crowning = rows[best]
     on_pinion, on_wheel = (design.profile(real(amount)) for amount in (first, second))
-    if any(further):
-        on_wheel = FlankLine(*further).on(mesh.pair, "wheel").modification + on_wheel
+    if slope or crowning:
+        on_wheel = FlankLine(real(slope), real(crowning)).on(mesh.pair, "wheel").modification + on_wheel
     return ProfileLayout(kind, table, best, theoretical, (on_pinion, on_wheel))
 
 

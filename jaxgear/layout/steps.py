@@ -191,6 +191,9 @@ def layout_flank_lines(
     added = _further(needed, further)
     on_wheel, crowned = (each.on(face.pair, "wheel") for each in (line, line.crowned(jnp.sum(added))))
     steps = FlankLine(), on_wheel, crowned
+    unmodified, before, after = (
+        {name: tolerance_cases(face, one, wheel=wheel) for name, one in several.items()} for wheel in steps
+    )
     layout = FlankLineLayout(
         gear=gear,
         torque=face.torque,
@@ -204,10 +207,9 @@ def layout_flank_lines(
                 for one in steps[:2]
             ]
         ),
-        **{
-            field: {name: tolerance_cases(face, one, wheel=wheel) for name, one in several.items()}
-            for field, wheel in zip(("unmodified", "before", "after"), steps)
-        },
+        unmodified=unmodified,
+        before=before,
+        after=after,
     )
     if duty_cycle is None or endurance is None:
         return layout
