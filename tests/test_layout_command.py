@@ -138,9 +138,13 @@ def laid_out(path, folder):
         assert last and not any(main["step_2_cases"][case]["edge_contact"])
     assert f"{main['step_1']['slope_um']:.2f}" in done.out
     before, level, after = main["relative_life"]
-    assert main["torque_Nm"] == 150.0 and before < 0.9 and level == 1.0
-    uncrowned, crowned = main["worst_relative_life"]["maximum"]
-    assert uncrowned < crowned < after and "worst case of maximum deviations" in done.out
+    assert main["torque_Nm"] == 150.0 and before < 0.9 and level == pytest.approx(1.0, rel=1e-12)
+    unmodified, uncrowned, crowned = main["worst_relative_life"]["maximum"]
+    assert unmodified < uncrowned < crowned < after and "worst case of maximum deviations" in done.out
+    bare = main["unmodified_cases"]["maximum"]
+    assert bare["face_load_factor"][0] == pytest.approx(main["face_load_factor"]["unmodified"])
+    assert f"{max(bare['face_load_factor']):.3f}" in done.out and "unmodified / step 1 / step 2" in done.out
+    assert f"the least is {main['least_further_crowning_um']:.1f} um" in done.out
     assert min(main["step_2_cases"]["maximum"]["life_h"]) == pytest.approx(crowned * main["life_h"][1])
     factor = main["face_load_factor"]["unmodified"]
     assert 1 < main["root_face_load_factor"]["unmodified"] < factor and "K_Fbeta, worst case" in done.out
@@ -171,7 +175,8 @@ def test_profiles_follow_the_flank_lines(file, tmp_path):
     assert "[tolerance] is not part" in done.err and "flank lines deviate by the limits of [layout]" in done.err
     names = {entry.name for entry in folder.iterdir()}
     figures = {"tolerance_cases.png", "face_load_factors.png", "face_load_over_torque.png", "shaft_deflection.png"}
-    figures |= {"radar.png"}
+    figures |= {"radar.png", "transmission_error.png", "load_sharing.png", "lead_chart.png"}
+    figures |= {"contact_pattern_unmodified.png", "contact_pattern_layout.png"}
     assert names == {"summary.json", "flanks.csv", "profiles.csv", *figures} and names <= RESULT_FILES
     found = json.loads((folder / "summary.json").read_text())
     assert found["quick"] and found["layouts"]["housing"]["face_load_factor"]["step_1"] < 1.01
@@ -185,6 +190,9 @@ def test_profiles_follow_the_flank_lines(file, tmp_path):
     assert contact["step_2"]["edge_load_factor"] < 1.0 < contact["unmodified"]["edge_load_factor"]
     assert 1 < contact["unmodified"]["root_face_load_factor"] < bare
     assert contact["annex_e_face_load_factor"]["unmodified"] == pytest.approx(bare, rel=0.25)
+    of_cases = contact["cases_face_load_factor"]["maximum"]
+    assert of_cases["step_2"][0] == contact["step_2"]["face_load_factor"] and max(of_cases["unmodified"]) > bare
+    assert f"{max(of_cases['step_2']):.3f}" in done.out
     with (folder / "profiles.csv").open() as rows:
         head = rows.readline()
     assert all(name in head for name in ("face_load_factor", "root_face_load_factor", "edge_load_factor"))

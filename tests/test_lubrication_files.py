@@ -88,7 +88,7 @@ def test_tables_bring_the_quantities_that_they_tell_of(load):
     assert names(PAIR.replace("speed = 3000.0", "friction = 0.05")) == {"mesh_efficiency"}
     oiled = names(PAIR + OIL)
     assert oiled > rubbing and "scuffing_safety" in oiled and "micropitting_safety" not in oiled
-    rated = {"pinion_pitting_safety", "wheel_pitting_safety", "pinion_root_safety", "wheel_root_safety"}
+    rated = {f"{gear}_{kind}_safety" for gear in ("pinion", "wheel") for kind in ("pitting", "root", "local_root")}
     assert names(PAIR.replace("speed = 3000.0", "") + STRENGTH) == rated
 
 

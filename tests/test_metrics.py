@@ -1,5 +1,7 @@
 """Metrics against published numbers and closed forms."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from catalogue import LINE, gear_pair
 
 import jaxgear as jg
 from jaxgear.metrics import quantities
+from jaxgear.metrics.root_stress import single_contact_root_stress
 
 # FZG type C gears with untrimmed tips: published form and stress correction factors and loss factor
 FZG = jg.GearPair(
@@ -27,6 +30,14 @@ def test_root_factors_at_the_outer_point_of_single_contact():
     np.testing.assert_allclose([pinion.form, wheel.form], [1.6889, 1.5832], atol=1e-4)
     np.testing.assert_allclose([pinion.correction, wheel.correction], [1.8514, 1.9165], atol=1e-4)
     np.testing.assert_allclose([pinion.lever_arm, wheel.lever_arm], [5.0586, 5.2769], atol=1e-3)
+
+
+def test_root_stress_of_the_standard_with_tips_cut_back():
+    """FZG C under 200 N m with the tips of the test gears: S_F 3.235 and 3.338 with 900 MPa."""
+    gears = [dataclasses.replace(gear, tip_diameter=tip) for gear, tip in zip(FZG.gears, (82.46, 118.36))]
+    per_load = single_contact_root_stress(jg.GearPair(*gears, 91.5))
+    line_load = 200e3 / (36.0 * np.cos(np.deg2rad(20.0))) / 14.0
+    np.testing.assert_allclose(900.0 / (line_load * np.array(per_load)), [3.235, 3.338], atol=5e-4)
 
 
 @pytest.mark.parametrize(

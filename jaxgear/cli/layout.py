@@ -4,9 +4,10 @@ from functools import partial
 from pathlib import Path
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-from ..contact import Mesh, Resolution
+from ..contact import Mesh, MeshCycle, Resolution, solve
 from ..contact.kinematics import kinematics
 from ..io import DesignFile, LayoutRequest, layout_request, write_flanks
 from ..io.schema_shafts import ProfileSection
@@ -25,7 +26,7 @@ from ..layout import (
 from ..numerics import real
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
 from . import layout_figures, layout_report, layout_tables, manufactured
-from .layout_study import STEPS, Study, designs, flank_lines
+from .layout_study import Study, designs, flank_lines
 from .progress import Stages
 from .run import coarse
 from .study_command import Make, StudyCommand
@@ -54,6 +55,8 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
     over_torque = _over_torque(request, next(iter(layouts.values())))
     meshes: dict[str, Mesh] = {}
     contacts: dict[str, dict[str, dict[str, float]]] = {}
+    cases: dict[str, dict[str, dict[str, np.ndarray]]] = {}
+    cycles: dict[str, MeshCycle] = {}
     factors: dict[str, dict[str, float]] = {}
     profiles: dict[str, ProfileLayout] = {}
     wanted = request.profile
@@ -67,14 +70,21 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
             stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
             meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
             if wanted.shafts:
-                contacts[name] = _contacts(request, mesh, layouts[name], profiles[name])
+                contacts[name], cases[name] = _contacts(request, mesh, layouts[name], profiles[name])
+                cycles = cycles or _cycles(request, mesh, layouts[name], profiles[name])
                 factors[name] = _factors(request, name, layouts[name], stations=size.slices)
     duty_cycle = request.options.get("duty_cycle")
     unusual = {
-        name: plausibility(layout, request.supports[name], duty_cycle=duty_cycle, profiles=profiles.get(name))
+        name: plausibility(
+            layout,
+            request.supports[name],
+            duty_cycle=duty_cycle,
+            profiles=profiles.get(name),
+            contact=cases.get(name),
+        )
         for name, layout in layouts.items()
     }
-    return Study(design, request, layouts, over_torque, meshes, contacts, factors, profiles, unusual)
+    return Study(design, request, layouts, over_torque, meshes, contacts, cases, cycles, factors, profiles, unusual)
 
 
 def _over_torque(request: LayoutRequest, layout: FlankLineLayout) -> dict[str, np.ndarray]:
@@ -89,17 +99,35 @@ def _over_torque(request: LayoutRequest, layout: FlankLineLayout) -> dict[str, n
 
 def _contacts(
     request: LayoutRequest, mesh: Mesh, layout: FlankLineLayout, profile: ProfileLayout
-) -> dict[str, dict[str, float]]:
-    """What the contact says of every step."""
-    first, second, last = STEPS
+) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, np.ndarray]]]:
+    """What the contact says of every step without deviations, and its K_Hbeta in the five cases by tolerance."""
     found = {}
-    for step in (first, second):
-        lines = flank_lines(layout)[step]
-        modifications = lines[0].modification, lines[1].modification
-        found[step] = flank_line_contact(mesh, request.profile_torque, modifications, kind=profile.kind)
-    for step, row in ((last, 0), ("step 3", profile.best)):
-        found[step] = {name: float(profile.table.column(name)[row]) for name in profile.table.results}
-    return found
+    cases: dict[str, dict[str, np.ndarray]] = {name: {} for name in request.tolerances}
+    deviations = np.concatenate([one.slopes for one in request.tolerances.values()])
+    for step, (pinion, wheel) in flank_lines(layout).items():
+        modifications = pinion.modification, wheel.modification
+        all_cases = flank_line_contact(
+            mesh, request.profile_torque, modifications, deviations=deviations, kind=profile.kind
+        )
+        found[step] = {name: float(values[0]) for name, values in all_cases.items()}
+        for name, factors in zip(cases, all_cases["face_load_factor"].reshape(len(cases), -1)):
+            cases[name][step] = factors
+    found["step 3"] = {name: float(profile.table.column(name)[profile.best]) for name in profile.table.results}
+    return found, cases
+
+
+def _cycles(
+    request: LayoutRequest, mesh: Mesh, layout: FlankLineLayout, profile: ProfileLayout
+) -> dict[str, MeshCycle]:
+    """The contact without modification and with all three steps."""
+    modified = tuple(line + own for line, own in zip(layout.modifications, profile.profiles))
+    # of zero amounts: one program serves both
+    nothing = jax.tree.map(jnp.zeros_like, modified)
+    torque = request.profile_torque
+    return {
+        name: solve(mesh, torque, pinion=pinion, wheel=wheel)
+        for name, (pinion, wheel) in (("unmodified", nothing), ("layout", modified))
+    }
 
 
 def _factors(request: LayoutRequest, name: str, layout: FlankLineLayout, *, stations: int) -> dict[str, float]:
@@ -132,6 +160,8 @@ def _profile(
         layout.modifications if wanted.shafts else left,
         wanted.pinion_amounts,
         wanted.wheel_amounts or wanted.pinion_amounts,
+        slopes=wanted.slopes or (0.0,),
+        crownings=wanted.crownings or (0.0,),
         kind="profile_crowning" if wanted.type == "profile_crowning" else "tip_relief",
         length=wanted.length,
         callback=lambda done, total, _: stages.count(done, total, "variants"),

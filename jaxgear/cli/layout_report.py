@@ -10,7 +10,7 @@ from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, Tolerance
 from ..shafts import bearing_reactions
 from . import report
 from .geometry import geometry
-from .layout_study import Study, designs, root_factor
+from .layout_study import STEPS, Study, designs, root_factor
 from .written import doubt_data, versions
 
 
@@ -19,12 +19,17 @@ def verdict(study: Study) -> Iterator[str]:
     layout = study.main
     for name, line in (("pinion", layout.pinion), ("wheel", layout.wheel)):
         yield f"{name}: slope {float(line.slope):.1f} um, crowning {float(line.crowning):.1f} um"
+    added = float(np.sum(layout.further))
+    yield f"further crowning of step 2: {added:.1f} um on both together, the least is {float(layout.needed):.1f} um"
     if layout.damage:
         before, _, after = np.asarray(layout.relative_life)
         yield f"life relative to the even load: {before:.2f} without modification, {after:.2f} after step 2"
         for name in layout.lives:
-            first, second = np.asarray(layout.worst_relative_life(name))
-            yield f"  worst case of {name} deviations: {first:.2f} after step 1, {second:.2f} after step 2"
+            none, first, second = np.asarray(layout.worst_relative_life(name))
+            yield (
+                f"  worst case of {name} deviations: {none:.2f} without modification, {first:.2f} after step 1, "
+                f"{second:.2f} after step 2"
+            )
     for name, profile in study.profiles.items():
         yield from _profile_verdict(study, profile, f", {name}" if len(study.profiles) > 1 else "")
 
@@ -34,6 +39,9 @@ def _profile_verdict(study: Study, profile: ProfileLayout, where: str) -> Iterat
     first, second = profile.amounts
     torque = study.request.profile_torque
     yield f"step 3 at {torque:g} N m{where}: {words} {first:g} um on the pinion, {second:g} um on the wheel"
+    if any(profile.further):
+        slope, crowning = profile.further
+        yield f"  on top of the flank lines, over the common face: slope {slope:+g} um, crowning {crowning:+g} um"
     ratio = profile.table.column("effective_contact_ratio")
     yield (
         f"  PPTE {profile.change('ppte'):+.0f} %, loss {profile.change('mesh_loss_factor'):+.0f} %; effective contact "
@@ -44,7 +52,7 @@ def _profile_verdict(study: Study, profile: ProfileLayout, where: str) -> Iterat
 def failures(study: Study) -> Iterator[str]:
     """What is not to be trusted or not reached."""
     for name, layout in study.layouts.items():
-        cases = [*layout.before.values(), *layout.after.values()]
+        cases = [one for of in layout.cases for one in of.values()]
         found = [*(one.load.converged for one in cases), *(one.converged for one in layout.damage)]
         if not all(bool(np.all(one)) for one in found):
             yield f"LOAD OVER THE FACE NOT FOUND: {name}; its numbers are not to be trusted"
@@ -92,6 +100,10 @@ def summary(study: Study) -> dict[str, Any]:
                 "torque_Nm": study.request.profile_torque,
                 **_by_step(steps),
                 "annex_e_face_load_factor": _by_step(study.factors[name]),
+                "cases": CASES,
+                "cases_face_load_factor": {
+                    tolerance: _by_step(factors) for tolerance, factors in study.contact_cases[name].items()
+                },
             }
             for name, steps in study.contacts.items()
         },
@@ -143,8 +155,10 @@ def _layout(layout: FlankLineLayout) -> dict[str, Any]:
         "face_load_factor": dict(zip(("unmodified", "step_1"), factors)),
         "root_face_load_factor": dict(zip(("unmodified", "step_1"), root_factor(layout, factors))),
         "cases": CASES,
-        "step_1_cases": cases(layout.before, 0),
-        "step_2_cases": cases(layout.after, 1),
+        **{
+            f"{step.replace(' ', '_')}_cases": cases(of, number)
+            for number, (step, of) in enumerate(zip(STEPS, layout.cases))
+        },
         **life,
     }
 
@@ -168,6 +182,7 @@ def _profile(study: Study, profile: ProfileLayout) -> dict[str, Any]:
         "torque_Nm": study.request.profile_torque,
         "variants": len(profile.table),
         "amounts_um": profile.amounts,
+        "further_slope_and_crowning_um": profile.further,
         "contact_ratio": profile.contact_ratio,
         "unmodified": {name: column[0] for name, column in values.items()},
         "best": {name: column[profile.best] for name, column in values.items()},

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contact import Mesh
+from ..contact import Mesh, MeshCycle
 from ..io import DesignFile, LayoutRequest
 from ..layout import FlankLine, FlankLineLayout, ProfileLayout
 from ..metrics import Doubt
@@ -27,6 +27,9 @@ class Study:
         meshes: of step 3, by the name of the support; empty without it.
         contacts: what the contact says of the flank lines of every step on their shafts, by the names of the support
             and of the step; empty without step 3 on shafts.
+        contact_cases: K_Hbeta of the contact in the five cases of deviations, by the names of the support, of the
+            tolerance and of the step, likewise.
+        cycles: contact of the first support without modification and with all three steps, likewise.
         factors: K_Hbeta of the one-dimensional analysis at the same torque and on as many stations, likewise.
         profiles: profile modifications of step 3, by the name of the support.
         unusual: what of every layout is not usual, by the name of the support.
@@ -38,6 +41,8 @@ class Study:
     over_torque: Mapping[str, np.ndarray]
     meshes: Mapping[str, Mesh]
     contacts: Mapping[str, Mapping[str, Mapping[str, float]]]
+    contact_cases: Mapping[str, Mapping[str, Mapping[str, np.ndarray]]]
+    cycles: Mapping[str, MeshCycle]
     factors: Mapping[str, Mapping[str, float]]
     profiles: Mapping[str, ProfileLayout]
     unusual: Mapping[str, tuple[Doubt, ...]]

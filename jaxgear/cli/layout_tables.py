@@ -16,6 +16,7 @@ def tables(study: Study) -> Iterator[Table]:
     yield _steps(study)
     if study.contacts:
         yield _contacts(study)
+        yield _contact_cases(study)
     yield _bearings(study)
 
 
@@ -40,17 +41,18 @@ def _steps(study: Study) -> Table:
     result.add_section()
     for index, gear in enumerate(("pinion", "wheel")):
         row(f"step 2, {gear}: crowning C_b [um]", (f"{float(one.further[index]):.2f}" for one in each))
+    row("  least of both together [um]", (f"{float(one.needed):.2f}" for one in each))
     for name in study.request.tolerances:
         result.add_section()
         tolerance = study.request.tolerances[name]
         row(
             f"{name}: f_Hb {float(tolerance.helix_slope):.1f}, f_ma {float(tolerance.misalignment):.1f} um",
-            ("step 1 / step 2" for _ in each),
+            ("unmodified / step 1 / step 2" for _ in each),
         )
         for number, case in enumerate(CASES):
             row(
                 f"  K_Hbeta, {case}",
-                (f"{_cell(one.before[name], number)} / {_cell(one.after[name], number)}" for one in each),
+                (" / ".join(_cell(of[name], number) for of in one.cases) for one in each),
             )
         row("  K_Fbeta, worst case", (_worst_root(one, name) for one in each))
         if study.main.damage:
@@ -68,7 +70,7 @@ def _cell(cases: ToleranceCases, number: int) -> str:
 
 
 def _worst_root(layout: FlankLineLayout, name: str) -> str:
-    worst = (np.max(of[name].face_load_factor) for of in (layout.before, layout.after))
+    worst = (np.max(of[name].face_load_factor) for of in layout.cases)
     return " / ".join(f"{float(root_factor(layout, factor)):.3f} " for factor in worst)
 
 
@@ -87,6 +89,19 @@ def _contacts(study: Study) -> Table:
             cells = [_number(found[name]) for name in FACTORS]
             given = study.factors[support].get(step)
             result.add_row(f"{support}: {step}", *cells, "" if given is None else _number(given))
+    return result
+
+
+def _contact_cases(study: Study) -> Table:
+    """K_Hbeta of the contact analysis in the five cases."""
+    title = f"K_Hbeta of the contact analysis at {study.request.profile_torque:g} N m in the cases of deviations"
+    result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
+    for number, name in enumerate(("", *CASES)):
+        result.add_column(name, justify="right" if number else "left", no_wrap=True)
+    for support, tolerances in study.contact_cases.items():
+        for tolerance, steps in tolerances.items():
+            for step, factors in steps.items():
+                result.add_row(f"{support}, {tolerance}: {step}", *map(_number, factors))
     return result
 
 

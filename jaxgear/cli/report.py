@@ -25,6 +25,11 @@ from .terminal import warn as warn
 
 Evaluations = Mapping[str, Evaluation]
 
+
+def _of_gears(key: str, label: str, form: str) -> dict[str, tuple[str, str]]:
+    return {f"{gear}_{key}": (f"{gear} {label}", form) for gear in ("pinion", "wheel")}
+
+
 # metric -> label and format; a metric without contact outside the path is 0 and says so
 _ROWS = {
     "ppte_um": ("PPTE [um]", ".3f"),
@@ -35,8 +40,8 @@ _ROWS = {
     "max_corner_pressure_MPa": ("max corner pressure [MPa]", ".0f"),
     "contact_ratio": ("contact ratio", ".3f"),
     "effective_contact_ratio": ("effective contact ratio", ".3f"),
-    "pinion_root_stress_MPa": ("pinion root stress [MPa]", ".1f"),
-    "wheel_root_stress_MPa": ("wheel root stress [MPa]", ".1f"),
+    **_of_gears("root_stress_MPa", "root stress, ISO 6336-3 [MPa]", ".1f"),
+    **_of_gears("local_root_stress_MPa", "root stress of the contact [MPa]", ".1f"),
     "face_load_factor": ("face load factor K_Hbeta", ".3f"),
     "mesh_loss_factor": ("mesh loss factor", ".4f"),
     "friction_coefficient": ("mean coefficient of friction", ".4f"),
@@ -47,15 +52,12 @@ _ROWS = {
     "max_contact_temperature_degC": ("max contact temperature [degC]", ".1f"),
     "min_film_thickness_um": ("min film thickness [um]", ".3f"),
     "min_specific_film_thickness": ("min specific film thickness", ".3f"),
-    "pinion_pitting_safety": ("pinion pitting safety S_H", ".2f"),
-    "wheel_pitting_safety": ("wheel pitting safety S_H", ".2f"),
-    "pinion_root_safety": ("pinion root safety S_F", ".2f"),
-    "wheel_root_safety": ("wheel root safety S_F", ".2f"),
+    **_of_gears("pitting_safety", "pitting safety S_H", ".2f"),
+    **_of_gears("root_safety", "root safety S_F", ".2f"),
+    **_of_gears("local_root_safety", "root safety of the contact", ".2f"),
     "pressure_safety": ("pressure safety p_lim / p_max", ".2f"),
-    "pinion_pitting_damage": ("pinion pitting damage per 1e6 revolutions", ".3g"),
-    "wheel_pitting_damage": ("wheel pitting damage per 1e6 revolutions", ".3g"),
-    "pinion_root_damage": ("pinion root damage per 1e6 revolutions", ".3g"),
-    "wheel_root_damage": ("wheel root damage per 1e6 revolutions", ".3g"),
+    **_of_gears("pitting_damage", "pitting damage per 1e6 revolutions", ".3g"),
+    **_of_gears("root_damage", "root damage per 1e6 revolutions", ".3g"),
     "micropitting_safety": ("micropitting safety S_lambda", ".2f"),
     "scuffing_safety": ("scuffing safety S_B", ".2f"),
 }

@@ -33,6 +33,8 @@ RESULT_FILES = frozenset(
         "lead_chart.png",
         "pressure_map.png",
         "contact_pattern.png",
+        "contact_pattern_unmodified.png",
+        "contact_pattern_layout.png",
         "line_load.png",
         "face_gap.png",
         "face_load_over_torque.png",

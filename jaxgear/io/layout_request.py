@@ -158,6 +158,8 @@ def _profile(layout: LayoutSection, quick: bool) -> ProfileSection | None:
     amounts = {
         "pinion_amounts": section.pinion_amounts,
         "wheel_amounts": section.wheel_amounts or section.pinion_amounts,
+        "slopes": section.slopes or [0.0],
+        "crownings": section.crownings or [0.0],
     }
     for key, values in amounts.items():
         if len(set(values)) != len(values):

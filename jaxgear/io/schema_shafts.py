@@ -13,6 +13,7 @@ Tables = dict[str, Any]
 
 _ROWS, _ROWS_OR_NONE = list_of(table()), list_of(table(), empty=True)
 _AMOUNTS = list_of(real(Number("um", low=0.0)))
+_FURTHER = list_of(real(Number("um")))
 _HOURS = list_of(real(Number("h", low=0.0)))
 _AXES = either(choice("class"), table(), '"class" or a table')
 
@@ -134,6 +135,9 @@ class ProfileSection(Section):
         type: of the modification.
         pinion_amounts: amounts on the pinion.
         wheel_amounts: amounts on the wheel; those of the pinion without it.
+        slopes: helix slopes of either sign on top of the flank line of the wheel, over the common face, crossed with
+            the amounts; none without it.
+        crownings: crownings of either sign, likewise.
         length: of a tip relief; the long one, over the zone of double contact, without it.
         torque_factor: torque of the contact analysis, in design torques.
         shafts: whether the contact feels shafts, bearings and housing, with the flank lines of both steps and once for
@@ -143,6 +147,8 @@ class ProfileSection(Section):
     type: Annotated[str, choice("tip_relief", "profile_crowning")] = "tip_relief"
     pinion_amounts: Annotated[list[float], _AMOUNTS]
     wheel_amounts: Annotated[list[float] | None, _AMOUNTS] = None
+    slopes: Annotated[list[float] | None, _FURTHER] = None
+    crownings: Annotated[list[float] | None, _FURTHER] = None
     length: Annotated[float | None, positive("mm")] = None
     torque_factor: Annotated[float, positive("")] = 0.9
     shafts: Annotated[bool, switch()] = True

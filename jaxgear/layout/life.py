@@ -17,8 +17,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..conditions import LoadSpectrum
-from ..geometry import Gear, GearPair, path_of_contact
-from ..metrics.root_stress import root_factors
+from ..geometry import GearPair
+from ..metrics.contact_stress import nominal_stress_squares
+from ..metrics.root_stress import single_contact_root_stress
 from ..numerics import Checked, maximum, number, program, result, whole
 from ..shafts import AbstractSupport, FaceLoad, annex_e, face_load_factor, root_face_load_factor, tooth_height
 from .flank_line import FlankLine
@@ -49,8 +50,8 @@ class Endurance(Checked):
     """What the material of a gear bears.
 
     Attributes:
-        pitting: against the contact stress at the pitch point.
-        bending: against the nominal stress in the tooth root.
+        pitting: against the nominal contact stress of ISO 6336-2, as `pitting` of `metrics.Strength`.
+        bending: against the nominal stress in the tooth root of ISO 6336-3.
     """
 
     pitting: WoehlerLine
@@ -62,8 +63,7 @@ class Damage(Checked):
 
     Attributes:
         pitting, bending: damage that every load does.
-        contact_stress: at every torque.
-        root_stress: of both gears.
+        contact_stress, root_stress: of both gears at every torque.
         face_load_factor: K_Hbeta at every torque.
         converged: whether the load over the face has been found at every torque; where it has not, its numbers are
             NaN, and with them every sum. Without torque there is nothing to find.
@@ -72,7 +72,7 @@ class Damage(Checked):
 
     pitting: OfGears = result()
     bending: OfGears = result()
-    contact_stress: Torques = result("MPa")
+    contact_stress: OfGears = result("MPa")
     root_stress: OfGears = result("MPa")
     face_load_factor: Torques = result()
     converged: Bool[Array, " torques"] = eqx.field()
@@ -108,8 +108,8 @@ def damage(
 ) -> Damage:
     """Damage of both gears under a duty cycle, K_Hbeta of every load by the one-dimensional analysis.
 
-    Contact stress is Hertz's at the pitch point under the largest line load K_Hbeta F_b / b; root stress is F_t K_Fbeta
-    / (b m) Y_F Y_S at the outer point of single contact. Dynamic and application factors belong into the torques.
+    Stresses are those of `metrics.nominal_contact_stress` with K_Hbeta and of `metrics.nominal_root_stress` with
+    K_Fbeta. Dynamic and application factors belong into the torques.
     Differentiable in everything.
 
     Args:
@@ -182,8 +182,7 @@ def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, endurance: tuple[E
     # without torque teeth carry nothing, whether the place of the shafts has been found or not
     carries = load.torques > 0
     largest, factor = jnp.where(carries, found.largest, 0.0), jnp.where(carries, found.factor, 1.0)
-    contact = _contact_stress_square(pair)
-    root = _root_stress(pair)
+    contact, root = nominal_stress_squares(pair), single_contact_root_stress(pair)
     mean = largest / factor
     # K_Fbeta of an even load; below 1 is rounding
     bent = mean * root_face_load_factor(jnp.maximum(factor, 1.0), pair.face_width, tooth_height(pair))
@@ -192,42 +191,22 @@ def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, endurance: tuple[E
     loaded = largest != 0
     pitting: list[Torques] = []
     bending: list[Torques] = []
-    for turned, share, bears in zip((turns, turns / pair.gear_ratio), root, endurance):
+    for turned, hertz, share, bears in zip((turns, turns / pair.gear_ratio), contact, root, endurance):
         lines = bears.pitting, bears.bending
         # by the square of the stress, whose root has no derivative at zero load
-        square = jnp.where(loaded, largest * contact / lines[0].endurance ** 2, 1.0)
+        square = jnp.where(loaded, largest * hertz / lines[0].endurance ** 2, 1.0)
         power = jnp.where(loaded, square ** (0.5 * lines[0].exponent), 0.0)
         shares = power / lines[0].cycles, (bent * share / lines[1].endurance) ** lines[1].exponent / lines[1].cycles
         # a load that is never run does nothing, even where it has not been found
         for each, damaged in zip((pitting, bending), shares):
             each.append(jnp.where(turned > 0, turned * damaged, 0.0))
-    stress = jnp.where(loaded, jnp.sqrt(jnp.where(loaded, largest * contact, 1.0)), 0.0)
+    stress = [jnp.where(loaded, jnp.sqrt(jnp.where(loaded, largest * hertz, 1.0)), 0.0) for hertz in contact]
     return Damage(
         jnp.stack(pitting),
         jnp.stack(bending),
-        stress,
+        jnp.stack(stress),
         jnp.stack([bent * share for share in root]),
         found.factor,
         found.converged | ~carries,
         load.duration,
-    )
-
-
-def _contact_stress_square(pair: GearPair) -> Scalar:
-    """Square of Hertz's stress at the pitch point per line load [MPa^2 mm/N]."""
-    materials = pair.pinion.material, pair.wheel.material
-    soft = sum((1 - item.poisson_ratio**2) / item.elastic_modulus for item in materials)
-    return 1 / (jnp.pi * soft * path_of_contact(pair).reduced_radius(jnp.zeros(())))
-
-
-def _root_stress(pair: GearPair) -> tuple[Scalar, Scalar]:
-    """Root stress of both gears per line load along the line of action at their outer points of single contact."""
-    path = path_of_contact(pair)
-
-    def of(gear: Gear, roll_length: Scalar) -> Scalar:
-        factors = root_factors(gear, roll_length)
-        return factors.form * factors.correction * jnp.cos(jnp.deg2rad(gear.pressure_angle)) / gear.module
-
-    return of(pair.pinion, path.pinion_roll_length(path.outer_single)), of(
-        pair.wheel, path.wheel_roll_length(path.inner_single)
     )

@@ -3,7 +3,7 @@
 Nothing is refused here: a doubt is a question. The limits are of this project where no source is named.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from ..shafts.shaft import facts_of
 from .profiles import AMOUNTS, ProfileLayout
 from .steps import FlankLineLayout
 
+# By so much K_Hbeta without deviations may be above that of unmodified flanks.
+_COST = 1.2
+
 # Of a load that falls straight to zero over m stations, K_Hbeta is 2 n / m, and 1 / 2 m of it below that at the end.
 _FEWEST = 8
 
@@ -28,6 +31,16 @@ LIMITS = {
         "",
         f"fewer than {_FEWEST} stations carry the load, so that it depends on their number: more stations? are the "
         "units of bearings, shafts and housing right?",
+    ),
+    "K_Hbeta without deviations": Limit(
+        0.0,
+        np.inf,
+        "",
+        f"more than {_COST:g} times that of unmodified flanks: do the cases of deviations gain what crowning costs "
+        "here, and would the least crowning do?",
+    ),
+    "K_Hbeta of the worst case": Limit(
+        0.0, np.inf, "", "no better than without the further crowning: would the least crowning do?"
     ),
     "slope and crowning in modules": Limit(
         0.0, 0.04, "", "twice the tip relief of ISO 53:1974: are the units of bearings, shafts and housing right?"
@@ -56,12 +69,18 @@ LIMITS = {
 }
 
 
+# K_Hbeta of the five cases by the names of tolerance and step
+ContactCases = Mapping[str, Mapping[str, np.ndarray]]
+_Factors = dict[str, list]  # of every step, by the deviations
+
+
 def plausibility(
     layout: FlankLineLayout,
     support: AbstractSupport,
     *,
     duty_cycle: LoadSpectrum | None = None,
     profiles: ProfileLayout | None = None,
+    contact: ContactCases | None = None,
 ) -> tuple[Doubt, ...]:
     """What of a layout and of the shafts that it was made for is not usual; empty where nothing is.
 
@@ -70,8 +89,10 @@ def plausibility(
         support: that they were made for; bearings move under the torques of its couplings.
         duty_cycle: for which they were made; None without one.
         profiles: that were tried on them in step 3; None without it.
+        contact: K_Hbeta of the contact analysis in the five cases, by the names of the tolerance and of the step,
+            "unmodified", "step 1" and "step 2"; None or empty without it.
     """
-    numbers = [*_of_load(layout), *_of_flank_lines(layout), *_of_axes(layout)]
+    numbers = [*_of_load(layout), *_of_crowning(layout, contact or {}), *_of_flank_lines(layout), *_of_axes(layout)]
     if isinstance(support, ShaftSupport):
         gearbox, module = support.gearbox, float(layout.pair.pinion.module)
         mesh = gearbox.meshes[support.mesh]
@@ -96,6 +117,27 @@ def _of_load(layout: FlankLineLayout) -> Iterator[Doubt]:
     worst = max(float(np.max(each.face_load_factor)) for each in cases)
     for where, factor in zip(("without modification", "after step 1", "after step 2"), (*layout.factors, worst)):
         yield _doubt("K_Hbeta", where, factor, limit)
+
+
+def _of_crowning(layout: FlankLineLayout, contact: ContactCases) -> Iterator[Doubt]:
+    """What step 2 costs without deviations, and whether it saves anything in the worst case, by both analyses."""
+    by_annex_e: _Factors = {
+        f"{name} deviations": [of[name].face_load_factor for of in layout.cases] for name in layout.before
+    }
+    by_contact: _Factors = {
+        f"{name} deviations, contact analysis": [steps[step] for step in ("unmodified", "step 1", "step 2")]
+        for name, steps in contact.items()
+    }
+    for number, analysis in enumerate((by_annex_e, by_contact)):
+        for where, cases in analysis.items():
+            unmodified, *_, crowned = (float(factors[0]) for factors in cases)
+            *others, worst = (float(np.max(factors)) for factors in cases)
+            if where == next(iter(analysis)):
+                place = "after step 2" + (", contact analysis" if number else "")
+                name = "K_Hbeta without deviations"
+                yield _doubt(name, place, crowned, LIMITS[name]._replace(high=_COST * unmodified))
+            name = "K_Hbeta of the worst case"
+            yield _doubt(name, f"after step 2, {where}", worst, LIMITS[name]._replace(high=min(others)))
 
 
 def _of_flank_lines(layout: FlankLineLayout) -> Iterator[Doubt]:

@@ -6,6 +6,7 @@ References:
     not above the theoretical one.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +17,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import Mesh
-from ..geometry import path_of_contact
+from ..geometry import GearPair, path_of_contact
 from ..metrics import Quantity
 from ..microgeometry import AbstractCurve, AbstractModification, ProfileCrowning, TipRelief
 from ..numerics import Callback, check, real
 from ..sizing import long_relief_length
 from ..sweeps import SweepTable, VariantList, sweep
+from .flank_line import FlankLine
 
 Kind = Literal["tip_relief", "profile_crowning"]
 
@@ -37,7 +39,9 @@ RESULTS = (
 # By so much the effective contact ratio may be above the theoretical one: positions resolve ends of contact to less.
 _SHOCK = 0.01
 AMOUNTS = "pinion_amount", "wheel_amount"
-_UNITS = dict.fromkeys(AMOUNTS, "um")
+LINE = "slope", "crowning"  # on top of the flank lines, over the common face
+_VARIABLES = (*AMOUNTS, *LINE)
+_UNITS = dict.fromkeys(_VARIABLES, "um")
 
 
 @dataclass(frozen=True)
@@ -46,11 +50,12 @@ class ProfileLayout:
 
     Attributes:
         kind: of the modification.
-        table: a row per variant; the first has no profile modification, the others are all combinations, those of the
-            wheel running fastest.
+        table: a row per variant; the first has neither a profile modification nor a further slope or crowning, the
+            others are all combinations, later ones running fastest: pinion, wheel, slope, crowning.
         best: number of the variant that was chosen.
         contact_ratio: theoretical one.
-        profiles: modifications of pinion and wheel of the variant that was chosen, without the flank lines.
+        profiles: modifications of pinion and wheel of the variant that was chosen, without the flank lines; that of the
+            wheel has the further slope and crowning where they were varied.
     """
 
     kind: Kind
@@ -64,6 +69,12 @@ class ProfileLayout:
         """Of the variant that was chosen, on pinion and wheel [um]."""
         first, second = (float(self.table.column(name)[self.best]) for name in AMOUNTS)
         return first, second
+
+    @property
+    def further(self) -> tuple[float, float]:
+        """Slope and crowning on top of the flank lines, of the variant that was chosen, over the common face [um]."""
+        slope, crowning = (float(self.table.column(name)[self.best]) for name in LINE)
+        return slope, crowning
 
     @property
     def without_shock(self) -> np.ndarray:
@@ -80,8 +91,12 @@ class ProfileLayout:
         ppte = np.where(self.without_shock, self.table.column("ppte"), np.inf)
         ranked = [int(row) for row in np.argsort(ppte, kind="stable") if row and np.isfinite(ppte[row])]
         rows = list(dict.fromkeys([self.best, *ranked]))[:count]
-        first, second = (self.table.column(name) for name in AMOUNTS)
-        return [0, *rows], ["no profile modification", *(f"{first[row]:g} and {second[row]:g} µm" for row in rows)]
+        first, second, *lines = (self.table.column(name) for name in _VARIABLES)
+        names = []
+        for row in rows:
+            further = [f"{name} {line[row]:+g} µm" for name, line in zip(LINE, lines) if np.ptp(line)]
+            names.append(", ".join([f"{first[row]:g} and {second[row]:g} µm", *further]))
+        return [0, *rows], ["no profile modification", *names]
 
 
 def vary_profiles(
@@ -94,21 +109,25 @@ def vary_profiles(
     kind: Kind = "tip_relief",
     length=None,
     curve: AbstractCurve | None = None,
+    slopes: Sequence[float] = (0.0,),
+    crownings: Sequence[float] = (0.0,),
     results: Sequence[str | Quantity] = (),
     output: str | Path | None = None,
     callback: Callback | None = None,
 ) -> ProfileLayout:
-    """Cross-variation of the profile modifications of both gears.
+    """Cross-variation of the profile modifications of both gears, and of the flank line with them.
 
     Args:
         mesh: prepared mesh with slices: over shafts, the flank lines are those of the first two steps; without them,
             what is left of the flank lines where they have levelled the load, the further crowning.
         torque: on the pinion [N m].
-        flank_lines: modifications of pinion and wheel, kept in every variant.
+        flank_lines: modifications of pinion and wheel, in every variant.
         pinion_amounts, wheel_amounts: of the modification [um], crossed with each other.
         kind: "tip_relief", for spur gears a long one, or "profile_crowning".
         length: of the tip relief [mm]; None for the long one.
         curve: of the tip relief; None for its default.
+        slopes, crownings: on top of the flank lines, over the common face and of either sign [um], crossed with the
+            amounts.
         results: further results, beside transmission error, contact ratio, loss, pressure and the face load factors of
             the contact.
         output: folder of the table; None keeps it in memory.
@@ -123,22 +142,30 @@ def vary_profiles(
     for name, value in (("length", length), ("curve", curve)):
         if kind == "profile_crowning" and value is not None:
             raise ValueError(f"vary_profiles: {name} has no effect on a profile crowning")
-    for name, amounts in (("pinion_amounts", pinion_amounts), ("wheel_amounts", wheel_amounts)):
-        check("vary_profiles", name, np.asarray(amounts, float), "um", low=0.0)
+    crossed = {
+        "pinion_amounts": pinion_amounts,
+        "wheel_amounts": wheel_amounts,
+        "slopes": slopes,
+        "crownings": crownings,
+    }
+    for name, amounts in crossed.items():
+        check("vary_profiles", name, np.asarray(amounts, float), "um", low=0.0 if name.endswith("amounts") else None)
         if not len(amounts):
             raise ValueError(f"vary_profiles: {name} must not be empty")
-    design = _Crossed(
-        flank_lines, _Profile(kind, real(long_relief_length(mesh.pair) if length is None else length), curve)
-    )
-    rows = [(0.0, 0.0), *((first, second) for first in pinion_amounts for second in wheel_amounts)]
+    length = real(long_relief_length(mesh.pair) if length is None else length)
+    design = _Crossed(flank_lines, _Profile(kind, length, curve), mesh.pair)
+    rows = [(0.0,) * len(_VARIABLES), *itertools.product(*crossed.values())]
     wanted = (*RESULTS, *(one for one in results if one not in RESULTS))
-    plan = VariantList(AMOUNTS, rows)
+    plan = VariantList(_VARIABLES, rows)
     given = {"mesh": mesh, "torque": torque, "results": wanted, "units": _UNITS}
     table = sweep(design, plan, output=output, callback=callback, title="profile modifications", **given)
     theoretical = float(path_of_contact(mesh.pair).contact_ratio)
     best = _best(table, theoretical)
-    first, second = rows[best]
-    return ProfileLayout(kind, table, best, theoretical, (design.profile(real(first)), design.profile(real(second))))
+    first, second, slope, crowning = rows[best]
+    on_pinion, on_wheel = (design.profile(real(amount)) for amount in (first, second))
+    if slope or crowning:
+        on_wheel = FlankLine(real(slope), real(crowning)).on(mesh.pair, "wheel").modification + on_wheel
+    return ProfileLayout(kind, table, best, theoretical, (on_pinion, on_wheel))
 
 
 def flank_line_contact(
@@ -146,19 +173,22 @@ def flank_line_contact(
     torque,
     flank_lines: tuple[AbstractModification, AbstractModification],
     *,
+    deviations=(0.0,),
     kind: Kind = "tip_relief",
-) -> dict[str, float]:
+) -> dict[str, Float[np.ndarray, " deviations"]]:
     """What the loaded tooth contact says of flank lines without profile modifications: `RESULTS`, NaN where it fails.
 
     Args:
         mesh, torque: as for `vary_profiles`, whose compiled program serves here.
         flank_lines: modifications of pinion and wheel.
+        deviations: of the helix slope over the common face, shape (deviations,) [um]; `FlankLineTolerance.slopes` are
+            those of the five cases.
         kind: of the profile modifications that are varied elsewhere, which are zero here.
     """
-    design = _Crossed(flank_lines, _Profile(kind, real(long_relief_length(mesh.pair)), None))
-    plan = VariantList(AMOUNTS, [(0.0, 0.0)])
+    design = _Crossed(flank_lines, _Profile(kind, real(long_relief_length(mesh.pair)), None), mesh.pair)
+    plan = VariantList(_VARIABLES, [(0.0, 0.0, float(slope), 0.0) for slope in deviations])
     table = sweep(design, plan, mesh=mesh, torque=torque, results=RESULTS, units=_UNITS)
-    return {name: float(table.column(name)[0]) for name in table.results}
+    return {name: table.column(name) for name in table.results}
 
 
 class _Profile(eqx.Module):
@@ -179,10 +209,12 @@ class _Crossed(eqx.Module):
 
     flank_lines: tuple[AbstractModification, AbstractModification]
     profile: _Profile
+    pair: GearPair
 
     def __call__(self, variant):
         pinion, wheel = (line + self.profile(variant[name]) for line, name in zip(self.flank_lines, AMOUNTS))
-        return pinion, wheel
+        further = FlankLine(*(variant[name] for name in LINE)).on(self.pair, "wheel")
+        return pinion, wheel + further.modification
 
 
 def _best(table: SweepTable, theoretical: float) -> int:

@@ -34,12 +34,12 @@ class FlankLineLayout(Checked):
         further: C_b of step 2 on pinion and wheel, on top of step 1, over the common face.
         needed: C_b of both together, without which a case touches an edge.
         factors: K_Hbeta without modification and after step 1, both without deviations.
-        before, after: the five cases with the flank line of step 1 alone, and with those of step 2, by the name of the
-            tolerance.
+        unmodified, before, after: the five cases without modification, with the flank line of step 1 alone, and with
+            those of step 2, by the name of the tolerance.
         damage: under the duty cycle without modification, after step 1 and after step 2, without deviations; empty
             without one.
-        lives: [h] of the five cases after step 1 and after step 2, shape (steps, cases), by the name of the tolerance;
-            empty without a duty cycle.
+        lives: [h] of the five cases without modification, after step 1 and after step 2, shape (steps, cases), by the
+            name of the tolerance; empty without a duty cycle.
     """
 
     gear: GearName = eqx.field(static=True)
@@ -49,6 +49,7 @@ class FlankLineLayout(Checked):
     further: Float[Array, "2"] = result("um")
     needed: Scalar = result("um")
     factors: Float[Array, "2"] = result()
+    unmodified: dict[str, ToleranceCases]
     before: dict[str, ToleranceCases]
     after: dict[str, ToleranceCases]
     damage: tuple[Damage, ...] = ()
@@ -63,6 +64,11 @@ class FlankLineLayout(Checked):
     def wheel(self) -> FlankLine:
         """Flank line of the wheel after step 2, over its own face."""
         return self._line("wheel", 1)
+
+    @property
+    def cases(self) -> tuple[dict[str, ToleranceCases], ...]:
+        """`unmodified`, `before` and `after`."""
+        return self.unmodified, self.before, self.after
 
     @property
     def modifications(self) -> tuple[AbstractModification, AbstractModification]:
@@ -84,8 +90,8 @@ class FlankLineLayout(Checked):
         return jnp.stack([each.life for each in self.damage]) / self._level_life("relative_life")
 
     def worst_relative_life(self, tolerance: str) -> Float[Array, " steps"]:
-        """Life of the worst case of deviations after step 1 and after step 2, relative to that after step 1 without
-        any.
+        """Life of the worst case of deviations without modification, after step 1 and after step 2, relative to that
+        after step 1 without any.
 
         Args:
             tolerance: its name.
@@ -113,7 +119,7 @@ class FlankLineLayout(Checked):
             "step 2, further crowning: pinion {:.2f} um, wheel {:.2f} um".format(*map(float, self.further)),
             f"{'K_Hbeta':24}" + "".join(f"{name:>14}" for name in CASES),
         ]
-        for step, of in (("step 1", self.before), ("step 2", self.after)):
+        for step, of in zip(("unmodified", "step 1", "step 2"), self.cases):
             for name, cases in of.items():
                 marks = ["*" if edge else "" for edge in np.asarray(cases.edge_contact)]
                 values = [f"{float(value):.3f}{mark}" for value, mark in zip(cases.face_load_factor, marks)]
@@ -184,6 +190,10 @@ def layout_flank_lines(
         raise ValueError("layout_flank_lines: no crowning keeps the load off the edges: the shafts are too soft")
     added = _further(needed, further)
     on_wheel, crowned = (each.on(face.pair, "wheel") for each in (line, line.crowned(jnp.sum(added))))
+    steps = FlankLine(), on_wheel, crowned
+    unmodified, before, after = (
+        {name: tolerance_cases(face, one, wheel=wheel) for name, one in several.items()} for wheel in steps
+    )
     layout = FlankLineLayout(
         gear=gear,
         torque=face.torque,
@@ -194,19 +204,19 @@ def layout_flank_lines(
         factors=jnp.stack(
             [
                 annex_e(face, torque=face.torque, wheel=one.modification, stations=face.count).face_load_factor
-                for one in (FlankLine(), on_wheel)
+                for one in steps[:2]
             ]
         ),
-        before={name: tolerance_cases(face, one, wheel=on_wheel) for name, one in several.items()},
-        after={name: tolerance_cases(face, one, wheel=crowned) for name, one in several.items()},
+        unmodified=unmodified,
+        before=before,
+        after=after,
     )
     if duty_cycle is None or endurance is None:
         return layout
-    steps = FlankLine(), on_wheel, crowned
     spent = tuple(damage(support, duty_cycle, endurance, wheel=one, stations=stations) for one in steps)
     lives = {
         name: jnp.stack(
-            [lives_in_cases(support, duty_cycle, endurance, each, wheel=one, stations=stations) for one in steps[1:]]
+            [lives_in_cases(support, duty_cycle, endurance, each, wheel=one, stations=stations) for one in steps]
         )
         for name, each in several.items()
     }

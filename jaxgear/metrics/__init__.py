@@ -53,11 +53,14 @@ from .quantity import quantity_of as quantity_of
 from .rating import LUBRICANT_QUANTITIES as LUBRICANT_QUANTITIES
 from .rating import STRENGTH_QUANTITIES as STRENGTH_QUANTITIES
 from .report import summary as summary
+from .root_stress import NominalRootStress as NominalRootStress
 from .root_stress import RootFactors as RootFactors
 from .root_stress import RootStress as RootStress
+from .root_stress import nominal_root_stress as nominal_root_stress
 from .root_stress import root_factors as root_factors
 from .root_stress import root_stress as root_stress
 from .safety import Strength as Strength
+from .safety import local_root_safety as local_root_safety
 from .safety import micropitting_safety as micropitting_safety
 from .safety import pitting_safety as pitting_safety
 from .safety import pressure_safety as pressure_safety

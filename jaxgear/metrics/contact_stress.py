@@ -9,8 +9,9 @@ from jaxtyping import Array, Float
 
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle
+from ..geometry import GearPair, path_of_contact
 from ..numerics import Checked, over_batch, result, safe_sqrt
-from .face_load import face_load_factor
+from .face_load import face_load_factor, over_several_slices
 
 Scalar = Float[Array, ""]
 
@@ -35,13 +36,18 @@ def nominal_contact_stress(cycle: MeshCycle) -> ContactStress:
     References:
         ISO 6336-2, clauses 6 and 7 (nominal contact stress, zone factor, single pair contact factors).
     """
-    kinematics = cycle.kinematics
-    pair, contact = kinematics.pair, kinematics.path_of_contact
+    pair = cycle.kinematics.pair
+    line_load = cycle.force / pair.face_width * over_several_slices(face_load_factor, cycle)
+    return ContactStress(*(safe_sqrt(line_load * square) for square in nominal_stress_squares(pair)))
+
+
+def nominal_stress_squares(pair: GearPair) -> tuple[Scalar, Scalar]:
+    """Squares of `nominal_contact_stress` per line load along the line of action, pinion and wheel [MPa^2 mm/N]."""
+    contact = path_of_contact(pair)
     modulus = combined_modulus(pair.pinion.material, pair.wheel.material, "strain")
-    pitch = contact.reduced_radius(0.0)
+    pitch = contact.reduced_radius(jnp.zeros(()))
     sharing = jnp.maximum(4 - contact.contact_ratio, 0.0) / 3
-    over_face = face_load_factor(cycle) if kinematics.resolution.slices > 1 else 1.0
-    line_load = cycle.force / pair.face_width * over_face
-    at_pitch = safe_sqrt(sharing * line_load * modulus / (jnp.pi * pitch))
+    at_pitch = sharing * modulus / (jnp.pi * pitch)
     worse = (pitch / contact.reduced_radius(single) for single in (contact.inner_single, contact.outer_single))
-    return ContactStress(*(at_pitch * jnp.sqrt(jnp.maximum(ratio, 1.0)) for ratio in worse))
+    pinion, wheel = (at_pitch * jnp.maximum(ratio, 1.0) for ratio in worse)
+    return pinion, wheel

@@ -13,11 +13,10 @@ from jaxtyping import Array, Float
 from ..contact import MeshCycle
 from ..numerics import over_batch
 from .contact_stress import nominal_contact_stress
-from .root_stress import root_stress
+from .root_stress import nominal_root_stress
 from .safety import Strength, given_strength, strengths_of
 
 Scalar = Float[Array, ""]
-Load = Float[Array, "pairs slices positions"]
 
 REVOLUTIONS = 1e6  # of the pinion, by which numbers are near 1
 
@@ -34,15 +33,13 @@ def pitting_damage(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar
 
 
 @over_batch
-def root_damage(cycle: MeshCycle, strength: Strength) -> tuple[Load, Load]:
-    """Damage of the tooth roots of pinion and wheel by the stress at every contact.
-
-    Per million revolutions of the pinion; every passage of a tooth through the mesh does the largest of it.
+def root_damage(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
+    """Damage of the tooth roots of pinion and wheel by the nominal root stress, per million revolutions of the pinion.
 
     Raises:
         ValueError: for a strength without `bending` or without its Woehler line.
     """
-    stress = root_stress(cycle)
+    stress = nominal_root_stress(cycle)
     return _damage(cycle, "bending", strength, stress.pinion, stress.wheel)
 
 

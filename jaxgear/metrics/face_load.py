@@ -5,6 +5,7 @@ References:
     height of the teeth over their width.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -76,6 +77,11 @@ def edge_load_factor(cycle: MeshCycle) -> Scalar:
     idle = mean <= 0
     ends = jnp.maximum(face.line_load[0], face.line_load[-1])
     return jnp.where(idle, 1.0, ends / jnp.where(idle, 1.0, mean))
+
+
+def over_several_slices(factor: Callable[[MeshCycle], Scalar], cycle: MeshCycle) -> Scalar | float:
+    """A factor of this module, 1 on one slice, over which the load is even."""
+    return factor(cycle) if cycle.kinematics.resolution.slices > 1 else 1.0
 
 
 def _at_positions(owner: str, cycle: MeshCycle) -> _Face:

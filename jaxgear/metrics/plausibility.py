@@ -20,7 +20,7 @@ from ..numerics import fields_of, program
 from .flank import flank_surface
 from .load import effective_contact_ratio
 from .lubricant import Lubricant
-from .root_stress import root_stress
+from .root_stress import nominal_root_stress
 
 
 class Limit(NamedTuple):
@@ -68,7 +68,7 @@ LIMITS = {
         -30.0, np.inf, "degC", "mineral gear oils stop flowing at -10 to -30 degC, synthetic ones at -30 to -60"
     ),
     "cooling factor": Limit(0.2, 1.2, "", "ISO/TS 6336-20: X_S is 0.2 for submerged teeth, 1 for dip, 1.2 for spray"),
-    "contact ratio": Limit(1.0, 2.0, "", "nominal contact stress and pitting safety are made for 1 to 2 (ISO 6336-2)"),
+    "contact ratio": Limit(1.0, 2.0, "", "stresses and safeties of ISO 6336-2 and -3 are made for 1 to 2"),
     "pitch line velocity": Limit(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
     "amount of the modification": Limit(0.0, np.inf, "um", "negative: material is added; positive removes it"),
     "depth of the modification": _of_field(TipRelief, "amount"),
@@ -219,7 +219,7 @@ def _numbers(cycle: MeshCycle):
             ("bore to root diameter", where, gear.bore_radius / gear.root_circle_radius),
             ("tip edge radius in modules", where, gear.tip_edge_radius / gear.module),
         ]
-    module, stress = pair.pinion.module, root_stress(cycle)
+    module, stress = pair.pinion.module, nominal_root_stress(cycle)
     in_stress = cycle.kinematics.plane == "stress"
     name = "face width in modules, plane stress" if in_stress else "face width in modules"
     gears.append((name, "", pair.face_width / module))
@@ -230,8 +230,8 @@ def _numbers(cycle: MeshCycle):
         ("mean transmission error in modules", "", 1e-3 * jnp.mean(cycle.transmission_error) / module),
         ("flank pressure", "", jnp.max(cycle.contact_pressure)),
         ("corner pressure", "", jnp.max(cycle.corner_pressure)),
-        ("root stress", "pinion", jnp.max(stress.pinion)),
-        ("root stress", "wheel", jnp.max(stress.wheel)),
+        ("root stress", "pinion", stress.pinion),
+        ("root stress", "wheel", stress.wheel),
         ("effective contact ratio", "", effective_contact_ratio(cycle)),
         ("contact ratio", "", cycle.kinematics.path_of_contact.contact_ratio),
     ]

@@ -25,7 +25,14 @@ from .lubrication import (
     specific_film_thickness,
 )
 from .quantity import Quantity
-from .safety import micropitting_safety, pitting_safety, pressure_safety, root_safety, scuffing_safety
+from .safety import (
+    local_root_safety,
+    micropitting_safety,
+    pitting_safety,
+    pressure_safety,
+    root_safety,
+    scuffing_safety,
+)
 from .settings import WithoutSettings
 
 Load = Float[Array, "pairs slices positions"]
@@ -122,7 +129,15 @@ LUBRICATED = (
 )
 RATED = (
     *_of_gears("pitting_safety", pitting_safety, "S_H, pitting strength over nominal contact stress", "pitting"),
-    *_of_gears("root_safety", root_safety, "S_F, bending strength over root stress", "bending", **_LEAST, local=True),
+    *_of_gears("root_safety", root_safety, "S_F, bending strength over root stress after ISO 6336-3", "bending"),
+    *_of_gears(
+        "local_root_safety",
+        local_root_safety,
+        "bending strength over the largest root stress of the contact analysis",
+        "bending",
+        **_LEAST,
+        local=True,
+    ),
     _borne(
         "pressure_safety",
         pressure_safety,
@@ -143,8 +158,6 @@ RATED = (
         root_damage,
         "share of the life that bending takes in 1e6 revolutions of the pinion",
         "bending_exponent",
-        reduction=Max(),
-        local=True,
         better="smaller",
     ),
 )

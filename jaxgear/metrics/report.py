@@ -21,6 +21,8 @@ _SUMMARY = (
     "corner_force",
     "pinion_root_stress",
     "wheel_root_stress",
+    "pinion_local_root_stress",
+    "wheel_local_root_stress",
     "pinion_contact_stress",
     "wheel_contact_stress",
     "mesh_loss_factor",

@@ -1,8 +1,9 @@
-"""Tooth-root stress after ISO 6336-3 Method B, at the real contact point and under the real pair load.
+"""Tooth-root stress after ISO 6336-3 Method B, and at every contact under the load that the contact analysis finds.
 
 The standard evaluates the form factor Y_F and the stress correction Y_S at the outer point of single contact with the
-full load. Here the critical section (30 degree tangent) is the same, and the lever arm follows the contact along the
-flank.
+full load, and its strengths belong to that stress. Under load contact goes on beyond the path of contact, so that a
+second pair shares the load at that point: the largest local stress is a few percent smaller. Its critical section (30
+degree tangent) is the same, and the lever arm follows the contact along the flank.
 
 References:
     ISO 6336-3:2006 clause 6, with the sign of the last term of h_Fe as in the 2019 edition (the 2006 print drops a
@@ -14,10 +15,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle, Side
-from ..geometry import Gear
+from ..geometry import Gear, GearPair, path_of_contact
 from ..geometry.involute import load_angle
 from ..geometry.outline import rack_tip
 from ..numerics import Checked, over_batch, result
+from .face_load import over_several_slices, root_face_load_factor
 
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
@@ -58,6 +60,13 @@ class RootStress(Checked):
     wheel: Load = result("MPa")
 
 
+class NominalRootStress(Checked):
+    """Tooth-root stress of both gears by the standard."""
+
+    pinion: Scalar = result("MPa")
+    wheel: Scalar = result("MPa")
+
+
 def critical_section(gear: Gear) -> CriticalSection:
     """Section of the generated root at the 30 degree tangent (external spur gear)."""
     m, z = gear.module, gear.teeth
@@ -85,13 +94,37 @@ def root_factors(gear: Gear, roll_length: Real) -> RootFactors:
     return RootFactors(form, correction, arm)
 
 
+def root_stress_per_load(gear: Gear, roll_length: Real) -> Real:
+    """cos(alpha) / m Y_F Y_S: root stress by a line load along the line of action at a roll length [MPa mm/N]."""
+    factors = root_factors(gear, roll_length)
+    return factors.form * factors.correction * jnp.cos(jnp.deg2rad(gear.pressure_angle)) / gear.module
+
+
+def single_contact_root_stress(pair: GearPair) -> tuple[Scalar, Scalar]:
+    """`root_stress_per_load` of pinion and wheel at their outer points of single contact, for contact ratios to 2."""
+    path = path_of_contact(pair)
+    rolls = path.pinion_roll_length(path.outer_single), path.wheel_roll_length(path.inner_single)
+    pinion, wheel = (root_stress_per_load(gear, roll) for gear, roll in zip(pair.gears, rolls))
+    return pinion, wheel
+
+
+@over_batch
+def nominal_root_stress(cycle: MeshCycle) -> NominalRootStress:
+    """sigma_F = F_t / (b m) Y_F Y_S K_Fbeta of both gears [MPa], for contact ratios from 1 to 2.
+
+    The whole load is at the outer point of single contact, whatever the contact analysis says of its sharing.
+    K_Fbeta is `root_face_load_factor`, 1 on one slice. Factors of application and dynamics belong into the torque.
+    """
+    pair = cycle.kinematics.pair
+    line_load = cycle.force / pair.face_width * over_several_slices(root_face_load_factor, cycle)
+    return NominalRootStress(*(line_load * share for share in single_contact_root_stress(pair)))
+
+
 @over_batch
 def root_stress(cycle: MeshCycle) -> RootStress:
-    """Nominal local root stress sigma_F0 = f_t / m Y_F Y_S of both gears [MPa], f_t tangential line load."""
+    """Local root stress f_t / m Y_F Y_S of both gears at every contact [MPa], f_t tangential line load there."""
 
     def stress(side: Side) -> Load:
-        gear, factors = side.gear, root_factors(side.gear, side.contact_roll_length)
-        tangential = cycle.line_load * jnp.cos(jnp.deg2rad(gear.pressure_angle))
-        return tangential / gear.module * (factors.form * factors.correction)[:, None]
+        return cycle.line_load * root_stress_per_load(side.gear, side.contact_roll_length)[:, None]
 
     return RootStress(*(stress(side) for side in cycle.sides))

@@ -9,7 +9,7 @@ from .contact_stress import nominal_contact_stress
 from .lubricant import Lubricant
 from .lubrication import contact_temperature, specific_film_thickness
 from .quantity import Quantity
-from .root_stress import root_stress
+from .root_stress import nominal_root_stress, root_stress
 from .settings import with_settings
 
 Real = Float[Array, "..."]
@@ -60,9 +60,9 @@ class Strength(Checked):
 
         Args:
             name: "pinion_pitting_safety", "wheel_pitting_safety" (need `pitting`), "pinion_root_safety",
-                "wheel_root_safety" (need `bending`), "pressure_safety" (needs `pressure`), "pinion_pitting_damage",
-                "wheel_pitting_damage" (need `pitting_exponent`), "pinion_root_damage" or "wheel_root_damage" (need
-                `bending_exponent`).
+                "wheel_root_safety", "pinion_local_root_safety", "wheel_local_root_safety" (need `bending`),
+                "pressure_safety" (needs `pressure`), "pinion_pitting_damage", "wheel_pitting_damage" (need
+                `pitting_exponent`), "pinion_root_damage" or "wheel_root_damage" (need `bending_exponent`).
 
         Raises:
             ValueError: for another name, and for a strength that is missing.
@@ -84,10 +84,21 @@ def pitting_safety(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar
 
 
 @over_batch
-def root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Load, Load]:
-    """S_F of pinion and wheel: bending strength over the root stress at every contact."""
-    stress = root_stress(cycle)
+def root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
+    """S_F of pinion and wheel after ISO 6336-3: bending strength over the nominal root stress."""
+    stress = nominal_root_stress(cycle)
     limits = strengths_of("root_safety", strength, "bending")
+    return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
+
+
+@over_batch
+def local_root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Load, Load]:
+    """Bending strength over the local root stress of pinion and wheel at every contact.
+
+    Larger than the standard's S_F where a pair that touches early or late shares the load.
+    """
+    stress = root_stress(cycle)
+    limits = strengths_of("local_root_safety", strength, "bending")
     return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
 
 

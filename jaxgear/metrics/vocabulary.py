@@ -14,7 +14,7 @@ from .load import contact_shock, corner_force, effective_contact_ratio
 from .loss import loss_factor
 from .quantity import Quantity, quantities
 from .rating import LUBRICATED, RATED
-from .root_stress import root_stress
+from .root_stress import nominal_root_stress, root_stress
 
 Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
@@ -113,15 +113,37 @@ quantities.add(
     Quantity("corner_contact_length", _corner_length, "mm", "loaded path beyond the theoretical path of contact"),
     Quantity("corner_force", corner_force, "N", "largest force on a pair there", Max(), local=True),
     Quantity(
-        "pinion_root_stress", lambda c: root_stress(c).pinion, "MPa", "largest root stress, pinion", Max(), local=True
+        "pinion_root_stress", lambda c: nominal_root_stress(c).pinion, "MPa", "root stress after ISO 6336-3, pinion"
+    ),
+    Quantity("wheel_root_stress", lambda c: nominal_root_stress(c).wheel, "MPa", "root stress after ISO 6336-3, wheel"),
+    Quantity(
+        "pinion_local_root_stress",
+        lambda c: root_stress(c).pinion,
+        "MPa",
+        "largest root stress of the contact analysis, pinion",
+        Max(),
+        local=True,
     ),
     Quantity(
-        "wheel_root_stress", lambda c: root_stress(c).wheel, "MPa", "largest root stress, wheel", Max(), local=True
+        "wheel_local_root_stress",
+        lambda c: root_stress(c).wheel,
+        "MPa",
+        "largest root stress of the contact analysis, wheel",
+        Max(),
+        local=True,
     ),
     Quantity(
-        "pinion_contact_stress", lambda c: nominal_contact_stress(c).pinion, "MPa", "nominal contact stress, pinion"
+        "pinion_contact_stress",
+        lambda c: nominal_contact_stress(c).pinion,
+        "MPa",
+        "nominal contact stress after ISO 6336-2, pinion",
     ),
-    Quantity("wheel_contact_stress", lambda c: nominal_contact_stress(c).wheel, "MPa", "nominal contact stress, wheel"),
+    Quantity(
+        "wheel_contact_stress",
+        lambda c: nominal_contact_stress(c).wheel,
+        "MPa",
+        "nominal contact stress after ISO 6336-2, wheel",
+    ),
     *(
         Quantity(f"{gear}_{name}", _margin(f"{gear}_{name}"), "mm", f"{meaning}, {gear}", better="larger")
         for gear in ("pinion", "wheel")

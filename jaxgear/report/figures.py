@@ -15,6 +15,8 @@ CAPTIONS = {
     "pressure": "Largest pressure of one tooth pair along the path of contact, of flanks and tip corners (dots).",
     "pressure_map": "Pressure over path of contact and face width.",
     "contact_pattern": "Contact pattern: largest pressure of every place of the flank over a whole mesh.",
+    "contact_pattern_unmodified": "Contact pattern without modification: largest pressure of every place of the flank.",
+    "contact_pattern_layout": "Contact pattern after all three steps: largest pressure of every place of the flank.",
     "line_load": "Load per length over the face.",
     "face_gap": "Gap over the face before the load closes it.",
     "k_chart": "Profile modification of both gears over the roll angle, material removed downwards (K-chart). A shaded "
