@@ -17,23 +17,13 @@ from ..metrics.plausibility import LIMITS
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
-from . import (
-    held,
-    rating,
-    schema,
-    schema_dynamics,
-    schema_optimize,
-    schema_shafts,
-    schema_sweep,
-    schema_wear,
-    sections,
-    template,
-)
+from . import held, rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, sections, template
 from .as_function import FileDesign, FileMesh
 from .errors import DesignFileError, naming, printable, refused
 from .flanks import check_files
 from .gearbox import layout_of, support_of
 from .gears import both_classes, drawing_of, gear_of, materials_of, pair_of, quality_of
+from .schema_optimize import OptimizeSection
 from .sizes import resolution_of
 from .stiffness import model_part, with_tables
 from .toml import decode, read
@@ -91,7 +81,7 @@ class DesignFile:
     units: dict[str, str]
     drawn: dict[str, dict[str, Any]]
     values: dict[str, float]
-    optimize: schema_optimize.OptimizeSection
+    optimize: OptimizeSection
     sweep: schema_sweep.SweepSection | None
     tolerance: schema_sweep.ToleranceSection | None
     dynamics: schema_dynamics.DynamicsSection | None
