@@ -68,8 +68,9 @@ def drawn(random: np.random.Generator) -> Problem:
                 for z, x in zip(teeth, shift)
             )
         )
-        mesh = jg.prepare(pair, resolution=SEARCH)
-        if not bool(mesh.margins.valid):
+        try:
+            mesh = jg.prepare(pair, resolution=SEARCH)
+        except ValueError:  # undercut or pointed teeth, or a path of contact for more pairs
             continue
         cycle = jg.solve(mesh, 100.0)
         pressure = float(jg.quantities["max_flank_pressure"](cycle))
@@ -140,7 +141,8 @@ def main(arguments: list[str] | None = None) -> int:
     jax.config.update("jax_enable_x64", True)
     quick.compile_quickly()
     console, random = Console(), np.random.default_rng(given.seed)
-    failed, solved = [], 0
+    failed: list[str] = []
+    solved = 0
     for i in track(range(given.problems), description="problems", console=console):
         said = failure(drawn(random), ROWS[i % len(ROWS)])
         solved += said != ""

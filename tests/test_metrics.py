@@ -110,6 +110,9 @@ def test_largest_contact_pressure_is_that_of_the_tip_edge_where_corners_touch(cy
 def test_stiffness_definitions(cycle, mesh):
     secant = jg.secant_stiffness(cycle)
     np.testing.assert_allclose(secant * cycle.transmission_error, float(cycle.force), rtol=1e-12)
+    # flanks that are apart without a load are not deflected by what brings them together
+    apart = {name: getattr(cycle, name) + 3.0 for name in ("transmission_error", "unloaded_transmission_error")}
+    np.testing.assert_allclose(jg.secant_stiffness(dataclasses.replace(cycle, **apart)), secant, rtol=1e-12)
     more = jg.solve(mesh, 50.01)
     slope = (more.force - cycle.force) / (more.transmission_error - cycle.transmission_error)
     np.testing.assert_allclose(cycle.tangent_stiffness, slope, rtol=2e-3)
