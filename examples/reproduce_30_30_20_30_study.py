@@ -40,6 +40,9 @@ RELATIVE = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # amounts of relief, to the largest o
 STEPS = (10_000, 20_000, 40_000, 60_000, 100_000)
 STIFFNESS = ((231.0, 225.0, 220.0, 218.0, 218.0), (185.0, 186.0, 199.0, 208.0, 213.0))
 ERROR = ((24.1, 26.0, 29.2, 32.3, 38.3), (31.5, 34.2, 37.2, 39.9, 46.0))
+# relative amounts 0.2 to 1.0, new and after wear
+STIFFNESS_OVER_AMOUNT = ((213.0, 190.0, 185.0, 185.0, 185.0), (216.0, 210.0, 199.0, 185.0, 185.0))
+ERROR_OVER_AMOUNT = ((25.0, 28.0, 28.7, 28.7, 28.7), (30.9, 33.6, 37.1, 39.9, 39.9))
 INCONSISTENT = """
 - 199 and 185 N/um stand for the same relief of 0.6 twice: once as the study's model beside its finite elements (error
   7.57 %), once as worn beside new flanks (change 7.59 %).
@@ -48,6 +51,10 @@ INCONSISTENT = """
 - That "unworn" stiffness begins with 231 N/um, above the 216 N/um of new flanks without relief.
 - The change of stiffness is printed as -19.63 % at the first step and as +17.18 % at the second, for differences of the
   same sign; as the study defines its rate, none has a sign.
+- The coupled fillet compliance is printed with E B in the numerator; E B divides it. The error in meshing-in has the
+  product of the coupling compliances in a sum of compliances, where their sum belongs.
+- The modification is multiplied by the cosine of tan(alpha_c) - alpha_2, though amounts are taken normal to the flank.
+- C_n is called normalized by the module: 0.6 of a module of 2 mm would be 1.2 mm.
 - 100,000 wear steps are called 100 million cycles, without a coefficient of wear or a depth.
 """
 
@@ -202,6 +209,47 @@ def show(found):
             print(textwrap.fill(why, 100, initial_indent="    ", subsequent_indent="    "))
 
 
+def wear_trends(found) -> dict[str, bool]:
+    """Trends of the study over the wear, and whether the numbers have them."""
+    te, stiffness = ([list(zip(of, of[1:])) for of in found[f"worn_{key}"]] for key in ("te", "stiffness"))
+    relieved = found["worn_stiffness"][RELATIVE.index(0.6)]
+    return {
+        "the error at A grows with the wear, whatever the relief": all(new < old for of in te for new, old in of),
+        "the stiffness of unmodified flanks falls": all(new > old for new, old in stiffness[0]),
+        "a relief of 0.6 that has kept the second pair apart does so no longer": max(relieved) > 1.01 * relieved[0],
+    }
+
+
+def relief_trends(found) -> dict[str, bool]:
+    """Trends of the study over amount and length of the relief, and whether the numbers of both pairs have them."""
+
+    def both(has) -> bool:
+        return all(has(key) for key in ("30_30", "20_30"))
+
+    def grows(key) -> bool:
+        te = found[f"te_over_amount_{key}"]
+        return all(low < high for low, high in zip(te, te[1:]))
+
+    return {
+        "QSTE grows with the amount": both(grows),
+        "up to where the stiffness is that of a single pair, within 4 %": both(
+            lambda key: abs(found[f"relieved_stiffness_{key}"] / found[f"single_stiffness_{key}"] - 1) < 0.04
+        ),
+        "the length changes QSTE by less than 2 %": both(
+            lambda key: found[f"length_effect_{key}"] < 0.02 * found[f"relieved_te_{key}"]
+        ),
+        "models without coupling overstate the stiffness of double contact": both(
+            lambda key: found[f"uncoupled_double_stiffness_{key}"] > found[f"double_stiffness_{key}"]
+        ),
+    }
+
+
+def say(trends):
+    """Prints which trends of the study the numbers have."""
+    for trend, holds in trends.items():
+        print(f"  {'as in the study' if holds else 'NOT as in the study'}: {trend}")
+
+
 def show_wear(found):
     """Prints the study's tables over wear beside those of unmodified and of relieved flanks."""
     print("\nWear, 30/30. The study over its wear steps, without and with relief:")
@@ -216,10 +264,13 @@ def show_wear(found):
         lines = {"deepest wear [um]": "depth", "stiffness at A [N/um]": "stiffness", "QSTE at A [um]": "te"}
         for text, key in (lines | {"PPTE [um]": "ppte"}).items():
             print(f"  {text:26}" + "".join(f"{found[f'worn_{key}'][index][life]:9.2f}" for life in shown))
-    print(
-        "As in the study: the error at A grows with the wear, the stiffness of unmodified flanks falls, and a relief\n"
-        "that has kept the second pair apart does so no longer once the flanks have worn between the reliefs."
-    )
+    print("All amounts of the relief, relative to the largest, at the end of the life; the study without wear steps:")
+    for text, key, published in (("stiffness", "stiffness", STIFFNESS_OVER_AMOUNT), ("QSTE", "te", ERROR_OVER_AMOUNT)):
+        changes = [100 * (worn[-1] / worn[0] - 1) for worn in found[f"worn_{key}"]]
+        of_study = [100 * (worn / new - 1) for new, worn in zip(*published)]
+        print(f"  change of {text} at A [%]" + " " * (16 - len(text)) + "".join(f"{change:8.1f}" for change in changes))
+        print(f"  {'  study, from 0.2 on':34}" + " " * 8 + "".join(f"{change:8.1f}" for change in of_study))
+    say(wear_trends(found))
     print("What does not agree within the study:" + INCONSISTENT)
 
 
@@ -234,7 +285,4 @@ if __name__ == "__main__":
         print("  stiffness [N/um]" + "".join(f"{value:8.1f}" for value in found[f"stiffness_over_amount_{key}"]))
         coupled, uncoupled = found[f"double_stiffness_{key}"], found[f"uncoupled_double_stiffness_{key}"]
         print(f"  double-pair stiffness {coupled:.0f} N/um, without coupling {uncoupled:.0f} N/um")
-    print(
-        "As in the study: QSTE grows with the amount up to the single-pair value, the length hardly matters, and models"
-    )
-    print("without coupling overstate the stiffness of double contact.")
+    say(relief_trends(found))

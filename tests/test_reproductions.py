@@ -116,6 +116,16 @@ def test_30_30_wear_has_the_trends_of_the_study():
     np.testing.assert_allclose(root[-1], depth[0, -1], rtol=5e-3)
 
 
+def test_30_30_trends_are_compared():
+    """What the script says of the trends follows from the numbers."""
+    study = found("reproduce_30_30_20_30_study")
+    module = importlib.import_module("examples.reproduce_30_30_20_30_study")  # after it has run: it would warn
+    assert all(module.wear_trends(study).values())
+    fallen = study | {"worn_te": [of[::-1] for of in study["worn_te"]]}
+    assert list(module.wear_trends(fallen).values()) == [False, True, True]
+    assert list(module.relief_trends(study).values()) == [True, True, False, True]  # half a millimetre is too short
+
+
 def test_20_30_against_finite_elements():
     truth = cases.reference(cases.Case("C", "stress", 98.0, "none"))
     force = truth.force.sum(axis=0) / truth.transmission_error

@@ -17,7 +17,7 @@ from report_page import check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import wear_scatter
+from jaxgear.cli import wear_report, wear_scatter
 from jaxgear.cli.compared import compared, sought
 from jaxgear.cli.kept import Kept, Marches
 from jaxgear.contact import removed_material
@@ -114,6 +114,12 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     assert float(last["wear_depth_error_um"]) == pytest.approx(unmodified["wear_depth_error_um"], rel=1e-6)
     assert float(last["pinion_wear_depth_um"]) == pytest.approx(unmodified["pinion_wear_depth_um"], rel=1e-6)
     assert unmodified["worn_ppte_um"] < unmodified["new_ppte_um"]
+    assert float(last["flank_pressure_error_MPa"]) == pytest.approx(
+        unmodified["worn_flank_pressure_error_MPa"], rel=1e-6
+    )
+    assert 0 < unmodified["worn_flank_pressure_error_MPa"] < 0.1 * unmodified["worn_flank_pressure_MPa"]
+    backlash = summary["geometry"]["pair"]["backlash_on_line_of_action_um"]
+    assert f"{backlash:g}" == "0"  # no -0
     assert 0 < unmodified["volume_by_tip_corners_share"] < 0.5
     assert unmodified["life_to_depth_revolutions"] == pytest.approx(2e7 * 5 / unmodified["pinion_wear_depth_um"], 0.15)
     assert f"{unmodified['worn_ppte_um']:.3f}" in done.out and "5 um deep" in done.out
@@ -138,6 +144,10 @@ def check_flanks(path, folder, rows):
         ("[wear]\n", "wear.revolutions: missing"),
         (TABLE.replace("2e7", "-1.0"), "wear.revolutions: -1 revolutions must be greater than 0"),
         (TABLE.replace("1e-18", "-1e-18"), "wear.coefficient: -1e-18 m2/N must be at least 0 m2/N"),
+        (
+            TABLE.replace("1e-18", "1e-12"),
+            "wear.coefficient: 1e-12 m2/N must be at least 0 m2/N and at most 1e-13 m2/N",
+        ),
         (TABLE.replace("blocks = 4", "blocks = 5"), "wear.blocks: 5 must be even"),
         (TABLE + "weights = [1.0]\n", "wear.weights: has no effect without wear.torques"),
         (TABLE + "torques = [50.0, 50.0]\n", "wear.torques: torques must be different"),
@@ -226,6 +236,17 @@ def test_loads_of_the_table_wear_one_flank_together(file, monkeypatch):
     assert asked["load"].torques.tolist() == [50.0, 150.0] and asked["load"].weights.tolist() == [0.75, 0.25]
     assert (float(asked["revolutions"]), asked["blocks"]) == (2e7, 4)
     np.testing.assert_array_equal(asked["coefficient"], 1e-18)
+
+
+@pytest.mark.parametrize("weights, told", [("weights = [3.0, 1.0]", "for 75, 25 % of"), ("", "the same share of")])
+def test_the_shares_of_the_torques_are_told(file, weights, told):
+    design = load_design(file(PAIR + LOADS.replace("weights = [3.0, 1.0]", weights)))
+    study = wear_report.Study(design, wear_request(design), {}, {}, {})
+    summary = wear_report.summary(study)
+    assert (
+        told in summary["shares_of_revolutions"]
+        and summary["shares_of_revolutions"] in wear_report.tables(study)[0].title
+    )
 
 
 @pytest.mark.slow
@@ -369,7 +390,7 @@ def test_overlong_blocks_are_a_failure(file, tmp_path):
 
 
 def test_a_life_that_is_not_known_is_not_endless(file, tmp_path):
-    text = PAIR + TABLE.replace("1e-18", "1e-12")
+    text = PAIR + TABLE.replace("1e-18", "1e-14").replace("2e7", "2e9")
     done = call("wear", str(file(text)), "--output", str(tmp_path / "out"), "--no-figures")
     assert done.code == 1 and "never" not in done.out and "NOT CONVERGED: unmodified from" in done.err
     found = json.loads((tmp_path / "out" / "summary.json").read_text())["designs"]["unmodified"]

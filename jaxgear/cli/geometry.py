@@ -59,7 +59,8 @@ def geometry(pair: GearPair) -> dict[str, dict[str, Any]]:
     usable involute runs from the root form diameter to the tip form diameter, and the mate's tip touches it from the
     active root diameter on.
     """
-    pinion, wheel, together = jax.tree.map(np.asarray, _numbers(pair))
+    # gears without backlash have it up to rounding, which is no -0
+    pinion, wheel, together = jax.tree.map(lambda number: np.where(abs(number) < 1e-9, 0.0, number), _numbers(pair))
     return {
         "pinion": dict(zip(_GEAR, pinion, strict=True)),
         "wheel": dict(zip(_GEAR, wheel, strict=True)),

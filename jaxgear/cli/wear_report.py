@@ -14,8 +14,8 @@ from rich.table import Table
 from ..io import DesignFile, WearRequest, describe
 from ..metrics import quantity_of
 from ..microgeometry import AbstractModification
-from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, wear_depth, worn_volume
-from ..wear.quantities import blocks_are_short
+from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth, worn_volume
+from ..wear.quantities import blocks_are_short, number_of
 from . import manufactured, report, wear_scatter
 from .geometry import geometry
 from .written import versions
@@ -80,6 +80,12 @@ def _numbers(study: Study, life: WearLife) -> dict[str, float]:
         "wheel_worn_volume_per_flank_mm3": volume[1].sum(),
         "volume_by_tip_corners_share": volume[:, 1].sum() / max(volume.sum(), np.finfo(float).tiny),
         "wear_depth_error_um": life.error[-1],
+        **{
+            f"{name}_MPa": number_of(name, life, settings)
+            for name in ("max_pressure_over_life", "max_pressure_over_life_error")
+        },
+        "worn_flank_pressure_MPa": over_life(life, "max_flank_pressure")[-1],
+        "worn_flank_pressure_error_MPa": pressure_error(life)[-1],
     }
     if life.dynamic_factor is not None:
         factors = np.asarray(over_life(life, "dynamic_factor"))
@@ -143,7 +149,17 @@ def _loads(study: Study) -> str:
 def _torques(study: Study) -> str:
     loads = study.request.settings.loads
     torques = [study.design.torque] if loads is None else loads.torques.tolist()
-    return ", ".join(f"{torque:g}" for torque in torques) + " N m"
+    text = ", ".join(f"{torque:g}" for torque in torques) + " N m"
+    return text if loads is None else f"{text} ({_shares(study)})"
+
+
+def _shares(study: Study) -> str:
+    """Which shares of the revolutions the torques have."""
+    assert study.design.wear is not None and study.request.settings.loads is not None
+    if study.design.wear.weights is None:
+        return "each for the same share of the revolutions, the default without wear.weights"
+    shares = study.request.settings.loads.weights.tolist()
+    return "for " + ", ".join(f"{100 * share:.3g}" for share in shares) + " % of the revolutions"
 
 
 def _cell(key: str, value: float, ended: float) -> str:
@@ -216,6 +232,7 @@ def summary(study: Study) -> dict[str, Any]:
         "design_file": study.design.path.name,
         "torque_Nm": study.design.torque,
         "settings": _without_none(settings),
+        **({} if settings.loads is None else {"shares_of_revolutions": _shares(study)}),
         "largest_increment_um": study.request.largest_increment,
         **(manufactured.tolerances(study.design) if study.scatters else {}),
         **({"optimum_over_life": _sought(study)} if OVER_LIFE in study.designs else {}),
@@ -241,10 +258,11 @@ def write_lives(path: Path, study: Study) -> None:
     known = [quantity_of(name) for name in (*_QUANTITIES, *(["dynamic_factor"] if vibrates else []))]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        depths = "pinion_wear_depth_um", "wheel_wear_depth_um", "wear_depth_error_um"
+        depths = "pinion_wear_depth_um", "wheel_wear_depth_um", "wear_depth_error_um", "flank_pressure_error_MPa"
         writer.writerow(["design", "revolutions", *depths, *(quantity.key for quantity in known)])
         for name, life in study.lives.items():
             columns = [life.revolutions, wear_depth(life, "pinion"), wear_depth(life, "wheel"), life.error]
+            columns += [pressure_error(life)]
             columns += [over_life(life, quantity) for quantity in known]
             for row in zip(*map(np.asarray, columns)):
                 writer.writerow([name, *(f"{value:.7g}" for value in row)])
@@ -257,7 +275,7 @@ def write_figures(folder: Path, study: Study) -> list[Path]:
     matplotlib.use("Agg")  # the command line never shows a window
     from .. import plot
 
-    shown = list(dict.fromkeys((next(iter(study.lives)), list(study.lives)[-1])))
+    shown = list(study.lives)
     size: dict[str, Any] = {"columns": len(shown), "width": _PANEL * len(shown), "height": _HEIGHT}
     axes: dict[str, Any] = {}
     for gear in ("pinion", "wheel"):

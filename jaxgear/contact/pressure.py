@@ -13,7 +13,7 @@ Bend = Float[Array, "pairs #slices positions"]
 
 # A concave flank is taken to be this much flatter than the involutes at most: one that fits its mate closer has no
 # Hertzian contact.
-_FLATTEST = 0.1
+FLATTEST = 0.1
 
 
 @program
@@ -33,7 +33,7 @@ def flank_pressure(kinematics: Kinematics, line_load: Load, bend: Bend) -> Load:
     pinion, wheel = kinematics.sides
     reduced = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)
     inside = kinematics.outside <= 0
-    reduced = reduced[:, None] / jnp.maximum(1 + bend, _FLATTEST)
+    reduced = reduced[:, None] / jnp.maximum(1 + bend, FLATTEST)
     return jnp.where(inside[:, None], _hertz(kinematics, line_load, reduced), 0.0)
 
 

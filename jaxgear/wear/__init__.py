@@ -9,6 +9,7 @@ from .over_life import life_to as life_to
 from .over_life import life_to_depth as life_to_depth
 from .over_life import mean_over_life as mean_over_life
 from .over_life import over_life as over_life
+from .over_life import pressure_error as pressure_error
 from .over_life import wear_depth as wear_depth
 from .over_life import worn_volume as worn_volume
 from .quantities import WEAR_QUANTITIES as WEAR_QUANTITIES

@@ -14,6 +14,10 @@ from ..numerics import check, real
 Field = Float[Array, "#gears #pairs #slices #positions"]
 _GEARS = 2
 
+# Lubricated steel has 1e-18 to 5e-16 m2/N, see `wear`; two hundred times the upper end is no such gear any more, and a
+# larger number most often one in mm2/N, which is 1e6 times as large.
+LARGEST_COEFFICIENT = 1e-13
+
 
 class Constant(eqx.Module):
     """A coefficient of each gear [m2/N], shape (gears, 1, 1, 1)."""
@@ -68,5 +72,5 @@ def wear_law(coefficient: Any, loads: Operation, dtype) -> Constant | OfLubricat
     values = real(coefficient).astype(dtype)
     if values.shape not in ((), (_GEARS,)):
         raise ValueError(f"wear: coefficient has shape {values.shape}, must be one number or a pair: pinion, wheel")
-    check("wear", "coefficient", values, "m2/N", low=0.0)
+    check("wear", "coefficient", values, "m2/N", low=0.0, high=LARGEST_COEFFICIENT)
     return Constant(jnp.broadcast_to(values, (_GEARS,))[:, None, None, None])

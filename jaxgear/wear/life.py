@@ -37,6 +37,9 @@ class WearLife(Checked):
             slices, points).
         error: estimate of the error of that depth by the length of the blocks, largest of all points [um], shape
             (lives,); NaN where that of two blocks is not known.
+        pressure_error: estimate of the error of the largest flank pressure by the grid and by the width over which wear
+            is spread [MPa], shape (lives,), (lives, torques) under a load spectrum; zero on new flanks, NaN on flanks
+            that are not known. It is not part of `error`, which is that of the blocks alone.
         known: whether all contacts that have worn these flanks were found, also within blocks, and something is left of
             the teeth, shape (lives,).
         cycles: the mesh on these flanks, leading axis (lives,); (lives, torques) under a load spectrum. None has
@@ -54,6 +57,7 @@ class WearLife(Checked):
     slice_width: Float[Array, " slices"] = result("mm")
     depth: Float[Array, "lives gears parts slices points"] = result("um")
     error: Lives = result("um")
+    pressure_error: Float[Array, "lives *torques"] = result("MPa")
     known: Bool[Array, " lives"] = result()
     cycles: MeshCycle
     weights: Float[Array, " torques"] | None = result()
@@ -130,7 +134,8 @@ def wear(
         deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions);
             None for perfect gears.
         blocks: of equal length, even: two and two are compared with one of double length.
-        points: of the grid on each flank, evenly spaced from the start of the active profile to the tip; None for 33.
+        points: of the grid on each flank, evenly spaced from the start of the active profile to the tip; None for
+            one and a half times the positions, from 33 to 97.
             Points nearer to each other than the contact is wide
             show no more, and pile up at the tip what the contact there would wear beyond it.
         dynamics: what vibrates, its speeds aside: the motion is that at the speed of an `Operation`, or of every load
@@ -185,6 +190,7 @@ def checked_revolutions(owner: str, revolutions: Any, mesh: Mesh) -> Scalar:
 def life_of(case: Case, found: March, revolutions: Lives) -> WearLife:
     """The life of a march; `revolutions` at its lives."""
     roll_length = grid(case.mesh, case.points)
+    cycles = case.cycles(roll_length, found)
     return WearLife(
         revolutions=revolutions,
         roll_length=roll_length,
@@ -193,8 +199,9 @@ def life_of(case: Case, found: March, revolutions: Lives) -> WearLife:
         slice_width=case.mesh.slice_width,
         depth=found.depth,
         error=_total_error(found.error),
+        pressure_error=case.pressure_errors(roll_length, found, cycles),
         known=found.known,
-        cycles=case.cycles(roll_length, found),
+        cycles=cycles,
         weights=case.weights,
         dynamic_factor=case.dynamic_factor(found),
     )

@@ -37,11 +37,26 @@ def over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure
         values = life.dynamic_factor
     else:
         values = jnp.where(solved(life.cycles), quantity(life.cycles), jnp.nan)
+    return _of_all_loads(life, values, quantity.better, measure)
+
+
+def _of_all_loads(life: WearLife, values, better, measure: AbstractMeasure | None) -> Lives:
+    """Values (lives, torques) joined over the torques of a spectrum."""
     if life.weights is None:
         return values
-    many = jnp.stack([joined(measure or Mean(), row, life.weights, quantity.better) for row in values])
+    many = jnp.stack([joined(measure or Mean(), row, life.weights, better) for row in values])
     # a failed case of many is joined as an infinite one: of one pair of flanks nothing is known
     return jnp.where(jnp.any(jnp.isnan(values), axis=-1), jnp.nan, many)
+
+
+def pressure_error(life: WearLife, measure: AbstractMeasure | None = None) -> Lives:
+    """Estimated error of the largest flank pressure at every life [MPa], shape (lives,).
+
+    By how much it changes where the worn flanks are known on every other point only, and where contacts are as wide as
+    their own loads make them. Arguments as for `over_life`.
+    """
+    _single("pressure_error", life)
+    return _of_all_loads(life, life.pressure_error, "smaller", measure)
 
 
 def mean_over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Scalar:

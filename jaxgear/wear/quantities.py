@@ -16,7 +16,7 @@ from ..metrics import Quantity, quantities
 from ..metrics.settings import WithoutSettings, WithSettings
 from ..numerics import maximum, once
 from .life import WearLife
-from .over_life import life_to, life_to_depth, mean_over_life, over_life, wear_depth
+from .over_life import life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth
 
 
 class Kind(NamedTuple):
@@ -52,6 +52,13 @@ def _at_most(longest, life):
     return jnp.where(life > longest, longest, life)
 
 
+def _pressure_error(life: WearLife):
+    """By how much the largest pressure of a life may be larger [MPa]; that at tip corners depends on no grid."""
+    largest = over_life(life, "max_contact_pressure")
+    may_be = jnp.maximum(largest, over_life(life, "max_flank_pressure") + pressure_error(life))
+    return maximum(may_be) - maximum(largest)
+
+
 WEAR_QUANTITIES: Mapping[str, Kind] = {
     "worn_ppte": Kind(lambda life, _: over_life(life, "ppte")[-1], "um", "peak-to-peak transmission error when worn"),
     "mean_ppte_over_life": Kind(
@@ -62,6 +69,11 @@ WEAR_QUANTITIES: Mapping[str, Kind] = {
     ),
     "max_pressure_over_life": Kind(
         lambda life, _: maximum(over_life(life, "max_contact_pressure")), "MPa", "largest pressure of the life"
+    ),
+    "max_pressure_over_life_error": Kind(
+        lambda life, _: _pressure_error(life),
+        "MPa",
+        "error of the largest pressure of the life by grid and width of the contacts, as estimated",
     ),
     "worn_dynamic_factor": Kind(
         lambda life, _: over_life(life, "dynamic_factor")[-1],

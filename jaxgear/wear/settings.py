@@ -12,6 +12,7 @@ from ..metrics import Quantity
 from ..metrics.settings import with_settings
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, count, number
+from .coefficient import LARGEST_COEFFICIENT
 from .life import BLOCKS, WearLife, check_blocks, wear
 from .vibration import LineLoad, check_line_load
 
@@ -27,7 +28,7 @@ class Wear(Checked):
             5e-16 for mild wear in mixed lubrication.
         wheel_coefficient: of wear of the wheel; None for that of the pinion.
         blocks: contact analyses and steps of wear in turn, of equal length; even.
-        points: of the grid on each flank; None for 33.
+        points: of the grid on each flank; None for one and a half times the positions, from 33 to 97.
         depth_limit: depth to which a life is asked for.
         ppte_limit: peak-to-peak transmission error to which a life is asked for.
         line_load: under which the flanks wear: "static", or that of the steady motion at the speed of the load,
@@ -38,8 +39,8 @@ class Wear(Checked):
     """
 
     revolutions: Scalar = number("revolutions", low=0.0, open_low=True)
-    coefficient: Scalar = number("m2/N", low=0.0)
-    wheel_coefficient: Scalar | None = number("m2/N", low=0.0, optional=True, default=None)
+    coefficient: Scalar = number("m2/N", low=0.0, high=LARGEST_COEFFICIENT)
+    wheel_coefficient: Scalar | None = number("m2/N", low=0.0, high=LARGEST_COEFFICIENT, optional=True, default=None)
     blocks: int = count(low=2, high=100_000, default=BLOCKS)
     points: int | None = count(low=3, high=10_000, optional=True, default=None)
     depth_limit: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
@@ -100,10 +101,10 @@ class Wear(Checked):
 
         Args:
             name: one of `WEAR_QUANTITIES`: "worn_ppte", "mean_ppte_over_life", "max_ppte_over_life",
-                "max_pressure_over_life", "wear_depth", "pinion_wear_depth", "wheel_wear_depth", "wear_depth_error",
-                "life_to_depth" (needs `depth_limit`), "life_to_ppte" (needs `ppte_limit`), "worn_dynamic_factor" or
-                "max_dynamic_factor_over_life" (both need `dynamics`). The steps of the integrator are those of the
-                dynamics, or 256.
+                "max_pressure_over_life", "max_pressure_over_life_error", "wear_depth", "pinion_wear_depth",
+                "wheel_wear_depth", "wear_depth_error", "life_to_depth" (needs `depth_limit`), "life_to_ppte" (needs
+                `ppte_limit`), "worn_dynamic_factor" or "max_dynamic_factor_over_life" (both need `dynamics`). The steps
+                of the integrator are those of the dynamics, or 256.
 
         Raises:
             ValueError: for another name, and for a limit that is missing.
