@@ -233,15 +233,6 @@ def show_printed(found):
 if __name__ == "__main__":
     found = main(fast="--fast" in sys.argv)
     show(found)
-<<<<<<< HEAD
     show_searched(found)
     show_over_torque(found)
     show_printed(found)
-=======
-    print("PPTE [um] over torque" + "".join(f"{torque:8g} N m" for torque in TORQUES))
-    for name, row in zip(DESIGNS, found["ppte_over_torque"]):
-        print(f"  {name:19}" + "".join(f"{value:12.3f}" for value in row))
-    best = [min(zip(column, DESIGNS))[1] for column in zip(*found["ppte_over_torque"])]
-    said = f"{best[0]} at every one" if len(set(best)) == 1 else ", ".join(best)
-    print(f"The study finds its genetic design best at every torque; least PPTE here: {said}.")
->>>>>>> wear
