@@ -211,11 +211,16 @@ def test_shafts_that_an_analysis_leaves_out_are_told(folder, analyzed):
 def test_what_is_not_usual_is_said_once_of_all_designs_it_concerns():
     usual, range_ = Limit(0.0, 1650.0, "MPa", "case-hardened"), Limit(0.0, 0.5, "", "steel")
     found = {
-        "unmodified": (Doubt("friction", "", 3.7, range_),),
-        "optimum": (Doubt("friction", "", 3.7, range_), Doubt("flank pressure", "", 3383.0, usual)),
+        "unmodified": (Doubt("friction", "", 3.7, range_), Doubt("corner pressure", "", 4689.0, usual)),
+        "optimum": (
+            Doubt("friction", "", 3.7, range_),
+            Doubt("corner pressure", "", 1837.0, usual),
+            Doubt("flank pressure", "", 3383.0, usual),
+        ),
     }
     assert list(report.doubt_lines(found)) == [
         "please check: friction 3.7 is more than 0.5 (steel)",
+        "please check: unmodified 4689, optimum 1837: corner pressure 1837 MPa is more than 1650 (case-hardened)",
         "please check: optimum: flank pressure 3383 MPa is more than 1650 (case-hardened)",
     ]
 
@@ -272,7 +277,7 @@ def test_all_result_files_are_there(folder, analyzed, optimized, iterated):
     of_others |= {"responses.csv", "dynamic_factor.png", "approach_rms.png", "waterfall.png", "bifurcation.png"}
     of_others |= {"phase_portrait.png", "branches.png"}  # of `jaxgear dynamics`
     of_others |= {"profiles.csv", "tolerance_cases.png", "face_load_factors.png", "radar.png"}  # of `jaxgear layout`
-    of_others |= {"shaft_deflection.png"}
+    of_others |= {"shaft_deflection.png", "contact_pattern_unmodified.png", "contact_pattern_layout.png"}
     of_others |= {"life.csv", "worn_flanks.csv", "worn_flanks.parquet", "worn_pinion.png", "worn_wheel.png"}
     of_others |= {"ppte_over_life.png", "depth_over_life.png", "dynamic_factor_over_life.png"}  # of `jaxgear wear`
     of_others |= {"life_ppte_distribution.png"}

@@ -533,7 +533,7 @@ OF_OTHER_COMMANDS = {
         SWEPT.replace("samples = 8", 'sampling = "full_factorial"\nlevels = { width = 3 }'),
         "sweep.levels: levels must be",
     ),
-    "speeds": (text(tail="[dynamics]\nnumber = 9"), "dynamics: needs either mesh_frequencies or speeds"),
+    "speeds": (text(tail="[dynamics]\nnumber = 9"), "dynamics: needs mesh_frequencies [Hz] or speeds [rpm]"),
     "wear": (
         text(tail="[wear]\nrevolutions = 1e6\ncoefficient = 1e-18\nweights = [1.0]"),
         "wear.weights: has no effect",
@@ -736,7 +736,7 @@ def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
     assert "| `density` | a number or the name of a variable | kg/m^3 | greater than 0 | `7850` | " in text
     assert '| `side` | one of "both", "negative", "positive" |  |  | `"both"` | ' in text
     guide = Path(__file__).parent.parent / "examples" / "guides" / "design_files.md"
-    assert guide.read_text(encoding="utf-8") == text, "python -m jaxgear.io.reference > examples/guides/design_files.md"
+    assert guide.read_text(encoding="utf-8") == text, "python -m jaxgear.io > examples/guides/design_files.md"
 
 
 def test_the_shortest_file_of_the_guide_is_one(load):

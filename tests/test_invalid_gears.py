@@ -119,7 +119,9 @@ def test_center_distance_too_small():
 
 
 def test_contact_ratio_below_one():
-    refused(lambda: jg.GearPair(gear(), gear(), 62.0), "GearPair: contact ratio", "at least 1", "center_distance")
+    refused(
+        lambda: jg.GearPair(gear(), gear(), 62.0), "GearPair: center_distance = 62 mm", "contact ratio", "at least 1"
+    )
     low = gear(tip_diameter=62.0)
     refused(lambda: jg.GearPair(low, low), "GearPair: contact ratio", "at least 1", "tip_diameter")
 

@@ -111,6 +111,7 @@ def methods(effort: Effort) -> list[Method]:
         Method("rule-based", _rule),
         Method("factorial", _searched(jg.optimize.Factorial(effort.levels))),
         Method("genetic", _searched(jg.optimize.Genetic(population, generations)), needs=_EVOLUTION),
+        Method("binary genetic", _searched(jg.optimize.BinaryGenetic(population, generations)), slow=True),
         Method(
             "differential evolution",
             _searched(jg.optimize.DifferentialEvolution(population, generations)),

@@ -28,7 +28,7 @@ app = typer.Typer(
     help="Flank design of spur gears by loaded tooth contact analysis. Exit codes: 0 success, 1 a contact solution did "
     "not converge or a constraint is not met (results are written and flagged), 2 error (nothing is written), "
     "130 interrupted (a sweep resumes). Begin with jaxgear new. Guides: examples/guides/index.md of the source; "
-    "python -m jaxgear.io.reference prints every table and key of a design file.",
+    "python -m jaxgear.io prints every table and key of a design file.",
 )
 
 

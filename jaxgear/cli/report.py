@@ -135,15 +135,19 @@ def _given_way(mesh: Mesh, line_load) -> Float[Array, ""]:
 
 
 def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
-    """A line for everything that is not usual, with the designs that it is said of unless those are all."""
+    """A line for everything that is not usual, with the designs that have it and their numbers where they differ."""
     grouped: dict[tuple[str, str], dict[str, Doubt]] = {}
     for design, several in found.items():
         for doubt in several:
             grouped.setdefault((doubt.name, doubt.where), {})[design] = doubt
     for same in grouped.values():
-        design, doubt = list(same.items())[-1]  # the last is the one that the run is about
-        others = "" if len(same) == len(found) else f"{', '.join(same)}: "
-        yield f"{PLEASE_CHECK}{others}{doubt}"
+        doubt = list(same.values())[-1]  # the last is the one that the run is about
+        numbers = {design: f"{each.value:.4g}" for design, each in same.items()}
+        if len(set(numbers.values())) > 1:
+            said = f"{', '.join(f'{design} {number}' for design, number in numbers.items())}: "
+        else:
+            said = "" if len(same) == len(found) else f"{', '.join(same)}: "
+        yield f"{PLEASE_CHECK}{said}{doubt}"
 
 
 def grid(evaluations: Evaluations) -> str:

@@ -169,7 +169,3 @@ def _default(name: str, default: Any, of: Callable[..., Any] | None) -> str:
     if isinstance(default, float) and math.isfinite(default):
         return f"`{default:g}`"
     return f"`{default}`" if isinstance(default, int) else f'`"{default}"`' if isinstance(default, str) else ""
-
-
-if __name__ == "__main__":
-    print(reference(), end="")

@@ -17,7 +17,7 @@ _TEXT = """# {title}
 # jaxgear analyze {name}     shows the pair without modification and with the tip reliefs of the values below
 # jaxgear optimize {name}    finds the best values between low and high
 #
-# python -m jaxgear.io.reference prints every table and key; a misspelt one is refused by name.
+# python -m jaxgear.io prints every table and key; a misspelt one is refused by name.
 title = "{title}"
 
 [pinion]                        # drives
