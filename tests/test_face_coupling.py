@@ -13,6 +13,7 @@ from gearboxes import two_stages
 
 import jaxgear as jg
 from jaxgear.compliance import face_kernel, few_modes
+from jaxgear.contact.prescribed import solve_series
 from jaxgear.numerics import ContactProblem, Coupling
 from jaxgear.optimize.refine import _with_positions
 from jaxgear.optimize.verification import verification
@@ -207,6 +208,12 @@ def test_approach_of_a_load_brings_that_load_and_its_stiffness(on_table):
     np.testing.assert_allclose(again.line_load, found.line_load, rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(again.tangent_stiffness, 1 / (1 / found.tangent_stiffness - windup), rtol=1e-8)
     np.testing.assert_allclose(again.tangent_stiffness, np.subtract(more.force, less.force) / 2e-3, rtol=1e-5)
+    # and the approach of teeth and bodies together: the share of either is found
+    removed = jg.contact.removed_material(on_table, TORQUE, pinion=SLOPE)
+    series = solve_series(on_table, found.transmission_error, removed, jnp.zeros(()))
+    assert bool(series.converged.all())
+    np.testing.assert_allclose(series.force, np.full_like(at, found.force), rtol=1e-6)
+    np.testing.assert_allclose(series.transmission_error, at, rtol=1e-3)
 
 
 @pytest.mark.slow

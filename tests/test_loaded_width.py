@@ -89,12 +89,15 @@ def test_other_models_take_one_solution_over_the_width_of_the_full_load(default)
         np.testing.assert_array_equal(one, other)
 
 
-def test_where_the_first_solution_failed_nothing_converges(mesh):
+def test_where_the_first_solution_failed_nothing_converges(mesh, default):
     task = jnp.asarray(TORQUE), *reliefs().values()
     residual = np.zeros(16)
     residual[[3, 5]] = 1.0, np.nan
     given = jnp.full((2, 1, 16), 50.0), jnp.asarray(residual)
-    found = loaded_material(mesh, *task, lambda removed: given)
+    met = []
+    found = loaded_material(mesh, *task, lambda removed: (met.append(removed), given)[1])
+    # what the first solution meets is over the width of one pair that carries all
+    np.testing.assert_allclose(met[0].amount, slid_material(default, *task).amount, rtol=1e-12, atol=1e-12)
     assert isinstance(found, RemovedMaterial)
     np.testing.assert_array_equal(np.isnan(found.amount).all(axis=(0, 1)), np.isin(np.arange(16), (3, 5)))
     cycle = jg.contact.solve_removed(mesh, TORQUE, found)
