@@ -113,7 +113,7 @@ def test_condensing_a_chain_of_springs_is_its_closed_form():
     """Ground - k1 - seat A - k2 - free node - k3 - seat B, in x; y and z on springs of their own."""
     k1, k2, k3 = 100.0, 50.0, 200.0
     chain = np.array([[k1 + k2, -k2, 0.0], [-k2, k2 + k3, -k3], [0.0, -k3, k3]])
-    matrix = scipy.sparse.block_diag([chain, 7e3 * np.eye(4)])
+    matrix = scipy.sparse.block_diag([scipy.sparse.coo_array(chain), 7e3 * np.eye(4)])
     pick = np.eye(7)
     housing = condense(matrix, {"A": pick[:, [0, 3, 4]], "B": pick[:, [2, 5, 6]]})
     among = 1e3 * np.array([[1 / k1, 1 / k1], [1 / k1, 1 / k1 + 1 / k2 + 1 / k3]])

@@ -60,7 +60,7 @@ def geometry(pair: GearPair) -> dict[str, dict[str, Any]]:
     active root diameter on.
     """
     # gears without backlash have it up to rounding, which is no -0
-    pinion, wheel, together = jax.tree.map(lambda number: np.where(abs(number) < 1e-9, 0.0, number), _numbers(pair))
+    pinion, wheel, together = jax.tree.map(lambda number: np.where(np.abs(number) < 1e-9, 0.0, number), _numbers(pair))
     return {
         "pinion": dict(zip(_GEAR, pinion, strict=True)),
         "wheel": dict(zip(_GEAR, wheel, strict=True)),

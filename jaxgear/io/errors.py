@@ -95,10 +95,12 @@ def check_file(path: Path) -> None:
     Raises:
         DesignFileError: without key, in the words of the system.
     """
+    if "\0" in str(path):  # every version of Python has its own words for it
+        raise DesignFileError("", "a path cannot hold a null byte")
     try:
         mode = path.stat().st_mode
-    except (OSError, ValueError) as error:  # ValueError: a path with a null byte
-        raise DesignFileError("", getattr(error, "strerror", None) or error) from None
+    except OSError as error:
+        raise DesignFileError("", error.strerror or error) from None
     if not stat.S_ISREG(mode):
         raise DesignFileError("", "is a folder, not a file" if stat.S_ISDIR(mode) else "is not a regular file")
 

@@ -1,5 +1,6 @@
 """The table `[optimize]` of a design file, its limits, and the options of the methods."""
 
+import inspect
 from typing import Annotated, Any
 
 from pydantic import create_model
@@ -107,7 +108,7 @@ def method_options() -> dict[str, type[Section]]:
 def optimize_section() -> type[OptimizeSection]:
     """The table [optimize] with those of the methods."""
     methods = method_options()
-    texts = "".join(f"\n        {name}: options of the method." for name in methods)
+    texts = "".join(f"\n    {name}: options of the method." for name in methods)
     tables: dict[str, Any] = {name: (Annotated[Tables | None, table()], None) for name in methods}
-    text = (OptimizeSection.__doc__ or "").rstrip() + texts + "\n    "
+    text = inspect.cleandoc(OptimizeSection.__doc__ or "") + texts  # Python 3.13 removes the indentation by itself
     return create_model("OptimizeSection", __base__=OptimizeSection, __doc__=text, **tables)

@@ -252,7 +252,14 @@ def _loaded(code: tuple[bytes, Any, Any], devices: list[jax.Device]) -> _Run:
 
 
 class Recipe(pickle.Pickler):
-    """Writes what a program is made of, to be compared: functions by their names and what they enclose."""
+    """Writes what a program is made of, to be compared: functions by their names and what they enclose.
+
+    Equal objects are written alike, whether they are one object or two, which differs from process to process.
+    """
+
+    def __init__(self, file: io.BytesIO):
+        super().__init__(file)
+        self.fast = True  # no references to what was written before
 
     def persistent_id(self, obj):
         if isinstance(obj, jax.sharding.Sharding | jax.sharding.Mesh):
