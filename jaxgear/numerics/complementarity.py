@@ -14,8 +14,9 @@ equation drops out and everything else stays.
 
 The iterate v holds the load of every spring in contact, and of every other one minus the load that would open it as far
 as it is open: its sign is the active set. All arrays keep the positions innermost and the P springs of an elimination
-are unrolled, so that a compiler fuses a step into few loops. Intermediate results that several loops need end with a
-division: compilers store those, but evaluate cheaper expressions again in every loop.
+are unrolled, so that a compiler fuses a step into few loops; their laws are evaluated together, which halves the program
+and takes no longer. Intermediate results that several loops need end with a division: compilers store those, but
+evaluate cheaper expressions again in every loop.
 """
 
 from dataclasses import replace
@@ -27,7 +28,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .contact_problem import ContactProblem, ContactSolution
-from .contact_state import active_of, carried_by, laws_of, secants_under, slopes_under
+from .contact_state import active_of, carried_by, deflections_under, secants_under, slopes_under
 from .contact_system import (
     correction,
     eliminable,
@@ -195,8 +196,8 @@ def _solve_jvp(steps, tolerance, primals, tangents):
 
     def conditions(data):
         d = approach if data.approach is None else data.approach
-        mismatch = [y + law.deflection(q) for y, law, q in zip(without_gap(data, load, d), laws_of(data), load)]
-        return jnp.stack(mismatch) + data.gap, d if data.load is None else total(data, load) - data.load
+        mismatch = jnp.stack(without_gap(data, load, d)) + deflections_under(data, load) + data.gap
+        return mismatch, d if data.load is None else total(data, load) - data.load
 
     _, (mismatch_dot, last_dot) = jvp_of_given(conditions, problem, problem_dot)
     slope = slopes_under(problem, load, secants_under(problem, load))

@@ -5,15 +5,13 @@ as it is open.
 """
 
 from functools import reduce
-from operator import itemgetter
 
-import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool
+from jaxtyping import Array, Bool, Float
 
 from .contact_problem import ContactProblem
 from .elimination import Rows, Slopes
-from .spring import LOAD_FLOOR, AbstractSpring
+from .spring import LOAD_FLOOR
 
 
 def active_of(problem: ContactProblem, v: Rows) -> list[Bool[Array, "slices positions"]]:
@@ -29,19 +27,17 @@ def carried_by(v: Rows) -> Rows:
     return [jnp.where(row >= 0, row, 0.0) for row in v]
 
 
-def laws_of(problem: ContactProblem) -> list[AbstractSpring]:
-    """The law of every spring."""
-    return [jax.tree.map(itemgetter(i), problem.law) for i in range(problem.lever.shape[0])]
-
-
 def secants_under(problem: ContactProblem, load: Rows) -> Slopes:
-    """Deflection per load of every spring."""
-    return [law.secant(jnp.maximum(q, LOAD_FLOOR)) for law, q in zip(laws_of(problem), load)]
+    """Deflection per load of every spring; all springs at once, so that a program holds the law once."""
+    return list(problem.law.secant(jnp.maximum(jnp.stack(load), LOAD_FLOOR)))
 
 
 def slopes_under(problem: ContactProblem, load: Rows, secant: Slopes) -> Slopes:
     """Its derivative; the secants are those under the same loads."""
-    return [
-        jnp.where(q > LOAD_FLOOR, law.slope(jnp.maximum(q, LOAD_FLOOR), c), c)
-        for law, q, c in zip(laws_of(problem), load, secant)
-    ]
+    q, c = jnp.stack(load), jnp.stack(secant)
+    return list(jnp.where(q > LOAD_FLOOR, problem.law.slope(jnp.maximum(q, LOAD_FLOOR), c), c))
+
+
+def deflections_under(problem: ContactProblem, load: Rows) -> Float[Array, "pairs slices positions"]:
+    """Deflection of every spring."""
+    return problem.law.deflection(jnp.stack(load))
