@@ -23,19 +23,22 @@ _EVENTS = {
     "/jax/core/compile/backend_compile_duration": "compiling",
 }
 _BEFORE, _AFTER = "imports, collection", "(end)"
-_MOST = 15  # programs in the list of those that took the longest to compile
+_MOST = 40  # programs in the list of those that took the longest to compile
+_FILES = 6  # that are named for each of them
 
 
 class Program(NamedTuple):
     """A program that a process needed.
 
     Attributes:
+        file: of the test that needed it.
         mark: the same for equal programs, whatever their names.
         seconds: until it was there, without tracing and lowering.
         kept: whether it was compiled before, by another process or an earlier run.
     """
 
     name: str
+    file: str
     mark: str
     seconds: float
     kept: bool
@@ -100,7 +103,7 @@ class Costs:
             mark = hashlib.sha256(str(computation).replace(name, "").encode()).hexdigest()
             self._kept, began = False, time.perf_counter()
             found = function(backend, computation, *args, **options)
-            self.programs.append(Program(name, mark, time.perf_counter() - began, self._kept))
+            self.programs.append(Program(name, self._file, mark, time.perf_counter() - began, self._kept))
             return found
 
         return run
@@ -157,7 +160,12 @@ def compiled(programs):
         named[each.name].append(each)
     for name, group in sorted(named.items(), key=lambda each: -sum(one.seconds for one in each[1]))[:_MOST]:
         different = len({each.mark for each in group})
-        yield f"{sum(each.seconds for each in group):8.1f} s  {len(group):5} times, {different:5} different  {name}"
+        files = Counter()
+        for each in group:
+            files[each.file.removeprefix("tests/test_").removesuffix(".py")] += each.seconds
+        most = ", ".join(f"{file} {seconds:.1f}" for file, seconds in files.most_common(_FILES))
+        total = sum(files.values())
+        yield f"{total:8.1f} s  {len(group):5} times, {different:5} different  {name:24} {most}"
 
 
 def _processor():

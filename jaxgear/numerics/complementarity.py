@@ -14,7 +14,7 @@ equation drops out and everything else stays.
 
 The iterate v holds the load of every spring in contact, and of every other one minus the load that would open it as far
 as it is open: its sign is the active set. All arrays keep the positions innermost and the P springs of an elimination
-are unrolled, so that a compiler fuses a step into few loops; their laws are evaluated together, which halves the program
+are unrolled, so that a compiler fuses a step into few loops; their laws are evaluated together, which halves a program
 and takes no longer. Intermediate results that several loops need end with a division: compilers store those, but
 evaluate cheaper expressions again in every loop.
 """
