@@ -8,8 +8,8 @@ import uuid
 from pathlib import Path
 
 import jax
-import jaxtyping
 import pytest
+import typechecker
 from jax._src.lru_cache import LRUCache
 
 jax.config.update("jax_enable_x64", True)
@@ -30,7 +30,7 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     """Before anything else imports jaxgear. Slow tests run without checks of annotations, as what users run."""
     if config.option.markexpr != "slow":
-        jaxtyping.install_import_hook("jaxgear", "typechecker.arrays")
+        typechecker.install()
     if "PYTEST_XDIST_WORKER" not in os.environ:
         _before_the_workers()
 
@@ -173,9 +173,9 @@ def clean_figures():
 @pytest.fixture(scope="module")
 def mesh():
     """The 19/48 pair at a coarse resolution, where a file has no mesh of its own."""
-    from catalogue import TWO_PAIRS, gear_pair, prepare
+    from catalogue import gear_pair, prepare
 
-    return prepare(gear_pair(), resolution=TWO_PAIRS)
+    return prepare(gear_pair())
 
 
 @pytest.fixture(scope="session")

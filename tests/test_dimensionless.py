@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import TWO_PAIRS, gear_pair, prepare, solve
+from catalogue import gear_pair, prepare, solve
 
 from jaxgear.dynamics import DeadZone
 from jaxgear.dynamics.dimensionless import (
@@ -244,7 +244,7 @@ def test_largest_relief_of_the_study():
 
 @pytest.fixture(scope="module")
 def identified():
-    cycle = solve(prepare(gear_pair(), resolution=TWO_PAIRS), 100.0)
+    cycle = solve(prepare(gear_pair()), 100.0)
     return cycle, from_mesh(cycle, mass=0.3, damping_ratio=0.05, half_clearance=40.0)
 
 
@@ -314,7 +314,7 @@ def test_dynamic_optimum_beats_the_static_one_where_a_displacement_excites():
 
 def test_flanks_take_off_what_a_cycle_relief_says():
     """At the contact of a pair anywhere on its path, from the tips of both gears; and back again."""
-    mesh, half, known = prepare(gear_pair(), resolution=TWO_PAIRS), 40.0, TipRelief(6.0, 4.0, Power(1.5))
+    mesh, half, known = prepare(gear_pair()), 40.0, TipRelief(6.0, 4.0, Power(1.5))
     path = path_of_contact(mesh.pair)
     cycle = cycle_relief(known, mesh.pair, half)
     flank = tip_relief(cycle, mesh.pair, half)

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import COARSE, kahraman_gear
+from catalogue import TWO_PAIRS, kahraman_gear
 
 import jaxgear as jg
 from jaxgear import io, manufacture
@@ -21,7 +21,7 @@ _kinematics = eqx.filter_jit(kinematics)
 def moving():
     """The 50/50 pair of contact ratio 1.37."""
     pair = jg.GearPair(kahraman_gear(), kahraman_gear())
-    return _kinematics(pair, jnp.asarray(0.0), COARSE, "strain")
+    return _kinematics(pair, jnp.asarray(0.0), TWO_PAIRS, "strain")
 
 
 @pytest.fixture(scope="module")
@@ -275,7 +275,7 @@ def test_a_flank_of_another_gear_or_place_is_refused(side, tmp_path, rolls, face
 def test_flanks_are_told_where_the_mate_meets_the_face(tmp_path):
     """Gears of other widths: a table over the common face is a flank, one over the middle of the wider gear is none."""
     pair = jg.GearPair(kahraman_gear(), replace(kahraman_gear(), face_width=40.0), axial_offset=9.0)
-    wheel = _kinematics(pair, jnp.asarray(0.0), COARSE, "strain").sides[1]
+    wheel = _kinematics(pair, jnp.asarray(0.0), TWO_PAIRS, "strain").sides[1]
     start, tip = float(wheel.start_roll_length), float(wheel.gear.tip_roll_length)
     for faces, fine in (((-19.0, 1.0), True), ((-5.0, 15.0), False)):
         path = written(tmp_path, HEAD + "\n".join(f"{roll},{face},0.5" for face in faces for roll in (start, tip)))

@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import COARSE, kahraman_gear
+from catalogue import TWO_PAIRS, kahraman_gear
 
 import jaxgear as jg
 from jaxgear import manufacture
@@ -18,7 +18,7 @@ _kinematics = eqx.filter_jit(kinematics)
 
 def pinion_of(gear):
     """Pinion of two equal gears."""
-    return _kinematics(jg.GearPair(gear, gear), jnp.asarray(0.0), COARSE, "strain").sides[0]
+    return _kinematics(jg.GearPair(gear, gear), jnp.asarray(0.0), TWO_PAIRS, "strain").sides[0]
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
-from catalogue import TWO_PAIRS, kahraman_gear, prepare  # noqa: E402
+from catalogue import kahraman_gear, prepare  # noqa: E402
 
 import jaxgear as jg  # noqa: E402
 from jaxgear import manufacture, plot  # noqa: E402
@@ -20,7 +20,7 @@ RELIEF = jg.TipRelief(6.0, 3.0, jg.Power(3.0))
 
 @pytest.fixture(scope="module")
 def mesh():
-    return prepare(jg.GearPair(kahraman_gear(), kahraman_gear()), resolution=TWO_PAIRS)
+    return prepare(jg.GearPair(kahraman_gear(), kahraman_gear()))
 
 
 @pytest.fixture(scope="module")

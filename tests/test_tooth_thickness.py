@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import COARSE, gear_pair, kahraman_gear
+from catalogue import TWO_PAIRS, gear_pair, kahraman_gear
 
 import jaxgear as jg
 from jaxgear.contact.kinematics import kinematics
@@ -38,7 +38,7 @@ def test_a_ball_touches_both_flanks(name):
     """The nearest points of the tooth space are half its diameter off a centre on the centreline."""
     gear = GEARS[name]
     mate = jg.Gear(50, gear.module, face_width=20.0)
-    side = kinematics(jg.GearPair(gear, mate), jnp.asarray(0.0), COARSE, "strain").sides[0]
+    side = kinematics(jg.GearPair(gear, mate), jnp.asarray(0.0), TWO_PAIRS, "strain").sides[0]
     ball = 1.7 * float(gear.module)
     dimension = float(over_balls(gear, ball)) - ball
     odd = int(gear.teeth) % 2
