@@ -15,6 +15,7 @@ CASE = cases.Case("A", "strain", 50.0, "par7.81x5.05")
 OTHER = cases.Case("L", "stress", 100.0, "linshort")
 
 
+@pytest.mark.slow
 def test_quick_mode_holds_the_recorded_bounds(capsys):
     assert accuracy.main(["--quick"]) == 0
     assert "42 mesh cycles" in capsys.readouterr().out
@@ -227,9 +228,10 @@ def test_solution_is_that_of_the_public_functions():
 
 @pytest.mark.parametrize(
     "second",
-    [replace(NO_CORNERS, name="legacy"), pytest.param(models.LEGACY, marks=pytest.mark.slow)],
+    [replace(NO_CORNERS, name="legacy"), models.LEGACY],
     ids=["stand-in", "legacy"],
 )
+@pytest.mark.slow
 def test_figures_are_written(tmp_path, monkeypatch, second):
     from benchmarks import figures
 

@@ -81,6 +81,7 @@ def test_law_has_the_slope_of_its_deflection(problem):
     np.testing.assert_allclose((higher - lower) / (2e-5 * load), slope, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_what_a_baseline_cannot_do_is_refused(mesh, problem):
     sliced = replace(problem, slice_width=np.full(3, 6.0), crowning=np.zeros(3))
     with pytest.raises(ValueError, match="one slice"):

@@ -198,6 +198,7 @@ def test_solution_meets_the_conditions_of_the_dense_problem(mesh, on_table, held
     np.testing.assert_allclose(carried(problem, found.line_load), float(found.force), rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_approach_of_a_load_brings_that_load_and_its_stiffness(on_table):
     found = jg.solve(on_table, TORQUE, pinion=SLOPE)
     windup = on_table.hub / on_table.pair.face_width

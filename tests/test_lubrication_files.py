@@ -166,6 +166,7 @@ def test_a_constraint_and_a_column_need_their_table(load):
             sweep_request(load(text))
 
 
+@pytest.mark.slow
 def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, capsys):
     design = load(PAIR + OIL + STRENGTH + RELIEF)
     numbers = design.lubricant.quantity("scuffing_safety"), design.strength.quantity("pinion_root_safety")

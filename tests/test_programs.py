@@ -264,6 +264,7 @@ slide_steps = 0
 """
 
 
+@pytest.mark.slow
 def test_a_second_command_with_another_number_compiles_nothing_and_finds_the_same(tmp_path, contacts):
     # without optimization it compiles in a quarter of the time
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "JAX_DISABLE_MOST_OPTIMIZATIONS": "1"}

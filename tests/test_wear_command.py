@@ -332,6 +332,7 @@ def scatter(design, flanks, kept):
     return mesh, found["relieved"]
 
 
+@pytest.mark.slow
 def test_manufactured_pairs_live_as_their_deviations_let_them(file, tmp_path, monkeypatch):
     """Each is the life of the gears that `sample_deviations` draws; finer gears scatter less."""
     design = load_design(file(PAIR + TABLE + TOLERANCE))
