@@ -356,7 +356,10 @@ MALFORMED = {
         text(wheel='[[wheel.modification]]\ntype = "tabulated_profile"\nposition = [1, 2]\namount = [1.0, "h"]'),
         'wheel.modification[0].amount[1]: "h" is not a variable',
     ),
-    "variable not used": (text(tail=VARIABLE), 'variables.height: is declared but used nowhere, write "height" in'),
+    "variable not used": (
+        text(tail=VARIABLE),
+        "variables.height: is declared but used nowhere: no number of the file has",
+    ),
     "variable and no modification": (
         text(pinion="modification = []", tail=VARIABLE),
         "variables.height: is declared but used nowhere: pinion.modification = [] has no modification, write",
