@@ -40,7 +40,8 @@ class Met:
         self._points = np.empty((0, len(record.problem.names)))
         self._values = np.empty((0, objectives))
         self._new: list[tuple[np.ndarray, np.ndarray]] = []
-        self._low, self._span = (np.zeros(objectives), np.ones(objectives)) if frame is None else frame
+        self._low: np.ndarray = np.zeros(objectives) if frame is None else frame[0]
+        self._span: np.ndarray = np.ones(objectives) if frame is None else frame[1]
         self._worst = np.full(objectives, -np.inf)
 
     @property

@@ -88,16 +88,16 @@ def iterate_transmission_error(
     limit = None if max_pressure is None else Constraint("max_contact_pressure", high=max_pressure)
     spent: list[int] = []
 
-    stay = limit is None or positions is None
-
-    def end_on(finer: Mesh) -> tuple[Levelled, bool]:
+    def end_on(finer: Mesh, between: bool = True) -> tuple[Levelled, bool]:
         flanks = Flanks(mesh, *given, float(max_relief))
         pressure = Pressure(limit, torque, parts(finer, mesh.resolution.positions))
         found = levelled(mesh, flanks, pressure, rtol, steps, spent, callback)
-        return found, stay or pressure.holds_between(found, half_way(finer))
+        return found, between and pressure.holds_between(found, half_way(finer))
 
-    owner = "iterate_transmission_error"
-    found = end_on(mesh)[0] if stay else on_finer_meshes(owner, mesh, positions, end_on)
+    if limit is None or positions is None:
+        found, _ = end_on(mesh, between=False)
+    else:
+        found = on_finer_meshes("iterate_transmission_error", mesh, positions, end_on)
     best, highest = found.iterates[found.best], found.pressures[found.best]
     limits = {"max_relief": Limit(best.max_relief, None, float(max_relief), "um", True)}
     excess = 0.0

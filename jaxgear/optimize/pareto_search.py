@@ -77,7 +77,8 @@ class Pareto(Checked):
         record = met.record.on(met.record.problem.on(mesh))
         finer = Met(record, met.frame())
         searches = [Search(point, Chebyshev(met.weight(value), finer.frame)) for point, value in zip(*met.rows())]
-        follow(record.linearizer, finer, searches, steps=_POLISH, rtol=_RTOL)
+        linearizer = record.linearizer or Linearizer(record.problem, self.points)
+        follow(linearizer, finer, searches, steps=_POLISH, rtol=_RTOL)
         finer.end(self.points)
         points, values = finer.rows()
         at_twice = at_twice_the_positions(record, points)
