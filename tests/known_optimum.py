@@ -45,6 +45,7 @@ class Known:
 
     def pareto(self, design, box, **options):
         """`jaxgear.pareto`."""
+        options = {"positions": None} | options  # the front is known at the positions of the mesh
         return jg.optimize.pareto(design, box, mesh=self.mesh, torque=self.torque, **options)
 
     def minimize(self, design, box, **options):

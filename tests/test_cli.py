@@ -157,9 +157,15 @@ def test_analyze_gives_what_the_library_gives(folder, analyzed):
     )
     assert table["unmodified_um"] == sorted(table["unmodified_um"])  # without relief PPTE grows with the torque
     finer = file.mesh(dataclasses.replace(mesh.resolution, positions=2 * mesh.resolution.positions))
-    twice = jg.peak_to_peak(jg.solve(finer, 50.0, pinion=pinion, wheel=wheel).transmission_error)
-    change = written["ppte_change_at_twice_the_positions_um"]
-    assert change == pytest.approx(float(twice) - written["ppte_um"], abs=1e-9)
+    twice = jg.solve(finer, 50.0, pinion=pinion, wheel=wheel)
+    changes = written["change_at_twice_the_positions"]
+    assert changes.keys() == {"ppte_um", "max_flank_pressure_MPa", "max_corner_pressure_MPa"}
+    for metric, change in changes.items():
+        value = jg.quantities[metric.rpartition("_")[0]](twice)
+        assert change == pytest.approx(float(value) - written[metric], abs=1e-7), metric
+    pressure = f"modified by {changes['max_flank_pressure_MPa']:+.2g} MPa"
+    assert "; max flank pressure: unmodified by" in analyzed.out and pressure in analyzed.out
+    change = changes["ppte_um"]
     assert (
         "twice as many change PPTE: unmodified by" in analyzed.out and f"modified by {change:+.2g} um" in analyzed.out
     )

@@ -356,7 +356,14 @@ MALFORMED = {
         text(wheel='[[wheel.modification]]\ntype = "tabulated_profile"\nposition = [1, 2]\namount = [1.0, "h"]'),
         'wheel.modification[0].amount[1]: "h" is not a variable',
     ),
-    "variable not used": (text(tail=VARIABLE), "variables.height: is declared but used nowhere"),
+    "variable not used": (
+        text(tail=VARIABLE),
+        "variables.height: is declared but used nowhere: no number of the file has",
+    ),
+    "variable and no modification": (
+        text(pinion="modification = []", tail=VARIABLE),
+        "variables.height: is declared but used nowhere: pinion.modification = [] has no modification, write",
+    ),
     "variable of two units": (
         text(pinion=RELIEF.replace("3.4", '"height"'), tail=VARIABLE),
         "pinion.modification[0].length: height stands for a quantity in mm here and for a quantity in um elsewhere",

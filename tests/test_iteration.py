@@ -1,10 +1,14 @@
 """Flanks from the transmission error itself, on the pair and at the torque of the study that they come from."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from catalogue import TWO_PAIRS, gear_pair, kahraman_gear, ppte
 
 import jaxgear as jg
+from jaxgear.contact.parts import parts
+from jaxgear.optimize.refine import POSITIONS
 
 TORQUE = 200.0  # [N m]
 
@@ -146,6 +150,24 @@ def test_a_relief_that_rises_to_the_tip_is_as_level_and_keeps_the_tip_edges_out(
     assert np.all(np.diff(pinion[pinion > 0.5]) > 0) and pinion.argmax() == pinion.size - 1
     strength = jg.metrics.Strength(pressure=2000.0)
     assert float(strength.quantity("pressure_safety")(slanted.cycle)) >= 1.0
+
+
+@pytest.mark.slow
+def test_the_limit_of_the_pressure_is_kept_between_the_positions(mesh):
+    """At four times the positions that judge it; what the positions of the mesh alone judge passes it."""
+    limit, count = 3000.0, mesh.resolution.positions
+    fine = parts(jg.prepare(mesh.pair, resolution=replace(mesh.resolution, positions=4 * POSITIONS)), count)
+    judged, short = (
+        jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=12.0, max_pressure=limit, positions=positions)
+        for positions in (POSITIONS, None)
+    )
+
+    def largest(found):
+        cycles = [jg.solve(part, TORQUE, pinion=found.pinion, wheel=found.wheel) for part in fine]
+        return max(float(np.max(np.asarray(cycle.corner_pressure))) for cycle in cycles)
+
+    assert judged.feasible and largest(judged) <= limit
+    assert short.feasible and largest(short) > limit
 
 
 def test_a_limit_of_the_pressure_that_holds_anyway_changes_nothing(nominal, mesh):

@@ -1,13 +1,19 @@
 """Limits that can be kept are kept, between the positions of a mesh too, and whatever the objective pulls at."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from catalogue import LINE, gear_pair
 
 import jaxgear as jg
-from jaxgear.optimize import Genetic
+from jaxgear.contact import Operation
+from jaxgear.contact.parts import parts
+from jaxgear.metrics import Lubricant, Strength
+from jaxgear.optimize import Genetic, Minimax, Pareto
 from jaxgear.optimize.goal import FEASIBLE, counted
+from jaxgear.optimize.refine import fine_enough
 
 KNOWN = {"amount": 9.0, "length": 4.2}  # keeps every limit below that can be kept
 
@@ -67,3 +73,77 @@ def test_two_limits_leave_room_between_them():
 def test_a_limit_of_a_free_parameter_holds_where_it_is():
     (excess,) = jg.Constraint({"amount": 1.0}, high=5.0).excess(jnp.asarray(5.0))
     assert float(excess) == 0.0
+
+
+def test_a_mesh_is_fine_enough_for_all_designs_or_for_none():
+    """What each of them is worth there, in parts of its own or of the span of a front, and the limits that it keeps."""
+    values, kept = np.array([[1.0, 0.0], [3.0, 50.0]]), np.zeros(2)
+    assert fine_enough(values, kept, values, kept)
+    moved = values + np.array([[0.0, 0.5], [0.0, 0.0]])
+    assert not fine_enough(values, kept, moved, kept) and fine_enough(values, kept, moved, kept, span=[2.0, 50.0])
+    assert fine_enough(values, kept, values, np.array([0.0, FEASIBLE]))
+    assert not fine_enough(values, kept, values, np.array([0.0, 1.1 * FEASIBLE]))
+    assert fine_enough(values, np.array([0.0, 0.5]), values, np.array([0.0, 0.6])), "a limit that is passed anyway"
+
+
+@pytest.mark.slow
+def test_limits_of_a_front_hold_on_a_mesh_of_four_times_the_positions():
+    """Those of every design; of a front that stays on the mesh of its search some pass them between its positions."""
+    mesh = jg.prepare(gear_pair(), resolution=LINE)
+    fine = parts(jg.prepare(mesh.pair, resolution=replace(LINE, positions=16 * LINE.positions)), LINE.positions)
+    limit = 1.05 * number(mesh, "max_flank_pressure")
+    names = "ppte", "max_corner_pressure"
+
+    def largest(positions):
+        """Of all designs, relative to the limit; and the front."""
+        front = jg.optimize.pareto(
+            design,
+            {"amount": (0.0, 30.0), "length": (1.0, 5.0)},
+            mesh=mesh,
+            torque=50.0,
+            objectives=names,
+            constraints=[jg.Constraint("max_flank_pressure", high=limit)],
+            method=Pareto(points=4, steps=10),
+            positions=positions,
+        )
+        found = []
+        for amount, length in zip(*front.parameters.values()):
+            pinion, wheel = design({"amount": amount, "length": length})
+            cycles = [jg.solve(part, 50.0, pinion=pinion, wheel=wheel) for part in fine]
+            found.append(max(float(np.max(np.asarray(cycle.contact_pressure))) for cycle in cycles))
+        return max(found) / limit, front
+
+    worst, front = largest(4 * LINE.positions)
+    assert worst <= 1.0 and front.compromise.feasible and front.compromise.positions >= 4 * LINE.positions
+    assert front.values[front.chosen, 0] == pytest.approx(front.compromise.ppte, rel=1e-9)
+    assert largest(None)[0] > 1.0
+
+
+@pytest.mark.slow
+def test_least_power_loss_within_limits_of_noise_and_root_safety():
+    """A 23/81 pair; a relief that is known keeps both limits, on a finer mesh than that of the answer too."""
+    pair = gear_pair((23, 81), 2.5, face_width=30.0, bores=(None, None))
+    mesh, fine = (jg.prepare(pair, resolution=replace(LINE, positions=count)) for count in (64, 256))
+    load = Operation(300.0, 1500.0)
+    oil = Lubricant(viscosity_40=100.0, viscosity_100=11.1, temperature=80.0, roughness=0.5)
+    safety = Strength(bending=700.0).quantity("pinion_root_safety")
+
+    def worth(x):
+        pinion, wheel = design({name: np.float64(value) for name, value in x.items()})
+        cycle = jg.solve(fine, load, pinion=pinion, wheel=wheel)
+        return float(jg.peak_to_peak(cycle.transmission_error)), float(safety(cycle))
+
+    ppte, least = worth({"amount": 16.0, "length": 3.6})
+    found = jg.minimize(
+        design,
+        {"amount": (0.0, 40.0), "length": (1.0, 4.5)},
+        mesh=mesh,
+        torque=load,
+        objective=oil.quantity("loss_power"),
+        constraints=[jg.Constraint("ppte", high=1.01 * ppte), jg.Constraint(safety, low=0.99 * least)],
+        method=Minimax(starts=2, rounds=1, steps=10),
+        positions=64,  # as many as the mesh has: one program linearizes on both
+    )
+    assert found.feasible and all(limit.kept for limit in found.constraints.values())
+    noise, safe = worth(found.parameters)
+    assert noise <= 1.01 * ppte and safe >= 0.99 * least

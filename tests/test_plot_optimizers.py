@@ -196,6 +196,20 @@ def test_convergence_steps_through_the_history_to_the_end(optima):
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
 
 
+def test_what_is_judged_on_a_finer_mesh_is_no_rise_of_the_search():
+    found = optimum(
+        history=(3.0, 1.0, 1.4, 1.2, 1.3),
+        spent=(1, 8, 9, 20, 30),
+        positions=256,
+        history_positions=[64, 64, 128, 128, 256],
+    )
+    search, judged = plot.convergence({"minimax": found}).lines
+    assert search.get_label() == "minimax" and judged.get_label() == "minimax, judged at 256 positions"
+    np.testing.assert_array_equal(search.get_ydata(), [3.0, 1.0])
+    np.testing.assert_array_equal(judged.get_data(), [[30, 33], [1.3, 1.3]])
+    assert search.get_color() == judged.get_color() and judged.get_markerfacecolor() == "white"
+
+
 def test_convergence_from_zero_analyses_and_without_any_valid_design():
     start = optimum(history=(4.0, 2.0), spent=(0, 8))
     never = optimum(history=(np.inf, np.inf), spent=(0, 8))

@@ -57,7 +57,7 @@ def test_the_best_variant_says_what_a_finer_mesh_would_change(folder):
         float(jg.peak_to_peak(jg.solve(file.mesh(of), 50.0, pinion=pinion, wheel=wheel).transmission_error))
         for of in (size, replace(size, positions=2 * size.positions))
     ]
-    told = f"variant {best.column('variant')[0]} by {ppte[1] - ppte[0]:+.2g} um at 50 N m"
+    told = f"variant {best.column('variant')[0]} at 50 N m by {ppte[1] - ppte[0]:+.2g} um"
     assert f"evaluated at 16 positions; twice as many change PPTE: {told}" in result.out
     assert told in (folder / "out" / "report.html").read_text("utf-8")
 

@@ -157,13 +157,12 @@ def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:
 
 
 def _positions(optimum: Optimum, evaluations: report.Evaluations, searched_at: int) -> str:
-    if not np.isfinite(optimum.grid_change):
-        return report.grid(evaluations)
     said = f"searched at {searched_at} positions, " if searched_at != optimum.positions else ""
-    said += f"evaluated at {optimum.positions} positions"
-    return (
-        said + f"; twice as many change the objective by {optimum.grid_change:+.2g} {optimum.objective_unit}".rstrip()
-    )
+    change = f"the objective by {optimum.grid_change:+.2g} {optimum.objective_unit}".rstrip()
+    shown = {
+        name: evaluations[name] for name in dict.fromkeys([next(iter(evaluations)), report.main_name(evaluations)])
+    }
+    return said + report.grid(shown, change * bool(np.isfinite(optimum.grid_change)))
 
 
 def _with_unit(file: DesignFile, name: str) -> str:

@@ -17,7 +17,7 @@ from ..io.results import unit_of
 from ..metrics import Doubt, plausibility
 from ..numerics import program
 from ..optimize import Verified
-from .study import Evaluation
+from .study import Evaluation, grid_line
 from .terminal import console as console
 from .terminal import say as say
 from .terminal import say_rows as say_rows
@@ -150,11 +150,10 @@ def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
         yield f"{PLEASE_CHECK}{said}{doubt}"
 
 
-def grid(evaluations: Evaluations) -> str:
-    """How fine the mesh was, and what a finer one would change."""
+def grid(evaluations: Evaluations, more: str = "") -> str:
+    """How fine the mesh was, and what a finer one would change, besides `more`."""
     positions = next(iter(evaluations.values())).cycle.kinematics.resolution.positions
-    changes = ", ".join(f"{name} by {evaluation.ppte_change:+.2g} um" for name, evaluation in evaluations.items())
-    return f"evaluated at {positions} positions; twice as many change PPTE: {changes}"
+    return grid_line(positions, {name: evaluation.grid_change for name, evaluation in evaluations.items()}, more)
 
 
 @program

@@ -18,6 +18,12 @@ from ..optimize import Verified
 from ..sweeps import Scatter, over_torques
 
 _SURFACE_REACH, _SURFACE_TORQUES = 2.0, 21
+# numbers that depend on the positions as extremes over them, by name and unit, and what a line calls them
+_EXTREMES = {
+    "ppte_um": "PPTE",
+    "max_flank_pressure_MPa": "max flank pressure",
+    "max_corner_pressure_MPa": "max corner pressure",
+}
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,7 @@ class Evaluation:
         transmission_error: over the torques, shape (torques, positions) [um].
         ppte: peak-to-peak transmission error over the torques [um].
         objectives: what an optimization made small, by name and unit, of this design; empty without one.
-        ppte_change: by how much PPTE at the design torque changes at twice the positions [um].
+        grid_change: by how much numbers at the design torque change at twice the positions, by name and unit.
         failed_torques: torques without a converged contact solution [N m], the design torque included.
         seconds: what finding and evaluating it took, without compilation of the latter [s].
         verified: what it is worth with the finite-element structure; None where nobody asked.
@@ -45,7 +51,7 @@ class Evaluation:
     metrics: dict[str, float | bool]
     transmission_error: np.ndarray
     ppte: np.ndarray
-    ppte_change: float
+    grid_change: Mapping[str, float]
     failed_torques: list[float]
     seconds: float
     objectives: dict[str, float] = field(default_factory=dict)
@@ -79,19 +85,41 @@ def evaluate(
         metrics={name: value.item() for name, value in metrics.items()},
         transmission_error=curves[1:],
         ppte=np.ptp(curves[1:], axis=1),
-        ppte_change=ppte_change(mesh, file.torque, pinion, wheel, curves[0]),
+        grid_change=grid_change(mesh, cycles[0], pinion, wheel),
         failed_torques=sorted({float(torque) for torque in every[~converged.all(axis=1)]}),
         seconds=seconds,
         face_load=_face_load(cycles[1:]),
     )
 
 
-def ppte_change(
-    mesh: Mesh, torque: float, pinion: AbstractModification, wheel: AbstractModification, curve: np.ndarray
-) -> float:
-    """By how much the PPTE of a transmission error [um], shape (positions,), changes at twice the positions [um]."""
-    between = over_torques(half_way(mesh), np.asarray([torque]), pinion=pinion, wheel=wheel)[0].transmission_error
-    return float(np.ptp(np.concatenate([curve, np.asarray(between)])) - np.ptp(curve))
+def grid_change(
+    mesh: Mesh, cycle: MeshCycle, pinion: AbstractModification, wheel: AbstractModification
+) -> dict[str, float]:
+    """By how much the extremes of a cycle change at twice the positions of its mesh, by name and unit."""
+    torque = np.asarray([float(cycle.torque)])
+    (between,) = over_torques(half_way(mesh), torque, pinion=pinion, wheel=wheel)
+    before, after = _extremes(cycle), _extremes(cycle, between)
+    return {name: after[name] - value for name, value in before.items()}
+
+
+def _extremes(*cycles: MeshCycle) -> dict[str, float]:
+    """Extremes over the positions of several cycles together."""
+    error, flank, corner = (
+        np.concatenate([np.asarray(getattr(cycle, name)).ravel() for cycle in cycles])
+        for name in ("transmission_error", "contact_pressure", "corner_pressure")
+    )
+    found = np.ptp(error), flank.max(), corner.max()
+    return dict(zip(_EXTREMES, map(float, found)))
+
+
+def grid_line(positions: int, changes: Mapping[str, Mapping[str, float]], more: str = "") -> str:
+    """How fine a mesh was, and what twice the positions would change; `changes` by the name of the design."""
+    said = [more] * bool(more)
+    for metric, label in _EXTREMES.items():
+        unit = metric.rpartition("_")[2]
+        each = (f"{name} by {change[metric]:+.2g} {unit}" for name, change in changes.items())
+        said.append(f"{label}: {', '.join(each)}")
+    return f"evaluated at {positions} positions; twice as many change {'; '.join(said)}"
 
 
 def response_surface(mesh: Mesh, torque: float, pinion: AbstractModification, wheel: AbstractModification):

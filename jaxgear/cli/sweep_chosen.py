@@ -15,7 +15,7 @@ from ..sweeps import SweepTable, over_torques
 from . import report
 from .progress import Stages
 from .run import Modifications, torques_of
-from .study import evaluate, ppte_change
+from .study import evaluate, grid_change, grid_line
 
 CHOSEN = 3  # variants
 
@@ -76,16 +76,15 @@ def evaluate_best(
 
 
 def grid_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> str:
-    """How fine the mesh of a sweep was, and by how much the PPTE of its best variant changes on a finer one."""
+    """How fine the mesh of a sweep was, and by how much the numbers of its best variant change on a finer one."""
     parameters = best.take([0]).designs()[0]
     made = design.sweep_mesh(size)
     mesh = made if isinstance(made, Mesh) else made(parameters)
     torque = float(design.operation(parameters).torque)
     pinion, wheel = design.design(parameters)
     (cycle,) = over_torques(mesh, np.asarray([torque]), pinion=pinion, wheel=wheel)
-    change = ppte_change(mesh, torque, pinion, wheel, np.asarray(cycle.transmission_error))
-    name = f"variant {best.column('variant')[0]} by {change:+.2g} um at {torque:g} N m"
-    return f"evaluated at {size.positions} positions; twice as many change PPTE: {name}"
+    name = f"variant {best.column('variant')[0]} at {torque:g} N m"
+    return grid_line(size.positions, {name: grid_change(mesh, cycle, pinion, wheel)})
 
 
 def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, list[Path]]:

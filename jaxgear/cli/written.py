@@ -64,7 +64,7 @@ def summary(
 def _design(evaluation: Evaluation) -> dict[str, Any]:
     return {
         **evaluation.metrics,
-        "ppte_change_at_twice_the_positions_um": evaluation.ppte_change,
+        "change_at_twice_the_positions": evaluation.grid_change,
         **({"objectives": evaluation.objectives} if evaluation.objectives else {}),
         **({"verified": _verified(evaluation.verified)} if evaluation.verified else {}),
         **manufactured.summary(evaluation),

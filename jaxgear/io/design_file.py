@@ -234,7 +234,9 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
     )
     open_case = [*pair.free(), *model.free(), *axes.free(), *operation.free()]
     open_flanks = [free for part in flanks for free in part.free()]
-    bounds, units, values = read_variables(top.variables or {}, [*open_flanks, *open_case])
+    both = {"pinion": pinion_says, "wheel": wheel_says}
+    empty = [f"{name}.modification" for name, says_of in both.items() if says_of.given().get("modification") == []]
+    bounds, units, values = read_variables(top.variables or {}, [*open_flanks, *open_case], empty)
     ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
     usual_pair = pair.build(middle)

@@ -75,7 +75,7 @@ class OptimizeRequest:
     @property
     def finer(self) -> int | None:
         """Positions of the finer mesh on which it ends; None where it stays on its mesh or chooses later."""
-        return self._common.get("positions", POSITIONS) if self.method in METHODS else None
+        return self._common.get("positions", POSITIONS) if self.method in (*METHODS, PARETO) else None
 
     def over_life(self, settings: Wear) -> "OptimizeRequest | None":
         """The search of the same variables for the least mean PPTE over the life at the design torque.
@@ -169,7 +169,7 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
         common |= options | fewer
     else:
         common["method"] = made_by(name)(**options | fewer)
-    if quick and name != PARETO:  # a quick look stays on its mesh
+    if quick:  # a quick look stays on its mesh
         common["positions"] = None
     return OptimizeRequest(name, curve, verify, design, common)
 

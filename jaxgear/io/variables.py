@@ -1,7 +1,7 @@
 """The table [variables]: numbers of the file that are left open."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from . import schema, template
 from .errors import DesignFileError, suggestion
@@ -12,9 +12,15 @@ _QUANTITY = re.compile(r"\s*[-+]?[.,]?\d")
 
 
 def read_variables(
-    tables: schema.Tables, open_numbers: Iterable[template.Free]
+    tables: schema.Tables, open_numbers: Iterable[template.Free], empty: Sequence[str] = ()
 ) -> tuple[dict[str, tuple[float, float]], dict[str, str], dict[str, float]]:
-    """Bounds, units and, where they are given, values of the free parameters, each declared once and used."""
+    """Bounds, units and, where they are given, values of the free parameters, each declared once and used.
+
+    Args:
+        tables: the variables.
+        open_numbers: the places in the file where their names stand.
+        empty: keys of lists without an entry, in which a name could have been.
+    """
     bounds: dict[str, tuple[float, float]] = {}
     units: dict[str, str] = {}
     values: dict[str, float] = {}
@@ -44,7 +50,9 @@ def read_variables(
                 raise DesignFileError(f"variables.{free.name}.{end}", f"{problem} as {free.key}")
     for name, table in tables.items():
         if name not in units:
-            raise DesignFileError(f"variables.{name}", "is declared but used nowhere")
+            where = f"{' and '.join(empty)} = [] has no modification" if empty else "no number of the file has its name"
+            problem = f'is declared but used nowhere: {where}, write "{name}" in place of the number that it stands for'
+            raise DesignFileError(f"variables.{name}", problem)
         unit = table.get("unit")
         if unit is not None and unit != units[name]:
             raise DesignFileError(f"variables.{name}.unit", f'"{unit}" must be "{units[name]}" as it is used')

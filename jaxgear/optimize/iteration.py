@@ -6,22 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..conditions import Design, solve_case, solved
-from ..contact import Mesh, MeshCycle
-from ..metrics import max_relief as largest_relief
+from ..conditions import Design
+from ..contact import Mesh
+from ..contact.parts import half_way, parts
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Callback, check, whole
 from .goal import Constraint
 from .iterated_flanks import Flanks
+from .levelling import Levelled, Pressure, levelled
 from .minimax import Minimax
 from .minimize import minimize
-from .result import Iterate, Limit, Optimum
+from .refine import POSITIONS, on_finer_meshes
+from .result import Limit, Optimum
 from .search import AbstractMethod
-
-_UNTOUCHED = 0.05  # [um]: a flank with less relief than this counts as unmodified
-_LOADED = 1e-6  # a pair with less than this share of the force carries none
-_STEEPEST = 2.0  # slant of a relief that begins a quarter of the way to the tip, and is three times as high there
-_HALVINGS = 5  # of the range of slants: the slant is the least one within 1/16
 
 
 def iterate_transmission_error(
@@ -34,6 +31,7 @@ def iterate_transmission_error(
     max_pressure: float | None = None,
     rtol: float = 0.1,
     steps: int = 5,
+    positions: int | None = POSITIONS,
     callback: Callback | None = None,
 ) -> Optimum:
     """Levels the transmission error by taking it off the flanks.
@@ -67,6 +65,8 @@ def iterate_transmission_error(
         rtol: ends the iteration where PPTE is within this part of its lower limit, or has fallen by less than
             this part of itself.
         steps: most steps.
+        positions: of the finer mesh on which the pressure is judged, doubled until its limit is kept at twice as many,
+            too; None for those of `mesh`, on which all else is evaluated.
         callback: called as callback(step, steps, best PPTE).
 
     Returns:
@@ -84,33 +84,26 @@ def iterate_transmission_error(
     check("iterate_transmission_error", "rtol", rtol, "", low=0.0, open_low=True)
     whole("iterate_transmission_error", "steps", steps, 1)
     began = time.perf_counter()
-    flanks = Flanks(mesh, pinion or NoModification(), wheel or NoModification(), float(max_relief))
-    limit = np.inf if max_pressure is None else float(max_pressure)
-    cycles: list[MeshCycle] = []
-    iterates: list[Iterate] = []
+    given = pinion or NoModification(), wheel or NoModification()
+    limit = None if max_pressure is None else Constraint("max_contact_pressure", high=max_pressure)
     spent: list[int] = []
-    reached: list[float] = []
-    level = float("nan")
-    for step in range(steps + 1):
-        pinion, wheel, cycle, solves = _least_slant(mesh, torque, flanks, limit if step else np.inf)
-        cycles.append(cycle)
-        spent.append(solves)
-        error, alone = np.asarray(cycle.transmission_error), _alone(cycle)
-        iterates.append(_iterate(mesh, cycle, alone, pinion, wheel))
-        reached.append(iterates[_best(iterates, limit)].ppte)
-        if callback is not None:
-            callback(step, steps, reached[-1])
-        if step == 0:
-            level = float(error[alone].max())
-        if step == steps or _ended(iterates, rtol):
-            break
-        flanks.take_off(level - error, alone)
-    number = _best(iterates, limit)
-    best = iterates[number]
+
+    def end_on(finer: Mesh, between: bool = True) -> tuple[Levelled, bool]:
+        flanks = Flanks(mesh, *given, float(max_relief))
+        pressure = Pressure(limit, torque, parts(finer, mesh.resolution.positions))
+        found = levelled(mesh, flanks, pressure, rtol, steps, spent, callback)
+        return found, between and pressure.holds_between(found, half_way(finer))
+
+    if limit is None or positions is None:
+        found, _ = end_on(mesh, between=False)
+    else:
+        found = on_finer_meshes("iterate_transmission_error", mesh, positions, end_on)
+    best, highest = found.iterates[found.best], found.pressures[found.best]
     limits = {"max_relief": Limit(best.max_relief, None, float(max_relief), "um", True)}
-    excess = max(best.max_pressure / limit - 1, 0.0)
+    excess = 0.0
     if max_pressure is not None:
-        limits["max_contact_pressure"] = Limit(best.max_pressure, None, limit, "MPa", excess == 0.0)
+        excess = max(highest / float(max_pressure) - 1, 0.0)
+        limits["max_contact_pressure"] = Limit(highest, None, float(max_pressure), "MPa", excess == 0.0)
     return Optimum(
         method="te_iteration",
         objective_name="ppte",
@@ -118,7 +111,7 @@ def iterate_transmission_error(
         pinion=best.pinion,
         wheel=best.wheel,
         mesh=mesh,
-        cycle=cycles[number],
+        cycle=found.cycles[found.best],
         ppte=best.ppte,
         objective=best.ppte,
         objective_unit="um",
@@ -129,10 +122,10 @@ def iterate_transmission_error(
         constraints=limits,
         violation=excess,
         evaluations=sum(spent),
-        history=np.asarray(reached),
-        history_evaluations=np.cumsum(spent),
+        history=np.asarray(found.reached),
+        history_evaluations=np.cumsum(spent)[-len(found.reached) :],
         seconds=time.perf_counter() - began,
-        iterations=tuple(iterates),
+        iterations=tuple(found.iterates),
     )
 
 
@@ -180,72 +173,4 @@ def iterate_from_low_pressure(
         evaluations=found.evaluations + start.evaluations,
         history_evaluations=found.history_evaluations + start.evaluations,
         seconds=found.seconds + start.seconds,
-    )
-
-
-def _best(iterates: list[Iterate], limit: float) -> int:
-    """Number of the state with the least PPTE within the limit of the pressure, else of the one with the least."""
-    excess = [max(state.max_pressure - limit, 0.0) for state in iterates]
-    return min(range(len(iterates)), key=lambda number: (excess[number], iterates[number].ppte))
-
-
-def _least_slant(
-    mesh: Mesh, torque, flanks: Flanks, limit: float
-) -> tuple[AbstractModification, AbstractModification, MeshCycle, int]:
-    """Both flanks with the least slant that keeps the pressure, or else the least pressure; solved, by how many."""
-    tried: dict[float, tuple] = {}
-
-    def kept(slant: float) -> bool:
-        pinion, wheel = flanks.modifications(slant)
-        cycle = _solve(mesh, torque, pinion, wheel)
-        # a contact is on the flank or at the tip edge, and zero in the other field
-        pressure = float(np.max(np.asarray(cycle.contact_pressure) + np.asarray(cycle.corner_pressure)))
-        tried[slant] = (pinion, wheel, cycle, pressure)
-        return tried[slant][-1] <= limit
-
-    low, high = 0.0, _STEEPEST
-    if not kept(low) and kept(high):
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if kept(middle) else (middle, high)
-    slant = min(tried, key=lambda slant: (max(tried[slant][-1] - limit, 0.0), slant))
-    return *tried[slant][:3], len(tried)
-
-
-def _ended(iterates: list[Iterate], rtol: float) -> bool:
-    last = iterates[-1]
-    if last.ppte - last.limit <= rtol * last.limit:
-        return True
-    return len(iterates) > 2 and iterates[-2].ppte - last.ppte < rtol * iterates[-2].ppte
-
-
-def _solve(mesh: Mesh, torque, pinion: AbstractModification, wheel: AbstractModification) -> MeshCycle:
-    cycle = solve_case(mesh, torque, pinion, wheel)
-    if not solved(cycle):
-        raise RuntimeError("iterate_transmission_error: a contact solution did not converge")
-    return cycle
-
-
-def _alone(cycle: MeshCycle) -> np.ndarray:
-    """Positions where one pair alone carries the load, on unmodified flank."""
-    error = np.asarray(cycle.transmission_error)
-    loaded = np.asarray(cycle.pair_force) > _LOADED * float(cycle.force)
-    single = loaded.sum(axis=0) == 1
-    untouched = (np.asarray(cycle.gap).min(axis=1) < _UNTOUCHED) | ~loaded
-    # a relief over the whole profile leaves no such position, and a high contact ratio no single contact at all
-    choices = single & untouched.all(axis=0), single, error == error.max()
-    return next(choice for choice in choices if choice.any())
-
-
-def _iterate(mesh: Mesh, cycle: MeshCycle, alone: np.ndarray, pinion, wheel) -> Iterate:
-    error = np.asarray(cycle.transmission_error)
-    return Iterate(
-        pinion=pinion,
-        wheel=wheel,
-        transmission_error=error,
-        ppte=float(np.ptp(error)),
-        limit=float(np.ptp(error[alone])),
-        max_relief=float(largest_relief(mesh, pinion=pinion, wheel=wheel)),
-        max_flank_pressure=float(np.max(np.asarray(cycle.contact_pressure))),
-        max_corner_pressure=float(np.max(np.asarray(cycle.corner_pressure))),
     )

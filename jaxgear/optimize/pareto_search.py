@@ -1,7 +1,7 @@
 """Pareto fronts of several objectives."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -11,24 +11,22 @@ from ..conditions import Design
 from ..contact import Mesh
 from ..numerics import AbstractMeasure, Callback
 from ..numerics.fields import Checked, count
-from ..numerics.pareto import pareto_front
 from ..tolerance import Tolerance
-from .goal import FEASIBLE, Constraint, Objective
-from .linear_model import AbstractScalarization, Model
+from .front_designs import END, Chebyshev, Descent, Met
+from .goal import Constraint, Objective
+from .linear_model import Model
 from .linearizer import Linearizer
 from .minimax import Search, follow
 from .problem import Problem, make_problem
+from .refine import POSITIONS, at_twice_the_positions, fine_enough, on_finer_meshes
 from .result import Front
 from .search import Record
 from .starts import start_points
 from .verdict import PROBE, optimum_of
 
 _ROUNDS = 3
+_POLISH = 3  # steps of every design on a finer mesh
 _RTOL = 1e-3  # a search ends where the predicted decrease is below this part of its distance from the ideal
-_END = 1e-6  # weight of the other objectives at the ends of the front: too small to bend the way there
-_SUM = 0.05  # part of the plain sum in the scalarization, which keeps weakly dominated designs away
-_NEAR = 0.01  # spans of the front; designs that are nearer to each other in every objective count as one
-_SPAN = 1e-3  # least span of an objective over the designs, relative to its ideal
 
 
 class Pareto(Checked):
@@ -38,7 +36,8 @@ class Pareto(Checked):
     too, by sequential linear programming as in `Minimax`: all of them advance together. Ideal and nadir follow the
     designs that have been met. The first round seeks the ends of the front, the best designs of one objective each,
     from start points all over the box. The others seek the designs of evenly spread weights, each from the best one
-    that has been met for its weight.
+    that has been met for its weight. On a finer mesh the designs of the front go on, each by the weight that leads to
+    it.
 
     Attributes:
         points: designs that are sought, and the most that the front has.
@@ -50,137 +49,40 @@ class Pareto(Checked):
     steps: int = count(high=100_000, default=20)
 
     def search(self, problem: Problem, record: Record) -> "Met":
-        """Runs the rounds; the record keeps the compromise.
+        """Runs the rounds; gives at most `points` designs.
 
         Raises:
             ValueError: for fewer points than objectives.
             RuntimeError: when no design keeps the constraints.
         """
-        met, objectives = Met(problem, record), len(problem.objectives)
+        met, objectives = Met(record), len(problem.objectives)
         if self.points < objectives:
             raise ValueError(f"Pareto: points = {self.points} must be at least the number of objectives, {objectives}")
         # in blocks: every other point of the Halton sequence covers half of the box only
         ends = _ends(objectives)[np.arange(self.points) * objectives // self.points]
         spread = _weights(self.points, objectives)
-        linearizer = Linearizer(problem, self.points)
+        record.linearizer = Linearizer(problem, self.points)
         points = list(start_points(problem, self.points))
         for number in range(_ROUNDS):
-            ways = [_Chebyshev(weight, met.frame) for weight in (spread if number else ends)]
+            ways = [Chebyshev(weight, met.frame) for weight in (spread if number else ends)]
             if number and met.found:
                 points = [met.best(way) for way in ways]
             searches = [Search(point, way) for point, way in zip(points, ways)]
-            follow(linearizer, met, searches, steps=self.steps, rtol=_RTOL, round_of=(number, _ROUNDS))
-        if not met.found:
-            raise RuntimeError("pareto: no design that the search for a front has met keeps the constraints")
-        met.thin(self.points)
-        record.offer(*met.compromise(), 0.0)
+            follow(record.linearizer, met, searches, steps=self.steps, rtol=_RTOL, round_of=(number, _ROUNDS))
+        met.end(self.points)
         return met
 
-
-class _Chebyshev(AbstractScalarization):
-    """Largest weighted distance from the ideal point, in spans of the objectives."""
-
-    part = _SUM
-
-    def __init__(self, weight: np.ndarray, frame: Callable[[], tuple[np.ndarray, np.ndarray]]):
-        self._weight, self._frame = weight, frame
-
-    def scales(self) -> tuple[np.ndarray, np.ndarray]:
-        """Factor and offset of every objective."""
-        low, span = self._frame()
-        factor = self._weight / span
-        return factor, -factor * low
-
-
-class Met:
-    """Designs met so far that keep the constraints and that no other one beats."""
-
-    def __init__(self, problem: Problem, record: Record):
-        objectives = len(problem.objectives)
-        self._problem, self._record = problem, record
-        self._points = np.empty((0, len(problem.names)))
-        self._values = np.empty((0, objectives))
-        self._new: list[tuple[np.ndarray, np.ndarray]] = []
-        self._low, self._span, self._worst = np.zeros(objectives), np.ones(objectives), np.full(objectives, -np.inf)
-
-    @property
-    def found(self) -> bool:
-        """Whether there are any."""
-        return len(self._values) > 0
-
-    def spend(self, designs: int, *, analyses: int) -> None:
-        """Counts contact analyses."""
-        self._record.spend(designs, analyses=analyses)
-
-    def take(self, point: np.ndarray, model: Model) -> None:
-        """Keeps a design until the next look."""
-        if np.isfinite(model.values).all() and model.violation <= FEASIBLE:
-            self._new.append((point, model.values))
-
-    def look(self, step: int, steps: int) -> None:
-        """Sorts out what is new; ideal and span stay the same in between, so that steps can be compared."""
-        if self._new:
-            points, values = (np.stack(part) for part in zip(*self._new))
-            self._new = []
-            self._worst = np.maximum(self._worst, values.max(axis=0))
-            points, values = np.concatenate([self._points, points]), np.concatenate([self._values, values])
-            best = pareto_front(values)
-            self._points, self._values = points[best], values[best]
-            self._low = self._values.min(axis=0)
-            # as long as one design beats all others, the front has no span of its own
-            high = self._values.max(axis=0) if len(self._values) > len(self._low) else self._worst
-            self._span = np.maximum(high - self._low, _SPAN * np.maximum(np.abs(self._low), 1.0))
-        self._record.report(step, steps, self.compromise()[1])
-
-    def frame(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ideal point, and the span of the objectives."""
-        return self._low, self._span
-
-    def best(self, way: _Chebyshev) -> np.ndarray:
-        """The design of the least distance."""
-        return self._points[way.join(self._values).argmin()]
-
-    def compromise(self) -> tuple[np.ndarray, float]:
-        """The design whose worst distance from the ideal, in spans of the front, is about the least; and that distance.
-
-        The part of the sum decides between designs that hardly differ in the worst.
-        """
-        if not self.found:
-            return np.full(self._points.shape[1], 0.5), np.inf
-        best = int(_Chebyshev(np.ones_like(self._low), self.frame).join(self._values).argmin())
-        return self._points[best], float(((self._values[best] - self._low) / self._span).max())
-
-    def thin(self, most: int) -> None:
-        """Keeps at most so many designs: the best of every objective, the compromise, and ever the farthest from those.
-
-        A design that hardly differs from a kept one goes.
-        """
-        scaled = (self._values - self._low) / self._span
-        compromise = int(np.abs(self._points - self.compromise()[0]).max(axis=1).argmin())
-        kept = list(dict.fromkeys([*scaled.argmin(axis=0).tolist(), compromise]))[:most]
-        distance = np.stack([np.abs(scaled - scaled[one]).max(axis=1) for one in kept]).min(axis=0)
-        while len(kept) < most and distance.max() > _NEAR:
-            kept.append(int(distance.argmax()))
-            distance = np.minimum(distance, np.abs(scaled - scaled[kept[-1]]).max(axis=1))
-        self._points, self._values = self._points[kept], self._values[kept]
-
-    def rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points and values, ascending in the first objective; equal designs once."""
-        _, order = np.unique(self._values, axis=0, return_index=True)
-        return self._points[order], self._values[order]
-
-
-class _Descent(AbstractScalarization):
-    """Largest change of the objectives from what they are at a point, in spans of the front."""
-
-    part = 0.0
-
-    def __init__(self, values: np.ndarray, span: np.ndarray):
-        self._values, self._span = values, span
-
-    def scales(self) -> tuple[np.ndarray, np.ndarray]:
-        """Factor and offset of every objective."""
-        return 1 / self._span, -self._values / self._span
+    def end_on(self, mesh: Mesh, met: "Met") -> tuple["Met", bool]:
+        """Goes on from the designs of a front on a finer mesh; whether that is fine enough for all of them."""
+        record = met.record.on(met.record.problem.on(mesh))
+        finer = Met(record, met.frame())
+        searches = [Search(point, Chebyshev(met.weight(value), finer.frame)) for point, value in zip(*met.rows())]
+        linearizer = record.linearizer or Linearizer(record.problem, self.points)
+        follow(linearizer, finer, searches, steps=_POLISH, rtol=_RTOL)
+        finer.end(self.points)
+        points, values = finer.rows()
+        at_twice = at_twice_the_positions(record, points)
+        return finer, fine_enough(values, np.zeros(len(points)), *at_twice, span=finer.frame()[1])
 
 
 def pareto(
@@ -196,6 +98,7 @@ def pareto(
     samples: int | None = None,
     seed: int = 0,
     method: Pareto = Pareto(),
+    positions: int | None = POSITIONS,
     callback: Callback | None = None,
 ) -> Front:
     """Finds the designs of which none is better in all of several objectives.
@@ -205,7 +108,8 @@ def pareto(
         method: how many designs are sought, and in how many steps.
         callback: called as callback(step, steps, distance of the compromise from the ideal).
 
-    The other arguments are those of `minimize`. Values are those on `mesh`.
+    The other arguments are those of `minimize`. Values are those on the mesh of the compromise, on which the search
+    ends: limits hold at twice its positions, too.
 
     Raises:
         ValueError: for fewer than two objectives, and whatever `minimize` refuses.
@@ -227,10 +131,19 @@ def pareto(
         seed=seed,
         owner="pareto",
     )
-    record = Record(posed, callback)
-    met = method.search(posed, record)
+    met = method.search(posed, Record(posed, callback))
+    if positions is not None:
+
+        def end_on(finer: Mesh) -> tuple[Met, bool]:
+            nonlocal met
+            met, enough = method.end_on(finer, met)
+            return met, enough
+
+        met = on_finer_meshes("pareto", mesh, positions, end_on)
+    record = met.record
+    record.offer(*met.compromise(), 0.0)
     points, values = met.rows()
-    left = _evidence(posed, record, points, values, met.frame()[1], method.points)
+    left = _evidence(record, points, values, met.frame()[1], method.points)
     chosen = int(np.abs(points - record.point).max(axis=1).argmin())
     low, high = np.asarray(posed.low), np.asarray(posed.high)
     parameters = low + points * (high - low)
@@ -246,27 +159,28 @@ def pareto(
     )
 
 
-def _evidence(posed: Problem, record: Record, points, values, span, batch: int) -> np.ndarray:
+def _evidence(record: Record, points, values, span, batch: int) -> np.ndarray:
     """Fastest decrease of all objectives at once that is left at every point."""
-    left, linearizer = np.empty(len(points)), Linearizer(posed, batch)
+    left, posed = np.empty(len(points)), record.problem
+    linearizer = record.linearizer or Linearizer(posed, batch)
     for start in range(0, len(points), batch):
         rows = slice(start, min(start + batch, len(points)))
         record.spend(len(points[rows]), analyses=posed.gradient_cost)
         for index, found in zip(range(rows.start, rows.stop), linearizer(points[rows])):
-            way = _Descent(values[index], span)
+            way = Descent(values[index], span)
             left[index] = Model(posed, points[index], found, way).decrease_left(PROBE)
     return left
 
 
 def _ends(objectives: int) -> np.ndarray:
     """Weights of one objective each, with next to nothing for the others."""
-    return np.where(np.eye(objectives, dtype=bool), 1 - (objectives - 1) * _END, _END)
+    return np.where(np.eye(objectives, dtype=bool), 1 - (objectives - 1) * END, END)
 
 
 def _weights(count: int, objectives: int) -> np.ndarray:
     """Weights that sum to 1: evenly along the line of two objectives, of a low-discrepancy sequence for more."""
     if objectives == 2:
-        first = np.linspace(_END, 1 - _END, count)
+        first = np.linspace(END, 1 - END, count)
         return np.stack([first, 1 - first], axis=1)
     # spacings of sorted uniform numbers are uniform on the simplex
     cuts = np.sort(scipy.stats.qmc.Halton(objectives - 1, scramble=False).random(count + 1)[1:], axis=1)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from .evaluate import scores
 from .goal import FEASIBLE, counted
 from .linear_model import Model, NoObjective
 from .linearizer import Linearizer
-from .minimax import Search, follow
+from .minimax import Ledger, Search, follow
 from .problem import Problem
 from .search import Record
 from .starts import points_nearby, start_points
@@ -25,15 +26,14 @@ _MOST = 2048
 _NEAR, _FAR, _REACH, _STEPS = 4, 4, 0.1, 30
 _ENOUGH = 0.1  # of the tolerance of a limit: what a step of theirs has to gain
 
+Found = TypeVar("Found")
 Polish = Callable[[Problem, Record, np.ndarray], None]
 
 
 def refined(record: Record, polish: Polish, positions: int | None) -> tuple[Record, float]:
-    """Goes on from the best design of a record on a finer mesh.
+    """Goes on from the best design of a record on a finer mesh, see `on_finer_meshes`.
 
-    The positions are doubled until the objective changes by less than 2 % of itself when they are doubled again, and
-    the limits that are kept are kept there, too. Where none of the designs met keeps all limits, one that does is
-    sought whatever its objective is.
+    Where none of the designs met keeps all limits, one that does is sought whatever its objective is.
 
     Args:
         record: of the search so far.
@@ -47,45 +47,87 @@ def refined(record: Record, polish: Polish, positions: int | None) -> tuple[Reco
     if positions is None:
         _kept_to_limits(record, polish)
         return record, float("nan")
-    whole("minimize", "positions", positions)
-    problem, mesh = record.problem, record.problem.mesh
-    count = max(positions, mesh.resolution.positions)
-    finer = problem.on(_with_positions(mesh, count))
-    while True:
-        found = record.on(finer)
-        polish(finer, found, record.point)
+    problem = record.problem
+
+    def end_on(mesh: Mesh) -> tuple[tuple[Record, float], bool]:
+        nonlocal record
+        found = record.on(problem.on(mesh))
+        polish(found.problem, found, record.point)
         found.check()
         _kept_to_limits(found, polish)
-        found.spend(1)
-        value, violation = _at_twice_the_positions(found)
-        change = value - found.value
+        record, now = found, np.asarray([[found.value]])
+        values, violations = at_twice_the_positions(found, found.point[None])
+        change = problem.objectives[0].sign * float(values[0, 0] - found.value)
+        return (found, change), fine_enough(now, np.asarray([found.violation]), values, violations)
+
+    return on_finer_meshes("minimize", problem.mesh, positions, end_on)
+
+
+def on_finer_meshes(owner: str, mesh: Mesh, positions: int, end_on: Callable[[Mesh], tuple[Found, bool]]) -> Found:
+    """The end of a search on a finer mesh.
+
+    The positions are doubled until what is found changes little when they are doubled again, and keeps its limits
+    there, too.
+
+    Args:
+        owner: who asks, for messages.
+        mesh: of the search.
+        positions: of the first finer mesh, at least those of the mesh.
+        end_on: ends the search on a finer mesh; tells what it has found and whether that mesh is fine enough.
+    """
+    whole(owner, "positions", positions)
+    count = max(positions, mesh.resolution.positions)
+    while True:
+        found, enough = end_on(_with_positions(mesh, count))
         count *= 2
-        same = abs(change) <= max(_BOUND * abs(found.value), _LEAST_BOUND) and _keeps_as(found.violation, violation)
-        if same or count > _MOST:
-            return found, finer.objectives[0].sign * change
-        record, finer = found, problem.on(_with_positions(mesh, count))
+        if enough or count > _MOST:
+            return found
 
 
-def _keeps_as(violation: float, finer: float) -> bool:
-    """Whether a finer mesh does not find limits passed that are kept."""
-    return bool(counted(violation) > 0 or finer <= FEASIBLE)
+def fine_enough(values, violations, finer_values, finer_violations, span: float | np.ndarray = 0.0) -> bool:
+    """Whether no design changes much on a finer mesh, and none passes a limit there that it keeps.
+
+    Args:
+        values: objectives, shape (designs, objectives).
+        violations: of the designs.
+        finer_values, finer_violations: the same on the finer mesh.
+        span: of the objectives over the designs, which a change is compared with where it is larger than a value.
+    """
+    same = abs(finer_values - values) <= np.maximum(_BOUND * np.maximum(abs(values), span), _LEAST_BOUND)
+    return bool(same.all() and ((counted(violations) > 0) | (finer_violations <= FEASIBLE)).all())
+
+
+def at_twice_the_positions(record: Record, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Objectives of designs, shape (designs, objectives), and their violations at twice the positions of a record."""
+    problem = record.problem
+    record.spend(len(points))
+    twice = record.linearizer.at_twice_the_positions() if record.linearizer is not None else None
+    if twice is None:
+        mesh = _with_positions(problem.mesh, 2 * problem.mesh.resolution.positions)
+        found = scores(problem.on(mesh), points)
+        return np.asarray(found.value), np.asarray(found.violation)
+    models = [Model(problem, point, of) for point, of in zip(points, twice(points))]
+    values = [[model.value] if len(problem.objectives) == 1 else model.values for model in models]
+    return np.asarray(values), np.asarray([model.violation for model in models])
 
 
 def _kept_to_limits(record: Record, polish: Polish) -> None:
     """Where no design so far keeps the limits, seeks one by their violation alone, and goes on from it."""
     if not counted(record.violation):
         return
-    problem = record.problem
-    linearizer = record.linearizer or Linearizer(problem, _NEAR + _FAR)
-    starts = (
-        record.point,
-        *points_nearby(record.point, _NEAR - 1, reach=_REACH, seed=0),
-        *start_points(problem, _FAR),
-    )
-    nothing = NoObjective(len(problem.objectives))
-    follow(linearizer, _Judging(record), [Search(start, nothing) for start in starts], steps=_STEPS, rtol=_ENOUGH)
+    linearizer = record.linearizer or Linearizer(record.problem, _NEAR + _FAR)
+    seek_limits(linearizer, _Judging(record), record.point)
     if not counted(record.violation):
-        polish(problem, record, record.point)
+        polish(record.problem, record, record.point)
+
+
+def seek_limits(linearizer: Linearizer, ledger: Ledger, point: np.ndarray) -> None:
+    """Searches for designs that keep the limits, by their violation alone, from about a point and all over the box."""
+    problem = linearizer.problem
+    beside = points_nearby(point, _NEAR - 1, reach=_REACH, seed=0)
+    nothing = NoObjective(len(problem.objectives))
+    searches = [Search(start, nothing) for start in (point, *beside, *start_points(problem, _FAR))]
+    follow(linearizer, ledger, searches, steps=_STEPS, rtol=_ENOUGH)
 
 
 class _Judging:
@@ -104,18 +146,6 @@ class _Judging:
 
     def look(self, step: int, steps: int) -> None:
         """Nothing to tell: the objective is not what is made small."""
-
-
-def _at_twice_the_positions(record: Record) -> tuple[float, float]:
-    """The objective and the violation of the best design."""
-    problem, points = record.problem, record.point[None]
-    twice = record.linearizer.at_twice_the_positions() if record.linearizer is not None else None
-    if twice is not None:
-        model = Model(problem, record.point, twice(points)[0])
-        return model.value, model.violation
-    mesh = _with_positions(problem.mesh, 2 * problem.mesh.resolution.positions)
-    found = scores(problem.on(mesh), points)
-    return float(found.value[0, 0]), float(found.violation[0])
 
 
 def _with_positions(mesh: Mesh, positions: int) -> Mesh:

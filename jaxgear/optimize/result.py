@@ -97,8 +97,9 @@ class Optimum(eqx.Module):
         violation: largest relative excess over a constraint; 0 where all are kept.
         evaluations: contact analyses spent, one per design, torque and manufactured gear; one with its gradient
             counts as three, each further gradient as two.
-        history: best objective after every look at the search.
+        history: best objective after every look at the search, on the mesh that it had reached.
         history_evaluations: contact analyses spent until then.
+        history_positions: positions of that mesh; None where they are `positions` all the way.
         seconds: wall time of the search, compilation included [s].
         iterations: states of the transmission-error iteration, the first one before any change; else empty.
         problem: what was solved, on `mesh`; `judged` tells by it what other designs are worth. None of the
@@ -126,6 +127,7 @@ class Optimum(eqx.Module):
     history_evaluations: np.ndarray
     seconds: float
     iterations: tuple[Iterate, ...] = ()
+    history_positions: np.ndarray | None = None
     problem: Problem | None = None
 
     @property

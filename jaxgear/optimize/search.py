@@ -28,7 +28,7 @@ class Record:
         self.value, self.violation = float("inf"), float("inf")
         self.model: Model | None = None  # linearization at the best design, where the method made one
         self.linearizer: Linearizer | None = None  # which made it
-        self.history: list[tuple[int, float]] = []
+        self.history: list[tuple[int, float, int]] = []  # analyses, value, and positions of the mesh that it is of
         self._callback = callback
 
     def on(self, problem: Problem) -> "Record":
@@ -82,7 +82,7 @@ class Record:
 
     def report(self, step: int, steps: int, value: float) -> None:
         """Marks the progress of a method that keeps its own best design."""
-        self.history.append((self.evaluations, value))
+        self.history.append((self.evaluations, value, self.problem.mesh.resolution.positions))
         if self._callback is not None:
             self._callback(step, steps, value)
 

@@ -60,8 +60,9 @@ def optimum_of(
         constraints=_limits(problem, x),
         violation=max(record.violation - FEASIBLE, 0.0),  # as an excess is counted from inside a limit
         evaluations=record.evaluations,
-        history=sign * np.asarray([value for _, value in record.history]),
-        history_evaluations=np.asarray([spent for spent, _ in record.history]),
+        history=sign * np.asarray([value for _, value, _ in record.history]),
+        history_evaluations=np.asarray([spent for spent, _, _ in record.history]),
+        history_positions=np.asarray([positions for _, _, positions in record.history], int),
         seconds=time.perf_counter() - began,
         problem=problem,
     )

@@ -13,9 +13,9 @@ from .objectives import ANALYSES_LABEL, logarithmic, objective_label, wrapped
 def convergence(optima: Mapping[str, Optimum], ax: Axes | None = None) -> Axes:
     """Best objective met over the contact analyses spent, with a mark at the end of every search.
 
-    A curve rises where its search goes on to a finer grid, on which the best design is judged anew. Both axes are
-    logarithmic, the ordinate only where all objectives are positive. What was known before the first analysis stands at
-    one analysis; as long as no design was valid there is no curve.
+    Where a search ends on a finer mesh, on which its designs are judged anew, what is reached there is a curve of its
+    own, dotted and with an open mark. Both axes are logarithmic, the ordinate only where all objectives are positive.
+    What was known before the first analysis is drawn at one analysis; as long as no design was valid there is no curve.
 
     Args:
         optima: results by the name of their method, of the same objective; up to eight differ in style.
@@ -24,9 +24,15 @@ def convergence(optima: Mapping[str, Optimum], ax: Axes | None = None) -> Axes:
     own, drawn = ax is None, []
     with report_axes(ax) as ax:
         for index, (name, optimum) in enumerate(optima.items()):
-            spent, best = _curve(optimum)
+            spent, best, positions = _curve(optimum)
             style = {**line_style(index), "marker": marker_style(index)["marker"], "markersize": 5.0}
-            ax.plot(spent, best, drawstyle="steps-post", markevery=[-1], label=name, **style)
+            style |= {"drawstyle": "steps-post", "markevery": [-1]}
+            searched, judged = positions == positions[:1], positions == positions[-1:]
+            ax.plot(spent[searched], best[searched], label=name, **style)
+            if not searched.all():
+                style |= {"linestyle": ":", "markerfacecolor": "white"}
+                label = f"{name}, judged at {positions[-1]} positions"
+                ax.plot(spent[judged], best[judged], label=label, **style)
             drawn.append((spent, best))
         spent, best = (np.concatenate([np.empty(0), *(curve[part] for curve in drawn)]) for part in (0, 1))
         if spent.size:
@@ -41,9 +47,12 @@ def convergence(optima: Mapping[str, Optimum], ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _curve(optimum: Optimum) -> tuple[np.ndarray, np.ndarray]:
-    """Contact analyses and finite best objectives, up to the end of the search."""
+def _curve(optimum: Optimum) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Contact analyses, finite best objectives and positions of their mesh, up to the end of the search."""
     spent = np.append(np.asarray(optimum.history_evaluations, float), optimum.evaluations)
     best = np.append(np.asarray(optimum.history, float), optimum.objective)
+    each = np.full(len(best), optimum.positions)
+    if optimum.history_positions is not None:
+        each[:-1] = optimum.history_positions
     valid = np.isfinite(best)
-    return np.maximum(spent[valid], 1.0), best[valid]
+    return np.maximum(spent[valid], 1.0), best[valid], each[valid]

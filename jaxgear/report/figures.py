@@ -28,8 +28,8 @@ CAPTIONS = {
     "harris_map": "Harris map: transmission error over two base pitches at several torques.",
     "response_surface": "Transmission error over phase and torque.",
     "face_load_over_torque": "Face load factor over the torque.",
-    "convergence": "Course of the search: best objective over the contact analyses spent. It rises where the "
-    "search goes on to a finer grid, on which the best design is judged anew.",
+    "convergence": "Course of the search: best objective over the contact analyses spent. Dotted: as judged "
+    "on the finer grid on which the search ends.",
     "front": "Pareto front: designs of which none is better in every objective.",
     "iterations_relief": "Relief after every iteration of the search.",
     "iterations_transmission_error": "Transmission error after every iteration of the search.",
