@@ -8,13 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 
-from ..dynamics import Branch, SpeedResponse
+from ..dynamics import Branch, RunUp, SpeedResponse
 from .figure import GREY, legend_above, line_style, marker_style, report_axes
 
 FREQUENCY_LABEL = "mesh frequency [Hz]"
 _APPROACH_LABEL = "approach of the flanks [µm]"
 _RESPONSES = {"dynamic_factor": "dynamic factor $K_v$ [-]", "approach_rms": "rms of the approach [µm]"}
 _RUNS = ("-", (0, (4, 1.5)), (0, (1, 1)))  # lines of the runs of a design, in their order
+RunUps = Mapping[str, RunUp]
 Runs = Mapping[str, SpeedResponse] | Sequence[SpeedResponse]  # by what a legend calls them, or by their directions
 _MARKS = 12  # on a curve
 _PAD, _LINE = 6.0, 13.0  # [pt] of a title over the Axes, and of a line of a legend between both
@@ -26,7 +27,7 @@ _BIFURCATIONS = {"fold": ("o", "#D55E00"), "flip": ("D", "#009E73"), "Neimark-Sa
 
 
 def speed_response(
-    responses: Mapping[str, Runs],
+    responses: Mapping[str, Runs | RunUps],
     of: Literal["dynamic_factor", "approach_rms"] = "dynamic_factor",
     ax: Axes | None = None,
     *,
@@ -36,7 +37,7 @@ def speed_response(
 
     Args:
         responses: of every design, by its name: those of several runs, by what the legend says of each ("falling,
-            kicked"); in a sequence each has its direction.
+            kicked"); in a sequence each has its direction. Run-ups, which have no rms, go with them or alone.
         of: which number: the dynamic factor or the rms of the approach about its mean.
         ax: Axes to draw into; None for a new figure.
         title: over the Axes and the legend.
@@ -63,7 +64,7 @@ def speed_response(
 _MOVES = {"up": "rising", "down": "falling"}
 
 
-def _named(runs: Runs) -> list[tuple[str, SpeedResponse]]:
+def _named(runs: Runs | RunUps) -> list[tuple[str, Any]]:
     if isinstance(runs, Mapping):
         return list(runs.items())
     return [(_MOVES[response.direction], response) for response in runs]

@@ -1,6 +1,5 @@
 """Dynamic profile modification: the relief whose vibration at one operating condition is least."""
 
-import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
@@ -11,15 +10,15 @@ import numpy as np
 import scipy
 from jaxtyping import Array, Bool, Float
 
-from ...microgeometry import Linear, Polynomial, Power, Quadratic
+from ...microgeometry import Linear, Polynomial, Power
 from ...numerics import Checked, check, concrete, kernel, real, result, spread, whole
 from ...numerics.genetic import decoded, next_generation, random_strings
+from .free_numbers import Free, bounds_of, made, vector
 from .model import DimensionlessModel, with_relief
 from .relief import CycleRelief
 from .settle import _settle, at_rest
 
 Scalar = Float[Array, ""]
-Free = Literal["amount", "length", "curve"]
 
 _SETTLING, _PERIODS = 60, 2  # cycles of every evaluation
 _STEPS = 64  # of every evaluation over a period of omega_0, and over a cycle where that is longer
@@ -134,10 +133,10 @@ def dynamic_profile_modification(
     if not names or set(names) - {"amount", "length", "curve"}:
         raise ValueError(f'dynamic_profile_modification: free = {names!r} must name "amount", "length" or "curve"')
     model = with_relief(model, None)
-    low, high = _bounds(model, relief, names, bounds or {})
+    low, high = bounds_of(model, relief, names, bounds or {})
     at = real(frequency)
     width = jnp.where(high > low, high - low, 1.0)
-    unit = jnp.clip((_vector(relief, names) - low) / width, 0.0, 1.0)
+    unit = jnp.clip((vector(relief, names) - low) / width, 0.0, 1.0)
     static = _static_search(model, relief, names, low, high, unit)
     further = jnp.clip(2 * static, 0.0, 1.0)
     none_free = jnp.clip(-low / width, 0.0, 1.0)  # no relief, where the free numbers reach it
@@ -149,7 +148,7 @@ def dynamic_profile_modification(
         ends = _genetic_search(model, relief, names, low, high, at, jax.random.key(seed), iterations, steps)[None]
     # near a threshold vibrations settle slowly: who wins is decided after many more cycles than the search takes
     none = eqx.tree_at(lambda r: r.amount, relief, jnp.zeros_like(relief.amount))
-    candidates = [_made(relief, names, low + (high - low) * x) for x in jnp.concatenate([starts, ends])]
+    candidates = [made(relief, names, low + (high - low) * x) for x in jnp.concatenate([starts, ends])]
     every = jax.tree.map(lambda *parts: jnp.stack(parts), none, *candidates)
     amplitude, settled = _last_amplitudes(model, every, at, _FINER * steps)
     three = jnp.stack([jnp.array(0), jnp.array(2), 1 + jnp.nanargmin(amplitude[1:])])  # none, static and the best
@@ -163,7 +162,7 @@ def modification_table(rows: Sequence[tuple[OperatingCondition, DynamicModificat
     lines = [f"{'condition':20} {'Omega':>6} {'free':14} {'none':>8} {'static':>8} {'dynamic':>8}  static -> dynamic"]
     for condition, found in rows:
         numbers = " ".join(f"{float(value):8.5f}" for value in found.amplitude)
-        before, after = (_vector(part, condition.free) for part in (found.static, found.dynamic))
+        before, after = (vector(part, condition.free) for part in (found.static, found.dynamic))
         change = " -> ".join("(" + ", ".join(f"{float(v):.3g}" for v in part) + ")" for part in (before, after))
         free = "+".join(condition.free)
         lines.append(f"{condition.name:20} {float(found.frequency):6.3f} {free:14} {numbers}  {change}")
@@ -179,51 +178,6 @@ def _steps(frequency) -> int:
 def _spread(like: Float[Array, " numbers"]) -> Float[Array, "designs numbers"]:
     """Points of a Halton sequence in the unit box, always the same."""
     return jnp.asarray(scipy.stats.qmc.Halton(len(like), scramble=False).random(_SPREAD), like.dtype)
-
-
-def _vector(relief: CycleRelief, free: Sequence[str]) -> Float[Array, " numbers"]:
-    """The free numbers of a relief."""
-    parts = [jnp.ravel(leaf) for name in free for leaf in jax.tree.leaves(getattr(relief, name))]
-    if not parts:
-        raise ValueError(f"dynamic_profile_modification: {type(relief.curve).__name__} has no coefficients to optimize")
-    return jnp.concatenate(parts)
-
-
-def _made(relief: CycleRelief, free: Sequence[str], vector: Float[Array, " numbers"]) -> CycleRelief:
-    """The relief with other free numbers."""
-    for name in free:
-        leaves, tree = jax.tree.flatten(getattr(relief, name))
-        new = []
-        for leaf in leaves:
-            part, vector = vector[: leaf.size], vector[leaf.size :]
-            new.append(part.reshape(leaf.shape))
-        relief = eqx.tree_at(operator.attrgetter(name), relief, jax.tree.unflatten(tree, new))
-    return relief
-
-
-def _bounds(model: DimensionlessModel, relief: CycleRelief, free: Sequence[str], given: Mapping):
-    if set(given) - set(free):
-        raise ValueError(f"dynamic_profile_modification: bounds = {sorted(given)} must be of what is free, {free!r}")
-    ratio = relief.contact_ratio
-    usual = {
-        "amount": (jnp.zeros_like(model.load), 4 * model.load),
-        "length": (0.2 * (ratio - 1), 0.5 * ratio),
-        "curve": (0.5, 4.0) if isinstance(relief.curve, Power) else (-4.0, 4.0),
-    }
-    if isinstance(relief.curve, Polynomial | Quadratic):  # b_0 would be a step where the relief starts
-        fixed = jnp.concatenate([jnp.ravel(leaf) for leaf in jax.tree.leaves(relief.curve)])
-        inner = jnp.arange(len(fixed)) > 0
-        usual["curve"] = (jnp.where(inner, -4.0, fixed), jnp.where(inner, 4.0, fixed))
-    low, high = [], []
-    for name in free:
-        count = sum(leaf.size for leaf in jax.tree.leaves(getattr(relief, name)))
-        least, most = given.get(name, usual[name])
-        known = concrete(real(least)), concrete(real(most))
-        if known[0] is not None and known[1] is not None and (known[0] > known[1]).any():
-            raise ValueError(f"dynamic_profile_modification: bounds of {name} = ({least}, {most}) must not fall")
-        low.append(jnp.broadcast_to(real(least), count))
-        high.append(jnp.broadcast_to(real(most), count))
-    return jnp.concatenate(low), jnp.concatenate(high)
 
 
 def _static_amplitude(model: DimensionlessModel, relief: CycleRelief) -> Scalar:
@@ -257,7 +211,7 @@ def _last_amplitudes(model, reliefs, frequency, steps):
 @kernel
 def _static_search(model, relief, free, low, high, unit):
     def value(x):
-        return _static_amplitude(model, _made(relief, free, low + (high - low) * x))
+        return _static_amplitude(model, made(relief, free, low + (high - low) * x))
 
     return _adam(value, unit, _STATIC_ITERATIONS)[0]
 
@@ -267,7 +221,7 @@ def _dynamic_search(model, relief, free, low, high, frequency, units, iterations
     """What Adam comes to from the first of the units and from the best of the second."""
 
     def value(x):
-        return _amplitude(model, _made(relief, free, low + (high - low) * x), frequency, steps)[0]
+        return _amplitude(model, made(relief, free, low + (high - low) * x), frequency, steps)[0]
 
     starts, spread = units
     found = jax.vmap(value)(spread)
@@ -280,7 +234,7 @@ def _genetic_search(model, relief, free, low, high, frequency, key, generations,
     """The best point of the unit box that generations of bit strings meet; the fitness is 1 / amplitude."""
 
     def value(x):
-        return _amplitude(model, _made(relief, free, low + (high - low) * x), frequency, steps)[0]
+        return _amplitude(model, made(relief, free, low + (high - low) * x), frequency, steps)[0]
 
     def step(carry, key):
         strings, best, least = carry
