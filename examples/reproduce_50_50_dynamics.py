@@ -64,6 +64,8 @@ LINES = [
     ("100 type 2 less K_v 3", "100 N m, K_v of type 2 at point 3 lower by", 60.0, "%", ""),
     ("100 type 1 less q_rms", "100 N m, largest q_rms of type 1 lower by", 22.0, "%", ""),
     ("100 type 2 less q_rms", "100 N m, largest q_rms of type 2 lower by", 33.0, "%", ""),
+    ("100 type 1 less q_rms 1", "100 N m, q_rms of type 1 at point 1 lower by", 60.0, "%", ""),
+    ("100 type 2 less q_rms 1", "100 N m, q_rms of type 2 at point 1 lower by", 60.0, "%", ""),
     ("400 unmodified f1", "400 N m, point 1", 1200.0, "Hz", ""),
     ("400 unmodified f2", "400 N m, point 2", 2400.0, "Hz", SMOOTH),
     ("400 unmodified f3", "400 N m, point 3", 4500.0, "Hz", DETACHED),
@@ -76,7 +78,21 @@ LINES = [
     ),
     ("400 unmodified q_rms", "400 N m, largest q_rms, unmodified", 32.5, "um", "The study has it at point 2."),
     ("400 type 1 less q_rms", "400 N m, largest q_rms of type 1 lower by", 14.0, "%", ""),
+    ("400 type 2 less q_rms", "400 N m, largest q_rms of type 2 lower by", 14.0, "%", ""),
 ]
+# largest K_v and q_rms [um] over all speeds, None where the study has no number; those of reliefs are mostly its
+# percentages of the unmodified gears
+PUBLISHED = {
+    "100 unmodified": (4.5, 13.5),
+    "100 type 1": (4.5 * (1 - 0.28), 13.5 * (1 - 0.22)),
+    "100 type 2": (4.5 * (1 - 0.34), 13.5 * (1 - 0.33)),
+    "200 unmodified": (4.25, 22.5),
+    "200 type 1": (2.75, 22.5 * (1 - 0.445)),
+    "200 type 2": (3.0, 22.5 * (1 - 0.333)),
+    "400 unmodified": (3.5, 32.5),
+    "400 type 1": (None, 32.5 * (1 - 0.14)),
+    "400 type 2": (None, 32.5 * (1 - 0.14)),
+}
 
 
 def prepare() -> jg.Mesh:
@@ -144,6 +160,7 @@ def _numbers(key: str, frequency, runs) -> dict:
         at = np.flatnonzero((frequency >= low) & (frequency <= high))
         highest = at[np.argmax(factor[at])]
         found |= {f"{key} f{point}": float(frequency[highest]), f"{key} K_v {point}": float(factor[highest])}
+        found[f"{key} q_rms {point}"] = float(rms[at].max())
     up, down = runs[dynamics.UP][0], runs[dynamics.DOWN][0]
     return found | {f"{key} down over up": float(np.max(down / up)), f"{key} median K_v": float(np.median(up))}
 
@@ -152,7 +169,7 @@ def _lower(torque: float, found: dict, names) -> dict:
     """By how much the numbers of relieved gears are lower than those of the unmodified ones [%]."""
     base, less = f"{torque:g} unmodified", {}
     for name in names:
-        for what in ("K_v", "K_v 3", "q_rms"):
+        for what in ("K_v", "K_v 3", "q_rms", "q_rms 1"):
             less[f"{torque:g} {name} less {what}"] = 100 * (
                 1 - found[f"{torque:g} {name} {what}"] / found[f"{base} {what}"]
             )
@@ -173,6 +190,27 @@ def show(found) -> None:
         if why and why not in said:
             said.add(why)
             print(textwrap.fill(why, 100, initial_indent="    ", subsequent_indent="    "))
+    for line in (*over_torque(found), *above_unmodified(found)):
+        print(line)
+
+
+def over_torque(found):
+    """Largest K_v and q_rms of every design at every torque, beside the study's."""
+    yield f"\n{'torque [N m], design':24}{'K_v published':>16}{'jaxgear':>10}{'q_rms [um] published':>24}{'here':>10}"
+    for key, published in PUBLISHED.items():
+        if f"{key} K_v" in found:
+            factor, rms = ("-" if value is None else f"{value:.4g}" for value in published)
+            yield f"{key:24}{factor:>16}{found[f'{key} K_v']:10.4g}{rms:>24}{found[f'{key} q_rms']:10.4g}"
+
+
+def above_unmodified(found):
+    """Where K_v of a relief at twice the nominal torque is above that of the unmodified gears."""
+    published = {"type 1": "at no point", "type 2": "at points 1, 2"}
+    for name, said in published.items():
+        if f"400 {name} K_v" in found:
+            points = [str(at) for at in POINTS if found[f"400 {name} K_v {at}"] > found[f"400 unmodified K_v {at}"]]
+            here = f"at points {', '.join(points)}" if points else "at no point"
+            yield f"400 N m: the study has K_v of {name} above that of the unmodified gears {said}; here {here}."
 
 
 if __name__ == "__main__":

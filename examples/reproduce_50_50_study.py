@@ -233,8 +233,25 @@ def show(found: dict) -> None:
         cells.append(format(found[f"{name}, half of it_K_v"], ".2f"))
         print(name.ljust(18) + "".join(f"{cell:>17}" for cell in cells))
     print("(PPTE loaded and unloaded and first harmonic of the transmission error in um, pressures in MPa, mm3)")
-    for line in (*attribution(found), *contradictions(found)):
+    for line in (*pressures(found), *attribution(found), *contradictions(found)):
         print(line)
+
+
+def pressures(found: dict):
+    """The study's limit of the pressure and what it leaves of it, beside the pressures here."""
+    yield f"\nThe study allows {ALLOWED:.0f} MPa against scuffing, which decides the height of its reliefs at the tip."
+    for name, safety in (("equation alone", None), ("type 1", 1.25), ("type 2", 1.74)):
+        reached = found[f"{name}_pressure"]
+        within = "within" if reached <= ALLOWED else "above"
+        reserve = ""
+        if safety is not None:
+            kept = "no less" if found[f"{name}_safety"] >= safety else "less"
+            reserve = f"; {kept} than the {safety:g} of the study, which are {ALLOWED / safety:.0f} MPa"
+        flank, corner = (found[f"{name}_{where}_pressure"] for where in ("flank", "corner"))
+        yield (
+            f"{name}: {flank:.0f} MPa on the flank and {corner:.0f} MPa at the tip corners, {within} the limit; a "
+            f"safety of {found[f'{name}_safety']:.2f}{reserve}."
+        )
 
 
 def attribution(found: dict):

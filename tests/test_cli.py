@@ -281,7 +281,13 @@ def test_all_result_files_are_there(folder, analyzed, optimized, iterated):
     of_others |= {"lead_chart.png", "pressure_map.png", "contact_pattern.png"}
     of_others |= {"line_load.png", "face_gap.png", "face_load_over_torque.png"}
     of_others |= {"responses.csv", "dynamic_factor.png", "approach_rms.png", "waterfall.png", "bifurcation.png"}
-    of_others |= {"phase_portrait.png", "branches.png"}  # of `jaxgear dynamics`
+    of_others |= {
+        "phase_portrait.png",
+        "branches.png",
+        "order_tracks.png",
+        "run_up.csv",
+        "run_up.png",
+    }  # of `jaxgear dynamics`
     of_others |= {"profiles.csv", "tolerance_cases.png", "face_load_factors.png", "radar.png"}  # of `jaxgear layout`
     of_others |= {"shaft_deflection.png", "contact_pattern_unmodified.png", "contact_pattern_layout.png"}
     of_others |= {"life.csv", "worn_flanks.csv", "worn_flanks.parquet", "worn_pinion.png", "worn_wheel.png"}

@@ -370,5 +370,18 @@ def test_every_operating_condition_of_the_study_has_its_own_optimum():
         found = dynamic_profile_modification(model, condition.frequency, given, free=condition.free)
         none, static, dynamic = found.amplitude
         assert dynamic <= min(none, static) + 1e-9, condition.name
+        if condition.name == "super-harmonic 1/2":  # 64 steps per cycle miss 1e-4
+            fine = settled_vibration(model, condition.frequency, settling=60, steps=1024).amplitude
+            assert none == pytest.approx(float(fine), rel=2e-5)
         rows.append((condition, found))
     assert len(modification_table(rows).splitlines()) == 6
+
+
+@pytest.mark.slow
+def test_the_search_leaves_local_minima():
+    """SciPy's Nelder-Mead from the best of a grid finds 0.252914; Adam from the four usual designs ends at 0.3005."""
+    model = model_of(PolynomialClearance.fit(), displacement=0.05, displacement_angle=1.0, torque=0.05)
+    model = eqx.tree_at(lambda m: m.stiffness_harmonics, model, rectangular_harmonics(1.75, 0.37))
+    found = dynamic_profile_modification(model, 1.0, relief(0.2, curve=Power(1.2), begin=-0.185))
+    assert found.settled.all() and found.amplitude[2] == pytest.approx(0.25291, abs=2e-5)
+    assert found.dynamic.amount == pytest.approx(1.3276, abs=1e-3) and found.dynamic.curve.exponent == 4.0

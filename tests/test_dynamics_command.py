@@ -48,11 +48,20 @@ positions = 32
 steps = 64
 torque_factors = [1.0]
 """
-FIGURES = "dynamic_factor", "approach_rms", "waterfall", "bifurcation", "phase_portrait", "branches"
+FIGURES = (
+    "dynamic_factor",
+    "approach_rms",
+    "waterfall",
+    "order_tracks",
+    "run_up",
+    "bifurcation",
+    "phase_portrait",
+    "branches",
+)
 
 
 def test_the_command_writes_what_it_says(file, tmp_path):
-    path, folder = file(PAIR + TABLE + "[tolerance]\nquality_class = 7\n"), tmp_path / "out"
+    path, folder = file(PAIR + TABLE + "run_up = 0.1\n[tolerance]\nquality_class = 7\n"), tmp_path / "out"
     done = call("dynamics", str(path), "--output", str(folder), "--report")
     code, out, err = done.code, done.out, done.err
     assert code == 0, err
@@ -60,6 +69,7 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     assert {entry.name for entry in folder.iterdir()} == {
         "summary.json",
         "responses.csv",
+        "run_up.csv",
         "report.html",
         *(f"{name}.png" for name in FIGURES),
     }
@@ -78,15 +88,34 @@ def test_the_command_writes_what_it_says(file, tmp_path):
             assert run["at_dynamic_factor_Hz"] == pytest.approx(float(of_run[factors.argmax()]["mesh_frequency_Hz"]))
             assert (factors > 0.99).all()  # the mean of the force over an orbit is the static one
             assert 1500.0 < run["natural_frequency_Hz"] < 3500.0
-            assert all(float(row["force_order_1_N"]) > 0 for row in of_run)
+            for row in of_run:
+                force, level = float(row["force_order_1_N"]), float(row["force_order_1_dB_re_1uN"])
+                assert force > 0 and level == pytest.approx(20 * np.log10(force / np.sqrt(2) / 1e-6), abs=1e-4)
             assert float(of_run[0]["pinion_speed_rpm"]) == pytest.approx(1800.0)  # 50 teeth, 60 s
     worst = {name: max(run["max_dynamic_factor"] for run in data["runs"]) for name, data in summary["designs"].items()}
     assert 1 < worst["rule-based"] < worst["unmodified"]
     assert f"unmodified {worst['unmodified']:.3f}, rule-based {worst['rule-based']:.3f}" in out
     assert "rule-based" in out and "down, kicked" in out
     check_branches(summary, rows)
+    check_run_ups(folder, summary, out)
     page = check_report(folder, path, "dynamics", path, "--output", folder, "--report")
     assert any(row[0] == "unmodified" and f"{worst['unmodified']:.3f}" in row for row in page.rows)
+
+
+def check_run_ups(folder, summary, out):
+    """From the lowest to the highest speed, with the factors that the summary and the terminal say."""
+    with (folder / "run_up.csv").open() as lines:
+        rows = list(csv.DictReader(lines))
+    assert summary["run_up_s"] == 0.1
+    for design, data in summary["designs"].items():
+        (risen,) = data["run_ups"]
+        of_design = [row for row in rows if row["design"] == design]
+        assert len(of_design) == 200
+        last = {name: float(of_design[-1][name]) for name in ("time_s", "mesh_frequency_Hz", "pinion_speed_rpm")}
+        assert last == pytest.approx({"time_s": 0.08, "mesh_frequency_Hz": 3500.0, "pinion_speed_rpm": 4200.0})
+        assert risen["max_dynamic_factor"] == pytest.approx(max(float(row["dynamic_factor"]) for row in of_design))
+        assert f"{design} {risen['max_dynamic_factor']:.3f} at {risen['at_dynamic_factor_Hz']:.0f} Hz" in out
+        assert 1 < risen["max_dynamic_factor"] < 1.1 * max(run["max_dynamic_factor"] for run in data["runs"])
 
 
 def check_branches(summary, rows):
@@ -112,6 +141,7 @@ def check_branches(summary, rows):
         ("[dynamics]\n", "dynamics: needs mesh_frequencies [Hz] or speeds [rpm]"),
         (TABLE + "speeds = [1.0, 2.0]\n", "dynamics: mesh_frequencies and speeds are both given"),
         (TABLE + "damping_ratio = 2.0\n", "dynamics.damping_ratio: 2 must be at least 0 and at most 1"),
+        (TABLE + "run_up = 0.05\n", "dynamics.run_up: 0.05 s holds 125 mesh cycles, needs 200"),
         (TABLE + "kick = 1e6\n", "dynamics.kick: 1e+06 must be at least 1 and at most 50"),
         (TABLE.replace("[1500.0, 3500.0]", "[1.0, 8.0]"), "dynamics.steps: 64 must be at least"),
         (TABLE.replace("3500.0", "1000.0"), "dynamics.mesh_frequencies[1]: 1000 Hz must be greater than 1500 Hz"),

@@ -398,6 +398,19 @@ def test_kicked_runs_are_told_from_falling_ones(draw):
     plt.close(ax.figure)
 
 
+def test_order_tracks_in_decibels_over_mesh_frequency_and_pinion_speed():
+    at, levels = np.linspace(500.0, 5000.0, 3), np.array([[150.0, -np.inf], [170.0, -np.inf], [90.0, -np.inf]])
+    response = SimpleNamespace(mesh_frequency=at, force_levels=levels, orders=(1.0, 0.5))
+    ax = plot.order_tracks(response)
+    plot.speed_scale(ax, 50.0)
+    (line,), (scale,) = ax.lines, ax.child_axes
+    assert line.get_label() == "order 1" and np.array_equal(line.get_ydata(), levels[:, 0])
+    assert ax.get_ylim() == (110.0, 173.0) and ax.get_ylabel().endswith("[dB re 1 µN]")
+    ax.figure.draw_without_rendering()
+    assert np.allclose(scale.get_xlim(), 1.2 * np.array(ax.get_xlim())) and scale.get_xlabel() == "pinion speed [rpm]"
+    plt.close(ax.figure)
+
+
 def test_shared_axes_of_speed_responses_show_all_curves():
     frequency = np.linspace(500.0, 5000.0, 10)
     figure, both = plt.subplots(1, 2, sharey=True)

@@ -158,6 +158,11 @@ def test_50_50_tip_corners_within_the_pressure_that_the_study_allows():
         assert study[f"{name}_wheel_fit"] < 1.0
         assert np.argmax(study[f"{name}_relief"]) == pytest.approx(200, abs=10)
     assert study["type 1_ppte"] < study["equation alone_ppte"]
+    said = "\n".join(importlib.import_module("examples.reproduce_50_50_study").pressures(study))  # after it has run
+    assert "equation alone: " in said and said.count("above the limit") == 1 and said.count("within the limit") == 2
+    for name, safety in (("type 1", "1.25"), ("type 2", "1.74")):
+        line = next(line for line in said.splitlines() if line.startswith(name))
+        assert f"a safety of {study[f'{name}_safety']:.2f}; less than the {safety} of the study" in line
 
 
 def test_50_50_dynamic_factor_follows_the_first_harmonic_whatever_the_inertia():
@@ -192,6 +197,9 @@ def test_50_50_at_speed():
     assert study["200 unmodified settled"] and study["200 type 1 settled"]
     assert study["200 type 1 median K_v"] == pytest.approx(1.0, abs=0.1)
     assert study["200 type 1 K_v"] < 0.5 * study["200 unmodified K_v"]
+    table = list(importlib.import_module("examples.reproduce_50_50_dynamics").over_torque(study))  # after it has run
+    assert [line.split()[:2] for line in table[1:]] == [["200", "unmodified"], ["200", "type"]]
+    assert f"{4.25:16.4g}{study['200 unmodified K_v']:10.4g}{22.5:24.4g}" in table[1]
 
 
 def test_iso_table():

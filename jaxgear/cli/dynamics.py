@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..contact import Mesh
-from ..dynamics import Dynamics, Oscillator, natural_frequencies, steps_for
+from ..dynamics import Dynamics, Oscillator, RunUp, natural_frequencies, run_up, steps_for
 from ..dynamics.speed_sweep import STABLE_STEPS
 from ..dynamics.static import Natural
 from ..io import DesignFile, DesignFileError, DynamicsRequest, dynamics_request
@@ -73,13 +73,22 @@ def _study(
                 made_of = oscillator, settings.mesh_frequencies, settings.kick, settings.kicks
                 runs[run] = kept((made_of, run, steps), partial(settings.run, oscillator, run, steps=steps))
                 done += 1
+    run_ups: dict[str, dict[float, RunUp]] = {}
+    if request.run_up is not None:
+        stages.begin("running up")
+        first, last = (float(settings.mesh_frequencies[place]) for place in (0, -1))
+        options: dict[str, Any] = {"first": first, "last": last, "duration": request.run_up, "steps": steps[0]}
+        run_ups = {
+            name: {torque: run_up(oscillator, **options) for torque, oscillator in of_torques.items()}
+            for name, of_torques in oscillators.items()
+        }
     stages.begin("following the orbits of the unmodified design")
     torque = next_to_design(design, request)
     branches = branches_of(oscillators["unmodified"][torque], responses["unmodified"][torque], steps)
     frequencies = {
         name: {torque: float(of.mesh) for torque, of in several.items()} for name, several in natural.items()
     }
-    return Study(design, request, mesh, designs, oscillators, frequencies, responses, steps, tuple(branches))
+    return Study(design, request, mesh, designs, oscillators, frequencies, responses, steps, tuple(branches), run_ups)
 
 
 def _steps(
@@ -106,7 +115,7 @@ run_dynamics = StudyCommand(
     "coarse positions and few speeds",
     _plan,
     dynamics_report.summary,
-    lambda folder, study: dynamics_report.write_responses(folder / "responses.csv", study),
+    dynamics_report.write_tables,
     dynamics_figures.write_figures,
     lambda study: [dynamics_report.table(study)],
     dynamics_report.verdict,

@@ -11,7 +11,7 @@ from . import report
 from .dynamics_report import Study, peak
 
 _RUNS = {UP: "rising", DOWN: "falling", KICKED: "falling, kicked"}
-_PANEL, _HEIGHT, _WIDE = 92.0, 84.0, 130.0  # [mm]
+_PANEL, _HEIGHT, _WIDE = 92.0, 94.0, 130.0  # [mm]
 
 
 def write_figures(folder: Path, study: Study) -> list[Path]:
@@ -29,22 +29,39 @@ def write_figures(folder: Path, study: Study) -> list[Path]:
             for number, (panel, torque) in enumerate(zip(np.ravel(panels), torques)):
                 runs = {name: _called(of[torque]) for name, of in study.responses.items()}
                 plot.speed_response(runs, field, panel, title=f"{torque:g} N m")
-                panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
+                _finish(panel, study, number)
         axes[field] = panels
+    if study.run_ups:
+        with plot.figure.report_axes(None, **size) as panels:
+            for number, (panel, torque) in enumerate(zip(np.ravel(panels), torques)):
+                risen = {name: {"rising": of[torque]} for name, of in study.run_ups.items()}
+                plot.speed_response(risen, ax=panel, title=f"{torque:g} N m, rising in {study.request.run_up:g} s")
+                _finish(panel, study, number)
+        axes["run_up"] = panels
     shown = list(dict.fromkeys((next(iter(study.designs)), list(study.designs)[-1])))
     size = {"columns": len(shown), "width": _PANEL * len(shown), "height": _HEIGHT}
-    for kind in ("waterfall", "bifurcation", "phase_portrait"):
+    for kind in ("waterfall", "order_tracks", "bifurcation", "phase_portrait"):
         with plot.figure.report_axes(None, **size) as panels:
             for number, (panel, name) in enumerate(zip(np.ravel(panels), shown)):
                 _draw(kind, panel, study, name)
-                panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
+                _finish(panel, study, number)
         axes[kind] = panels
     if study.branches:
         swept = list(study.responses["unmodified"][study.torque].values())
         title = f"unmodified, {study.torque:g} N m"
         with plot.figure.report_axes(None, width=_WIDE, height=_HEIGHT) as axis:
             axes["branches"] = plot.branches(study.branches, ax=axis, responses=swept, title=title)
+            _finish(axis, study, 0)
     return report.save_figures(folder, axes)
+
+
+def _finish(panel, study: Study, number: int) -> None:
+    """One name of the ordinate for all panels, and speeds beside mesh frequencies."""
+    from .. import plot
+
+    panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
+    if panel.get_xlabel() == plot.dynamics.FREQUENCY_LABEL:
+        plot.speed_scale(panel, float(study.mesh.pair.pinion.teeth))
 
 
 def _called(runs: Mapping[str, SpeedResponse]) -> dict[str, SpeedResponse]:
@@ -63,6 +80,8 @@ def _draw(kind: str, panel, study: Study, name: str) -> None:
         every = [list(of[study.torque].values())[-1] for of in study.responses.values()]
         most = max(float(np.nanmax(np.asarray(of.force_harmonics)[:, np.asarray(of.orders) > 0])) for of in every)
         plot.waterfall(last, "force", panel, title=f"{title}, {list(_called(runs))[-1]}", most=most)
+    elif kind == "order_tracks":
+        plot.order_tracks(last, panel, title=f"{title}, {list(_called(runs))[-1]}")
     elif kind == "bifurcation":
         called = list(_called(runs).items())
         plot.bifurcation(dict([called[0], called[-1]]), panel, title=title)

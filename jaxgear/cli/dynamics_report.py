@@ -12,7 +12,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..contact import Mesh
-from ..dynamics import Branch, Oscillator, SpeedResponse, inertia_of
+from ..dynamics import Branch, Oscillator, RunUp, SpeedResponse, inertia_of
+from ..dynamics.response import FORCE_REFERENCE
 from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
 from .geometry import geometry
@@ -49,6 +50,7 @@ class Study:
         responses: of every design, by torque [N m] and name of the run.
         steps: of the integrator per mesh cycle, at every speed.
         branches: of periodic orbits of the unmodified design, at `torque`.
+        run_ups: of every design, by torque [N m]; empty where none is asked for.
     """
 
     design: DesignFile
@@ -60,6 +62,7 @@ class Study:
     responses: Mapping[str, Mapping[float, Mapping[str, SpeedResponse]]]
     steps: tuple[int, ...]
     branches: tuple[Branch, ...]
+    run_ups: Mapping[str, Mapping[float, RunUp]]
 
     def rows(self) -> Iterator[tuple[str, float, str, SpeedResponse]]:
         """Design, torque, run and response of all runs."""
@@ -79,7 +82,7 @@ def next_to_design(design: DesignFile, request: DynamicsRequest) -> float:
     return min(request.torques, key=lambda torque: abs(torque - design.torque))
 
 
-def peak(response: SpeedResponse, field: str) -> tuple[float, float]:
+def peak(response: SpeedResponse | RunUp, field: str) -> tuple[float, float]:
     """Largest value of a field and its mesh frequency [Hz]; NaN where nothing is finite."""
     values = np.asarray(getattr(response, field))
     if not np.isfinite(values).any():
@@ -119,6 +122,13 @@ def verdict(study: Study) -> Iterator[str]:
     first = next(iter(worst.values()))
     others = [f"{name} {value:.3f} ({100 * (value / first - 1):+.0f} %)" for name, value in list(worst.items())[1:]]
     yield f"worst dynamic factor over all torques and speeds: unmodified {first:.3f}, {', '.join(others)}"
+    if study.run_ups:
+        highest = {
+            name: max(peak(of, "dynamic_factor") for of in of_torques.values())
+            for name, of_torques in study.run_ups.items()
+        }
+        said = ", ".join(f"{name} {factor:.3f} at {at:.0f} Hz" for name, (factor, at) in highest.items())
+        yield f"largest dynamic factor of a run-up in {study.request.run_up:g} s: {said}"
     yield from _far_from_resonance(study)
     yield from _bodies(study)
     aperiodic = sum(int(np.sum(np.asarray(response.period) == 0)) for *_, response in study.rows())
@@ -181,12 +191,20 @@ def summary(study: Study) -> dict[str, Any]:
         ]
         flanks = {"pinion_modification": describe(pinion), "wheel_modification": describe(wheel)}
         designs[name] = {"runs": runs, **flanks}
+        if study.run_ups:
+            of_torques = {torque: peak(of, "dynamic_factor") for torque, of in study.run_ups[name].items()}
+            designs[name]["run_ups"] = [
+                {"torque_Nm": torque, "max_dynamic_factor": factor, "at_dynamic_factor_Hz": at}
+                for torque, (factor, at) in of_torques.items()
+            ]
     return {
         "title": study.design.title,
         "design_file": study.design.path.name,
         "torques_Nm": study.request.torques,
         "mesh_frequencies_Hz": [float(frequencies[0]), float(frequencies[-1])],
         "speeds": len(frequencies),
+        **({} if study.request.run_up is None else {"run_up_s": study.request.run_up}),
+        "force_level_reference_N": FORCE_REFERENCE,
         "settings": {name: value for name, value in given.items() if value is not None},
         "equivalent_mass_kg": np.asarray(study.oscillators["unmodified"][study.torque].mass),
         "steps": [min(study.steps), max(study.steps)],
@@ -216,17 +234,41 @@ def _peaks(response: SpeedResponse) -> dict[str, float]:
     return found
 
 
-def write_responses(path: Path, study: Study) -> None:
-    """Every speed of every run as CSV."""
+def write_tables(folder: Path, study: Study) -> None:
+    """The CSV files."""
+    _write_responses(folder / "responses.csv", study)
+    if study.run_ups:
+        _write_run_ups(folder / "run_up.csv", study)
+
+
+def _write_run_ups(path: Path, study: Study) -> None:
+    """Every sample of every run-up."""
+    per_hertz = 60 / float(study.mesh.pair.pinion.teeth)
+    fields = {"time": "time_s", "mesh_frequency": "mesh_frequency_Hz"}
+    others = {name: _COLUMNS[name] for name in ("dynamic_factor", "approach_min", "approach_max")}
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["design", "torque_Nm", *fields.values(), "pinion_speed_rpm", *others.values()])
+        for name, of_torques in study.run_ups.items():
+            for torque, of in of_torques.items():
+                at = [np.asarray(getattr(of, field)) for field in fields]
+                columns = [*at, per_hertz * at[1], *(np.asarray(getattr(of, field)) for field in others)]
+                for values in zip(*columns):
+                    writer.writerow([name, f"{torque:g}", *(f"{value:.7g}" for value in values)])
+
+
+def _write_responses(path: Path, study: Study) -> None:
+    """Every speed of every run."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         begin = "design", "torque_Nm", "speed", "mesh_frequency_Hz", "pinion_speed_rpm"
         orders = next(study.rows())[-1].orders
-        writer.writerow([*begin, *_COLUMNS.values(), *(f"force_order_{order:g}_N" for order in orders)])
+        of_orders = [f"force_order_{order:g}_{unit}" for unit in ("N", "dB_re_1uN") for order in orders]
+        writer.writerow([*begin, *_COLUMNS.values(), *of_orders])
         per_hertz = 60 / float(study.mesh.pair.pinion.teeth)
         for name, torque, run, response in study.rows():
             columns = [np.asarray(getattr(response, field)) for field in _COLUMNS]
-            columns += list(np.asarray(response.force_harmonics).T)
+            columns += [*np.asarray(response.force_harmonics).T, *np.asarray(response.force_levels).T]
             for frequency, *values in zip(np.asarray(response.mesh_frequency), *columns):
                 numbers = [int(value) if value.dtype.kind in "ib" else f"{value:.7g}" for value in values]
                 speed = f"{frequency:.7g}", f"{frequency * per_hertz:.7g}"

@@ -43,6 +43,11 @@ class ForceMap(AbstractMeshForce):
     The force is exactly zero in the clearance, rises everywhere else with a continuous slope, and goes on linearly
     beyond the table.
 
+    Modifications are averaged over the contact width under the nominal torque, at every approach. On a 50/50 pair with
+    6 um of relief dynamic factor and rms are then within 0.4 % of those with the width of every approach, and their
+    derivatives by the relief within 0.9 %, at half of the natural frequency within 5 %; a map made for three times the
+    torque it runs at has up to 1.1 % (dynamic factor) and 4.8 % (rms) less.
+
     Attributes:
         first_phase: mesh position with which the grid begins [base pitches].
         start: approach at which the drive flanks touch, and the negative of that at which the coast flanks do [um],

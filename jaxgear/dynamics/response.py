@@ -14,6 +14,7 @@ from .oscillator import Oscillator, State
 
 Scalar = Float[Array, ""]
 
+FORCE_REFERENCE = 1e-6  # N, of levels (ISO 1683)
 # an order repeats after so many cycles if times their number it is whole but for rounding
 _ROUNDING = 1e-6
 
@@ -59,6 +60,11 @@ class SpeedResponse(Checked):
     state: tuple[Float[Array, "*batch speeds coordinates"], Float[Array, "*batch speeds coordinates"]] = result()
     orders: tuple[float, ...] = eqx.field(static=True)
     direction: Literal["up", "down"] = eqx.field(static=True)
+
+    @property
+    def force_levels(self) -> Float[Array, "*batch speeds orders"]:
+        """Levels of the rms values of the force harmonics [dB], re 1 uN (ISO 1683); minus infinity for no force."""
+        return 20 * jnp.log10(self.force_harmonics / (2**0.5 * FORCE_REFERENCE))
 
 
 class Sums(NamedTuple):

@@ -18,6 +18,9 @@ Scalar = Float[Array, ""]
 Samples = Float[Array, " samples"]
 
 
+SAMPLES = 200  # stretches for which extremes are given
+
+
 class RunUp(Checked):
     """Vibration during a change of speed, sampled over stretches of whole mesh cycles.
 
@@ -43,7 +46,7 @@ def run_up(
     first: float,
     last: float,
     duration: float,
-    samples: int = 200,
+    samples: int = SAMPLES,
     start: State | None = None,
     steps: int | None = None,
 ) -> RunUp:

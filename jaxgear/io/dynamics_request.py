@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..dynamics import DYNAMIC_QUANTITIES, Dynamics
+from ..dynamics.run_up import SAMPLES
 from ..metrics import Quantity
 from .design_file import DesignFile
 from .errors import DesignFileError, naming
@@ -24,10 +25,12 @@ class DynamicsRequest:
     Attributes:
         settings: speeds, and what vibrates.
         torques: on the pinion [N m], ascending.
+        run_up: duration of a run-up [s]; None for none.
     """
 
     settings: Dynamics
     torques: tuple[float, ...]
+    run_up: float | None = None
 
 
 def dynamics_request(design: DesignFile, *, quick: bool = False) -> DynamicsRequest:
@@ -47,10 +50,18 @@ def dynamics_request(design: DesignFile, *, quick: bool = False) -> DynamicsRequ
         factors = section.torque_factors
         if len(set(factors)) != len(factors):
             raise DesignFileError("dynamics.torque_factors", "must all be different")
-        return DynamicsRequest(
-            _settings(design, section, _QUICK_NUMBER if quick else section.number),
-            tuple(factor * design.torque for factor in sorted(factors)),
-        )
+        settings = _settings(design, section, _QUICK_NUMBER if quick else section.number)
+        _check_run_up(settings, section.run_up)
+        return DynamicsRequest(settings, tuple(factor * design.torque for factor in sorted(factors)), section.run_up)
+
+
+def _check_run_up(settings: Dynamics, duration: float | None) -> None:
+    """At least one mesh cycle for every sample."""
+    if duration is None:
+        return
+    cycles = duration * float(settings.mesh_frequencies[0] + settings.mesh_frequencies[-1]) / 2
+    if cycles < SAMPLES:
+        raise DesignFileError("dynamics.run_up", f"{duration:g} s holds {cycles:.0f} mesh cycles, needs {SAMPLES}")
 
 
 def dynamic_quantity(design: DesignFile, key: str, name: str) -> Quantity:

@@ -7,8 +7,10 @@ None shows a window or changes matplotlib's settings; `save` writes the file.
 from .convergence import convergence as convergence
 from .dynamics import bifurcation as bifurcation
 from .dynamics import branches as branches
+from .dynamics import order_tracks as order_tracks
 from .dynamics import phase_portrait as phase_portrait
 from .dynamics import speed_response as speed_response
+from .dynamics import speed_scale as speed_scale
 from .dynamics import waterfall as waterfall
 from .face import face_gap as face_gap
 from .face import line_load as line_load

@@ -8,24 +8,26 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 
-from ..dynamics import Branch, SpeedResponse
+from ..dynamics import Branch, RunUp, SpeedResponse
 from .figure import GREY, legend_above, line_style, marker_style, report_axes
 
 FREQUENCY_LABEL = "mesh frequency [Hz]"
 _APPROACH_LABEL = "approach of the flanks [µm]"
 _RESPONSES = {"dynamic_factor": "dynamic factor $K_v$ [-]", "approach_rms": "rms of the approach [µm]"}
 _RUNS = ("-", (0, (4, 1.5)), (0, (1, 1)))  # lines of the runs of a design, in their order
+RunUps = Mapping[str, RunUp]
 Runs = Mapping[str, SpeedResponse] | Sequence[SpeedResponse]  # by what a legend calls them, or by their directions
 _MARKS = 12  # on a curve
 _PAD, _LINE = 6.0, 13.0  # [pt] of a title over the Axes, and of a line of a legend between both
-_DECADES = 3.0  # of amplitudes that a spectrum shows
+_DECADES, _DEEPEST = 3.0, 60.0  # of amplitudes that a spectrum shows, and of levels [dB]
+_SCALE = 34.0  # [pt] of a second scale below the first one
 # drive flanks, clearance, coast flanks: in lightness too
 _STATES = {"drive flanks": "#0072B2", "apart": "#E69F00", "coast flanks": "#000000"}
 _BIFURCATIONS = {"fold": ("o", "#D55E00"), "flip": ("D", "#009E73"), "Neimark-Sacker": ("s", "#CC79A7")}
 
 
 def speed_response(
-    responses: Mapping[str, Runs],
+    responses: Mapping[str, Runs | RunUps],
     of: Literal["dynamic_factor", "approach_rms"] = "dynamic_factor",
     ax: Axes | None = None,
     *,
@@ -35,7 +37,7 @@ def speed_response(
 
     Args:
         responses: of every design, by its name: those of several runs, by what the legend says of each ("falling,
-            kicked"); in a sequence each has its direction.
+            kicked"); in a sequence each has its direction. Run-ups, which have no rms, go with them or alone.
         of: which number: the dynamic factor or the rms of the approach about its mean.
         ax: Axes to draw into; None for a new figure.
         title: over the Axes and the legend.
@@ -62,7 +64,7 @@ def speed_response(
 _MOVES = {"up": "rising", "down": "falling"}
 
 
-def _named(runs: Runs) -> list[tuple[str, SpeedResponse]]:
+def _named(runs: Runs | RunUps) -> list[tuple[str, Any]]:
     if isinstance(runs, Mapping):
         return list(runs.items())
     return [(_MOVES[response.direction], response) for response in runs]
@@ -126,6 +128,51 @@ def _name_orders(ax: Axes, orders, highest: float) -> None:
         place = {"xytext": (3, 0), "textcoords": "offset points", "va": "center", "color": GREY}
         if order == round(order):
             ax.annotate(f"{order:g}", (highest, order * highest), annotation_clip=False, **place)
+
+
+def order_tracks(
+    response: SpeedResponse,
+    ax: Axes | None = None,
+    *,
+    orders: Sequence[float] = (1.0, 2.0, 3.0, 4.0, 0.5),
+    title: str = "",
+) -> Axes:
+    """Levels of orders of the mesh force over the mesh frequency: rms values re 1 uN (ISO 1683), the upper 60 dB.
+
+    Args:
+        response: of one run.
+        orders: multiples of the mesh frequency; those that the response lacks, or that are nowhere, are left out.
+        ax: Axes to draw into; None for a new figure.
+        title: over the Axes and the legend.
+    """
+    frequency, known = np.asarray(response.mesh_frequency), list(response.orders)
+    levels = np.asarray(response.force_levels)
+    with report_axes(ax) as ax:
+        for index, order in enumerate(orders):
+            along = levels[:, known.index(order)] if order in known else np.full(len(frequency), -np.inf)
+            if np.isfinite(along).any():
+                ax.plot(frequency, along, label=f"order {order:g}", **line_style(index))
+        shared = ax.get_shared_y_axes().get_siblings(ax)
+        drawn = np.concatenate([np.asarray(line.get_ydata(), float) for each in shared for line in each.lines])
+        highest = float(np.max(drawn[np.isfinite(drawn)]))
+        ax.set_ylim(highest - _DEEPEST, highest + 0.05 * _DEEPEST)
+        ax.set(xlabel=FREQUENCY_LABEL, ylabel="level of the mesh force [dB re 1 µN]")
+        _entitle(ax, title, legend_above(ax))
+    return ax
+
+
+def speed_scale(ax: Axes, teeth: float) -> None:
+    """A second scale below Axes over the mesh frequency: the speed of the pinion.
+
+    Args:
+        ax: the Axes.
+        teeth: of the pinion.
+    """
+    per_hertz = 60 / teeth
+    scale = ax.secondary_xaxis("bottom", functions=(lambda at: at * per_hertz, lambda speed: speed / per_hertz))
+    scale.spines["bottom"].set_position(("outward", _SCALE))
+    scale.tick_params(labelsize=ax.xaxis.label.get_fontsize(), width=0.6, length=3)
+    scale.set_xlabel("pinion speed [rpm]")
 
 
 def bifurcation(responses: Runs, ax: Axes | None = None, *, title: str = "") -> Axes:

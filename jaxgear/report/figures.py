@@ -36,6 +36,8 @@ CAPTIONS = {
     "dynamic_factor": "Dynamic factor over the mesh frequency, speed going up and down.",
     "approach_rms": "Root mean square of the approach over the mesh frequency.",
     "waterfall": "Orders of the mesh force over the mesh frequency.",
+    "order_tracks": "Level of the orders of the mesh force over the mesh frequency, rms values re 1 µN (ISO 1683).",
+    "run_up": "Largest mesh force over the static one while the speed rises at constant acceleration.",
     "bifurcation": "Approach at the start of every mesh cycle over the mesh frequency.",
     "phase_portrait": "Motion at the speed of the largest dynamic factor; marked once per mesh cycle.",
     "branches": "Stable and unstable periodic motions of the unmodified design.",

@@ -1,6 +1,5 @@
 """Dynamic profile modification: the relief whose vibration at one operating condition is least."""
 
-import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
@@ -8,20 +7,23 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy
 from jaxtyping import Array, Bool, Float
 
-from ...microgeometry import Linear, Polynomial, Power, Quadratic
+from ...microgeometry import Linear, Polynomial, Power
 from ...numerics import Checked, check, concrete, kernel, real, result, spread, whole
 from ...numerics.genetic import decoded, next_generation, random_strings
+from .free_numbers import Free, bounds_of, made, vector
 from .model import DimensionlessModel, with_relief
 from .relief import CycleRelief
 from .settle import _settle, at_rest
 
 Scalar = Float[Array, ""]
-Free = Literal["amount", "length", "curve"]
 
-_SETTLING, _PERIODS, _STEPS = 60, 2, 64  # cycles, cycles, steps per cycle of every evaluation
-_LAST_SETTLING = 400  # cycles, of the amplitudes that are reported
+_SETTLING, _PERIODS = 60, 2  # cycles of every evaluation
+_STEPS = 64  # of every evaluation over a period of omega_0, and over a cycle where that is longer
+_LAST_SETTLING, _FINER = 400, 4  # cycles of the amplitudes that are reported, and their steps over those of the search
+_SPREAD, _BEST = 64, 4  # designs all over the bounds, and how many of them Adam starts from
 _POSITIONS = 128  # of the static curve
 _KICK = 0.5  # velocity over F_m of the second start, which finds a detached branch
 _STATIC_ITERATIONS = 300
@@ -100,10 +102,11 @@ def dynamic_profile_modification(
     """The coefficients of a relief that minimize the largest amplitude of a model at one frequency.
 
     The amplitude is that of the study, half of the range of x in the settled vibration. Its gradient is exact (implicit
-    function theorem of the periodic orbit), and Adam follows it with projection onto the bounds, from four designs: the
-    given one, the static optimum, twice its numbers, and none as far as what is free allows. The study's genetic
-    algorithm needs no gradient; the best design that it meets competes with the same four. The static optimum minimizes
-    the range of x at vanishing speed within the same parameters.
+    function theorem of the periodic orbit), and Adam follows it with projection onto the bounds, from the given design,
+    the static optimum, twice its numbers, none as far as what is free allows, and the best four of 64 that are spread
+    over the bounds: the amplitude has several minima. The study's genetic algorithm needs no gradient; the best design
+    that it meets competes with the first four. The static optimum minimizes the range of x at vanishing speed within
+    the same parameters. The amplitudes of the result are of four times as many steps as those of the search.
 
     Without torque fluctuation and displacement a relief that keeps the static x constant keeps x constant at every
     speed: then static and dynamic optimum are the same, but for a parametric instability about it. Beyond the clearance
@@ -130,29 +133,28 @@ def dynamic_profile_modification(
     if not names or set(names) - {"amount", "length", "curve"}:
         raise ValueError(f'dynamic_profile_modification: free = {names!r} must name "amount", "length" or "curve"')
     model = with_relief(model, None)
-    low, high = _bounds(model, relief, names, bounds or {})
+    low, high = bounds_of(model, relief, names, bounds or {})
     at = real(frequency)
     width = jnp.where(high > low, high - low, 1.0)
-    unit = jnp.clip((_vector(relief, names) - low) / width, 0.0, 1.0)
+    unit = jnp.clip((vector(relief, names) - low) / width, 0.0, 1.0)
     static = _static_search(model, relief, names, low, high, unit)
     further = jnp.clip(2 * static, 0.0, 1.0)
     none_free = jnp.clip(-low / width, 0.0, 1.0)  # no relief, where the free numbers reach it
     starts = jnp.stack([unit, static, further, none_free])
+    steps = _steps(frequency)
     if method == "adam":
-        ends = _dynamic_search(model, relief, names, low, high, at, starts, iterations)
+        ends = _dynamic_search(model, relief, names, low, high, at, (starts, _spread(low)), iterations, steps)
     else:
-        ends = _genetic_search(model, relief, names, low, high, at, jax.random.key(seed), iterations)[None]
+        ends = _genetic_search(model, relief, names, low, high, at, jax.random.key(seed), iterations, steps)[None]
     # near a threshold vibrations settle slowly: who wins is decided after many more cycles than the search takes
-    candidates = jnp.concatenate([ends, starts])
-    last = [_amplitude(model, _made(relief, names, low + width * x), at, _LAST_SETTLING)[0] for x in candidates]
-    best = candidates[jnp.nanargmin(jnp.stack(last))]
-    found = [_made(relief, names, low + (high - low) * part) for part in (static, best)]
     none = eqx.tree_at(lambda r: r.amount, relief, jnp.zeros_like(relief.amount))
-    every = (none, *found)
-    amplitude, settled = zip(*(_amplitude(model, part, at, _LAST_SETTLING) for part in every))
-    at_rest_too = jnp.stack([_static_amplitude(model, part) for part in every])
-    static_found, dynamic_found = found
-    return DynamicModification(at, static_found, dynamic_found, jnp.stack(amplitude), at_rest_too, jnp.stack(settled))
+    candidates = [made(relief, names, low + (high - low) * x) for x in jnp.concatenate([starts, ends])]
+    every = jax.tree.map(lambda *parts: jnp.stack(parts), none, *candidates)
+    amplitude, settled = _last_amplitudes(model, every, at, _FINER * steps)
+    three = jnp.stack([jnp.array(0), jnp.array(2), 1 + jnp.nanargmin(amplitude[1:])])  # none, static and the best
+    of_three = [jax.tree.map(lambda part, i=i: part[i], every) for i in three]
+    at_rest_too = jnp.stack([_static_amplitude(model, part) for part in of_three])
+    return DynamicModification(at, of_three[1], of_three[2], amplitude[three], at_rest_too, settled[three])
 
 
 def modification_table(rows: Sequence[tuple[OperatingCondition, DynamicModification]]) -> str:
@@ -160,56 +162,22 @@ def modification_table(rows: Sequence[tuple[OperatingCondition, DynamicModificat
     lines = [f"{'condition':20} {'Omega':>6} {'free':14} {'none':>8} {'static':>8} {'dynamic':>8}  static -> dynamic"]
     for condition, found in rows:
         numbers = " ".join(f"{float(value):8.5f}" for value in found.amplitude)
-        before, after = (_vector(part, condition.free) for part in (found.static, found.dynamic))
+        before, after = (vector(part, condition.free) for part in (found.static, found.dynamic))
         change = " -> ".join("(" + ", ".join(f"{float(v):.3g}" for v in part) + ")" for part in (before, after))
         free = "+".join(condition.free)
         lines.append(f"{condition.name:20} {float(found.frequency):6.3f} {free:14} {numbers}  {change}")
     return "\n".join(lines)
 
 
-def _vector(relief: CycleRelief, free: Sequence[str]) -> Float[Array, " numbers"]:
-    """The free numbers of a relief."""
-    parts = [jnp.ravel(leaf) for name in free for leaf in jax.tree.leaves(getattr(relief, name))]
-    if not parts:
-        raise ValueError(f"dynamic_profile_modification: {type(relief.curve).__name__} has no coefficients to optimize")
-    return jnp.concatenate(parts)
+def _steps(frequency) -> int:
+    """Steps per mesh cycle of the search; of a frequency that is being traced those of 1 and more."""
+    known = concrete(real(frequency))
+    return _STEPS if known is None else _STEPS * max(round(1 / float(known)), 1)
 
 
-def _made(relief: CycleRelief, free: Sequence[str], vector: Float[Array, " numbers"]) -> CycleRelief:
-    """The relief with other free numbers."""
-    for name in free:
-        leaves, tree = jax.tree.flatten(getattr(relief, name))
-        new = []
-        for leaf in leaves:
-            part, vector = vector[: leaf.size], vector[leaf.size :]
-            new.append(part.reshape(leaf.shape))
-        relief = eqx.tree_at(operator.attrgetter(name), relief, jax.tree.unflatten(tree, new))
-    return relief
-
-
-def _bounds(model: DimensionlessModel, relief: CycleRelief, free: Sequence[str], given: Mapping):
-    if set(given) - set(free):
-        raise ValueError(f"dynamic_profile_modification: bounds = {sorted(given)} must be of what is free, {free!r}")
-    ratio = relief.contact_ratio
-    usual = {
-        "amount": (jnp.zeros_like(model.load), 4 * model.load),
-        "length": (0.2 * (ratio - 1), 0.5 * ratio),
-        "curve": (0.5, 4.0) if isinstance(relief.curve, Power) else (-4.0, 4.0),
-    }
-    if isinstance(relief.curve, Polynomial | Quadratic):  # b_0 would be a step where the relief starts
-        fixed = jnp.concatenate([jnp.ravel(leaf) for leaf in jax.tree.leaves(relief.curve)])
-        inner = jnp.arange(len(fixed)) > 0
-        usual["curve"] = (jnp.where(inner, -4.0, fixed), jnp.where(inner, 4.0, fixed))
-    low, high = [], []
-    for name in free:
-        count = sum(leaf.size for leaf in jax.tree.leaves(getattr(relief, name)))
-        least, most = given.get(name, usual[name])
-        known = concrete(real(least)), concrete(real(most))
-        if known[0] is not None and known[1] is not None and (known[0] > known[1]).any():
-            raise ValueError(f"dynamic_profile_modification: bounds of {name} = ({least}, {most}) must not fall")
-        low.append(jnp.broadcast_to(real(least), count))
-        high.append(jnp.broadcast_to(real(most), count))
-    return jnp.concatenate(low), jnp.concatenate(high)
+def _spread(like: Float[Array, " numbers"]) -> Float[Array, "designs numbers"]:
+    """Points of a Halton sequence in the unit box, always the same."""
+    return jnp.asarray(scipy.stats.qmc.Halton(len(like), scramble=False).random(_SPREAD), like.dtype)
 
 
 def _static_amplitude(model: DimensionlessModel, relief: CycleRelief) -> Scalar:
@@ -221,14 +189,14 @@ def _static_amplitude(model: DimensionlessModel, relief: CycleRelief) -> Scalar:
 
 
 def _amplitude(
-    model: DimensionlessModel, relief: CycleRelief, frequency: Scalar, settling: int = _SETTLING
+    model: DimensionlessModel, relief: CycleRelief, frequency: Scalar, steps: int, settling: int = _SETTLING
 ) -> tuple[Scalar, Bool[Array, ""]]:
     """The larger amplitude of two starts, at rest and kicked; and whether it has settled."""
     moved = with_relief(model, relief)
     rest = at_rest(moved)
     kicked = rest + jnp.stack([jnp.zeros_like(model.load), _KICK * model.load])
     starts = jnp.stack([rest, kicked])
-    found = jax.vmap(lambda start: _settle(moved, frequency, start, settling, _PERIODS, _STEPS))(starts)
+    found = jax.vmap(lambda start: _settle(moved, frequency, start, settling, _PERIODS, steps))(starts)
     # a kick that leaves the range of a polynomial says nothing about the design
     second = jnp.where(jnp.isfinite(found.amplitude[1]), found.amplitude[1], -1.0)
     which = jnp.where(second > found.amplitude[0], 1, 0)
@@ -236,27 +204,37 @@ def _amplitude(
 
 
 @kernel
+def _last_amplitudes(model, reliefs, frequency, steps):
+    return jax.vmap(lambda relief: _amplitude(model, relief, frequency, steps, _LAST_SETTLING))(reliefs)
+
+
+@kernel
 def _static_search(model, relief, free, low, high, unit):
     def value(x):
-        return _static_amplitude(model, _made(relief, free, low + (high - low) * x))
+        return _static_amplitude(model, made(relief, free, low + (high - low) * x))
 
     return _adam(value, unit, _STATIC_ITERATIONS)[0]
 
 
 @kernel
-def _dynamic_search(model, relief, free, low, high, frequency, units, iterations):
-    def value(x):
-        return _amplitude(model, _made(relief, free, low + (high - low) * x), frequency)[0]
+def _dynamic_search(model, relief, free, low, high, frequency, units, iterations, steps):
+    """What Adam comes to from the first of the units and from the best of the second."""
 
-    return jax.vmap(lambda unit: _adam(value, unit, iterations)[0])(units)
+    def value(x):
+        return _amplitude(model, made(relief, free, low + (high - low) * x), frequency, steps)[0]
+
+    starts, spread = units
+    found = jax.vmap(value)(spread)
+    best = jnp.argsort(jnp.where(jnp.isfinite(found), found, jnp.inf))[:_BEST]
+    return jax.vmap(lambda unit: _adam(value, unit, iterations)[0])(jnp.concatenate([starts, spread[best]]))
 
 
 @kernel
-def _genetic_search(model, relief, free, low, high, frequency, key, generations):
+def _genetic_search(model, relief, free, low, high, frequency, key, generations, steps):
     """The best point of the unit box that generations of bit strings meet; the fitness is 1 / amplitude."""
 
     def value(x):
-        return _amplitude(model, _made(relief, free, low + (high - low) * x), frequency)[0]
+        return _amplitude(model, made(relief, free, low + (high - low) * x), frequency, steps)[0]
 
     def step(carry, key):
         strings, best, least = carry
