@@ -25,7 +25,7 @@ from report_page import Page, check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import app, cache, drawing, main, manufactured, report, run, study
+from jaxgear.cli import app, cache, drawing, main, manufactured, optimum_report, report, run, study
 from jaxgear.cli.front import front_rows, front_table
 from jaxgear.cli.gains import gains
 from jaxgear.cli.geometry import gears
@@ -398,7 +398,7 @@ def test_gains_lead_with_the_objective_and_say_what_became_worse():
     assert hot[1] == "80 -> 70 degC: -10 degC against unmodified, -5 degC against rule-based (75)"
 
 
-def test_a_front_is_tabulated_and_compared():
+def test_a_front_is_tabulated_drawn_and_compared(monkeypatch):
     values = np.array([[0.5, 400.0], [1.0, 380.0], [3.0, 350.0]])
     parameters = {"height": np.array([1.0, 2.0, 3.0])}
     front = SimpleNamespace(
@@ -406,6 +406,20 @@ def test_a_front_is_tabulated_and_compared():
     )
     both = {"unmodified": [4.0, 500.0], "rule-based": [1.2, 390.0], "compromise": [1.0, 380.0]}
     designs = {name: SimpleNamespace(objectives=dict(zip("ab", of))) for name, of in both.items()}
+    # the picture has the designs that are no part of the front
+    for owner, name, found in (
+        (optimum_report, "response_surface", (None, None)),
+        (plot, "response_surface", None),
+    ):
+        monkeypatch.setattr(owner, name, lambda *given, found=found, **options: found)
+    monkeypatch.setattr(plot, "optimum_front", lambda front, **options: options)
+    monkeypatch.setattr(report, "save_figures", lambda folder, axes: axes)
+    cycle = SimpleNamespace(unloaded_transmission_error=None, torque=1.0)
+    optimum = SimpleNamespace(cycle=cycle, pinion=None, wheel=None, iterations=())
+    drawn = optimum_report.write_figures(None, SimpleNamespace(phase=None), 1.0, optimum, front, designs)["front"]
+    assert drawn["chosen"] == 1 and {name: [*point] for name, point in drawn["others"].items()} == {
+        name: both[name] for name in ("unmodified", "rule-based")
+    }
     rows = read_table(front_table(front, designs)).rows
     assert rows[1] == ("2, compromise", "1", "380", "2") and rows[-1] == ("rule-based", "1.2", "390", "-")
     told = dict(reversed([*front_rows(front, [1, 1], designs)]))
