@@ -10,7 +10,7 @@ from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, Tolerance
 from ..shafts import bearing_reactions
 from . import report
 from .geometry import gears
-from .layout_study import STEPS, Study, designs, root_factor
+from .layout_study import STEPS, Study, designs, lives, root_factor
 from .written import doubt_data, identity, versions
 
 
@@ -175,7 +175,7 @@ def _reactions(support) -> dict[str, Any]:
 
 
 def _profile(study: Study, profile: ProfileLayout) -> dict[str, Any]:
-    values = {name: profile.table.column(name) for name in profile.table.results}
+    values = {name: profile.table.column(name) for name in profile.table.results} | lives(study, profile)
     return {
         "type": profile.kind,
         "torque_Nm": study.request.profile_torque,
