@@ -25,22 +25,31 @@ from report_page import Page, check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import app, cache, main, manufactured, report, run, study
+from jaxgear.cli import app, cache, drawing, main, manufactured, optimum_report, report, run, study
 from jaxgear.cli.front import front_rows, front_table
 from jaxgear.cli.gains import gains
+from jaxgear.cli.geometry import gears
 from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
 from jaxgear.io.schema_optimize import METHODS_WITHOUT_VARIABLES
+from jaxgear.manufacture import over_balls
 from jaxgear.metrics import Doubt
 from jaxgear.metrics.plausibility import Limit
 from jaxgear.microgeometry import NoModification
 from jaxgear.optimize import result as optimum_result
 from jaxgear.report import read_table
+from jaxgear.tolerance import ToleranceClass, iso_rounded
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
 STAGES = "finite-element tables", "searching", "verifying"  # in this order
 EARLIER = '{"versions": {"jaxgear": "0.1.0"}}'  # the summary of an earlier run
+PROJECT = """
+[project]
+number = "4711"
+customer = "<Miller> & sons"
+"""
+THIN = "tooth_thickness_allowance = [-90.0, -60.0]\n"
 # on which gears of one slice do not stand
 SHAFTS = """
 [layout]
@@ -73,6 +82,7 @@ def folder(tmp_path_factory):
     """Design files, and the results of one run of each command."""
     folder = tmp_path_factory.mktemp("cli")
     fixed = FIXED.replace(LINE, f"{LINE}\nslices = 1") + SHAFTS
+    fixed += PROJECT
     (folder / "fixed.toml").write_text(fixed + "[tolerance]\nquality_class = 5\nsamples = 8\n")
     (folder / "plain.toml").write_text(FIXED)
     (folder / "free.toml").write_text(FREE + 'te_iteration = { start = "unmodified" }\n')
@@ -264,6 +274,33 @@ def test_the_reports_hold_what_was_found(folder, analyzed, optimized):
     told = [design["manufactured"]["q95_ppte_um"] for design in analyzed.summary["designs"].values()]
     assert page.rows[made] == ["95 % quantile [um]", *(f"{value:.3f}" for value in told)]
     assert ["tolerances / quality class", "5"] in page.rows
+    # whose gears they are, what stands on their drawings, and the factors of their rating
+    assert page.rows[:2] == [["project number", "4711"], ["customer", "<Miller> & sons"]]
+    assert analyzed.summary["project"] == {"number": "4711", "customer": "<Miller> & sons"}
+    rows = {row[0]: row[1:] for row in page.rows if len(row) == 3}
+    assert rows["teeth spanned, k"] == ["3", "6"] and rows["flank tolerance class"] == ["5", "5"]
+    pair = load_design(file).pair()
+    for gear, name in zip(pair.gears, ("pinion", "wheel")):
+        drawn, limits = analyzed.summary["drawing"][name], ToleranceClass.of(gear, 5)
+        assert drawn["profile_total_deviation_um"] == float(iso_rounded(limits.profile_total))
+        assert drawn["ball_diameter_mm"] == pytest.approx(5.1)
+    over = float(over_balls(pair.wheel, 5.1))
+    assert drawn["over_balls_upper_limit_mm"] == drawn["over_balls_lower_limit_mm"] == pytest.approx(over, rel=1e-12)
+    (folder / "thin.toml").write_text(file.read_text().replace("[pinion]", "[pinion]\n" + THIN, 1))
+    with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):  # those of the command
+        drawn = gears(load_design(folder / "thin.toml"))["drawing"]["pinion"]
+    for key, times in (("span", np.cos(np.deg2rad(20.0))), ("over_balls", 2.3)):  # dE cos(alpha) / sin(alpha_K)
+        width = drawn[f"{key}_upper_limit_mm"] - drawn[f"{key}_lower_limit_mm"]
+        assert width == pytest.approx(30e-3 * times, rel=1e-9 if key == "span" else 0.05)
+    chosen = "span = [22.85, 22.88]\nteeth_spanned = 3"
+    (folder / "thin.toml").write_text(file.read_text().replace("[pinion]", "[pinion]\n" + chosen, 1))
+    (teeth, ball, quality), (free, *_) = drawing.chosen(load_design(folder / "thin.toml"))
+    assert (float(teeth), ball, float(quality.quality_class), free) == (3.0, None, 5.0, None)
+    factors = [one["pinion_form_factor"] for one in analyzed.summary["iso_6336"].values()]
+    assert rows["pinion form factor, Y_F"] == [f"{factor:.6g}" for factor in factors] and factors[0] > 1
+    design = next(iter(analyzed.summary["designs"].values()))
+    rated = next(iter(analyzed.summary["iso_6336"].values()))
+    assert rated["wheel_root_stress_MPa"] == pytest.approx(design["wheel_root_stress_MPa"], rel=1e-12)
     page = check_report(optimized.target, folder / "free.toml", *optimized.typed)
     printed = [row for row in page.rows if row[0] == "PPTE [um]"]
     ppte = [f"{design['ppte_um']:.3f}" for design in optimized.summary["designs"].values()]
@@ -373,7 +410,7 @@ def test_gains_lead_with_the_objective_and_say_what_became_worse():
     assert hot[1] == "80 -> 70 degC: -10 degC against unmodified, -5 degC against rule-based (75)"
 
 
-def test_a_front_is_tabulated_and_compared():
+def test_a_front_is_tabulated_drawn_and_compared(monkeypatch):
     values = np.array([[0.5, 400.0], [1.0, 380.0], [3.0, 350.0]])
     parameters = {"height": np.array([1.0, 2.0, 3.0])}
     front = SimpleNamespace(
@@ -381,6 +418,20 @@ def test_a_front_is_tabulated_and_compared():
     )
     both = {"unmodified": [4.0, 500.0], "rule-based": [1.2, 390.0], "compromise": [1.0, 380.0]}
     designs = {name: SimpleNamespace(objectives=dict(zip("ab", of))) for name, of in both.items()}
+    # the picture has the designs that are no part of the front
+    for owner, name, found in (
+        (optimum_report, "response_surface", (None, None)),
+        (plot, "response_surface", None),
+    ):
+        monkeypatch.setattr(owner, name, lambda *given, found=found, **options: found)
+    monkeypatch.setattr(plot, "optimum_front", lambda front, **options: options)
+    monkeypatch.setattr(report, "save_figures", lambda folder, axes: axes)
+    cycle = SimpleNamespace(unloaded_transmission_error=None, torque=1.0)
+    optimum = SimpleNamespace(cycle=cycle, pinion=None, wheel=None, iterations=())
+    drawn = optimum_report.write_figures(None, SimpleNamespace(phase=None), 1.0, optimum, front, designs)["front"]
+    assert drawn["chosen"] == 1 and {name: [*point] for name, point in drawn["others"].items()} == {
+        name: both[name] for name in ("unmodified", "rule-based")
+    }
     rows = read_table(front_table(front, designs)).rows
     assert rows[1] == ("2, compromise", "1", "380", "2") and rows[-1] == ("rule-based", "1.2", "390", "-")
     told = dict(reversed([*front_rows(front, [1, 1], designs)]))

@@ -26,6 +26,7 @@ from jaxgear.layout import (
     damage,
     face_load_over_torques,
     flank_line_tolerance,
+    gear_lives,
     helix_slope_limits,
     layout_flank_lines,
     level_load,
@@ -465,6 +466,10 @@ def test_damage_adds_up_and_grows_by_the_exponent():
     factor = np.asarray(skewed.face_load_factor)[1]
     assert factor > 1.05
     np.testing.assert_allclose(np.asarray(skewed.pitting).sum(axis=1) / pitting[1], factor**6.6, rtol=1e-9)
+    # of either gear, and by a factor that stands for every load
+    assert float(jnp.min(skewed.gear_lives)) == float(skewed.life)
+    lives = gear_lives(PAIR, duty(torques, second, 500.0), ENDURANCE, [factor, np.nan])
+    np.testing.assert_allclose(lives, [skewed.gear_lives, [np.nan, np.nan]], rtol=1e-9)
 
 
 IDLE = [0.0, 120.0, 1.0], [5.0, 10.0, 0.0], 500.0

@@ -278,6 +278,21 @@ def test_nominal_contact_stress_is_that_of_iso_6336(cycle):
     assert float(stress.pinion) == pytest.approx(nominal * single, rel=1e-6)
     other = np.tan(working) / np.sqrt((tip[1] - 2 * np.pi / 24) * (tip[0] - (ratio - 1) * 2 * np.pi / 16))
     assert float(stress.wheel) == pytest.approx(nominal * max(other, 1.0), rel=1e-6)
+    # one by one
+    factors = metrics.rating_factors(cycle)
+    names = "zone_factor", "elasticity_factor_sqrt_MPa", "contact_ratio_factor", "pinion_single_pair_contact_factor"
+    np.testing.assert_allclose([factors[name] for name in names], [zone, elasticity, sharing, single], rtol=1e-6)
+    assert float(factors["tangential_force_N"]) == pytest.approx(1e3 * TORQUE / 36.0, rel=1e-12)
+    assert float(factors["nominal_contact_stress_MPa"]) == pytest.approx(nominal, rel=1e-6)
+    bent = metrics.nominal_root_stress(cycle)
+    for name in ("pinion", "wheel"):
+        assert float(factors[f"{name}_contact_stress_MPa"]) == pytest.approx(float(getattr(stress, name)), rel=1e-12)
+        product = 1e3 * TORQUE / 36.0 / (14.0 * 4.5)
+        for factor in ("form", "stress_correction"):
+            product *= float(factors[f"{name}_{factor}_factor"])
+        assert product == pytest.approx(float(factors[f"{name}_nominal_root_stress_MPa"]), rel=1e-12)
+        assert float(factors[f"{name}_root_stress_MPa"]) == pytest.approx(float(getattr(bent, name)), rel=1e-12)
+        assert float(getattr(bent, name)) == pytest.approx(product, rel=1e-12)
 
 
 def test_root_safety_is_that_of_iso_6336_whatever_shares_the_load(cycle):
@@ -298,6 +313,9 @@ def test_uneven_load_over_the_face_counts_in_the_nominal_stresses(mesh):
         names = "face_load_factor", "root_face_load_factor", "pinion_contact_stress", "pinion_root_stress"
         factor, of_root, contact, root = (float(jg.quantities[name](cycle)) for name in names)
         stress.append((contact / np.sqrt(factor), root / of_root))
+        one = metrics.rating_factors(cycle)
+        found = [float(one[key]) for key in ("face_load_factor", "pinion_contact_stress_MPa", "pinion_root_stress_MPa")]
+        np.testing.assert_allclose(found, [factor, contact, root], rtol=1e-12)
     assert factor > 1.05 and stress[1] == pytest.approx(stress[0], rel=1e-9)
 
 

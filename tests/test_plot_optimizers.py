@@ -312,6 +312,12 @@ def test_front_is_drawn_as_it_is_and_the_chosen_design_marked(front):
     texts = [text.get_text() for text in ax.get_legend().get_texts()]
     assert texts == ["Pareto front, 12 designs", "chosen: 1.25 µm, 800 MPa"]
     assert len(plot.optimum_front(front).lines) == 2
+    beside = {"unmodified": np.asarray([8.0, 900.0]), "rule-based": np.asarray([2.0, 850.0])}
+    drawn = plot.optimum_front(front, chosen=3, others=beside).lines[3:]
+    assert {line.get_label(): [*line.get_xdata(), *line.get_ydata()] for line in drawn} == {
+        name: [*point] for name, point in beside.items()
+    }
+    assert len({line.get_marker() for line in (star, *drawn)}) == 3
     with pytest.raises(ValueError, match="^optimum_front: chosen is 12, must be a design of the front, 0 to 11"):
         plot.optimum_front(front, chosen=12)
 

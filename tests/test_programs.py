@@ -204,6 +204,35 @@ def test_files_are_whole_or_not_there(tmp_path):
     assert files.read(b"recipe") is None
 
 
+@pytest.mark.skipif(os.name != "posix", reason="owners and modes are those of POSIX")
+def test_what_others_can_have_written_is_not_executed(tmp_path, monkeypatch):
+    files, before = cache.Files(tmp_path), os.umask(0)
+    try:
+        files.write(b"recipe", b"program")
+    finally:
+        os.umask(before)
+    (file,) = tmp_path.iterdir()
+    assert files.read(b"recipe") == b"program"
+    for path, mode in ((file, 0o620), (file, 0o602), (tmp_path, 0o770), (tmp_path, 0o707)):
+        mine = path.stat().st_mode
+        path.chmod(mode)
+        assert files.read(b"recipe") is None
+        path.chmod(mine)
+    uid = os.getuid()
+    with monkeypatch.context() as another:
+        another.setattr(os, "getuid", lambda: uid + 1)  # so that both are owned by somebody else
+        assert files.read(b"recipe") is None
+    file.rename(tmp_path / "elsewhere")
+    file.symlink_to(tmp_path / "elsewhere")
+    assert files.read(b"recipe") is None
+    file.unlink()
+    os.mkfifo(file)  # at which a plain open waits
+    assert files.read(b"recipe") is None
+    file.unlink()
+    (tmp_path / "elsewhere").rename(file)
+    assert files.read(b"recipe") == b"program"
+
+
 def test_many_write_at_once(tmp_path):
     files, programs_ = cache.Files(tmp_path), [bytes([i]) * 100_000 for i in range(8)]
     seen = set()

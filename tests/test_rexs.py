@@ -1,5 +1,6 @@
 """REXS files: what is written reads back as it was, is of the schema, and what cannot be meant is refused."""
 
+import dataclasses
 import re
 from xml.etree import ElementTree
 
@@ -13,6 +14,8 @@ import jaxgear as jg
 from jaxgear.io import describe, read_rexs, write_rexs
 from jaxgear.io.layout import family
 from jaxgear.io.rexs.frame import frames
+from jaxgear.io.rexs.gears import _SPANS as SPANS
+from jaxgear.manufacture import span
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, TabulatedFlank
 from jaxgear.numerics import number
 
@@ -116,6 +119,14 @@ def test_a_pair_comes_back_as_it_was(tmp_path):
     # to every digit, and with no further ones
     allowance = found.pair.pinion.tooth_thickness_allowance, found.pair.pinion.tooth_thickness_tolerance
     assert tuple(map(float, allowance)) == (-41.3, 27.1)
+    # and as a drawing has it, for programs that read no chord
+    text = (tmp_path / "pair.rexs").read_text()
+    attributes = dict(re.findall(r'<attribute id="([a-z_]*(?:span|span_measurement))" unit="m+u?m?">([^<]+)<', text))
+    thick = span(dataclasses.replace(PINION, tooth_thickness_tolerance=0.0 * PINION.module), 3)
+    wanted = float(attributes["span_measurement"]) + 1e-3 * float(attributes[SPANS[0]])
+    assert wanted == pytest.approx(float(thick), abs=1e-9) and ">3</attribute>" in text
+    width = float(attributes[SPANS[0]]) - float(attributes[SPANS[1]])
+    assert width == pytest.approx(27.1 * np.cos(np.deg2rad(20.0)), rel=1e-12)
     assert found.pair.center_distance == 101.2 and found.pair.wheel.bore_diameter is None
     assert (found.torque, found.speed, found.title) == (51.7, 2987.3, 'a <pair> & "more"')
     assert found.quality_classes == (6, 11)

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from catalogue import SLIDING, flank, gear_pair
+from jax.experimental import checkify
 
 import jaxgear as jg
 from jaxgear.contact import removed_material
@@ -259,6 +260,19 @@ def test_nothing_and_no_load_leave_finite_gradients_and_second_derivatives(mesh)
     for x, way in at_edges():
         slopes, second = backward(mesh, CURVES[0], x, np.ones(16), way)
         assert np.isfinite(slopes).all() and np.isfinite(second).all(), x
+
+
+@pytest.mark.slow
+def test_nothing_is_divided_by_zero_on_the_way_to_finite_results(mesh):
+    """So that a user can let JAX look for his own; its checks for NaN compile for seven times as long."""
+
+    def checked(mesh, amount, torque):
+        return jg.solve(mesh, torque, pinion=jg.TipRelief(amount, 3.4)).transmission_error
+
+    found = jax.jit(checkify.checkify(checked, errors=checkify.div_checks))
+    for amount, torque in ((7.3, 50.0), (0.0, 50.0), (7.3, 0.0)):
+        error, curve = found(mesh, jnp.asarray(amount), jnp.asarray(torque))
+        assert error.get() is None and np.isfinite(curve).all()
 
 
 def test_slices_slide_on_their_own(mesh, sliced):

@@ -8,7 +8,15 @@ from catalogue import TWO_PAIRS, gear_pair, kahraman_gear
 
 import jaxgear as jg
 from jaxgear.contact.kinematics import kinematics
-from jaxgear.manufacture import allowance_of_balls, allowance_of_span, over_balls, space_flank, span, teeth_spanned
+from jaxgear.manufacture import (
+    allowance_of_balls,
+    allowance_of_span,
+    measures,
+    over_balls,
+    space_flank,
+    span,
+    teeth_spanned,
+)
 
 GEARS = {
     "plain": jg.Gear(20, 3.0, face_width=20.0),
@@ -31,6 +39,18 @@ def test_span_of_the_tables():
     assert float(span(jg.Gear(20, 1.0, face_width=20.0), 3)) == pytest.approx(7.6604, abs=5e-5)
     assert float(span(jg.Gear(50, 1.0, face_width=20.0), 6)) == pytest.approx(16.9370, abs=5e-5)
     assert [teeth_spanned(jg.Gear(z, 1.0, face_width=20.0)) for z in (20, 50)] == [3, 6]
+
+
+def test_measures_of_a_traced_gear_are_missing_where_those_of_a_concrete_one_are_refused():
+    gear, of = GEARS["thin"], jax.jit(measures)
+    found = of(gear, 6, 4.25)
+    assert float(found.span) == pytest.approx(float(span(gear, 6)), rel=1e-14)
+    assert float(found.over_balls) == pytest.approx(float(over_balls(gear, 4.25)), rel=1e-14)
+    for teeth, ball in ((20, 2.5), (1, 20.0)):
+        assert np.isnan(of(gear, teeth, ball).span) and np.isnan(of(gear, teeth, ball).over_balls)
+        for refused, given in ((span, teeth), (over_balls, ball)):
+            with pytest.raises(ValueError, match="must be"):
+                refused(gear, given)
 
 
 @EVERY

@@ -9,8 +9,10 @@ from types import SimpleNamespace
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from catalogue import gear_pair
 from commands import call
 from pyarrow import parquet
 from report_page import check_report
@@ -127,6 +129,30 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     assert ruled > 2e7 and f"{ruled:.3g} *" in done.out and "* beyond the revolutions" in done.out
     check_flanks(path, folder, rows)
     check_report(folder, path, "wear", path, "--output", folder, "--report")
+
+
+def test_the_figures_of_worn_flanks_show_every_design(monkeypatch):
+    drawn, depth = {}, np.linspace(0.0, 3.0, 10).reshape(5, 1, 2)
+    gears = gear_pair().gears
+    lives = {
+        name: SimpleNamespace(
+            pinion_depth=times * depth,
+            wheel_depth=times * depth,
+            gears=gears,
+            roll_length=(np.asarray([8.0, 12.0]),) * 2,
+            revolutions=np.linspace(0.0, 2e7, 5),
+        )
+        for times, name in enumerate(("unmodified", "rule-based", "optimum"), 1)
+    }
+    request = SimpleNamespace(settings=SimpleNamespace(dynamics=None))
+    monkeypatch.setattr(wear_report.report, "save_figures", lambda folder, axes: [*drawn, drawn.update(axes)][:0])
+    monkeypatch.setattr(plot, "lives", lambda *given: None)
+    assert wear_report.write_figures(None, SimpleNamespace(lives=lives, request=request, scatters={})) == []
+    for gear in ("pinion", "wheel"):
+        panels = np.ravel(drawn[f"worn_{gear}"])
+        assert [panel.get_title() for panel in panels] == list(lives)
+        assert [panel.lines[-1].get_ydata().max() for panel in panels] == [3.0, 6.0, 9.0]
+    plt.close("all")
 
 
 def check_flanks(path, folder, rows):

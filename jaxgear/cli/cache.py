@@ -37,7 +37,7 @@ class Files(Kept):
     """Programs as files of a folder, named by all that they depend on."""
 
     def __init__(self, folder: Path):
-        super().__init__(folder, _surroundings())
+        super().__init__(folder, _surroundings(), executed=True)
 
 
 def _surroundings() -> bytes:

@@ -13,9 +13,11 @@ from ..io import DesignFile
 from ..io.errors import naming
 from ..io.toml import content
 from ..report import Report, Section, Source, Table, figure, heading, needed, numbers, read_table, text, write_report
+from .drawing import drawing_table, rating_page
 
 REPORT = "report.html"
 _NOTHING = "-"
+_PROJECT = {"name": "project", "number": "project number"}  # keys of [project] that alone do not say whose they are
 _SIDE_BY_SIDE = 5  # columns of a table
 _GEOMETRY_NOTE = (
     "Positions on the path of contact count from the pitch point C, positive towards the tip of the pinion: A start of "
@@ -51,7 +53,7 @@ _INPUTS = (
     "quick",
     "left_out",
 )
-_IDENTITY = ("title", "design_file", "versions", "geometry")
+_ELSEWHERE = ("title", "design_file", "project", "versions", "geometry", "drawing", "iso_6336")
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,8 @@ class Document:
             *_figures(found.figures),
             _validity(found, data),
             _inputs(design, data, found),
-            Section("Geometry", [_GEOMETRY_NOTE], tables=geometry_tables(data["geometry"]), new_page=True),
+            *([rating_page(data["iso_6336"])] if "iso_6336" in data else []),
+            Section("Geometry", [_GEOMETRY_NOTE], tables=_gears(data), new_page=True),
             *_all_numbers(data),
             Section(
                 "Design file",
@@ -132,8 +135,9 @@ class Document:
                 new_page=True,
             ),
         ]
+        facts = [*project_facts(design), *self.facts, versions]
         subtitle = f"jaxgear {self.command[0]}" if self.command else "jaxgear"
-        write_report(folder / REPORT, Report(design.title, subtitle, [*self.facts, versions], sections))
+        write_report(folder / REPORT, Report(design.title, subtitle, facts, sections))
 
 
 def asked_for(command: Sequence[str] | None, *libraries: str) -> datetime | None:
@@ -159,6 +163,17 @@ def document(command: Sequence[str] | None, file: Path, *libraries: str) -> Docu
         return None
     with naming(file):
         return Document(tuple(command), Source.of(file, content(file)), began)
+
+
+def project_facts(design: DesignFile) -> list[tuple[str, str]]:
+    """Whose gears these are."""
+    return [(_PROJECT.get(name, name), said) for name, said in design.project.items()]
+
+
+def _gears(data: Mapping[str, Any]) -> list[Table]:
+    """Geometry, and what stands on a drawing."""
+    tables = geometry_tables(data["geometry"])
+    return [*tables, drawing_table(data["drawing"])] if "drawing" in data else tables
 
 
 def geometry_tables(geometry: Mapping[str, Mapping[str, Any]]) -> list[Table]:
@@ -234,7 +249,7 @@ def _split(title: str, data: Mapping[str, Any]) -> list[Table]:
 
 def _all_numbers(data: Mapping[str, Any]) -> list[Section]:
     """What `summary.json` holds beside what stands in other sections."""
-    rest = {name: value for name, value in data.items() if name not in (*_INPUTS, *_IDENTITY)}
+    rest = {name: value for name, value in data.items() if name not in (*_INPUTS, *_ELSEWHERE)}
     tables = []
     for name, value in rest.items():
         if isinstance(value, Mapping):

@@ -16,8 +16,8 @@ from ..dynamics import Branch, Oscillator, RunUp, SpeedResponse, inertia_of
 from ..dynamics.response import FORCE_REFERENCE
 from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
-from .geometry import geometry
-from .written import model, versions
+from .geometry import gears
+from .written import identity, model, versions
 
 _COLUMNS = {
     "dynamic_factor": "dynamic_factor",
@@ -198,8 +198,7 @@ def summary(study: Study) -> dict[str, Any]:
                 for torque, (factor, at) in of_torques.items()
             ]
     return {
-        "title": study.design.title,
-        "design_file": study.design.path.name,
+        **identity(study.design),
         "torques_Nm": study.request.torques,
         "mesh_frequencies_Hz": [float(frequencies[0]), float(frequencies[-1])],
         "speeds": len(frequencies),
@@ -210,7 +209,7 @@ def summary(study: Study) -> dict[str, Any]:
         "steps": [min(study.steps), max(study.steps)],
         "designs": designs,
         "branches_of_unmodified": [_branch(branch) for branch in study.branches],
-        "geometry": geometry(study.design.pair()),
+        **gears(study.design),
         "model": model(study.mesh),
         "versions": versions(),
     }

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 from ..geometry import Gear, GearPair, PathOfContact, diameter, margins, outline, path_of_contact
 from ..io import DesignFile
 from ..numerics import program
+from . import drawing
 
 # the names of ISO 21771 with the unit, in the order of their numbers below
 _GEAR = (
@@ -52,28 +53,31 @@ _PAIR = (
 Scalar = Float[Array, ""]
 
 
-def geometry(pair: GearPair) -> dict[str, dict[str, Any]]:
-    """Numbers of both gears and of the pair, by name and unit.
+def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
+    """What every `summary.json` says of the gears: their geometry with that of the pair, and their drawing data.
 
     Points of the path of contact are positions from the pitch point C, positive towards the tip of the pinion. The
     usable involute runs from the root form diameter to the tip form diameter, and the mate's tip touches it from the
     active root diameter on.
     """
     # gears without backlash have it up to rounding, which is no -0
-    pinion, wheel, together = jax.tree.map(lambda number: np.where(np.abs(number) < 1e-9, 0.0, number), _numbers(pair))
-    return {
+    chosen = drawing.chosen(file)
+    shape, drawn = _numbers(file.pair(), chosen)
+    pinion, wheel, together = jax.tree.map(lambda number: np.where(np.abs(number) < 1e-9, 0.0, number), shape)
+    geometry = {
         "pinion": dict(zip(_GEAR, pinion, strict=True)),
         "wheel": dict(zip(_GEAR, wheel, strict=True)),
         "pair": dict(zip(_PAIR, together, strict=True)),
     }
+    of = zip(("pinion", "wheel"), drawn, chosen)
+    return {"geometry": geometry, "drawing": {name: drawing.drawing(found, given[-1]) for name, found, given in of}}
 
 
 def mounting(file: DesignFile) -> str:
     """Both bores, where the bodies are held, and whether anybody has asked for them; how the gears are mounted."""
-    gears = (("pinion", file.pair().pinion), ("wheel", file.pair().wheel))
-    shape = geometry(file.pair())
+    shape = gears(file)["geometry"]
     texts = []
-    for name, gear in gears:
+    for name, gear in (("pinion", file.pair().pinion), ("wheel", file.pair().wheel)):
         guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
         texts.append(f"{name} {float(shape[name]['bore_diameter_mm']):.4g} mm{guess}")
     pair = shape["pair"]
@@ -83,15 +87,16 @@ def mounting(file: DesignFile) -> str:
 
 
 @program
-def _numbers(pair: GearPair):
+def _numbers(pair: GearPair, chosen):
     contact, room = path_of_contact(pair), margins(pair)
     pitch = contact.pinion_pitch_roll_length, contact.wheel_pitch_roll_length
     lowest = contact.pinion_roll_length(contact.start), contact.wheel_roll_length(contact.end)
-    return (
+    shape = (
         _gear(pair.pinion, pitch[0], lowest[0], room.pinion_tip_clearance),
         _gear(pair.wheel, pitch[1], lowest[1], room.wheel_tip_clearance),
         _together(pair, contact, room.backlash),
     )
+    return shape, [drawing.numbers(gear, *given) for gear, given in zip(pair.gears, chosen)]
 
 
 def _gear(gear: Gear, pitch: Scalar, lowest: Scalar, tip_clearance: Scalar) -> tuple[Scalar, ...]:

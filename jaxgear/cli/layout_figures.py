@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from . import report
-from .layout_study import STEPS, Study, designs
+from .layout_study import STEPS, Study, designs, lives
 
 _PANEL, _HEIGHT = 92.0, 90.0  # [mm]
 
@@ -44,5 +44,7 @@ def write_figures(folder: Path, study: Study) -> list[Path]:
         rows, names = study.profile.radar_variants()
         results = ["ppte_um", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure_MPa"]
         values = {one: study.profile.table.column(one) for one in results}
-        axes["radar"] = plot.radar(values, results, rows, names)
+        of_gears = lives(study, study.profile)
+        values |= {one: hours for one, hours in of_gears.items() if np.isfinite(hours[rows]).all()}
+        axes["radar"] = plot.radar(values, list(values), rows, names, maximize=set(of_gears) & set(values))
     return report.save_figures(folder, axes)

@@ -9,9 +9,9 @@ from ..io import describe
 from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, ToleranceCases
 from ..shafts import bearing_reactions
 from . import report
-from .geometry import geometry
-from .layout_study import STEPS, Study, designs, root_factor
-from .written import doubt_data, versions
+from .geometry import gears
+from .layout_study import STEPS, Study, designs, lives, root_factor
+from .written import doubt_data, identity, versions
 
 
 def verdict(study: Study) -> Iterator[str]:
@@ -83,8 +83,7 @@ def doubts(study: Study) -> Iterator[str]:
 def summary(study: Study) -> dict[str, Any]:
     """Contents of `summary.json`."""
     return {
-        "title": study.design.title,
-        "design_file": study.design.path.name,
+        **identity(study.design),
         "torque_Nm": study.design.torque,
         "tolerances": {
             name: {"f_Hbeta_um": one.helix_slope, "f_ma_um": one.misalignment}
@@ -113,7 +112,7 @@ def summary(study: Study) -> dict[str, Any]:
             name: {"pinion_modification": describe(pinion), "wheel_modification": describe(wheel)}
             for name, (pinion, wheel) in designs(study).items()
         },
-        "geometry": geometry(study.design.pair()),
+        **gears(study.design),
         "versions": versions(),
     }
 
@@ -176,7 +175,7 @@ def _reactions(support) -> dict[str, Any]:
 
 
 def _profile(study: Study, profile: ProfileLayout) -> dict[str, Any]:
-    values = {name: profile.table.column(name) for name in profile.table.results}
+    values = {name: profile.table.column(name) for name in profile.table.results} | lives(study, profile)
     return {
         "type": profile.kind,
         "torque_Nm": study.request.profile_torque,

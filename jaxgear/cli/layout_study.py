@@ -7,12 +7,13 @@ import numpy as np
 
 from ..contact import Mesh, MeshCycle
 from ..io import DesignFile, LayoutRequest
-from ..layout import FlankLine, FlankLineLayout, ProfileLayout
+from ..layout import FlankLine, FlankLineLayout, ProfileLayout, gear_lives
 from ..metrics import Doubt
 from ..microgeometry import AbstractModification
 from ..shafts import root_face_load_factor, tooth_height
 
 STEPS = ("unmodified", "step 1", "step 2")
+LIVES = ("pinion_life_h", "wheel_life_h")
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,16 @@ def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine
     level = layout.line.on(layout.pair, layout.gear)
     first = (level, none) if layout.gear == "pinion" else (none, level)
     return dict(zip(STEPS, ((none, none), first, (layout.pinion, layout.wheel))))
+
+
+def lives(study: Study, profile: ProfileLayout) -> dict[str, np.ndarray]:
+    """Life [h] of pinion and wheel with every profile modification, by K_Hbeta of its contact; empty without a duty
+    cycle. That factor is of the torque of step 3 and stands for every load."""
+    load, endurance = (study.request.options.get(name) for name in ("duty_cycle", "endurance"))
+    if load is None or endurance is None:
+        return {}
+    found = gear_lives(study.design.pair(), load, endurance, profile.table.column("face_load_factor"))
+    return dict(zip(LIVES, np.asarray(found).T))
 
 
 def root_factor(layout: FlankLineLayout, factor) -> np.ndarray:

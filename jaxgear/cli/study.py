@@ -10,7 +10,7 @@ import numpy as np
 from ..contact import Mesh, MeshCycle, Operation
 from ..contact.parts import half_way
 from ..io import DesignFile, quantities_of_tables
-from ..metrics import face_load_factor, quantities, summary
+from ..metrics import face_load_factor, quantities, rating_factors, summary
 from ..metrics.settings import of_tables
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, optional_real, program, real
@@ -40,6 +40,7 @@ class Evaluation:
         grid_change: by how much numbers at the design torque change at twice the positions, by name and unit.
         failed_torques: torques without a converged contact solution [N m], the design torque included.
         seconds: what finding and evaluating it took, without compilation of the latter [s].
+        factors: of the rating by ISO 6336 at the design torque, by name and unit.
         verified: what it is worth with the finite-element structure; None where nobody asked.
         face_load: face load factor over the torques; empty on one slice.
         scatter: over manufactured gears; None where the file has no tolerances.
@@ -55,6 +56,7 @@ class Evaluation:
     failed_torques: list[float]
     seconds: float
     objectives: dict[str, float] = field(default_factory=dict)
+    factors: dict[str, float] = field(default_factory=dict)
     verified: Verified | None = None
     face_load: np.ndarray = field(default_factory=lambda: np.empty(0))
     scatter: Scatter | None = None
@@ -77,17 +79,18 @@ def evaluate(
     # names and settings, which are arrays: one program serves all oils and strengths
     further = tuple(quantity.name for quantity in quantities_of_tables(file))
     tables = {"lubricant": file.lubricant, "strength": file.strength}
-    metrics = jax.tree.map(np.asarray, _numbers(bare, further, tables))
+    metrics, factors = jax.tree.map(lambda value: np.asarray(value).item(), _numbers(bare, further, tables))
     return Evaluation(
         pinion=pinion,
         wheel=wheel,
         cycle=cycles[0],
-        metrics={name: value.item() for name, value in metrics.items()},
+        metrics=metrics,
         transmission_error=curves[1:],
         ppte=np.ptp(curves[1:], axis=1),
         grid_change=grid_change(mesh, cycles[0], pinion, wheel),
         failed_torques=sorted({float(torque) for torque in every[~converged.all(axis=1)]}),
         seconds=seconds,
+        factors=factors,
         face_load=_face_load(cycles[1:]),
     )
 
@@ -147,5 +150,6 @@ def _factor(cycle: MeshCycle):
 
 @program
 def _numbers(cycle: MeshCycle, further: tuple[str, ...], tables: Mapping[str, Checked | None]):
-    """The numbers of a cycle, and some quantities of [lubricant] and [strength], by name and unit."""
-    return summary(cycle) | {quantities[name].key: of_tables(name, tables, cycle) for name in further}
+    """The numbers of a cycle and some quantities of [lubricant] and [strength], and the factors of ISO 6336."""
+    numbers = summary(cycle) | {quantities[name].key: of_tables(name, tables, cycle) for name in further}
+    return numbers, rating_factors(cycle)

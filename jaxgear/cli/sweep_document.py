@@ -11,8 +11,8 @@ from ..io import DesignFile
 from ..metrics import Quantity
 from ..report import Section, Table, figure, text, write_variants, write_workbook
 from ..sweeps import SweepTable
-from .document import Document, Found
-from .geometry import geometry
+from .document import Document, Found, project_facts
+from .geometry import gears
 from .sweep_chosen import CHOSEN, Chosen
 from .sweep_figures import head_columns, labels_of
 from .written import sizes, versions
@@ -51,7 +51,7 @@ def write(
         grid: what a finer mesh would change.
     """
     release = versions()
-    facts = [*asked.facts, *release.items()]
+    facts = [*project_facts(design), *asked.facts, *release.items()]
     write_workbook(folder / WORKBOOK, facts, best, table)
     failed = table.failures()
     if failed < len(table):
@@ -73,7 +73,7 @@ def write(
         "resolution": sizes(size),
         "quick": quick,
         "variables": {_with_unit(design, name): limits for name, limits in design.bounds.items()},
-        "geometry": geometry(design.pair()),
+        **gears(design),
         "versions": release,
         **({"left_out": design.left_out} if design.left_out else {}),
     }

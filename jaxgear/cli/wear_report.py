@@ -17,8 +17,8 @@ from ..microgeometry import AbstractModification
 from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth, worn_volume
 from ..wear.quantities import blocks_are_short, number_of
 from . import manufactured, report, wear_scatter
-from .geometry import geometry
-from .written import versions
+from .geometry import gears
+from .written import identity, versions
 
 _QUANTITIES = (
     "ppte",
@@ -228,8 +228,7 @@ def summary(study: Study) -> dict[str, Any]:
         for name, life in study.lives.items()
     }
     return {
-        "title": study.design.title,
-        "design_file": study.design.path.name,
+        **identity(study.design),
         "torque_Nm": study.design.torque,
         "settings": _without_none(settings),
         **({} if settings.loads is None else {"shares_of_revolutions": _shares(study)}),
@@ -237,7 +236,7 @@ def summary(study: Study) -> dict[str, Any]:
         **(manufactured.tolerances(study.design) if study.scatters else {}),
         **({"optimum_over_life": _sought(study)} if OVER_LIFE in study.designs else {}),
         "designs": designs,
-        "geometry": geometry(study.design.pair()),
+        **gears(study.design),
         "versions": versions(),
     }
 

@@ -18,7 +18,7 @@ from ..numerics import Number, fields_of
 from ..optimize import Verified
 from ..shafts import RigidSupport
 from . import manufactured
-from .geometry import geometry
+from .geometry import gears
 from .report import Evaluations, diameters, reduction
 from .study import Evaluation
 from .version import version
@@ -32,16 +32,15 @@ def summary(
     found: Mapping[str, tuple[Doubt, ...]],
 ) -> dict[str, Any]:
     """Contents of `summary.json`, with the doubts that were `found` of every design."""
-    shape = geometry(file.pair())
+    of_gears = gears(file)
     return {
-        "title": file.title,
-        "design_file": file.path.name,
+        **identity(file),
         "torque_Nm": file.torque,
         "torque_range_Nm": file.torque_range,
         "speed_rpm": file.speed,
         "friction": file.friction,
         "gears": {name: _gear(getattr(mesh.pair, name)) | _drawn(drawn) for name, drawn in file.drawn.items()},
-        "center_distance_mm": shape["pair"]["center_distance_mm"],
+        "center_distance_mm": of_gears["geometry"]["pair"]["center_distance_mm"],
         **_misalignment(mesh),
         **manufactured.tolerances(file),
         **{name: _numbers(part) for name in ("lubricant", "strength") if (part := getattr(file, name)) is not None},
@@ -55,10 +54,17 @@ def summary(
             "torque_Nm": torques,
             **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
         },
-        "geometry": shape,
+        "iso_6336": {name: evaluation.factors for name, evaluation in evaluations.items()},
+        **of_gears,
         "resolution": sizes(mesh.resolution),
         "versions": versions(),
     }
+
+
+def identity(file: DesignFile) -> dict[str, Any]:
+    """What every `summary.json` begins with."""
+    project = {"project": file.project} if file.project else {}
+    return {"title": file.title, "design_file": file.path.name, **project}
 
 
 def _design(evaluation: Evaluation) -> dict[str, Any]:

@@ -47,6 +47,7 @@ class DesignFile:
         path: the file.
         says: all that it held when it was read, as one text.
         title: free text, the file's stem if it has none.
+        project: what the table of that name says, by its keys.
         torque: design torque on the pinion [N m]; the middle of its bounds where it is a variable.
         torque_range: lowest and highest torque of interest [N m].
         speed: of the pinion [rpm], None if the file names none; the middle of its bounds where it is a variable.
@@ -72,6 +73,7 @@ class DesignFile:
     path: Path
     says: str
     title: str
+    project: dict[str, str]
     torque: float
     torque_range: tuple[float, float]
     speed: float | None
@@ -263,6 +265,7 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
         path=file,
         says=says,
         title=top.title or printable(file.stem),
+        project=decode("project", top.project or {}, schema.ProjectSection).given(),
         torque=torque,
         torque_range=(low, high),
         speed=None if usual.speed is None else float(usual.speed),

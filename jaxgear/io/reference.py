@@ -77,6 +77,7 @@ def _anchor(title: str) -> str:
 
 def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     yield "The top level", schema.FileSection, None
+    yield "[project]", schema.ProjectSection, None
     yield "[pinion] and [wheel]", schema.GearSection, Gear
     yield "[materials.NAME], [pinion.material] and [wheel.material]", section_of(Material), Material
     yield "[pair]", schema.PairSection, GearPair

@@ -38,6 +38,7 @@ class FileSection(Section):
         wheel: the driven gear.
         load: torque and speed.
         title: free text; the name of the file without it.
+        project: whose gears these are, for the head of the report.
         materials: of gears and shafts, by names of the file's own; "STEEL" is known without it.
         pair: how the gears are mounted.
         model: the stiffness model; the library's default without it.
@@ -61,6 +62,7 @@ class FileSection(Section):
     wheel: Annotated[Tables, table()]
     load: Annotated[Tables, table()]
     title: Annotated[str | None, text()] = None
+    project: Annotated[Tables | None, table()] = None
     materials: Annotated[Tables | None, table(table())] = None
     pair: Annotated[Tables | None, table()] = None
     model: Annotated[Tables | None, table()] = None
@@ -78,6 +80,28 @@ class FileSection(Section):
     meshes: Annotated[list[Tables], _TABLES] = []
     housing: Annotated[Tables | None, table()] = None
     layout: Annotated[Tables | None, table()] = None
+
+
+class ProjectSection(Section):
+    """Whose gears these are: texts that stand in the head of the report and in `summary.json`.
+
+    Attributes:
+        name: of the project.
+        number: of the project or order.
+        customer: for whom it is.
+        drawing: number of the drawing.
+        revision: of the drawing.
+        author: who made the design.
+        remark: what else is to stand there.
+    """
+
+    name: Annotated[str | None, text()] = None
+    number: Annotated[str | None, text()] = None
+    customer: Annotated[str | None, text()] = None
+    drawing: Annotated[str | None, text()] = None
+    revision: Annotated[str | None, text()] = None
+    author: Annotated[str | None, text()] = None
+    remark: Annotated[str | None, text()] = None
 
 
 _ThicknessKeys = section_of(ToothThickness, most=(("teeth_spanned", 1000),))

@@ -7,6 +7,7 @@ vary_profiles                3: profile modifications in all combinations
 flank_line_contact           the loaded tooth contact of the flank lines alone
 damage                       pitting and bending under a duty cycle, as a differentiable number
 plausibility                 what of a layout is not usual
+gear_lives                   life of either gear by the face load factors of a contact
 lives_in_cases               what is left of the life in the five cases
 face_load_over_torques       K_Hbeta over the torque
 
@@ -22,6 +23,7 @@ from .life import Damage as Damage
 from .life import Endurance as Endurance
 from .life import WoehlerLine as WoehlerLine
 from .life import damage as damage
+from .life import gear_lives as gear_lives
 from .lives_in_cases import lives_in_cases as lives_in_cases
 from .longest_life import longest_life as longest_life
 from .over_torque import face_load_over_torques as face_load_over_torques

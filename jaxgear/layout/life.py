@@ -20,7 +20,7 @@ from ..conditions import LoadSpectrum
 from ..geometry import GearPair
 from ..metrics.contact_stress import nominal_stress_squares
 from ..metrics.root_stress import single_contact_root_stress
-from ..numerics import Checked, maximum, number, program, result, whole
+from ..numerics import Checked, maximum, number, program, real, result, whole
 from ..shafts import AbstractSupport, FaceLoad, annex_e, face_load_factor, root_face_load_factor, tooth_height
 from .flank_line import FlankLine
 from .stations import STATIONS, Stations, at_stations
@@ -92,8 +92,15 @@ class Damage(Checked):
     def life(self) -> Scalar:
         """Hours until the largest damage sum is 1; without a duration the revolutions of the pinion. Infinite without
         damage, NaN where a load has not been found."""
-        worst, lasts = self.largest, 1.0 if self.duration is None else self.duration
-        none = worst == 0
+        return self._until(self.largest)
+
+    @property
+    def gear_lives(self) -> Float[Array, " gears"]:
+        """`life` of pinion and wheel."""
+        return self._until(maximum(self.total, axis=0))
+
+    def _until(self, worst):
+        lasts, none = 1.0 if self.duration is None else self.duration, worst == 0
         return jnp.where(none, jnp.inf, lasts / jnp.where(none, 1.0, worst))
 
 
@@ -161,6 +168,31 @@ def damage_of(
     pair = jax.tree.map(lambda leaf: leaf[0], faces.pair)
     loaded = Loaded(maximum(found.line_load, axis=-1), face_load_factor(found.line_load), found.converged)
     return summed(pair, loaded, load, endurance)
+
+
+def gear_lives(
+    pair: GearPair, load: LoadSpectrum, endurance: Endurance | tuple[Endurance, Endurance], factors
+) -> Float[Array, "variants gears"]:
+    """`Damage.gear_lives` of pinion and wheel where one face load factor stands for every load.
+
+    Args:
+        pair: the gears.
+        load, endurance: as for `damage`.
+        factors: K_Hbeta, such as that of the loaded tooth contact at one torque, shape (variants,).
+    """
+    both = endurance if isinstance(endurance, tuple) else (endurance, endurance)
+    return _gear_lives(pair, load, both, real(factors))
+
+
+@program
+def _gear_lives(pair: GearPair, load: LoadSpectrum, endurance: tuple[Endurance, Endurance], factors):
+    mean = 1e3 * load.torques / (pair.pinion.base_radius * pair.face_width)
+
+    def lives(factor):
+        every = jnp.full_like(mean, factor)
+        return summed(pair, Loaded(factor * mean, every, jnp.isfinite(every)), load, endurance).gear_lives
+
+    return jax.vmap(lives)(factors)
 
 
 class Loaded(NamedTuple):

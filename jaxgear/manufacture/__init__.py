@@ -26,8 +26,10 @@ from .spline import relief_start as relief_start
 from .spline import wheel_spline as wheel_spline
 from .tooth_space import SpaceFlank as SpaceFlank
 from .tooth_space import space_flank as space_flank
+from .tooth_thickness import Measures as Measures
 from .tooth_thickness import allowance_of_balls as allowance_of_balls
 from .tooth_thickness import allowance_of_span as allowance_of_span
+from .tooth_thickness import measures as measures
 from .tooth_thickness import over_balls as over_balls
 from .tooth_thickness import span as span
 from .tooth_thickness import teeth_spanned as teeth_spanned

@@ -3,6 +3,8 @@
 The numbers are those of unmodified flanks: a relief may not reach where the anvils or balls touch.
 """
 
+from typing import NamedTuple
+
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -13,6 +15,7 @@ from ..numerics import bracketed_root, check, concrete, real, whole
 
 Scalar = Float[Array, ""]
 
+_USUAL_BALL = 1.7  # diameter of a ball [modules]
 _WIDEST = 3.0  # tan(pressure angle) at the ball centre, about 72 degrees
 
 
@@ -22,12 +25,15 @@ def teeth_spanned(gear: Gear) -> int:
     The anvils then touch nearest to the diameter d + 2 x m, where tan(alpha_v) = sqrt((d + 2 x m)^2 - d_b^2) / d_b:
     k = z / pi (tan(alpha_v) - inv(alpha)) - 2 x tan(alpha) / pi + 0.5, rounded, and at least 2.
     """
-    tangent = np.tan(np.deg2rad(float(gear.pressure_angle)))
-    diameter = 2 * float(gear.pitch_radius) + 2 * float(gear.profile_shift) * float(gear.module)
-    base = 2 * float(gear.base_radius)
-    touched = np.sqrt(max(diameter**2 - base**2, 0.0)) / base
-    exact = float(gear.teeth) / np.pi * (touched - (tangent - np.arctan(tangent)))
-    return max(round(exact - 2 * float(gear.profile_shift) * tangent / np.pi + 0.5), 2)
+    return int(_teeth_spanned(gear))
+
+
+def _teeth_spanned(gear: Gear) -> Scalar:
+    tangent = jnp.tan(jnp.deg2rad(gear.pressure_angle))
+    radius = gear.pitch_radius + gear.profile_shift * gear.module
+    touched = jnp.sqrt(jnp.maximum((radius / gear.base_radius) ** 2 - 1, 0.0))
+    exact = gear.teeth / jnp.pi * (touched - involute(tangent))
+    return jnp.maximum(jnp.round(exact - 2 * gear.profile_shift * tangent / jnp.pi + 0.5), 2.0)
 
 
 def span(gear: Gear, teeth: int) -> Scalar:
@@ -49,7 +55,7 @@ def span(gear: Gear, teeth: int) -> Scalar:
     return found
 
 
-def _span(gear: Gear, teeth: int) -> Scalar:
+def _span(gear: Gear, teeth) -> Scalar:
     alpha = jnp.deg2rad(gear.pressure_angle)
     nominal = jnp.pi * (teeth - 0.5) + gear.teeth * involute(jnp.tan(alpha))
     shifted = 2 * gear.profile_shift * gear.module * jnp.sin(alpha)
@@ -71,14 +77,55 @@ def over_balls(gear: Gear, ball) -> Scalar:
         ValueError: for a ball that falls onto the root circle, does not stand out of the spaces or misses the involute.
     """
     check("over_balls", "ball", ball, "mm", low=0.0, open_low=True)
-    alpha = jnp.deg2rad(gear.pressure_angle)
-    wanted = _thick(gear, ball, 1e-3 * gear.mean_tooth_thickness_allowance)
-    tangent = bracketed_root(_missing, jnp.full_like(alpha, 1e-6), jnp.full_like(alpha, _WIDEST), wanted)
-    radius = gear.base_radius * jnp.sqrt(1 + tangent**2)
+    wanted, radius, touched = _ball(gear, ball)
     _check_ball(gear, ball, wanted, radius)
-    # the ball's centre lies on the normal of the involute where it touches
-    _check_touched("over_balls", "ball", ball, " mm", gear.base_radius * tangent - 0.5 * ball, gear)
+    _check_touched("over_balls", "ball", ball, " mm", touched, gear)
     return 2 * radius * _offset(gear) + ball
+
+
+def _ball(gear: Gear, ball) -> tuple[Scalar, Scalar, Scalar]:
+    """inv(alpha_K), radius of the ball's centre and roll length where it touches [mm]."""
+    wanted = _thick(gear, ball, 1e-3 * gear.mean_tooth_thickness_allowance)
+    tangent = bracketed_root(_missing, jnp.full_like(wanted, 1e-6), jnp.full_like(wanted, _WIDEST), wanted)
+    # the ball's centre lies on the normal of the involute where it touches
+    return wanted, gear.base_radius * jnp.sqrt(1 + tangent**2), gear.base_radius * tangent - 0.5 * ball
+
+
+class Measures(NamedTuple):
+    """What the tooth thickness of a gear measures; lengths are NaN where anvils or balls miss the involute.
+
+    Attributes:
+        teeth: k of the span.
+        span: W_k [mm].
+        ball: D_M [mm].
+        over_balls: M_dK [mm].
+    """
+
+    teeth: Scalar
+    span: Scalar
+    ball: Scalar
+    over_balls: Scalar
+
+
+def measures(gear: Gear, teeth=None, ball=None) -> Measures:
+    """`span` and `over_balls` of a gear, which may be traced.
+
+    Args:
+        gear: the gear, with its tooth thickness allowance.
+        teeth: k; None for `teeth_spanned`.
+        ball: D_M [mm]; None for 1.7 modules.
+    """
+    teeth = _teeth_spanned(gear) if teeth is None else real(teeth)
+    ball = _USUAL_BALL * gear.module if ball is None else real(ball)
+    first, (wanted, centre, touched) = _span(gear, teeth), _ball(gear, ball)
+    form = outline(gear).form_roll_length
+
+    def missing(length, found):
+        return jnp.where((form <= length) & (length <= gear.tip_roll_length), found, jnp.nan)
+
+    outside = (wanted > 0) & (centre - 0.5 * ball >= gear.root_circle_radius) & (centre + 0.5 * ball >= gear.tip_radius)
+    over = jnp.where(outside, 2 * centre * _offset(gear) + ball, jnp.nan)
+    return Measures(teeth, missing(0.5 * first, first), ball, missing(touched, over))
 
 
 def allowance_of_span(gear: Gear, teeth: int, measured) -> Float[Array, "..."]:

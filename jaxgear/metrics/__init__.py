@@ -21,6 +21,7 @@ from .face_load import edge_load_factor as edge_load_factor
 from .face_load import face_load_factor as face_load_factor
 from .face_load import face_load_factors as face_load_factors
 from .face_load import root_face_load_factor as root_face_load_factor
+from .factors import rating_factors as rating_factors
 from .flank import FlankSurface as FlankSurface
 from .flank import flank_surface as flank_surface
 from .flank import gear_volume as gear_volume

@@ -4,6 +4,8 @@ The pressure of the contact analysis is another number: the standard's contact r
 the load, and strengths are measured by the same formula.
 """
 
+from typing import NamedTuple
+
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -43,11 +45,38 @@ def nominal_contact_stress(cycle: MeshCycle) -> ContactStress:
 
 def nominal_stress_squares(pair: GearPair) -> tuple[Scalar, Scalar]:
     """Squares of `nominal_contact_stress` per line load along the line of action, pinion and wheel [MPa^2 mm/N]."""
+    factors = contact_factor_squares(pair)
+    at_pitch = factors.contact_ratio * factors.elasticity / path_of_contact(pair).reduced_radius(jnp.zeros(()))
+    return at_pitch * factors.pinion_single_pair, at_pitch * factors.wheel_single_pair
+
+
+class ContactFactors(NamedTuple):
+    """Squares of factors of ISO 6336-2 for spur gears.
+
+    Attributes:
+        zone: Z_H^2.
+        elasticity: Z_E^2 [MPa].
+        contact_ratio: Z_eps^2.
+        pinion_single_pair, wheel_single_pair: Z_B^2 and Z_D^2, at least 1.
+    """
+
+    zone: Scalar
+    elasticity: Scalar
+    contact_ratio: Scalar
+    pinion_single_pair: Scalar
+    wheel_single_pair: Scalar
+
+
+def contact_factor_squares(pair: GearPair) -> ContactFactors:
+    """The factors of `nominal_contact_stress` that belong to a pair, whatever its load."""
     contact = path_of_contact(pair)
-    modulus = combined_modulus(pair.pinion.material, pair.wheel.material, "strain")
     pitch = contact.reduced_radius(jnp.zeros(()))
-    sharing = jnp.maximum(4 - contact.contact_ratio, 0.0) / 3
-    at_pitch = sharing * modulus / (jnp.pi * pitch)
-    worse = (pitch / contact.reduced_radius(single) for single in (contact.inner_single, contact.outer_single))
-    pinion, wheel = (at_pitch * jnp.maximum(ratio, 1.0) for ratio in worse)
-    return pinion, wheel
+    inner, outer = (pitch / contact.reduced_radius(single) for single in (contact.inner_single, contact.outer_single))
+    cosine = jnp.cos(jnp.deg2rad(pair.pinion.pressure_angle))
+    return ContactFactors(
+        zone=2 / (cosine**2 * jnp.tan(pair.working_pressure_angle)),
+        elasticity=combined_modulus(pair.pinion.material, pair.wheel.material, "strain") / jnp.pi,
+        contact_ratio=jnp.maximum(4 - contact.contact_ratio, 0.0) / 3,
+        pinion_single_pair=jnp.maximum(inner, 1.0),
+        wheel_single_pair=jnp.maximum(outer, 1.0),
+    )

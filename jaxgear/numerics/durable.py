@@ -48,15 +48,18 @@ class Kept:
     Args:
         folder: where they lie.
         surroundings: what all of them depend on.
+        executed: whether they may be executed, so that only files are read that nobody else can have written.
     """
 
-    def __init__(self, folder: Path, surroundings: bytes = b""):
-        self._folder, self._here = folder, surroundings
+    def __init__(self, folder: Path, surroundings: bytes = b"", *, executed: bool = False):
+        self._folder, self._here, self._executed = folder, surroundings, executed and os.name == "posix"
 
     def read(self, made_of: bytes) -> bytes | None:
-        """What was written; None where nothing was, or where it is damaged."""
+        """What was written; None where nothing was, where it is damaged, or where others can have written it."""
         file = self._file(made_of)
         try:
+            if self._executed:
+                return unsealed(_read_own(file))
             kept = file.read_bytes()
             os.utime(file)  # the oldest are forgotten
         except OSError:
@@ -65,13 +68,45 @@ class Kept:
 
     def write(self, made_of: bytes, content: bytes) -> None:
         """Keeps something, if the disk allows it."""
+
+        def write(file):
+            if self._executed:
+                os.fchmod(file.fileno(), 0o600)  # whatever the umask
+            file.write(sealed(content))
+
         try:
-            write_durably(self._file(made_of), lambda file: file.write(sealed(content)))
+            write_durably(self._file(made_of), write)
         except OSError:  # a full disk: the next process makes it again
             return
 
     def _file(self, made_of: bytes) -> Path:
         return self._folder / _sum(self._here + made_of).hexdigest()
+
+
+def _read_own(path: Path) -> bytes:
+    """The bytes of a regular file that nobody but this user can have placed or written, of a POSIX system.
+
+    Folder and file are judged once they are open: what a path leads to can change between a look and a use.
+
+    Raises:
+        OSError: for every other file.
+    """
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK  # a pipe would wait for its writer
+        with open(os.open(path.name, flags, dir_fd=folder), "rb") as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode) or not all(map(_is_own, (status, os.fstat(folder)))):
+                raise PermissionError(f"{path}: can be written by others")
+            os.utime(file.fileno())  # the oldest are forgotten
+            return file.read()
+    finally:
+        os.close(folder)
+
+
+def _is_own(status: os.stat_result) -> bool:
+    """Whether this user owns a file or folder, and nobody else writes it."""
+    return status.st_uid == os.getuid() and not status.st_mode & 0o022
 
 
 def forget_the_oldest(folder: Path, most: int) -> None:
@@ -113,9 +148,7 @@ def _is_private(folder: Path) -> bool:
         return False
     if sys.platform == "win32":
         return True
-    status, real = folder.stat(), folder.resolve()
-    own = status.st_uid == os.getuid() and not status.st_mode & 0o022
-    return own and all(map(_is_out_of_reach, {*folder.parents, *real.parents}))
+    return _is_own(folder.stat()) and all(map(_is_out_of_reach, {*folder.parents, *folder.resolve().parents}))
 
 
 def _is_out_of_reach(folder: Path) -> bool:

@@ -23,6 +23,7 @@ _UNITS = {
     "rpm": "rpm",
     "Hz": "Hz",
     "percent": "%",
+    "h": "h",
 }
 # what may follow the unit: the torque, or a statistic over torques and samples
 _STATISTIC = r"_[-+.\de]+(?:Nm|rpm)|_mean|_worst|_q[.\d]+|_cvar[.\d]+"

@@ -20,6 +20,7 @@ _UNITS = {
     "um": "um",
     "degC": "degC",
     "deg": "deg",
+    "sqrt_MPa": "MPa^0.5",
     "MPa": "MPa",
     "Nm": "N m",
     "rpm": "rpm",

@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from ...geometry import Gear, Material
-from ...manufacture import allowance_of_balls, over_balls
+from ...manufacture import allowance_of_balls, measures, over_balls
 from ...numerics import real
 from ..errors import refused
 from .model import CUSTOM, Component, Model
@@ -147,6 +148,7 @@ def write_gear(
         datum_face_orientation=("negative", "none"),
         **{QUALITY: (None if quality is None else str(quality), "none")},
         **{name: (_chordal(gear, limit), "mm") for name, limit in zip(_ALLOWANCES, limits)},
+        **_span(gear, limits),
         **{_THERMAL: (shifted(gear.material.thermal_contact_coefficient, -3), "N / (mm s^0.5 K)")},
         **{_EDGE: (gear.tip_edge_radius, "mm")},
     )
@@ -241,6 +243,20 @@ def _chordal(gear: Gear, limit: float | None) -> float | None:
     diameter, arc = _nominal(gear)
     # d (sin((s + E) / d) - sin(s / d)), without the difference of two near numbers
     return float(2 * diameter * np.cos((arc + 0.5 * allowance) / diameter) * np.sin(0.5 * allowance / diameter))
+
+
+def _span(gear: Gear, limits: tuple[float | None, float | None]) -> dict[str, tuple[Any, str]]:
+    """The base tangent length without an allowance and what its limits [um] make of it; nothing without limits."""
+    zero = jnp.zeros_like(gear.module)
+    found = measures(replace(gear, tooth_thickness_allowance=zero, tooth_thickness_tolerance=zero))
+    if limits[0] is None or not np.isfinite(found.span):
+        return {}
+    cosine = float(np.cos(np.deg2rad(gear.pressure_angle)))
+    return {
+        "number_of_teeth_for_span_measurement": (int(found.teeth), "none"),
+        "span_measurement": (found.span, "mm"),
+        **{name: (limit * cosine, "mum") for name, limit in zip(_SPANS, limits) if limit is not None},
+    }
 
 
 def _thickness(gear: Component, made: Gear) -> dict[str, Any]:
