@@ -11,11 +11,13 @@ with the weight of the Hertzian pressure, as the contact in turn meets the flank
 the flank, so that the volume of the depth is the worn volume to rounding, and equal pieces of sliding leave no ripple
 of the positions.
 
-A contact is as wide as its own load makes it, up to the full load of one pair: its wear is interpolated between those
-under a few shares of that load, linearly in the share, by which the mean square of its width is exact. What would lie
-beyond an end of the flank is folded back, so that an even load wears evenly up to the end. That the contact slides
-down a slope, by less than half its width on usual reliefs, is left out.
+A contact is as wide as its own load makes it, up to the full load of one pair: its wear is a mixture of those over a
+few shares of that width, by Bernstein polynomials, which are smooth and keep the mean width. What would lie beyond an
+end of the flank is folded back, so that an even load wears evenly up to the end. That the contact slides down a slope,
+by less than half its width on usual reliefs, is left out.
 """
+
+from math import comb
 
 import equinox as eqx
 import jax
@@ -26,7 +28,7 @@ from jaxtyping import Array, Float
 from ..contact import Mesh
 from ..contact.kinematics import contacts
 from ..contact.patch import patch_nodes, place_of
-from ..numerics import program, safe_divide
+from ..numerics import program, safe_divide, safe_sqrt
 
 Scalar = Float[Array, ""]
 Field = Float[Array, "pairs positions"]
@@ -34,8 +36,8 @@ Field = Float[Array, "pairs positions"]
 # Places along the piece of a position. On a grid coarser than a step the depth changes by 1e-4 with twice as many.
 _PLACES = 8
 
-# of the full load, for which it is known where contacts leave their wear
-_SHARES = 0.0, 0.0625, 0.25, 1.0
+# widths from none to that of the full load, evenly spaced, over which it is known where contacts leave their wear
+_WIDTHS = 4
 
 # of the worn material: from contact on the flanks, and of tip corners on the mate's flank
 PARTS = "flank", "corner"
@@ -48,22 +50,21 @@ class Deposit(eqx.Module):
         roll_length: of the grid points, from the start of the active profile to the tip [mm], shape (gears, points).
         arc: of the flank that belongs to every point [mm], shape (gears, points).
         sliding: of every position, on the flank and of tip corners [mm], shape (parts, pairs, positions).
-        spreads: sliding by the points where contacts under shares of the full load leave their wear [mm], least share
-            first, shape (shares, gears, parts, points, pairs, positions).
+        spreads: sliding by the points where contacts leave their wear [mm], from those without width to those of the
+            full load, shape (widths, gears, parts, points, pairs, positions).
         full_load: line load of one pair that carries all [N/mm].
     """
 
     roll_length: Float[Array, "gears points"]
     arc: Float[Array, "gears points"]
     sliding: Float[Array, "parts pairs positions"]
-    spreads: Float[Array, "shares gears parts points pairs positions"]
+    spreads: Float[Array, "widths gears parts points pairs positions"]
     full_load: Scalar
 
-    def shares(self, line_load: Float[Array, "*contacts"]) -> Float[Array, "shares *contacts"]:
-        """What each of the `spreads` counts for in contacts under line loads [N/mm]."""
-        share = safe_divide(line_load, self.full_load)
-        knots, each = jnp.asarray(_SHARES, share.dtype), jnp.eye(len(_SHARES), dtype=share.dtype)
-        return jnp.stack([jnp.interp(share, knots, one) for one in each])
+    def shares(self, line_load: Float[Array, "*contacts"]) -> Float[Array, "widths *contacts"]:
+        """What each of the `spreads` counts for in contacts under line loads [N/mm], as wide as the root of these."""
+        width, most = safe_sqrt(jnp.minimum(safe_divide(line_load, self.full_load), 1.0)), _WIDTHS - 1
+        return jnp.stack([comb(most, i) * width**i * (1 - width) ** (most - i) for i in range(_WIDTHS)])
 
 
 def grid(mesh: Mesh, points: int) -> Float[Array, "gears points"]:
@@ -94,14 +95,14 @@ def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
     half_width = place_of(mesh, torque).half_width[:, 0, :, None]
     lengths = grid(mesh, points)
 
-    def under(share) -> Float[Array, "gears parts points pairs positions"]:
+    def over(width) -> Float[Array, "gears parts points pairs positions"]:
         made = [
-            _spread(roll, jnp.sqrt(share) * half_width, sliding, knots, side.base_radius, mesh.resolution.patch_nodes)
+            _spread(roll, width * half_width, sliding, knots, side.base_radius, mesh.resolution.patch_nodes)
             for roll, side, knots in zip(rolls, mesh.sides, lengths)
         ]
         return jnp.stack(made)
 
-    spreads = jax.lax.map(under, jnp.asarray(_SHARES, dtype))
+    spreads = jax.lax.map(over, jnp.linspace(0.0, 1.0, _WIDTHS, dtype=dtype))
     arc = jnp.stack([arcs(knots, side.base_radius) for knots, side in zip(lengths, mesh.sides)])
     full_load = 1e3 * torque / (mesh.pair.pinion.base_radius * mesh.pair.face_width)
     return Deposit(lengths, arc, jnp.sum(sliding, axis=-1), spreads, full_load)
