@@ -8,7 +8,8 @@ contact no longer carries load.
 It wears the flanks by Archard's law, without a coefficient of wear, and prints stiffness and error at the same boundary
 over "wear steps". Its sum of both gears' depths takes pinion and wheel through as many cycles, and its sliding
 velocities are rolling ones; here each gear wears by its own revolutions. Its tables do not agree with themselves (see
-`INCONSISTENT`), so that only their trends stand beside ours, over the deepest wear in place of the steps.
+`INCONSISTENT`). Those over its wear steps stand beside ours over the deepest wear; those after wear beside ours after
+as much wear as changes the error behind a relief of 0.6 as there, for two largest amounts.
 
 Run it: `python examples/reproduce_30_30_20_30_study.py`.
 """
@@ -25,16 +26,19 @@ import jax.numpy as jnp  # noqa: E402
 
 import jaxgear as jg  # noqa: E402
 from jaxgear import wear  # noqa: E402
+from jaxgear.wear.case import points_for  # noqa: E402
+from jaxgear.wear.deposit import grid  # noqa: E402
 
 TORQUES = {"30/30": 150.0, "20/30": 98.0}  # N m
 # The study's largest amount is not known: with 0.4 of it the pair that enters contact carries little at the boundary,
 # with 0.6 nothing. Here it carries nothing from 16.5 um on.
-LARGEST = 33.0  # um
+LARGEST, OTHER = 33.0, 25.0  # um
 AMOUNTS = (0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 20.0, 30.0)  # um
 LENGTHS = (0.5, 1.0, 2.0, 3.0)  # mm
 COEFFICIENT = 1e-18  # m2/N; any other one is another number of revolutions
-REVOLUTIONS = 1.5e8  # of the pinion
-RELATIVE = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # amounts of relief, to the largest one
+REVOLUTIONS = 1.3e8  # of the pinion; farther on nothing is left of the load at A, nor of what the study shows
+RELATIVE = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # amounts of relief, to the largest one; lengths from 0.2 on
+MIDDLE = RELATIVE.index(0.6)  # the relief behind which the study varies wear steps and lengths
 
 # wear steps of the study, with its stiffness [N/um] and QSTE [um] at the boundary, "unworn" and "worn"
 STEPS = (10_000, 20_000, 40_000, 60_000, 100_000)
@@ -43,6 +47,8 @@ ERROR = ((24.1, 26.0, 29.2, 32.3, 38.3), (31.5, 34.2, 37.2, 39.9, 46.0))
 # relative amounts 0.2 to 1.0, new and after wear
 STIFFNESS_OVER_AMOUNT = ((213.0, 190.0, 185.0, 185.0, 185.0), (216.0, 210.0, 199.0, 185.0, 185.0))
 ERROR_OVER_AMOUNT = ((25.0, 28.0, 28.7, 28.7, 28.7), (30.9, 33.6, 37.1, 39.9, 39.9))
+# relative lengths 0.2 to 1.0 of the relief of 0.6: stiffness new and after wear, change of the error [%]
+STIFFNESS_OVER_LENGTH, ERROR_CHANGE_OVER_LENGTH = (185.0, 199.0), 29.4
 INCONSISTENT = """
 - 199 and 185 N/um stand for the same relief of 0.6 twice: once as the study's model beside its finite elements (error
   7.57 %), once as worn beside new flanks (change 7.59 %).
@@ -143,29 +149,79 @@ def largest(stiffness, pairs, count) -> float:
     return float(jnp.max(jnp.where(pairs == count, stiffness, 0.0)))
 
 
+@eqx.filter_jit
+def live(mesh, torque, amount, length, worn_before, revolutions, blocks):
+    """The life of both gears with a linear tip relief [um, mm] and material worn off before [um], (gears, points)."""
+    lengths = grid(mesh, points_for(mesh.resolution.positions))
+    before = [jg.TabulatedProfile(*of) for of in zip(lengths, worn_before)]
+    pinion, wheel = (jg.TipRelief(amount, length, jg.Linear()) + of for of in before)
+    life = wear.wear(mesh, torque, revolutions, coefficient=COEFFICIENT, pinion=pinion, wheel=wheel, blocks=blocks)
+    te, stiffness = life.cycles.transmission_error, jg.secant_stiffness(life.cycles)
+    return {
+        "te": at_entry(mesh, te),
+        "stiffness": at_entry(mesh, stiffness),
+        "ppte": wear.over_life(life, "ppte"),
+        "depth": wear.wear_depth(life),
+        "error": life.error,
+        "root": life.pinion_depth[:, 0, 0],
+        "cycles": jnp.stack([te[jnp.array([0, -1])], stiffness[jnp.array([0, -1])]]),
+        "worn": jnp.stack([life.pinion_depth[-1, 0], life.wheel_depth[-1, 0]]),
+    }
+
+
 def over_life(fast=False) -> dict:
-    """Stiffness and error at point A over the wear of flanks without and with relief; the last axis is the life."""
-    pair, torque = gear_pair("30/30"), TORQUES["30/30"]
-    mesh = prepare(pair, jg.Resolution(positions=32 if fast else 64))
-    blocks, revolutions = 12 if fast else 30, REVOLUTIONS
+    """Lives of the 30/30 pair; lists are over designs and, last, over the life.
 
-    def worn(amount):
-        relief = jg.TipRelief(amount, jg.long_relief_length(pair), jg.Linear())
-        options = {"pinion": relief, "wheel": relief, "coefficient": COEFFICIENT, "blocks": blocks}
-        life = wear.wear(mesh, torque, revolutions, **options)
-        te, stiffness = at_entry(mesh, life.cycles.transmission_error), jg.secant_stiffness(life.cycles)
-        return {
-            "te": te,
-            "stiffness": at_entry(mesh, stiffness),
-            "ppte": wear.over_life(life, "ppte"),
-            "depth": wear.wear_depth(life),
-            "error": life.error,
-            "root": life.pinion_depth[:, 0, 0],
-        }
+    "worn" and "worn_other" run over the relative amounts of `LARGEST` and `OTHER`, "worn_length" over the relative
+    lengths; "recovery" is by how much wear raises the stiffness at A behind a relief of 0.6 [%], by what is changed.
+    """
+    pair = gear_pair("30/30")
+    on, off = (
+        prepare(pair, jg.Resolution(32 if fast else 64, extended_contact=extended)) for extended in (True, False)
+    )
+    off = eqx.tree_at(lambda mesh: mesh.kinematics, off, on.kinematics)  # one program serves both
+    long = jg.long_relief_length(pair)
+    nothing = jnp.zeros((2, points_for(on.resolution.positions)))
 
-    amounts = jnp.asarray(RELATIVE) * LARGEST
-    found = jax.jit(lambda: jax.lax.map(worn, amounts))()
-    return {f"worn_{key}": values.tolist() for key, values in found.items()}
+    def one(amount, length=1.0, mesh=on, torque=TORQUES["30/30"], before=nothing, revolutions=REVOLUTIONS):
+        numbers = [jnp.asarray(number, float) for number in (torque, amount, length * long)]
+        return live(mesh, *numbers, before, jnp.asarray(revolutions), 12 if fast else 30)
+
+    kept = one(RELATIVE[MIDDLE] * LARGEST, revolutions=1.0)
+    frozen = one(RELATIVE[MIDDLE] * LARGEST, before=REVOLUTIONS * kept["worn"], revolutions=1.0)
+    worn = [one(share * LARGEST) for share in RELATIVE]
+    lives = {
+        "worn": worn,
+        "worn_other": worn[:1] + [one(share * OTHER) for share in RELATIVE[1:]],
+        "worn_length": [one(RELATIVE[MIDDLE] * LARGEST, length) for length in RELATIVE[1:-1]] + [worn[MIDDLE]],
+        "path_alone": [one(share * LARGEST, mesh=off) for share in (0.0, RELATIVE[MIDDLE])],
+        "torques": [one(RELATIVE[MIDDLE] * LARGEST, torque=torque) for torque in (100.0, 200.0)],
+    }
+    found = {
+        f"{name}_{key}": [life[key].tolist() for life in of]
+        for name, of in lives.items()
+        for key in of[0]
+        if key != "worn"
+    }
+
+    def risen(stiffness) -> float:
+        return 100 * (max(stiffness) / stiffness[0] - 1)
+
+    recovery = {
+        f"{LARGEST:g} um as the largest amount": found["worn_stiffness"][MIDDLE],
+        f"{OTHER:g} um": found["worn_other_stiffness"][MIDDLE],
+        "contact on the path alone": found["path_alone_stiffness"][1],
+        "100 N m": found["torques_stiffness"][0],
+        "200 N m": found["torques_stiffness"][1],
+        "worn on under the loads of new flanks": [float(kept["stiffness"][0]), float(frozen["stiffness"][0])],
+    }
+    path = on.path_of_contact
+    faster = [sum(wear.specific_sliding(path, at)) for at in (path.start, path.outer_single)]
+    return found | {
+        "phase": on.phase.tolist(),
+        "recovery": {name: risen(stiffness) for name, stiffness in recovery.items()},
+        "faster_at_A": float(faster[0] / faster[1]),
+    }
 
 
 def main(fast=False) -> dict:
@@ -212,12 +268,116 @@ def show(found):
 def wear_trends(found) -> dict[str, bool]:
     """Trends of the study over the wear, and whether the numbers have them."""
     te, stiffness = ([list(zip(of, of[1:])) for of in found[f"worn_{key}"]] for key in ("te", "stiffness"))
-    relieved = found["worn_stiffness"][RELATIVE.index(0.6)]
+    relieved = found["worn_stiffness"][MIDDLE]
     return {
         "the error at A grows with the wear, whatever the relief": all(new < old for of in te for new, old in of),
         "the stiffness of unmodified flanks falls": all(new > old for new, old in stiffness[0]),
         "a relief of 0.6 that has kept the second pair apart does so no longer": max(relieved) > 1.01 * relieved[0],
     }
+
+
+def after_wear(found, name):
+    """Stiffness [N/um] and error [um] of designs, new and once the error behind a relief of 0.6 has changed as in the
+    study: two pairs of lists."""
+    middle = found["worn_other_te" if name == "worn_other" else "worn_te"][MIDDLE]
+    new, worn = (of[MIDDLE - 1] for of in ERROR_OVER_AMOUNT)
+    life = jnp.interp(worn / new * middle[0], jnp.asarray(middle), jnp.arange(float(len(middle))))
+    return [
+        ([of[0] for of in rows], [float(jnp.interp(life, jnp.arange(float(len(of))), jnp.asarray(of))) for of in rows])
+        for rows in (found[f"{name}_stiffness"], found[f"{name}_te"])
+    ]
+
+
+def deviation(found, name) -> float:
+    """Root mean square of what both tables over the amount differ by from the study's [%]."""
+    published = STIFFNESS_OVER_AMOUNT, ERROR_OVER_AMOUNT
+    ratios = [
+        ours / theirs - 1
+        for table, of_study in zip(after_wear(found, name), published)
+        for row, study in zip(table, of_study)
+        for ours, theirs in zip(row[1:], study)
+    ]
+    return 100 * (sum(ratio**2 for ratio in ratios) / len(ratios)) ** 0.5
+
+
+def show_after_wear(found):
+    """Prints the study's tables after wear, over amount and length of the relief, beside ours."""
+
+    def line(text, values, of="{:8.1f}"):
+        print(f"  {text:38}" + "".join(of.format(value) for value in values))
+
+    def table(text, ours, study):
+        for state, *both in zip(("new", "after wear"), ours, study):
+            line(f"{text}, {state}", both[0])
+            line("  study", both[1])
+        line("  change [%]", [100 * (worn / new - 1) for new, worn in zip(*ours)])
+        line("    study", [100 * (worn / new - 1) for new, worn in zip(*study)])
+
+    names = {"worn": LARGEST, "worn_other": OTHER}
+    for name, largest in names.items():
+        print(f"Relief, relative to {largest:g} um, new and after as much wear as changes QSTE at 0.6 as in the study:")
+        line("amount", RELATIVE[1:])
+        published = STIFFNESS_OVER_AMOUNT, ERROR_OVER_AMOUNT
+        for text, ours, study in zip(("stiffness at A [N/um]", "QSTE at A [um]"), after_wear(found, name), published):
+            table(text, [row[1:] for row in ours], study)
+    off = {largest: deviation(found, name) for name, largest in names.items()}
+    print("  root mean square of the differences: " + ", ".join(f"{of:.1f} % with {um:g} um" for um, of in off.items()))
+    print(f"  {min(off, key=off.get):g} um as the largest amount reproduces the tables better")
+    print(f"Length of a relief of 0.6 of {LARGEST:g} um, relative to the double-contact zone, likewise:")
+    line("length", RELATIVE[1:])
+    stiffness, te = after_wear(found, "worn_length")
+    table("stiffness at A [N/um]", stiffness, [[value] * len(te[0]) for value in STIFFNESS_OVER_LENGTH])
+    line("QSTE at A [um], new", te[0])
+    line("after wear", te[1])
+    line("  change [%]", [100 * (worn / new - 1) for new, worn in zip(*te)])
+    line("    study", [ERROR_CHANGE_OVER_LENGTH] * len(te[0]))
+
+
+def show_recovery(found):
+    """Prints by how much wear raises the stiffness at A behind a relief of 0.6, and what that depends on."""
+    study = 100 * (STIFFNESS[1][-1] / STIFFNESS[1][0] - 1)
+    ours = ", ".join(f"{value:.1f} % ({name})" for name, value in found["recovery"].items())
+    told = (
+        f"The stiffness at A behind a relief of 0.6 rises by {study:.1f} % over the wear steps of the study, here by at"
+        f" most {ours}. A load wears {found['faster_at_A']:.1f} times as fast at A as at D, where the other pair is:"
+        " what comes onto load at A is soon off it again, unless the wear does not follow the load. Gears of equal"
+        " numbers of teeth go through as many cycles."
+    )
+    print(textwrap.fill(told, 118, subsequent_indent="  "))
+
+
+def draw(found):
+    """Stiffness and QSTE over the mesh cycle: new and worn, without and with relief; with and without corners."""
+    import matplotlib.pyplot as plt
+
+    from jaxgear import plot
+    from jaxgear.plot.figure import line_style, report_axes
+    from jaxgear.plot.history import PHASE_LABEL, two_pitches
+
+    relief = f"relief {RELATIVE[MIDDLE] * LARGEST:.0f} µm"
+    worn, alone = found["worn_cycles"], found["path_alone_cycles"]  # of each design: QSTE and stiffness, new and worn
+    figures = {
+        "worn": [
+            (f"{name}, {state}", [worn[index][quantity][life] for quantity in (1, 0)])
+            for index, name in ((0, "unmodified"), (MIDDLE, relief))
+            for life, state in enumerate(("new", "worn"))
+        ],
+        "extended_contact": [
+            (f"{name}, {contact}", [of[quantity][0] for quantity in (1, 0)])
+            for name, both in (("unmodified", (worn[0], alone[0])), (relief, (worn[MIDDLE], alone[1])))
+            for of, contact in zip(both, ("extended", "path alone"))
+        ],
+    }
+    for name, curves in figures.items():
+        figure, axes = plt.subplots(2, figsize=(4.7, 5.2), sharex=True, layout="constrained")
+        for axis, label, quantity in zip(axes, ("mesh stiffness [N/µm]", "QSTE [µm]"), (0, 1)):
+            with report_axes(axis):
+                for number, (text, values) in enumerate(curves):
+                    axis.plot(*two_pitches(found["phase"], values[quantity]), label=text, **line_style(number))
+                axis.set(xlim=(0, 2), ylabel=label)
+        axes[1].set_xlabel(PHASE_LABEL)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=2, frameon=False)
+        plot.save(figure, f"results/reproduce_30_30_{name}.png")
 
 
 def relief_trends(found) -> dict[str, bool]:
@@ -259,17 +419,13 @@ def show_wear(found):
         print(f"  {'  with relief':26}" + "".join(f"{value:9.1f}" for value in relieved))
     lives = len(found["worn_depth"][0])
     shown = [round(share * (lives - 1)) for share in (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)]
-    for index in (0, RELATIVE.index(0.6)):
+    for index in (0, MIDDLE):
         print(f"jaxgear, {RELATIVE[index]:g} of the largest relief:")
         lines = {"deepest wear [um]": "depth", "stiffness at A [N/um]": "stiffness", "QSTE at A [um]": "te"}
         for text, key in (lines | {"PPTE [um]": "ppte"}).items():
             print(f"  {text:26}" + "".join(f"{found[f'worn_{key}'][index][life]:9.2f}" for life in shown))
-    print("All amounts of the relief, relative to the largest, at the end of the life; the study without wear steps:")
-    for text, key, published in (("stiffness", "stiffness", STIFFNESS_OVER_AMOUNT), ("QSTE", "te", ERROR_OVER_AMOUNT)):
-        changes = [100 * (worn[-1] / worn[0] - 1) for worn in found[f"worn_{key}"]]
-        of_study = [100 * (worn / new - 1) for new, worn in zip(*published)]
-        print(f"  change of {text} at A [%]" + " " * (16 - len(text)) + "".join(f"{change:8.1f}" for change in changes))
-        print(f"  {'  study, from 0.2 on':34}" + " " * 8 + "".join(f"{change:8.1f}" for change in of_study))
+    show_after_wear(found)
+    show_recovery(found)
     say(wear_trends(found))
     print("What does not agree within the study:" + INCONSISTENT)
 
@@ -286,3 +442,4 @@ if __name__ == "__main__":
         coupled, uncoupled = found[f"double_stiffness_{key}"], found[f"uncoupled_double_stiffness_{key}"]
         print(f"  double-pair stiffness {coupled:.0f} N/um, without coupling {uncoupled:.0f} N/um")
     say(relief_trends(found))
+    draw(found)

@@ -6,11 +6,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import gear_pair, kahraman_gear, prepare
+from catalogue import LINE, gear_pair, kahraman_gear, prepare
 
 import jaxgear as jg
 from jaxgear.compliance.edge import cut_off
+from jaxgear.contact import solve_removed
 from jaxgear.contact.corner import corner_gap
+from jaxgear.contact.slide import nothing_removed
+from jaxgear.io.sizes import resolution_of
 
 # Gap [um] of the approach corner when the mate stays, over the distance before A in base pitches, and its parabola.
 TABLE = {
@@ -230,3 +233,25 @@ def test_corner_contact_is_softer_than_the_flank_and_regular(fine):
     middle = np.abs(mesh.path) < 0.1 * float(mesh.path_of_contact.base_pitch)
     ratio = (deflection / np.where(uncut > 0, uncut, 1.0))[:, middle[:, None]]
     assert ratio[1:].max() < 1.02, "far from the corners nothing changes"
+
+
+def test_without_extended_contact_pairs_carry_load_on_the_path_alone():
+    """Nothing else changes: where no corner touches anyway, the transmission error is the same."""
+    table = {"positions": 16, "pairs": 2, "slide_steps": 0}
+    sizes = [resolution_of(table | {"extended_contact": on}, [], bent=False) for on in (False, True)]
+    assert sizes[1] == LINE
+    meshes = [prepare(gear_pair(), resolution=of) for of in sizes]
+    removed = nothing_removed(LINE, meshes[0].path.dtype)
+    off, on = (solve_removed(mesh, 50.0, removed) for mesh in meshes)
+    assert off.converged.all() and on.converged.all()
+    outside, force = np.asarray(meshes[0].outside) > 0, np.asarray(off.pair_force)
+    assert (force[outside] == 0).all() and (force[~outside] > 0).all()
+    # as many pairs on the mean as the path is base pitches long, to one position
+    ratio = float(meshes[0].path_of_contact.contact_ratio)
+    assert (force > 0).sum() / 16 == pytest.approx(ratio, abs=1 / 16)
+    assert ratio - 2.1 / 16 < float(jg.effective_contact_ratio(off)) < ratio + 1 / 16
+    assert float(jg.effective_contact_ratio(on)) > ratio + 0.05
+    alone = ~((np.asarray(on.pair_force) > 0) & outside).any(axis=0)
+    off, on = np.asarray(off.transmission_error), np.asarray(on.transmission_error)
+    assert 0 < alone.sum() < 16 and (off[~alone] > on[~alone]).all()
+    np.testing.assert_allclose(off[alone], on[alone], rtol=1e-9)

@@ -126,6 +126,26 @@ def test_30_30_trends_are_compared():
     assert list(module.relief_trends(study).values()) == [True, True, False, True]  # half a millimetre is too short
 
 
+def test_30_30_after_wear():
+    """Over amount and length of the relief, and what the stiffness at A rises by: most where wear follows no load."""
+    study = found("reproduce_30_30_20_30_study")
+    module = importlib.import_module("examples.reproduce_30_30_20_30_study")
+    (new, worn), (te, worn_te) = module.after_wear(study, "worn")
+    assert worn_te[3] / te[3] == pytest.approx(37.1 / 28.7, rel=1e-6)
+    assert worn[3] > 1.015 * new[3] and worn[1] < 0.95 * new[1]
+    # over the length nothing changes, but where the relief is as short as a contact
+    (new, worn), _ = module.after_wear(study, "worn_length")
+    assert np.ptp(new[1:]) < 1e-3 * new[-1] and np.ptp(worn[1:]) < 5e-3 * worn[-1]
+    assert module.deviation(study, "worn_other") < module.deviation(study, "worn") < 10.0
+    *others, kept = study["recovery"].values()
+    assert max(others) < 3.0 < 6.0 < kept < 15.1
+    # corners bring the second pair in before A; behind the relief they do not touch
+    extended, alone = np.array(study["worn_cycles"])[[0, 3]], np.array(study["path_alone_cycles"])
+    carried = extended[0, 1, 0] > 1.01 * alone[0, 1, 0]
+    assert 0 < carried.sum() < 10 and (extended[0, 0, 0][carried] < alone[0, 0, 0][carried]).all()
+    np.testing.assert_allclose(extended[1, :, 0], alone[1, :, 0], rtol=1e-9)
+
+
 def test_20_30_against_finite_elements():
     truth = cases.reference(cases.Case("C", "stress", 98.0, "none"))
     force = truth.force.sum(axis=0) / truth.transmission_error

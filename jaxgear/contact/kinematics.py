@@ -177,8 +177,10 @@ class Contacts(eqx.Module):
     lever: Float[Array, "..."]
 
 
-def contacts(pair: GearPair, contact: PathOfContact, path: Float[Array, "..."]) -> Contacts:
+def contacts(pair: GearPair, contact: PathOfContact, path: Float[Array, "..."], extended: bool = True) -> Contacts:
     """Contact points at path positions [mm], on the path of contact and outside it.
+
+    Where contact is not `extended`, corners outside the path are a base pitch farther apart: no teeth bend as much.
 
     A position is the mean one of both gears: under a transmission error d the pinion leads it by d/2 and the wheel
     lags by d/2, so a corner is d/2 farther out than its nominal position and its gap grows by half its slope times d.
@@ -192,10 +194,11 @@ def contacts(pair: GearPair, contact: PathOfContact, path: Float[Array, "..."]) 
         (path - contact.end, recess),
     )
     on_path = jnp.clip(path, contact.start, contact.end)
+    apart = 0.0 if extended else jnp.where(path == on_path, 0.0, 1e3 * contact.base_pitch)
     return Contacts(
         jnp.where(path < contact.start, before.mate_roll_length, contact.pinion_roll_length(on_path)),
         jnp.where(path > contact.end, after.mate_roll_length, contact.wheel_roll_length(on_path)),
-        before.gap + after.gap,
+        before.gap + after.gap + apart,
         1 - 0.5e-3 * (before.slope + after.slope),
     )
 

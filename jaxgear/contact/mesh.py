@@ -238,13 +238,14 @@ def _arrays_of(
     plane = contact_plane(compliance.plane)
     moving = kinematics(pair, first_phase, resolution, plane)
     contact = moving.path_of_contact
-    points = contacts(pair, contact, moving.path)
+    points = contacts(pair, contact, moving.path, resolution.extended_contact)
     outlines = on_both(outline, pair.pinion, pair.wheel)
     rolls = points.pinion_roll_length, points.wheel_roll_length
     pinion, wheel = on_both(lambda given: tooth_load(*given), *zip(outlines, rolls))
     geometry = contact_geometry(pinion, wheel, plane, pair.face_width)
     base_pitch = contact.base_pitch
-    outer = contacts(pair, contact, jnp.stack([moving.path[-1] - base_pitch, moving.path[0] + base_pitch]))
+    beyond = jnp.stack([moving.path[-1] - base_pitch, moving.path[0] + base_pitch])
+    outer = contacts(pair, contact, beyond, resolution.extended_contact)
     spreading = spreading_of(pair, outlines, resolution, even)
     structures = spreading.shares[:, None, None, None] * compliance.structure(pinion, wheel)
     hubs = compliance.hub(pinion, wheel)

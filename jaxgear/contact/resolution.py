@@ -41,6 +41,9 @@ class Resolution(Checked):
         slice_widths: relative widths of the slices as whole numbers, from the negative end of the face to the positive
             one; None for slices of equal width. What changes over a short piece of the face takes narrow slices there,
             see `end_relief_widths`.
+        extended_contact: whether pairs touch with their tip corners beyond the path of contact too, as those of loaded
+            gears do; without it every pair takes load from the start of the path to its end alone, as in many published
+            models, and the transmission error jumps there.
     """
 
     positions: int = count(low=4, default=64)
@@ -57,6 +60,7 @@ class Resolution(Checked):
     slice_widths: tuple[int, ...] | None = number(
         "", low=1, high=_MOST_PARTS, whole=True, static=True, shape=("slices",), optional=True, default=None
     )
+    extended_contact: bool = eqx.field(static=True, default=True)
 
     def check_together(self) -> None:
         if self.slide_steps and self.patch_nodes < _SLIDING_NODES:
@@ -119,7 +123,8 @@ class Resolution(Checked):
     @property
     def of_arrays(self) -> "Resolution":
         """What the arrays of a prepared mesh depend on, all else at its default: one program makes them for many."""
-        plain = Resolution(self.positions, self.slices, self.pairs, slice_widths=self.parts)
+        sizes = self.positions, self.slices, self.pairs
+        plain = Resolution(*sizes, slice_widths=self.parts, extended_contact=self.extended_contact)
         if self.slices == 1:
             return plain
         modes = self.face_modes if self.coupled_slices else plain.face_modes

@@ -70,4 +70,5 @@ def worn(line_load: Load, coefficient: Any, place: Deposit) -> Float[Array, "gea
         place: where contacts wear the flanks.
     """
     worn = jnp.broadcast_to(UM_PER_LOAD * coefficient * line_load[None], (2, *line_load.shape))
-    return jnp.einsum("gkxij,gisj->gksx", place.spread, worn) / place.arc[:, None, None]
+    left = place.shares(line_load)[:, None] * worn[None]
+    return jnp.einsum("ugkxij,ugisj->gksx", place.spreads, left) / place.arc[:, None, None]

@@ -11,11 +11,16 @@ with the weight of the Hertzian pressure, as the contact in turn meets the flank
 the flank, so that the volume of the depth is the worn volume to rounding, and equal pieces of sliding leave no ripple
 of the positions.
 
-The width of the contact is that of one pair that carries the full load, as for the modifications themselves
-(`removed_material`). That the contact slides down a slope, by less than half that width on usual reliefs, is left out.
+A contact is as wide as its own load makes it, up to the full load of one pair: its wear is a mixture of those over a
+few shares of that width, by Bernstein polynomials, which are smooth and keep the mean width. What would lie beyond an
+end of the flank is folded back, so that an even load wears evenly up to the end. That the contact slides down a slope,
+by less than half its width on usual reliefs, is left out.
 """
 
+from math import comb
+
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -23,13 +28,16 @@ from jaxtyping import Array, Float
 from ..contact import Mesh
 from ..contact.kinematics import contacts
 from ..contact.patch import patch_nodes, place_of
-from ..numerics import program
+from ..numerics import program, safe_divide, safe_sqrt
 
 Scalar = Float[Array, ""]
 Field = Float[Array, "pairs positions"]
 
 # Places along the piece of a position. On a grid coarser than a step the depth changes by 1e-4 with twice as many.
 _PLACES = 8
+
+# widths from none to that of the full load, evenly spaced, over which it is known where contacts leave their wear
+_WIDTHS = 4
 
 # of the worn material: from contact on the flanks, and of tip corners on the mate's flank
 PARTS = "flank", "corner"
@@ -42,13 +50,21 @@ class Deposit(eqx.Module):
         roll_length: of the grid points, from the start of the active profile to the tip [mm], shape (gears, points).
         arc: of the flank that belongs to every point [mm], shape (gears, points).
         sliding: of every position, on the flank and of tip corners [mm], shape (parts, pairs, positions).
-        spread: sliding by the points where it leaves its wear [mm], shape (gears, parts, points, pairs, positions).
+        spreads: sliding by the points where contacts leave their wear [mm], from those without width to those of the
+            full load, shape (widths, gears, parts, points, pairs, positions).
+        full_load: line load of one pair that carries all [N/mm].
     """
 
     roll_length: Float[Array, "gears points"]
     arc: Float[Array, "gears points"]
     sliding: Float[Array, "parts pairs positions"]
-    spread: Float[Array, "gears parts points pairs positions"]
+    spreads: Float[Array, "widths gears parts points pairs positions"]
+    full_load: Scalar
+
+    def shares(self, line_load: Float[Array, "*contacts"]) -> Float[Array, "widths *contacts"]:
+        """What each of the `spreads` counts for in contacts under line loads [N/mm], as wide as the root of these."""
+        width, most = safe_sqrt(jnp.minimum(safe_divide(line_load, self.full_load), 1.0)), _WIDTHS - 1
+        return jnp.stack([comb(most, i) * width**i * (1 - width) ** (most - i) for i in range(_WIDTHS)])
 
 
 def grid(mesh: Mesh, points: int) -> Float[Array, "gears points"]:
@@ -78,12 +94,18 @@ def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
     rolls = at.pinion_roll_length, at.wheel_roll_length
     half_width = place_of(mesh, torque).half_width[:, 0, :, None]
     lengths = grid(mesh, points)
-    made = [
-        _spread(roll, half_width, sliding, knots, side.base_radius, mesh.resolution.patch_nodes)
-        for roll, side, knots in zip(rolls, mesh.sides, lengths)
-    ]
+
+    def over(width) -> Float[Array, "gears parts points pairs positions"]:
+        made = [
+            _spread(roll, width * half_width, sliding, knots, side.base_radius, mesh.resolution.patch_nodes)
+            for roll, side, knots in zip(rolls, mesh.sides, lengths)
+        ]
+        return jnp.stack(made)
+
+    spreads = jax.lax.map(over, jnp.linspace(0.0, 1.0, _WIDTHS, dtype=dtype))
     arc = jnp.stack([arcs(knots, side.base_radius) for knots, side in zip(lengths, mesh.sides)])
-    return Deposit(lengths, arc, jnp.sum(sliding, axis=-1), jnp.stack(made))
+    full_load = 1e3 * torque / (mesh.pair.pinion.base_radius * mesh.pair.face_width)
+    return Deposit(lengths, arc, jnp.sum(sliding, axis=-1), spreads, full_load)
 
 
 def _sliding(mesh: Mesh, ends: Float[Array, "pairs positions ends"]) -> Float[Array, "parts pairs positions places"]:

@@ -37,9 +37,9 @@ class WearLife(Checked):
             slices, points).
         error: estimate of the error of that depth by the length of the blocks, largest of all points [um], shape
             (lives,); NaN where that of two blocks is not known.
-        pressure_error: estimate of the error of the largest flank pressure by the grid and by the width over which wear
-            is spread [MPa], shape (lives,), (lives, torques) under a load spectrum; zero on new flanks, NaN on flanks
-            that are not known. It is not part of `error`, which is that of the blocks alone.
+        pressure_error: estimate of the error of the largest flank pressure by the grid and by the width over which
+            contacts average the worn flanks [MPa], shape (lives,), (lives, torques) under a load spectrum; zero on new
+            flanks, NaN on flanks that are not known. It is not part of `error`, which is that of the blocks alone.
         known: whether all contacts that have worn these flanks were found, also within blocks, and something is left of
             the teeth, shape (lives,).
         cycles: the mesh on these flanks, leading axis (lives,); (lives, torques) under a load spectrum. None has
