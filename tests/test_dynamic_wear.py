@@ -224,6 +224,7 @@ def test_flanks_whose_coast_side_touches_are_not_known(natural):
     assert np.isnan(wear_depth(life)[-1]) and np.isnan(over_life(life, "ppte")[-1])
 
 
+@pytest.mark.slow
 def test_steps_on_the_host_are_the_blocks(mesh, natural, resonant):
     made_of = []
 

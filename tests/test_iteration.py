@@ -129,7 +129,7 @@ def test_a_relief_to_start_from_also_softens_the_entry(nominal, relieved):
 @pytest.fixture(scope="module")
 def slanted(mesh):
     """Within 2 GPa, what the study allows: the height at the tip is left to the pressure."""
-    return jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=12.0, max_pressure=2000.0)
+    return jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=12.0, max_pressure=2000.0, positions=None)
 
 
 def test_a_relief_that_rises_to_the_tip_is_as_level_and_keeps_the_tip_edges_out(mesh, nominal, slanted):

@@ -210,7 +210,7 @@ def test_other_oils_and_strengths_are_other_numbers_of_one_program(load, monkeyp
         design = load(PAIR + OIL.replace("80.0", temperature) + STRENGTH.replace("900.0", f"9{temperature}"))
         further = tuple(quantities_of_tables(design))
         tables = {"lubricant": design.lubricant, "strength": design.strength}
-        found = numbers(cycle, tuple(quantity.name for quantity in further), tables)
+        found, _ = numbers(cycle, tuple(quantity.name for quantity in further), tables)
         each = eqx.filter_jit(lambda cycle, of=further: {quantity.key: quantity(cycle) for quantity in of})(cycle)
         expected = {name: float(value) for name, value in each.items()}
         assert {name: float(value) for name, value in found.items()} == pytest.approx(expected, rel=1e-9)

@@ -159,6 +159,7 @@ def batch():
     return {name: np.asarray(part) for name, part in found.items()}
 
 
+@pytest.mark.slow
 def test_a_batch_keeps_its_good_members(batch):
     """Load, damage and bearing forces of shafts that cannot be are NaN beside those that can."""
     assert (batch["factors"][GOOD, 0] > 1.1).all() and np.isfinite(batch["loads"][GOOD]).all()
@@ -174,6 +175,7 @@ def test_a_batch_keeps_its_good_members(batch):
     assert np.isnan(batch["pitting"][BAD_SHAFTS, :, 1]).all() and (batch["pitting"][GOOD, :, 1] > 0).all()
 
 
+@pytest.mark.slow
 def test_gears_that_cannot_run_carry_no_load_whatever_holds_them(batch):
     """Not converged, as in the contact, and NaN: rigid, by a table, and on shafts."""
     np.testing.assert_array_equal(batch["valid"], np.arange(7) < 5)

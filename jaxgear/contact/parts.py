@@ -12,7 +12,12 @@ from .mesh import Mesh, prepare_from
 
 def half_way(mesh: Mesh) -> Mesh:
     """The same mesh half a position later: both together have twice the positions."""
-    first = np.asarray(mesh.kinematics.first_phase) + 0.5 / mesh.resolution.positions
+    return later(mesh, 0.5)
+
+
+def later(mesh: Mesh, share: float) -> Mesh:
+    """The same mesh a share of a position later."""
+    first = np.asarray(mesh.kinematics.first_phase) + share / mesh.resolution.positions
     moved = prepare_from(first, mesh.pair, mesh.compliance, mesh.resolution, mesh.support, mesh.even)
     return replace(moved, automatic=mesh.automatic)
 

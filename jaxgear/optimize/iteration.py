@@ -8,7 +8,7 @@ import numpy as np
 
 from ..conditions import Design
 from ..contact import Mesh
-from ..contact.parts import half_way, parts
+from ..contact.parts import parts
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Callback, check, whole
 from .goal import Constraint
@@ -65,8 +65,8 @@ def iterate_transmission_error(
         rtol: ends the iteration where PPTE is within this part of its lower limit, or has fallen by less than
             this part of itself.
         steps: most steps.
-        positions: of the finer mesh on which the pressure is judged, doubled until its limit is kept at twice as many,
-            too; None for those of `mesh`, on which all else is evaluated.
+        positions: of the finer mesh on which the pressure is judged, doubled until its limit is kept at four times as
+            many, too; None for those of `mesh`, on which all else is evaluated.
         callback: called as callback(step, steps, best PPTE).
 
     Returns:
@@ -92,7 +92,7 @@ def iterate_transmission_error(
         flanks = Flanks(mesh, *given, float(max_relief))
         pressure = Pressure(limit, torque, parts(finer, mesh.resolution.positions))
         found = levelled(mesh, flanks, pressure, rtol, steps, spent, callback)
-        return found, between and pressure.holds_between(found, half_way(finer))
+        return found, between and pressure.holds_between(found, finer)
 
     if limit is None or positions is None:
         found, _ = end_on(mesh, between=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..conditions import solve_case, solved
 from ..contact import Mesh, MeshCycle
-from ..contact.parts import parts
+from ..contact.parts import later, parts
 from ..metrics import max_relief as largest_relief
 from ..microgeometry import AbstractModification
 from ..numerics import Callback
@@ -69,10 +69,11 @@ class Pressure:
         """The excess that counts."""
         return float(counted(self.excess(pressure)))
 
-    def holds_between(self, found: Levelled, half_way: Mesh) -> bool:
-        """Whether the result keeps the limit half way between the positions as well."""
+    def holds_between(self, found: Levelled, mesh: Mesh) -> bool:
+        """Whether the result keeps the limit at four times the positions of the mesh as well."""
         best, pressure = found.iterates[found.best], found.pressures[found.best]
-        between = replace(self, meshes=parts(half_way, self.meshes[0].resolution.positions))
+        count = self.meshes[0].resolution.positions
+        between = replace(self, meshes=[part for number in (1, 2, 3) for part in parts(later(mesh, number / 4), count)])
         finer = max(between.largest(best.pinion, best.wheel, None), pressure)
         nothing = np.empty((1, 0))  # its PPTE is that of the mesh of the iteration
         return fine_enough(nothing, np.asarray([self.excess(pressure)]), nothing, np.asarray([self.excess(finer)]))

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 
 from ..conditions.batches import padded
-from ..contact.parts import half_way, parts
+from ..contact.parts import later, parts
 from ..numerics import kernel
 from .linearization import Linearization, Pieces
 from .problem import Problem
@@ -33,13 +33,14 @@ class Linearizer:
         """That of the same problem on another mesh, by the same program if there can be one."""
         return Linearizer(problem, self._batch, self._positions)
 
-    def at_twice_the_positions(self) -> "Linearizer | None":
-        """That of the problem on a mesh of twice the positions, by the same program; None where there is none."""
+    def at_more_positions(self, factor: int) -> "Linearizer | None":
+        """That of the problem at so many times the positions, by the same program; None where there is none."""
         if not self.problem.is_made_of_extremes:
             return None
-        twice = Linearizer(self.problem.on(half_way(self.problem.mesh)), self._batch, self._positions)
-        twice._parts = [*self._parts, *twice._parts]
-        return twice
+        between = (later(self.problem.mesh, number / factor) for number in range(1, factor))
+        found = Linearizer(self.problem, self._batch, self._positions)
+        found._parts = [*self._parts, *(part for mesh in between for part in self.on(self.problem.on(mesh))._parts)]
+        return found
 
     def __call__(self, points: np.ndarray) -> list[Linearization]:
         """The linearization at every point."""

@@ -18,7 +18,7 @@ from .linear_model import Model
 from .linearizer import Linearizer
 from .minimax import Search, follow
 from .problem import Problem, make_problem
-from .refine import POSITIONS, at_twice_the_positions, fine_enough, on_finer_meshes
+from .refine import POSITIONS, at_more_positions, fine_enough, on_finer_meshes
 from .result import Front
 from .search import Record
 from .starts import start_points
@@ -81,7 +81,7 @@ class Pareto(Checked):
         follow(linearizer, finer, searches, steps=_POLISH, rtol=_RTOL)
         finer.end(self.points)
         points, values = finer.rows()
-        at_twice = at_twice_the_positions(record, points)
+        at_twice = at_more_positions(record, points)
         return finer, fine_enough(values, np.zeros(len(points)), *at_twice, span=finer.frame()[1])
 
 

@@ -56,7 +56,7 @@ def refined(record: Record, polish: Polish, positions: int | None) -> tuple[Reco
         found.check()
         _kept_to_limits(found, polish)
         record, now = found, np.asarray([[found.value]])
-        values, violations = at_twice_the_positions(found, found.point[None])
+        values, violations = at_more_positions(found, found.point[None])
         change = problem.objectives[0].sign * float(values[0, 0] - found.value)
         return (found, change), fine_enough(now, np.asarray([found.violation]), values, violations)
 
@@ -97,18 +97,22 @@ def fine_enough(values, violations, finer_values, finer_violations, span: float 
     return bool(same.all() and ((counted(violations) > 0) | (finer_violations <= FEASIBLE)).all())
 
 
-def at_twice_the_positions(record: Record, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Objectives of designs, shape (designs, objectives), and their violations at twice the positions of a record."""
+def at_more_positions(record: Record, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Objectives of designs at twice the positions of a record, shape (designs, objectives), and their violations.
+
+    Violations are those at four times the positions where the program of the search gives them: a peak between two
+    positions may lie between those of twice as many as well.
+    """
     problem = record.problem
     record.spend(len(points))
-    twice = record.linearizer.at_twice_the_positions() if record.linearizer is not None else None
-    if twice is None:
+    twice, four = (record.linearizer and record.linearizer.at_more_positions(factor) for factor in (2, 4))
+    if twice is None or four is None:
         mesh = _with_positions(problem.mesh, 2 * problem.mesh.resolution.positions)
         found = scores(problem.on(mesh), points)
         return np.asarray(found.value), np.asarray(found.violation)
-    models = [Model(problem, point, of) for point, of in zip(points, twice(points))]
+    models, more = ([Model(problem, point, of) for point, of in zip(points, each(points))] for each in (twice, four))
     values = [[model.value] if len(problem.objectives) == 1 else model.values for model in models]
-    return np.asarray(values), np.asarray([model.violation for model in models])
+    return np.asarray(values), np.asarray([model.violation for model in more])
 
 
 def _kept_to_limits(record: Record, polish: Polish) -> None:

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from ...geometry import Gear, Material
@@ -247,9 +246,8 @@ def _chordal(gear: Gear, limit: float | None) -> float | None:
 
 def _span(gear: Gear, limits: tuple[float | None, float | None]) -> dict[str, tuple[Any, str]]:
     """The base tangent length without an allowance and what its limits [um] make of it; nothing without limits."""
-    zero = jnp.zeros_like(gear.module)
-    found = measures(replace(gear, tooth_thickness_allowance=zero, tooth_thickness_tolerance=zero))
-    if limits[0] is None or not np.isfinite(found.span):
+    bare = None if limits[0] is None else replace(gear, tooth_thickness_allowance=0.0, tooth_thickness_tolerance=0.0)
+    if bare is None or not np.isfinite((found := measures(bare)).span):
         return {}
     cosine = float(np.cos(np.deg2rad(gear.pressure_angle)))
     return {
