@@ -27,6 +27,7 @@ def test_quick_mode_holds_the_recorded_bounds(capsys):
 @pytest.mark.parametrize(
     "model", [NO_CORNERS, pytest.param(models.LEGACY, marks=pytest.mark.slow)], ids=lambda model: model.name
 )
+@pytest.mark.slow
 def test_a_worse_model_fails(capsys, model):
     assert accuracy.main(["--quick", "--cases", "A"], models=(model,)) == 1
     assert "Worse than recorded" in capsys.readouterr().out

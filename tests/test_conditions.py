@@ -58,6 +58,7 @@ def test_every_case_weighs_as_its_torque(mesh, tolerance):
         np.testing.assert_allclose(weights[torques == torque], share / 3, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_one_quantile_in_every_engine(tolerance):
     mesh = constant_stiffness_mesh(gear_pair(), 300.0, LINE)  # of which every program is a small one
     made = {"tolerance": tolerance, "samples": 6, "seed": 3}

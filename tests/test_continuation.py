@@ -120,6 +120,7 @@ def test_the_end_of_the_doubled_branch_is_the_twin_of_the_resonance(resonance, d
     np.testing.assert_allclose(two.orbit.approach_rms, one.orbit.approach_rms, rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_family_over_any_parameter():
     """The load of the dead zone changes with the speed; an unstable orbit lies where one harmonic puts it."""
     moving, speed = dead_zone(jnp.asarray(frequency(0.9)))

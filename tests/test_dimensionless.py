@@ -209,6 +209,7 @@ def test_clearance_that_opens_gives_the_exact_softening_branch():
     assert np.isclose(found.mean, 1.019012, atol=2e-5)
 
 
+@pytest.mark.slow
 def test_gradient_of_the_settled_amplitude():
     clearance = PolynomialClearance.published()
 

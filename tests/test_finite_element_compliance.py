@@ -122,6 +122,7 @@ def test_auto_lies_between_the_planes_by_the_face_width(tabulated, folder):
     np.testing.assert_allclose(mixed.law.secant(LOAD), strain.law.secant(LOAD), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_derivatives_by_what_a_table_scales_with(tabulated):
     """Module, modulus, face width and centre distance."""
     names, steps = ("module", "modulus", "face_width", "distance"), (1e-6, 1.0, 1e-4, 1e-6)
@@ -160,6 +161,7 @@ def test_the_module_has_no_derivative_beside_a_bore_in_millimetres(tabulated, us
         jax.grad(found)(3.0)
 
 
+@pytest.mark.slow
 def test_a_thinner_tooth_is_softer_and_has_a_table_of_its_own(usual, folder):
     """By about as much as beam and ring say, which bend the same outline."""
 

@@ -189,6 +189,7 @@ def test_the_wedge_of_the_tip_that_is_taken_out_is_that_of_the_law():
     np.testing.assert_allclose(softer, 1e3 / 206e3 * _wedge(tooth, rho), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_finer_mesh_changes_nothing():
     coarse, fine = build(shape(25, bore=0.6)), build(shape(25, bore=0.6), 1.5)
     np.testing.assert_allclose(coarse.center, fine.center, rtol=3e-4)

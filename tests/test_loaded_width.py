@@ -121,6 +121,7 @@ def batch(mesh):
     return [np.asarray(part) for part in found]
 
 
+@pytest.mark.slow
 def test_derivatives_go_through_the_first_solution(mesh, batch):
     """Central differences of the whole chain."""
     point = AMOUNT, TORQUE

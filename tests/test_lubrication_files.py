@@ -196,6 +196,7 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
     assert "micropitting" not in shown
 
 
+@pytest.mark.slow
 def test_other_oils_and_strengths_are_other_numbers_of_one_program(load, monkeypatch):
     traced = []
     monkeypatch.setattr(study, "summary", lambda cycle: {})

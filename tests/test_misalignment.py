@@ -29,6 +29,7 @@ def sloped(pair):
     return jg.solve(prepare(pair, resolution=SIZES), 50.0, pinion=RELIEF + jg.LeadSlope(AMOUNT), wheel=RELIEF)
 
 
+@pytest.mark.slow
 def test_misalignment_is_the_lead_slope_of_its_amount(pair, sloped):
     """Given over the face, or as f_Sigma_beta and f_Sigma_delta over the bearing span."""
     angle, width = float(pair.working_pressure_angle), float(pair.face_width)

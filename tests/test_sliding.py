@@ -275,6 +275,7 @@ def test_nothing_is_divided_by_zero_on_the_way_to_finite_results(mesh):
         assert error.get() is None and np.isfinite(curve).all()
 
 
+@pytest.mark.slow
 def test_slices_slide_on_their_own(mesh, sliced):
     """A flank that is twisted: every slice is that of a flank of its own profile."""
     roll = np.linspace(3.0, 15.0, 13)  # as many points as of `ROUGH`

@@ -409,6 +409,7 @@ def test_so_many_pairs_last_so_long():
     assert wear_scatter.summary(lives)["manufactured"]["life_to_ppte_revolutions"]["95_percent_last"] == 5.0
 
 
+@pytest.mark.slow
 def test_overlong_blocks_are_a_failure(file, tmp_path):
     """As quantities are no numbers then: flanks that wear ten times as much in two blocks overshoot."""
     text = PAIR + TABLE.replace("1e-18", "1e-17").replace("blocks = 4", "blocks = 2")

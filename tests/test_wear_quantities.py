@@ -170,6 +170,7 @@ def worn_ppte(mesh, design):
 DESIGN = jnp.array([5.0, 2.0, 1.0, 0.5])
 
 
+@pytest.mark.slow
 def test_slopes_of_worn_ppte_are_those_of_differences(mesh):
     @jax.jit
     def with_slopes(design):
