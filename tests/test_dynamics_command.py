@@ -137,7 +137,7 @@ def check_branches(summary, rows):
 @pytest.mark.parametrize(
     "text, message",
     [
-        ("", "dynamics: missing, nothing says at which speeds the pair runs"),
+        ("", "dynamics: missing; it says at which speeds the pair runs"),
         ("[dynamics]\n", "dynamics: needs mesh_frequencies [Hz] or speeds [rpm]"),
         (TABLE + "speeds = [1.0, 2.0]\n", "dynamics: mesh_frequencies and speeds are both given"),
         (TABLE + "damping_ratio = 2.0\n", "dynamics.damping_ratio: 2 must be at least 0 and at most 1"),

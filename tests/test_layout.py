@@ -633,11 +633,11 @@ def test_hours_are_weights_with_a_duration():
         ),
         (
             lambda: longest_life(SUPPORT, jg.LoadSpectrum([0.0]), ENDURANCE),
-            "longest_life: torques are all zero, every flank line lives for ever",
+            "longest_life: torques are all zero; every flank line has an infinite life",
         ),
         (
             lambda: longest_life(SUPPORT, jg.LoadSpectrum.from_hours([0.0, 9.0], [1.0, 0.0], 500.0), ENDURANCE),
-            "longest_life: torques are all zero, every flank line lives for ever",
+            "longest_life: torques are all zero; every flank line has an infinite life",
         ),
         (
             lambda: jg.LoadSpectrum.from_hours([1.0, 2.0], [0.0, 0.0]),

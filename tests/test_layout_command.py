@@ -499,4 +499,4 @@ def test_torques_without_a_load_over_the_face_are_told():
 def test_a_layout_needs_its_table(file, tmp_path):
     text = FILE[: FILE.index("[housing]")]
     done = call("layout", str(file(text)), "--output", str(tmp_path / "out"))
-    assert done.code == 2 and "layout: missing, nothing says which tolerances" in done.err
+    assert done.code == 2 and "layout: missing; it says for which tolerances" in done.err

@@ -122,7 +122,7 @@ def test_tables_bring_the_quantities_that_they_tell_of(load):
         (PAIR + OIL.replace("80.0", "280.0"), "lubricant.temperature: 280 degC must be at least -60 degC and at most"),
         (PAIR + OIL.replace("80.0", "245.0") + "density = 0.9", "density: 0.9 kg/m^3 must be at least 50 kg/m^3"),
         (PAIR + OIL.replace("roughness", "rougness"), 'lubricant.rougness: unknown key, did you mean "roughness"?'),
-        (PAIR + "[strength]", "strength: is empty, nothing says what the gears bear"),
+        (PAIR + "[strength]", "strength: is empty; it gives the permissible stresses"),
         (PAIR + "[strength]\nwheel_bending = 900.0", "strength: bending must be given where wheel_bending is"),
         (PAIR + "[strength]\npitting = 0", "strength.pitting: 0 MPa must be greater than 0 MPa"),
     ],

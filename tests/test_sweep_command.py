@@ -303,7 +303,7 @@ def test_the_example_asks_for_a_million():
 
 def test_a_file_without_a_sweep_or_variables_is_refused(tmp_path):
     (tmp_path / "free.toml").write_text(FREE)
-    assert_refused(sweep(tmp_path / "free.toml"), "free.toml: sweep: missing, nothing says which variants")
+    assert_refused(sweep(tmp_path / "free.toml"), "free.toml: sweep: missing; it says which variants")
     fixed = SWEEP.replace('"height"', "6.5").partition("[variables]")
     (tmp_path / "fixed.toml").write_text(fixed[0] + fixed[2].partition('unit = "um" }')[2])
     assert_refused(sweep(tmp_path / "fixed.toml"), "fixed.toml: sweep: has no effect without [variables]")

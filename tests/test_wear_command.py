@@ -166,7 +166,7 @@ def check_flanks(path, folder, rows):
 @pytest.mark.parametrize(
     "text, message",
     [
-        ("", "wear: missing, nothing says for how long the pair runs and how it wears"),
+        ("", "wear: missing; it says for how long the pair runs and how it wears"),
         ("[wear]\n", "wear.revolutions: missing"),
         (TABLE.replace("2e7", "-1.0"), "wear.revolutions: -1 revolutions must be greater than 0"),
         (TABLE.replace("1e-18", "-1e-18"), "wear.coefficient: -1e-18 m2/N must be at least 0 m2/N"),
@@ -638,7 +638,7 @@ def test_other_files_are_refused_in_one_line(tmp_path):
         read_worn(tmp_path / "none.csv")
     assert "\n" not in str(refused.value)
     (tmp_path / "other.parquet").write_text("a,b\n1,2\n")
-    with pytest.raises(ValueError, match="other.parquet: is no Parquet file: ") as refused:
+    with pytest.raises(ValueError, match="other.parquet: is not a valid Parquet file: ") as refused:
         read_worn(tmp_path / "other.parquet")
     assert "\n" not in str(refused.value)
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")

@@ -41,7 +41,7 @@ class Kept(Generic[_Found]):
     Args:
         folder: where they lie, beside the results; it goes when these are complete.
         codec: of the results.
-        total: how many there will be; None where nobody knows.
+        total: how many there will be; None where it is not known.
     """
 
     def __init__(self, folder: Path, codec: Codec[_Found], total: int | None = None):

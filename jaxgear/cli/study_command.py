@@ -38,9 +38,9 @@ class StudyCommand(Generic[S]):
         verdict: the results in words.
         failures: a line for everything that is not to be trusted; the command fails where there is one.
         assumptions: of the study, for a report.
-        doubts: a line for everything that is not usual; None where nobody looks.
+        doubts: a line for everything that is not usual; None where it is not checked.
         takes_shafts: whether the study is on the shafts of the file at every load.
-        omits: what else of the file is not part of the study and why, "" for nothing; None where nobody looks.
+        omits: what else of the file is not part of the study and why, "" for nothing; None where it is not checked.
     """
 
     name: str

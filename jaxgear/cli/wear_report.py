@@ -184,7 +184,7 @@ def verdict(study: Study) -> Iterator[str]:
     for name, life in study.lives.items():
         error, deepest = float(life.error[-1]), float(wear_depth(life)[-1])
         if np.isfinite(deepest) and not error <= _WORTH_A_WORD * deepest:  # NaN where it could not be told
-            by = f"by {error:.3g} um" if np.isfinite(error) else "by nobody knows how much"
+            by = f"by {error:.3g} um" if np.isfinite(error) else "by an amount that is not estimated"
             yield f"{name}: the depth is uncertain {by}, take more blocks"
 
 

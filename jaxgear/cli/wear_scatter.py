@@ -195,7 +195,7 @@ def _lasts(samples: Samples, name: str, share: float) -> float:
 
 
 def _life(settings: Wear, name: str, value: float) -> str:
-    """Revolutions; beyond what is looked at nobody knows more."""
+    """Revolutions; a lower bound where the life is longer than what is looked at."""
     most = _LIVES[name][1] * float(settings.revolutions)
     return f"> {most:.3g}" if value >= most else f"{value:.3g}"
 

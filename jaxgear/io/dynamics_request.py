@@ -46,7 +46,7 @@ def dynamics_request(design: DesignFile, *, quick: bool = False) -> DynamicsRequ
     with naming(design.path):
         section = design.dynamics
         if section is None:
-            raise DesignFileError("dynamics", "missing, nothing says at which speeds the pair runs")
+            raise DesignFileError("dynamics", "missing; it says at which speeds the pair runs")
         factors = section.torque_factors
         if len(set(factors)) != len(factors):
             raise DesignFileError("dynamics.torque_factors", "must all be different")

@@ -59,7 +59,7 @@ def layout_request(design: DesignFile, *, quick: bool = False) -> LayoutRequest:
     with naming(design.path):
         section, support = design.layout, design.support
         if section is None or support is None:
-            raise DesignFileError("layout", "missing, nothing says which tolerances the flank lines have to bear")
+            raise DesignFileError("layout", "missing; it says for which tolerances the flank lines are designed")
         _check_open(design)
         pair = support.pair
         classes = both_classes(section.quality_class)

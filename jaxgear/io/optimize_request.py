@@ -255,7 +255,7 @@ def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: floa
         return
     looked_at = design.wear.revolutions
     if low > lives[of.name] * looked_at:
-        most = f"{lives[of.name] * looked_at:g}, beyond which nobody looks"
+        most = f"{lives[of.name] * looked_at:g}, the end of the searched range"
         raise DesignFileError(key, f"{low:g} must be at most {most}: wear.revolutions = {looked_at:g}")
 
 

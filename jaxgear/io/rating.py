@@ -79,7 +79,7 @@ def strength_of(table: Tables | None, folder: Path) -> Strength | None:
         return None
     section = _whole("strength", table, StrengthSection, folder)
     if not section.given().keys() - {_FILE}:
-        raise DesignFileError("strength", "is empty, nothing says what the gears bear")
+        raise DesignFileError("strength", "is empty; it gives the permissible stresses")
     return part_of("strength", section, Strength).build({})
 
 

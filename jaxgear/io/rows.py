@@ -30,7 +30,7 @@ def _read_parquet(path: Path) -> Rows:
     except OSError as error:
         raise DesignFileError("", error.strerror or str(error).splitlines()[0]) from None
     except pyarrow.ArrowException as error:
-        raise DesignFileError("", f"is no Parquet file: {str(error).splitlines()[0]}") from None
+        raise DesignFileError("", f"is not a valid Parquet file: {str(error).splitlines()[0]}") from None
     names = [name.strip() for name in table.column_names]
     if not table.num_rows:
         raise DesignFileError("", "holds no points")

@@ -71,7 +71,7 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
 def _request(design: DesignFile, samples: int | None, most: int | None) -> SweepRequest:
     section = design.sweep
     if section is None:
-        raise DesignFileError("sweep", "missing, nothing says which variants to evaluate")
+        raise DesignFileError("sweep", "missing; it says which variants to evaluate")
     if samples is not None:
         if "samples" not in _KEYS[section.sampling]:
             problem = f'"{section.sampling}" takes no number of samples from the command line'

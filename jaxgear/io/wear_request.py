@@ -41,7 +41,7 @@ def wear_request(design: DesignFile, *, quick: bool = False) -> WearRequest:
     with naming(design.path):
         section = design.wear
         if section is None:
-            raise DesignFileError("wear", "missing, nothing says for how long the pair runs and how it wears")
+            raise DesignFileError("wear", "missing; it says for how long the pair runs and how it wears")
         settings = _settings(design, vibrates=section.line_load == "dynamic")
         if quick:
             return WearRequest(dataclasses.replace(settings, blocks=_QUICK_BLOCKS), None)

@@ -58,7 +58,7 @@ def longest_life(
         raise ValueError("longest_life: searches with numbers, not inside of a traced function; `damage` can be traced")
     both = endurance if isinstance(endurance, tuple) else (endurance, endurance)
     if not float(jnp.max(jnp.where(load.weights > 0, load.torques, 0.0))) > 0:
-        raise ValueError("longest_life: torques are all zero, every flank line lives for ever")
+        raise ValueError("longest_life: torques are all zero; every flank line has an infinite life")
     faces = under_loads(support, load, stations=stations)
     unmodified = damage(support, load, both, stations=stations)
     missed = np.asarray(load.torques)[~np.asarray(unmodified.converged)]

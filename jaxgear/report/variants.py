@@ -1,4 +1,4 @@
-"""Variants of a sweep as a page to look around in: parallel coordinates, Pareto front and radar, linked."""
+"""Variants of a sweep as an interactive page: parallel coordinates, Pareto front and radar, linked."""
 
 import json
 from collections.abc import Mapping, Sequence
