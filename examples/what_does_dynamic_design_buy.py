@@ -47,7 +47,7 @@ def prepare() -> jg.Mesh:
     )
     pair = jg.GearPair(gear, gear, center_distance=150.0)
     # two-dimensional, as the finite elements of the study; a fixed number of pairs serves every design of a search
-    resolution = jg.Resolution(positions=64, pairs=2)
+    resolution = jg.Resolution(positions=64, pairs=4)
     return jg.prepare(pair, compliance=jg.default_compliance("stress"), resolution=resolution)
 
 
