@@ -51,9 +51,7 @@ LIMITS = {
     "module": Limit(0.05, 100.0, "mm", "ISO 54 lists 1 to 50 mm, fine mechanics goes down to 0.1 mm"),
     "elastic modulus": _of_field(Material, "elastic_modulus"),
     "density": Limit(500.0, 25_000.0, "kg/m^3", "steel 7850 kg/m^3: is it in g/cm^3?"),
-    "bore to root diameter": Limit(
-        0.1, 0.95, "", "a ring held at its bore, outside of the usual proportions"
-    ),
+    "bore to root diameter": Limit(0.1, 0.95, "", "a ring held at its bore, outside of the usual proportions"),
     "face width in modules, plane stress": Limit(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
     "face width in modules": Limit(2.0, 48.0, "", "as compared with finite elements; narrower contacts are softer"),
     "overhang in modules, one slice": Limit(0.0, 1.0, "", "load gathers beside it, which takes Resolution(slices=9)"),
