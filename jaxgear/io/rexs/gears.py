@@ -246,7 +246,8 @@ def _chordal(gear: Gear, limit: float | None) -> float | None:
 
 def _span(gear: Gear, limits: tuple[float | None, float | None]) -> dict[str, tuple[Any, str]]:
     """The base tangent length without an allowance and what its limits [um] make of it; nothing without limits."""
-    bare = None if limits[0] is None else replace(gear, tooth_thickness_allowance=0.0, tooth_thickness_tolerance=0.0)
+    none = real(0.0)
+    bare = None if limits[0] is None else replace(gear, tooth_thickness_allowance=none, tooth_thickness_tolerance=none)
     if bare is None or not np.isfinite((found := measures(bare)).span):
         return {}
     cosine = float(np.cos(np.deg2rad(gear.pressure_angle)))
