@@ -64,7 +64,7 @@ class Quantity:
         """What is reduced, of one cycle, in its own shape.
 
         Raises:
-            ValueError: when it is no number or array, or an array without a reduction.
+            ValueError: when it is neither a number nor an array, or an array without a reduction.
         """
         given = self.of(cycle)
         try:
