@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
 from ..conditions.batches import divided, local_devices, over_devices, padded
-from ..numerics import kernel
+from ..numerics import kernel, quick_jit
 from .batch import side_by_side
 from .oscillator import Oscillator
 from .response import SpeedResponse
@@ -156,7 +156,12 @@ def _ways(runs: Mapping[str, Run]) -> _Ways:
 def _named(found: SpeedResponse, ways: _Ways, axis: int = 0) -> Responses:
     """Responses by the names of their runs, which have an axis of their own."""
 
-    def of(index: int) -> SpeedResponse:
-        return jax.tree.map(lambda part: jax.lax.index_in_dim(part, index, axis, keepdims=False), found)
+    each = _along(found, axis)
+    return {name: replace(one, direction=direction) for one, (name, direction) in zip(each, ways, strict=True)}
 
-    return {name: replace(of(index), direction=direction) for index, (name, direction) in enumerate(ways)}
+
+@quick_jit
+def _along(found: SpeedResponse, axis: int) -> list[SpeedResponse]:
+    """What lies side by side along an axis, one by one."""
+    leaves, structure = jax.tree.flatten(found)
+    return [structure.unflatten(parts) for parts in zip(*(jnp.unstack(leaf, axis=axis) for leaf in leaves))]

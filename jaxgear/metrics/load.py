@@ -1,7 +1,9 @@
 """How the pairs share the load and over which part of the path they carry it."""
 
 from dataclasses import replace
+from functools import partial
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -44,13 +46,13 @@ def effective_contact_ratio(cycle: MeshCycle) -> Scalar:
     the value changes continuously with the design. Above the theoretical contact ratio the teeth meet with their
     corners.
     """
-    return jnp.sum(jnp.mean(_loaded_fraction(cycle), axis=-1))
+    return jnp.sum(jnp.mean(_loaded_fraction(cycle.opening), axis=-1))
 
 
 @over_batch
 def contact_shock(cycle: MeshCycle) -> ContactShock:
     """Loaded path beyond its theoretical ends and the largest corner force there."""
-    kinematics, fraction = cycle.kinematics, _loaded_fraction(cycle)
+    kinematics, fraction = cycle.kinematics, _loaded_fraction(cycle.opening)
     contact, path = kinematics.path_of_contact, kinematics.path
     step = contact.base_pitch / kinematics.resolution.positions
     # Every step [path, path + step] counts with its loaded length minus the part of it that lies on the theoretical
@@ -69,9 +71,10 @@ def corner_force(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
     return jnp.where(cycle.kinematics.outside > 0, cycle.pair_force, 0.0)
 
 
-def _loaded_fraction(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
+@partial(jax.jit, inline=True)
+def _loaded_fraction(opening: Float[Array, "pairs slices positions"]) -> Float[Array, "pairs positions"]:
     """Loaded part of every step from one position to the next, per pair."""
-    depth = -minimum(cycle.opening, axis=1)
+    depth = -minimum(opening, axis=1)
     # after the last position every pair takes the place of its predecessor
     arriving = jnp.concatenate([depth[:1, :1] * 0 - jnp.abs(depth[:1, -1:]), depth[:-1, :1]])
     following = jnp.concatenate([depth[:, 1:], arriving], axis=1)

@@ -1,5 +1,8 @@
 """Variation of a transmission error curve over one base pitch."""
 
+from functools import partial
+
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -46,6 +49,12 @@ def harmonics(curve: Curve, count: int = 5) -> Harmonics:
     positions = curve.shape[-1]
     if not 1 <= count < positions / 2:
         raise ValueError(f"harmonics: count = {count} must be at least 1 and less than half of {positions} positions")
+    return Harmonics(*_amplitudes_and_phases(curve, count))
+
+
+@partial(jax.jit, static_argnums=1, inline=True)
+def _amplitudes_and_phases(curve, count):
+    positions = curve.shape[-1]
     order = jnp.arange(1, count + 1, dtype=curve.dtype)
     angle = 2 * jnp.pi / positions * jnp.arange(positions, dtype=curve.dtype)[:, None] * order[None]
     real = 2 / positions * (curve @ jnp.cos(angle))
@@ -54,4 +63,4 @@ def harmonics(curve: Curve, count: int = 5) -> Harmonics:
     present = squared > 0
     amplitude = jnp.where(present, jnp.sqrt(jnp.where(present, squared, 1.0)), 0.0)
     phase = jnp.where(present, jnp.arctan2(jnp.where(present, imaginary, 0.0), jnp.where(present, real, 1.0)), 0.0)
-    return Harmonics(amplitude, jnp.rad2deg(phase))
+    return amplitude, jnp.rad2deg(phase)

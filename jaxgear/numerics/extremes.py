@@ -17,6 +17,7 @@ _MOST_PLACES = 1 << 16  # leaves 36 bits of the mantissa, ten digits
 Axes = int | tuple[int, ...] | None
 
 
+@partial(jax.jit, static_argnames="axis", inline=True)
 def maximum(x: Float[Array, "..."], axis: Axes = None) -> Float[Array, "..."]:
     """Largest entry along axes; its derivative is that of the first of several equal entries.
 
@@ -29,11 +30,13 @@ def maximum(x: Float[Array, "..."], axis: Axes = None) -> Float[Array, "..."]:
     return _largest(*_together(x, axis))
 
 
+@partial(jax.jit, static_argnames="axis", inline=True)
 def minimum(x: Float[Array, "..."], axis: Axes = None) -> Float[Array, "..."]:
     """Smallest entry along axes, otherwise as `maximum`."""
     return -maximum(-x, axis)
 
 
+@partial(jax.jit, static_argnames="axis", inline=True)
 def spread(x: Float[Array, "..."], axis: Axes = None) -> Float[Array, "..."]:
     """Largest minus smallest entry along axes, otherwise as `maximum`; zero derivative where all entries are equal."""
     return maximum(x, axis) - minimum(x, axis)

@@ -11,6 +11,7 @@ from jax.scipy.special import betainc
 from jaxtyping import Array, Float
 
 from .fields import Checked, number
+from .quick import quick_jit
 
 Scalar = Float[Array, ""]
 Values = Float[Array, " values"]
@@ -28,6 +29,7 @@ class AbstractMeasure(Checked):
             count: effective number of values.
         """
 
+    @quick_jit
     def shares(self, values: Values, weights: Values) -> Values:
         """What every value contributes to the result, in the order of the values; they sum to 1."""
         order = jnp.argsort(values)
@@ -40,6 +42,7 @@ class AbstractMeasure(Checked):
         carried = jnp.where(weights[order] > 0, jnp.diff(self.spread(edges, count)), 0.0)
         return jnp.zeros_like(values).at[order].set(carried)
 
+    @quick_jit
     def __call__(self, values: Values, weights: Values) -> Scalar:
         """The number. Values that are not finite count where they carry a share."""
         shares = self.shares(values, weights)

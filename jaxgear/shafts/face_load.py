@@ -5,7 +5,10 @@ References:
     in which U. Kissling uses it for the first two steps of a layout of modifications; clause 7 for K_Fbeta.
 """
 
+from functools import partial
+
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
@@ -63,7 +66,11 @@ def face_load_factor(line_load: Float[Array, "... slices"], slice_width: Slices 
     load = real(line_load)
     check("face_load_factor", "slice_width", slice_width, "mm", low=0.0, open_low=True)
     given = jnp.ones_like(load[..., :1]) if slice_width is None else real(slice_width)
-    width = jnp.expand_dims(given, range(load.ndim - given.ndim))
+    return _largest_over_mean(load, given)
+
+
+@partial(jax.jit, inline=True)
+def _largest_over_mean(load, width):
     width = jnp.broadcast_to(width, load.shape)
     mean = jnp.sum(load * width, axis=-1) / jnp.sum(width, axis=-1)
     idle = mean <= 0  # loads that have not been found are not idle: they stay NaN
