@@ -164,4 +164,4 @@ def _named(found: SpeedResponse, ways: _Ways, axis: int = 0) -> Responses:
 def _along(found: SpeedResponse, axis: int) -> list[SpeedResponse]:
     """What lies side by side along an axis, one by one."""
     leaves, structure = jax.tree.flatten(found)
-    return [structure.unflatten(parts) for parts in zip(*(jnp.unstack(leaf, axis=axis) for leaf in leaves))]
+    return [jax.tree.unflatten(structure, parts) for parts in zip(*(jnp.unstack(leaf, axis=axis) for leaf in leaves))]
