@@ -116,14 +116,14 @@ def test_a_problem_is_linearized_on_the_parts(fine, coarse, whole):
 
 
 def test_at_twice_the_positions_a_problem_is_that_of_the_finer_mesh(coarse, whole):
-    twice = coarse.at_more_positions(2)(POINT)[0]
+    twice = coarse.at_more_positions(POINT)[0][0]
     for found, expected in zip((*twice.objectives, *twice.limits), (*whole.objectives, *whole.limits)):
         np.testing.assert_allclose(found.value, expected.value, rtol=1e-9)
 
 
 @pytest.mark.slow
 def test_at_twice_the_positions_of_parts_a_problem_is_that_of_the_finer_mesh(fine, coarse):
-    twice = coarse.on(problem_on(fine)).at_more_positions(2)(POINT)[0]
+    twice = coarse.on(problem_on(fine)).at_more_positions(POINT)[0][0]
     expected = problem_on(mesh_of(2 * COUNT * COARSE)).score(jnp.asarray(POINT[0]))
     assert float(twice.objectives[0].value[0]) == pytest.approx(float(expected.value[0]), rel=1e-9)
 
@@ -142,4 +142,4 @@ def test_the_finer_search_compiles_nothing(fine, coarse):
 def test_a_mean_is_not_made_of_extremes(fine, coarse):
     posed = problem_on(fine, objective="effective_contact_ratio")
     assert not posed.is_made_of_extremes
-    assert coarse.on(posed).at_more_positions(2) is None
+    assert coarse.on(posed).at_more_positions(POINT) is None

@@ -1,6 +1,7 @@
 """Linearizations of a problem at many points, by a program that is compiled once."""
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from ..conditions.batches import padded
@@ -33,24 +34,31 @@ class Linearizer:
         """That of the same problem on another mesh, by the same program if there can be one."""
         return Linearizer(problem, self._batch, self._positions)
 
-    def at_more_positions(self, factor: int) -> "Linearizer | None":
-        """That of the problem at so many times the positions, by the same program; None where there is none."""
-        if not self.problem.is_made_of_extremes:
-            return None
-        between = (later(self.problem.mesh, number / factor) for number in range(1, factor))
-        found = Linearizer(self.problem, self._batch, self._positions)
-        found._parts = [*self._parts, *(part for mesh in between for part in self.on(self.problem.on(mesh))._parts)]
-        return found
-
     def __call__(self, points: np.ndarray) -> list[Linearization]:
         """The linearization at every point."""
+        return [_joined(each) for each in self._at_parts(points)]
+
+    def at_more_positions(self, points: np.ndarray) -> list[tuple[Linearization, Linearization]] | None:
+        """Linearizations at two and at four times the positions, by the same program; None where there is none."""
+        if not self.problem.is_made_of_extremes:
+            return None
+        half, *quarters = (self.on(self.problem.on(later(self.problem.mesh, share))) for share in (0.5, 0.25, 0.75))
+        twice = zip(self._at_parts(points), half._at_parts(points))
+        between = zip(*(each._at_parts(points) for each in quarters))
+        return [
+            (_joined([*own, *other]), _joined([*own, *other, *first, *last]))
+            for (own, other), (first, last) in zip(twice, between)
+        ]
+
+    def _at_parts(self, points: np.ndarray) -> list[list[Linearization]]:
+        """At every point, the linearizations on each of the meshes."""
         found = []
         for part in self._parts:
-            batch = _linearizations(part, real_points(part, padded(points, self._batch)))
-            leaves, tree = jax.tree.flatten(batch)
+            rows = _linearizations(part, real_points(part, padded(points, self._batch)), np.asarray(len(points)))
+            leaves, tree = jax.tree.flatten(rows)
             found.append(([np.asarray(leaf) for leaf in leaves], tree))
         return [
-            _joined([jax.tree.unflatten(tree, [leaf[row] for leaf in leaves]) for leaves, tree in found])
+            [jax.tree.unflatten(tree, [leaf[row] for leaf in leaves]) for leaves, tree in found]
             for row in range(len(points))
         ]
 
@@ -69,8 +77,18 @@ def _together(each: tuple[Pieces, ...]) -> Pieces:
 
 
 @kernel
-def _linearizations(problem: Problem, points) -> Linearization:
+def _linearizations(problem: Problem, points, count) -> Linearization:
+    """At the first `count` points; what stands in the other rows means nothing."""
+    if jax.default_backend() != "cpu":  # an accelerator needs all of them to be busy
+        return jax.vmap(problem.linearize)(points)
     # one point after the other: as quick on a processor, whose cores a single analysis keeps busy, and compiled in half
-    # the time; an accelerator needs all of them to be busy
-    batch = None if jax.default_backend() == "cpu" else len(points)
-    return jax.lax.map(problem.linearize, points, batch_size=batch)
+    # the time; jit has it traced once for both its shapes and the loop
+    linearize = jax.jit(lambda point: problem.linearize(point), inline=True)  # a method of tracers has no hash
+    nothing = jax.tree.map(
+        lambda leaf: jnp.zeros((len(points), *leaf.shape), leaf.dtype), jax.eval_shape(linearize, points[0])
+    )
+
+    def with_row(row, found):
+        return jax.tree.map(lambda rows, one: rows.at[row].set(one), found, linearize(points[row]))
+
+    return jax.lax.fori_loop(0, count, with_row, nothing)

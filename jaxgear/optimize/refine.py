@@ -105,14 +105,14 @@ def at_more_positions(record: Record, points: np.ndarray) -> tuple[np.ndarray, n
     """
     problem = record.problem
     record.spend(len(points))
-    twice, four = (record.linearizer and record.linearizer.at_more_positions(factor) for factor in (2, 4))
-    if twice is None or four is None:
+    finer = record.linearizer and record.linearizer.at_more_positions(points)
+    if not finer:
         mesh = _with_positions(problem.mesh, 2 * problem.mesh.resolution.positions)
         found = scores(problem.on(mesh), points)
         return np.asarray(found.value), np.asarray(found.violation)
-    models, more = ([Model(problem, point, of) for point, of in zip(points, each(points))] for each in (twice, four))
-    values = [[model.value] if len(problem.objectives) == 1 else model.values for model in models]
-    return np.asarray(values), np.asarray([model.violation for model in more])
+    models = [[Model(problem, point, of) for of in both] for point, both in zip(points, finer)]
+    values = [[twice.value] if len(problem.objectives) == 1 else twice.values for twice, _ in models]
+    return np.asarray(values), np.asarray([four.violation for _, four in models])
 
 
 def _kept_to_limits(record: Record, polish: Polish) -> None:
