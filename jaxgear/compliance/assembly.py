@@ -1,13 +1,13 @@
 """Composition of tooth, body and contact models into the compliance of a mesh."""
 
 from abc import abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry import GearPair
+from ..geometry import GearPair, Outline
 from ..numerics import AbstractSpring, on_both
 from .beam import AbstractTooth, Beam
 from .body import AbstractBody, ElasticRing, Sainsot
@@ -33,6 +33,17 @@ class AbstractCompliance(eqx.Module):
 
     plane: eqx.AbstractVar[PlaneState]
     averages_over_loaded_width: ClassVar[bool] = False
+
+    def of_gears(self, pinion: Outline, wheel: Outline, count: int) -> "AbstractCompliance":
+        """The same for these gears alone, with what does not depend on the positions evaluated; the model itself where
+        there is nothing of that kind.
+
+        Args:
+            pinion: outline of the pinion's teeth.
+            wheel: the same of the wheel.
+            count: tooth pairs that are carried along.
+        """
+        return self
 
     @abstractmethod
     def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Structures:
@@ -89,10 +100,19 @@ class Compliance(AbstractCompliance):
     def __check_init__(self):
         check_plane_state(self.plane)
 
+    def of_gears(self, pinion: Outline, wheel: Outline, count: int) -> AbstractCompliance:
+        known = self.body.of_gears(pinion, wheel, count, structure_planes(self.plane))
+        return self if known is None else _OfGears(model=self, known=known, plane=self.plane)
+
     def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Structures:
+        return self.structure_on(pinion, wheel, None)
+
+    def structure_on(self, pinion: ToothLoad, wheel: ToothLoad, known: Any) -> Structures:
+        """`structure` with what `body.of_gears` gives; None where that has not been asked."""
         planes = structure_planes(self.plane)
         shares = on_both(lambda load: plane_stress_share(load.outline, load.outline.gear.face_width), pinion, wheel)
-        bodies = _mixed(shares, self.body.of_both(pinion, wheel, planes))
+        given = (planes,) if known is None else (planes, known)
+        bodies = _mixed(shares, self.body.of_both(pinion, wheel, *given))
         teeth = _mixed(shares, on_both(lambda load: self.tooth.in_planes(load, planes), pinion, wheel))
         own = jnp.eye(teeth.shape[1], dtype=bool)[None, :, :, None]
         return jnp.where(own, bodies + teeth[:, None], bodies)
@@ -105,6 +125,23 @@ class Compliance(AbstractCompliance):
         if not self.edge_softening:
             return law
         return with_edge(law, geometry, pinion, wheel, outside)
+
+
+class _OfGears(AbstractCompliance):
+    """A compliance, and what its body knows of one pair of gears."""
+
+    model: Compliance
+    known: Any
+    plane: PlaneState = eqx.field(static=True)
+
+    def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Structures:
+        return self.model.structure_on(pinion, wheel, self.known)
+
+    def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
+        return self.model.hub(pinion, wheel)
+
+    def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside) -> AbstractSpring:
+        return self.model.law(geometry, pinion, wheel, outside)
 
 
 def with_edge(

@@ -1,6 +1,8 @@
 """Gear-body models: what the root of a loaded tooth, and of its neighbours, gives way."""
 
 from abc import abstractmethod
+from functools import partial
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -15,6 +17,7 @@ from .plane import Plane, check_plane, plane_modulus, plane_poisson
 from .toothload import ToothLoad
 
 Matrices = Float[Array, "planes pairs pairs positions"]
+Arcs = Float[Array, "planes pairs 3 3"]
 
 
 class AbstractBody(Checked):
@@ -31,8 +34,15 @@ class AbstractBody(Checked):
             plane: "stress" or "strain"; what lies between them is put together from both.
         """
 
-    def of_both(self, pinion: ToothLoad, wheel: ToothLoad, planes: tuple[Plane, ...]) -> tuple[Matrices, Matrices]:
-        """`compliance` of driving and driven gear, each in several planes."""
+    def of_gears(self, pinion: Outline, wheel: Outline, count: int, planes: tuple[Plane, ...]) -> Any:
+        """What `of_both` of so many pairs needs that is the same at all positions; None for nothing, and then
+        `of_both` is called without it."""
+        return None
+
+    def of_both(
+        self, pinion: ToothLoad, wheel: ToothLoad, planes: tuple[Plane, ...], known: Any = None
+    ) -> tuple[Matrices, Matrices]:
+        """`compliance` of driving and driven gear, each in several planes; `known` is what `of_gears` has given."""
         first, second = (
             jnp.stack([self.compliance(load, step, plane) for plane in planes])
             for load, step in ((pinion, +1), (wheel, -1))
@@ -58,32 +68,41 @@ class ElasticRing(AbstractBody):
     coupling: bool = eqx.field(static=True, default=True)
     harmonics: int = count(high=100_000, default=400)
 
-    def of_both(self, pinion: ToothLoad, wheel: ToothLoad, planes: tuple[Plane, ...]) -> tuple[Matrices, Matrices]:
-        def of_one(given):
-            load, step = given
-            material = load.outline.gear.material
-            constants = [(plane_modulus(material, plane), plane_poisson(material, plane)) for plane in planes]
-            # one program for all planes: the ring's equations are most of what there is to compile
-            return jax.vmap(lambda *each: self._compliance(load, step, *each))(*map(jnp.stack, zip(*constants)))
+    def of_gears(self, pinion: Outline, wheel: Outline, count: int, planes: tuple[Plane, ...]) -> tuple[Arcs, Arcs]:
+        return on_both(lambda outline: self._arcs(outline, count, planes), pinion, wheel)
 
-        return on_both(of_one, (pinion, +1), (wheel, -1))
+    def of_both(
+        self, pinion: ToothLoad, wheel: ToothLoad, planes: tuple[Plane, ...], known: tuple[Arcs, Arcs] | None = None
+    ) -> tuple[Matrices, Matrices]:
+        if known is None:
+            known = self.of_gears(pinion.outline, wheel.outline, pinion.angle.shape[0], planes)
+
+        def of_one(given):
+            load, step, arcs = given
+            modulus = jnp.stack([plane_modulus(load.outline.gear.material, plane) for plane in planes])
+            return jax.vmap(partial(self._between_teeth, load, step))(modulus, arcs)
+
+        return on_both(of_one, (pinion, +1, known[0]), (wheel, -1, known[1]))
 
     def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
-        material = load.outline.gear.material
-        return self._compliance(load, step, plane_modulus(material, plane), plane_poisson(material, plane))
+        (arcs,) = self._arcs(load.outline, load.angle.shape[0], (plane,))
+        return self._between_teeth(load, step, plane_modulus(load.outline.gear.material, plane), arcs)
 
-    def _compliance(self, load: ToothLoad, step: int, modulus, poisson) -> Float[Array, "pairs pairs positions"]:
-        """`compliance` with the elastic constants of the plane problem."""
+    def _arcs(self, outline: Outline, count: int, planes: tuple[Plane, ...]) -> Arcs:
+        """Between the root arc of a tooth and those of itself and its neighbours, times the plane modulus."""
+        gear, angle = outline.gear, outline.root_half_angle
+        spacing = jnp.arange(count, dtype=angle.dtype) * (2 * jnp.pi / gear.teeth)
+        ratio = gear.root_circle_radius / gear.bore_radius
+        poisson = jnp.stack([plane_poisson(gear.material, plane) for plane in planes])
+        # one program for all planes: the ring's equations are most of what there is to compile
+        return jax.vmap(lambda of: ring.arc_compliance(angle, ratio, of, spacing, self.harmonics))(poisson)
+
+    def _between_teeth(
+        self, load: ToothLoad, step: int, modulus, blocks: Float[Array, "pairs 3 3"]
+    ) -> Float[Array, "pairs pairs positions"]:
+        """`compliance` by what lies between the root arcs."""
         outline, count = load.outline, load.angle.shape[0]
         gear = outline.gear
-        spacing = jnp.arange(count, dtype=load.angle.dtype) * (2 * jnp.pi / gear.teeth)
-        blocks = ring.arc_compliance(
-            outline.root_half_angle,
-            gear.root_circle_radius / gear.bore_radius,
-            poisson,
-            spacing,
-            self.harmonics,
-        )
         arm = (load.height - outline.root_height) / gear.root_circle_radius
         cosine = jnp.cos(load.angle)
         modes = jnp.stack([-arm * cosine, cosine, -jnp.sin(load.angle)], axis=1)  # (pairs, 3, positions)

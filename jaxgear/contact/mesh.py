@@ -12,7 +12,7 @@ from ..compliance import AbstractCompliance, default_compliance
 from ..compliance.hertz import contact_geometry
 from ..compliance.plane import contact_plane
 from ..compliance.toothload import tooth_load
-from ..geometry import GearPair, Margins, PathOfContact, explicit, margins_between, outline
+from ..geometry import GearPair, Margins, PathOfContact, explicit
 from ..microgeometry import Flank
 from ..numerics import AbstractSpring, Coupling, changed, on_both, program
 from ..numerics.programs import begin
@@ -20,6 +20,7 @@ from ..shafts import AbstractSupport
 from .covering import check_cover, closing, pairs_for
 from .face_coupling import check_modes, check_support, coupling_of
 from .face_spreading import ends_together, spreading_of
+from .gears import Gears, gears_of
 from .kinematics import Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution
 
@@ -204,8 +205,10 @@ def prepare_from(
     even: bool,
 ) -> Mesh:
     """The mesh over the base pitch that begins with a mesh position [base pitches]; `even` as of the mesh."""
-    mesh = _arrays_of(first_phase, explicit(pair), compliance, resolution.of_arrays, support, even)
-    return _labelled(mesh, pair, resolution)
+    given = explicit(pair)
+    gears = gears_of(given, compliance, resolution.chosen_pairs)
+    mesh = _arrays_of(first_phase, given, gears, resolution.of_arrays, support, even)
+    return _labelled(mesh, pair, compliance, resolution)
 
 
 def begin_mesh(
@@ -216,30 +219,33 @@ def begin_mesh(
     even: bool,
 ) -> Mesh | None:
     """Starts to compile what `prepare` runs; gives the mesh of shapes that it will make, see `begin`."""
-    made = begin(_arrays_of, np.zeros(()), explicit(pair), compliance, resolution.of_arrays, support, even)
-    return None if made is None else eqx.filter_eval_shape(_labelled, made, pair, resolution)
+    given = explicit(pair)
+    gears = begin(gears_of, given, compliance, resolution.chosen_pairs)
+    made = begin(_arrays_of, np.zeros(()), given, gears, resolution.of_arrays, support, even)
+    return None if made is None else eqx.filter_eval_shape(_labelled, made, pair, compliance, resolution)
 
 
-def _labelled(mesh: Mesh, pair: GearPair, resolution: Resolution) -> Mesh:
+def _labelled(mesh: Mesh, pair: GearPair, compliance: AbstractCompliance, resolution: Resolution) -> Mesh:
     """The mesh with what its program leaves out, so as to serve many."""
-    return changed(mesh, kinematics=changed(mesh.kinematics, pair=pair, resolution=resolution))
+    kinematics = changed(mesh.kinematics, pair=pair, resolution=resolution)
+    return changed(mesh, kinematics=kinematics, compliance=compliance)
 
 
 @program
 def _arrays_of(
     first_phase,
     pair: GearPair,
-    compliance: AbstractCompliance,
+    gears: Gears,
     resolution: Resolution,
     support: AbstractSupport | None,
     even: bool,
 ) -> Mesh:
     """`prepare_from`, for an `explicit` pair and the sizes `of_arrays`."""
+    compliance, outlines = gears.compliance, gears.outlines
     plane = contact_plane(compliance.plane)
     moving = kinematics(pair, first_phase, resolution, plane)
     contact = moving.path_of_contact
     points = contacts(pair, contact, moving.path, resolution.extended_contact)
-    outlines = on_both(outline, pair.pinion, pair.wheel)
     rolls = points.pinion_roll_length, points.wheel_roll_length
     pinion, wheel = on_both(lambda given: tooth_load(*given), *zip(outlines, rolls))
     geometry = contact_geometry(pinion, wheel, plane, pair.face_width)
@@ -257,7 +263,7 @@ def _arrays_of(
         sides=sides(pair, contact, points),
         corner_gap=points.corner_gap,
         lever=points.lever,
-        margins=margins_between(*outlines, contact, pair.center_distance, pair.face_overlap),
+        margins=gears.margins,
         outer_gap=closing(outer),
         outer_lever=outer.lever,
         outer_steps=jnp.stack(
