@@ -11,10 +11,10 @@ from jaxtyping import Array, Bool, Float
 from ..compliance import few_modes
 from ..geometry import GearPair
 from ..numerics import Coupling, Other, concrete
-from ..shafts import AbstractSupport, TabulatedSupport
 from .face_spreading import Spreading
 from .kinematics import Kinematics
 from .resolution import Resolution
+from .support import AbstractSupport
 
 _SAME = 1e-6  # relative difference of numbers that single precision keeps apart
 _SAME_TORQUE = 1e-4
@@ -106,7 +106,8 @@ def check_modes(support: AbstractSupport | None, resolution: Resolution) -> None
     Raises:
         ValueError: where they miss more than a twentieth of the matrix.
     """
-    matrix = concrete(support.matrix) if isinstance(support, TabulatedSupport) else None
+    table = None if support is None else support.tabulated
+    matrix = None if table is None else concrete(table)
     if matrix is None or not matrix.any():
         return
     bends = _polynomials(resolution)

@@ -16,13 +16,13 @@ from ..geometry import GearPair, Margins, PathOfContact, explicit
 from ..microgeometry import Flank
 from ..numerics import AbstractSpring, Coupling, changed, on_both, program
 from ..numerics.programs import begin
-from ..shafts import AbstractSupport
 from .covering import check_cover, closing, pairs_for
 from .face_coupling import check_modes, check_support, coupling_of
 from .face_spreading import ends_together, spreading_of
 from .gears import Gears, gears_of
 from .kinematics import Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution
+from .support import AbstractSupport
 
 Scalar = Float[Array, ""]
 Field = Float[Array, "pairs positions"]

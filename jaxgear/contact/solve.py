@@ -14,7 +14,6 @@ from ..geometry import GearPair, reduced_radius
 from ..microgeometry import AbstractModification, NoModification, terms
 from ..numerics import ContactProblem, concrete, minimum, program, solve_contact, stored, tangent_stiffness
 from ..numerics.programs import begin
-from ..shafts import AbstractSupport
 from .cycle import MeshCycle
 from .face_coupling import check_torque, holds_at
 from .face_spreading import ends_together
@@ -23,6 +22,7 @@ from .mesh import Mesh, begin_mesh, prepare
 from .operation import Operation, operation_of
 from .resolution import Resolution
 from .slide import RemovedMaterial, as_removed, nothing_removed
+from .support import AbstractSupport
 
 _MOST_PAIRS = 12
 

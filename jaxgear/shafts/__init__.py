@@ -6,6 +6,7 @@ shafts with sections, bearings, gears, couplings -> Gearbox with meshes and hous
 -> annex_e(support)                      line load and K_Hbeta with one mesh stiffness along the face
 """
 
+from ..contact.support import AbstractSupport as AbstractSupport
 from .bearing import AbstractBearing as AbstractBearing
 from .bearing import Bearing as Bearing
 from .bearing import MatrixBearing as MatrixBearing
@@ -24,7 +25,6 @@ from .housing_file import read_housing as read_housing
 from .housing_file import write_housing as write_housing
 from .iso_method_c import iso_shaft_deflection as iso_shaft_deflection
 from .iso_method_c import method_c as method_c
-from .mesh_support import AbstractSupport as AbstractSupport
 from .mesh_support import RigidSupport as RigidSupport
 from .mesh_support import ShaftSupport as ShaftSupport
 from .mesh_support import TabulatedSupport as TabulatedSupport

@@ -13,10 +13,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..compliance.iso_6336 import iso_stiffness
+from ..contact.support import AbstractSupport
 from ..geometry import Gear, GearPair, path_of_contact
 from ..microgeometry import AbstractModification, Flank, NoModification
 from ..numerics import Checked, check, maximum, press, program, real, result, whole
-from .mesh_support import AbstractSupport, ShaftSupport, even_coordinates
+from .mesh_support import ShaftSupport, even_coordinates
 
 Scalar = Float[Array, ""]
 Slices = Float[Array, " slices"]

@@ -1,14 +1,13 @@
 """What shafts, bearings and housing do to the gap of a mesh over its face."""
 
-from abc import abstractmethod
-
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..contact.support import AbstractSupport
 from ..geometry import GearPair, margins
-from ..numerics import Checked, concrete, number, program, real, whole, within_limits
+from ..numerics import concrete, number, program, real, whole, within_limits
 from .beam import twist
 from .equilibrium import solve
 from .gearbox import Gearbox
@@ -19,38 +18,6 @@ from .operating_point import system_under_load
 
 Slices = Float[Array, " slices"]
 Scalar = Float[Array, ""]
-
-
-class AbstractSupport(Checked):
-    """How the flanks of a mesh come apart along the line of action, over the face coordinate y."""
-
-    @property
-    @abstractmethod
-    def pair(self) -> GearPair:
-        """The gears of the mesh."""
-
-    @property
-    def torque(self) -> Scalar | None:
-        """On the pinion [N m], where influence and gap belong to one; None where they hold at every torque."""
-        return None
-
-    @property
-    def needs_even_slices(self) -> bool:
-        """Whether it is known over slices of equal width alone."""
-        return False
-
-    @property
-    @abstractmethod
-    def valid(self) -> Bool[Array, ""]:
-        """Whether such a support can be and its gears run: concrete ones are refused else, traced ones flagged."""
-
-    @abstractmethod
-    def influence(self, y: Slices) -> Float[Array, "slices slices"]:
-        """Gap that opens at y[s] under a unit force between the flanks at y[t] [um/N], symmetric, semidefinite."""
-
-    @abstractmethod
-    def gap(self, y: Slices) -> Slices:
-        """Gap by everything else than the force of this mesh [um]."""
 
 
 class RigidSupport(AbstractSupport):
@@ -125,6 +92,11 @@ class TabulatedSupport(AbstractSupport):
     @property
     def needs_even_slices(self) -> bool:
         return True
+
+    @property
+    def tabulated(self) -> Float[Array, "slices slices"]:
+        """`matrix`."""
+        return self.matrix
 
     @property
     def valid(self) -> Bool[Array, ""]:

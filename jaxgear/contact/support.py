@@ -1,0 +1,48 @@
+"""What a contact analysis needs to know of shafts, bearings and housing."""
+
+from abc import abstractmethod
+
+from jaxtyping import Array, Bool, Float
+
+from ..geometry import GearPair
+from ..numerics import Checked
+
+Slices = Float[Array, " slices"]
+Scalar = Float[Array, ""]
+
+
+class AbstractSupport(Checked):
+    """How the flanks of a mesh come apart along the line of action, over the face coordinate y."""
+
+    @property
+    @abstractmethod
+    def pair(self) -> GearPair:
+        """The gears of the mesh."""
+
+    @property
+    def torque(self) -> Scalar | None:
+        """On the pinion [N m], where influence and gap belong to one; None where they hold at every torque."""
+        return None
+
+    @property
+    def needs_even_slices(self) -> bool:
+        """Whether it is known over slices of equal width alone."""
+        return False
+
+    @property
+    def tabulated(self) -> Float[Array, "slices slices"] | None:
+        """Influence [um/N] of any shape over the slices, which modes may fail to follow; None for a smooth one."""
+        return None
+
+    @property
+    @abstractmethod
+    def valid(self) -> Bool[Array, ""]:
+        """Whether such a support can be and its gears run: concrete ones are refused else, traced ones flagged."""
+
+    @abstractmethod
+    def influence(self, y: Slices) -> Float[Array, "slices slices"]:
+        """Gap that opens at y[s] under a unit force between the flanks at y[t] [um/N], symmetric, semidefinite."""
+
+    @abstractmethod
+    def gap(self, y: Slices) -> Slices:
+        """Gap by everything else than the force of this mesh [um]."""
