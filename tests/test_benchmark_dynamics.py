@@ -1,6 +1,6 @@
 """The benchmark of the dynamics: its closed form, its baselines and its judgement."""
 
-import jax.numpy as jnp
+import equinox as eqx
 import numpy as np
 import pytest
 
@@ -23,7 +23,7 @@ STEPS = 128
 
 @pytest.fixture(scope="module")
 def moving():
-    return imagined(positions=32)
+    return eqx.filter_jit(imagined)(positions=32)
 
 
 @pytest.fixture(scope="module")
@@ -73,17 +73,17 @@ def test_the_order_is_the_slope_of_the_errors_above_rounding():
 
 def test_scipy_has_the_force_of_the_map(moving):
     solver = ScipySweep(vibration_of(moving), "DOP853", 1e-9)
-    random = np.random.default_rng(0)
+    random, force = np.random.default_rng(0), eqx.filter_jit(moving.mesh_force)
     # drive flanks, clearance, coast flanks, and beyond the table on both sides
     for phase, q in zip(random.uniform(0, 2, 60), random.uniform(-230, 100, 60)):
-        expected = float(moving.mesh_force(jnp.asarray(phase), jnp.asarray(q)))
+        expected = float(force(phase, q))
         assert solver.force(phase, q) == pytest.approx(expected, rel=1e-12, abs=1e-9)
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 def test_c_has_the_steady_states_of_the_sweep(moving, swept):
     kernel = CSweep(vibration_of(moving), STEPS)
-    rest = [float(moving.mesh_force.static_approach(jnp.asarray(0.0), moving.load[0])), 0.0]
+    rest = [float(eqx.filter_jit(moving.mesh_force.static_approach)(np.zeros(()), np.asarray(moving.load)[0])), 0.0]
     numbers = kernel.sweep(SPEEDS[::-1], [STEPS] * 3, rest, tolerance=1e-12, most_cycles=3000)[::-1]
     assert (numbers[:, 2] > 0).all() and float(swept.approach_min.min()) < -1
     np.testing.assert_allclose(numbers[:, 0], swept.dynamic_factor, rtol=1e-8)

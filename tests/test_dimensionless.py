@@ -1,5 +1,7 @@
 """The dimensionless model: polynomial clearance, relief over the mesh cycle, identification, dynamic modification."""
 
+from functools import partial
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -60,10 +62,15 @@ def test_fit_depends_on_its_range():
     assert np.allclose(PolynomialClearance.fit(7, 2.5).coefficients, [-0.1532, 0.2769, -0.03331, 0.001285], atol=2e-5)
 
 
+@jax.jit
+def polynomial(clearance, x):
+    return jax.vmap(clearance.polynomial)(x)
+
+
 def test_published_polynomial_is_far_from_the_dead_zone_where_it_is_said_to_be():
-    f = PolynomialClearance.published().polynomial
-    assert np.allclose([f(x) for x in jnp.array([1.0, 1.5, 2.0, 3.0])], [0.0929, 0.4739, 1.0022, 2.0236], atol=5e-5)
-    assert np.isclose(PolynomialClearance.published().polynomial(jnp.array(4.0)), 8.0, atol=0.05)
+    values = polynomial(PolynomialClearance.published(), np.array([1.0, 1.5, 2.0, 3.0, 4.0]))
+    assert np.allclose(values[:4], [0.0929, 0.4739, 1.0022, 2.0236], atol=5e-5)
+    assert np.isclose(values[4], 8.0, atol=0.05)
     assert np.isclose(PolynomialClearance.published().false_zero, 0.7701, atol=5e-5)
     assert PolynomialClearance.published(3).false_zero == 0
 
@@ -96,31 +103,40 @@ def test_a_light_load_in_the_false_double_well_is_warned_of():
 
 def test_loaded_mean_of_a_polynomial_is_differentiable():
     clearance = PolynomialClearance.published()
-    x, slope = jax.value_and_grad(clearance.loaded)(jnp.array(0.5))
+    x, slope = jax.jit(jax.value_and_grad(lambda load: clearance.loaded(load)))(0.5)
     assert np.isclose(x, 1.526750, atol=1e-6)
-    assert np.isclose(slope, 1 / clearance.slope(x))
+    assert np.isclose(slope, 1 / eqx.filter_jit(clearance.slope)(jnp.asarray(x)))
 
 
 def relief(amount=0.4, length=0.37, curve=None, **given):
     return CycleRelief(amount, length, 1.37, Linear() if curve is None else curve, **given)
 
 
+@jax.jit
+def at_phases(given, phases):
+    return jax.vmap(given)(phases)
+
+
+@jax.jit
+def of_pairs(given, travels):
+    return jax.vmap(given.of_pair)(travels)
+
+
 def test_linear_relief_from_the_tip_to_single_contact_is_even_in_double_contact():
     """What one pair gains the other loses: C_max / 2; and none in single contact."""
-    c = jax.vmap(relief())(jnp.linspace(0.01, 0.36, 8))
-    assert np.allclose(c, 0.2)
-    assert np.allclose(jax.vmap(relief())(jnp.linspace(0.38, 0.99, 8)), 0.0)
+    assert np.allclose(at_phases(relief(), np.linspace(0.01, 0.36, 8)), 0.2)
+    assert np.allclose(at_phases(relief(), np.linspace(0.38, 0.99, 8)), 0.0)
     # period and begin
-    assert np.isclose(relief(begin=0.3)(jnp.array(1.45)), 0.2)
+    assert np.allclose(at_phases(relief(begin=0.3), np.full(8, 1.45)), 0.2)
     assert np.allclose(relief(begin=-0.185).ends, [0.815, 0.185])
 
 
 def test_relief_of_a_pair_follows_its_curve_from_either_tip():
     curve = relief(curve=Power(1.5))
-    for depth in (0.25, 1.0):
-        from_end = curve.of_pair(jnp.array(1.37 - 0.37 * (1 - depth)))
-        assert np.isclose(from_end, 0.4 * depth**1.5)
-        assert np.isclose(from_end, curve.of_pair(jnp.array(0.37 * (1 - depth))))
+    depths = np.array([0.25, 1.0])
+    travels = np.concatenate([1.37 - 0.37 * (1 - depths), 0.37 * (1 - depths)])
+    from_end, from_begin = np.split(np.asarray(of_pairs(curve, travels)), 2)
+    assert np.allclose(from_end, 0.4 * depths**1.5) and np.allclose(from_end, from_begin)
     with pytest.raises(ValueError, match="CycleRelief: length = 0.7 base pitches must be"):
         relief(length=0.7)
 
@@ -136,19 +152,20 @@ def model_of(clearance=None, **given):
 
 
 def test_first_order_relief_tends_to_the_exact_shift_and_the_printed_sign_does_not():
-    clearance, phase, x = PolynomialClearance.published(), jnp.array(0.1), jnp.array(1.6)
+    clearance, phase, x = PolynomialClearance.published(), 0.1, 1.6
 
+    @partial(jax.jit, static_argnums=0)
     def at(form, amount):
         force = DimensionlessForce(clearance, jnp.array([0.2]), jnp.array([0.3]), relief(amount), form)
-        return force(phase, x)
+        return force(jnp.array(phase), jnp.array(x))
 
     misses = [at("first order", c) - at("exact", c) for c in (0.2, 0.1)]
     assert np.isclose(misses[0] / misses[1], 4, rtol=0.1)
     # the plus sign shifts the other way, by twice C f'
     c = 0.1
     shift = at("first order as printed", c) - at("first order", c)
-    stiffness = 1 + 0.2 * jnp.cos(2 * jnp.pi * phase + 0.3)
-    assert np.isclose(shift, stiffness * 2 * 0.5 * c * clearance.slope(x))
+    stiffness = 1 + 0.2 * np.cos(2 * np.pi * phase + 0.3)
+    assert np.isclose(shift, stiffness * 2 * 0.5 * c * eqx.filter_jit(clearance.slope)(jnp.asarray(x)))
     with pytest.raises(ValueError, match='relief_form = "first order" needs a PolynomialClearance'):
         DimensionlessForce(DeadZone(), jnp.zeros(1), jnp.zeros(1), relief(), "first order")
 
@@ -158,26 +175,27 @@ def test_equation_of_motion_is_that_of_the_study():
     clearance, frequency, t = PolynomialClearance.published(), 0.8, 1.3
     model = model_of(clearance, torque=0.05, torque_angle=0.4, torque_order=2.0, displacement=0.03,
                      displacement_angle=1.1, relief=relief(), relief_form="exact")  # fmt: skip
-    oscillator = model.oscillator()
     phase = frequency * t / (2 * np.pi)
     e, rate = 0.03 * np.cos(frequency * t + 1.1), -0.03 * frequency * np.sin(frequency * t + 1.1)
     x, v = 1.7, 0.2
-    moved, slope = oscillator(
-        jnp.array(t), (jnp.array([x + e]), jnp.array([v + rate])), jnp.array(frequency / (2 * jnp.pi))
+    moved, slope = eqx.filter_jit(lambda model, *given: model.oscillator()(*given))(
+        model, jnp.array(t), (jnp.array([x + e]), jnp.array([v + rate])), jnp.array(frequency / (2 * np.pi))
     )
-    stiffness = 1 + sum(b * np.cos((j + 1) * frequency * t) for j, b in enumerate(model.stiffness_harmonics))
-    inner = stiffness * clearance.polynomial(x - relief()(jnp.array(phase)))
+    harmonics = np.asarray(model.stiffness_harmonics)
+    stiffness = 1 + sum(b * np.cos((j + 1) * frequency * t) for j, b in enumerate(harmonics))
+    taken = at_phases(relief(), np.full(8, phase))
+    inner = stiffness * np.asarray(polynomial(clearance, x - np.asarray(taken)))[0]
     forced = 0.5 + 0.05 * np.cos(2 * frequency * t + 0.4) + 0.03 * frequency**2 * np.cos(frequency * t + 1.1)
     # x'' is q'' - e''
-    assert np.isclose(slope[0] + frequency**2 * e, forced - 2 * 0.05 * v - inner)
-    assert np.isclose(moved[0], v + rate)
+    assert np.allclose(np.asarray(slope) + frequency**2 * e, forced - 2 * 0.05 * v - inner)
+    assert np.allclose(moved, v + rate)
 
 
 @pytest.mark.parametrize("steps", [64, pytest.param(128, marks=pytest.mark.slow)])
 def test_a_relief_jumps_between_two_steps_of_a_sweep(steps):
-    oscillator = model_of(PolynomialClearance.published(), relief=relief(), relief_form="exact").oscillator()
-    ends = np.asarray(cycle_of(oscillator, steps).nodes)[::2]
-    for place in np.asarray(oscillator.mesh_force.relief.ends):
+    model = model_of(PolynomialClearance.published(), relief=relief(), relief_form="exact")
+    ends = np.asarray(eqx.filter_jit(lambda model: cycle_of(model.oscillator(), steps).nodes)(model))[::2]
+    for place in np.asarray(model.mesh_force.relief.ends):
         assert np.abs(ends - place).min() < 1e-12
 
 
@@ -230,7 +248,7 @@ def test_gradient_of_the_settled_amplitude():
 
 def test_nodes_lie_where_the_relief_jumps():
     force = with_relief(model_of(), relief(begin=-0.185)).mesh_force
-    grid = np.asarray(force.nodes(32))
+    grid = np.asarray(eqx.filter_jit(lambda force: force.nodes(32))(force))
     assert len(grid) == 33 and grid[0] == 0 and grid[-1] == 1 and (np.diff(grid) > 0).all()
     assert np.abs(grid[:, None] - np.array([0.815, 0.185])).min(0).max() < 1e-15
 
@@ -243,35 +261,39 @@ def test_largest_relief_of_the_study():
     assert np.isclose(largest_relief(0.5, 0.1, 0.05, 0.8), 0.65 / 0.8)
 
 
+identify = eqx.filter_jit(from_mesh)
+
+
 @pytest.fixture(scope="module")
 def identified():
     cycle = solve(prepare(gear_pair()), 100.0)
-    return cycle, from_mesh(cycle, mass=0.3, damping_ratio=0.05, half_clearance=40.0)
+    return cycle, identify(cycle, mass=0.3, damping_ratio=0.05, half_clearance=40.0)
 
 
 def test_identified_model_has_the_static_transmission_error_of_the_mesh(identified):
     """With all its harmonics: mean and variation, 1 + (error - mean unloaded one) / b."""
     cycle, _ = identified
-    found = from_mesh(cycle, mass=0.3, damping_ratio=0.05, half_clearance=40.0, orders=15)
+    found = identify(cycle, mass=0.3, damping_ratio=0.05, half_clearance=40.0, orders=15)
     model = found.model
-    _, stiffness, _ = jax.vmap(model.mesh_force.at)(cycle.phase)
-    q = 1 + model.load / stiffness
-    turn = 2 * jnp.pi * model.orders[:, None] * cycle.phase[None] + model.displacement_angles[:, None]
-    q = q + jnp.sum(model.displacement[:, None] * jnp.cos(turn), 0)
-    wanted = 1 + (cycle.transmission_error - jnp.mean(cycle.unloaded_transmission_error)) / 40.0
-    assert np.allclose(q, wanted, atol=0.01 * float(jnp.ptp(wanted)))
+    _, stiffness, _ = jax.jit(lambda model, phase: jax.vmap(model.mesh_force.at)(phase))(model, cycle.phase)
+    cycle, model = jax.tree.map(np.asarray, (cycle, model))
+    q = 1 + model.load / np.asarray(stiffness)
+    turn = 2 * np.pi * model.orders[:, None] * cycle.phase[None] + model.displacement_angles[:, None]
+    q = q + np.sum(model.displacement[:, None] * np.cos(turn), 0)
+    wanted = 1 + (cycle.transmission_error - np.mean(cycle.unloaded_transmission_error)) / 40.0
+    assert np.allclose(q, wanted, atol=0.01 * np.ptp(wanted))
 
 
 def test_identification_keeps_units(identified):
     cycle, found = identified
-    mean = float(jnp.mean(secant_stiffness(cycle)))
+    mean = np.mean(secant_stiffness(cycle))
     assert np.isclose(found.mean_stiffness, mean)
     assert np.isclose(found.natural_frequency, np.sqrt(mean * 1e6 / 0.3) / (2 * np.pi))
     assert np.isclose(found.model.load, cycle.force / (40.0 * mean))
     # c = 2 zeta sqrt(m k) in N s/m is 1e6 times that in N s/um
-    damped = from_mesh(cycle, mass=0.3, damping=2 * 0.05 * np.sqrt(0.3 * mean * 1e6) * 1e-6, half_clearance=40.0)
+    damped = identify(cycle, mass=0.3, damping=2 * 0.05 * np.sqrt(0.3 * mean * 1e6) * 1e-6, half_clearance=40.0)
     assert np.isclose(damped.model.damping_ratio, 0.05)
-    tangent = from_mesh(cycle, mass=0.3, damping_ratio=0.05, half_clearance=40.0, stiffness="tangent")
+    tangent = identify(cycle, mass=0.3, damping_ratio=0.05, half_clearance=40.0, stiffness="tangent")
     assert tangent.mean_stiffness > found.mean_stiffness  # the mesh stiffens under load
 
 
@@ -321,15 +343,21 @@ def test_flanks_take_off_what_a_cycle_relief_says():
     flank = tip_relief(cycle, mesh.pair, half)
     assert np.isclose(flank.amount, 6.0) and np.isclose(flank.length, 4.0) and flank.curve.exponent == 1.5
 
-    at = jnp.linspace(path.start, path.end, 41)
-    rolls = path.pinion_roll_length(at), path.wheel_roll_length(at)
-    lost = sum(removed_at(side, flank, roll, jnp.zeros(1))[0] for side, roll in zip(mesh.sides, rolls))
-    assert np.allclose(lost, half * jax.vmap(cycle.of_pair)((at - path.start) / path.base_pitch), atol=1e-9)
+    @jax.jit
+    def lost_at(at):
+        rolls = path.pinion_roll_length(at), path.wheel_roll_length(at)
+        return sum(removed_at(side, flank, roll, jnp.zeros(1))[0] for side, roll in zip(mesh.sides, rolls))
+
+    start, end, pitch = map(float, (path.start, path.end, path.base_pitch))
+    at = np.linspace(start, end, 41)
     # at mesh position 0 a pair touches at the pitch point
-    assert np.isclose(cycle(jnp.array(0.0)), 0.0) and np.isclose(cycle.of_pair(-path.start / path.base_pitch), 0.0)
-    position = 0.5 * (path.inner_single + path.start) / path.base_pitch
-    both = [cycle.of_pair(position - path.start / path.base_pitch + later) for later in (0, 1)]
-    assert np.isclose(cycle(position), 0.5 * sum(both)) and sum(both) > 0
+    position = 0.5 * (float(path.inner_single) + start) / pitch
+    places = np.append(at / pitch, [0.0, position, position + 1]) - start / pitch
+    *of_path, at_pitch_point, first, second = np.asarray(of_pairs(cycle, places))
+    assert np.allclose(lost_at(at), half * np.array(of_path), atol=1e-9)
+    none, both = np.asarray(at_phases(cycle, np.array([0.0, position])))
+    assert np.isclose(none, 0.0) and np.isclose(at_pitch_point, 0.0)
+    assert np.isclose(both, 0.5 * (first + second)) and first + second > 0
 
     with pytest.raises(ValueError, match="tip_relief: contact_ratio = 1.37 of the relief must be that of the pair"):
         tip_relief(relief(), mesh.pair, half)

@@ -1,5 +1,6 @@
 """The finite-element model of a gear: outline, mesh, reciprocity, a closed form, and compliances of another program."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -28,6 +29,12 @@ def bored(teeth, ratio, poisson):
     return shape(teeth, poisson=poisson)._replace(bore_ratio=ratio).rounded()
 
 
+@jax.jit
+def points(drawn, rho, g):
+    curves = drawn.curves.over((5,))
+    return curves.involute(rho), curves.trochoid(g)
+
+
 @pytest.mark.parametrize("teeth, shift", [(9, 0.0), (19, 0.3), (150, 0.0)])
 def test_the_outline_is_that_of_the_geometry(teeth, shift):
     gear = jg.Gear(teeth, 1.0, profile_shift=shift, face_width=5.0)
@@ -37,9 +44,9 @@ def test_the_outline_is_that_of_the_geometry(teeth, shift):
     assert tooth.root_half_angle == pytest.approx(float(drawn.root_half_angle), rel=1e-9)
     rho = np.linspace(tooth.form_roll_length, tooth.tip_roll_length, 5)
     g = np.linspace(tooth.junction, np.pi / 2, 5)
-    curves = drawn.curves.over((5,))
-    np.testing.assert_allclose(tooth.involute(rho), curves.involute(jnp.asarray(rho)), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(tooth.trochoid(g), curves.trochoid(jnp.asarray(g)), rtol=1e-9, atol=1e-9)
+    involute, trochoid = points(drawn, rho, g)
+    np.testing.assert_allclose(tooth.involute(rho), involute, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(tooth.trochoid(g), trochoid, rtol=1e-9, atol=1e-9)
 
 
 SHAPES = {
@@ -179,14 +186,18 @@ def test_the_wedge_of_the_tip_that_is_taken_out_is_that_of_the_law():
     gears = jg.GearPair(*(jg.Gear(z, 1.0, face_width=5.0) for z in (19, 48)))
     tooth = Tooth(shape(19, radius=0.38))
     rho = np.sqrt(tooth.tip_roll_length**2 - 2 * tooth.base * np.array([0.13, 0.2, 0.4]))
-    pinion = tooth_load(outline(gears.pinion), jnp.asarray(rho)[None])
-    wheel = tooth_load(outline(gears.wheel), jnp.full((1, 3), 3.0))
-    geometry = contact_geometry(pinion, wheel, "stress", gears.face_width)
-    flank = jg.compliance.DepthReferenced().prepare(geometry)
-    law = with_edge(flank, geometry, pinion, wheel, jnp.zeros((1, 3)))
-    load = 0.06**2 / geometry.width_factor
-    softer = np.asarray(law.secant(load) - flank.secant(load))[0, 0]
-    np.testing.assert_allclose(softer, 1e3 / 206e3 * _wedge(tooth, rho), rtol=1e-6)
+
+    @jax.jit
+    def softer(gears):
+        pinion = tooth_load(outline(gears.pinion), jnp.asarray(rho)[None])
+        wheel = tooth_load(outline(gears.wheel), jnp.full((1, 3), 3.0))
+        geometry = contact_geometry(pinion, wheel, "stress", gears.face_width)
+        flank = jg.compliance.DepthReferenced().prepare(geometry)
+        law = with_edge(flank, geometry, pinion, wheel, jnp.zeros((1, 3)))
+        load = 0.06**2 / geometry.width_factor
+        return (law.secant(load) - flank.secant(load))[0, 0]
+
+    np.testing.assert_allclose(softer(gears), 1e3 / 206e3 * _wedge(tooth, rho), rtol=1e-6)
 
 
 @pytest.mark.slow

@@ -232,15 +232,20 @@ def random_problem(seed, cases=5, pieces=12, parameters=3, limits=4):
     }
 
 
+@eqx.filter_jit
+def joined(measure, spans, weights):
+    return jax.vmap(measure, (0, None))(spans, weights)
+
+
 def merit(data, measure, steps):
     """What the model predicts after steps (steps, parameters), computed apart from it."""
     pieces = data["values"] + np.einsum("kip,sp->ski", data["slope"], steps)
     spans = np.ptp(pieces, axis=-1)
     if isinstance(measure, jg.Quantile):  # keeps the shares that the cases have at the point
-        shares = np.asarray(measure.shares(jnp.asarray(np.ptp(data["values"], axis=1)), jnp.asarray(data["weights"])))
+        shares = np.asarray(eqx.filter_jit(measure.shares)(np.ptp(data["values"], axis=1), data["weights"]))
         objective = spans @ shares
     else:
-        objective = np.asarray(jax.vmap(measure, (0, None))(jnp.asarray(spans), jnp.asarray(data["weights"])))
+        objective = np.asarray(joined(measure, spans, data["weights"]))
     violation = np.maximum(data["excess"] + steps @ data["excess_slope"].T, 0.0).max(axis=-1)
     rough = np.abs((data["x"] + steps) @ data["forms"].T).max(axis=-1)
     return objective + PENALTY * violation + data["weight"] * rough

@@ -45,8 +45,9 @@ PLACES = np.array(
 
 
 def test_places_along_the_profile(side):
+    place_of = jax.jit(manufacture.flank_place)
     for roll, angle, size in PLACES:
-        place = manufacture.flank_place(side, jnp.asarray(roll))
+        place = place_of(side, roll)
         assert float(place.roll_angle) == pytest.approx(angle, abs=1e-4)
         assert float(place.diameter) == pytest.approx(size, abs=1e-4)
     trace = profile_trace(side, jg.NoModification())
@@ -76,12 +77,12 @@ def test_band_of_the_class_within_the_evaluation_range(side, quality):
     profile = profile_trace(side, relief, quality, points=101)
     inside = np.isfinite(profile.upper)
     assert inside[:96].all() and not inside[96:].any(), "points 0 to 95 of 100"
-    np.testing.assert_allclose((profile.upper - profile.lower)[inside], 8.5, atol=1e-12)
-    np.testing.assert_allclose((profile.upper + profile.lower)[inside] / 2, np.asarray(profile.design)[inside])
+    np.testing.assert_allclose(np.subtract(profile.upper, profile.lower)[inside], 8.5, atol=1e-12)
+    np.testing.assert_allclose(np.add(profile.upper, profile.lower)[inside] / 2, np.asarray(profile.design)[inside])
     helix = helix_trace(side, relief, quality, points=41)
     inside = np.isfinite(helix.upper)
     np.testing.assert_allclose(np.asarray(helix.face_coordinate)[inside][[0, -1]], [-9.0, 9.0])
-    np.testing.assert_allclose((helix.upper - helix.lower)[inside], 9.0, atol=1e-12)
+    np.testing.assert_allclose(np.subtract(helix.upper, helix.lower)[inside], 9.0, atol=1e-12)
     assert not np.isfinite(profile_trace(side, relief).upper).any(), "no class, no band"
 
 

@@ -1,5 +1,6 @@
 """Resonances in closed form beside the integrated motion: errors fall with the excitation."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -40,6 +41,19 @@ def model(damping_ratio, *, stiffness=(0.0, 0.0, 0.0), load=0.5, clearance=None,
         clearance=PolynomialClearance.published() if clearance is None else clearance,
         **given,
     )
+
+
+shift_of = eqx.filter_jit(frequency_shift)
+acting = eqx.filter_jit(effective_forcing)
+combined = eqx.filter_jit(combination_forcing)
+amplitudes = eqx.filter_jit(forced_amplitude)
+
+
+@eqx.filter_jit
+def linear(state, frequency):
+    """Forcing and forced response at a mesh frequency, and the inverse receptance at it and at twice it."""
+    inverse = [state.receptance_inverse(order * frequency) for order in (1, 2)]
+    return state.forcing(frequency), state.response(frequency), *inverse
 
 
 @pytest.mark.parametrize(
@@ -84,7 +98,7 @@ def test_stiffness_harmonics_force_directly_and_in_the_slope():
     assert np.allclose(found.parametric[:3], stiff * float(found.frequency) ** 2)
     assert np.allclose(found.parametric_quadratic[:3], stiff * float(found.quadratic))
     # a displacement's force grows with the square of its frequency
-    assert np.isclose(found.forcing(jnp.array(0.4))[1], -0.5 * stiff[1] + 0.03 * 0.8**2)
+    assert np.isclose(linear(found, jnp.array(0.4))[0][1], -0.5 * stiff[1] + 0.03 * 0.8**2)
 
 
 def test_relief_takes_its_part_of_the_forcing():
@@ -172,13 +186,9 @@ def test_super_harmonic_forcing_has_every_part():
     given = model(0.02, stiffness=(0.05, 0.0125, 0.0), torque=0.2, torque_angle=0.4)
     state = loaded_mean(given)
     half = state.frequency / 2
-    line = complex(state.response(half)[0])
-    whole = complex(effective_forcing(state, half, 2))
-    parts = (
-        complex(state.forcing(half)[1]),
-        -2 * float(state.quadratic) * line**2,
-        -complex(state.parametric[0]) * line,
-    )
+    forcing, (line, *_), *_ = map(np.asarray, linear(state, half))
+    whole = complex(acting(state, half, 2))
+    parts = forcing[1], -2 * float(state.quadratic) * line**2, -np.asarray(state.parametric)[0] * line
     assert np.isclose(whole, sum(parts))
     assert all(abs(part) > 0.05 * abs(whole) for part in parts)
     with pytest.raises(ValueError, match="order = 4 must be 1, 2 or 3"):
@@ -221,7 +231,7 @@ def test_instability_of_the_dead_zone_is_that_of_mathieu():
         stiffness = np.append(rectangular_harmonics(1.75, 0.37, 1), [0.0, 0.0])
         state = loaded_mean(model(zeta, stiffness=stiffness, clearance=DeadZone()))
         found = np.array(parametric_instability(state))
-        shift = 2 * float(frequency_shift(state, jnp.array(2.0), parametric=1))
+        shift = 2 * float(shift_of(state, jnp.array(2.0), parametric=1))
         assert np.allclose(found - shift, [low, high], atol=5e-4)
         assert abs(shift) < 0.343**2 / 16
     assert np.isclose(damping_threshold(state), 0.343 / 4, atol=1e-4)
@@ -254,8 +264,8 @@ def test_combination_resonance_is_asymptotic(sign, orders):
             displacement_order=orders[1],
         )
         state = loaded_mean(given)
-        forcing = combination_forcing(state, given, frequency, 0, 1, sign)
-        closed = forced_amplitude(state, forcing, 20 * frequency - state.frequency)[0]
+        forcing = combined(state, given, jnp.array(frequency), 0, 1, sign)
+        closed = amplitudes(state, forcing, 20 * frequency - state.frequency)[0]
         settled = settled_vibration(given, frequency, settling=24, periods=1, steps=1024)
         errors.append(abs(float(closed / abs(settled.harmonic(20))) - 1))
     assert errors[0] < 0.1 and errors[1] < 0.6 * errors[0]
@@ -266,11 +276,10 @@ def test_combinations_of_mesh_harmonics_are_the_super_harmonics():
     given = model(0.03, torque=0.03, displacement=0.02, displacement_order=2.0)
     state = loaded_mean(given)
     third = state.frequency / 3
-    line = state.response(third)
-    made = combination_forcing(state, given, third, 0, 1)
-    assert np.isclose(made, -4 * float(state.quadratic) * complex(line[0]) * complex(line[1]))
+    _, (one, two, *_), _, inverse = map(np.asarray, linear(state, third))
+    made = combined(state, given, third, 0, 1)
+    assert np.isclose(made, -4 * float(state.quadratic) * one * two)
     # what is left at order 3 is from order 1 alone, of third order in it
-    alone = complex(effective_forcing(state, third, 3)) - complex(made)
-    a2, a3, one = float(state.quadratic), float(state.cubic), complex(line[0])
-    inverse = complex(state.receptance_inverse(2 * third))
+    alone = complex(acting(state, third, 3)) - complex(made)
+    a2, a3 = float(state.quadratic), float(state.cubic)
     assert np.isclose(alone, -2 * a3 * one**3 - 4 * a2 * one * (-a2 * one**2 / inverse))

@@ -74,6 +74,16 @@ def place(mesh):
     return deposit(mesh, jnp.asarray(TORQUE), POINTS)
 
 
+@eqx.filter_jit
+def _told(life, limit, of):
+    return over_life(life, of), life_to(life, of, limit), mean_over_life(life, of)
+
+
+def told(life, limit=0.0, of="ppte"):
+    """A quantity at every life, the life to a limit of it, and its mean."""
+    return map(np.asarray, _told(life, np.asarray(limit), of))
+
+
 sliding_of = jax.jit(specific_sliding)
 thickness = jax.jit(tooth_thickness)
 
@@ -305,15 +315,15 @@ def test_revolutions_of_a_spectrum_without_load_wear_nothing(mesh):
     """By a coefficient that is a constant in the end."""
     part, blocks = lubricated(mesh, 0.0, 1.0), 2
     np.testing.assert_allclose(part.depth, life_of(mesh).depth, rtol=1e-9, atol=1e-12)
-    means = np.asarray(over_life(part, "mean_te"))
+    means, *_ = told(part, of="mean_te")
     assert means.shape == (blocks + 1,)
     np.testing.assert_allclose(means, np.asarray(part.cycles.transmission_error).mean(-1) @ [0.25, 0.75])
     # where the contact under one of the loads was not found, nothing is known of the flanks under both
     converged = np.array(part.cycles.converged)
     converged[1, 1] = False
     lost = eqx.tree_at(lambda life: life.cycles.converged, part, jnp.asarray(converged))
-    assert np.isnan(over_life(lost, "ppte")).tolist() == [life == 1 for life in range(blocks + 1)]
-    assert np.isnan(life_to(lost, "ppte", 1e3)) and np.isnan(mean_over_life(lost, "ppte"))
+    values, *numbers = told(lost, 1e3)
+    assert np.isnan(values).tolist() == [life == 1 for life in range(blocks + 1)] and np.isnan(numbers).all()
 
 
 @pytest.mark.slow
@@ -457,21 +467,24 @@ def test_the_life_to_a_depth_is_where_the_depth_is_reached(life):
 
 
 def test_the_life_to_a_limit_of_a_quantity(life):
-    ppte = np.asarray(over_life(life, "ppte"))
+    ppte, _, mean = told(life)
     np.testing.assert_allclose(ppte, np.ptp(life.cycles.transmission_error, axis=1), rtol=1e-12)
-    assert float(life_to(life, "ppte", ppte[0] - 0.1)) == 0
-    assert np.isinf(life_to(life, "ppte", ppte.max() + 1))
+    for limit, expected in ((ppte[0] - 0.1, 0), (ppte.max() + 1, np.inf)):
+        assert list(told(life, limit))[1] == expected
     # the contact ratio does not change, and is bad where it is small
-    assert float(life_to(life, "contact_ratio", 2.0)) == 0 and np.isinf(life_to(life, "contact_ratio", 1.0))
+    for limit, expected in ((2.0, 0), (1.0, np.inf)):
+        assert list(told(life, limit, "contact_ratio"))[1] == expected
     expected = np.trapezoid(ppte, life.revolutions) / REVOLUTIONS
-    assert float(mean_over_life(life, "ppte")) == pytest.approx(expected, rel=1e-12)
+    assert mean == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_contact_that_was_not_found_is_no_number(life):
     """One at the start of a block."""
-    lost = eqx.tree_at(lambda life: life.cycles.converged, life, life.cycles.converged.at[2, 0].set(False))
-    assert np.isnan(over_life(lost, "ppte")).tolist() == [life == 2 for life in range(BLOCKS + 1)]
-    assert np.isnan(life_to(lost, "ppte", 1e3))
+    converged = np.array(life.cycles.converged)
+    converged[2, 0] = False
+    lost = eqx.tree_at(lambda life: life.cycles.converged, life, jnp.asarray(converged))
+    values, until, _ = told(lost, 1e3)
+    assert np.isnan(values).tolist() == [life == 2 for life in range(BLOCKS + 1)] and np.isnan(until)
 
 
 def test_flanks_that_a_lost_contact_has_worn_are_not_known(mesh):
@@ -479,16 +492,18 @@ def test_flanks_that_a_lost_contact_has_worn_are_not_known(mesh):
     life = life_of(mesh)
     options = {"pinion": NONE, "wheel": NONE, "deviation": None, "points": None}
     case = case_of("wear", mesh, TORQUE, coefficient=COEFFICIENT, **options)
-    found = marched(case, case.start(), jnp.full(1, REVOLUTIONS / 2, float))
+    found = marched(case, case.start(), jnp.asarray([REVOLUTIONS / 2]))
     np.testing.assert_array_equal(life_from(case, found, life.revolutions).depth, life.depth)
-    lost = life_from(case, found._replace(known=jnp.arange(3) < 2), life.revolutions)
+    lost = life_from(case, found._replace(known=jnp.asarray(np.arange(3) < 2)), life.revolutions)
     after = [False, False, True]
-    for values in (over_life(lost, "ppte"), wear_depth(lost), worn_volume(lost)[:, 0, 0]):
+    errors, *numbers = told(lost, 1e3)
+    for values in (errors, wear_depth(lost), np.asarray(worn_volume(lost))[:, 0, 0]):
         assert np.isnan(values).tolist() == after
     assert (~np.asarray(lost.cycles.converged)).all(axis=-1).tolist() == after
-    assert np.isnan(life_to(lost, "ppte", 1e3)) and np.isnan(mean_over_life(lost, "ppte"))
-    assert np.isnan(life_to_depth(lost, wear_depth(life)[-1]))
-    np.testing.assert_array_equal(life_to_depth(lost, wear_depth(life)[1]), life_to_depth(life, wear_depth(life)[1]))
+    assert np.isnan(numbers).all()
+    _, middle, last = np.asarray(wear_depth(life))
+    assert np.isnan(life_to_depth(lost, last))
+    np.testing.assert_array_equal(life_to_depth(lost, middle), life_to_depth(life, middle))
     assert not solved(lost.cycles)[-1]  # by which quantities of the life are no numbers
 
 
@@ -512,7 +527,8 @@ def test_a_function_that_gives_no_coefficient_leaves_no_flank_known(mesh):
     for value in (jnp.nan, -1e-17):
         life = lubricated(mesh, 0.0, 0.5, value)
         assert life.known.tolist() == [True, False, False]
-        assert np.isfinite(over_life(life, "ppte")).tolist() == [True, False, False]
+        values, *_ = told(life)
+        assert np.isfinite(values).tolist() == [True, False, False]
 
 
 @pytest.mark.slow
@@ -641,7 +657,8 @@ def test_what_is_worn_through_is_not_worn_on(mesh):
     assert known[0] and not known[-1] and life.revolutions[-1] == REVOLUTIONS == blocks[-1][0]
     assert 100 < float(np.nanmax(wear_depth(life))) < 4e3 * max(tip)
     assert len(known) < 200 and known.tolist() == sorted(known, reverse=True)
-    assert np.isnan(over_life(life, "ppte")).tolist() == (~known).tolist()
+    values, *_ = told(life)
+    assert np.isnan(values).tolist() == (~known).tolist()
     assert np.isnan(life_to_depth(life, 1e6)) and 0 < float(life_to_depth(life, 5.0)) < float(
         life.revolutions[known][-1]
     )

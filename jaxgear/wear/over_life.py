@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 from ..conditions import joined, solved
 from ..metrics import Quantity, quantities, quantity_of
 from ..numerics import AbstractMeasure, Mean, check, maximum, real
+from ..numerics.quick import quick_jit
 from .life import WearLife
 
 Scalar = Float[Array, ""]
@@ -132,6 +133,7 @@ def _single(owner: str, life: WearLife) -> None:
         raise ValueError(f"{owner}: life is of a batch of designs, must be of one: put jax.vmap around {owner} as well")
 
 
+@quick_jit
 def _reached(done: Lives, values: Lives, limit: Scalar, *, goes_on: bool) -> Scalar:
     """Where values first exceed a limit."""
     # written so that NaN counts as reached, and is what comes out

@@ -11,6 +11,7 @@ from ..contact import Mesh
 from ..dynamics import Dynamics
 from ..microgeometry import AbstractModification
 from ..numerics import check, real
+from ..numerics.quick import quick_jit
 from .case import Case, case_of, marched
 from .life import BLOCKS, WearLife, check_blocks, checked_revolutions, life_of
 from .march import BLOCKS_OF_A_PAIR, Depth, March
@@ -111,6 +112,7 @@ def _most(pair: March) -> float:
     return most if np.isfinite(most) else 0.0
 
 
+@quick_jit
 def _together(pairs: list[March]) -> March:
     """One march after the other: each begins with the flank with which the one before has ended."""
 

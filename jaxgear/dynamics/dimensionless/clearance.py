@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...numerics import check, concrete, number, real
+from ...numerics.quick import quick_jit
 from ..force import AbstractMeshForce
 
 Scalar = Float[Array, ""]
@@ -87,26 +88,29 @@ class PolynomialClearance(AbstractMeshForce):
 
     def loaded(self, load) -> Scalar:
         """Largest x in range with f(x) = load: the mean of a loaded mesh; the range itself where the load is beyond."""
-
-        def halve(_, bracket):
-            low, high = bracket
-            middle = 0.5 * (low + high)
-            below = self.polynomial(middle) < load
-            return jnp.where(below, middle, low), jnp.where(below, high, middle)
-
-        load = real(load)
-        # the outermost turning point of f bounds the branch that loaded gears stand on
-        grid = jnp.linspace(0.0, 1.0, 257, dtype=load.dtype) * self.range
-        falls = jax.vmap(self.polynomial)(grid) < load
-        last = jnp.max(jnp.where(falls, jnp.arange(257), 0))
-        bracket = grid[last], grid[jnp.minimum(last + 1, 256)]
-        x = jax.lax.stop_gradient(jax.lax.fori_loop(0, _BISECTIONS, halve, bracket)[0])
-        return x - (self.polynomial(x) - load) / self.slope(x)  # its derivative is that of the root
+        return _loaded(self, real(load))
 
     @property
     def false_zero(self) -> Scalar:
         """x > 0 with f(x) = 0, where the gears of a fit with a_1 < 0 stand without load; 0 where there is none."""
         return jnp.where(self.coefficients[0] < 0, self.loaded(0.0), 0.0)
+
+
+@quick_jit
+def _loaded(clearance: PolynomialClearance, load: Scalar) -> Scalar:
+    def halve(_, bracket):
+        low, high = bracket
+        middle = 0.5 * (low + high)
+        below = clearance.polynomial(middle) < load
+        return jnp.where(below, middle, low), jnp.where(below, high, middle)
+
+    # the outermost turning point of f bounds the branch that loaded gears stand on
+    grid = jnp.linspace(0.0, 1.0, 257, dtype=load.dtype) * clearance.range
+    falls = jax.vmap(clearance.polynomial)(grid) < load
+    last = jnp.max(jnp.where(falls, jnp.arange(257), 0))
+    bracket = grid[last], grid[jnp.minimum(last + 1, 256)]
+    x = jax.lax.stop_gradient(jax.lax.fori_loop(0, _BISECTIONS, halve, bracket)[0])
+    return x - (clearance.polynomial(x) - load) / clearance.slope(x)  # its derivative is that of the root
 
 
 def warn_of_false_well(clearance: PolynomialClearance, load) -> bool:
@@ -134,6 +138,7 @@ def warn_of_false_well(clearance: PolynomialClearance, load) -> bool:
     return True
 
 
+@quick_jit
 def _fitted(order: int, most: Scalar) -> Float[Array, " terms"]:
     """Coefficients of least squares: Legendre's odd polynomials of x / range are orthogonal over the range."""
     node, weight = np.polynomial.legendre.leggauss(_NODES)

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
-from ...numerics import Checked, check, kernel, real, result, safe_divide, whole
+from ...numerics import Checked, check, kernel, program, real, result, safe_divide, whole
 from ..orbit import settled_orbit
 from .model import DimensionlessModel, loaded_approach
 
@@ -45,9 +45,7 @@ class Settled(Checked):
 
     def harmonic(self, order) -> Complex[Array, ""]:
         """Complex amplitude c of x ~ Re(c e^(2 pi i order phase))."""
-        part = self.weight * self.approach
-        angle = 2 * jnp.pi * real(order) * self.phase
-        return 2 * jax.lax.complex(jnp.sum(part * jnp.cos(angle)), -jnp.sum(part * jnp.sin(angle)))
+        return _harmonic(self.phase, self.weight * self.approach, real(order))
 
 
 def settled_vibration(
@@ -97,6 +95,12 @@ def _settle(model: DimensionlessModel, frequency: Scalar, begin, settling: int, 
         settled=jnp.isfinite(orbit.approach).all() & orbit.stable & (residual < _SETTLED),
         start=jnp.concatenate(orbit.start),
     )
+
+
+@program
+def _harmonic(phase, part, order: Scalar) -> Complex[Array, ""]:
+    angle = 2 * jnp.pi * order * phase
+    return 2 * jax.lax.complex(jnp.sum(part * jnp.cos(angle)), -jnp.sum(part * jnp.sin(angle)))
 
 
 def _phases(count: int) -> Float[Array, " positions"]:
