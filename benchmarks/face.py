@@ -154,14 +154,13 @@ def run(pair: str, *, slices: Slices = SLICES, coupled: bool = True) -> dict[Fac
     keys = "torque_Nm", "lead_slope_um", "lead_crowning_um", "end_relief_um"
     numbers = jnp.asarray([[inputs(case)[key] for key in keys] for case in chosen])
 
-    @jax.jit
     def solved(values):
         torque, slope, crowning, end = values
         flank = jg.LeadSlope(slope) + jg.LeadCrowning(crowning) + jg.EndRelief(end, _END)
         cycle = jg.solve(mesh, torque, pinion=flank)
         return cycle.line_load, cycle.transmission_error, cycle.converged
 
-    load, error, converged = map(np.asarray, jax.lax.map(solved, numbers))
+    load, error, converged = map(np.asarray, jg.quick_jit(lambda of: jax.lax.map(solved, of))(numbers))
     if not converged.all():
         raise RuntimeError(f"{pair}: contact not converged")
     return {case: Face(*found, slices) for case, found in zip(chosen, zip(load, error))}

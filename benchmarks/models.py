@@ -93,8 +93,8 @@ def curves_of(cycle: jg.MeshCycle) -> Curves:
     return Curves(te, np.asarray(cycle.unloaded_transmission_error), force, pressure)
 
 
-_prepare = eqx.filter_jit(jg.prepare)
-_solve = eqx.filter_jit(jg.solve)
+_prepare = jg.quick_jit(jg.prepare)
+_solve = jg.quick_jit(jg.solve)
 
 
 @functools.cache

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..contact import Mesh
-from ..dynamics import Dynamics, Oscillator, RunUp, natural_frequencies, run_up, steps_for
+from ..dynamics import UP, Dynamics, Oscillator, RunUp, natural_frequencies, run_up, steps_for
 from ..dynamics.speed_sweep import STABLE_STEPS
 from ..dynamics.static import Natural
 from ..io import DesignFile, DesignFileError, DynamicsRequest, dynamics_request
@@ -30,7 +30,7 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
     def make(target: Path, stages: Stages):
         mesh, designs = compared(design, max(design.torque, *request.torques), search, target, stages, quick=quick)
         kept = Kept(runs_beside(target), SpeedResponses(), _count(designs, request))
-        return _study(design, request, mesh, designs, kept, stages), kept.remove
+        return _study(design, request, mesh, designs, kept, stages, quick=quick), kept.remove
 
     return make
 
@@ -46,8 +46,10 @@ def _study(
     designs: dict[str, Modifications],
     kept: Kept,
     stages: Stages,
+    *,
+    quick: bool,
 ) -> Study:
-    """All runs of all designs under all torques."""
+    """All runs of all designs under all torques, and the branches of one; a quick look follows its first branch."""
     settings = request.settings
     oscillators: dict[str, dict[float, Oscillator]] = {}
     for name, (pinion, wheel) in designs.items():
@@ -84,7 +86,8 @@ def _study(
         }
     stages.begin("following the orbits of the unmodified design")
     torque = next_to_design(design, request)
-    branches = branches_of(oscillators["unmodified"][torque], responses["unmodified"][torque], steps)
+    runs = responses["unmodified"][torque]
+    branches = branches_of(oscillators["unmodified"][torque], {UP: runs[UP]} if quick else runs, steps)
     frequencies = {
         name: {torque: float(of.mesh) for torque, of in several.items()} for name, several in natural.items()
     }

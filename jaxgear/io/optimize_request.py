@@ -164,8 +164,8 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
         _check_iteration(design, options["start"], section)
         if options["start"] == "low_pressure":
             options["method"] = METHODS[_DEFAULT_METHOD](**(_QUICK[_DEFAULT_METHOD] if quick else {}))
-        return OptimizeRequest(name, curve, verify, design, options)
-    if name == "free_form":
+        common = options
+    elif name == "free_form":
         common |= options | fewer
     else:
         common["method"] = made_by(name)(**options | fewer)
