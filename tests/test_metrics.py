@@ -9,6 +9,7 @@ import pytest
 from catalogue import LINE, gear_pair
 
 import jaxgear as jg
+from jaxgear.contact.pressure import corner_pressure
 from jaxgear.metrics import quantities
 from jaxgear.metrics.root_stress import single_contact_root_stress
 
@@ -18,6 +19,8 @@ FZG = jg.GearPair(
     jg.Gear(24, 4.5, profile_shift=0.1715, face_width=14.0, tip_diameter=118.544, root_radius=0.375),
     91.5,
 )
+
+EDGES = {"pinion": 0.1, "wheel": 0.3}  # mm
 
 
 def test_ohlendorf_loss_factor():
@@ -111,6 +114,21 @@ def test_largest_contact_pressure_is_that_of_the_tip_edge_where_corners_touch(cy
     assert float(quantities["max_contact_pressure"](light)) == float(quantities["max_flank_pressure"](light)) > 0
 
 
+def test_pressure_of_a_tip_edge_is_hertz_with_that_edge_and_the_flank_of_its_mate(mesh):
+    """Before the path the wheel's tip touches the pinion's flank, behind it the pinion's tip the wheel's."""
+    gears = {name: dataclasses.replace(getattr(mesh.pair, name), tip_edge_radius=edge) for name, edge in EDGES.items()}
+    kinematics = dataclasses.replace(mesh.kinematics, pair=dataclasses.replace(mesh.pair, **gears))
+    path, contact = np.asarray(kinematics.path), kinematics.path_of_contact
+    pressure = np.asarray(corner_pressure(kinematics, jnp.full((*path.shape[:1], 1, path.shape[1]), 100.0)))[:, 0]
+    flanks = [np.asarray(side.contact_roll_length) for side in kinematics.sides]
+    before, behind = path < float(contact.start), path > float(contact.end)
+    assert before.any() and behind.any() and not pressure[~before & ~behind].any()
+    for there, edge, mate in ((before, EDGES["wheel"], flanks[0]), (behind, EDGES["pinion"], flanks[1])):
+        curvature = 1 / edge + 1 / mate[there]
+        wanted = np.sqrt(100.0 * 206e3 / (2 * (1 - 0.3**2)) * curvature / np.pi)
+        np.testing.assert_allclose(pressure[there], wanted, rtol=1e-12)
+
+
 def test_stiffness_definitions(cycle, mesh):
     secant_of = jax.jit(jg.secant_stiffness)
     secant = secant_of(cycle)
@@ -132,8 +150,15 @@ def test_loaded_teeth_touch_beyond_the_theoretical_path(cycle):
     assert float(shock.approach) > 0.0 and float(shock.recess) > 0.0 and float(shock.force) > 0.0
 
 
-def test_flash_temperature_vanishes_at_the_pitch_point_and_grows_with_the_root_of_speed(cycle):
-    flash = jax.jit(jg.metrics.flash_temperature)
-    slow, fast = (np.asarray(flash(cycle, speed)).max(axis=(0, 1)) for speed in (1000.0, 4000.0))
-    assert slow[0] == pytest.approx(0.0, abs=1e-9)
-    np.testing.assert_allclose(fast, 2 * slow, rtol=1e-9, atol=1e-9)
+@pytest.mark.parametrize("speed", [1000.0, 4000.0])
+def test_flash_temperature_is_that_of_blok_on_steel(cycle, speed):
+    """2 / sqrt(pi) is rounded to 1.13; the half width of the contact follows from its load and Hertzian pressure."""
+    there = np.asarray(cycle.contact_pressure)[:, 0] > 0
+    load, pressure = (np.asarray(of)[:, 0][there] for of in (1e3 * cycle.line_load, 1e6 * cycle.contact_pressure))
+    turning = speed * 2 * np.pi / 60 * np.array([1.0, 19 / 48])
+    first, second = (1e-3 * np.asarray(of.contact_roll_length)[there] * rate for of, rate in zip(cycle.sides, turning))
+    heat = 0.05 * load * np.abs(first - second)
+    sink = 13_800.0 * (np.sqrt(first) + np.sqrt(second)) * np.sqrt(2 * 2 * load / (np.pi * pressure))
+    rise = np.asarray(jg.metrics.flash_temperature(cycle, speed, friction=0.05))[:, 0]
+    np.testing.assert_allclose(rise[there], 2 / np.sqrt(np.pi) * heat / sink, rtol=2e-3, atol=1e-9)
+    assert rise[:, 0].max() == pytest.approx(0.0, abs=1e-9)  # at the pitch point
