@@ -96,6 +96,10 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     assert 1 < worst["rule-based"] < worst["unmodified"]
     assert f"unmodified {worst['unmodified']:.3f}, rule-based {worst['rule-based']:.3f}" in out
     assert "rule-based" in out and "down, kicked" in out
+    assert "evaluated at 32 positions of the mesh force and 64 steps per mesh cycle; twice as many change" in out
+    for name, data in summary["designs"].items():
+        change = data["change_at_twice_the_positions_and_steps"]["max_dynamic_factor"]
+        assert 0 < abs(change) < 0.05 and f"{name} by {change:+.2g}" in out
     check_branches(summary, rows)
     check_run_ups(folder, summary, out)
     page = check_report(folder, path, "dynamics", path, "--output", folder, "--report")

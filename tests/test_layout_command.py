@@ -159,6 +159,10 @@ def laid_out(path, folder):
     end = main["wheel"]["slope_um"] / 2 + main["wheel"]["crowning_um"]
     assert float(flanks["flank lines"]["modification_um"]) == pytest.approx(end, abs=1e-5)
     assert float(flanks["step 1"]["modification_um"]) < end
+    changes = {step: of["face_load_factor"] for step, of in found["change_at_twice_the_stations"].items()}
+    assert 0 < abs(changes["unmodified"]) < 0.02 * factor and list(changes) == ["unmodified", "step_1", "step_2"]
+    said = f"twice as many change K_Hbeta: unmodified by {changes['unmodified']:+.2g}"
+    assert f"evaluated at 21 stations (ISO 6336-1 Annex E); {said}" in done.out
     assert "life relative to the even load" in done.out and "life after step 1 [h]" in done.out
     assert found["profiles"] == {}
     for one in found["layouts"].values():
@@ -166,6 +170,22 @@ def laid_out(path, folder):
             ("shaft diameter over bore", 'gear "wheel"')
         ]
     return found, done.out
+
+
+@pytest.mark.slow
+def test_twice_the_slices_are_those_of_the_file(file, tmp_path):
+    """What twice the slices are said to change is the difference of two runs."""
+    found = {}
+    for slices, quick in ((4, ()), (8, ("--quick",))):
+        text = replaced(FACE, f"positions = 8\nslices = {slices}").replace('[housing]\nfile = "housing.csv"\n', "")
+        folder = tmp_path / f"of_{slices}"
+        done = call("layout", str(file(text + PROFILE)), "--output", str(folder), "--no-figures", *quick)
+        found[slices] = json.loads((folder / "summary.json").read_text())
+        assert (" slices (contact analysis); twice as many change K_Hbeta: unm" in done.out) == (slices == 4), done.err
+    before, after = (of["contact"]["rigid seats"]["unmodified"]["face_load_factor"] for of in found.values())
+    change = found[4]["change_at_twice_the_slices"]["unmodified"]["face_load_factor"]
+    assert change == pytest.approx(after - before, rel=1e-6) and change > 0.01
+    assert "change_at_twice_the_slices" not in found[8] and "change_at_twice_the_stations" not in found[8]
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..contact import Mesh
-from ..dynamics import UP, Dynamics, Oscillator, RunUp, natural_frequencies, run_up, steps_for
+from ..dynamics import UP, Dynamics, Oscillator, RunUp, natural_frequencies, run_up, speed_sweep, steps_for
 from ..dynamics.speed_sweep import STABLE_STEPS
 from ..dynamics.static import Natural
 from ..io import DesignFile, DesignFileError, DynamicsRequest, dynamics_request
@@ -17,10 +18,12 @@ from ..io.errors import naming
 from . import dynamics_figures, dynamics_report, manufactured
 from .compared import Modifications, compared, search_of
 from .dynamics_branches import branches_of
-from .dynamics_report import Study, next_to_design
+from .dynamics_report import Study, next_to_design, peak
 from .kept import Kept, SpeedResponses, runs_beside
 from .progress import Stages
 from .study_command import Make, StudyCommand
+
+_BESIDE = 4  # speeds on either side of a peak that are gone through again on a finer grid
 
 
 def _plan(design: DesignFile, quick: bool) -> Make[Study]:
@@ -30,7 +33,11 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
     def make(target: Path, stages: Stages):
         mesh, designs = compared(design, max(design.torque, *request.torques), search, target, stages, quick=quick)
         kept = Kept(runs_beside(target), SpeedResponses(), _count(designs, request))
-        return _study(design, request, mesh, designs, kept, stages, quick=quick), kept.remove
+        study = _study(design, request, mesh, designs, kept, stages, quick=quick)
+        if not quick:
+            stages.begin("the largest dynamic factors on a finer grid")
+            study = replace(study, grid_change=_grid_change(study))
+        return study, kept.remove
 
     return make
 
@@ -92,6 +99,36 @@ def _study(
         name: {torque: float(of.mesh) for torque, of in several.items()} for name, several in natural.items()
     }
     return Study(design, request, mesh, designs, oscillators, frequencies, responses, steps, tuple(branches), run_ups)
+
+
+def _grid_change(study: Study) -> dict[str, dict[str, float]]:
+    """By how much the largest dynamic factor of every design changes at twice the positions of the mesh force and the
+    steps, which meet no more positions than they are themselves."""
+    settings = study.request.settings
+    finer = replace(settings, positions=2 * settings.positions)
+    last = len(settings.mesh_frequencies)
+    width = min(2 * _BESIDE + 1, last)
+    found = {}
+    for name, (pinion, wheel) in study.designs.items():
+        of_design = ((torque, run, response) for other, torque, run, response in study.rows() if other == name)
+        torque, run, response = max(of_design, key=lambda row: peak(row[-1], "dynamic_factor")[0])
+        factors = np.asarray(response.dynamic_factor)
+        if not np.isfinite(factors).any():
+            continue
+        first = min(max(int(np.nanargmax(factors)) - _BESIDE, 0), last - width)
+        near = slice(first, first + width)
+        begin = near.stop - 1 if response.direction == "down" else near.start
+        again = speed_sweep(
+            finer.oscillator(study.mesh, torque, pinion=pinion, wheel=wheel),
+            settings.mesh_frequencies[near],
+            direction=response.direction,
+            start=tuple(part[begin] for part in response.state),
+            steps=[2 * count for count in study.steps[near]],
+            kicks=settings.kicks_of(run),
+        )
+        change = float(np.nanmax(again.dynamic_factor) - np.nanmax(factors))
+        found[name] = {"max_dynamic_factor": change}
+    return found
 
 
 def _steps(

@@ -3,7 +3,7 @@
 import csv
 import dataclasses
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from ..dynamics.response import FORCE_REFERENCE
 from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
 from .geometry import gears
+from .study import grid_line
 from .written import identity, model, versions
 
 _COLUMNS = {
@@ -51,6 +52,8 @@ class Study:
         steps: of the integrator per mesh cycle, at every speed.
         branches: of periodic orbits of the unmodified design, at `torque`.
         run_ups: of every design, by torque [N m]; empty where none is asked for.
+        grid_change: by how much numbers of every design change at twice the positions of the mesh force and the steps,
+            by name and unit; empty in a quick run.
     """
 
     design: DesignFile
@@ -63,6 +66,7 @@ class Study:
     steps: tuple[int, ...]
     branches: tuple[Branch, ...]
     run_ups: Mapping[str, Mapping[float, RunUp]]
+    grid_change: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def rows(self) -> Iterator[tuple[str, float, str, SpeedResponse]]:
         """Design, torque, run and response of all runs."""
@@ -129,6 +133,10 @@ def verdict(study: Study) -> Iterator[str]:
         }
         said = ", ".join(f"{name} {factor:.3f} at {at:.0f} Hz" for name, (factor, at) in highest.items())
         yield f"largest dynamic factor of a run-up in {study.request.run_up:g} s: {said}"
+    if study.grid_change:
+        steps = " to ".join(f"{count}" for count in dict.fromkeys((min(study.steps), max(study.steps))))
+        grid = f"{study.request.settings.positions} positions of the mesh force and {steps} steps per mesh cycle"
+        yield grid_line(grid, study.grid_change)
     yield from _far_from_resonance(study)
     yield from _bodies(study)
     aperiodic = sum(int(np.sum(np.asarray(response.period) == 0)) for *_, response in study.rows())
@@ -191,6 +199,8 @@ def summary(study: Study) -> dict[str, Any]:
         ]
         flanks = {"pinion_modification": describe(pinion), "wheel_modification": describe(wheel)}
         designs[name] = {"runs": runs, **flanks}
+        if name in study.grid_change:
+            designs[name]["change_at_twice_the_positions_and_steps"] = study.grid_change[name]
         if study.run_ups:
             of_torques = {torque: peak(of, "dynamic_factor") for torque, of in study.run_ups[name].items()}
             designs[name]["run_ups"] = [

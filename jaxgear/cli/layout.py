@@ -1,5 +1,6 @@
 """What the command `layout` does, with its options."""
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -29,6 +30,7 @@ from . import layout_figures, layout_report, layout_tables, manufactured
 from .layout_study import Study, designs, flank_lines
 from .progress import Stages
 from .run import coarse
+from .study import face_change
 from .study_command import Make, StudyCommand
 
 
@@ -73,6 +75,17 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
                 contacts[name], cases[name] = _contacts(request, mesh, layouts[name], profiles[name])
                 cycles = cycles or _cycles(request, mesh, layouts[name], profiles[name])
                 factors[name] = _factors(request, name, layouts[name], stations=size.slices)
+    stations_change: dict[str, dict[str, float]] = {}
+    slices_change: dict[str, dict[str, float]] = {}
+    if not quick:
+        stages.begin("face load factor on a finer grid")
+        name, stations = next(iter(layouts)), request.options["stations"]
+        once, again = (_factors(request, name, layouts[name], stations=count) for count in (stations, 2 * stations))
+        stations_change = {step: {"face_load_factor": again[step] - value} for step, value in once.items()}
+        if cycles:
+            finer = _finer(design, request, name)
+            between = _cycles(request, finer, layouts[name], profiles[name])
+            slices_change = {which: face_change(cycle, between[which]) for which, cycle in cycles.items()}
     duty_cycle = request.options.get("duty_cycle")
     unusual = {
         name: plausibility(
@@ -84,7 +97,16 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
         )
         for name, layout in layouts.items()
     }
-    return Study(design, request, layouts, over_torque, meshes, contacts, cases, cycles, factors, profiles, unusual)
+    found = layouts, over_torque, meshes, contacts, cases, cycles, factors, profiles, unusual
+    return Study(design, request, *found, stations_change, slices_change)
+
+
+def _finer(design: DesignFile, request: LayoutRequest, name: str) -> Mesh:
+    """The mesh of step 3 on its shafts with twice the slices."""
+    size = design.resolution()
+    widths = None if size.parts is None else tuple(int(part) for part in np.repeat(size.parts, 2))
+    twice = replace(size, slices=2 * size.slices, slice_widths=widths)
+    return design.mesh(twice, _held(request.supports[name], request.profile_torque, twice), rigid=False)
 
 
 def _over_torque(request: LayoutRequest, layout: FlankLineLayout) -> dict[str, np.ndarray]:

@@ -11,6 +11,7 @@ from ..shafts import bearing_reactions
 from . import report
 from .geometry import gears
 from .layout_study import STEPS, Study, designs, lives, root_factor
+from .study import grid_line
 from .written import doubt_data, identity, versions
 
 
@@ -32,6 +33,11 @@ def verdict(study: Study) -> Iterator[str]:
             )
     for name, profile in study.profiles.items():
         yield from _profile_verdict(study, profile, f", {name}" if len(study.profiles) > 1 else "")
+    if study.stations_change:
+        grid = f"{study.request.options['stations']} stations (ISO 6336-1 Annex E)"
+        yield grid_line(grid, study.stations_change)
+    if study.slices_change:
+        yield grid_line(f"{study.design.resolution().slices} slices (contact analysis)", study.slices_change)
 
 
 def _profile_verdict(study: Study, profile: ProfileLayout, where: str) -> Iterator[str]:
@@ -106,6 +112,8 @@ def summary(study: Study) -> dict[str, Any]:
             }
             for name, steps in study.contacts.items()
         },
+        **({"change_at_twice_the_stations": _by_step(study.stations_change)} if study.stations_change else {}),
+        **({"change_at_twice_the_slices": study.slices_change} if study.slices_change else {}),
         "bearings": {name: _reactions(support) for name, support in study.request.supports.items()},
         "profiles": {name: _profile(study, profile) for name, profile in study.profiles.items()},
         "designs": {

@@ -34,6 +34,10 @@ class Study:
         factors: K_Hbeta of the one-dimensional analysis at the same torque and on as many stations, likewise.
         profiles: profile modifications of step 3, by the name of the support.
         unusual: what of every layout is not usual, by the name of the support.
+        stations_change: by how much K_Hbeta of the one-dimensional analysis changes at twice the stations, of the
+            design at the torque of the profiles, by step; empty in a quick run.
+        slices_change: by how much numbers of `cycles` change at twice the slices, by name and unit; empty in a quick
+            run.
     """
 
     design: DesignFile
@@ -47,6 +51,8 @@ class Study:
     factors: Mapping[str, Mapping[str, float]]
     profiles: Mapping[str, ProfileLayout]
     unusual: Mapping[str, tuple[Doubt, ...]]
+    stations_change: Mapping[str, Mapping[str, float]]
+    slices_change: Mapping[str, Mapping[str, float]]
 
     @property
     def profile(self) -> ProfileLayout | None:

@@ -153,7 +153,8 @@ def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
 def grid(evaluations: Evaluations, more: str = "") -> str:
     """How fine the mesh was, and what a finer one would change, besides `more`."""
     positions = next(iter(evaluations.values())).cycle.kinematics.resolution.positions
-    return grid_line(positions, {name: evaluation.grid_change for name, evaluation in evaluations.items()}, more)
+    changes = {name: evaluation.grid_change for name, evaluation in evaluations.items()}
+    return grid_line(f"{positions} positions", changes, more)
 
 
 @program

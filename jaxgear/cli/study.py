@@ -18,12 +18,13 @@ from ..optimize import Verified
 from ..sweeps import Scatter, over_torques
 
 _SURFACE_REACH, _SURFACE_TORQUES = 2.0, 21
-# numbers that depend on the positions as extremes over them, by name and unit, and what a line calls them
+# numbers that depend on the grid, by name and unit: the extremes over the positions, K_Hbeta over the face and K_v
 _EXTREMES = {
-    "ppte_um": "PPTE",
-    "max_flank_pressure_MPa": "max flank pressure",
-    "max_corner_pressure_MPa": "max corner pressure",
+    "ppte_um": ("PPTE", " um"),
+    "max_flank_pressure_MPa": ("max flank pressure", " MPa"),
+    "max_corner_pressure_MPa": ("max corner pressure", " MPa"),
 }
+_LABELS = {"face_load_factor": ("K_Hbeta", ""), "max_dynamic_factor": ("largest dynamic factor", ""), **_EXTREMES}
 
 
 @dataclass(frozen=True)
@@ -115,14 +116,20 @@ def _extremes(*cycles: MeshCycle) -> dict[str, float]:
     return dict(zip(_EXTREMES, map(float, found)))
 
 
-def grid_line(positions: int, changes: Mapping[str, Mapping[str, float]], more: str = "") -> str:
-    """How fine a mesh was, and what twice the positions would change; `changes` by the name of the design."""
+def face_change(before: MeshCycle, after: MeshCycle) -> dict[str, float]:
+    """By how much numbers change from a cycle to the same one on other slices, by name and unit."""
+    found = [{"face_load_factor": float(_face_load([cycle])[0]), **_extremes(cycle)} for cycle in (before, after)]
+    return {name: found[1][name] - value for name, value in found[0].items()}
+
+
+def grid_line(grid: str, changes: Mapping[str, Mapping[str, float]], more: str = "") -> str:
+    """How fine a grid was, and what twice that would change; `changes` by the name of the design."""
     said = [more] * bool(more)
-    for metric, label in _EXTREMES.items():
-        unit = metric.rpartition("_")[2]
-        each = (f"{name} by {change[metric]:+.2g} {unit}" for name, change in changes.items())
+    for metric in next(iter(changes.values())):
+        label, unit = _LABELS[metric]
+        each = (f"{name} by {change[metric]:+.2g}{unit}" for name, change in changes.items())
         said.append(f"{label}: {', '.join(each)}")
-    return f"evaluated at {positions} positions; twice as many change {'; '.join(said)}"
+    return f"evaluated at {grid}; twice as many change {'; '.join(said)}"
 
 
 def response_surface(mesh: Mesh, torque: float, pinion: AbstractModification, wheel: AbstractModification):

@@ -84,7 +84,7 @@ def grid_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> str:
     pinion, wheel = design.design(parameters)
     (cycle,) = over_torques(mesh, np.asarray([torque]), pinion=pinion, wheel=wheel)
     name = f"variant {best.column('variant')[0]} at {torque:g} N m"
-    return grid_line(size.positions, {name: grid_change(mesh, cycle, pinion, wheel)})
+    return grid_line(f"{size.positions} positions", {name: grid_change(mesh, cycle, pinion, wheel)})
 
 
 def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, list[Path]]:

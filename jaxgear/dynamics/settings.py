@@ -175,6 +175,10 @@ class Dynamics(Checked):
         ways = {UP: Run("up"), DOWN: Run("down"), KICKED: Run("down", self.kick, kicks)}
         return {name: ways[name] for name in self.run_names}
 
+    def kicks_of(self, name: str) -> Any:
+        """Dynamic factors of the kicks at every speed of one of `run_names`."""
+        return self._runs[name].kicks
+
     def runs(self, oscillator: Oscillator) -> dict[str, SpeedResponse]:
         """The steady states of all runs."""
         return speed_runs(oscillator, self.mesh_frequencies, self._runs, steps=self.steps)

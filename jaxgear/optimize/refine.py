@@ -100,16 +100,17 @@ def fine_enough(values, violations, finer_values, finer_violations, span: float 
 def at_more_positions(record: Record, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Objectives of designs at twice the positions of a record, shape (designs, objectives), and their violations.
 
-    Violations are those at four times the positions where the program of the search gives them: a peak between two
-    positions may lie between those of twice as many as well.
+    Violations are those at four times the positions: a peak between two positions may lie between those of twice as
+    many as well.
     """
     problem = record.problem
     record.spend(len(points))
     finer = record.linearizer and record.linearizer.at_more_positions(points)
     if not finer:
-        mesh = _with_positions(problem.mesh, 2 * problem.mesh.resolution.positions)
-        found = scores(problem.on(mesh), points)
-        return np.asarray(found.value), np.asarray(found.violation)
+        own = problem.mesh.resolution.positions
+        twice = scores(problem.on(_with_positions(problem.mesh, 2 * own)), points)
+        four = scores(problem.on(_with_positions(problem.mesh, 4 * own)), points) if problem.constraints else twice
+        return np.asarray(twice.value), np.asarray(four.violation)
     models = [[Model(problem, point, of) for of in both] for point, both in zip(points, finer)]
     values = [[twice.value] if len(problem.objectives) == 1 else twice.values for twice, _ in models]
     return np.asarray(values), np.asarray([four.violation for _, four in models])
