@@ -235,8 +235,8 @@ def _branch(branch: Branch) -> dict[str, Any]:
 
 def _peaks(response: SpeedResponse) -> dict[str, float]:
     found: dict[str, float] = {}
-    for field, column in (("dynamic_factor", "dynamic_factor"), ("approach_rms", "approach_rms_um")):
-        found[f"max_{column}"], found[f"at_{field}_Hz"] = peak(response, field)
+    for name, column in (("dynamic_factor", "dynamic_factor"), ("approach_rms", "approach_rms_um")):
+        found[f"max_{column}"], found[f"at_{name}_Hz"] = peak(response, name)
     found["max_no_contact_share"] = peak(response, "no_contact")[0]
     found["max_coast_contact_share"] = peak(response, "coast_contact")[0]
     found["speeds_without_period"] = int(np.sum(np.asarray(response.period) == 0))
