@@ -12,8 +12,11 @@ from jaxgear.contact import Operation
 from jaxgear.contact.parts import parts
 from jaxgear.metrics import Lubricant, Strength
 from jaxgear.optimize import Genetic, Minimax, Pareto
+from jaxgear.optimize.evaluate import scores
 from jaxgear.optimize.goal import FEASIBLE, counted
-from jaxgear.optimize.refine import fine_enough
+from jaxgear.optimize.problem import make_problem
+from jaxgear.optimize.refine import at_more_positions, fine_enough
+from jaxgear.optimize.search import Record
 
 KNOWN = {"amount": 9.0, "length": 4.2}  # keeps every limit below that can be kept
 
@@ -84,6 +87,29 @@ def test_a_mesh_is_fine_enough_for_all_designs_or_for_none():
     assert fine_enough(values, kept, values, np.array([0.0, FEASIBLE]))
     assert not fine_enough(values, kept, values, np.array([0.0, 1.1 * FEASIBLE]))
     assert fine_enough(values, np.array([0.0, 0.5]), values, np.array([0.0, 0.6])), "a limit that is passed anyway"
+
+
+def test_limits_beside_an_objective_that_is_no_extreme_are_judged_at_four_times_the_positions():
+    """Its programs know no mesh half a position later; the largest pressure lies between twice the positions."""
+    few = replace(LINE, positions=8)
+    limit = jg.Constraint("max_flank_pressure", high=500.0)
+    posed = make_problem(
+        design,
+        {"amount": (0.0, 30.0), "length": (1.0, 5.0)},
+        mesh=jg.prepare(gear_pair(), resolution=few),
+        torque=50.0,
+        objective="effective_contact_ratio",
+        constraints=[limit],
+    )
+    point = np.array([[0.3, 0.6]])
+    values, violations = at_more_positions(Record(posed, None), point)
+    twice, four = (
+        scores(posed.on(jg.prepare(posed.mesh.pair, resolution=replace(few, positions=count))), point)
+        for count in (16, 32)
+    )
+    np.testing.assert_allclose(values, twice.value, rtol=1e-12)
+    np.testing.assert_allclose(violations, four.violation, rtol=1e-12)
+    assert abs(float(four.violation[0]) - float(twice.violation[0])) > 1e-4
 
 
 @pytest.mark.slow
