@@ -119,7 +119,7 @@ def _grid_change(study: Study) -> dict[str, dict[str, float]]:
             finer.oscillator(study.mesh, torque, pinion=pinion, wheel=wheel),
             settings.mesh_frequencies[near],
             direction=response.direction,
-            start=tuple(part[begin] for part in response.state),
+            start=(response.state[0][begin], response.state[1][begin]),
             steps=[2 * count for count in study.steps[near]],
             kicks=settings.kicks_of(run),
         )
