@@ -3,7 +3,7 @@
 import csv
 import dataclasses
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +66,7 @@ class Study:
     steps: tuple[int, ...]
     branches: tuple[Branch, ...]
     run_ups: Mapping[str, Mapping[float, RunUp]]
-    grid_change: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    grid_change: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
 
     def rows(self) -> Iterator[tuple[str, float, str, SpeedResponse]]:
         """Design, torque, run and response of all runs."""
