@@ -4,6 +4,7 @@ JAX and the library are imported when a command runs: help, version and what is 
 """
 
 import os
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -249,6 +250,10 @@ def convert(
         from .convert import convert
     convert(source, target, stage=stage, flank=flank, load_case=load_case, torque=torque)
     return OK
+
+
+for _command in app.registered_commands:  # the terminal breaks the lines of a paragraph, not the source
+    _command.help = re.sub(r"(?<=\S)\n +(?=\S)", " ", _command.callback.__doc__ or "")
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
