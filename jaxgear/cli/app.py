@@ -89,13 +89,7 @@ def optimize(
     file: File,
     output: Annotated[Path | None, output_option("optimize/METHOD")] = None,
     method: Annotated[
-        str | None,
-        typer.Option(
-            "--method",
-            "-m",
-            metavar="NAME",
-            help=f"In place of the file's: {METHODS}; pareto takes several objectives.",
-        ),
+        str | None, typer.Option("--method", "-m", metavar="NAME", help=f"In place of the file's: {METHODS}, pareto.")
     ] = None,
     quick: Quick = False,
     no_figures: NoFigures = False,
