@@ -432,7 +432,7 @@ def test_a_front_is_tabulated_drawn_and_compared(monkeypatch):
     assert drawn["chosen"] == 1 and {name: [*point] for name, point in drawn["others"].items()} == {
         name: both[name] for name in ("unmodified", "rule-based")
     }
-    rows = read_table(front_table(front, designs)).rows
+    rows = read_table(front_table(front, designs, {"height": "mm"})).rows
     assert rows[1] == ("2, compromise", "1", "380", "2") and rows[-1] == ("rule-based", "1.2", "390", "-")
     told = dict(reversed([*front_rows(front, [1, 1], designs)]))
     assert "worst distance" in told["compromise"]

@@ -421,7 +421,7 @@ def test_flank_lines_are_varied_together_with_the_profiles(monkeypatch):
     for wheel in (tried[10.0, 5.0, -4.0, 3.0][1], lines[1] + found.profiles[1]):
         removed = removed_at(side, wheel, jnp.reshape(side.pitch_roll_length, (1,)), ends)
         np.testing.assert_allclose(removed[:, 0], [-1.0 + 2.0 + 3.0, 1.0 - 2.0 + 3.0], atol=1e-9)
-    assert found.radar_variants()[1][1] == "10 and 5 µm, slope -4 µm, crowning +3 µm"
+    assert found.radar_variants()[1][1] == "pinion 10, wheel 5 µm, slope -4 µm, crowning +3 µm"
 
 
 def duty(torques, hours, speed):

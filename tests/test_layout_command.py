@@ -157,7 +157,7 @@ def laid_out(path, folder):
         flanks = {row["design"]: row for row in csv.DictReader(rows) if row["gear"] == "wheel"}
     # the last row of a flank is its tip at the end of the face
     end = main["wheel"]["slope_um"] / 2 + main["wheel"]["crowning_um"]
-    assert float(flanks["flank lines"]["modification_um"]) == pytest.approx(end, abs=1e-5)
+    assert float(flanks["step 2"]["modification_um"]) == pytest.approx(end, abs=1e-5)
     assert float(flanks["step 1"]["modification_um"]) < end
     changes = {step: of["face_load_factor"] for step, of in found["change_at_twice_the_stations"].items()}
     assert 0 < abs(changes["unmodified"]) < 0.02 * factor and list(changes) == ["unmodified", "step_1", "step_2"]
@@ -247,7 +247,7 @@ def test_profiles_follow_the_flank_lines(file, tmp_path):
     with (folder / "profiles.csv").open() as rows:
         head = rows.readline()
     assert all(name in head for name in ("face_load_factor", "root_face_load_factor", "edge_load_factor"))
-    kinds = [one["type"] for one in found["designs"]["layout"]["wheel_modification"]]
+    kinds = [one["type"] for one in found["designs"]["step 3"]["wheel_modification"]]
     assert kinds == ["lead_slope", "lead_crowning", "tip_relief"]
 
 

@@ -94,7 +94,7 @@ def test_band_of_the_class_about_the_first_design(mesh, quality, chart):
     low, high = panels[0].get_ylim()
     assert low > vertices[:, 1].max() and high < vertices[:, 1].min()
     labels = [text.get_text() for text in panels[0].figure.legends[0].get_texts()]
-    assert labels == ["design", "none", "tolerance about design"]
+    assert labels == ["design", "none", "ISO 1328 tolerance about design"]
     assert np.asarray(manufacture.profile_trace(mesh.sides[0], design, quality).design).max() == 0.0
 
 

@@ -4,6 +4,7 @@ JAX and the library are imported when a command runs: help, version and what is 
 """
 
 import os
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -88,7 +89,7 @@ def optimize(
     file: File,
     output: Annotated[Path | None, output_option("optimize/METHOD")] = None,
     method: Annotated[
-        str | None, typer.Option("--method", "-m", metavar="NAME", help=f"In place of the file's: {METHODS}.")
+        str | None, typer.Option("--method", "-m", metavar="NAME", help=f"In place of the file's: {METHODS}, pareto.")
     ] = None,
     quick: Quick = False,
     no_figures: NoFigures = False,
@@ -249,6 +250,10 @@ def convert(
         from .convert import convert
     convert(source, target, stage=stage, flank=flank, load_case=load_case, torque=torque)
     return OK
+
+
+for _command in app.registered_commands:  # the terminal breaks the lines of a paragraph, not the source
+    _command.help = re.sub(r"(?<=\S)\n +(?=\S)", " ", _command.callback.__doc__ or "")
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

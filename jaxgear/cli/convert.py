@@ -57,10 +57,11 @@ def convert(
 
 def _to_rexs(source: Path, target: Path) -> None:
     design = load_design(source)
-    if design.bounds:
-        problem = f"convert needs numbers, these are free: {', '.join(design.bounds)}"
+    free = [name for name in design.bounds if design.open_case or name not in design.values]
+    if free:
+        problem = f"convert needs numbers, these are free: {', '.join(free)}; give each a value"
         raise DesignFileError("variables", problem, source)
-    pinion, wheel = design.design({})
+    pinion, wheel = design.design(design.values)
     with interrupt.held(f"{target} is there"):
         write_rexs(
             target,

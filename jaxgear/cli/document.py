@@ -53,6 +53,12 @@ _INPUTS = (
     "quick",
     "left_out",
 )
+_OF_OPTIMUM = {
+    "feasible": "all constraints met",
+    "objective_change_at_twice_the_positions": "change of the objective at twice the positions, in its unit",
+    "decrease_left_per_range": "first-order optimality, in the unit of the objective",
+    "evaluations": "contact analyses",
+}
 _ELSEWHERE = ("title", "design_file", "project", "versions", "geometry", "drawing", "iso_6336")
 
 
@@ -197,7 +203,7 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
     if not found.warnings:
         lines.append("Every solution converged, and no limit is passed.")
     if data.get("quick"):
-        lines.append("Quick run: coarse positions and a short search, not a result to build on.")
+        lines.append("Quick run, coarse positions and a short search: a preview, do not use for design.")
     if found.doubts is not None and not found.doubts:
         lines.append("Inputs and results lie within the usual ranges.")
     lines += found.details
@@ -210,11 +216,7 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
         ]
         checks += [(f"{name}: by finite elements, {key}", value) for key, value in numbers(design.get("verified", {}))]
     optimum = data.get("optimum", {})
-    checks += [
-        (heading(key), text(optimum[key]))
-        for key in ("feasible", "objective_change_at_twice_the_positions", "decrease_left_per_range", "evaluations")
-        if key in optimum
-    ]
+    checks += [(said, text(optimum[key])) for key, said in _OF_OPTIMUM.items() if key in optimum]
     tables = [Table(("", "value"), tuple(checks), "checks")] if checks else []
     return Section("Convergence and validity", lines, found.warnings, found.doubts or (), tables)
 

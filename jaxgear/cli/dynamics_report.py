@@ -102,7 +102,7 @@ def table(study: Study) -> Table:
     result.add_column("torque [N m]", justify="right")
     result.add_column("f_n [Hz]", justify="right", no_wrap=True)
     result.add_column("speed", no_wrap=True)
-    for heading in ("K_v", "at [Hz]", "rms [um]", "at [Hz]", "no contact [%]"):
+    for heading in ("K_v", "at [Hz]", "DTE rms [um]", "at [Hz]", "contact loss [%]"):
         result.add_column(heading, justify="right", no_wrap=True)
     before = None
     for name, torque, run, response in study.rows():
@@ -137,12 +137,24 @@ def verdict(study: Study) -> Iterator[str]:
         steps = " to ".join(f"{count}" for count in dict.fromkeys((min(study.steps), max(study.steps))))
         grid = f"{study.request.settings.positions} positions of the mesh force and {steps} steps per mesh cycle"
         yield grid_line(grid, study.grid_change)
+    yield from _still_rising(study)
     yield from _far_from_resonance(study)
     yield from _bodies(study)
     aperiodic = sum(int(np.sum(np.asarray(response.period) == 0)) for *_, response in study.rows())
     total = sum(len(response.mesh_frequency) for *_, response in study.rows())
     if aperiodic:
         yield f"no periodic motion was found at {aperiodic} of {total} speeds: their numbers are of a recorded time"
+
+
+def _still_rising(study: Study) -> Iterator[str]:
+    """A line for designs whose largest dynamic factor is that of the highest speed: it may rise beyond."""
+    highest = float(study.request.settings.mesh_frequencies[-1])
+    rising = {name: None for name, _, _, response in study.rows() if peak(response, "dynamic_factor")[1] == highest}
+    if rising:
+        yield (
+            f"largest dynamic factor at the highest speed, {highest:.0f} Hz: {', '.join(rising)}; it may rise further "
+            "beyond it, up to the natural frequency f_n"
+        )
 
 
 def _far_from_resonance(study: Study) -> Iterator[str]:

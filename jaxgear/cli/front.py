@@ -1,12 +1,13 @@
 """A Pareto front in words and as a table, compared with the unmodified and the rule-based design."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from rich.table import Table
 
 from ..optimize import Front
 from . import report
+from .gains import words
 
 COMPROMISE = "compromise"  # what the design of a front is called that the run shows
 _SHOWN_PARAMETERS = 6  # more columns than these are for a file
@@ -21,15 +22,16 @@ def others_of(front: Front, evaluations: report.Evaluations) -> dict[str, np.nda
     }
 
 
-def front_table(front: Front, evaluations: report.Evaluations) -> Table:
-    """All designs of a front, with the others below."""
+def front_table(front: Front, evaluations: report.Evaluations, of_variables: Mapping[str, str]) -> Table:
+    """All designs of a front, with the others below; variables with their units."""
     result = Table(title=f"Pareto front, {len(front.values)} designs, all in front.csv", title_justify="left")
     result.add_column("")
     names = list(front.parameters) if len(front.parameters) <= _SHOWN_PARAMETERS else []
     for name, unit in zip(front.objectives, front.units):
-        result.add_column(f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " "), justify="right")
+        result.add_column(f"{words(name)}\n[{unit}]" if unit else words(name), justify="right")
     for name in names:
-        result.add_column(name, justify="right")
+        unit = of_variables.get(name, "")
+        result.add_column(f"{name}\n[{unit}]" if unit else name, justify="right")
     for row, values in enumerate(front.values):
         cells = [*values, *(front.parameters[name][row] for name in names)]
         label = f"{row + 1}, {COMPROMISE}" if row == front.chosen else f"{row + 1}"

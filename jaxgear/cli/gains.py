@@ -76,12 +76,13 @@ def _numbers(evaluations: report.Evaluations, problem: Problem | None) -> Iterat
         name, _, unit = label.partition(" [")
         verified = {of: found.verified.objectives[label] for of, found in evaluations.items() if found.verified}
         values = {of: found.objectives[label] for of, found in evaluations.items()}
-        yield Judged(_words(name), unit.rstrip("]"), sign, values, verified if several else {})
+        yield Judged(words(name), unit.rstrip("]"), sign, values, verified if several else {})
     if _PPTE not in labels:
         verified = {of: found.verified.ppte for of, found in evaluations.items() if found.verified}
         values = {of: float(found.metrics["ppte_um"]) for of, found in evaluations.items()}
-        yield Judged(_words("ppte"), "um", 1, values, verified if several else {})
+        yield Judged(words("ppte"), "um", 1, values, verified if several else {})
 
 
-def _words(name: str) -> str:
+def words(name: str) -> str:
+    """Name of a quantity as a table says it."""
     return name.replace("ppte", "PPTE").replace("_", " ")

@@ -19,7 +19,7 @@ def verdict(study: Study) -> Iterator[str]:
     """The layout in words."""
     layout = study.main
     for name, line in (("pinion", layout.pinion), ("wheel", layout.wheel)):
-        yield f"{name}: slope {float(line.slope):.1f} um, crowning {float(line.crowning):.1f} um"
+        yield f"flank line of the {name}: slope {float(line.slope):.1f} um, crowning {float(line.crowning):.1f} um"
     added = float(np.sum(layout.further))
     yield f"further crowning of step 2: {added:.1f} um on both together, the least is {float(layout.needed):.1f} um"
     if layout.damage:
@@ -50,8 +50,9 @@ def _profile_verdict(study: Study, profile: ProfileLayout, where: str) -> Iterat
         yield f"  on top of the flank lines, over the common face: slope {slope:+g} um, crowning {crowning:+g} um"
     ratio = profile.table.column("effective_contact_ratio")
     yield (
-        f"  PPTE {profile.change('ppte'):+.0f} %, loss {profile.change('mesh_loss_factor'):+.0f} %; effective contact "
-        f"ratio {ratio[0]:.3f} to {ratio[profile.best]:.3f}, theoretical {profile.contact_ratio:.3f}"
+        f"  than without it: PPTE {profile.change('ppte'):+.0f} %, loss {profile.change('mesh_loss_factor'):+.0f} %, "
+        f"max flank pressure {profile.change('max_flank_pressure'):+.0f} %, effective contact ratio {ratio[0]:.3f} -> "
+        f"{ratio[profile.best]:.3f} (theoretical {profile.contact_ratio:.3f})"
     )
 
 

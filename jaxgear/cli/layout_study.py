@@ -90,12 +90,12 @@ def root_factor(layout: FlankLineLayout, factor) -> np.ndarray:
 
 
 def designs(study: Study) -> dict[str, tuple[AbstractModification, AbstractModification]]:
-    """Modifications of pinion and wheel: the flank lines after both steps, and with the profile modification."""
+    """Modifications of pinion and wheel after every step."""
     _, first, _ = flank_lines(study.main).values()
     pinion, wheel = study.main.modifications
-    found = {"step 1": (first[0].modification, first[1].modification), "flank lines": (pinion, wheel)}
+    found = {"step 1": (first[0].modification, first[1].modification), "step 2": (pinion, wheel)}
     if study.profile is not None:
         # the profile was made on the further crowning, which the flank line has as well
         of_pinion, of_wheel = study.profile.profiles
-        found["layout"] = pinion + of_pinion, wheel + of_wheel
+        found["step 3"] = pinion + of_pinion, wheel + of_wheel
     return found

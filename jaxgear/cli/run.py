@@ -198,7 +198,7 @@ class Run:
     def _tables(self) -> Iterator[Table]:
         yield report.table(self.design, self._evaluations)
         if self._front is not None:
-            yield front_table(self._front, self._evaluations)
+            yield front_table(self._front, self._evaluations, self.design.units)
 
     def _first(self) -> Iterator[Block]:
         """What an optimization says before its tables."""
@@ -224,7 +224,7 @@ class Run:
     def _notes(self) -> Iterator[str]:
         yield from manufactured.lines(self.design, self._evaluations)
         if self._quick:
-            yield "quick run: coarse positions and a short search, not a result to build on"
+            yield "quick run, coarse positions and a short search: a preview, do not use for design"
         if self._unverified:
             yield f"not verified by finite elements: {self._unverified}"
 

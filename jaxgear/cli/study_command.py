@@ -112,7 +112,7 @@ class StudyCommand(Generic[S]):
             report.console().print(table)
         report.say(*lines, *(doubts or ()))
         if quick:
-            report.say(f"quick run: {self.coarse}, not a result to build on")
+            report.say(f"quick run, {self.coarse}: a preview, do not use for design")
         report.say(f"results in {target}{os.sep}, {stages.elapsed:.1f} s")
         for line in (*left_out, *failures):
             report.warn(line)

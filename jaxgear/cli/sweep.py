@@ -15,7 +15,7 @@ from . import interrupt, report, sweep_document
 from .document import document
 from .progress import Meter
 from .run import coarse, default_folder, opened
-from .sweep_chosen import evaluate_best, grid_of_best
+from .sweep_chosen import evaluate_best, said_of_best
 from .sweep_figures import write_figures
 
 _QUICK_SAMPLES = 4096
@@ -65,7 +65,7 @@ def run_sweep(
     with writing(target / _BEST_FILE):
         chosen.to_csv(target / _BEST_FILE)
     interrupt.note(f"the table and {_BEST_FILE} are complete in {target}{os.sep}, not all figures are drawn")
-    grid = grid_of_best(design, chosen, size) if len(chosen) else ""
+    grid, doubts = said_of_best(design, chosen, size) if len(chosen) else ("", [])
     files = write_figures(target, table, request.results) if figures and len(chosen) else []
     if asked is not None:
         closer = evaluate_best(target, design, chosen, size, quick=quick, figures=figures)
@@ -73,7 +73,7 @@ def run_sweep(
             target, asked, design, table, chosen, closer, files, request.results, size=size, quick=quick, grid=grid
         )
     interrupt.note(f"all results are in {target}{os.sep}")
-    fine = _show(table, chosen, target, meter, quick=quick, grid=grid)
+    fine = _show(table, chosen, target, meter, quick=quick, lines=[*[grid] * bool(grid), *doubts])
     if design.left_out:
         report.warn(design.left_out)
     return fine
@@ -87,12 +87,14 @@ def _check(target: Path) -> None:
         raise ValueError(f"{target}: holds other files than a sweep ({others[0]}), choose another folder")
 
 
-def _show(table: SweepTable, chosen: SweepTable, target: Path, meter: Meter, *, quick: bool, grid: str) -> bool:
+def _show(
+    table: SweepTable, chosen: SweepTable, target: Path, meter: Meter, *, quick: bool, lines: Sequence[str]
+) -> bool:
     out = report.console()
     out.print(_side_by_side(chosen, (out.width - _LABEL_WIDTH) // _CELL_WIDTH))
-    report.say(*[grid] * bool(grid))
+    report.say(*lines)
     if quick:
-        report.say("quick run: coarse positions and few samples, not a result to build on")
+        report.say("quick run, coarse positions and few samples: a preview, do not use for design")
     report.say(f"best {len(chosen)} in {target / _BEST_FILE}, table in {target / _TABLE}{os.sep}")
     rate = f", {meter.rate:,.0f}/s" if meter.rate else ""
     report.say(f"{len(table):,} variants{rate}, {meter.elapsed:.1f} s")

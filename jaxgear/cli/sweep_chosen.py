@@ -10,6 +10,7 @@ import rich.table
 
 from ..contact import Mesh, Resolution
 from ..io import DesignFile
+from ..metrics import plausibility
 from ..microgeometry import NoModification
 from ..sweeps import SweepTable, over_torques
 from . import report
@@ -75,8 +76,8 @@ def evaluate_best(
     return Chosen([report.table(design, best_first)], drawn, pages, list(doubts), list(report.failures(found)))
 
 
-def grid_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> str:
-    """How fine the mesh of a sweep was, and by how much the numbers of its best variant change on a finer one."""
+def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tuple[str, list[str]]:
+    """By how much the numbers of the best variant change on a finer mesh, and what is not usual of it."""
     parameters = best.take([0]).designs()[0]
     made = design.sweep_mesh(size)
     mesh = made if isinstance(made, Mesh) else made(parameters)
@@ -84,7 +85,9 @@ def grid_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> str:
     pinion, wheel = design.design(parameters)
     (cycle,) = over_torques(mesh, np.asarray([torque]), pinion=pinion, wheel=wheel)
     name = f"variant {best.column('variant')[0]} at {torque:g} N m"
-    return grid_line(f"{size.positions} positions", {name: grid_change(mesh, cycle, pinion, wheel)})
+    found = plausibility(cycle, pinion=pinion, wheel=wheel, compliance=mesh.compliance)
+    doubts = list(report.doubt_lines({name: found, "other": ()}))
+    return grid_line(f"{size.positions} positions", {name: grid_change(mesh, cycle, pinion, wheel)}), doubts
 
 
 def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, list[Path]]:

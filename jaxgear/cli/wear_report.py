@@ -110,19 +110,19 @@ def _table(study: Study) -> Table:
     result = Table(title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD)
     result.add_column("design", no_wrap=True)
     columns = {
-        "pinion_wear_depth_um": "pinion [um]",
-        "wheel_wear_depth_um": "wheel [um]",
-        "wear_depth_error_um": "error [um]",
-        "new_ppte_um": "PPTE new",
-        "max_ppte_over_life_um": "worst",
-        "worn_ppte_um": "worn",
-        "mean_ppte_over_life_um": "mean [um]",
+        "pinion_wear_depth_um": "depth pinion\n[um]",
+        "wheel_wear_depth_um": "depth wheel\n[um]",
+        "wear_depth_error_um": "its error\n[um]",
+        "new_ppte_um": "PPTE new\n[um]",
+        "max_ppte_over_life_um": "PPTE worst\n[um]",
+        "worn_ppte_um": "PPTE worn\n[um]",
+        "mean_ppte_over_life_um": "PPTE mean\n[um]",
     }
     if settings.dynamics is not None:
         columns |= {"new_dynamic_factor": "K_v new", "max_dynamic_factor_over_life": "K_v worst"}
     limits = {
-        "life_to_depth_revolutions": (settings.depth_limit, "{:g} um deep"),
-        "life_to_ppte_revolutions": (settings.ppte_limit, "PPTE {:g} um"),
+        "life_to_depth_revolutions": (settings.depth_limit, "revolutions to\n{:g} um depth"),
+        "life_to_ppte_revolutions": (settings.ppte_limit, "revolutions to\nPPTE {:g} um"),
     }
     columns |= {key: text.format(float(limit)) for key, (limit, text) in limits.items() if limit is not None}
     for heading in columns.values():
@@ -178,6 +178,8 @@ def verdict(study: Study) -> Iterator[str]:
     if found:
         best = min(found, key=lambda name: found[name])
         yield f"least mean PPTE over the life: {best}, {found[best]:.3f} um"
+        if found.get(OVER_LIFE, 0.0) > found[best]:
+            yield f"{OVER_LIFE}: its search ended above {best}, do not use it; give the method of [optimize] more steps"
     yield from wear_scatter.lines(study.design, study.scatters)
     if OVER_LIFE in study.designs:
         yield f"{OVER_LIFE}: {_sought(study)}"

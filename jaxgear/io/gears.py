@@ -129,7 +129,9 @@ def with_quality(key: str, section: Any, own: list[int] | None) -> Any:
             raise DesignFileError(f"{key}.quality_class", "missing, this key is required where the gears have none")
         return section.model_copy(update={"quality_class": own})
     if own is not None:
-        raise DesignFileError(f"{key}.quality_class", "has no effect, the gears have classes of their own")
+        raise DesignFileError(
+            f"{key}.quality_class", "has no effect, the gears have classes of their own: take one of them out"
+        )
     return section
 
 

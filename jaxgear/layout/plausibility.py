@@ -36,11 +36,11 @@ LIMITS = {
         0.0,
         np.inf,
         "",
-        f"more than {_COST:g} times that of unmodified flanks: do the cases of deviations gain what crowning costs "
-        "here, and would the least crowning do?",
+        f"more than {_COST:g} times that of unmodified flanks; compare the worst cases of deviations, and try "
+        'layout.further_crowning = "least"',
     ),
     "K_Hbeta of the worst case": Limit(
-        0.0, np.inf, "", "no better than without the further crowning: would the least crowning do?"
+        0.0, np.inf, "", 'no better than without the further crowning; try layout.further_crowning = "least"'
     ),
     "slope and crowning in modules": Limit(
         0.0, 0.04, "", "twice the tip relief of ISO 53:1974: are the units of bearings, shafts and housing right?"

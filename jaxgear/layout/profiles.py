@@ -95,7 +95,7 @@ class ProfileLayout:
         names = []
         for row in rows:
             further = [f"{name} {line[row]:+g} µm" for name, line in zip(LINE, lines) if np.ptp(line)]
-            names.append(", ".join([f"{first[row]:g} and {second[row]:g} µm", *further]))
+            names.append(", ".join([f"pinion {first[row]:g}, wheel {second[row]:g} µm", *further]))
         return [0, *rows], ["no profile modification", *names]
 
 

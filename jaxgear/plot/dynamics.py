@@ -12,8 +12,11 @@ from ..dynamics import Branch, RunUp, SpeedResponse
 from .figure import GREY, legend_above, line_style, marker_style, report_axes
 
 FREQUENCY_LABEL = "mesh frequency [Hz]"
-_APPROACH_LABEL = "approach of the flanks [µm]"
-_RESPONSES = {"dynamic_factor": "dynamic factor $K_v$ [-]", "approach_rms": "rms of the approach [µm]"}
+_APPROACH_LABEL = "dynamic transmission error [µm]"
+_RESPONSES = {
+    "dynamic_factor": "dynamic factor $K_v$ [-]",
+    "approach_rms": "rms of the dynamic\ntransmission error [µm]",
+}
 _RUNS = ("-", (0, (4, 1.5)), (0, (1, 1)))  # lines of the runs of a design, in their order
 RunUps = Mapping[str, RunUp]
 Runs = Mapping[str, SpeedResponse] | Sequence[SpeedResponse]  # by what a legend calls them, or by their directions
@@ -192,7 +195,7 @@ def bifurcation(responses: Runs, ax: Axes | None = None, *, title: str = "") -> 
             style = {"color": line_style(1 + index)["color"], "marker": "^v"[index % 2]}
             label = f"speed {run}"
             ax.plot(frequency.ravel(), points.ravel(), linestyle="", markersize=3.0, mew=0, label=label, **style)
-        ax.set(xlabel=FREQUENCY_LABEL, ylabel="approach at mesh position 0 [µm]")
+        ax.set(xlabel=FREQUENCY_LABEL, ylabel="dynamic transmission error\nat mesh position 0 [µm]")
         _entitle(ax, title, legend_above(ax))
     return ax
 
@@ -286,7 +289,7 @@ def phase_portrait(approach, velocity, force, ax: Axes | None = None, *, once: A
                 label="once a cycle",
             )
         ax.autoscale_view()
-        ax.set(xlabel=_APPROACH_LABEL, ylabel="velocity of approach [mm/s]")
+        ax.set(xlabel=_APPROACH_LABEL, ylabel="its rate [mm/s]")
         _entitle(ax, title, legend_above(ax))
     return ax
 

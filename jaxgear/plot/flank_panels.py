@@ -11,7 +11,7 @@ from ..tolerance import ToleranceClass
 from .figure import ABOVE, HEIGHT, PALE, legend_above, legend_over_panels, line_style, report_axes
 
 WIDTH = 150.0  # of the two panels together [mm]
-_BAND = "tolerance about "  # the name of the design
+_BAND = "ISO 1328 tolerance about "  # the name of the design
 
 Design = tuple[AbstractModification | None, AbstractModification | None]
 Tolerances = tuple[ToleranceClass | None, ToleranceClass | None]

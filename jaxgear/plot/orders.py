@@ -36,7 +36,7 @@ def transmission_error_orders(cycles: Mapping[str, MeshCycle], ax: Axes | None =
             )
         ax.grid(False, axis="x")
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-        ax.set(xlim=(0.4, count + 0.6), xlabel="mesh order [-]", ylabel="amplitude [µm]")
+        ax.set(xlim=(0.4, count + 0.6), xlabel="mesh order [-]", ylabel="amplitude of the\ntransmission error [µm]")
         legend_above(ax)
     return ax
 

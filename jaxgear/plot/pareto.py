@@ -58,7 +58,7 @@ def pareto(
             where = "pre" if x in maximize else "post"
             front_steps(ax, best, f"Pareto front, {len(best)} variants", where=where)
         else:
-            text = f"Pareto front of three, {len(best)} variants"
+            text = f"Pareto front of all three results, {len(best)} variants"
             front_dots(ax, best, text, label(colour, labels), turned=colour in maximize)
         for index, (name, row) in enumerate((marked or {}).items()):
             front_star(ax, values[row], name, index)

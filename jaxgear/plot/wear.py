@@ -42,7 +42,7 @@ def worn_flank(life: WearLife, gear: str, ax: Axes | None = None, *, title: str 
         if not ax.yaxis_inverted():  # panels share it
             ax.invert_yaxis()
         ax.set(xlabel=f"roll angle of the {gear} [deg]", ylabel="wear depth [µm]", title=title)
-        legend_above(ax) if not title else ax.legend(frameon=False, loc="lower right")
+        legend_above(ax) if not title else ax.legend(frameon=False, loc="best")
     return ax
 
 
