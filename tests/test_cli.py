@@ -236,8 +236,9 @@ def test_what_is_not_usual_is_said_once_of_all_designs_it_concerns():
     }
     assert list(report.doubt_lines(found)) == [
         "please check: friction 3.7 is more than 0.5 (steel)",
-        "please check: unmodified 4689, optimum 1837: corner pressure 1837 MPa is more than 1650 (case-hardened)",
-        "please check: optimum: flank pressure 3383 MPa is more than 1650 (case-hardened)",
+        "please check: unmodified 4689 MPa, optimum 1837 MPa: corner pressure 1837 MPa is more than 1650 MPa "
+        "(case-hardened)",
+        "please check: optimum: flank pressure 3383 MPa is more than 1650 MPa (case-hardened)",
     ]
 
 

@@ -13,7 +13,7 @@ from commands import LINE, call
 from report_page import check_report
 
 from jaxgear.cli import interrupt
-from jaxgear.cli.dynamics_report import _bodies, _far_from_resonance
+from jaxgear.cli.dynamics_report import _bodies, _far_from_resonance, _still_rising
 from jaxgear.cli.kept import Kept, SpeedResponses
 from jaxgear.dynamics import Oscillator, RectangularStiffness, SpeedResponse
 from jaxgear.io import DesignFileError, dynamics_request, load_design, sweep_request
@@ -256,3 +256,18 @@ def test_kept_responses_are_not_made_again(tmp_path):
     assert len(made) == 4
     kept.remove()
     assert not (tmp_path / ".runs").exists()
+
+
+def test_a_largest_dynamic_factor_at_the_highest_speed_is_told():
+    frequencies = np.array([100.0, 200.0, 300.0])
+
+    def response(*factors):
+        return SimpleNamespace(dynamic_factor=np.array(factors), mesh_frequency=frequencies)
+
+    runs = {"rises": response(1.0, 1.2, 1.3), "peaks": response(1.0, 1.4, 1.2)}
+    study = SimpleNamespace(
+        request=SimpleNamespace(settings=SimpleNamespace(mesh_frequencies=frequencies)),
+        rows=lambda: ((name, 50.0, "up", of) for name, of in runs.items()),
+    )
+    (told,) = _still_rising(study)
+    assert told.startswith("largest dynamic factor at the highest speed, 300 Hz: rises;")

@@ -309,7 +309,7 @@ def test_usual_shafts_raise_no_doubt_and_slips_of_a_unit_do(layout):
     assert few.value > 0.5 * STATIONS and few.limit.high == STATIONS / 4
     stiff = plausibility(layout, softened(5e5))
     assert {doubt.name for doubt in stiff} == {"radial stiffness", thick.name}
-    assert str(stiff[0]).startswith('bearing "C", radial stiffness 5e+05 N/um is more than 2e+04 (')
+    assert str(stiff[0]).startswith('bearing "C", radial stiffness 5e+05 N/um is more than 2e+04 N/um (')
 
 
 def test_crowning_that_costs_more_than_bending_raises_a_doubt():

@@ -622,6 +622,17 @@ def test_what_a_drawing_says_is_converted_both_ways(tmp_path):
     assert tolerances[0] == pytest.approx(30.0 / np.cos(np.deg2rad(20)), rel=1e-9) == pytest.approx(tolerances[1])
 
 
+def test_values_of_variables_are_converted(tmp_path):
+    """As `jaxgear analyze` takes them; their bounds are left out."""
+    design, rexs = tmp_path / "pair.toml", tmp_path / "pair.rexs"
+    assert call("new", design, *"--teeth 19 48 --module 3 --torque 50 --face-width 18".split()).code == 0
+    done = call("convert", design, rexs)
+    assert done.code == 0 and "left out, REXS has no place for it: [variables]" in done.out
+    found, given = read_rexs(rexs).pinion, load_design(design)
+    points = np.meshgrid(ALONG, ACROSS)
+    np.testing.assert_allclose(removed(found, *points), removed(given.design(given.values)[0], *points), atol=1e-9)
+
+
 def test_the_command_refuses_in_one_line_and_writes_nothing(tmp_path):
     rexs, free, there = tmp_path / "pair.rexs", tmp_path / "free.toml", tmp_path / "there.toml"
     write_rexs(rexs, PAIR)

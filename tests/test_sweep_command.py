@@ -22,7 +22,9 @@ from report_page import assert_row, check_report
 import jaxgear as jg
 from jaxgear.cli import devices, progress, sweep_figures
 from jaxgear.cli import sweep as sweep_command
+from jaxgear.cli.sweep_chosen import said_of_best
 from jaxgear.io import load_design, read_variants, sweep_request
+from jaxgear.metrics.plausibility import LIMITS
 from jaxgear.sweeps import SweepTable, evaluate
 from jaxgear.sweeps.columns import Column
 
@@ -48,7 +50,7 @@ def folder(tmp_path_factory):
     return folder, result
 
 
-def test_the_best_variant_says_what_a_finer_mesh_would_change(folder):
+def test_the_best_variant_says_what_a_finer_mesh_would_change_and_what_is_unusual(folder, monkeypatch):
     folder, result = folder
     file, best = load_design(folder / "gear.toml"), jg.open_sweep(folder / "out" / "table").best(1)
     pinion, wheel = file.design(best.designs()[0])
@@ -60,6 +62,9 @@ def test_the_best_variant_says_what_a_finer_mesh_would_change(folder):
     told = f"variant {best.column('variant')[0]} at 50 N m by {ppte[1] - ppte[0]:+.2g} um"
     assert f"evaluated at 16 positions; twice as many change PPTE: {told}" in result.out
     assert told in (folder / "out" / "report.html").read_text("utf-8")
+    monkeypatch.setitem(LIMITS, "flank pressure", LIMITS["flank pressure"]._replace(high=1.0))
+    _, (unusual,) = said_of_best(file, best, size)
+    assert unusual.startswith(f"please check: variant {best.column('variant')[0]} at 50 N m: flank pressure ")
 
 
 def test_the_report_shows_the_best_variants(folder):

@@ -142,7 +142,7 @@ def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
             grouped.setdefault((doubt.name, doubt.where), {})[design] = doubt
     for same in grouped.values():
         doubt = list(same.values())[-1]  # the last is the one that the run is about
-        numbers = {design: f"{each.value:.4g}" for design, each in same.items()}
+        numbers = {design: f"{each.value:.4g} {each.limit.unit}".rstrip() for design, each in same.items()}
         if len(set(numbers.values())) > 1:
             said = f"{', '.join(f'{design} {number}' for design, number in numbers.items())}: "
         else:

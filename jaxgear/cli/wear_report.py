@@ -110,19 +110,19 @@ def _table(study: Study) -> Table:
     result = Table(title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD)
     result.add_column("design", no_wrap=True)
     columns = {
-        "pinion_wear_depth_um": "depth pinion\n[um]",
-        "wheel_wear_depth_um": "depth wheel\n[um]",
-        "wear_depth_error_um": "its error\n[um]",
-        "new_ppte_um": "PPTE new\n[um]",
-        "max_ppte_over_life_um": "PPTE worst\n[um]",
-        "worn_ppte_um": "PPTE worn\n[um]",
-        "mean_ppte_over_life_um": "PPTE mean\n[um]",
+        "pinion_wear_depth_um": "depth\npinion\n[um]",
+        "wheel_wear_depth_um": "depth\nwheel\n[um]",
+        "wear_depth_error_um": "its\nerror\n[um]",
+        "new_ppte_um": "PPTE\nnew\n[um]",
+        "max_ppte_over_life_um": "PPTE\nworst\n[um]",
+        "worn_ppte_um": "PPTE\nworn\n[um]",
+        "mean_ppte_over_life_um": "PPTE\nmean\n[um]",
     }
     if settings.dynamics is not None:
         columns |= {"new_dynamic_factor": "K_v new", "max_dynamic_factor_over_life": "K_v worst"}
     limits = {
-        "life_to_depth_revolutions": (settings.depth_limit, "revolutions to\n{:g} um depth"),
-        "life_to_ppte_revolutions": (settings.ppte_limit, "revolutions to\nPPTE {:g} um"),
+        "life_to_depth_revolutions": (settings.depth_limit, "revolutions\nto {:g} um\ndepth"),
+        "life_to_ppte_revolutions": (settings.ppte_limit, "revolutions\nto PPTE of\n{:g} um"),
     }
     columns |= {key: text.format(float(limit)) for key, (limit, text) in limits.items() if limit is not None}
     for heading in columns.values():

@@ -107,9 +107,9 @@ class Doubt(NamedTuple):
 
     def __str__(self) -> str:
         low, high, unit, remark = self.limit
-        bound = f"less than {low:.4g}" if self.value < low else f"more than {high:.4g}"
-        number = f"{self.name} {self.value:.4g}" + (f" {unit}" if unit else "")
-        return f"{f'{self.where}, ' if self.where else ''}{number} is {bound} ({remark})"
+        bound = f"less than {low:.4g} {unit}" if self.value < low else f"more than {high:.4g} {unit}"
+        number = f"{self.name} {self.value:.4g} {unit}"
+        return f"{f'{self.where}, ' if self.where else ''}{number.rstrip()} is {bound.rstrip()} ({remark})"
 
 
 def plausibility(
