@@ -3,6 +3,7 @@
 JAX and the library are imported when a command runs: help, version and what is wrong with the options need neither.
 """
 
+import inspect
 import os
 import re
 import sys
@@ -253,7 +254,7 @@ def convert(
 
 
 for _command in app.registered_commands:  # the terminal breaks the lines of a paragraph, not the source
-    _command.help = re.sub(r"(?<=\S)\n +(?=\S)", " ", _command.callback.__doc__ or "")
+    _command.help = re.sub(r"(?<=\S)\n(?=\S)", " ", inspect.cleandoc(_command.callback.__doc__ or ""))
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
