@@ -3,9 +3,7 @@
 JAX and the library are imported when a command runs: help, version and what is wrong with the options need neither.
 """
 
-import inspect
 import os
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -254,7 +252,8 @@ def convert(
 
 
 for _command in app.registered_commands:  # the terminal breaks the lines of a paragraph, not the source
-    _command.help = re.sub(r"(?<=\S)\n(?=\S)", " ", inspect.cleandoc(_command.callback.__doc__ or ""))
+    _paragraphs = (_command.callback.__doc__ or "").split("\n\n")
+    _command.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in _paragraphs)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
