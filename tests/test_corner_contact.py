@@ -12,6 +12,7 @@ import jaxgear as jg
 from jaxgear.compliance.edge import cut_off
 from jaxgear.contact import solve_removed
 from jaxgear.contact.corner import corner_gap
+from jaxgear.contact.kinematics import contacts
 from jaxgear.contact.slide import nothing_removed
 from jaxgear.io.sizes import resolution_of
 
@@ -255,3 +256,16 @@ def test_without_extended_contact_pairs_carry_load_on_the_path_alone():
     off, on = np.asarray(off.transmission_error), np.asarray(on.transmission_error)
     assert 0 < alone.sum() < 16 and (off[~alone] > on[~alone]).all()
     np.testing.assert_allclose(off[alone], on[alone], rtol=1e-9)
+
+
+def test_the_gap_beside_either_end_of_the_path_is_that_of_its_corner():
+    """To second order, x^2 rho_tip (rho_tip + rho_mate) / (2 rho_mate r_b,tip^2); the mate is touched next to where it was."""
+    pair, beyond = gear_pair(), 1e-3
+    path = jg.path_of_contact(pair)
+    at = np.array([float(path.start) - beyond, float(path.end) + beyond])
+    found = jax.jit(lambda at: contacts(pair, path, at))(at)
+    for i, (tip, tip_base, mate, _) in enumerate(ends(pair)):
+        wanted = 1e3 * beyond**2 * tip * (tip + mate) / (2 * mate * tip_base**2)
+        assert float(found.corner_gap[i]) == pytest.approx(float(wanted), rel=2e-3)
+        touched = (found.pinion_roll_length, found.wheel_roll_length)[i][i]
+        assert float(touched) == pytest.approx(float(mate), abs=10 * beyond)

@@ -79,6 +79,11 @@ def test_allowances_come_back(name):
     assert float(allowance_of_balls(gear, ball, over_balls(gear, ball))) == pytest.approx(wanted, abs=1e-6)
 
 
+def test_the_tooth_that_is_analysed_is_the_mean_of_its_limits():
+    gear = jg.Gear(20, 3.0, face_width=20.0, tooth_thickness_allowance=-80.0, tooth_thickness_tolerance=40.0)
+    assert float(gear.mean_tooth_thickness_allowance) == 0.5 * (-80.0 - 120.0)
+
+
 def test_backlash_of_a_drawing():
     """What a thinner span of both gears leaves of play on the line of action is its sum: W_k lies on base tangents."""
     gear = kahraman_gear()
