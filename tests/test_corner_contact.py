@@ -259,7 +259,7 @@ def test_without_extended_contact_pairs_carry_load_on_the_path_alone():
 
 
 def test_the_gap_beside_either_end_of_the_path_is_that_of_its_corner():
-    """To second order, x^2 rho_tip (rho_tip + rho_mate) / (2 rho_mate r_b,tip^2); the mate is touched next to where it was."""
+    """To second order, x^2 rho_tip (rho_tip + rho_mate) / (2 rho_mate r_b,tip^2); it touches the mate nearby."""
     pair, beyond = gear_pair(), 1e-3
     path = jg.path_of_contact(pair)
     at = np.array([float(path.start) - beyond, float(path.end) + beyond])

@@ -264,8 +264,9 @@ def test_a_largest_dynamic_factor_at_the_highest_speed_is_told():
     def response(*factors):
         return SimpleNamespace(dynamic_factor=np.array(factors), mesh_frequency=frequencies)
 
-    runs = {"rises": response(1.0, 1.2, 1.3), "peaks": response(1.0, 1.4, 1.2)}
+    runs = {"rises": response(1.0, 1.2, 1.3), "peaks": response(1.0, 1.4, 1.2), "beyond": response(1.0, 1.2, 1.3)}
     study = SimpleNamespace(
+        natural_frequencies={"rises": {50.0: 400.0}, "peaks": {50.0: 400.0}, "beyond": {50.0: 250.0}},
         request=SimpleNamespace(settings=SimpleNamespace(mesh_frequencies=frequencies)),
         rows=lambda: ((name, 50.0, "up", of) for name, of in runs.items()),
     )

@@ -147,9 +147,13 @@ def verdict(study: Study) -> Iterator[str]:
 
 
 def _still_rising(study: Study) -> Iterator[str]:
-    """A line for designs whose largest dynamic factor is that of the highest speed: it may rise beyond."""
+    """A line for designs whose largest dynamic factor is that of the highest speed, below the natural frequency."""
     highest = float(study.request.settings.mesh_frequencies[-1])
-    rising = {name: None for name, _, _, response in study.rows() if peak(response, "dynamic_factor")[1] == highest}
+    rising = {
+        name: None
+        for name, torque, _, response in study.rows()
+        if peak(response, "dynamic_factor")[1] == highest < study.natural_frequencies[name][torque]
+    }
     if rising:
         yield (
             f"largest dynamic factor at the highest speed, {highest:.0f} Hz: {', '.join(rising)}; it may rise further "
