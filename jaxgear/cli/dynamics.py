@@ -110,12 +110,15 @@ def _grid_change(study: Study) -> dict[str, dict[str, float]]:
     width = min(2 * _BESIDE + 1, last)
     found = {}
     for name, (pinion, wheel) in study.designs.items():
-        of_design = ((torque, run, response) for other, torque, run, response in study.rows() if other == name)
-        torque, run, response = max(of_design, key=lambda row: peak(row[-1], "dynamic_factor")[0])
-        factors = np.asarray(response.dynamic_factor)
-        if not np.isfinite(factors).any():
+        of_design = [
+            (factor, torque, run, response)
+            for other, torque, run, response in study.rows()
+            if other == name and np.isfinite(factor := peak(response, "dynamic_factor")[0])
+        ]
+        if not of_design:
             continue
-        first = min(max(int(np.nanargmax(factors)) - _BESIDE, 0), last - width)
+        largest, torque, run, response = max(of_design, key=lambda row: row[0])
+        first = min(max(int(np.nanargmax(response.dynamic_factor)) - _BESIDE, 0), last - width)
         near = slice(first, first + width)
         begin = near.stop - 1 if response.direction == "down" else near.start
         approach, rate = (part[begin] for part in response.state)
@@ -127,8 +130,7 @@ def _grid_change(study: Study) -> dict[str, dict[str, float]]:
             steps=[2 * count for count in study.steps[near]],
             kicks=settings.kicks_of(run),
         )
-        change = float(np.nanmax(again.dynamic_factor) - np.nanmax(factors))
-        found[name] = {"max_dynamic_factor": change}
+        found[name] = {"max_dynamic_factor": peak(again, "dynamic_factor")[0] - largest}
     return found
 
 

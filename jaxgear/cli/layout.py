@@ -97,8 +97,21 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
         )
         for name, layout in layouts.items()
     }
-    found = layouts, over_torque, meshes, contacts, cases, cycles, factors, profiles, unusual
-    return Study(design, request, *found, stations_change, slices_change)
+    return Study(
+        design,
+        request,
+        layouts,
+        over_torque,
+        meshes,
+        contacts,
+        cases,
+        cycles,
+        factors,
+        profiles,
+        unusual,
+        stations_change,
+        slices_change,
+    )
 
 
 def _finer(design: DesignFile, request: LayoutRequest, name: str) -> Mesh:

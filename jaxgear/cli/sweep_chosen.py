@@ -85,9 +85,9 @@ def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tupl
     pinion, wheel = design.design(parameters)
     (cycle,) = over_torques(mesh, np.asarray([torque]), pinion=pinion, wheel=wheel)
     name = f"variant {best.column('variant')[0]} at {torque:g} N m"
-    found = plausibility(cycle, pinion=pinion, wheel=wheel, compliance=mesh.compliance)
-    doubts = list(report.doubt_lines({name: found, "other": ()}))
-    return grid_line(f"{size.positions} positions", {name: grid_change(mesh, cycle, pinion, wheel)}), doubts
+    doubts = plausibility(cycle, pinion=pinion, wheel=wheel, compliance=mesh.compliance)
+    grid = grid_line(f"{size.positions} positions", {name: grid_change(mesh, cycle, pinion, wheel)})
+    return grid, [f"{report.PLEASE_CHECK}{name}: {doubt}" for doubt in doubts]
 
 
 def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, list[Path]]:

@@ -111,8 +111,7 @@ class Compliance(AbstractCompliance):
         """`structure` with what `body.of_gears` gives; None where that has not been asked."""
         planes = structure_planes(self.plane)
         shares = on_both(lambda load: plane_stress_share(load.outline, load.outline.gear.face_width), pinion, wheel)
-        given = (planes,) if known is None else (planes, known)
-        bodies = _mixed(shares, self.body.of_both(pinion, wheel, *given))
+        bodies = _mixed(shares, self.body.of_both(pinion, wheel, planes, known))
         teeth = _mixed(shares, on_both(lambda load: self.tooth.in_planes(load, planes), pinion, wheel))
         own = jnp.eye(teeth.shape[1], dtype=bool)[None, :, :, None]
         return jnp.where(own, bodies + teeth[:, None], bodies)

@@ -35,8 +35,7 @@ class AbstractBody(Checked):
         """
 
     def of_gears(self, pinion: Outline, wheel: Outline, count: int, planes: tuple[Plane, ...]) -> Any:
-        """What `of_both` of so many pairs needs that is the same at all positions; None for nothing, and then
-        `of_both` is called without it."""
+        """What `of_both` of so many pairs needs that is the same at all positions; None for nothing."""
         return None
 
     def of_both(

@@ -155,7 +155,6 @@ def _ways(runs: Mapping[str, Run]) -> _Ways:
 
 def _named(found: SpeedResponse, ways: _Ways, axis: int = 0) -> Responses:
     """Responses by the names of their runs, which have an axis of their own."""
-
     each = _along(found, axis)
     return {name: replace(one, direction=direction) for one, (name, direction) in zip(each, ways, strict=True)}
 

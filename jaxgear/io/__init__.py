@@ -1,4 +1,4 @@
-"""Files: design files (TOML) in, results (JSON, CSV) out, gear pairs to and from other programs (REXS)."""
+"""Files: design files (TOML) in, results (JSON, CSV) out, gear pairs exchanged with other programs (REXS)."""
 
 from .design_file import DesignFile as DesignFile
 from .dynamics_request import DynamicsRequest as DynamicsRequest

@@ -19,7 +19,7 @@ def real(value, what: str = "") -> Float[Array, "..."]:
         what: name of the value, for the message.
 
     Raises:
-        ValueError: for anything else: a truth value or a text is no number, and of a complex one half would be lost.
+        ValueError: for anything else: a truth value or a text is not a number, and half of a complex one would be lost.
     """
     try:
         if any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value)):
@@ -44,7 +44,7 @@ def _inexact(value) -> Float[Array, "..."]:
 
 
 def real_or_given(value):
-    """A number field's value: what is no number stays as it is for the check, which knows its name."""
+    """A number field's value: anything else stays as it is for the check, which knows its name."""
     try:
         return optional_real(value)
     except ValueError:
@@ -52,7 +52,7 @@ def real_or_given(value):
 
 
 def no_number(what: str, value) -> str:
-    """That a value is no number, in words."""
+    """The message that a value is not a number."""
     wanted = "a real number" if getattr(value, "dtype", np.dtype(type(value))).kind == "c" else "a number"
     return f"{what}{' = ' if what else ''}{shown(value)} must be {wanted}"
 

@@ -7,8 +7,7 @@ from jaxtyping import Array, Float
 
 from ..conditions import joined, solved
 from ..metrics import Quantity, quantities, quantity_of
-from ..numerics import AbstractMeasure, Mean, check, maximum, real
-from ..numerics.quick import quick_jit
+from ..numerics import AbstractMeasure, Mean, check, maximum, quick_jit, real
 from .life import WearLife
 
 Scalar = Float[Array, ""]

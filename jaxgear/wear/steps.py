@@ -10,8 +10,7 @@ import numpy as np
 from ..contact import Mesh
 from ..dynamics import Dynamics
 from ..microgeometry import AbstractModification
-from ..numerics import check, real
-from ..numerics.quick import quick_jit
+from ..numerics import check, quick_jit, real
 from .case import Case, case_of, marched
 from .life import BLOCKS, WearLife, check_blocks, checked_revolutions, life_of
 from .march import BLOCKS_OF_A_PAIR, Depth, March

@@ -7,8 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...numerics import check, concrete, number, real
-from ...numerics.quick import quick_jit
+from ...numerics import check, concrete, number, quick_jit, real
 from ..force import AbstractMeshForce
 
 Scalar = Float[Array, ""]
