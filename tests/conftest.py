@@ -2,6 +2,7 @@
 functions kept on disk, and a garbage collector that does not look through everything all the time."""
 
 import contextlib
+import ctypes
 import gc
 import os
 import uuid
@@ -110,29 +111,36 @@ except OSError:  # a read-only home: the tests run all the same, only slower
     pass
 
 
-# Each compiled program holds some mappings of memory, of which Linux grants a process 65530.
+# Each compiled program holds some mappings of memory, of which Linux grants a process 65530, and memory, of which two
+# workers, a browser and the processes of a test have to share what a small machine has.
 MOST_MAPPINGS = 40_000
+MOST_MEMORY = 3 << 30  # bytes
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _forget_compiled_programs():
     """Drops what files of tests compiled once it is much: the system refuses a process that holds too many programs."""
     yield
-    if _mappings() > MOST_MAPPINGS:
+    if _holds_much():
         _forget()
 
 
-def _mappings() -> float:
-    """Mappings of memory that this process holds; infinite where the system does not list them."""
+def _holds_much() -> bool:
+    """Whether this process holds more than it should; true where the system does not say."""
+    process = Path("/proc/self")
     try:
-        return Path("/proc/self/maps").read_bytes().count(b"\n")
+        pages = int((process / "statm").read_text().split()[1])
+        mappings = (process / "maps").read_bytes().count(b"\n")
     except OSError:
-        return float("inf")
+        return True
+    return mappings > MOST_MAPPINGS or pages * os.sysconf("SC_PAGE_SIZE") > MOST_MEMORY
 
 
 def _forget():
     jax.clear_caches()
     gc.collect()  # programs in reference cycles too
+    with contextlib.suppress(OSError, AttributeError):  # the memory too, which the GNU library would keep
+        ctypes.CDLL("libc.so.6").malloc_trim(0)
 
 
 @pytest.fixture

@@ -169,7 +169,7 @@ def test_analyze_gives_what_the_library_gives(folder, analyzed):
     finer = file.mesh(dataclasses.replace(mesh.resolution, positions=2 * mesh.resolution.positions))
     twice = jg.solve(finer, 50.0, pinion=pinion, wheel=wheel)
     changes = written["change_at_twice_the_positions"]
-    assert changes.keys() == {"ppte_um", "max_flank_pressure_MPa", "max_corner_pressure_MPa"}
+    assert changes.keys() == {"ppte_um", "force_excitation_N", "max_flank_pressure_MPa", "max_corner_pressure_MPa"}
     for metric, change in changes.items():
         value = jg.quantities[metric.rpartition("_")[0]](twice)
         assert change == pytest.approx(float(value) - written[metric], abs=1e-7), metric

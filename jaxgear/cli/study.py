@@ -10,7 +10,7 @@ import numpy as np
 from ..contact import Mesh, MeshCycle, Operation
 from ..contact.parts import half_way
 from ..io import DesignFile, quantities_of_tables
-from ..metrics import face_load_factor, quantities, rating_factors, summary
+from ..metrics import excited_by, face_load_factor, quantities, rating_factors, summary
 from ..metrics.settings import of_tables
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, optional_real, program, real
@@ -21,6 +21,7 @@ _SURFACE_REACH, _SURFACE_TORQUES = 2.0, 21
 # numbers that depend on the grid, by name and unit: the extremes over the positions, K_Hbeta over the face and K_v
 _EXTREMES = {
     "ppte_um": ("PPTE", " um"),
+    "force_excitation_N": ("force excitation", " N"),
     "max_flank_pressure_MPa": ("max flank pressure", " MPa"),
     "max_corner_pressure_MPa": ("max corner pressure", " MPa"),
 }
@@ -108,11 +109,11 @@ def grid_change(
 
 def _extremes(*cycles: MeshCycle) -> dict[str, float]:
     """Extremes over the positions of several cycles together."""
-    error, flank, corner = (
+    error, stiffness, flank, corner = (
         np.concatenate([np.asarray(getattr(cycle, name)).ravel() for cycle in cycles])
-        for name in ("transmission_error", "contact_pressure", "corner_pressure")
+        for name in ("transmission_error", "tangent_stiffness", "contact_pressure", "corner_pressure")
     )
-    found = np.ptp(error), flank.max(), corner.max()
+    found = np.ptp(error), np.ptp(excited_by(error, stiffness)), flank.max(), corner.max()
     return dict(zip(_EXTREMES, map(float, found)))
 
 
@@ -127,7 +128,11 @@ def grid_line(grid: str, changes: Mapping[str, Mapping[str, float]], more: str =
     said = [more] * bool(more)
     for metric in next(iter(changes.values())):
         label, unit = _LABELS[metric]
-        each = (f"{name} by {change[metric]:+.2g}{unit}" for name, change in changes.items())
+        # the same extreme: at a position that both grids have
+        each = (
+            f"{name} by {by:+.2g}{unit}" if (by := change[metric]) else f"{name} not"
+            for name, change in changes.items()
+        )
         said.append(f"{label}: {', '.join(each)}")
     return f"evaluated at {grid}; twice as many change {'; '.join(said)}"
 

@@ -15,6 +15,7 @@ from .contact_stress import ContactStress as ContactStress
 from .contact_stress import nominal_contact_stress as nominal_contact_stress
 from .damage import pitting_damage as pitting_damage
 from .damage import root_damage as root_damage
+from .excitation import excited_by as excited_by
 from .excitation import force_excitation as force_excitation
 from .excitation import relative_transmission_error as relative_transmission_error
 from .face_load import edge_load_factor as edge_load_factor

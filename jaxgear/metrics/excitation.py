@@ -30,5 +30,9 @@ def force_excitation(cycle: MeshCycle) -> Curve:
         H. N. Ozguven, D. R. Houser, J. Sound Vib. 125 (1988) 71-83, on the loaded static transmission error as the
         excitation; for the local slope Cooley, Liu, Dai, Parker, Mech. Mach. Theory 105 (2016) 540-553.
     """
-    error = cycle.transmission_error
-    return cycle.tangent_stiffness * (error - jnp.mean(error))
+    return excited_by(cycle.transmission_error, cycle.tangent_stiffness)
+
+
+def excited_by(error, stiffness):
+    """The same of a transmission error [um] and mesh stiffness [N/um] at the same positions, in NumPy or JAX."""
+    return stiffness * (error - error.mean())
