@@ -15,6 +15,7 @@ from jaxgear.dynamics import (
     RectangularStiffness,
     equivalent_mass,
     inertia_of,
+    motion,
     on_bearings,
     speed_sweep,
     torsional,
@@ -148,6 +149,30 @@ def test_bearings_carry_the_mesh_force():
     load = float(oscillator.load[0])
     expected = [load / 250.0 + load / 500.0 + load / 250.0, -load / 500.0, 0.0, load / 250.0, 0.0]
     np.testing.assert_allclose(found.state[0][0], expected, atol=1e-6)
+
+
+def test_a_bearing_force_is_what_the_centre_of_a_gear_does_not_take_to_accelerate():
+    """Newton's law over the cycle, m dv = integral of (mesh force - bearing force) dt, and their means are equal."""
+    stiffness = np.array([np.diag([500.0, 100.0]), np.diag([250.0, 100.0])])
+    oscillator = made(on_bearings, bearing_stiffness=stiffness, bearing_damping=1e-1 * stiffness / 250.0)
+    found = speed_sweep(oscillator, [900.0], steps=512)
+    assert found.settled.all() and found.period[0] == 1
+    start = tuple(part[0] for part in found.state)
+    moved = motion(oscillator, 900.0, start, steps=512)
+    held, load = np.asarray(moved.support_force), float(oscillator.load[0])
+    assert held.shape == (512, 5) and (held[:, 0] == 0).all()
+    nodes = np.append(moved.phase, 1.0)
+    once_more = np.vstack([held, held[:1]])
+    mean = np.trapezoid(once_more, nodes, axis=0)
+    np.testing.assert_allclose(mean, [0.0, -load, 0.0, load, 0.0], atol=1e-3 * load)
+    assert np.ptp(held[:, 3]) > 0.05 * load and np.abs(held[:, [2, 4]]).max() < 1e-6 * load
+    _, (_, speed) = one_cycle(oscillator, start, steps_of(oscillator, jnp.asarray(nodes)), jnp.asarray(900.0))
+    inner = np.asarray(moved.force + oscillator.mesh_damping * moved.approach_rate) - held[:, 3]
+    each = 0.5 * (inner[1:] + inner[:-1]) * np.diff(moved.phase) / 900.0
+    impulse = np.concatenate([[0.0], np.cumsum(each)])
+    gained = float(oscillator.mass[3]) * np.asarray(speed[:, 3] - speed[0, 3]) / oscillator.newton
+    jump = int(np.searchsorted(nodes, 0.37))  # where the stiffness of the mesh does
+    np.testing.assert_allclose(gained[:jump], impulse[:jump], atol=1e-3 * np.ptp(impulse))
 
 
 @pytest.mark.parametrize(

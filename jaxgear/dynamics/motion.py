@@ -23,12 +23,15 @@ class Motion(Checked):
         approach_rate: [um/s], shape (samples,).
         force: elastic force of the mesh [N], shape (samples,): zero where nothing touches, negative on the coast
             flanks.
+        support_force: by which springs and dampers to ground and between coordinates hold every coordinate [N], shape
+            (samples, coordinates); `on_bearings` says which are the bearings of pinion and wheel.
     """
 
     phase: Samples = result()
     approach: Samples = result("um")
     approach_rate: Samples = result("um/s")
     force: Samples = result("N")
+    support_force: Float[Array, "samples coordinates"] = result("N")
 
 
 def motion(oscillator: Oscillator, mesh_frequency: Any, start: Any, *, periods: int = 1, steps: Any = STEPS) -> Motion:
@@ -56,10 +59,10 @@ def _moved(oscillator: Oscillator, frequency, start, nodes, periods: int) -> Mot
 
     def of_step(step, phase, x, v):
         q, rate = oscillator.approach(phase, x), oscillator.approach_rate(phase, v, frequency)
-        return phase, q, rate, oscillator.mesh_force.force(step.first, q)
+        return phase, q, rate, oscillator.mesh_force.force(step.first, q), oscillator.support_force(x, v)
 
     def of_cycle(number, x, v):
         return jax.vmap(of_step)(steps, steps.phase + number, x, v)
 
     found = jax.vmap(of_cycle)(jnp.arange(periods, dtype=frequency.dtype), *states)
-    return Motion(*(part.ravel() for part in found))
+    return Motion(*(part.reshape(-1, *part.shape[2:]) for part in found))

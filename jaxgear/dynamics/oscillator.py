@@ -81,12 +81,17 @@ class Oscillator(Checked):
         error, error_rate, extra = self._excited(phase, mesh_frequency)
         approach, speed = self._along(x) - error, self._along(v) - error_rate
         inner = self.mesh_force.force(place, approach) + self.mesh_damping * speed
-        total = self.load * (1 + extra) - self.direction * inner
-        if self.stiffness is not None:
-            total = total - self.stiffness @ x
-        if self.damping is not None:
-            total = total - self.damping @ v
+        total = self.load * (1 + extra) - self.direction * inner - self.support_force(x, v)
         return v, self.newton * total / self.mass
+
+    def support_force(self, x: Coordinates, v: Coordinates) -> Coordinates:
+        """What holds every coordinate against ground and the others [N], positive against its displacement."""
+        total = jnp.zeros_like(x)
+        if self.stiffness is not None:
+            total = total + self.stiffness @ x
+        if self.damping is not None:
+            total = total + self.damping @ v
+        return total
 
     @property
     def converged(self) -> Bool[Array, ""]:
