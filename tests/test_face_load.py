@@ -25,7 +25,7 @@ from jaxgear.shafts import (
 PAIR = jg.GearPair(PINION, WHEEL)
 TORQUE, STIFFNESS, STATIONS = 150.0, 16.0, 41
 WIDTH = 18.0
-MEAN = 1e3 * TORQUE / float(PINION.base_radius) / WIDTH
+MEAN = 1e3 * TORQUE / (19 * 3.0 * np.cos(np.deg2rad(20.0)) / 2) / WIDTH  # over the base radius of the pinion
 pressed = jax.jit(press)
 
 
