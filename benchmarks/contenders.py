@@ -29,7 +29,7 @@ class Contender:
         precision: "float64" or "float32".
         gradient: whether the derivatives by the four parameters are computed too.
         batch: variants per batch of jaxgear or NumPy; zero where there is none.
-        coupled: whether slices feel each other, which those of the baselines do not.
+        coupled: whether slices are coupled, which those of the baselines do not.
     """
 
     kind: str

@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 import jaxgear as jg
-from jaxgear.contact import Operation
+from jaxgear.contact import OperatingPoint
 from jaxgear.metrics import Lubricant, Quantity, Strength
 from jaxgear.numerics import quick
 
@@ -69,7 +69,7 @@ class Problem:
     """A pair in operation, the range of its designs, and one that keeps the limits."""
 
     pair: jg.GearPair
-    load: Operation
+    load: OperatingPoint
     bounds: dict[str, tuple[float, float]]
     known: dict[str, float]
     room: tuple[float, float]
@@ -129,10 +129,10 @@ def drawn(random: np.random.Generator, refused: Counter[str]) -> Problem:
         known = {name: random.uniform(low, high) for name, (low, high) in bounds.items()}
         room = random.uniform(_LEAST_ROOM, _MOST_ROOM, 2)
         speed = random.uniform(*_VELOCITY) * 6e4 / (np.pi * module * pinion)
-        return Problem(pair, Operation(torque, speed), bounds, known, (float(room[0]), float(room[1])))
+        return Problem(pair, OperatingPoint(torque, speed), bounds, known, (float(room[0]), float(room[1])))
 
 
-def numbers(mesh: jg.Mesh, load: Operation, parameters: dict[str, float] | None, names) -> dict[str, float]:
+def numbers(mesh: jg.Mesh, load: OperatingPoint, parameters: dict[str, float] | None, names) -> dict[str, float]:
     """Quantities of a design; None for unmodified flanks."""
     pinion, wheel = (
         design({name: np.float64(value) for name, value in parameters.items()}) if parameters else (None,) * 2

@@ -12,7 +12,7 @@ _DIFFERENCES = ("PPTE", "gradient")
 _LEGEND = """\
 variants/s: the best repetition. / C, / NumPy: over their best rate with as many slices, C on all cores, NumPy on one.
 /core: variants per second of processor time, less sensitive to other work on the machine. cold start, compile: seconds
-from the start of the process and from the first call to the first result. coupled: slices that feel each other, another
+from the start of the process and from the first call to the first result. coupled: coupled slices, another
 problem; the line tells what that costs. memory: peak in MiB. PPTE, gradient: largest difference from jaxgear in float64
 (coupled: from itself), in um and in um per um or mm."""
 

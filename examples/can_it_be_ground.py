@@ -70,7 +70,7 @@ def designs(mesh, fast=False) -> dict[str, jg.optimize.Optimum]:
             mesh=mesh,
             torque=TORQUE,
             max_relief=LARGEST,
-            method=jg.optimize.Minimax(starts=1, rounds=1) if fast else jg.optimize.Minimax(),
+            method=jg.optimize.SLP(starts=1, rounds=1) if fast else jg.optimize.SLP(),
         ),
     }
     if not fast:

@@ -66,8 +66,8 @@ class Drivetrain(eqx.Module):
         speed = FIRST_SPEED * RPM
         v = jnp.full(2, 1e6 * self.radius * speed)
         *_, load = self.torques((0.0, speed, (jnp.zeros(2), v)))
-        approach = self.gears.mesh_force.static_approach(0.0, load)
-        return load * self.radius / SHAFT_STIFFNESS, speed, (jnp.stack([approach, 0.0 * approach]), v)
+        dte = self.gears.mesh_force.static_te(0.0, load)
+        return load * self.radius / SHAFT_STIFFNESS, speed, (jnp.stack([dte, 0.0 * dte]), v)
 
 
 def drivetrain(mesh, amount, length) -> Drivetrain:

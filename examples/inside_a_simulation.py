@@ -38,18 +38,18 @@ def oscillator(mesh: jg.Mesh, relief: jg.TipRelief) -> dynamics.Oscillator:
 
 
 def vibration(mesh: jg.Mesh, relief: jg.TipRelief, share):
-    """Rms of the approach of the flanks about its mean [um], at a share of the natural frequency."""
+    """Rms of the DTE about its mean [um], at a share of the natural frequency."""
     system = oscillator(mesh, relief)
     frequency = share * dynamics.natural_frequencies(system).mesh
     times = jnp.linspace(CYCLES - KEPT, CYCLES, KEPT * PER_CYCLE, endpoint=False) / frequency
-    approach = system.mesh_force.static_approach(jnp.zeros(()), system.load[0])
+    dte = system.mesh_force.static_te(jnp.zeros(()), system.load[0])
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(system),
         diffrax.Tsit5(),
         t0=0.0,
         t1=times[-1],
         dt0=1 / (PER_CYCLE * frequency),
-        y0=(approach[None], jnp.zeros(1)),
+        y0=(dte[None], jnp.zeros(1)),
         args=frequency,
         saveat=diffrax.SaveAt(ts=times),
         max_steps=CYCLES * PER_CYCLE + 16,

@@ -26,7 +26,7 @@ PUBLISHED = {
     (50, 50): (14.0545, 22.0094),
 }
 WHY = """The standard's c' rests on measurements of single pairs (a factor of 0.8 leads from theory to them) and lies
-below plane stress. Its c_gamma grows with the contact ratio as if pairs did not feel each other; coupled through the
+below plane stress. Its c_gamma grows with the contact ratio as if pairs were not coupled; coupled through the
 gear bodies they carry less together."""
 LINE_LOAD = 100.0  # N/mm, tangential
 FACE_WIDTH = 10.0  # mm

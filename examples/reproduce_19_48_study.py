@@ -145,7 +145,7 @@ def searched(mesh, fast) -> dict[str, tuple[float, ...]]:
 
     The genetic algorithm is that of the study: 100 strings of bits, 100 generations, roulette wheel, fitness 1 / PPTE.
     """
-    methods = {"searched": jg.optimize.BinaryGenetic(generations=30 if fast else 100), "optimum": jg.optimize.Minimax()}
+    methods = {"searched": jg.optimize.BinaryGenetic(generations=30 if fast else 100), "optimum": jg.optimize.SLP()}
     return {
         name: tuple(
             jg.minimize(flanks, BOUNDS, mesh=mesh, torque=TORQUE, method=method, positions=None).parameters.values()
@@ -160,7 +160,7 @@ def main(fast=False) -> dict:
     `ppte_over_torque` holds one row per design of `DESIGNS`, `searched_over_torque` one of the design that the study's
     algorithm finds here and one of the optimum.
     """
-    # the published model has slices that do not feel each other
+    # the published model has slices that are not coupled
     resolution = jg.Resolution(positions=32 if fast else 64, slices=5 if fast else 11, coupled_slices=False)
     designs, torques, nominal = jnp.asarray(list(DESIGNS.values())), jnp.asarray(TORQUES), TORQUES.index(TORQUE)
     found = {}

@@ -123,7 +123,7 @@ def reliefs(mesh: jg.Mesh, fast=False) -> dict:
         return relief, relief
 
     bounds = {"amount": (1.0, height), "length": (1.0, 3.27), "node": (0.05, 1.0)}
-    limits["method"] = jg.optimize.Minimax(starts=4, rounds=1)
+    limits["method"] = jg.optimize.SLP(starts=4, rounds=1)
     type_2 = jg.optimize.iterate_from_low_pressure(
         low_pressure, bounds, mesh=mesh, torque=NOMINAL, max_relief=height, **limits
     )
@@ -145,7 +145,7 @@ def main(fast=False) -> dict:
         for name, (pinion, wheel) in designs.items():
             runs = settings.runs(settings.oscillator(mesh, torque, pinion=pinion, wheel=wheel))
             key = f"{torque:g} {name}"
-            curves[key] = {run: (np.asarray(r.dynamic_factor), np.asarray(r.approach_rms)) for run, r in runs.items()}
+            curves[key] = {run: (np.asarray(r.dynamic_factor), np.asarray(r.dte_rms)) for run, r in runs.items()}
             found |= _numbers(key, np.asarray(settings.mesh_frequencies), curves[key])
             found[f"{key} settled"] = all(bool(np.all(r.settled)) for r in runs.values())
         found |= _lower(torque, found, [name for name in designs if name != "unmodified"])

@@ -96,7 +96,7 @@ def optima(mesh: jg.Mesh, fast=False) -> dict:
         torque=NOMINAL,
         max_relief=height,
         max_pressure=ALLOWED,
-        method=jg.optimize.Minimax(starts=1 if fast else 4, rounds=1),
+        method=jg.optimize.SLP(starts=1 if fast else 4, rounds=1),
     )
     return {"equation alone": plateau, "type 1": type_1, "type 2": type_2}
 
@@ -184,7 +184,7 @@ def vibration(mesh: jg.Mesh, tables: dict, inertias: dict, fast=False) -> dict:
             f"{key}_K_v_at": float(settings.mesh_frequencies[speed]),
             f"{key}_K_v_without_kick": float(np.asarray(runs[dynamics.DOWN].dynamic_factor).max()),
             f"{key}_period": int(period[run, speed]),
-            f"{key}_q_rms": max(float(r.approach_rms.max()) for r in runs.values()),
+            f"{key}_q_rms": max(float(r.dte_rms.max()) for r in runs.values()),
         }
     return found
 

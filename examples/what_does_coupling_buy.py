@@ -1,4 +1,4 @@
-"""What does it buy to let neighbouring teeth feel each other through the gear body?
+"""What does it buy to couple neighbouring teeth through the gear body?
 
 Takes two pairs of which finite-element results are known and solves each with three models: teeth coupled through the
 body (the default), the same without the coupling, and the usual published model (uncoupled, constant Hertz stiffness).

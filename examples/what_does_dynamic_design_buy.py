@@ -70,7 +70,7 @@ def designs(mesh, fast=False, callback=None) -> dict:
         torque=jg.LoadSpectrum(TORQUES),
         objective=search.quantity("worst_dynamic_factor"),
         measure=jg.Worst(),
-        method=jg.optimize.Minimax(starts=1, rounds=1, steps=12 if fast else 30, rtol=1e-3),
+        method=jg.optimize.SLP(starts=1, rounds=1, steps=12 if fast else 30, rtol=1e-3),
         positions=None,  # K_v is none of the extremes over the positions of the mesh
         callback=callback,
     )

@@ -1,6 +1,6 @@
-"""The best relief of perfect gears: is it the best of manufactured ones?
+"""The best relief of nominal gears: is it the best of manufactured ones?
 
-The pair of robust_50_50.toml, whose contact ratio is just below 2: the tip reliefs with the least PPTE of perfect gears
+The pair of robust_50_50.toml, whose contact ratio is just below 2: the tip reliefs with the least PPTE of nominal gears
 at the design torque, and those with the least PPTE of manufactured gears between 0.7 and 1.3 times that torque (mean of
 the worst tenth). Both are judged by gears that neither has seen. Run it:
 `python examples/what_does_robust_design_buy.py`.
@@ -39,7 +39,7 @@ def robust_optimum(file, mesh, tolerance, fast=False):
         tolerance=tolerance,
         samples=asked.manufactured // 2,
         seed=asked.seed,
-        method=jg.optimize.Minimax(starts=asked.starts, steps=asked.steps),
+        method=jg.optimize.SLP(starts=asked.starts, steps=asked.steps),
         positions=None,
     )
 
@@ -78,7 +78,7 @@ def numbers(results):
     found = {}
     for name, (best, ppte) in results.items():
         if best is not None:
-            found[f"{name}_ppte_of_perfect_gears_um"] = best.ppte
+            found[f"{name}_ppte_of_nominal_gears_um"] = best.ppte
             found |= {f"{name}_{key}": value for key, value in best.parameters.items()}
         found[f"{name}_mean_ppte_um"] = float(np.mean(ppte))
         found[f"{name}_quantile95_ppte_um"] = float(np.quantile(ppte, SHARE))

@@ -151,7 +151,7 @@ def numbers(results) -> dict:
             answer[f"{name}_{method}_um"] = clearance * float(each.amplitude[2])
         for place, key in enumerate(RELIEFS):
             relief, said = speed["flanks"][key], speed["judged"][key]
-            ranges = [response.approach_max[at] - response.approach_min[at] for response in said["responses"]]
+            ranges = [response.dte_max[at] - response.dte_min[at] for response in said["responses"]]
             answer |= {
                 f"{name}_{key}_model_um": clearance * float(speed["best"].amplitude[place]),
                 f"{name}_{key}_integrated_um": 0.5 * float(max(ranges)),

@@ -26,7 +26,7 @@ from .conditions import LoadSpectrum as LoadSpectrum
 from .contact import Mesh as Mesh
 from .contact import MeshCycle as MeshCycle
 from .contact import ModifiedMesh as ModifiedMesh
-from .contact import Operation as Operation
+from .contact import OperatingPoint as OperatingPoint
 from .contact import Resolution as Resolution
 from .contact import fewest_pairs as fewest_pairs
 from .contact import prepare as prepare

@@ -11,7 +11,7 @@ from jaxgear.contact import removed_material, solve_removed
 from jaxgear.microgeometry import AbstractModification
 
 # Sizes that tests share, so that the programs of these sizes are compiled once for all of them: contacts that stay at
-# their nominal places, contacts that slide (where sliding is argued), and slices that feel each other.
+# their nominal places, contacts that slide (where sliding is argued), and coupled slices.
 LINE = jg.Resolution(positions=16, pairs=2, slide_steps=0)
 SLIDING = jg.Resolution(positions=16, pairs=2)
 FACE = jg.Resolution(positions=8, slices=6, pairs=2, face_modes=3, slide_steps=0, patch_nodes=1)

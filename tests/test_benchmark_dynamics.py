@@ -83,11 +83,11 @@ def test_scipy_has_the_force_of_the_map(moving):
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 def test_c_has_the_steady_states_of_the_sweep(moving, swept):
     kernel = CSweep(vibration_of(moving), STEPS)
-    rest = [float(eqx.filter_jit(moving.mesh_force.static_approach)(np.zeros(()), np.asarray(moving.load)[0])), 0.0]
+    rest = [float(eqx.filter_jit(moving.mesh_force.static_te)(np.zeros(()), np.asarray(moving.load)[0])), 0.0]
     numbers = kernel.sweep(SPEEDS[::-1], [STEPS] * 3, rest, tolerance=1e-12, most_cycles=3000)[::-1]
-    assert (numbers[:, 2] > 0).all() and float(swept.approach_min.min()) < -1
+    assert (numbers[:, 2] > 0).all() and float(swept.dte_min.min()) < -1
     np.testing.assert_allclose(numbers[:, 0], swept.dynamic_factor, rtol=1e-8)
-    np.testing.assert_allclose(numbers[:, 1], swept.approach_rms, rtol=1e-8)
+    np.testing.assert_allclose(numbers[:, 1], swept.dte_rms, rtol=1e-8)
     # a steady state stays one
     state = [float(part[1, 0]) for part in swept.state]
     np.testing.assert_allclose(kernel.settle(SPEEDS[1], state, 2 * int(swept.period[1])), state, rtol=1e-7)
@@ -100,7 +100,7 @@ def test_scipy_has_the_steady_states_of_the_sweep(moving, swept):
     assert cycles > 0
     # its samples are not the steps of the sweep
     assert factor == pytest.approx(float(swept.dynamic_factor[0]), rel=1e-3)
-    assert rms == pytest.approx(float(swept.approach_rms[0]), rel=1e-3)
+    assert rms == pytest.approx(float(swept.dte_rms[0]), rel=1e-3)
 
 
 def test_another_orbit_is_no_error_of_this_one():

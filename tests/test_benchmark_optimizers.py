@@ -12,10 +12,10 @@ GOOD = {
     ("50/50", "iteration, type 1"): (0.6, 4000.0, 5, 4),
     ("50/50", "iteration, type 2"): (0.5, 2000.0, 300, 3),
     ("50/50", "genetic"): (0.37, 2500.0, 10_000, None),
-    ("50/50", "minimax"): (0.37, 2500.0, 150, None),
+    ("50/50", "slp"): (0.37, 2500.0, 150, None),
     ("50/50", "free form"): (0.1, 600.0, 100, None),
     ("19/48", "genetic"): (0.22, 900.0, 10_000, None),
-    ("19/48", "minimax"): (0.221, 900.0, 150, None),
+    ("19/48", "slp"): (0.221, 900.0, 150, None),
     ("19/48", "free form"): (0.1, 900.0, 60, None),
 }
 
@@ -42,8 +42,8 @@ def test_claims_hold_of_good_rows(rows):
 @pytest.mark.parametrize(
     ("method", "values", "words"),
     [
-        ("minimax", {"ppte_um": 0.2223}, "at most 1 % above"),
-        ("minimax", {"evaluations": 200}, "less than 2 %"),
+        ("slp", {"ppte_um": 0.2223}, "at most 1 % above"),
+        ("slp", {"evaluations": 200}, "less than 2 %"),
         ("free form", {"ppte_um": 0.16}, "30 % below"),
         ("iteration, type 1", {"ppte_um": 0.9}, "type 1 iteration: PPTE at least 75 %"),
         ("iteration, type 1", {"steps": 6}, "type 1 iteration: PPTE at least 75 %"),
@@ -64,7 +64,7 @@ def test_a_claim_on_an_absent_method_is_not_checked(rows):
 
 def test_findings_leave_out_what_did_not_take_part(rows):
     said = report.findings(rows)
-    assert any(line.startswith("19/48: minimax reaches 1.005 times") and "1.5 %" in line for line in said)
+    assert any(line.startswith("19/48: slp reaches 1.005 times") and "1.5 %" in line for line in said)
     assert not any("robust design" in line for line in said)
     assert not any("genetic" in line for line in report.findings([row for row in rows if row.method != "genetic"]))
 

@@ -133,7 +133,7 @@ def test_parabolic_relief(fine):
 
 
 def test_worst_case_over_a_torque_range(mesh):
-    """Long relief: the design load in the middle of the range is the minimax, worst PPTE (T_hi - T_lo) / (4 k r_b)."""
+    """Long relief: the design load in the middle of the range is the slp, worst PPTE (T_hi - T_lo) / (4 k r_b)."""
     low, high = 0.5, 1.5
 
     def worst(design):

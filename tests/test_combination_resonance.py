@@ -60,7 +60,7 @@ def branch():
 
 
 def test_a_pair_of_multipliers_leaves_and_enters_the_circle_about_the_sum_of_both_frequencies(branch):
-    assert branch.ended == "range" and (np.asarray(branch.orbits.no_contact) == 0).all()
+    assert branch.ended == "range" and (np.asarray(branch.orbits.contact_loss_share) == 0).all()
     assert [found.kind for found in branch.bifurcations] == ["Neimark-Sacker"] * 2
     limits = [exact_limit(bracket, POINT) for bracket in ((2.4, 2.55), (2.65, 2.85))]
     np.testing.assert_allclose([TWO_PI * found.parameter for found in branch.bifurcations], limits, rtol=1e-7)

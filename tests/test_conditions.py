@@ -52,7 +52,10 @@ def test_every_case_weighs_as_its_torque(mesh, tolerance):
     """Three parts of the time at the first torque, one at the second: so does every gear that runs under them."""
     load = jg.LoadSpectrum(TORQUES, [3.0, 1.0])
     cases = conditions("test", mesh, load, tolerance=tolerance, samples=3, seed=7).on(mesh)
-    torques, weights = np.asarray(cases.each(lambda operation, removed: operation.torque)), np.asarray(cases.weights)
+    torques, weights = (
+        np.asarray(cases.each(lambda operating_point, removed: operating_point.torque)),
+        np.asarray(cases.weights),
+    )
     assert weights.shape == torques.shape == (6,)
     for torque, share in zip(TORQUES, (3 / 4, 1 / 4)):
         np.testing.assert_allclose(weights[torques == torque], share / 3, rtol=1e-12)
@@ -142,7 +145,9 @@ def test_what_has_no_effect_is_refused(mesh):
 def test_a_load_has_a_speed(mesh):
     load = jg.LoadSpectrum([50.0, 50.0], speeds=[1000.0, 2000.0], friction=0.05)
     made = variants("test", ("amount",), (AMOUNT,), design=design, mesh=mesh, torque=load)
-    speeds = made.cases.each(lambda operation, removed: (operation.speed, operation.torque * operation.friction))
+    speeds = made.cases.each(
+        lambda operating_point, removed: (operating_point.speed, operating_point.torque * operating_point.friction)
+    )
     np.testing.assert_allclose(speeds, [[1000.0, 2000.0], [2.5, 2.5]])
     with pytest.raises(ValueError, match="torques must be different, or their speeds"):
         jg.LoadSpectrum([50.0, 50.0], speeds=1000.0)

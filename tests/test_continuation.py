@@ -52,13 +52,13 @@ def test_the_primary_resonance_folds_twice(resonance):
     stable = np.asarray(resonance.stable)
     assert stable[:first].all() and not stable[first + 1 : second].any() and stable[second + 1 :].all()
     tip = resonance.bifurcations[0].orbit
-    assert abs(tip.dynamic_factor - 6.56) < 0.05 and abs(tip.approach_rms - 4.12) < 0.02
+    assert abs(tip.dynamic_factor - 6.56) < 0.05 and abs(tip.dte_rms - 4.12) < 0.02
 
 
 def test_orbits_of_the_resonance_are_the_exact_ones(resonance):
     """Behind both folds the branch ends at Omega 0.5, where the orbit is known."""
     last = jax.tree.map(lambda part: part[-1], resonance.orbits)
-    found = [last.displacement[0], last.velocity[0], last.approach_rms, last.dynamic_factor]
+    found = [last.displacement[0], last.velocity[0], last.dte_rms, last.dynamic_factor]
     np.testing.assert_allclose(found, [1.390083, 0.574387, 0.622171, 2.119300], rtol=0, atol=2e-5)
     # high and low orbit at the same speed, and between them an unstable one
     for omega, factors in ((0.70, (5.039343, 1.425710)), (0.80, (4.225453, 1.618880))):
@@ -93,7 +93,7 @@ def test_the_parametric_resonance_lies_between_two_flips(parametric):
         back = flip.orbit.monodromy @ flip.direction
         np.testing.assert_allclose(back, -flip.direction, rtol=0, atol=1e-6)
     # contact is kept: the equation is linear, and the flips are those of its own monodromy at every amplitude
-    assert (np.asarray(parametric.orbits.no_contact) == 0).all()
+    assert (np.asarray(parametric.orbits.contact_loss_share) == 0).all()
 
 
 def test_orbits_of_two_cycles_join_both_flips(parametric, doubled):
@@ -117,7 +117,7 @@ def test_the_end_of_the_doubled_branch_is_the_twin_of_the_resonance(resonance, d
     (two,) = (found for found in doubled.bifurcations if found.kind == "fold")
     np.testing.assert_allclose(two.parameter, 2 * one.parameter, rtol=1e-3)
     np.testing.assert_allclose(two.orbit.dynamic_factor, one.orbit.dynamic_factor, rtol=5e-3)
-    np.testing.assert_allclose(two.orbit.approach_rms, one.orbit.approach_rms, rtol=2e-3)
+    np.testing.assert_allclose(two.orbit.dte_rms, one.orbit.dte_rms, rtol=2e-3)
 
 
 @pytest.mark.slow
@@ -131,10 +131,10 @@ def test_a_family_over_any_parameter():
     (orbit,) = near(branch, 0.80, False)
     orbit = find_orbit(*dead_zone(jnp.asarray(frequency(0.80))), orbit.start, steps=STEPS)
     turn = np.exp(-1j * TWO_PI * np.asarray(orbit.phase))
-    amplitude = 2 * abs(np.mean(np.asarray(orbit.approach) * turn))
+    amplitude = 2 * abs(np.mean(np.asarray(orbit.dte) * turn))
     assert bool(orbit.converged) and not bool(orbit.stable)
     # one harmonic is 3 % off on the stable branch, and more where the flanks only just part
-    assert abs(orbit.approach_mean - 1.085105) < 0.01 and abs(amplitude - 0.156748) < 0.02
+    assert abs(orbit.dte_mean - 1.085105) < 0.01 and abs(amplitude - 0.156748) < 0.02
 
 
 @pytest.mark.slow
@@ -152,8 +152,8 @@ def finer(orbit, changes):
 
     A kink inside of a step costs the derivative its accuracy.
     """
-    phase, approach = np.asarray(orbit.phase), np.asarray(orbit.approach)
-    (turns,) = np.nonzero(approach * np.roll(approach, -1) < 0)
+    phase, dte = np.asarray(orbit.phase), np.asarray(orbit.dte)
+    (turns,) = np.nonzero(dte * np.roll(dte, -1) < 0)
     assert len(turns) == changes
     short = [np.linspace(phase[i] - 0.003, phase[i] + 0.004, 501) for i in turns]
     return jnp.asarray(np.unique(np.concatenate([phase, [1.0], *short])))

@@ -95,11 +95,11 @@ def test_cycles_do_not_hold_the_prepared_mesh(mesh, batch):
 
 
 def test_a_cycle_is_solved_again_from_what_it_holds(batch):
-    """Flanks, operation, pair and array sizes are in it, also after many were stacked and one was taken out."""
+    """Flanks, operating point, pair and array sizes are in it, also after many were stacked and one was taken out."""
     cycle = one_of(batch, (1, 2))
     again = jg.solve(
         jg.prepare(cycle.kinematics.pair, resolution=cycle.kinematics.resolution),
-        cycle.operation,
+        cycle.operating_point,
         pinion=cycle.pinion,
         wheel=cycle.wheel,
     )
@@ -110,11 +110,11 @@ def test_a_cycle_is_solved_again_from_what_it_holds(batch):
 
 
 def test_operation_carries_what_the_contact_does_not_need(mesh):
-    cycle = jg.solve(mesh, jg.Operation(50.0, speed=1500.0))
+    cycle = jg.solve(mesh, jg.OperatingPoint(50.0, speed=1500.0))
     np.testing.assert_array_equal(cycle.transmission_error, jg.solve(mesh, 50.0).transmission_error)
-    assert float(cycle.operation.speed) == 1500.0 and cycle.operation.friction is None
-    with pytest.raises(ValueError, match="Operation: speed = -1 rpm must be at least 0 rpm"):
-        jg.Operation(50.0, speed=-1.0)
+    assert float(cycle.operating_point.speed) == 1500.0 and cycle.operating_point.friction is None
+    with pytest.raises(ValueError, match="OperatingPoint: speed = -1 rpm must be at least 0 rpm"):
+        jg.OperatingPoint(50.0, speed=-1.0)
 
 
 def test_one_design_over_torques_is_that_of_each(mesh):

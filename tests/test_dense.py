@@ -119,7 +119,7 @@ def test_nothing_stays_nothing_and_nan_stays_nan():
 
 
 def over_meshes(x):
-    """Slices that feel each other through gears and shafts, and their contact."""
+    """Slices that are coupled through gears and shafts, and their contact."""
     held = support(stage(1.0, radial=300.0 * x))
     sizes = jg.Resolution(positions=8, patch_nodes=1, slices=7, pairs=2, slide_steps=0, newton_steps=2)
     return jg.solve(jg.prepare(held.pair, support=held, resolution=sizes), 40.0).transmission_error
@@ -130,7 +130,7 @@ def over_lines(x):
 
 
 def over_tables(x):
-    return interpolate(jnp.linspace(0.0, 3.0, 9), jnp.arange(4.0), x * jnp.array([0.0, 1.0, 0.5, 2.0]), "cubic2")
+    return interpolate(jnp.linspace(0.0, 3.0, 9), jnp.arange(4.0), x * jnp.array([0.0, 1.0, 0.5, 2.0]), "natural_cubic")
 
 
 def test_traced_code_has_no_other_equations():

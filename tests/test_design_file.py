@@ -663,7 +663,7 @@ WRONG = [
 ]
 EVERYTHING = """
 [optimize]
-method = "minimax"
+method = "slp"
 objective = "ppte"
 measure = "cvar"
 level = 0.9
@@ -675,7 +675,7 @@ starts = 4
 steps = 20
 application_factor = 1.2
 constraint = [{ of = "max_contact_pressure", high = 900.0 }, { variables = { height = 1.0 }, low = 1.0 }]
-minimax = { rounds = 2 }
+slp = { rounds = 2 }
 free_form = { points = 20, max_relief = 10.0, curvature = 0.01 }
 te_iteration = { start = "unmodified", max_relief = 8.0, max_pressure = 2000.0 }
 factorial = { levels = { height = 3 } }
@@ -848,8 +848,12 @@ def test_speed_and_friction_reach_objective_constraint_and_sweep(load):
     free = load(whole.replace("speed = 1000.0", 'speed = "n"').replace("[optimize]", variable + "[optimize]"))
     assert free.speed == 1000.0 and free.units["n"] == "rpm"
     request = sweep_request(free)
-    operation = request.load({"height": jnp.asarray(1.0), "n": jnp.asarray(700.0)})
-    assert float(operation.speed) == 700.0 and float(operation.torque) == 50.0 and request.highest_torque == 50.0
+    operating_point = request.load({"height": jnp.asarray(1.0), "n": jnp.asarray(700.0)})
+    assert (
+        float(operating_point.speed) == 700.0
+        and float(operating_point.torque) == 50.0
+        and request.highest_torque == 50.0
+    )
     with pytest.raises(DesignFileError, match=r'load\.speed: "n" is a variable, which a sweep alone'):
         optimize_request(free)
 

@@ -77,7 +77,7 @@ def test_published_polynomial_is_far_from_the_dead_zone_where_it_is_said_to_be()
 
 def test_polynomial_is_refused_out_of_its_range():
     clearance = PolynomialClearance.published()
-    with pytest.raises(ValueError, match="PolynomialClearance: approach = 3.5 must be at least -3 and at most 3"):
+    with pytest.raises(ValueError, match="PolynomialClearance: dte = 3.5 must be at least -3 and at most 3"):
         clearance(jnp.array(0.0), jnp.array(3.5))
     assert jnp.isnan(eqx.filter_jit(clearance)(jnp.array(0.0), jnp.array(3.5)))
     # and so is a vibration that leaves it
@@ -215,7 +215,7 @@ def test_dead_zone_without_stiffness_variation_is_the_linear_oscillator():
     found = settled_vibration(model, 0.7, start=[1.1, 0.0], settling=40, steps=512)
     assert found.settled
     assert np.isclose(abs(found.harmonic(1)), 0.047593, atol=1e-6)
-    assert np.isclose(found.mean, 1.1) and np.isclose(np.max(found.approach), 1.147593, atol=2e-6)
+    assert np.isclose(found.mean, 1.1) and np.isclose(np.max(found.dte), 1.147593, atol=2e-6)
 
 
 def test_clearance_that_opens_gives_the_exact_softening_branch():
@@ -235,7 +235,7 @@ def test_gradient_of_the_settled_amplitude():
         amount, load = parameters
         model = eqx.tree_at(lambda m: m.load, with_relief(model_of(clearance), relief(amount)), load)
         found = settled_vibration(model, 0.6, settling=60, steps=64)
-        return jnp.sqrt(jnp.sum(found.weight * (found.approach - found.mean) ** 2))
+        return jnp.sqrt(jnp.sum(found.weight * (found.dte - found.mean) ** 2))
 
     along = jax.jit(lambda at, way: jax.jvp(rms, (at,), (way,)))
     at, step = np.array([0.2, 0.5]), 1e-5

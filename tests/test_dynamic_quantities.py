@@ -45,7 +45,7 @@ def numbers(mesh, height):
     """Dynamic factor and rms of all runs and speeds."""
     relief = jg.TipRelief(height, 3.2)
     found = SETTINGS.numbers(SETTINGS.oscillator(mesh, TORQUE, pinion=relief, wheel=relief))
-    return jnp.stack([found.dynamic_factor, found.approach_rms]), found.exact
+    return jnp.stack([found.dynamic_factor, found.dte_rms]), found.exact
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def along(oscillator, way):
 
     def of(moving):
         found = SETTINGS.numbers(eqx.combine(moving, rest))
-        return jnp.stack([found.dynamic_factor, found.approach_rms]), found
+        return jnp.stack([found.dynamic_factor, found.dte_rms]), found
 
     return jax.jvp(of, (moving,), (way,), has_aux=True)
 
@@ -118,10 +118,10 @@ def test_a_quantity_is_the_number_of_the_sweep(mesh, nearby, monkeypatch):
     monkeypatch.setattr(Dynamics, "numbers", lambda _, oscillator: along(oscillator, nearby[1])[2])
     relief = jg.TipRelief(HEIGHT, 3.2)
     cycle = jg.solve(mesh, TORQUE, pinion=relief, wheel=relief).on(mesh)
-    values = [float(SETTINGS.quantity(f"worst_{name}")(cycle)) for name in ("dynamic_factor", "approach_rms")]
+    values = [float(SETTINGS.quantity(f"worst_{name}")(cycle)) for name in ("dynamic_factor", "dte_rms")]
     runs = SETTINGS.runs(oscillator_of(mesh, HEIGHT))
     assert list(runs) == ["up", "down"]
-    swept = [max(getattr(run, name).max() for run in runs.values()) for name in ("dynamic_factor", "approach_rms")]
+    swept = [max(getattr(run, name).max() for run in runs.values()) for name in ("dynamic_factor", "dte_rms")]
     np.testing.assert_allclose(values, swept, rtol=2e-3)
     assert values[0] > 1.1
 
@@ -129,7 +129,7 @@ def test_a_quantity_is_the_number_of_the_sweep(mesh, nearby, monkeypatch):
 @pytest.mark.slow
 def test_an_objective_is_the_number_of_the_sweep(mesh):
     """The whole chain, cycle, mesh, force and oscillator, against the steps done by hand; and its slope."""
-    objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_approach_rms")]
+    objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_dte_rms")]
     problem = make_problem(design, {"height": (0.0, 8.0)}, mesh=mesh, torque=TORQUE, objective=objectives)
 
     @eqx.filter_jit
@@ -142,7 +142,7 @@ def test_an_objective_is_the_number_of_the_sweep(mesh):
     )
     runs = SETTINGS.runs(oscillator_of(mesh, HEIGHT))
     assert list(runs) == ["up", "down"]
-    swept = [max(getattr(run, name).max() for run in runs.values()) for name in ("dynamic_factor", "approach_rms")]
+    swept = [max(getattr(run, name).max() for run in runs.values()) for name in ("dynamic_factor", "dte_rms")]
     np.testing.assert_allclose(values, swept, rtol=2e-3)
     assert values[0] > 1.1
     np.testing.assert_allclose(slopes, np.subtract(above, below) / (2 * step), rtol=1e-4)
@@ -172,7 +172,7 @@ def test_many_designs_are_each_as_alone(mesh, of_contacts):
     assert set(runs) == {"up", "down"} and runs["down"].direction == "down"
     runs, worst = jax.tree.map(np.asarray, (runs, worst))
     assert worst[:2] == pytest.approx(runs["down"].dynamic_factor[:2].max(axis=1)) and np.isnan(worst[2])
-    assert np.isnan(runs["up"].approach_rms[2]).all() and not runs["up"].settled[2].any()
+    assert np.isnan(runs["up"].dte_rms[2]).all() and not runs["up"].settled[2].any()
     for i in range(2):
         alone = SETTINGS.runs(of(heights[i]))
         one = jax.tree.map(lambda part: part[i], runs)  # noqa: B023 - at once
@@ -189,7 +189,7 @@ def test_designs_have_one_leading_axis():
 
 @pytest.mark.slow
 def test_a_linearization_has_the_slopes_of_every_speed(mesh, sloped):
-    objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_approach_rms")]
+    objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_dte_rms")]
     problem = make_problem(design, {"height": (0.0, 8.0)}, mesh=mesh, torque=TORQUE, objective=objectives)
     found = eqx.filter_jit(lambda problem, x: problem.linearize(x))(problem, jnp.asarray([HEIGHT / 8]))
     assert bool(found.fine)
@@ -200,19 +200,21 @@ def test_a_linearization_has_the_slopes_of_every_speed(mesh, sloped):
 
 
 def test_quantities_of_the_same_settings_share_a_sweep(mesh, monkeypatch):
-    """As objectives and limits of one problem; those at the speed of the operation have their own."""
+    """As objectives and limits of one problem; those at the speed of the operating point have their own."""
     traced = []
     made = Dynamics.numbers
     monkeypatch.setattr(Dynamics, "numbers", lambda *args: traced.append(args) or made(*args))
-    objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_no_contact")]
-    limit = jg.Constraint(SETTINGS.quantity("worst_approach_rms"), high=5.0)
+    objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_contact_loss_share")]
+    limit = jg.Constraint(SETTINGS.quantity("worst_dte_rms"), high=5.0)
     options = {"mesh": mesh, "torque": TORQUE, "objective": objectives, "constraints": [limit]}
     problem = make_problem(design, {"height": (0.0, 8.0)}, **options)
     for times in (1, 2):  # a second trace has nothing of the first one
         eqx.filter_eval_shape(problem.score, jnp.asarray([0.3]))
         assert len(traced) == times
-    cycle = dataclasses.replace(jg.solve(mesh, TORQUE), operation=jg.Operation(TORQUE, speed=3000.0)).on(mesh)
-    names = "dynamic_factor", "approach_rms", "worst_approach_rms"
+    cycle = dataclasses.replace(jg.solve(mesh, TORQUE), operating_point=jg.OperatingPoint(TORQUE, speed=3000.0)).on(
+        mesh
+    )
+    names = "dynamic_factor", "dte_rms", "worst_dte_rms"
     jax.eval_shape(lambda: [SETTINGS.quantity(name)(cycle) for name in names])
     assert len(traced) == 4
 
@@ -237,8 +239,8 @@ def test_names_are_known_and_refused_without_settings(mesh):
 def test_a_cycle_without_its_mesh_is_refused(mesh):
     cycle = jg.solve(mesh, TORQUE)
     assert cycle.mesh is None
-    with pytest.raises(ValueError, match="^worst_approach_rms: needs the prepared mesh"):
-        SETTINGS.quantity("worst_approach_rms")(cycle)
+    with pytest.raises(ValueError, match="^worst_dte_rms: needs the prepared mesh"):
+        SETTINGS.quantity("worst_dte_rms")(cycle)
     with pytest.raises(ValueError, match="^dynamic_factor: needs a speed"):
         SETTINGS.quantity("dynamic_factor")(cycle.on(mesh))
     many = jax.tree.map(lambda leaf: np.stack([leaf, leaf]) if eqx.is_array(leaf) else leaf, cycle)

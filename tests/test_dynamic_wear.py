@@ -45,7 +45,7 @@ def natural(mesh):
 
 def at(frequency):
     """The load at a mesh frequency [Hz]."""
-    return jg.Operation(TORQUE, 60 * frequency / TEETH[0])
+    return jg.OperatingPoint(TORQUE, 60 * frequency / TEETH[0])
 
 
 def life_of(mesh, frequency, revolutions=REVOLUTIONS, **options):
@@ -81,7 +81,7 @@ def resonant(mesh, natural):
 def test_slow_gears_have_the_static_force(mesh, natural):
     """But for the vibration after every step of the stiffness."""
     _, motion = motion_at(mesh, natural / 40)
-    assert motion.found and not motion.coast_contact
+    assert motion.found and not motion.back_side_contact
     np.testing.assert_allclose(motion.force[:, OF_MESH], static_force(mesh), rtol=0.02)
     assert motion.force.std() < 0.01 * static_force(mesh)
 
@@ -100,7 +100,7 @@ def test_far_above_the_resonance_the_approach_stands_still(mesh, natural):
     force = jax.jit(jax.vmap(oscillator.mesh_force, in_axes=(0, None)))
     low, high = 0.0, 50.0
     mean = static_force(mesh)
-    for _ in range(50):  # the approach at which the mean force is the static one
+    for _ in range(50):  # the DTE at which the mean force is the static one
         middle = 0.5 * (low + high)
         low, high = (middle, high) if np.mean(np.asarray(force(PHASES, middle))) < mean else (low, middle)
     standing = np.asarray(force(PHASES, low))
@@ -143,7 +143,7 @@ def test_a_force_is_carried_as_its_torque_is(mesh, resonant):
 @pytest.mark.slow
 @pytest.mark.parametrize("slices", [1, 7])
 def test_one_force_at_every_position_is_a_torque(mesh, slices):
-    """Slices that feel each other too."""
+    """Coupled slices too."""
     mesh = mesh if slices == 1 else prepare(mesh.pair, resolution=replace(SIZES, slices=slices, face_modes=3))
     forces = jnp.asarray(static_force(mesh) * np.where(np.arange(16) < 8, 1.0, 0.5))
     contact = solve_forces(mesh, forces, removed_material(mesh, TORQUE, **FLANKS))
@@ -243,9 +243,9 @@ def test_steps_on_the_host_are_the_blocks(mesh, natural, resonant):
 @pytest.mark.parametrize(
     "options, message",
     [
-        ({"torque": TORQUE}, r"wear: dynamics needs a speed: give Operation\(torque, speed\)"),
-        ({"torque": jg.Operation(TORQUE, 0.0)}, "wear: speed with dynamics = 0 rpm must be greater than 0 rpm"),
-        ({"torque": jg.Operation(0.0, 9.0)}, "wear: torque with dynamics = 0 N m must be greater than 0 N m"),
+        ({"torque": TORQUE}, r"wear: dynamics needs a speed: give OperatingPoint\(torque, speed\)"),
+        ({"torque": jg.OperatingPoint(TORQUE, 0.0)}, "wear: speed with dynamics = 0 rpm must be greater than 0 rpm"),
+        ({"torque": jg.OperatingPoint(0.0, 9.0)}, "wear: torque with dynamics = 0 N m must be greater than 0 N m"),
         ({"dynamics": None, "line_load": "dynamic"}, 'wear: line_load = "dynamic" needs dynamics'),
         ({"line_load": "quick"}, 'wear: line_load = \'quick\' must be "static" or "dynamic"'),
         ({"dynamics": 3.0}, "wear: dynamics is of type float, must be Dynamics"),

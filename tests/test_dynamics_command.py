@@ -50,7 +50,7 @@ torque_factors = [1.0]
 """
 FIGURES = (
     "dynamic_factor",
-    "approach_rms",
+    "dte_rms",
     "waterfall",
     "order_tracks",
     "run_up",
@@ -65,7 +65,7 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     done = call("dynamics", str(path), "--output", str(folder), "--report")
     code, out, err = done.code, done.out, done.err
     assert code == 0, err
-    assert "[tolerance] is not part of this analysis, the gears are perfect\n" in err
+    assert "[tolerance] is not part of this analysis, the gears are nominal\n" in err
     assert {entry.name for entry in folder.iterdir()} == {
         "summary.json",
         "responses.csv",
@@ -216,8 +216,8 @@ def test_a_design_file_binds_names_to_its_settings(file):
     assert results == ("ppte", request.settings.quantity("worst_dynamic_factor"))
     with pytest.raises(DesignFileError, match=r'sweep.results\[1\]: "worst_dynamic_factor" needs the table \[dynam'):
         sweep_request(load_design(file(text)))
-    with pytest.raises(DesignFileError, match='"approach_rms" needs load.speed'):
-        sweep_request(load_design(file(PAIR + SWEEP.format(name="approach_rms") + TABLE)))
+    with pytest.raises(DesignFileError, match='"dte_rms" needs load.speed'):
+        sweep_request(load_design(file(PAIR + SWEEP.format(name="dte_rms") + TABLE)))
 
 
 def test_kept_responses_are_not_made_again(tmp_path):
@@ -225,7 +225,7 @@ def test_kept_responses_are_not_made_again(tmp_path):
     oscillator = Oscillator(RectangularStiffness(1.4, 0.8, 0.4), [1.0], [1.0], [1.0], mesh_damping=0.1, newton=1.0)
     made = []
     shapes = {"force_harmonics": (2, 3), "velocity_harmonics": (2, 3)}  # of two speeds, three orders and four points
-    shapes |= {"poincare_approach": (2, 4), "poincare_velocity": (2, 4)}
+    shapes |= {"poincare_dte": (2, 4), "poincare_velocity": (2, 4)}
     kinds = {"period": int, "settled": bool}
 
     def sweep():

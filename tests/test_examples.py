@@ -153,11 +153,11 @@ def test_the_robust_relief_is_sized_for_more_than_the_design_torque(robust):
 
 
 def test_the_robust_optimum_is_better_for_gears_that_it_has_not_seen(manufactured):
-    """It gives up on perfect gears what it gains on manufactured ones: at least 15 % of their 95 % quantile."""
+    """It gives up on nominal gears what it gains on manufactured ones: at least 15 % of their 95 % quantile."""
     assert manufactured["robust_quantile95_lower_percent"] > 15.0
     assert manufactured["robust_quantile95_ppte_um"] < manufactured["unmodified_quantile95_ppte_um"]
     assert manufactured["robust_mean_ppte_um"] < manufactured["nominal_mean_ppte_um"]
-    assert manufactured["nominal_ppte_of_perfect_gears_um"] < manufactured["robust_ppte_of_perfect_gears_um"]
+    assert manufactured["nominal_ppte_of_nominal_gears_um"] < manufactured["robust_ppte_of_nominal_gears_um"]
 
 
 def test_two_loaded_pairs_average_their_deviations(manufactured):

@@ -1,4 +1,4 @@
-"""Slices that feel each other, and what holds the gears: kernel, contact problem, limits, symmetry, derivatives."""
+"""Coupled slices, and what holds the gears: kernel, contact problem, limits, symmetry, derivatives."""
 
 from dataclasses import replace
 

@@ -29,8 +29,8 @@ class Wave(AbstractMeshForce):
     def at(self, phase):
         return 1 + self.variation * jnp.cos(2 * jnp.pi * (phase - self.stiffest))
 
-    def force(self, place, approach):
-        return place * jnp.maximum(approach, 0.0)
+    def force(self, place, dte):
+        return place * jnp.maximum(dte, 0.0)
 
 
 def swept(variation, stiffest, zeta, kicks, cycles=500):

@@ -19,7 +19,7 @@ from jaxgear.layout import (
     Endurance,
     FlankLine,
     FlankLineTolerance,
-    WoehlerLine,
+    SNCurve,
     at_stations,
     at_torque,
     crowning_off_the_edges,
@@ -60,7 +60,7 @@ TORQUE = 150.0
 BOX = two_stages()
 SUPPORT = support(BOX, 1)
 OWN_TORQUE = 60.0 * 48 / 19  # of the couplings; told all the same, so that one program serves every torque
-ENDURANCE = Endurance(WoehlerLine(1500.0, 13.2, 5e7), WoehlerLine(900.0, 8.7, 3e6))
+ENDURANCE = Endurance(SNCurve(1500.0, 13.2, 5e7), SNCurve(900.0, 8.7, 3e6))
 DUTY = jg.LoadSpectrum.from_hours([60.0, 120.0, 180.0], [3000.0, 500.0, 20.0], [1000.0, 800.0, 500.0])
 
 
@@ -120,7 +120,7 @@ def bulged():
 @pytest.mark.slow
 def test_the_best_crowning_of_barrelled_gaps_is_hollow():
     """The crowning of the wheel is the negative of the pinion's."""
-    assert float(level_load(bulged(), hollow=True, stations=STATIONS).crowning) < -5.9
+    assert float(level_load(bulged(), negative_crowning=True, stations=STATIONS).crowning) < -5.9
 
 
 def test_a_flank_line_that_would_be_hollow_has_no_crowning():
@@ -644,7 +644,7 @@ def test_hours_are_weights_with_a_duration():
             "LoadSpectrum: sum of the hours = 0 h must be greater than 0 h",
         ),
         (lambda: jg.LoadSpectrum.from_hours([1.0], [-1.0]), "LoadSpectrum: hours = -1 h must be at least 0 h"),
-        (lambda: WoehlerLine(0.0, 5.0, 1e6), "WoehlerLine: endurance = 0 MPa must be greater than 0 MPa"),
+        (lambda: SNCurve(0.0, 5.0, 1e6), "SNCurve: endurance = 0 MPa must be greater than 0 MPa"),
     ],
 )
 def test_refusals(make, fault):
@@ -664,7 +664,7 @@ def two_stages_idle():
 
 
 def test_pictures_mark_the_edges(layout, clean_figures):
-    """One curve per case, a cross where an end is touched; hollow marks of the same cases."""
+    """One curve per case, a cross where an end is touched; negative_crowning marks of the same cases."""
     from jaxgear import plot
 
     cases = layout.before["maximum"]
@@ -676,5 +676,5 @@ def test_pictures_mark_the_edges(layout, clean_figures):
     np.testing.assert_allclose(tops, np.sort(np.asarray(cases.load.line_load).max(axis=1))[1:])
     assert "[mm]" in panel.get_xlabel() and "[N/mm]" in panel.get_ylabel()
     panel = plot.face_load_factors({"step 1": cases, "step 2": layout.after["maximum"]})
-    hollow = [line for line in panel.get_lines() if line.get_markerfacecolor() == "white"]
-    assert [len(line.get_xdata()) for line in hollow] == [4, 0]
+    negative_crowning = [line for line in panel.get_lines() if line.get_markerfacecolor() == "white"]
+    assert [len(line.get_xdata()) for line in negative_crowning] == [4, 0]

@@ -397,7 +397,7 @@ WRONG = [
     (FILE[: FILE.index("[housing]")] + "[layout]\nquality_class = 6\n", "layout: has no effect without [[shafts]]"),
     (replaced("quality_class = 6\n", ""), "layout.quality_class: missing, this key is required"),
     (replaced("quality_class = 6", "quality_class = 14"), "layout.quality_class: 14 must be at least 1 and at most 11"),
-    (replaced("stations = 21", "hollo = true"), 'layout.hollo: unknown key, did you mean "hollow"?'),
+    (replaced("stations = 21", "hollo = true"), 'layout.hollo: unknown key, did you mean "negative_crowning"?'),
     (replaced(f"misalignment = {AXES}", "bearing_span = 80.0"), "layout.bearing_span: has no effect without skew or"),
     (replaced("span = 80.0", "span = 17.0"), "misalignment.bearing_span: 17 mm must be at least 18 mm, the face width"),
     (replaced("skew = 15.0", "skew = -1.0"), "layout.misalignment.skew: -1 um must be at least 0 um"),

@@ -8,10 +8,10 @@ import pytest
 from catalogue import LINE, gear_pair
 
 import jaxgear as jg
-from jaxgear.contact import Operation
+from jaxgear.contact import OperatingPoint
 from jaxgear.contact.parts import parts
 from jaxgear.metrics import Lubricant, Strength
-from jaxgear.optimize import Genetic, Minimax, Pareto
+from jaxgear.optimize import SLP, Genetic, Pareto
 from jaxgear.optimize.evaluate import scores
 from jaxgear.optimize.goal import FEASIBLE, counted
 from jaxgear.optimize.problem import make_problem
@@ -150,7 +150,7 @@ def test_least_power_loss_within_limits_of_noise_and_root_safety():
     """A 23/81 pair; a relief that is known keeps both limits, on a finer mesh than that of the answer too."""
     pair = gear_pair((23, 81), 2.5, face_width=30.0, bores=(None, None))
     mesh, fine = (jg.prepare(pair, resolution=replace(LINE, positions=count)) for count in (64, 256))
-    load = Operation(300.0, 1500.0)
+    load = OperatingPoint(300.0, 1500.0)
     oil = Lubricant(viscosity_40=100.0, viscosity_100=11.1, temperature=80.0, roughness=0.5)
     safety = Strength(bending=700.0).quantity("pinion_root_safety")
 
@@ -167,7 +167,7 @@ def test_least_power_loss_within_limits_of_noise_and_root_safety():
         torque=load,
         objective=oil.quantity("loss_power"),
         constraints=[jg.Constraint("ppte", high=1.01 * ppte), jg.Constraint(safety, low=0.99 * least)],
-        method=Minimax(starts=2, rounds=1, steps=10),
+        method=SLP(starts=2, rounds=1, steps=10),
         positions=64,  # as many as the mesh has: one program linearizes on both
     )
     assert found.feasible and all(limit.kept for limit in found.constraints.values())

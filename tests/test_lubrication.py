@@ -11,7 +11,7 @@ from catalogue import LINE, gear_pair
 
 import jaxgear as jg
 from jaxgear import metrics
-from jaxgear.contact import Operation, solve_at
+from jaxgear.contact import OperatingPoint, solve_at
 from jaxgear.metrics import LUBRICANT_QUANTITIES, STRENGTH_QUANTITIES
 
 OIL = metrics.Lubricant(220.0, 19.0, 80.0, 0.4, permissible_film=0.2, scuffing_temperature=300.0)
@@ -39,7 +39,7 @@ def mesh():
 def solve(mesh):
     """Solves unmodified flanks at a torque and a speed, and another coefficient of friction where it is given."""
     return lambda torque=TORQUE, *running: dataclasses.replace(
-        jg.solve(mesh, torque), operation=Operation(torque, *(running or (SPEED,)))
+        jg.solve(mesh, torque), operating_point=OperatingPoint(torque, *(running or (SPEED,)))
     )
 
 
@@ -56,7 +56,7 @@ def relieved(mesh, torque, amount):
 def numbers(cycle, x):
     """Of a cycle by torque, speed, amount of relief, temperature and roughness."""
     torque, speed, _, temperature, roughness = x
-    cycle = dataclasses.replace(cycle, operation=Operation(torque, speed))
+    cycle = dataclasses.replace(cycle, operating_point=OperatingPoint(torque, speed))
     oil = metrics.Lubricant(220.0, 19.0, temperature, roughness, permissible_film=0.2, scuffing_temperature=300.0)
     least = (
         metrics.scuffing_safety(cycle, oil),
@@ -101,7 +101,7 @@ def with_slope(mesh):
     def of(x):
         torque, speed, amount, *_ = x
         relief = jg.TipRelief(amount, 4.0)
-        return numbers(jg.solve(mesh, Operation(torque, speed), pinion=relief, wheel=relief), x)
+        return numbers(jg.solve(mesh, OperatingPoint(torque, speed), pinion=relief, wheel=relief), x)
 
     return jax.jit(lambda x, way: jax.jvp(of, (x,), (way,)))
 
@@ -161,7 +161,7 @@ def test_friction_by_hand(cycle, law, factor):
 def test_friction_scales_with_the_powers_of_its_law(cycle):
     def logarithm(x):
         torque, speed, roughness, density = jnp.exp(x)
-        running = dataclasses.replace(cycle, operation=Operation(torque, speed))
+        running = dataclasses.replace(cycle, operating_point=OperatingPoint(torque, speed))
         oil = metrics.Lubricant(220.0, 19.0, 16.0, roughness, density=density)  # at 16 degC it has its density
         return jnp.log(metrics.friction_coefficient(running, oil))
 
@@ -239,7 +239,9 @@ def test_film_scales_with_speed_load_and_viscosity(cycle):
 
     def logarithm(x):
         load, speed, density = jnp.exp(x)
-        running = dataclasses.replace(cycle, operation=Operation(TORQUE, speed, 0.05), line_load=cycle.line_load * load)
+        running = dataclasses.replace(
+            cycle, operating_point=OperatingPoint(TORQUE, speed, 0.05), line_load=cycle.line_load * load
+        )
         oil = metrics.Lubricant(220.0, 19.0, 16.0, 0.4, density=density, cooling_factor=0.0)
         return jnp.log(metrics.film_thickness(running, oil)[pair, 0, PITCH])
 
@@ -253,7 +255,7 @@ def test_no_oil_is_as_hot_as_that(cycle):
     """Beyond 510 degC nothing thickens under pressure any more: there is no film, and no NaN."""
     hot = dataclasses.replace(OIL, bulk="loss", cooling_factor=10.0)
     assert float(metrics.bulk_temperature(cycle, hot)) > 250
-    fast = dataclasses.replace(cycle, operation=Operation(TORQUE, 50 * SPEED, 0.3))
+    fast = dataclasses.replace(cycle, operating_point=OperatingPoint(TORQUE, 50 * SPEED, 0.3))
     film = np.asarray(metrics.film_thickness(fast, hot))
     assert film[cycle.contact_pressure > 0].min() == 0.0 and np.isfinite(film).all()
     assert float(hot.quantity("micropitting_safety")(fast)) == 0.0
@@ -436,7 +438,7 @@ def test_slopes_through_the_contact_are_those_of_differences(with_slope):
 def test_slopes_backwards_are_those_forwards(mesh):
     def safety(amount):
         relief = jg.TipRelief(amount, 4.0)
-        cycle = jg.solve(mesh, Operation(TORQUE, SPEED), pinion=relief, wheel=relief)
+        cycle = jg.solve(mesh, OperatingPoint(TORQUE, SPEED), pinion=relief, wheel=relief)
         return jnp.min(metrics.micropitting_safety(cycle, OIL)) + jnp.min(metrics.scuffing_safety(cycle, OIL))
 
     at = jnp.asarray(12.0)
@@ -449,7 +451,7 @@ def test_standstill_is_never_safe(solve):
 
     @jax.jit
     def safeties(speed):
-        cycle = dataclasses.replace(loaded, operation=Operation(50.0, speed))
+        cycle = dataclasses.replace(loaded, operating_point=OperatingPoint(50.0, speed))
         names = "scuffing_safety", "mesh_efficiency", "max_contact_temperature", "max_flash_temperature"
         return jnp.stack([OIL.quantity(name)(cycle) for name in names])
 
@@ -480,16 +482,16 @@ def test_equal_settings_make_equal_quantities(cycle):
 
 
 def test_names_without_settings_say_what_they_need(solve, cycle):
-    still = dataclasses.replace(cycle, operation=Operation(TORQUE))
+    still = dataclasses.replace(cycle, operating_point=OperatingPoint(TORQUE))
     for name in ("min_film_thickness", "scuffing_safety", "bulk_temperature"):
         with pytest.raises(ValueError, match=f"^{name}: needs settings, give jaxgear.metrics.Lubricant"):
             jg.quantities[name](cycle)
-        with pytest.raises(ValueError, match=r"needs a speed, solve with Operation\(torque, speed\)$"):
+        with pytest.raises(ValueError, match=r"needs a speed, solve with OperatingPoint\(torque, speed\)$"):
             OIL.quantity(name)(still)
     with pytest.raises(ValueError, match=r"^pinion_root_safety: needs settings, give jaxgear.metrics.Strength\(...\)"):
         jg.quantities["pinion_root_safety"](cycle)
     for name in ("loss_power", "mesh_efficiency"):
-        with pytest.raises(ValueError, match=f"^{name}: needs a coefficient of friction, solve with Operation"):
+        with pytest.raises(ValueError, match=f"^{name}: needs a coefficient of friction, solve with OperatingPoint"):
             jg.quantities[name](cycle)
     with pytest.raises(ValueError, match="^friction_coefficient: speed = 0 rpm must be greater than 0 rpm"):
         metrics.friction_coefficient(solve(TORQUE, 0.0), OIL)

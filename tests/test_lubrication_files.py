@@ -10,7 +10,7 @@ from commands import LINE
 
 import jaxgear as jg
 from jaxgear.cli import commands, study, sweep
-from jaxgear.contact import Operation
+from jaxgear.contact import OperatingPoint
 from jaxgear.io import DesignFileError, load_design, optimize_request, quantities_of_tables, sweep_request
 from jaxgear.numerics import program
 
@@ -175,7 +175,7 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
     of_cycle = eqx.filter_jit(lambda cycle: [quantity(cycle) for quantity in numbers])
 
     def solved(amount):  # by the programs of the analysis
-        return of_cycle(jg.solve(mesh, Operation(50.0, 3000.0), pinion=jg.TipRelief(amount, 4.0)))
+        return of_cycle(jg.solve(mesh, OperatingPoint(50.0, 3000.0), pinion=jg.TipRelief(amount, 4.0)))
 
     table = sweep_table(file(PAIR + OIL + STRENGTH + RELIEF), tmp_path)
     for row in table:
@@ -206,7 +206,7 @@ def test_other_oils_and_strengths_are_other_numbers_of_one_program(load, monkeyp
         traced.append(of)
         return study._numbers.__wrapped__(*of)
 
-    cycle = jg.solve(load(PAIR).mesh(), Operation(50.0, 3000.0))
+    cycle = jg.solve(load(PAIR).mesh(), OperatingPoint(50.0, 3000.0))
     for temperature in ("80.0", "90.0"):
         design = load(PAIR + OIL.replace("80.0", temperature) + STRENGTH.replace("900.0", f"9{temperature}"))
         further = tuple(quantities_of_tables(design))
@@ -225,7 +225,7 @@ def test_a_sweep_over_the_speed(load, file, tmp_path):
     design = load(text)
     mesh, quantity = design.mesh(), design.lubricant.quantity("loss_power")
     for row in sweep_table(file(text), tmp_path):
-        cycle = jg.solve(mesh, Operation(50.0, row["n"]), pinion=jg.TipRelief(row["amount"], 4.0))
+        cycle = jg.solve(mesh, OperatingPoint(50.0, row["n"]), pinion=jg.TipRelief(row["amount"], 4.0))
         assert row["loss_power_W"] == pytest.approx(float(quantity(cycle)), rel=1e-9)
 
 

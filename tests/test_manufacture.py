@@ -293,7 +293,9 @@ def to_differentiate(side, lengths, criterion):
         return wheel_spline(side, jg.TipRelief(x[0], x[1], jg.Power(3.0)), criterion=criterion).largest
 
     def of_table(amounts):
-        return wheel_spline(side, jg.TabulatedProfile(roll, amounts, method="cubic2"), criterion=criterion).largest
+        return wheel_spline(
+            side, jg.TabulatedProfile(roll, amounts, method="natural_cubic"), criterion=criterion
+        ).largest
 
     amounts = jnp.asarray(6.0 * np.linspace(0.0, 1.0, 9) ** 3)
     given = {"least_squares": (of_relief, jnp.asarray([6.0, lengths["fewest_pairs"]])), "minimax": (of_table, amounts)}

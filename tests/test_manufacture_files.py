@@ -349,9 +349,9 @@ def test_a_design_file_takes_a_measured_flank(tmp_path):
     assert isinstance(pinion, jg.TabulatedFlank) and isinstance(wheel, jg.NoModification)
     np.testing.assert_array_equal(pinion.amount, io.read_flank(tmp_path / "measured.csv").amount)
     assert design.resolution().slices == 11
-    more = 'method = "cubic2"'
+    more = 'method = "natural_cubic"'
     design = io.load_design(written(tmp_path, DESIGN.format(file="measured.csv", more=more), "design.toml"))
-    assert design.design({})[0].method == "cubic2"
+    assert design.design({})[0].method == "natural_cubic"
 
 
 @pytest.mark.parametrize(
@@ -364,7 +364,7 @@ def test_a_design_file_takes_a_measured_flank(tmp_path):
         (
             "measured.csv",
             'method = "cubic"',
-            'pinion.modification[0].method: "cubic" is not known, did you mean "cubic2"',
+            'pinion.modification[0].method: "cubic" is not known, did you mean "natural_cubic"',
         ),
     ],
 )
@@ -387,6 +387,6 @@ def test_a_design_file_holds_a_search_to_what_the_wheel_grinds(tmp_path):
         text = DESIGN.replace("[wheel]", relief).format(file="measured.csv", more="") + variables + limits
         return io.optimize_request(io.load_design(written(tmp_path, text, "design.toml")))
 
-    assert request("pinion_quadratic_deviation").method == request("wheel_cubic_deviation_um").method == "minimax"
+    assert request("pinion_quadratic_deviation").method == request("wheel_cubic_deviation_um").method == "slp"
     with pytest.raises(io.DesignFileError, match='"pinion_quadratic" is not known, did you mean "pinion_quadratic_dev'):
         request("pinion_quadratic")

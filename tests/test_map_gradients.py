@@ -56,7 +56,7 @@ def cases(oscillator):
 @eqx.filter_jit
 def numbers_of(oscillator, frequency, start):
     orbit = find_orbit(oscillator, frequency, start, steps=STEPS)
-    return jnp.stack([orbit.dynamic_factor, orbit.approach_rms]), orbit.no_contact, orbit.converged & orbit.stable
+    return jnp.stack([orbit.dynamic_factor, orbit.dte_rms]), orbit.contact_loss_share, orbit.converged & orbit.stable
 
 
 @eqx.filter_jit
@@ -69,8 +69,8 @@ def test_dynamic_factor_and_rms(cases, frequency, apart):
     """Below the resonance, on its flank, and where contact is lost."""
     moving, changes, beside = cases
     start = settle(moving, frequency, ([12.0], [0.0]), cycles=150, steps=STEPS)
-    _, no_contact, fine = numbers_of(moving, frequency, start)
-    assert bool(fine) and (float(no_contact) > 0.1) == apart
+    _, contact_loss_share, fine = numbers_of(moving, frequency, start)
+    assert bool(fine) and (float(contact_loss_share) > 0.1) == apart
     for name, value, change, (above, below) in zip(NAMES, POINT, changes, beside):
         found = slopes_of(moving, change, frequency, start)
         ends = [numbers_of(each, frequency, start)[0] for each in (above, below)]

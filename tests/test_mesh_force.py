@@ -1,4 +1,4 @@
-"""The force of a mesh over mesh position and approach: its map, the coast flanks and the simpler models."""
+"""The force of a mesh over mesh position and DTE: its map, the coast flanks and the simpler models."""
 
 from functools import partial
 
@@ -67,8 +67,8 @@ def fine(request, mesh):
 
 
 @eqx.filter_jit
-def forces(force, phase, approach):
-    return jax.vmap(force)(phase, approach)
+def forces(force, phase, dte):
+    return jax.vmap(force)(phase, dte)
 
 
 @eqx.filter_jit
@@ -77,22 +77,22 @@ def starts(force, phase):
 
 
 @eqx.filter_jit
-def approaches(force, phase, load):
-    return jax.vmap(lambda at: force.static_approach(at, load))(phase)
+def static_errors(force, phase, load):
+    return jax.vmap(lambda at: force.static_te(at, load))(phase)
 
 
 @eqx.filter_jit
-def solved(mesh, removed, approach, compliance):
+def solved(mesh, removed, dte, compliance):
     at = partial(solve_series, mesh, removed=removed, compliance=compliance)
-    return jax.vmap(lambda q: at(jnp.full(mesh.resolution.positions, q)).force)(approach)
+    return jax.vmap(lambda q: at(jnp.full(mesh.resolution.positions, q)).force)(dte)
 
 
-def direct(mesh, removed, approach, compliance=0.0):
-    """Force at every approach, shape (approaches, positions)."""
-    return np.asarray(solved(mesh, removed, jnp.asarray(approach), jnp.asarray(compliance)))
+def direct(mesh, removed, dte, compliance=0.0):
+    """Force at every DTE, shape (DTEs, positions)."""
+    return np.asarray(solved(mesh, removed, jnp.asarray(dte), jnp.asarray(compliance)))
 
 
-def random_approaches(random):
+def random_dtes(random):
     return random.uniform(-5.0, 16.0, 80)
 
 
@@ -101,25 +101,25 @@ def test_a_load_has_the_transmission_error_of_the_contact_analysis(case, mesh, s
     removed = removed_material(mesh, TORQUE, **given)
     for share in (0.2, 1.0, 3.0):
         cycle = solve_removed(mesh, share * TORQUE, removed)
-        found = approaches(force, mesh.phase, share * static_force)
+        found = static_errors(force, mesh.phase, share * static_force)
         np.testing.assert_allclose(found, cycle.transmission_error, rtol=1e-3, atol=1e-3)
 
 
-def errors(case, mesh, static_force, approach):
+def errors(case, mesh, static_force, dte):
     """Of the static force, or of the force itself where that is larger; also far beyond the static deflection."""
     given, force = case
-    wanted = direct(mesh, removed_material(mesh, TORQUE, **given), approach).ravel()
-    phase, approach = (part.ravel() for part in np.meshgrid(mesh.phase, approach))
+    wanted = direct(mesh, removed_material(mesh, TORQUE, **given), dte).ravel()
+    phase, dte = (part.ravel() for part in np.meshgrid(mesh.phase, dte))
     assert wanted.max() > 2.5 * static_force and wanted.min() == 0
-    return np.abs(np.asarray(forces(force, phase, approach)) - wanted) / np.maximum(wanted, static_force)
+    return np.abs(np.asarray(forces(force, phase, dte)) - wanted) / np.maximum(wanted, static_force)
 
 
 def test_the_map_is_that_of_the_contact_analysis(case, mesh, static_force):
     """At its positions as far as the levels let it be, and near between them."""
     random = np.random.default_rng(7)
-    assert errors(case, mesh, static_force, random_approaches(random)).max() < 5e-3
+    assert errors(case, mesh, static_force, random_dtes(random)).max() < 5e-3
     aside = prepare_from(jnp.asarray(0.5 / 16), mesh.pair, mesh.compliance, mesh.resolution, None, mesh.even)
-    between = errors(case, aside, static_force, random_approaches(random))
+    between = errors(case, aside, static_force, random_dtes(random))
     assert np.median(between) < 0.01 and between.max() < 0.5, (np.median(between), between.max())
 
 
@@ -128,7 +128,7 @@ def test_between_its_grid_the_map_is_within_half_a_percent_of_the_contact_analys
     random = np.random.default_rng(7)
     for first in random.uniform(0, 1 / 16, 4):
         aside = prepare_from(first, mesh.pair, mesh.compliance, mesh.resolution, None, mesh.even)
-        assert errors(fine, aside, static_force, random_approaches(random)).max() < 5e-3
+        assert errors(fine, aside, static_force, random_dtes(random)).max() < 5e-3
 
 
 @pytest.mark.slow
@@ -142,12 +142,12 @@ def test_the_map_is_that_of_the_contact_analysis_where_contacts_slide():
 def test_the_force_rises_outside_the_clearance_and_is_exactly_zero_in_it(case, mesh):
     force = case[1]
     backlash = float(mesh.pair.backlash)
-    approach = np.linspace(-backlash - 60.0, 60.0, 2001)
+    dte = np.linspace(-backlash - 60.0, 60.0, 2001)
     for phase in np.random.default_rng(1).uniform(-1, 2, 5):
         touch, back = np.asarray(starts(force, jnp.asarray(phase)))
-        found = np.asarray(forces(force, np.full_like(approach, phase), approach))
-        inside = (approach <= touch) & (approach >= -back)
-        assert not np.any(found[inside]) and np.all(found[approach > touch] > 0) and np.all(found[approach < -back] < 0)
+        found = np.asarray(forces(force, np.full_like(dte, phase), dte))
+        inside = (dte <= touch) & (dte >= -back)
+        assert not np.any(found[inside]) and np.all(found[dte > touch] > 0) and np.all(found[dte < -back] < 0)
         rising = np.diff(found)
         assert np.all(rising[~(inside[1:] & inside[:-1])] > 0)
         np.testing.assert_allclose(np.diff(found, 2)[-20:], 0.0, atol=1e-9)  # linear beyond the table
@@ -160,9 +160,9 @@ def test_both_flanks_are_the_same_gears_in_a_mirror(fine, mesh):
     first, shift, _ = _coast_phase(mesh)
     middle = 0.5 * (first + shift / 16)
     random = np.random.default_rng(3)
-    aside, approach = jnp.asarray(random.uniform(0, 1, 40)), jnp.asarray(random.uniform(0, 25.0, 40))
-    drive = forces(force, middle + aside, approach)
-    coast = forces(force, middle - aside, -backlash - approach)
+    aside, dte = jnp.asarray(random.uniform(0, 1, 40)), jnp.asarray(random.uniform(0, 25.0, 40))
+    drive = forces(force, middle + aside, dte)
+    coast = forces(force, middle - aside, -backlash - dte)
     # each side is solved at positions of its own, between which the map is linear: at nodes it is exact, see below
     np.testing.assert_allclose(coast, -drive, rtol=5e-3, atol=10.0)
 
@@ -222,20 +222,18 @@ def test_other_coast_flanks_change_nothing_on_the_drive_side(mesh):
     nominal = tuple(NO_RELIEFS.values())
     plain, other = (mapped(mesh, RELIEFS, **COARSE, coast=coast) for coast in (None, nominal))
     np.testing.assert_array_equal(plain.node_force[0], other.node_force[0])
-    approach = -mesh.pair.backlash - 10.0
-    assert np.any(
-        forces(plain, mesh.phase, jnp.full(16, approach)) != forces(other, mesh.phase, jnp.full(16, approach))
-    )
+    dte = -mesh.pair.backlash - 10.0
+    assert np.any(forces(plain, mesh.phase, jnp.full(16, dte)) != forces(other, mesh.phase, jnp.full(16, dte)))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("approach", [8.0, -84.0])  # on the drive flanks and, 75 um of backlash behind, the coast ones
-def test_gradients_equal_central_differences(mesh, approach):
+@pytest.mark.parametrize("dte", [8.0, -84.0])  # on the drive flanks and, 75 um of backlash behind, the coast ones
+def test_gradients_equal_central_differences(mesh, dte):
     def at(amount):
         made = mesh_force(
             mesh, torque=TORQUE, pinion=jg.TipRelief(amount, 3.4), positions=16, levels=16, compliance=1e-3
         )
-        return jax.vmap(lambda phase: made(phase, jnp.asarray(approach)))(jnp.asarray([0.11, 0.42, 0.83]))
+        return jax.vmap(lambda phase: made(phase, jnp.asarray(dte)))(jnp.asarray([0.11, 0.42, 0.83]))
 
     step = 1e-4
     _, found = jax.jvp(at, (jnp.asarray(6.9),), (jnp.asarray(1.0),))
@@ -246,9 +244,9 @@ def test_gradients_equal_central_differences(mesh, approach):
 
 def test_what_is_in_series_adds_its_deflection(mesh):
     compliance, removed = 2e-3, removed_material(mesh, TORQUE, **RELIEFS)
-    approach = np.linspace(1.0, 20.0, 80)
-    with_it = direct(mesh, removed, approach, compliance)
-    for row, q in zip(with_it[::13], approach[::13]):
+    dte = np.linspace(1.0, 20.0, 80)
+    with_it = direct(mesh, removed, dte, compliance)
+    for row, q in zip(with_it[::13], dte[::13]):
         teeth = q - (compliance + mesh.hub / mesh.pair.face_width) * row
         found = jg.solve_at(mesh, teeth, torque=TORQUE, **RELIEFS)
         np.testing.assert_allclose(found.force, row, rtol=1e-8, atol=1e-8)
@@ -270,7 +268,7 @@ def test_simpler_models_have_the_static_transmission_error_of_their_torque(mesh,
     removed = removed_material(mesh, TORQUE, **RELIEFS)
     cycle = solve_removed(mesh, TORQUE, removed)
     force = mesh_force(mesh, torque=TORQUE, **RELIEFS, model=model, positions=16)
-    np.testing.assert_allclose(approaches(force, mesh.phase, static_force), cycle.transmission_error, rtol=1e-9)
+    np.testing.assert_allclose(static_errors(force, mesh.phase, static_force), cycle.transmission_error, rtol=1e-9)
     coast = np.asarray(forces(force, mesh.phase, jnp.full(16, -0.5 * mesh.pair.backlash)))
     assert model == "tangent" or not coast.any()
     if model == "tangent":
@@ -279,7 +277,7 @@ def test_simpler_models_have_the_static_transmission_error_of_their_torque(mesh,
     else:
         touching = force.over_cycle(lambda phase: force.at(phase).start[0], static_force.dtype)
         np.testing.assert_allclose(touching, jnp.mean(cycle.unloaded_transmission_error), rtol=1e-9, atol=1e-9)
-        loaded = force.over_cycle(lambda phase: force.static_approach(phase, static_force), static_force.dtype)
+        loaded = force.over_cycle(lambda phase: force.static_te(phase, static_force), static_force.dtype)
         assert float(force.mean_secant_stiffness(static_force)) == pytest.approx(
             float(static_force / (loaded - touching)), rel=1e-5
         )

@@ -71,7 +71,7 @@ def check_of_parameters(mesh, torque, result, box):
     assert result.objective == pytest.approx(result.ppte, abs=1e-9)
     assert float(result.pinion.amount) == pytest.approx(result.parameters["pinion"])
     assert float(result.wheel.amount) == pytest.approx(result.parameters["wheel"])
-    assert result.method == "minimax" and result.objective_name == "ppte"
+    assert result.method == "slp" and result.objective_name == "ppte"
     assert result.violation == 0.0 and result.constraints == {}
     for name, (low, high) in box.items():
         assert low <= result.parameters[name] <= high
@@ -409,7 +409,7 @@ def test_refuses_a_design_that_makes_no_two_modifications(known, made, words):
         (lambda: jg.Constraint({}, high=1.0), "at least one free parameter"),
         (lambda: jg.Constraint("max_relief"), "low or high"),
         (lambda: jg.Constraint("max_relief", low=2.0, high=1.0), "high"),
-        (lambda: jg.optimize.Minimax(rtol=0.0), "rtol"),
+        (lambda: jg.optimize.SLP(rtol=0.0), "rtol"),
         (lambda: jg.optimize.Genetic(population=3), "population = 3"),
         (lambda: jg.optimize.Genetic(crossover=1.5), "crossover"),
         (lambda: jg.optimize.CMAES(spread=0.0), "spread"),

@@ -28,8 +28,8 @@ def moduli(orbit):
 @pytest.mark.parametrize("known", RECTANGULAR, ids=lambda known: f"{known.name} {known.factor:.2f}")
 def test_orbits_of_a_rectangular_stiffness(known):
     orbit = at(known.omega, ([known.x0 + 0.01], [known.v0 - 0.01]), periods=known.periods)
-    found = [orbit.displacement[0], orbit.velocity[0], orbit.approach_mean, orbit.approach_rms]
-    found += [orbit.approach_max, orbit.approach_min, orbit.dynamic_factor]
+    found = [orbit.displacement[0], orbit.velocity[0], orbit.dte_mean, orbit.dte_rms]
+    found += [orbit.dte_max, orbit.dte_min, orbit.dynamic_factor]
     exact = [known.x0, known.v0, known.mean, known.rms, known.most, known.least, known.factor]
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-6)
     np.testing.assert_allclose(moduli(orbit), known.moduli, rtol=0, atol=1e-4)
@@ -45,7 +45,7 @@ def test_orbits_with_more_damping(known):
     orbit = at(known.omega, ([x], [v]), zeta=known.zeta, periods=known.periods)
     assert bool(orbit.converged) and bool(orbit.stable) == known.stable
     if known.rms is not None:
-        found = [orbit.approach_rms, orbit.dynamic_factor]
+        found = [orbit.dte_rms, orbit.dynamic_factor]
         np.testing.assert_allclose(found, [known.rms, known.factor], rtol=0, atol=1e-6)
     np.testing.assert_allclose(moduli(orbit)[: len(known.moduli)], known.moduli, rtol=0, atol=1e-4)
 
@@ -56,15 +56,15 @@ def test_orbits_in_a_dead_zone(known):
     orbit = find_orbit(moving, speed, ([known.x0 + 0.002], [known.v0]), steps=2 * STEPS)
     assert bool(orbit.converged) and bool(orbit.stable)
     np.testing.assert_allclose([orbit.displacement[0], orbit.velocity[0]], [known.x0, known.v0], rtol=0, atol=1e-8)
-    found = [orbit.approach_mean, orbit.approach_rms, orbit.approach_max, orbit.approach_min]
+    found = [orbit.dte_mean, orbit.dte_rms, orbit.dte_max, orbit.dte_min]
     np.testing.assert_allclose(found, [known.mean, known.rms, known.most, known.least], rtol=0, atol=1e-6)
 
 
 def test_contact_is_lost_for_the_share_of_time_that_the_approach_is_negative():
     orbit = at(0.9, NEAR)
-    below = np.diff(np.append(orbit.phase, 1.0)) @ (np.asarray(orbit.approach) < 0)
-    assert abs(orbit.no_contact - below) < 1e-3 and orbit.coast_contact == 0
-    assert at(1.2, ([1.3], [0.9])).no_contact == 0
+    below = np.diff(np.append(orbit.phase, 1.0)) @ (np.asarray(orbit.dte) < 0)
+    assert abs(orbit.contact_loss_share - below) < 1e-3 and orbit.back_side_contact == 0
+    assert at(1.2, ([1.3], [0.9])).contact_loss_share == 0
 
 
 def test_peaks_do_not_depend_on_the_steps():
@@ -81,8 +81,8 @@ def refined(numbers):
     for width in (1e-5, 1e-7):
         orbit = at(numbers[0], NEAR, zeta=numbers[1], ratio=numbers[2], steps=jnp.asarray(nodes))
         ends = np.append(orbit.phase, 1.0)
-        values = np.append(orbit.approach, orbit.approach[0])
-        rates = np.append(orbit.approach_rate, orbit.approach_rate[0]) / float(orbit.mesh_frequency)
+        values = np.append(orbit.dte, orbit.dte[0])
+        rates = np.append(orbit.dte_rate, orbit.dte_rate[0]) / float(orbit.mesh_frequency)
         zeros = CubicHermiteSpline(ends, values, rates).roots(extrapolate=False)
         assert len(zeros) == 2
         nodes = np.sort(np.concatenate([even, zeros - width, zeros + width]))
@@ -93,7 +93,7 @@ def refined(numbers):
 def quantities(numbers, nodes, start):
     omega, zeta, ratio = numbers
     orbit = at(omega, start, zeta=zeta, ratio=ratio, steps=nodes)
-    return jnp.stack([orbit.approach_rms, orbit.dynamic_factor])
+    return jnp.stack([orbit.dte_rms, orbit.dynamic_factor])
 
 
 POINT = jnp.array([0.9, 0.05, 1.75])  # Omega, zeta, stiffness ratio
@@ -144,14 +144,14 @@ def test_the_share_of_two_pairs_moves_the_orbit():
     @jax.jit
     def rms(share):
         moving = eqx.tree_at(lambda o: o.mesh_force.share, rectangular(), share)
-        return find_orbit(moving, frequency(1.2), ([1.3], [0.9]), steps=FEW).approach_rms
+        return find_orbit(moving, frequency(1.2), ([1.3], [0.9]), steps=FEW).dte_rms
 
     slope = jax.grad(rms)(0.37)
     np.testing.assert_allclose(slope, (rms(0.371) - rms(0.369)) / 2e-3, rtol=1e-4)
 
 
 def two_gears(mass=2.0):
-    """The first benchmark as two gears that turn freely: the same approach, and a rotation of both together."""
+    """The first benchmark as two gears that turn freely: the same DTE, and a rotation of both together."""
     one = rectangular()
     masses = [mass, 1 / (1 - 1 / mass)]  # whose equivalent mass is one
     return Oscillator(
@@ -164,7 +164,7 @@ def test_gears_that_turn_freely_have_the_orbit_of_their_equivalent_mass():
     both = find_orbit(two_gears(), frequency(0.9), ([1.3, -0.7], [1.0, -0.6]), steps=FEW)
     one = at(0.9, NEAR, steps=FEW)
     assert bool(both.converged) and bool(both.stable)
-    for name in ("dynamic_factor", "approach_rms", "approach_mean", "approach_min", "no_contact"):
+    for name in ("dynamic_factor", "dte_rms", "dte_mean", "dte_min", "contact_loss_share"):
         np.testing.assert_allclose(getattr(both, name), getattr(one, name), rtol=1e-9)
     np.testing.assert_allclose(moduli(both), [1.0, 1.0, *moduli(one)], rtol=0, atol=1e-5)
 

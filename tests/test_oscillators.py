@@ -87,7 +87,7 @@ def excitation(**given):
     [
         # slow: q = F0 (1 + a cos) / k
         ({"load": [0.1]}, lambda load, ratio: 0.1 * load / 250.0),
-        # a displacement is taken off the approach, whose inertia then drives it: (m w^2 / k) e / (1 - (w / w_n)^2)
+        # a displacement is taken off the DTE, whose inertia then drives it: (m w^2 / k) e / (1 - (w / w_n)^2)
         ({"displacement": [2.0]}, lambda load, ratio: 2.0 * ratio**2 / (1 - ratio**2)),
     ],
 )
@@ -99,10 +99,10 @@ def test_excitations_have_the_amplitudes_of_a_linear_oscillator(given, amplitude
     exact = amplitude(float(oscillator.load[0]), ratio)
     if "load" in given:
         exact /= 1 - ratio**2
-    assert float(found.settled[0]) and float(found.approach_rms[0]) * np.sqrt(2) == pytest.approx(exact, rel=2e-3)
-    # velocity is the approach times its circular frequency
+    assert float(found.settled[0]) and float(found.dte_rms[0]) * np.sqrt(2) == pytest.approx(exact, rel=2e-3)
+    # velocity is the DTE times its circular frequency
     assert float(found.velocity_harmonics[0, 1]) == pytest.approx(
-        2 * np.pi * ratio * natural * np.sqrt(2) * float(found.approach_rms[0]), rel=1e-6
+        2 * np.pi * ratio * natural * np.sqrt(2) * float(found.dte_rms[0]), rel=1e-6
     )
 
 
@@ -134,7 +134,7 @@ def test_two_gears_vibrate_as_the_torsional_model_and_stiff_bearings_do_not_chan
     stiff = np.array([np.eye(2) * 1e5] * 2)
     held = speed_sweep(made(on_bearings, bearing_stiffness=stiff), speeds, steps=steps)
     assert alone.settled.all() and both.settled.all() and held.settled.all()
-    for name in ("dynamic_factor", "approach_rms", "no_contact"):
+    for name in ("dynamic_factor", "dte_rms", "contact_loss_share"):
         np.testing.assert_allclose(getattr(both, name), getattr(alone, name), rtol=1e-6)
         np.testing.assert_allclose(getattr(held, name), getattr(alone, name), rtol=0.03)
 
@@ -167,7 +167,7 @@ def test_a_bearing_force_is_what_the_centre_of_a_gear_does_not_take_to_accelerat
     np.testing.assert_allclose(mean, [0.0, -load, 0.0, load, 0.0], atol=1e-3 * load)
     assert np.ptp(held[:, 3]) > 0.05 * load and np.abs(held[:, [2, 4]]).max() < 1e-6 * load
     _, (_, speed) = one_cycle(oscillator, start, steps_of(oscillator, jnp.asarray(nodes)), jnp.asarray(900.0))
-    inner = np.asarray(moved.force + oscillator.mesh_damping * moved.approach_rate) - held[:, 3]
+    inner = np.asarray(moved.force + oscillator.mesh_damping * moved.dte_rate) - held[:, 3]
     each = 0.5 * (inner[1:] + inner[:-1]) * np.diff(moved.phase) / 900.0
     impulse = np.concatenate([[0.0], np.cumsum(each)])
     gained = float(oscillator.mass[3]) * np.asarray(speed[:, 3] - speed[0, 3]) / oscillator.newton

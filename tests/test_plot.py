@@ -390,7 +390,7 @@ assert not changed, changed
 @pytest.mark.parametrize("draw", [lambda runs: plot.speed_response({"unmodified": runs}), plot.bifurcation])
 def test_kicked_runs_are_told_from_falling_ones(draw):
     at = np.linspace(500.0, 5000.0, 3)
-    numbers = {"mesh_frequency": at, "dynamic_factor": at / 500.0, "poincare_approach": at[:, None]}
+    numbers = {"mesh_frequency": at, "dynamic_factor": at / 500.0, "poincare_dte": at[:, None]}
     response = SimpleNamespace(direction="down", **numbers)
     ax = draw({"rising": response, "falling": response, "falling, kicked": response})
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
@@ -415,7 +415,7 @@ def test_shared_axes_of_speed_responses_show_all_curves():
     frequency = np.linspace(500.0, 5000.0, 10)
     figure, both = plt.subplots(1, 2, sharey=True)
     for ax, height in zip(both, (3.0, 30.0)):
-        response = SimpleNamespace(direction="up", mesh_frequency=frequency, approach_rms=height * np.ones(10))
-        plot.speed_response({"unmodified": [response]}, "approach_rms", ax)
+        response = SimpleNamespace(direction="up", mesh_frequency=frequency, dte_rms=height * np.ones(10))
+        plot.speed_response({"unmodified": [response]}, "dte_rms", ax)
     assert both[0].get_ylim() == both[1].get_ylim() and both[0].get_ylim()[0] == 0.0 and both[0].get_ylim()[1] > 30.0
     plt.close(figure)

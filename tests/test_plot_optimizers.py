@@ -22,10 +22,10 @@ pytestmark = pytest.mark.usefixtures("clean_figures")
 PHASE = np.arange(16) / 16
 TORQUES = np.linspace(20.0, 400.0, 20)
 AMOUNTS = (0.0, 5.0, 8.0, 9.0)
-METHODS = ("minimax", "adam", "lbfgs", "genetic", "cma_es", "differential evolution", "factorial", "iteration")
+METHODS = ("slp", "adam", "lbfgs", "genetic", "cma_es", "differential evolution", "factorial", "iteration")
 
 
-def optimum(method="minimax", history=(np.inf, 3.0, 1.0), spent=(0, 10, 100), **others):
+def optimum(method="slp", history=(np.inf, 3.0, 1.0), spent=(0, 10, 100), **others):
     """An optimum without a contact solution behind it."""
     given = {
         "method": method,
@@ -203,8 +203,8 @@ def test_what_is_judged_on_a_finer_mesh_is_no_rise_of_the_search():
         positions=256,
         history_positions=[64, 64, 128, 128, 256],
     )
-    search, judged = plot.convergence({"minimax": found}).lines
-    assert search.get_label() == "minimax" and judged.get_label() == "minimax, judged at 256 positions"
+    search, judged = plot.convergence({"slp": found}).lines
+    assert search.get_label() == "slp" and judged.get_label() == "slp, judged at 256 positions"
     np.testing.assert_array_equal(search.get_ydata(), [3.0, 1.0])
     np.testing.assert_array_equal(judged.get_data(), [[30, 33], [1.3, 1.3]])
     assert search.get_color() == judged.get_color() and judged.get_markerfacecolor() == "white"

@@ -10,7 +10,7 @@ import pytest
 from catalogue import LINE, gear_pair, ppte
 
 import jaxgear as jg
-from jaxgear.contact import Operation
+from jaxgear.contact import OperatingPoint
 from jaxgear.metrics import Quantity, quantities, quantity_of
 from jaxgear.numerics.reductions import Average, Harmonic, Max, Min, Range, Rms, Value
 
@@ -107,7 +107,7 @@ def test_what_takes_a_speed_says_so(mesh, cycle):
     flash = quantities["max_flash_temperature"]
     with pytest.raises(ValueError, match="max_flash_temperature: needs a speed"):
         flash(cycle)
-    running = jg.solve(mesh, Operation(50.0, speed=3000.0), pinion=cycle.pinion, wheel=cycle.wheel)
+    running = jg.solve(mesh, OperatingPoint(50.0, speed=3000.0), pinion=cycle.pinion, wheel=cycle.wheel)
     found, field = jax.jit(lambda cycle: (flash(cycle), jg.metrics.flash_temperature(cycle, 3000.0)))(running)
     assert float(found) == pytest.approx(np.max(field))
 

@@ -19,7 +19,7 @@ def test_the_result_does_not_belong_to_the_positions_of_the_search():
     """At 16 positions the search fits the flanks to these positions; what it reports is true at any."""
     pair = gear_pair()
     coarse, fine = (prepare(pair, resolution=jg.Resolution(positions=n, pairs=2)) for n in (16, 512))
-    options = {"torque": TORQUE, "method": jg.optimize.Minimax(starts=2, rounds=1, steps=15)}
+    options = {"torque": TORQUE, "method": jg.optimize.SLP(starts=2, rounds=1, steps=15)}
     fitted = jg.minimize(design, BOX, mesh=coarse, positions=None, **options)
     result = jg.minimize(design, BOX, mesh=coarse, positions=128, **options)
     assert np.isnan(fitted.grid_change) and fitted.positions == 16

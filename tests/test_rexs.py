@@ -67,7 +67,7 @@ OTHERS = {
         EXACT,
     ),
     "end relief of another curve": (jg.EndRelief(6.0, 4.0, jg.Power(1.6)), POINTS),
-    "cubic table": (jg.TabulatedProfile([8.0, 10.0, 14.0, 16.0], [0.0, 3.0, 1.0, 6.0], method="cubic2"), POINTS),
+    "cubic table": (jg.TabulatedProfile([8.0, 10.0, 14.0, 16.0], [0.0, 3.0, 1.0, 6.0], method="natural_cubic"), POINTS),
     "relief longer than the involute": (jg.TipRelief(3.0, 40.0, jg.Linear()), EXACT),
 }
 
@@ -225,7 +225,7 @@ def mesh():
 @pytest.fixture(scope="module")
 def solved(mesh):
     relief = jg.TipRelief(4.0, 3.0)
-    return jg.solve(mesh, jg.Operation(20.0, 3000.0, 0.05), pinion=relief, wheel=relief)
+    return jg.solve(mesh, jg.OperatingPoint(20.0, 3000.0, 0.05), pinion=relief, wheel=relief)
 
 
 @pytest.fixture(scope="module")

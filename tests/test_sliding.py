@@ -112,7 +112,7 @@ def linear(tip, length):
 
 
 RELIEF = flank(tip=8.0, tip_length=3.0)
-ROUGH = jg.TabulatedProfile(np.linspace(3.0, 15.0, 13), 4 * np.sin(np.arange(13) ** 2), method="cubic2")
+ROUGH = jg.TabulatedProfile(np.linspace(3.0, 15.0, 13), 4 * np.sin(np.arange(13) ** 2), method="natural_cubic")
 FLANKS = {
     "parabolic": (RELIEF, flank(tip=12.0, tip_length=2.0), 0.02),
     "kinked": (linear(10.0, 1.5), linear(8.0, 4.0), 0.03),
@@ -280,10 +280,12 @@ def test_slices_slide_on_their_own(mesh, sliced):
     """A flank that is twisted: every slice is that of a flank of its own profile."""
     roll = np.linspace(3.0, 15.0, 13)  # as many points as of `ROUGH`
     columns = np.outer((roll - 9.0) ** 2 / 10, [0.2, 1.0, 2.0])
-    twisted = jg.TabulatedFlank(roll, sliced.face_coordinate, columns, "cubic2")
+    twisted = jg.TabulatedFlank(roll, sliced.face_coordinate, columns, "natural_cubic")
     found = removed_material(sliced, TORQUE, pinion=twisted)
     for number in range(3):
-        alone = removed_material(mesh, TORQUE, pinion=jg.TabulatedProfile(roll, columns[:, number], method="cubic2"))
+        alone = removed_material(
+            mesh, TORQUE, pinion=jg.TabulatedProfile(roll, columns[:, number], method="natural_cubic")
+        )
         for name in ("amount", "shift", "bend"):
             mine, theirs = getattr(found, name)[:, number], getattr(alone, name)[:, 0]
             np.testing.assert_allclose(mine, theirs, atol=1e-9)

@@ -30,7 +30,7 @@ def loaded(load):
 
 
 def row(response, i):
-    names = "approach_mean", "approach_rms", "approach_max", "approach_min", "dynamic_factor"
+    names = "dte_mean", "dte_rms", "dte_max", "dte_min", "dynamic_factor"
     return [float(getattr(response, name)[i]) for name in names]
 
 
@@ -53,7 +53,7 @@ def test_orbits_are_the_exact_ones(direction):
         numbers = [known.mean, known.rms, known.most, known.least, known.factor]
         np.testing.assert_allclose(row(found, i), numbers, rtol=0, atol=1e-6)
         # an orbit of two cycles is at one of two states
-        starts = np.stack([found.poincare_approach[i], found.poincare_velocity[i]], axis=1)
+        starts = np.stack([found.poincare_dte[i], found.poincare_velocity[i]], axis=1)
         assert np.abs(starts[:2] - [known.x0, known.v0]).max(axis=1).min() < 1e-6
 
 
@@ -62,7 +62,7 @@ def test_the_way_down_stays_on_the_upper_branch_until_its_fold():
     higher = np.isin(OMEGA, [0.7, 0.8, 1.7])
     assert (down.dynamic_factor > 2 * up.dynamic_factor)[higher].all()
     # where the orbit is unique both ways end on it
-    for name in ("dynamic_factor", "approach_rms", "approach_mean"):
+    for name in ("dynamic_factor", "dte_rms", "dte_mean"):
         np.testing.assert_allclose(getattr(up, name)[~higher], getattr(down, name)[~higher], rtol=1e-6)
 
 
@@ -88,7 +88,7 @@ def test_runs_in_one_program_are_those_of_one_each():
 
 def test_results_do_not_depend_on_the_number_of_steps():
     chosen = speed_sweep(rectangular(), SPEEDS, steps=steps_for(rectangular(), SPEEDS))
-    for name in ("dynamic_factor", "approach_rms", "force_harmonics", "velocity_harmonics"):
+    for name in ("dynamic_factor", "dte_rms", "force_harmonics", "velocity_harmonics"):
         fine, coarse = (np.asarray(getattr(found, name)) for found in (swept(), chosen))
         assert np.abs(coarse - fine).max() < 1e-3 * np.abs(fine).max()
         if fine.ndim == 1:
@@ -103,7 +103,7 @@ def test_the_orbit_is_foreseen_before_the_motion_has_settled():
     few = jax.tree.map(np.asarray, speed_sweep(rectangular(zeta), SPEEDS, most_cycles=cycles, **options))
     assert few.settled[unique].all()
     many = speed_sweep(rectangular(zeta), SPEEDS, most_cycles=5000, tolerance=1e-11, **options)
-    for name in ("dynamic_factor", "approach_rms", "period"):
+    for name in ("dynamic_factor", "dte_rms", "period"):
         np.testing.assert_allclose(getattr(few, name)[unique], np.asarray(getattr(many, name))[unique], rtol=1e-6)
 
 
@@ -112,7 +112,7 @@ def test_more_damping_has_its_exact_orbits_too():
     for known in MORE_DAMPED:
         if known.omega <= 1.0:
             i = list(OMEGA).index(known.omega)
-            assert float(found.approach_rms[i]) == pytest.approx(known.rms, abs=1e-6)
+            assert float(found.dte_rms[i]) == pytest.approx(known.rms, abs=1e-6)
             assert float(found.dynamic_factor[i]) == pytest.approx(known.factor, abs=1e-6)
 
 
@@ -122,14 +122,14 @@ def test_slow_speeds_take_more_steps():
 
 
 def test_load_that_is_multiplied_multiplies_the_approach():
-    """Without a clearance the oscillator is linear in its size: K_v stays, the approach grows with the load."""
+    """Without a clearance the oscillator is linear in its size: K_v stays, the DTE grows with the load."""
     loads = jnp.array([1.0, 2.0, 5.0])
     stacked = jax.vmap(loaded)(loads)
     batched = speed_sweeps(stacked, SPEEDS, steps=STEPS, batch=2)
     alone = swept()
-    for factor, rms, load in zip(np.asarray(batched.dynamic_factor), np.asarray(batched.approach_rms), loads):
+    for factor, rms, load in zip(np.asarray(batched.dynamic_factor), np.asarray(batched.dte_rms), loads):
         np.testing.assert_allclose(factor, alone.dynamic_factor, rtol=1e-9)
-        np.testing.assert_allclose(rms, load * alone.approach_rms, rtol=1e-9)
+        np.testing.assert_allclose(rms, load * alone.dte_rms, rtol=1e-9)
 
 
 @pytest.mark.slow
@@ -155,24 +155,24 @@ def test_dead_zone_orbits_are_the_exact_ones(steps, within):
                 continue  # the weak orbit there is not printed
             numbers = [known.mean, known.rms, known.most, known.least]
             np.testing.assert_allclose(row(found, i)[:4], numbers, rtol=0, atol=1e-6)
-            np.testing.assert_allclose(found.poincare_approach[i, 0], known.x0, rtol=0, atol=within)
+            np.testing.assert_allclose(found.poincare_dte[i, 0], known.x0, rtol=0, atol=within)
             np.testing.assert_allclose(found.poincare_velocity[i, 0], known.v0, rtol=0, atol=within)
 
 
 def test_slow_speed_is_the_static_limit():
-    """The approach follows load over stiffness, its harmonic of a linear force that of the displacement, which is 0."""
+    """The DTE follows load over stiffness, its harmonic of a linear force that of the displacement, which is 0."""
     linear = dataclasses.replace(dead_zone_on_a_moving_base(), mesh_force=DeadZone(half_clearance=0.0))
     found = speed_sweep(linear, [1e-3 / (2 * np.pi)], steps=4096 * 4)
-    assert float(found.approach_mean[0]) == pytest.approx(0.1, rel=1e-6)
+    assert float(found.dte_mean[0]) == pytest.approx(0.1, rel=1e-6)
     assert float(found.dynamic_factor[0]) == pytest.approx(1.0, abs=2e-6)
-    assert float(found.no_contact[0]) == 0.0
+    assert float(found.contact_loss_share[0]) == 0.0
 
 
 def test_shares_of_contact():
     """A light load within a clearance: the flanks are apart for a while, and without coast flanks never on those."""
     found = swept("down")
-    assert ((found.no_contact > 0) == (found.approach_min < 0)).all()
-    assert not found.coast_contact.any()
+    assert ((found.contact_loss_share > 0) == (found.dte_min < 0)).all()
+    assert not found.back_side_contact.any()
 
 
 def test_an_undamped_start_never_settles():

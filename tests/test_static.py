@@ -1,4 +1,4 @@
-"""Equilibrium under a static load: approach, mean stiffness, what bearings and springs carry, the slow limit."""
+"""Equilibrium under a static load: dte, mean stiffness, what bearings and springs carry, the slow limit."""
 
 import jax
 import jax.numpy as jnp
@@ -54,14 +54,14 @@ def sprung():
 def shared(phase):
     """Approach and mesh force at rest: k (x - 1) + x / 4 = 1."""
     stiffness = 1 + 0.3 * np.cos(2 * np.pi * phase)
-    approach = (1 + stiffness) / (stiffness + 0.25)
-    return approach, stiffness * (approach - 1)
+    dte = (1 + stiffness) / (stiffness + 0.25)
+    return dte, stiffness * (dte - 1)
 
 
 def test_a_spring_behind_a_clearance_has_its_own_stiffness():
     force = DeadZone(300.0, 20.0)
     for load in jnp.array([700.0, -700.0]):
-        assert float(force.static_approach(HERE, load)) == pytest.approx(
+        assert float(force.static_te(HERE, load)) == pytest.approx(
             float(load / 300.0 + jnp.sign(load) * 20.0), rel=1e-12
         )
         assert float(force.mean_secant_stiffness(load)) == pytest.approx(300.0, rel=1e-9)
@@ -81,9 +81,9 @@ def test_a_stiffening_contact_is_stiffer_for_small_vibrations_than_for_the_whole
     """f = k x^3 has the slope 3 f / x."""
     cubic = PolynomialClearance(jnp.array([0.0, 2.0]), 3.0)
     load = jnp.asarray(2.0 * 1.3**3)
-    assert float(cubic.static_approach(HERE, load)) == pytest.approx(1.3, rel=1e-12)
+    assert float(cubic.static_te(HERE, load)) == pytest.approx(1.3, rel=1e-12)
     assert float(cubic.mean_tangent_stiffness(load)) == pytest.approx(3 * float(load) / 1.3, rel=1e-9)
-    # less the approach under a millionth of the load, a hundredth of the deflection
+    # less the DTE under a millionth of the load, a hundredth of the deflection
     assert float(cubic.mean_secant_stiffness(load)) == pytest.approx(float(load) / 1.3 / 0.99, rel=1e-5)
 
 
@@ -91,13 +91,13 @@ def test_the_approach_of_a_polynomial_is_found_up_to_the_end_of_its_range():
     clearance = PolynomialClearance.published()
     for x in (1.6, 2.7, 2.99):
         load = clearance.polynomial(jnp.asarray(x))
-        assert float(clearance.static_approach(HERE, load)) == pytest.approx(x, rel=1e-12)
-    assert np.isnan(clearance.static_approach(HERE, clearance.polynomial(jnp.asarray(3.01))))
+        assert float(clearance.static_te(HERE, load)) == pytest.approx(x, rel=1e-12)
+    assert np.isnan(clearance.static_te(HERE, clearance.polynomial(jnp.asarray(3.01))))
 
 
 def test_a_force_that_the_flanks_never_have_has_no_approach():
-    assert np.isnan(RECTANGULAR.static_approach(HERE, jnp.asarray(-1.0)))
-    assert np.isnan(DeadZone(300.0, 1.0).static_approach(HERE, jnp.asarray(jnp.nan)))
+    assert np.isnan(RECTANGULAR.static_te(HERE, jnp.asarray(-1.0)))
+    assert np.isnan(DeadZone(300.0, 1.0).static_te(HERE, jnp.asarray(jnp.nan)))
 
 
 @pytest.mark.parametrize("form", ["exact", "first order", "first order as printed"])
@@ -107,7 +107,7 @@ def test_the_approach_of_every_form_of_relief_carries_the_load(form, load):
     force = dimensionless_model(load=0.6, damping_ratio=0.05, relief=relief, relief_form=form).mesh_force
     for phase in (0.1, 0.6):
         phase = jnp.asarray(phase)
-        assert float(force(phase, force.static_approach(phase, jnp.asarray(load)))) == pytest.approx(load, rel=1e-10)
+        assert float(force(phase, force.static_te(phase, jnp.asarray(load)))) == pytest.approx(load, rel=1e-10)
 
 
 def test_bearings_and_mesh_are_in_equilibrium_everywhere(held):
@@ -118,7 +118,7 @@ def test_bearings_and_mesh_are_in_equilibrium_everywhere(held):
             held.stiffness @ rest.coordinates + held.direction * rest.force, held.load, rtol=0, atol=1e-8
         )
         assert float(rest.force) == pytest.approx(float(held.load[0]), rel=1e-12)
-        wanted = held.mesh_force(jnp.asarray(phase), held.approach(jnp.asarray(phase), rest.coordinates))
+        wanted = held.mesh_force(jnp.asarray(phase), held.dte(jnp.asarray(phase), rest.coordinates))
         assert float(wanted) == pytest.approx(float(rest.force), rel=1e-10)
     assert float(mean_force(held)) == pytest.approx(float(held.load[0]), rel=1e-12)
 
@@ -159,8 +159,8 @@ def test_mean_force_of_a_vibration_on_bearings_is_the_static_one(held):
 def test_slow_motion_passes_through_the_equilibria(sprung):
     """Approach of every mesh position at rest, and K_v is the largest force at rest over the mean one."""
     found = speed_sweep(sprung, [1e-3], steps=4096)
-    approach, force = shared(np.arange(4096) / 4096)
+    dte, force = shared(np.arange(4096) / 4096)
     assert found.settled[0]
-    np.testing.assert_allclose(found.approach_min[0], approach.min(), rtol=1e-4)
-    np.testing.assert_allclose(found.approach_max[0], approach.max(), rtol=1e-4)
+    np.testing.assert_allclose(found.dte_min[0], dte.min(), rtol=1e-4)
+    np.testing.assert_allclose(found.dte_max[0], dte.max(), rtol=1e-4)
     np.testing.assert_allclose(found.dynamic_factor[0], force.max() / force.mean(), rtol=1e-4)

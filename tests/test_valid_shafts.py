@@ -10,7 +10,7 @@ import pytest
 from gearboxes import PAIR, PINION, TILTED, WHEEL, gearbox, stage, two_stages
 
 import jaxgear as jg
-from jaxgear.layout import Endurance, WoehlerLine, damage, level_load
+from jaxgear.layout import Endurance, SNCurve, damage, level_load
 from jaxgear.numerics import positive_definite, within_limits
 from jaxgear.shafts import (
     Bearing,
@@ -130,7 +130,7 @@ GOOD, BAD_SHAFTS, BAD_GEARS = slice(0, 2), slice(2, 5), slice(5, 7)
 def batch():
     """What shafts do to the load, in one batch of those that can be and those that cannot."""
     load = jg.LoadSpectrum.from_hours([0.0, 50.0], [5.0, 10.0], 500.0)
-    endurance = Endurance(WoehlerLine(1500.0, 13.2, 5e7), WoehlerLine(900.0, 8.7, 3e6))
+    endurance = Endurance(SNCurve(1500.0, 13.2, 5e7), SNCurve(900.0, 8.7, 3e6))
 
     def of(radial, shift):
         box = eqx.tree_at(

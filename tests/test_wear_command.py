@@ -232,7 +232,7 @@ constraint = [{ of = "life_to_depth", low = 7.2e9 }]
     )
     design = load_design(file(PAIR + VARIABLES + table))
     assert wear_request(design).settings.revolutions == 3.6e9
-    assert optimize_request(design).method == "minimax"
+    assert optimize_request(design).method == "slp"
     beyond = table.replace("life_to_depth", "life_to_ppte").replace("[wear]", "[wear]\nppte_limit = 3.0")
     with pytest.raises(DesignFileError, match=r"constraint\[0\].low: 7.2e\+09 must be at most 3.6e"):
         optimize_request(load_design(file(PAIR + VARIABLES + beyond)))
@@ -429,7 +429,7 @@ def test_tolerances_are_left_out_under_the_dynamic_load_alone(file):
     assert wear_scatter.left_out(load_design(file(PAIR + TABLE + TOLERANCE))) == ""
     assert wear_scatter.left_out(load_design(file(FAST + DYNAMICS + DYNAMIC))) == ""
     told = wear_scatter.left_out(load_design(file(FAST + DYNAMICS + DYNAMIC + TOLERANCE)))
-    assert told.startswith("[tolerance] is not part of this analysis, the gears are perfect (lives under")
+    assert told.startswith("[tolerance] is not part of this analysis, the gears are nominal (lives under")
     assert "\n" not in told
 
 
@@ -529,7 +529,7 @@ def prepared(pair, *, resolution, compliance=None, support=None):
 class Search:
     """Stands for a search that takes long."""
 
-    method = "minimax"
+    method = "slp"
 
     def __init__(self, parameters):
         self.parameters, self.run = parameters, 0

@@ -163,7 +163,7 @@ def worn_ppte(mesh, design):
     """By amount and length of the relief, and by coefficient and exponent of wear."""
     relief = jg.TipRelief(design[0], design[1])
     options = {"coefficient": Power(1e-18 * design[2], design[3]), "blocks": 8, "points": 9}
-    life = wear(mesh, jg.Operation(TORQUE, 1000.0), 4e7, pinion=relief, wheel=relief, **options)
+    life = wear(mesh, jg.OperatingPoint(TORQUE, 1000.0), 4e7, pinion=relief, wheel=relief, **options)
     return over_life(life, "ppte")[-1]
 
 

@@ -36,7 +36,7 @@ class CSweep:
         self._model = _Model(vibration.force.shape[-1], *numbers, *(pointer(part) for part in self._kept))
 
     def settle(self, frequency: float, state, cycles: int) -> np.ndarray:
-        """State after some mesh cycles: approach [um] and its rate [um/s]."""
+        """State after some mesh cycles: dte [um] and its rate [um/s]."""
         state = np.array(state, float)
         self._library.settle(
             ctypes.byref(self._model), ctypes.c_double(frequency), ctypes.c_long(self._steps), ctypes.c_long(cycles),
@@ -45,7 +45,7 @@ class CSweep:
         return state
 
     def sweep(self, frequencies, steps, state, *, tolerance: float, most_cycles: int) -> np.ndarray:
-        """K_v, rms of the approach [um] and mesh cycles integrated, negative where it did not settle, of every speed.
+        """K_v, rms of the DTE [um] and mesh cycles integrated, negative where it did not settle, of every speed.
 
         Shape (speeds, 3), in the order in which the speeds are given and gone through. The steps per cycle, one for
         each speed, divide the largest number of them.

@@ -66,7 +66,7 @@ class Problem:
 def prepare(positions: int = 64, slices: int = 1, *, coupled: bool = False):
     """The prepared mesh of the 19/48 pair of `examples/spur_19_48.toml`, a `jaxgear.Mesh`.
 
-    The slices of the baselines do not feel each other, and no gear overhangs the other.
+    The slices of the baselines are not coupled, and no gear overhangs the other.
     """
     import jaxgear as jg
 

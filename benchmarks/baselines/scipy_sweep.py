@@ -27,7 +27,7 @@ class ScipySweep:
         self._levels = vibration.force.shape[-1]
 
     def force(self, phase: float, q: float) -> float:
-        """Force [N] at a mesh position and an approach [um]."""
+        """Force [N] at a mesh position and a DTE [um]."""
         of, count = self._of, len(self._start)
         place = (phase - of.first_phase) * count
         lower = floor(place)
@@ -60,7 +60,7 @@ class ScipySweep:
         return found if drive else -found
 
     def speed(self, frequency: float, state, *, tolerance: float, most_cycles: int) -> np.ndarray:
-        """K_v, rms of the approach [um] and mesh cycles integrated, negative where it did not settle."""
+        """K_v, rms of the DTE [um] and mesh cycles integrated, negative where it did not settle."""
         of, scale = self._of, np.array([1.0, 1 / (2 * np.pi * frequency)])
 
         def rate(t, y):

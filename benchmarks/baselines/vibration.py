@@ -15,9 +15,9 @@ class Vibration:
     Attributes:
         mass, damping, load: [kg], [N s/um], [N].
         first_phase: mesh position with which the tables begin [base pitches].
-        reach: approach of the last level beyond touching [um].
+        reach: dte of the last level beyond touching [um].
         start: where drive and coast flanks touch [um], shape (positions, 2).
-        force, rise: at the levels of the approach, and its slope over their number [N], shape (positions, 2, levels).
+        force, rise: at the levels of the DTE, and its slope over their number [N], shape (positions, 2, levels).
     """
 
     mass: float

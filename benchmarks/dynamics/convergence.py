@@ -35,8 +35,8 @@ class SmoothForce(AbstractMeshForce):
     def at(self, phase):
         return 1 + self.variation * jnp.cos(2 * jnp.pi * phase)
 
-    def force(self, place, approach):
-        return place * (approach + self.cubic * approach**3)
+    def force(self, place, dte):
+        return place * (dte + self.cubic * dte**3)
 
 
 class PlacedSteps(RectangularStiffness):
@@ -121,11 +121,11 @@ def _numbers(oscillator: Oscillator, omega: float, steps: int) -> np.ndarray:
     found = speed_sweep(
         oscillator, frequency(omega * np.array([1.0, 1.5])), carry=False, steps=(steps, MOST_STEPS), tolerance=_SETTLED
     )
-    return np.array([float(values[0]) for values in (*_state(found), found.dynamic_factor, found.approach_rms)])
+    return np.array([float(values[0]) for values in (*_state(found), found.dynamic_factor, found.dte_rms)])
 
 
 def _state(found):
-    return found.poincare_approach[:, 0], found.poincare_velocity[:, 0]
+    return found.poincare_dte[:, 0], found.poincare_velocity[:, 0]
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def independence(oscillator: Oscillator, speeds=SPEEDS) -> Independence:
             speed_sweep(oscillator, speeds, direction=direction, steps=[factor * count for count in chosen])
             for factor in (1, _FINER)
         )
-        pairs = ((few.dynamic_factor, many.dynamic_factor), (few.approach_rms, many.approach_rms))
+        pairs = ((few.dynamic_factor, many.dynamic_factor), (few.dte_rms, many.dte_rms))
         changes.append([100 * np.abs(np.asarray(a) / np.asarray(b) - 1) for a, b in pairs])
     factor, rms = np.concatenate(changes, axis=1)
     # a jump is a jump of the rms by many times what an integrator could be off

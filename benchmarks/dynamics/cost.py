@@ -111,7 +111,7 @@ def _many_entry(moving: Oscillator, speeds, chosen, both: str, reference) -> Ent
 
 
 def _c_entry(kernel: CSweep, moving: Oscillator, speeds, chosen, both: str, reference) -> Entry:
-    rest = [float(moving.mesh_force.static_approach(0.0, moving.load[0])), 0.0]
+    rest = [float(moving.mesh_force.static_te(0.0, moving.load[0])), 0.0]
     options = {"tolerance": _SETTLED, "most_cycles": _MOST_CYCLES}
 
     def swept():
@@ -126,7 +126,7 @@ def _c_entry(kernel: CSweep, moving: Oscillator, speeds, chosen, both: str, refe
 def inner_loops(*, quick: bool) -> dict[str, tuple[int, Callable[[], object]]]:
     """Runge-Kutta steps alone: number of them in a call, and the call."""
     moving = one_of(quick=quick)
-    start = moving.mesh_force.static_approach(0.0, moving.load[0])[None], np.zeros(1)
+    start = moving.mesh_force.static_te(0.0, moving.load[0])[None], np.zeros(1)
     steps = _INNER_STEPS * _INNER_CYCLES
 
     def one(moving):

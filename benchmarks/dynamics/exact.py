@@ -87,9 +87,9 @@ def of_orbit(orbit: Orbit) -> dict[str, float]:
     """Numbers of an orbit of shooting or continuation; the samples of a cycle are evenly spaced where it has X_1."""
     moduli = sorted(np.abs(np.linalg.eigvals(np.asarray(orbit.monodromy))), reverse=True)
     turn = np.exp(-2j * np.pi * np.asarray(orbit.phase))
-    first = 2 * abs(np.mean(np.asarray(orbit.approach) * turn))
-    numbers = [orbit.displacement[0], orbit.velocity[0], orbit.approach_mean, orbit.approach_rms]
-    numbers += [orbit.approach_max, orbit.approach_min, orbit.dynamic_factor, first, *moduli]
+    first = 2 * abs(np.mean(np.asarray(orbit.dte) * turn))
+    numbers = [orbit.displacement[0], orbit.velocity[0], orbit.dte_mean, orbit.dte_rms]
+    numbers += [orbit.dte_max, orbit.dte_min, orbit.dynamic_factor, first, *moduli]
     names = "x0", "v0", "mean", "rms", "most", "least", "factor", "harmonic", "modulus", "modulus_2"
     return {name: float(number) for name, number in zip(names, numbers)}
 
@@ -97,8 +97,8 @@ def of_orbit(orbit: Orbit) -> dict[str, float]:
 def of_sweep(found: SpeedResponse, i: int, cycle: int) -> dict[str, float]:
     """Numbers of one speed of a sweep, from the state before a cycle of the orbit."""
     first = found.velocity_harmonics[i, found.orders.index(1.0)] / (2 * np.pi * found.mesh_frequency[i])
-    numbers = [found.poincare_approach[i, cycle], found.poincare_velocity[i, cycle], found.approach_mean[i]]
-    numbers += [found.approach_rms[i], found.approach_max[i], found.approach_min[i], found.dynamic_factor[i], first]
+    numbers = [found.poincare_dte[i, cycle], found.poincare_velocity[i, cycle], found.dte_mean[i]]
+    numbers += [found.dte_rms[i], found.dte_max[i], found.dte_min[i], found.dynamic_factor[i], first]
     names = "x0", "v0", "mean", "rms", "most", "least", "factor", "harmonic"
     return {name: float(number) for name, number in zip(names, numbers)}
 

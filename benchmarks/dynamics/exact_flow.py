@@ -22,7 +22,7 @@ class ExactOrbit:
 
     Attributes:
         x0, v0: at mesh position 0.
-        rms: of the approach about its mean.
+        rms: of the DTE about its mean.
         factor: largest force; the static one is 1.
         places: mesh positions at which contact is lost or made, of all cycles of the orbit, increasing.
     """

@@ -1,4 +1,4 @@
-"""Force map against the contact analysis at the same approach."""
+"""Force map against the contact analysis at the same DTE."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -30,41 +30,41 @@ class MapError:
     Attributes:
         pair, relief: of the case.
         percent: of the static force, or of the force itself where that is larger.
-        approach: where [um].
+        dte: where [um].
         phase: where [base pitches].
-        places: how many mesh positions and approaches have been compared.
+        places: how many mesh positions and DTEs have been compared.
         megabytes: of the map's tables.
     """
 
     pair: str
     relief: str
     percent: float
-    approach: float
+    dte: float
     phase: float
     places: int
     megabytes: float
 
 
-def map_against_direct(*, phases: int = 160, approaches: int = 240, **sizes: int) -> list[MapError]:
+def map_against_direct(*, phases: int = 160, dtes: int = 240, **sizes: int) -> list[MapError]:
     """Force map against the contact analysis at random places, on the drive flanks up to three static forces.
 
     Args:
         phases: mesh positions compared, a multiple of 16.
-        approaches: compared at each of them.
+        dtes: compared at each of them.
         sizes: `positions` and `levels` of `mesh_force`, where not its defaults.
     """
     random = np.random.default_rng(_SEED)
     firsts = random.uniform(0, 1 / _POSITIONS, phases // _POSITIONS)
-    return [_map_error(*case, firsts, random.uniform(0, 1, approaches), sizes) for case in _cases()]
+    return [_map_error(*case, firsts, random.uniform(0, 1, dtes), sizes) for case in _cases()]
 
 
 def print_map_errors(console: Console, rows: Sequence[MapError]) -> None:
     console.print("Force map against the contact analysis, of the static force or of the force where that is larger")
     table = Table("pair", "relief")
-    for title in ("largest error [%]", "at approach [um]", "and phase", "places", "map [MB]"):
+    for title in ("largest error [%]", "at DTE [um]", "and phase", "places", "map [MB]"):
         table.add_column(title.replace("[", r"\["), justify="right")
     for row in rows:
-        numbers = f"{row.percent:.3f}", f"{row.approach:.2f}", f"{row.phase:.3f}", f"{row.places}"
+        numbers = f"{row.percent:.3f}", f"{row.dte:.2f}", f"{row.phase:.3f}", f"{row.places}"
         table.add_row(row.pair, row.relief, *numbers, f"{row.megabytes:.2f}")
     console.print(table)
 
@@ -92,22 +92,22 @@ def _map_error(name, pair, torque, kind, relief, firsts, shares, sizes) -> MapEr
     both = {"pinion": relief, "wheel": relief}
     made = mesh_force(mesh, torque=torque, **both, **sizes)
     static = 1e3 * torque / pair.pinion.base_radius
-    highest = jnp.max(jax.vmap(lambda at: made.static_approach(at, _LARGEST_LOAD * static))(mesh.phase))
+    highest = jnp.max(jax.vmap(lambda at: made.static_te(at, _LARGEST_LOAD * static))(mesh.phase))
     lowest = jnp.min(made.start[0])
-    approach = lowest + (highest - lowest) * shares
+    dte = lowest + (highest - lowest) * shares
     wanted, phase = [], []
     for first in firsts:
         aside = prepare_from(first, mesh.pair, mesh.compliance, mesh.resolution, None, mesh.even)
-        wanted.append(_direct(aside, removed_material(aside, torque, **both), approach))
+        wanted.append(_direct(aside, removed_material(aside, torque, **both), dte))
         phase.append(aside.phase)
     wanted, phase = jnp.concatenate(wanted, axis=1), jnp.concatenate(phase)
-    error = jnp.abs(_forces(made, phase, approach) - wanted) / jnp.maximum(wanted, static)
+    error = jnp.abs(_forces(made, phase, dte) - wanted) / jnp.maximum(wanted, static)
     row, column = np.unravel_index(int(jnp.argmax(error)), error.shape)
     return MapError(
         name,
         kind,
         100 * float(error[row, column]) if bool(jnp.all(jnp.isfinite(error))) else np.nan,
-        float(approach[row]),
+        float(dte[row]),
         float(phase[column]),
         error.size,
         (made.node_force.nbytes + made.node_stiffness.nbytes) / 1e6,
@@ -115,19 +115,19 @@ def _map_error(name, pair, torque, kind, relief, firsts, shares, sizes) -> MapEr
 
 
 @eqx.filter_jit
-def _direct(mesh, removed, approach):
-    """Force of the contact analysis, shape (approaches, positions); nan where none has been found."""
+def _direct(mesh, removed, dte):
+    """Force of the contact analysis, shape (DTEs, positions); nan where none has been found."""
 
     def at(q):
         found = solve_series(mesh, jnp.full(mesh.resolution.positions, q), removed, jnp.zeros_like(q))
         return jnp.where(found.converged, found.force, jnp.nan)
 
-    return jax.vmap(at)(approach)
+    return jax.vmap(at)(dte)
 
 
 @eqx.filter_jit
-def _forces(force, phase, approach):
-    return jax.vmap(lambda q: jax.vmap(lambda at: force(at, q))(phase))(approach)
+def _forces(force, phase, dte):
+    return jax.vmap(lambda q: jax.vmap(lambda at: force(at, q))(phase))(dte)
 
 
 def map_section(console: Console) -> list[str]:

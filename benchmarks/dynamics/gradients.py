@@ -1,4 +1,4 @@
-"""Derivatives of K_v and of the rms of the approach: against central differences, and what they cost."""
+"""Derivatives of K_v and of the rms of the DTE: against central differences, and what they cost."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -71,7 +71,7 @@ def exact_slopes() -> Iterator[Slope]:
     def quantities(point):
         omega, zeta, ratio = point
         orbit = find_orbit(rectangular(zeta, ratio), frequency(omega), ([_NEAR[0]], [_NEAR[1]]), steps=nodes)
-        return jnp.stack([orbit.approach_rms, orbit.dynamic_factor])
+        return jnp.stack([orbit.dte_rms, orbit.dynamic_factor])
 
     with jax.numpy_rank_promotion("allow"):
         found = np.asarray(jax.jacfwd(quantities)(jnp.asarray(_POINT)))
@@ -90,7 +90,7 @@ def _made(of, point):
 
 def _quantities(moving, start):
     orbit = find_orbit(moving, _SPEED, start, steps=_STEPS)
-    return jnp.stack([orbit.dynamic_factor, orbit.approach_rms])
+    return jnp.stack([orbit.dynamic_factor, orbit.dte_rms])
 
 
 def _settled(moving):

@@ -22,11 +22,11 @@ class Known(NamedTuple):
     Attributes:
         omega: angular mesh frequency.
         periods: mesh cycles after which it repeats.
-        x0, v0: approach and its rate at mesh position 0, of the sharper table to eight digits.
-        mean, rms, most, least: of the approach.
+        x0, v0: dte and its rate at mesh position 0, of the sharper table to eight digits.
+        mean, rms, most, least: of the DTE.
         factor: largest force over the static one (K_v).
         moduli: of the Floquet multipliers, to four digits.
-        harmonic: amplitude of the approach at the mesh frequency.
+        harmonic: amplitude of the DTE at the mesh frequency.
         zeta: damping ratio.
         near: state from which shooting finds it, where no state is printed.
         stable: whether a motion settles on it.
@@ -123,7 +123,7 @@ def dead_zone(mesh_frequency, zeta=ZETA):
 
 
 def dead_zone_on_a_moving_base(zeta=ZETA):
-    """The same approach at every mesh frequency: the base of the mass moves by -0.05 cos(Omega t)."""
+    """The same DTE at every mesh frequency: the base of the mass moves by -0.05 cos(Omega t)."""
     return _driven(zeta, load=[0.0], displacement=[EXCITED])
 
 

@@ -25,7 +25,7 @@ class Effort:
         population, generations: of the genetic algorithm and of differential evolution.
         cma_population, cma_generations: of CMA-ES.
         starts, steps, lbfgs_steps: of Adam and L-BFGS.
-        minimax_starts: of sequential linear programming.
+        slp_starts: of sequential linear programming.
         points: of the free-form flanks.
         samples: manufactured gears per torque of the robust design.
     """
@@ -41,7 +41,7 @@ class Effort:
     starts: int = 16
     steps: int = 300
     lbfgs_steps: int = 150
-    minimax_starts: int = 4
+    slp_starts: int = 4
     points: int = 40
     samples: int = 16
 
@@ -56,7 +56,7 @@ QUICK = Effort(
     generations=5,
     cma_population=64,
     cma_generations=5,
-    minimax_starts=2,
+    slp_starts=2,
     points=12,
 )
 
@@ -120,8 +120,8 @@ def methods(effort: Effort) -> list[Method]:
         Method("CMA-ES", _searched(jg.optimize.CMAES(effort.cma_population, effort.cma_generations)), needs=_EVOLUTION),
         Method("Adam", _searched(jg.optimize.Adam(effort.starts, effort.steps)), slow=True),
         Method("L-BFGS", _searched(jg.optimize.LBFGS(effort.starts, effort.lbfgs_steps)), slow=True),
-        Method("minimax", _searched(jg.optimize.Minimax(effort.minimax_starts))),
-        Method("robust minimax", _robust(effort), slow=True),
+        Method("slp", _searched(jg.optimize.SLP(effort.slp_starts))),
+        Method("robust slp", _robust(effort), slow=True),
         Method("iteration, type 1", _iterated),
         Method("iteration, type 2", _iterated_from_relief(effort), slow=True),
         Method(
@@ -170,7 +170,7 @@ def _robust(effort: Effort):
             measure=jg.CVaR(0.9),
             tolerance=task.tolerance,
             samples=effort.samples,
-            method=jg.optimize.Minimax(effort.minimax_starts),
+            method=jg.optimize.SLP(effort.slp_starts),
             positions=None,
         )
         return _found(found)
@@ -192,7 +192,7 @@ def _iterated_from_relief(effort: Effort):
             mesh=mesh,
             torque=task.torque,
             objective="max_contact_pressure",
-            method=jg.optimize.Minimax(effort.minimax_starts),
+            method=jg.optimize.SLP(effort.slp_starts),
             positions=None,
         )
         found = jg.optimize.iterate_transmission_error(

@@ -17,7 +17,7 @@ from .version import version as own_version
 
 # of `optimize.METHODS` and of the search for flanks without parameters, as a test makes sure
 METHODS = (
-    "minimax, adam, lbfgs, genetic, binary_genetic, cma_es, differential_evolution, factorial, te_iteration, free_form"
+    "slp, adam, lbfgs, genetic, binary_genetic, cma_es, differential_evolution, factorial, te_iteration, free_form"
 )
 
 OK, NOT_CONVERGED, FAILED, INTERRUPTED = 0, 1, 2, 130

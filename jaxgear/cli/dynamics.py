@@ -121,12 +121,12 @@ def _grid_change(study: Study) -> dict[str, dict[str, float]]:
         first = min(max(int(np.nanargmax(response.dynamic_factor)) - _BESIDE, 0), last - width)
         near = slice(first, first + width)
         begin = near.stop - 1 if response.direction == "down" else near.start
-        approach, rate = (part[begin] for part in response.state)
+        dte, rate = (part[begin] for part in response.state)
         again = speed_sweep(
             finer.oscillator(study.mesh, torque, pinion=pinion, wheel=wheel),
             settings.mesh_frequencies[near],
             direction=response.direction,
-            start=(approach, rate),
+            start=(dte, rate),
             steps=[2 * count for count in study.steps[near]],
             kicks=settings.kicks_of(run),
         )

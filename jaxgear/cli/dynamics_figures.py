@@ -24,7 +24,7 @@ def write_figures(folder: Path, study: Study) -> list[Path]:
     torques = study.request.torques
     size: dict[str, Any] = {"columns": len(torques), "width": _PANEL * len(torques), "height": _HEIGHT}
     axes: dict[str, Any] = {}
-    for field in ("dynamic_factor", "approach_rms"):
+    for field in ("dynamic_factor", "dte_rms"):
         with plot.figure.report_axes(None, **size) as panels:
             for number, (panel, torque) in enumerate(zip(np.ravel(panels), torques)):
                 runs = {name: _called(of[torque]) for name, of in study.responses.items()}
@@ -95,10 +95,10 @@ def _portrait(panel, study: Study, oscillator: Oscillator, response: SpeedRespon
     from .. import plot
 
     place = int(np.nanargmax(np.asarray(response.dynamic_factor)))
-    count = int(response.period[place]) or response.poincare_approach.shape[-1]
+    count = int(response.period[place]) or response.poincare_dte.shape[-1]
     frequency = float(response.mesh_frequency[place])
     start = tuple(part[place] for part in response.state)
     moved = motion(oscillator, frequency, start, periods=count, steps=study.steps[place])
-    once = response.poincare_approach[place, :count], response.poincare_velocity[place, :count]
+    once = response.poincare_dte[place, :count], response.poincare_velocity[place, :count]
     title = f"{name}, {study.torque:g} N m, {frequency:.0f} Hz"
-    plot.phase_portrait(moved.approach, moved.approach_rate, moved.force, panel, once=once, title=title)
+    plot.phase_portrait(moved.dte, moved.dte_rate, moved.force, panel, once=once, title=title)

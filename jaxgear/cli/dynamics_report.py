@@ -22,12 +22,12 @@ from .written import identity, model, versions
 
 _COLUMNS = {
     "dynamic_factor": "dynamic_factor",
-    "approach_rms": "approach_rms_um",
-    "approach_mean": "approach_mean_um",
-    "approach_min": "approach_min_um",
-    "approach_max": "approach_max_um",
-    "no_contact": "no_contact_share",
-    "coast_contact": "coast_contact_share",
+    "dte_rms": "dte_rms_um",
+    "dte_mean": "dte_mean_um",
+    "dte_min": "dte_min_um",
+    "dte_max": "dte_max_um",
+    "contact_loss_share": "no_contact_share",
+    "back_side_contact": "coast_contact_share",
     "period": "period_mesh_cycles",
     "settled": "settled",
 }
@@ -47,7 +47,7 @@ class Study:
         mesh: on which the designs are compared.
         designs: their modifications (pinion, wheel) by name.
         oscillators: of every design, by torque [N m].
-        natural_frequencies: of the approach about the static one [Hz], of every design by torque [N m].
+        natural_frequencies: of the DTE about the static one [Hz], of every design by torque [N m].
         responses: of every design, by torque [N m] and name of the run.
         steps: of the integrator per mesh cycle, at every speed.
         branches: of periodic orbits of the unmodified design, at `torque`.
@@ -108,8 +108,8 @@ def table(study: Study) -> Table:
     for name, torque, run, response in study.rows():
         if before not in (None, name):
             result.add_section()
-        (factor, at_factor), (rms, at_rms) = peak(response, "dynamic_factor"), peak(response, "approach_rms")
-        apart = 100 * peak(response, "no_contact")[0]
+        (factor, at_factor), (rms, at_rms) = peak(response, "dynamic_factor"), peak(response, "dte_rms")
+        apart = 100 * peak(response, "contact_loss_share")[0]
         numbers = f"{factor:.3f}", f"{at_factor:.0f}", f"{rms:.2f}", f"{at_rms:.0f}", f"{apart:.1f}"
         natural = study.natural_frequencies[name][torque]
         result.add_row(name, f"{torque:g}", f"{natural:.0f}", run, *numbers)
@@ -186,7 +186,7 @@ def _bodies(study: Study) -> Iterator[str]:
 
 
 def failures(study: Study) -> Iterator[str]:
-    """A line for every design whose contact was not found at some approach."""
+    """A line for every design whose contact was not found at some DTE."""
     for name, of_torques in study.oscillators.items():
         bad = [f"{torque:g}" for torque, of in of_torques.items() if not bool(of.converged)]
         if bad:
@@ -251,10 +251,10 @@ def _branch(branch: Branch) -> dict[str, Any]:
 
 def _peaks(response: SpeedResponse) -> dict[str, float]:
     found: dict[str, float] = {}
-    for name, column in (("dynamic_factor", "dynamic_factor"), ("approach_rms", "approach_rms_um")):
+    for name, column in (("dynamic_factor", "dynamic_factor"), ("dte_rms", "dte_rms_um")):
         found[f"max_{column}"], found[f"at_{name}_Hz"] = peak(response, name)
-    found["max_no_contact_share"] = peak(response, "no_contact")[0]
-    found["max_coast_contact_share"] = peak(response, "coast_contact")[0]
+    found["max_no_contact_share"] = peak(response, "contact_loss_share")[0]
+    found["max_coast_contact_share"] = peak(response, "back_side_contact")[0]
     found["speeds_without_period"] = int(np.sum(np.asarray(response.period) == 0))
     return found
 
@@ -270,7 +270,7 @@ def _write_run_ups(path: Path, study: Study) -> None:
     """Every sample of every run-up."""
     per_hertz = 60 / float(study.mesh.pair.pinion.teeth)
     fields = {"time": "time_s", "mesh_frequency": "mesh_frequency_Hz"}
-    others = {name: _COLUMNS[name] for name in ("dynamic_factor", "approach_min", "approach_max")}
+    others = {name: _COLUMNS[name] for name in ("dynamic_factor", "dte_min", "dte_max")}
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["design", "torque_Nm", *fields.values(), "pinion_speed_rpm", *others.values()])

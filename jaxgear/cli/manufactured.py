@@ -42,10 +42,10 @@ def pairs_of(design: DesignFile, *, quick: bool) -> int:
 
 
 def left_out(design: DesignFile, why: str = "") -> str:
-    """That an analysis is of perfect gears though the file has tolerances; "" where it has none."""
+    """That an analysis is of nominal gears though the file has tolerances; "" where it has none."""
     if design.tolerance is None:
         return ""
-    return "[tolerance] is not part of this analysis, the gears are perfect" + f" ({why})" * bool(why)
+    return "[tolerance] is not part of this analysis, the gears are nominal" + f" ({why})" * bool(why)
 
 
 def lines(design: DesignFile, evaluations: Evaluations) -> Iterator[str]:

@@ -122,16 +122,16 @@ def doubts(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, 
         options |= {"oil_friction": design.metrics.get("friction_coefficient")}
         options |= {"bulk_temperature": design.metrics.get("bulk_temperature_degC")}
         if mesh.support is not None:
-            options["given_way"] = float(_given_way(mesh, design.cycle.line_load))
+            options["support_deflection"] = float(_support_deflection(mesh, design.cycle.line_load))
         options["verified"] = design.verified and design.verified.ppte
         found[name] = plausibility(design.cycle, **options)
     return found
 
 
 @program
-def _given_way(mesh: Mesh, line_load) -> Float[Array, ""]:
+def _support_deflection(mesh: Mesh, line_load) -> Float[Array, ""]:
     """Mean transmission error that is that of what holds the gears [um]."""
-    return jnp.mean(mesh.given_way(line_load))
+    return jnp.mean(mesh.support_deflection(line_load))
 
 
 def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:

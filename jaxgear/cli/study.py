@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import jax
 import numpy as np
 
-from ..contact import Mesh, MeshCycle, Operation
+from ..contact import Mesh, MeshCycle, OperatingPoint
 from ..contact.parts import half_way
 from ..io import DesignFile, quantities_of_tables
 from ..metrics import excited_by, face_load_factor, quantities, rating_factors, summary
@@ -76,8 +76,8 @@ def evaluate(
     curves = np.asarray([cycle.transmission_error for cycle in cycles])
     converged = np.asarray([cycle.converged for cycle in cycles]) & np.isfinite(curves)
     # without the flanks: one program serves every kind of them
-    running = Operation(real(file.torque), optional_real(file.speed), optional_real(file.friction))
-    bare = replace(cycles[0], pinion=None, wheel=None, operation=running)
+    running = OperatingPoint(real(file.torque), optional_real(file.speed), optional_real(file.friction))
+    bare = replace(cycles[0], pinion=None, wheel=None, operating_point=running)
     # names and settings, which are arrays: one program serves all oils and strengths
     further = tuple(quantity.name for quantity in quantities_of_tables(file))
     tables = {"lubricant": file.lubricant, "strength": file.strength}

@@ -81,7 +81,7 @@ def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tupl
     parameters = best.take([0]).designs()[0]
     made = design.sweep_mesh(size)
     mesh = made if isinstance(made, Mesh) else made(parameters)
-    torque = float(design.operation(parameters).torque)
+    torque = float(design.operating_point(parameters).torque)
     pinion, wheel = design.design(parameters)
     (cycle,) = over_torques(mesh, np.asarray([torque]), pinion=pinion, wheel=wheel)
     name = f"variant {best.column('variant')[0]} at {torque:g} N m"

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..contact import Operation
+from ..contact import OperatingPoint
 from ..io import DesignFile, WearRequest, wear_request, write_worn
 from ..io.cases import tolerance_of
 from ..io.errors import naming
@@ -42,7 +42,7 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
         scatters: Mapping[str, wear_scatter.Samples] = {}
         if tolerance is not None:
             stages.begin("wearing manufactured gears of all designs")
-            # of one length, as quantities take them, and as many as the perfect gears have taken
+            # of one length, as quantities take them, and as many as the nominal gears have taken
             blocks = min(max(len(life.revolutions) - 1 for life in lives.values()), _MOST_BLOCKS)
             settings = dataclasses.replace(request.settings, blocks=blocks)
             of_pairs = Kept(runs_beside(target), wear_scatter.Arrays())
@@ -68,7 +68,8 @@ def _life(design: DesignFile, request: WearRequest, mesh, name: str, flanks, kep
 
     return wear_in_steps(
         mesh,
-        settings.loads or Operation(real(design.torque), optional_real(design.speed), optional_real(design.friction)),
+        settings.loads
+        or OperatingPoint(real(design.torque), optional_real(design.speed), optional_real(design.friction)),
         settings.revolutions,
         coefficient=settings.coefficients,
         pinion=pinion,

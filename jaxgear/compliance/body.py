@@ -59,7 +59,7 @@ class ElasticRing(AbstractBody):
     Attributes:
         hub_windup: include the torsion of the ring between bore and root circle. It is common to all teeth: it shifts
             the transmission error and changes neither its variation nor the load sharing.
-        coupling: let neighbouring teeth feel each other. Off only to show what the coupling is worth.
+        coupling: couple neighbouring teeth. Off only to show what the coupling is worth.
         harmonics: Fourier terms of the ring solution.
     """
 

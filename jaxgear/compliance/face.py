@@ -1,4 +1,4 @@
-"""How the slices of a face feel each other: the deflection at one place under a load at another.
+"""How the slices of a face are elastically coupled: the deflection at one place under a load at another.
 
 A load at one place of the face bends the tooth beside it too. With the compliance C of a section under a load that is
 uniform over the face, slices of line load q[t] deflect by the sum of C F[s, t] q[t]. The parts of F = T + E are
@@ -11,7 +11,7 @@ does a single slice. Decaying kernels with images are those of Petersen's and th
 moment images of Jaramillo, and of Wellauer and Seireg; the three constants here are chosen by contacts of
 three-dimensional finite elements with free ends (spur gears, 19/48 teeth, face widths of 6 and 20 modules). With them
 the ratio of peak to mean line load of sloped and crowned flanks is within 5 % (slopes over 20 modules: 7 %), that of
-end reliefs within 17 %; slices that do not feel each other miss it by up to 40 %.
+end reliefs within 17 %; slices that are not coupled miss it by up to 40 %.
 
 A gear that is wider than its mate has its free ends, and with them the images, farther out: what overhangs the load
 helps to carry it. The rows of F then sum to less than one.

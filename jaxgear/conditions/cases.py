@@ -4,9 +4,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..contact import Mesh, Operation
+from ..contact import Mesh, OperatingPoint
 from ..contact.face_coupling import check_torque
-from ..contact.operation import operation_of
+from ..contact.operating_point import operating_point_of
 from ..numerics import Checked, program, real, result, whole
 from ..tolerance import Deviation, Tolerance, sample_deviations
 from ..tolerance.deviation import deviation_field, flank_basis
@@ -23,7 +23,7 @@ class Conditions(Checked):
 
     Attributes:
         load: torques and their weights.
-        deviations: of the manufactured gears, with a leading axis (samples,); None for perfect gears.
+        deviations: of the manufactured gears, with a leading axis (samples,); None for nominal gears.
     """
 
     load: LoadSpectrum
@@ -31,7 +31,7 @@ class Conditions(Checked):
 
     @property
     def samples(self) -> int:
-        """Number of manufactured pairs; 1 for perfect gears."""
+        """Number of manufactured pairs; 1 for nominal gears."""
         return 1 if self.deviations is None else len(self.deviations.misalignment)
 
     @property
@@ -58,7 +58,7 @@ class Cases(Checked):
         friction: mean coefficient of friction; None for the default of whatever needs it.
         weight: of every torque, sum 1, shape (torques,).
         removed: material that deviations remove [um], shape (torques, samples, pairs, slices, positions); None for
-            perfect gears.
+            nominal gears.
     """
 
     torque: Float[Array, " torques"] = result("N m")
@@ -69,7 +69,7 @@ class Cases(Checked):
 
     @property
     def samples(self) -> int:
-        """Number of manufactured pairs; 1 for perfect gears."""
+        """Number of manufactured pairs; 1 for nominal gears."""
         return 1 if self.removed is None else self.removed.shape[1]
 
     @property
@@ -78,9 +78,9 @@ class Cases(Checked):
         return len(self.torque) * self.samples
 
     @property
-    def first(self) -> Operation:
+    def first(self) -> OperatingPoint:
         """The first load."""
-        return Operation(self.torque[0], None if self.speed is None else self.speed[0], self.friction)
+        return OperatingPoint(self.torque[0], None if self.speed is None else self.speed[0], self.friction)
 
     @property
     def weights(self) -> Float[Array, " cases"]:
@@ -88,14 +88,14 @@ class Cases(Checked):
         return _repeated(self.weight, self.samples)
 
     def each(self, function):
-        """function(operation, removed) in every case, with a leading axis (cases,); the torques run slowest.
+        """function(operating_point, removed) in every case, with a leading axis (cases,); the torques run slowest.
 
         A single case is not mapped, so that it costs no more than a plain call.
         """
 
         def at(load, removed):
             torque, speed = load
-            return function(Operation(torque, speed, self.friction), removed)
+            return function(OperatingPoint(torque, speed, self.friction), removed)
 
         loads = self.torque, self.speed
         if self.removed is not None:
@@ -115,8 +115,8 @@ def conditions(
     Args:
         owner: the function that is asked, for messages.
         mesh: prepared mesh; its number of pairs and its floating-point type count, nothing else.
-        torque: on the pinion [N m], an `Operation`, or a `LoadSpectrum`.
-        tolerance: of manufactured gears; None for perfect ones.
+        torque: on the pinion [N m], an `OperatingPoint`, or a `LoadSpectrum`.
+        tolerance: of manufactured gears; None for nominal ones.
         samples: manufactured pairs, which run under every torque; None for 64. Sample i depends on the seed and on i
             alone, see `sample_deviations`.
         seed: of their deviations.
@@ -126,7 +126,7 @@ def conditions(
     """
     load = torque
     if not isinstance(torque, LoadSpectrum):
-        load = LoadSpectrum.of(operation_of(owner, torque, real(0.0).dtype))
+        load = LoadSpectrum.of(operating_point_of(owner, torque, real(0.0).dtype))
     if tolerance is None:
         if samples is not None:
             raise ValueError(f"{owner}: samples = {samples!r} has no effect without a tolerance")

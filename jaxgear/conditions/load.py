@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..contact import Operation
+from ..contact import OperatingPoint
 from ..numerics import Checked, check, concrete, number, optional_real, real
 
 
@@ -94,10 +94,10 @@ class LoadSpectrum(Checked):
         return None if self.duration is None else self.weights * self.duration
 
     @staticmethod
-    def of(operation: Operation) -> "LoadSpectrum":
+    def of(operating_point: OperatingPoint) -> "LoadSpectrum":
         """A spectrum of a single load."""
-        torque, speed = operation.torque, operation.speed
-        return LoadSpectrum(_alone(torque), None, None if speed is None else _alone(speed), operation.friction)
+        torque, speed = operating_point.torque, operating_point.speed
+        return LoadSpectrum(_alone(torque), None, None if speed is None else _alone(speed), operating_point.friction)
 
 
 def _alone(number):

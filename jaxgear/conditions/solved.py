@@ -21,10 +21,10 @@ def solve_case(
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m], scalar; or an `Operation`.
+        torque: on the pinion [N m], scalar; or an `OperatingPoint`.
         pinion, wheel: modifications; None for nominal involutes.
         deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions), or a
-            scalar; None for perfect gears.
+            scalar; None for nominal gears.
     """
     pinion, wheel = pinion or NoModification(), wheel or NoModification()
     removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)

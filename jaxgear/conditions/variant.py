@@ -11,7 +11,7 @@ from jax.interpreters.partial_eval import dce_jaxpr
 from jaxtyping import Array, Bool, Float
 
 from ..contact import Mesh, removed_material
-from ..contact.operation import operation_of
+from ..contact.operating_point import operating_point_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Checked, fields_of, real
 from .cases import Cases, Conditions, conditions
@@ -57,8 +57,8 @@ class Variants(Checked):
         names: of the variables.
         design: makes (pinion, wheel) modifications from the named variables.
         mesh: prepared mesh, or a function that prepares one from the named variables.
-        torque: on the pinion [N m], or an `Operation`, as a function of the named variables; None where the conditions
-            say it.
+        torque: on the pinion [N m], or an `OperatingPoint`, as a function of the named variables; None where the
+            conditions say it.
         conditions: loads and manufactured gears; its load counts where `torque` is None.
         cases: the conditions on a mesh that is the same for all variants, else None.
     """
@@ -82,9 +82,9 @@ class Variants(Checked):
         if cases is None:
             conditions = self.conditions
             if self.torque is not None:
-                operation = operation_of("torque", self.torque(parameters), mesh.slice_width.dtype)
-                made.append(operation)
-                conditions = Conditions(LoadSpectrum.of(operation), conditions.deviations)
+                operating_point = operating_point_of("torque", self.torque(parameters), mesh.slice_width.dtype)
+                made.append(operating_point)
+                conditions = Conditions(LoadSpectrum.of(operating_point), conditions.deviations)
             cases = conditions.on(mesh)
         possible = jnp.all(jnp.stack([jnp.asarray(True), *_in_range(made)]))
         return Variant(mesh, cases, pinion, wheel, possible)
@@ -132,8 +132,8 @@ def variants(
         values: of the variables of one variant, by which the functions are tried.
         design: makes (pinion, wheel) modifications from the named variables.
         mesh: prepared mesh, or a function of the named variables that prepares one; traced.
-        torque: on the pinion [N m], an `Operation` or a `LoadSpectrum`; or a function of the named variables that gives
-            a torque or an operation.
+        torque: on the pinion [N m], an `OperatingPoint` or a `LoadSpectrum`; or a function of the named variables that
+            gives a torque or an operating point.
         tolerance, samples, seed: of manufactured gears, see `conditions`.
 
     Raises:

@@ -7,7 +7,7 @@ from .kinematics import Kinematics as Kinematics
 from .kinematics import Side as Side
 from .mesh import Mesh as Mesh
 from .mesh import prepare as prepare
-from .operation import Operation as Operation
+from .operating_point import OperatingPoint as OperatingPoint
 from .prescribed import PrescribedContact as PrescribedContact
 from .prescribed import solve_at as solve_at
 from .resolution import Resolution as Resolution

@@ -11,7 +11,7 @@ from ..microgeometry import AbstractModification
 from ..numerics import over_batch
 from .kinematics import Kinematics, Side
 from .mesh import Mesh
-from .operation import Operation
+from .operating_point import OperatingPoint
 from .pressure import pressures
 
 Curve = Float[Array, " positions"]
@@ -27,7 +27,7 @@ class MeshCycle(eqx.Module):
     Attributes:
         kinematics: the pair, its path of contact and the array sizes.
         margins: how far the pair is from what cannot run.
-        operation: what the mesh was run at.
+        operating_point: what the mesh was run at.
         pinion, wheel: modifications of the flanks; None where only the material removed was given (`solve_removed`).
         transmission_error: loaded, on the line of action, positive when the wheel lags [um], shape (positions,);
             with what shafts, bearings and housing give way, where the mesh was prepared with them.
@@ -51,7 +51,7 @@ class MeshCycle(eqx.Module):
 
     kinematics: Kinematics
     margins: Margins
-    operation: Operation
+    operating_point: OperatingPoint
     pinion: AbstractModification | None
     wheel: AbstractModification | None
     transmission_error: Curve
@@ -85,7 +85,7 @@ class MeshCycle(eqx.Module):
     @property
     def torque(self) -> Float[Array, "*cycles"]:
         """On the pinion [N m]."""
-        return self.operation.torque
+        return self.operating_point.torque
 
     @property
     def force(self) -> Float[Array, "*cycles"]:

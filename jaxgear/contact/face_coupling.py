@@ -1,4 +1,4 @@
-"""How the slices of a mesh feel each other: through teeth and bodies, and through what holds the gears."""
+"""How the slices of a mesh are elastically coupled: through teeth and bodies, and through what holds the gears."""
 
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ def coupling_of(
     wheel: Float[Array, "pairs pairs positions"],
     support: AbstractSupport | None,
 ) -> Coupling | None:
-    """The coupling of the slices; None where they do not feel each other.
+    """The coupling of the slices; None where they are not coupled.
 
     A support bends in polynomials over the face, as many as the resolution has modes.
 
@@ -73,7 +73,7 @@ def check_support(support: AbstractSupport | None, pair: GearPair, resolution: R
 
     Raises:
         TypeError: for something else than a support.
-        ValueError: for a support of other gears, or slices that do not feel each other.
+        ValueError: for a support of other gears, or slices that are not coupled.
     """
     if support is None:
         return
@@ -86,7 +86,7 @@ def check_support(support: AbstractSupport | None, pair: GearPair, resolution: R
             "prepare: support acts over the face, which a mesh of 1 slice cannot show: Resolution(slices=11)"
         )
     if not resolution.coupled_slices:
-        raise ValueError("prepare: support needs slices that feel each other: Resolution(coupled_slices=True)")
+        raise ValueError("prepare: support needs coupled slices: Resolution(coupled_slices=True)")
     if support.needs_even_slices and resolution.parts is not None:
         raise ValueError(
             f"prepare: support is a {type(support).__name__}, over slices of equal width, the mesh has others: leave "

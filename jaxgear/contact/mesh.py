@@ -51,7 +51,7 @@ class Mesh(eqx.Module):
         hub: common wind-up of the gear bodies, each over its own face, under a line load over the common one [um per
             N/mm].
         slice_width: [mm], shape (slices,).
-        coupling: how the slices feel each other; None where they do not.
+        coupling: how the slices are elastically coupled; None where they do not.
         support: what holds the gears; None for rigid, parallel shafts.
         support_gap: by which it opens the flanks without the force of this mesh [um], shape (slices,); None without.
         support_torque: at which the support holds [N m]; None where it does at every torque.
@@ -130,7 +130,7 @@ class Mesh(eqx.Module):
         """A gap of the flanks [um] as what holds the gears leaves it."""
         return gap if self.support_gap is None else gap + self.lever[:, None] * self.support_gap[None, :, None]
 
-    def given_way(self, line_load: Float[Array, "pairs slices positions"]) -> Float[Array, " positions"]:
+    def support_deflection(self, line_load: Float[Array, "pairs slices positions"]) -> Float[Array, " positions"]:
         """Transmission error by which the support gives way to all pairs alike under line loads [N/mm], in um."""
         bent = None if self.coupling is None else self.coupling.support_deflection(self.lever, list(line_load))
         return jnp.zeros_like(line_load[0, 0]) if bent is None else jnp.min(bent, axis=0)
@@ -172,7 +172,7 @@ def prepare(
             [um]; None for 16 um per mm of module, at which root stresses are beyond 1000 MPa. Gears that are traced
             take four pairs.
         support: what shafts, bearings, housing and misalignment do to the gap over the face, as `support` of a gearbox
-            gives it; None for rigid, parallel shafts. It needs slices that feel each other, and bends over the face in
+            gives it; None for rigid, parallel shafts. It needs coupled slices, and bends over the face in
             as many polynomials as the resolution has `face_modes`. That of a gearbox holds at the gearbox's torque,
             which `solve` and the like then ask for. Transmission error and stiffness contain what it gives way.
 
@@ -181,7 +181,7 @@ def prepare(
 
     Raises:
         ValueError: when the path of contact is longer than the pairs of the resolution can cover, or the compliance is
-            a table of other gears; for a support of other gears, or on a mesh whose slices do not feel each other.
+            a table of other gears; for a support of other gears, or on a mesh whose slices are not coupled.
     """
     compliance = default_compliance() if compliance is None else compliance
     compliance.check(pair)

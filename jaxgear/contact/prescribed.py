@@ -11,7 +11,7 @@ from ..numerics import Checked, ContactProblem, check, program, real, result, so
 from .face_coupling import check_torque
 from .loaded_width import for_contact, loaded_material
 from .mesh import Mesh
-from .operation import operation_of
+from .operating_point import operating_point_of
 from .slide import RemovedMaterial
 from .solve import check_mesh, flanks_of, outermost
 
@@ -88,7 +88,7 @@ def solve_at(
             f"solve_at: transmission_error has shape {error.shape}, must be a single number or ({positions},)"
         )
     check("solve_at", "transmission_error", error, "um")
-    torque = operation_of("solve_at", torque, mesh.slice_width.dtype).torque
+    torque = operating_point_of("solve_at", torque, mesh.slice_width.dtype).torque
     check_torque("solve_at", mesh.support_torque, torque)
     flanks, prepared = flanks_of("solve_at", mesh, pinion, wheel), for_contact(mesh)
     error = jnp.broadcast_to(error.astype(torque.dtype), (positions,))
@@ -120,7 +120,7 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
     pair_force = mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1)
     force = jnp.sum(pair_force, axis=0)
     error = approach if shared is None else approach - shared * force
-    teeth = error - mesh.given_way(solution.line_load)
+    teeth = error - mesh.support_deflection(solution.line_load)
     return PrescribedContact(
         transmission_error=error,
         force=force,
@@ -152,7 +152,7 @@ def solve_forces(mesh: Mesh, force: Curve, removed: RemovedMaterial) -> ForcedCo
         mesh.structure, law, gap, mesh.lever, mesh.slice_width, force, start_law=mesh.law, coupling=mesh.coupling
     )
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
-    teeth = solution.approach - mesh.given_way(solution.line_load)
+    teeth = solution.approach - mesh.support_deflection(solution.line_load)
     return ForcedContact(solution.line_load, solution.solved & mesh.margins.valid & (teeth < outermost(mesh, removed)))
 
 

@@ -29,10 +29,10 @@ class Resolution(Checked):
             and steep flanks over its own width; 1 takes the nominal contact point alone.
         slide_steps: steps in which the contact slides down the slope of a modification; 0 keeps it at its nominal
             place. None for 2, and 0 where fewer than 3 points across the contact do not see slope and curvature.
-        coupled_slices: whether slices feel each other's load, as those of a real face do; without it each slice bends
+        coupled_slices: whether slices are elastically coupled, as those of a real face are; without it each slice bends
             on its own, and the peak of line loads that vary over the face comes out 10 to 40 % too small. One slice has
             nothing to feel.
-        face_modes: waves over the face by which slices feel each other; more than slices are as many as slices. With 5
+        face_modes: waves over the face by which slices are coupled; more than slices are as many as slices. With 5
             line loads are within 0.4 % of those with all on faces of 6 modules, 0.7 % on 67. Gears of unequal width
             take two more, at least 7, of which four decay from the ends: 0.1 % on 6 modules, 0.9 % on 20.
         newton_steps: largest number of steps of the contact solution.
@@ -110,7 +110,7 @@ class Resolution(Checked):
 
     @property
     def is_coupled(self) -> bool:
-        """Whether there are slices that feel each other."""
+        """Whether there are coupled slices."""
         return self.coupled_slices and self.slices > 1
 
     @property

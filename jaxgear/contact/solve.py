@@ -19,7 +19,7 @@ from .face_coupling import check_torque, holds_at
 from .face_spreading import ends_together
 from .loaded_width import for_contact, loaded_material
 from .mesh import Mesh, begin_mesh, prepare
-from .operation import Operation, operation_of
+from .operating_point import OperatingPoint, operating_point_of
 from .resolution import Resolution
 from .slide import RemovedMaterial, as_removed, nothing_removed
 from .support import AbstractSupport
@@ -43,7 +43,7 @@ def solve(
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m], scalar; or an `Operation`.
+        torque: on the pinion [N m], scalar; or an `OperatingPoint`.
         pinion: modification of the pinion flank; None for the nominal involute.
         wheel: modification of the wheel flank; None for the nominal involute.
 
@@ -57,14 +57,16 @@ def solve(
             face on a mesh of one slice, or a torque that is not that of the gearbox which holds the gears.
     """
     check_mesh("solve", mesh)
-    operation = operation_of("solve", torque, mesh.slice_width.dtype)
-    check_torque("solve", mesh.support_torque, operation.torque)
+    operating_point = operating_point_of("solve", torque, mesh.slice_width.dtype)
+    check_torque("solve", mesh.support_torque, operating_point.torque)
     pinion, wheel = flanks_of("solve", mesh, pinion, wheel)
     # two programs: that of the contact, by far the longer one to compile, serves every kind of modification
-    removed = _material(mesh, operation.torque, pinion, wheel)
-    cycle = _cycle(mesh, operation, _solve_removed(for_contact(mesh), operation.torque, removed), pinion, wheel)
+    removed = _material(mesh, operating_point.torque, pinion, wheel)
+    cycle = _cycle(
+        mesh, operating_point, _solve_removed(for_contact(mesh), operating_point.torque, removed), pinion, wheel
+    )
     wider = _wider(mesh, cycle)
-    return cycle if wider is None else solve(wider, operation, pinion=pinion, wheel=wheel)
+    return cycle if wider is None else solve(wider, operating_point, pinion=pinion, wheel=wheel)
 
 
 def solve_removed(
@@ -79,7 +81,7 @@ def solve_removed(
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m], scalar; or an `Operation`.
+        torque: on the pinion [N m], scalar; or an `OperatingPoint`.
         removed: from both flanks together at every contact, as `removed_material` gives it; or the amount alone [um],
             shape (pairs, slices, positions), where the contacts stay at their nominal places.
         pinion, wheel: modifications for the cycle to carry, where they are known; `removed` alone is solved for.
@@ -90,14 +92,16 @@ def solve_removed(
             torque that is not that of the gearbox which holds the gears.
     """
     check_mesh("solve_removed", mesh)
-    operation = operation_of("solve_removed", torque, mesh.slice_width.dtype)
-    check_torque("solve_removed", mesh.support_torque, operation.torque)
+    operating_point = operating_point_of("solve_removed", torque, mesh.slice_width.dtype)
+    check_torque("solve_removed", mesh.support_torque, operating_point.torque)
     shape = jnp.shape(removed.amount if isinstance(removed, RemovedMaterial) else removed)
     wanted = (mesh.resolution.pairs, mesh.resolution.slices, mesh.resolution.positions)
     if shape != wanted:
         raise ValueError(f"solve_removed: removed has shape {shape}, must be {wanted} (pairs, slices, positions)")
     removed = removed if isinstance(removed, RemovedMaterial) else as_removed(mesh.resolution, removed)
-    return _cycle(mesh, operation, _solve_removed(for_contact(mesh), operation.torque, removed), pinion, wheel)
+    return _cycle(
+        mesh, operating_point, _solve_removed(for_contact(mesh), operating_point.torque, removed), pinion, wheel
+    )
 
 
 def removed_material(
@@ -122,7 +126,7 @@ def removed_material(
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m], scalar; or an `Operation`.
+        torque: on the pinion [N m], scalar; or an `OperatingPoint`.
         pinion: modification of the pinion flank; None for the nominal involute.
         wheel: modification of the wheel flank; None for the nominal involute.
 
@@ -135,7 +139,7 @@ def removed_material(
             face on a mesh of one slice.
     """
     check_mesh("removed_material", mesh)
-    torque = operation_of("removed_material", torque, mesh.slice_width.dtype).torque
+    torque = operating_point_of("removed_material", torque, mesh.slice_width.dtype).torque
     pinion, wheel = flanks_of("removed_material", mesh, pinion, wheel)
     return _material(mesh, torque, pinion, wheel)
 
@@ -197,10 +201,15 @@ def flanks_of(owner: str, mesh: Mesh, pinion: Any, wheel: Any) -> tuple[Abstract
     return pinion or NoModification(), wheel or NoModification()
 
 
-def _cycle(mesh: Mesh, operation: Operation, contact: dict[str, Any], pinion=None, wheel=None) -> MeshCycle:
+def _cycle(mesh: Mesh, operating_point: OperatingPoint, contact: dict[str, Any], pinion=None, wheel=None) -> MeshCycle:
     """What the compiled programs leave out: it passes through them unchanged, and would be copied."""
     return MeshCycle(
-        kinematics=mesh.kinematics, margins=mesh.margins, operation=operation, pinion=pinion, wheel=wheel, **contact
+        kinematics=mesh.kinematics,
+        margins=mesh.margins,
+        operating_point=operating_point,
+        pinion=pinion,
+        wheel=wheel,
+        **contact,
     )
 
 
@@ -220,7 +229,7 @@ def _wider(mesh: Mesh, cycle: MeshCycle) -> Mesh | None:
 def _beyond(mesh: Mesh, cycle: MeshCycle) -> Bool[Array, " positions"]:
     removed = RemovedMaterial(cycle.gap - mesh.corner_gap[:, None], cycle.shift, cycle.bend)
     windup = mesh.hub * cycle.force / mesh.pair.face_width
-    return cycle.transmission_error - windup - mesh.given_way(cycle.line_load) >= outermost(mesh, removed)
+    return cycle.transmission_error - windup - mesh.support_deflection(cycle.line_load) >= outermost(mesh, removed)
 
 
 def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
@@ -266,7 +275,9 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
     contact_stiffness = tangent_stiffness(problem, solution)
     unloaded = minimum(held / mesh.lever[:, None], axis=(0, 1))
     valid = mesh.valid & holds_at(mesh.support_torque, torque)
-    teeth = solution.approach - mesh.given_way(solution.line_load)  # what closes the gaps of pairs that are not there
+    teeth = solution.approach - mesh.support_deflection(
+        solution.line_load
+    )  # what closes the gaps of pairs that are not there
     return {
         "transmission_error": solution.approach + windup,
         "unloaded_transmission_error": unloaded,

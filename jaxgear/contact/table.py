@@ -12,7 +12,7 @@ def flank_table(
     kinematics: Kinematics,
     field: Any,
     gear: Literal["pinion", "wheel"],
-    method: Literal["linear", "cubic2", "monotonic"] = "linear",
+    method: Literal["linear", "natural_cubic", "monotonic"] = "linear",
 ) -> TabulatedFlank | TabulatedProfile:
     """A field over the contacts as a table over roll length and face coordinate of one gear.
 

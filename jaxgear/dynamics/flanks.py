@@ -24,7 +24,7 @@ class Flanks(NamedTuple):
         mesh: prepared at the mesh positions of these flanks.
         removed: material removed.
         order: which of its positions belongs to each position of the drive flanks, shape (positions,).
-        clearance: what is added to the approach of these flanks where the other ones just touch unmodified [um].
+        clearance: what is added to the DTE of these flanks where the other ones just touch unmodified [um].
     """
 
     mesh: Mesh
@@ -37,8 +37,8 @@ class Static(NamedTuple):
     """Static contact of one side under a torque, shape (positions,) each, in the order of the drive flanks.
 
     Attributes:
-        unloaded: approach at which the flanks touch [um].
-        loaded: approach under the torque, series compliance included [um].
+        unloaded: DTE at which the flanks touch [um].
+        loaded: DTE under the torque, series compliance included [um].
         stiffness: slope of the force there [N/um].
         converged: where the contact has been found.
     """
@@ -67,12 +67,12 @@ def coast_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
     with the backlash j on the line of action, the tooth thicknesses s_1 of the pinion and s_2 of the wheel on the
     working pitch circles, and the pitch p = s_1 + s_2 + j / cos(alpha_w) there.
 
-    Of an approach q both gears have half: the pinion is q/2 ahead of its mean position, the wheel q/2 behind, as
+    Of a DTE q both gears have half: the pinion is q/2 ahead of its mean position, the wheel q/2 behind, as
     everywhere in jaxgear. On the pitch circle the leading flank of the pinion's reference tooth is then
     phase p + q / (2 cos(alpha_w)) ahead of the pitch point and the coast flank s_1 behind that. The coast flanks touch
     where q = -j: they do so in the pitch point at phase p = s_1 + j / (2 cos(alpha_w)), modulo p, which is phase_c.
     The coast contact moves against the mirrored direction while the gears turn on, hence the sign of the phase; its
-    approach is measured from q = -j, and half of it again moves either gear. (R. G. Parker and co-workers name the
+    DTE is measured from q = -j, and half of it again moves either gear. (R. G. Parker and co-workers name the
     phase between both sides: Y. Guo, R. G. Parker, Mech. Mach. Theory 78, 2014.)
 
     What holds the gears is known along the line of action of the drive flanks alone: coast flanks meet as on rigid,

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from ..numerics import Checked, bracketed_root, number, real
 
-# Doublings of 1 um until a bracket holds the approach of a force; there is no root where they do not suffice.
+# Doublings of 1 um until a bracket holds the DTE of a force; there is no root where they do not suffice.
 _DOUBLINGS = 40
 # mesh positions over which a stiffness is averaged
 _POSITIONS = 32
@@ -22,9 +22,9 @@ Scalar = Float[Array, ""]
 
 
 class AbstractMeshForce(Checked):
-    """Force between the flanks of a mesh on the line of action, as a function of mesh position and approach.
+    """Force between the flanks of a mesh on the line of action, as a function of mesh position and DTE.
 
-    The approach q [um] is how much farther the pinion has turned than the wheel, on the line of action: under a static
+    The DTE q [um] is how much farther the pinion has turned than the wheel, on the line of action: under a static
     load it is the loaded transmission error. The force [N] is positive on the drive flanks, zero in the clearance and
     negative on the coast flanks.
 
@@ -44,46 +44,46 @@ class AbstractMeshForce(Checked):
         """A tree of arrays: what the force at a mesh position [base pitches, any number] depends on."""
 
     @abstractmethod
-    def force(self, place: Any, approach: Scalar) -> Scalar:
-        """Force [N] at a place that `at` has found and an approach [um]."""
+    def force(self, place: Any, dte: Scalar) -> Scalar:
+        """Force [N] at a place that `at` has found and a DTE [um]."""
 
-    def __call__(self, phase: Scalar, approach: Scalar) -> Scalar:
-        """Force [N] at a mesh position [base pitches] and an approach [um]."""
-        return self.force(self.at(phase), approach)
+    def __call__(self, phase: Scalar, dte: Scalar) -> Scalar:
+        """Force [N] at a mesh position [base pitches] and a DTE [um]."""
+        return self.force(self.at(phase), dte)
 
-    def stiffness(self, phase: Scalar, approach: Scalar) -> Scalar:
-        """Slope of the force over the approach [N/um]."""
+    def stiffness(self, phase: Scalar, dte: Scalar) -> Scalar:
+        """Slope of the force over the DTE [N/um]."""
         place = self.at(phase)
-        return jax.jvp(lambda q: self.force(place, q), (approach,), (jnp.ones_like(approach),))[1]
+        return jax.jvp(lambda q: self.force(place, q), (dte,), (jnp.ones_like(dte),))[1]
 
-    def static_approach(self, phase: Scalar, force: Scalar) -> Scalar:
-        """Approach [um] that takes a force [N]: the loaded transmission error under it.
+    def static_te(self, phase: Scalar, force: Scalar) -> Scalar:
+        """Loaded transmission error [um] under a force [N].
 
         A positive force has one on the drive flanks, a negative one on the coast flanks; for a force of zero it is
         somewhere in the clearance. NaN where there is none, as for a negative force without coast flanks.
         """
-        return approach_under(self, self.at(phase), force)
+        return te_under(self, self.at(phase), force)
 
     def mean_tangent_stiffness(self, force: Scalar) -> Scalar:
         """Slope of the force under a static force [N], averaged over the mesh cycle [N/um].
 
-        The stiffness that a small vibration about the static approach meets: natural frequencies and damping ratios
-        refer to it.
+        The stiffness that a small vibration about the static transmission error meets: natural frequencies and
+        damping ratios refer to it.
         """
         force = real(force)
-        return self.over_cycle(lambda phase: self.stiffness(phase, self.static_approach(phase, force)), force.dtype)
+        return self.over_cycle(lambda phase: self.stiffness(phase, self.static_te(phase, force)), force.dtype)
 
     def mean_secant_stiffness(self, force: Scalar) -> Scalar:
         """A static force [N], not zero, over the mean deflection of the mesh cycle under it [N/um].
 
-        The deflection is the static approach under the force less that at which the flanks touch: the stiffness of a
-        linear spring with the same mean deflection, below the tangent one since contacts stiffen from zero on. Studies
-        that know a static transmission error and no slope state it.
+        The deflection is the static transmission error under the force less that at which the flanks touch: the
+        stiffness of a linear spring with the same mean deflection, below the tangent one since contacts stiffen from
+        zero on. Studies that know a static transmission error and no slope state it.
         """
         force = real(force)
 
         def deflection(phase):
-            return self.static_approach(phase, force) - self.static_approach(phase, _TOUCHING * force)
+            return self.static_te(phase, force) - self.static_te(phase, _TOUCHING * force)
 
         return (1 - _TOUCHING) * force / self.over_cycle(deflection, force.dtype)
 
@@ -94,10 +94,10 @@ class AbstractMeshForce(Checked):
 
 
 @partial(jax.jit, inline=True)
-def approach_under(mesh_force: AbstractMeshForce, place: Any, force: Scalar) -> Scalar:
-    """Approach [um] at which a mesh force has a value [N]; NaN where it has it nowhere.
+def te_under(mesh_force: AbstractMeshForce, place: Any, force: Scalar) -> Scalar:
+    """Transmission error [um] at which a mesh force has a value [N]; NaN where it has it nowhere.
 
-    A mesh force that is NaN from some approach on counts as larger than any value there.
+    A mesh force that is NaN from some DTE on counts as larger than any value there.
     """
     args = mesh_force, place, force
     fixed = jax.lax.stop_gradient(args)
@@ -116,11 +116,11 @@ def approach_under(mesh_force: AbstractMeshForce, place: Any, force: Scalar) -> 
     return jnp.where(known, found, jnp.nan)
 
 
-def missing(approach: Scalar, args) -> Scalar:
-    """Force [N] at an approach [um] less the wanted one; args are (mesh force, place, wanted force)."""
+def missing(dte: Scalar, args) -> Scalar:
+    """Force [N] at a DTE [um] less the wanted one; args are (mesh force, place, wanted force)."""
     mesh_force, place, force = args
-    found = mesh_force.force(place, approach)
-    return jnp.where(jnp.isnan(found), jnp.where(approach < 0, -jnp.inf, jnp.inf), found - force)
+    found = mesh_force.force(place, dte)
+    return jnp.where(jnp.isnan(found), jnp.where(dte < 0, -jnp.inf, jnp.inf), found - force)
 
 
 class DeadZone(AbstractMeshForce):
@@ -128,7 +128,7 @@ class DeadZone(AbstractMeshForce):
 
     Attributes:
         stiffness_constant: [N/um].
-        half_clearance: of the clearance about approach zero [um].
+        half_clearance: of the clearance about DTE zero [um].
     """
 
     stiffness_constant: Scalar = number("N/um", low=0.0, open_low=True, default=1.0)
@@ -137,9 +137,9 @@ class DeadZone(AbstractMeshForce):
     def at(self, phase: Scalar) -> tuple:
         return ()
 
-    def force(self, place, approach: Scalar) -> Scalar:
+    def force(self, place, dte: Scalar) -> Scalar:
         half = self.half_clearance
-        return self.stiffness_constant * (jnp.maximum(approach - half, 0.0) + jnp.minimum(approach + half, 0.0))
+        return self.stiffness_constant * (jnp.maximum(dte - half, 0.0) + jnp.minimum(dte + half, 0.0))
 
 
 class RectangularStiffness(AbstractMeshForce):
@@ -165,5 +165,5 @@ class RectangularStiffness(AbstractMeshForce):
     def at(self, phase: Scalar) -> Scalar:
         return jnp.where(phase - jnp.floor(phase) < self.share, self.double, self.single)
 
-    def force(self, place: Scalar, approach: Scalar) -> Scalar:
-        return place * jnp.maximum(approach, 0.0)
+    def force(self, place: Scalar, dte: Scalar) -> Scalar:
+        return place * jnp.maximum(dte, 0.0)

@@ -1,4 +1,4 @@
-"""The force of a mesh from contact analyses, on a grid of mesh positions and approaches."""
+"""The force of a mesh from contact analyses, on a grid of mesh positions and DTEs."""
 
 from typing import NamedTuple
 
@@ -27,8 +27,8 @@ class Rows(NamedTuple):
     """What the force at one mesh position depends on; first the drive, then the coast flanks.
 
     Attributes:
-        start: approach at which the drive flanks touch, and the negative of that at which the coast flanks do [um].
-        force: at the levels of approach beyond `start` [N], shape (sides x levels,).
+        start: DTE at which the drive flanks touch, and the negative of that at which the coast flanks do [um].
+        force: at the levels of DTE beyond `start` [N], shape (sides x levels,).
         rise: its slope over the number of the level [N], same shape.
     """
 
@@ -38,23 +38,23 @@ class Rows(NamedTuple):
 
 
 class ForceMap(AbstractMeshForce):
-    """Force of a mesh by cubic pieces over the approach, linear between mesh positions; made by `mesh_force`.
+    """Force of a mesh by cubic pieces over the DTE, linear between mesh positions; made by `mesh_force`.
 
     The force is exactly zero in the clearance, rises everywhere else with a continuous slope, and goes on linearly
     beyond the table.
 
-    Modifications are averaged over the contact width under the nominal torque, at every approach. On a 50/50 pair with
-    6 um of relief dynamic factor and rms are then within 0.4 % of those with the width of every approach, and their
+    Modifications are averaged over the contact width under the nominal torque, at every DTE. On a 50/50 pair with
+    6 um of relief dynamic factor and rms are then within 0.4 % of those with the width of every DTE, and their
     derivatives by the relief within 0.9 %, at half of the natural frequency within 5 %; a map made for three times the
     torque it runs at has up to 1.1 % (dynamic factor) and 4.8 % (rms) less.
 
     Attributes:
         first_phase: mesh position with which the grid begins [base pitches].
-        start: approach at which the drive flanks touch, and the negative of that at which the coast flanks do [um],
+        start: DTE at which the drive flanks touch, and the negative of that at which the coast flanks do [um],
             shape (2, positions).
-        reach: approach of the last level beyond `start` [um]; the levels lie closer where the flanks begin to touch.
+        reach: DTE of the last level beyond `start` [um]; the levels lie closer where the flanks begin to touch.
         node_force: force of drive and coast flanks [N], shape (2, positions, levels), from `start` on.
-        node_stiffness: its slope over the approach [N/um], same shape.
+        node_stiffness: its slope over the DTE [N/um], same shape.
         converged: whether all contacts of the grid have been found.
     """
 
@@ -74,9 +74,9 @@ class ForceMap(AbstractMeshForce):
         apart = distances(self.reach, self.node_force.shape[-1])
         return Rows(mixed(self.start), mixed(self.node_force), mixed(self.node_stiffness * apart[None, None]))
 
-    def force(self, place: Rows, approach: Scalar) -> Scalar:
+    def force(self, place: Rows, dte: Scalar) -> Scalar:
         levels = len(place.force) // 2
-        drive, closed = closing(place.start, approach)
+        drive, closed = closing(place.start, dte)
         level = level_of(closed, self.reach, levels)
         below = jnp.floor(jnp.clip(level, 0.0, levels - 2.0))
         node = below.astype(jnp.int32) + jnp.where(drive, 0, levels).astype(jnp.int32)
@@ -90,21 +90,21 @@ class ForceMap(AbstractMeshForce):
 
 
 def level_of(closed: Scalar, reach: Scalar, levels: int) -> Scalar:
-    """Number of the level at an approach beyond touching [um], a fraction between two: the inverse of `approaches`."""
+    """Number of the level at a DTE beyond touching [um], a fraction between two: the inverse of `dte_levels`."""
     share, bend = closed / reach, (1 - _FIRST_STEP) / _FIRST_STEP**2
     inside = 2 * share / (_FIRST_STEP * (1 + jnp.sqrt(1 + 4 * bend * jnp.clip(share, 0.0, 1.0))))
     beyond = (share - 1) / (2 - _FIRST_STEP)
     return (levels - 1) * jnp.where(share < 1, inside, 1 + beyond)
 
 
-def approaches(reach: Scalar, levels: int) -> Float[Array, " levels"]:
-    """Approach of the levels beyond touching [um]: parabolic in their number, from 0 to the reach."""
+def dte_levels(reach: Scalar, levels: int) -> Float[Array, " levels"]:
+    """DTE of the levels beyond touching [um]: parabolic in their number, from 0 to the reach."""
     share = jnp.linspace(0.0, 1.0, levels, dtype=reach.dtype)
     return reach * share * (_FIRST_STEP + (1 - _FIRST_STEP) * share)
 
 
 def distances(reach: Scalar, levels: int) -> Float[Array, " levels"]:
-    """Slope of `approaches` over the number of the level [um]."""
+    """Slope of `dte_levels` over the number of the level [um]."""
     share = jnp.linspace(0.0, 1.0, levels, dtype=reach.dtype)
     return reach * (_FIRST_STEP + 2 * (1 - _FIRST_STEP) * share) / (levels - 1)
 
@@ -117,27 +117,27 @@ def between(phase: Scalar, first: Scalar, count: int):
     return index, (index + 1) % count, place - lower
 
 
-def closing(start: Start, approach: Scalar) -> tuple[Bool[Array, ""], Scalar]:
+def closing(start: Start, dte: Scalar) -> tuple[Bool[Array, ""], Scalar]:
     """Whether the drive flanks are nearer than the coast flanks, and how far the nearer ones are past touching [um]."""
-    drive = approach >= 0.5 * (start[0] - start[1])
-    return drive, jnp.where(drive, approach - start[0], -approach - start[1])
+    drive = dte >= 0.5 * (start[0] - start[1])
+    return drive, jnp.where(drive, dte - start[0], -dte - start[1])
 
 
 @program
 def tabulate(flanks: Flanks, unloaded, compliance: Scalar, reach: Scalar, levels: int):
-    """Force [N] and slope [N/um] of one side at levels of the approach, shape (positions, levels) each, and whether
+    """Force [N] and slope [N/um] of one side at levels of the DTE, shape (positions, levels) each, and whether
     all of it has converged.
 
     Called as it is, it runs for a hundredth of the time that it compiles, and a gear pair needs it twice.
 
     Args:
         flanks: of one side.
-        unloaded: approach at which the flanks touch [um], in the order of the flanks' own mesh.
+        unloaded: DTE at which the flanks touch [um], in the order of the flanks' own mesh.
         compliance: in series [um/N].
         reach: of the last level [um].
         levels: their number.
     """
-    above, apart = approaches(reach, levels)[1:], distances(reach, levels)
+    above, apart = dte_levels(reach, levels)[1:], distances(reach, levels)
 
     def at(level):
         return solve_series(flanks.mesh, unloaded + level, flanks.removed, compliance)

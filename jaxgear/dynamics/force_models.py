@@ -20,8 +20,8 @@ class Springs(NamedTuple):
     start: Sides
     stiffness: Sides
 
-    def force(self, approach: Scalar) -> Scalar:
-        drive, closed = closing(self.start, approach)
+    def force(self, dte: Scalar) -> Scalar:
+        drive, closed = closing(self.start, dte)
         found = jnp.where(drive, self.stiffness[0], self.stiffness[1]) * jnp.maximum(closed, 0.0)
         return jnp.where(drive, found, -found)
 
@@ -35,11 +35,11 @@ class VaryingStiffness(AbstractMeshForce):
     """Stiffness that varies with the mesh position, beyond the unloaded transmission error: k(phase) (q - e_u(phase)).
 
     The stiffness is that of the whole deflection under the torque it was made for: the force is right for this load
-    and every mesh position, and no other. How much of the teeth is in contact does not change with the approach.
+    and every mesh position, and no other. How much of the teeth is in contact does not change with the DTE.
 
     Attributes:
         first_phase: mesh position with which the curves begin [base pitches].
-        start: approach at which the drive flanks touch, and the negative of that at which the coast flanks do [um],
+        start: DTE at which the drive flanks touch, and the negative of that at which the coast flanks do [um],
             shape (2, positions).
         secant_stiffness: of drive and coast flanks [N/um], same shape.
         converged: whether the contacts have been found.
@@ -53,8 +53,8 @@ class VaryingStiffness(AbstractMeshForce):
     def at(self, phase: Scalar) -> Springs:
         return Springs(*(_mixed(part, phase, self.first_phase) for part in (self.start, self.secant_stiffness)))
 
-    def force(self, place: Springs, approach: Scalar) -> Scalar:
-        return place.force(approach)
+    def force(self, place: Springs, dte: Scalar) -> Scalar:
+        return place.force(dte)
 
 
 class LoadedError(AbstractMeshForce):
@@ -63,8 +63,8 @@ class LoadedError(AbstractMeshForce):
 
     Attributes:
         first_phase: mesh position with which the curves begin [base pitches].
-        start: static approach under the load less F_0 / k, of the drive flanks, and its negative for the coast flanks
-            [um], shape (2, positions).
+        start: static transmission error under the load less F_0 / k, of the drive flanks, and its negative for the
+            coast flanks [um], shape (2, positions).
         constant_stiffness: F_0 over the mean deflection of drive and coast flanks [N/um], shape (2,).
         converged: whether the contacts have been found.
     """
@@ -77,8 +77,8 @@ class LoadedError(AbstractMeshForce):
     def at(self, phase: Scalar) -> Springs:
         return Springs(_mixed(self.start, phase, self.first_phase), self.constant_stiffness)
 
-    def force(self, place: Springs, approach: Scalar) -> Scalar:
-        return place.force(approach)
+    def force(self, place: Springs, dte: Scalar) -> Scalar:
+        return place.force(dte)
 
 
 class Tangent(AbstractMeshForce):
@@ -87,19 +87,19 @@ class Tangent(AbstractMeshForce):
     Attributes:
         first_phase: mesh position with which the curves begin [base pitches].
         static_force: F_0 [N].
-        approach: q_0, static approach [um], shape (positions,).
+        dte: q_0, static transmission error [um], shape (positions,).
         tangent_stiffness: slope of the force there [N/um], shape (positions,).
         converged: whether the contacts have been found.
     """
 
     first_phase: Scalar = result("base pitches")
     static_force: Scalar = result("N")
-    approach: Float[Array, " positions"] = result("um")
+    dte: Float[Array, " positions"] = result("um")
     tangent_stiffness: Float[Array, " positions"] = result("N/um")
     converged: Bool[Array, ""] = result()
 
     def at(self, phase: Scalar) -> Sides:
-        return _mixed(jnp.stack([self.approach, self.tangent_stiffness]), phase, self.first_phase)
+        return _mixed(jnp.stack([self.dte, self.tangent_stiffness]), phase, self.first_phase)
 
-    def force(self, place: Sides, approach: Scalar) -> Scalar:
-        return self.static_force + place[1] * (approach - place[0])
+    def force(self, place: Sides, dte: Scalar) -> Scalar:
+        return self.static_force + place[1] * (dte - place[0])

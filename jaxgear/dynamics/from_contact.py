@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from ..contact import Mesh
 from ..contact.mesh import prepare_from
-from ..contact.operation import operation_of
+from ..contact.operating_point import operating_point_of
 from ..contact.solve import check_mesh
 from ..microgeometry import AbstractModification
 from ..numerics import check, concrete, real, whole
@@ -44,9 +44,9 @@ def mesh_force(
     compliance: Any = 0.0,
     deviation: Any = None,
 ) -> Any:
-    """Force of a mesh as a function of mesh position and approach, for oscillators.
+    """Force of a mesh as a function of mesh position and DTE, for oscillators.
 
-    The approach is that of the teeth, of the wind-up of the gear bodies (`mesh.hub`) and of `compliance` in series.
+    The DTE is that of the teeth, of the wind-up of the gear bodies (`mesh.hub`) and of `compliance` in series.
 
     Args:
         mesh: prepared mesh, of any number of positions.
@@ -56,18 +56,18 @@ def mesh_force(
         wheel: likewise of the wheel.
         coast: modifications of the coast flanks of (pinion, wheel), None of either for the nominal involute; None for
             those of the drive flanks.
-        model: "map" for `ForceMap`, the contact at every approach; "varying stiffness" for `VaryingStiffness`, "loaded
+        model: "map" for `ForceMap`, the contact at every DTE; "varying stiffness" for `VaryingStiffness`, "loaded
             error" for `LoadedError`, "tangent" for `Tangent`: all give the static transmission error of the torque.
-        positions: mesh positions of the force, which is linear between them: the approach at which a pair comes into
+        positions: mesh positions of the force, which is linear between them: the DTE at which a pair comes into
             contact changes by several um from one of 64 positions to the next, so that they limit how near the map is
             to the contact analysis (half a percent needs 512). An integrator whose steps meet these positions alone
             needs no more than it has steps.
-        levels: number of approaches of the map on either side of the clearance, closer together where it ends.
+        levels: number of DTEs of the map on either side of the clearance, closer together where it ends.
         reach: largest deflection of the map, relative to the largest static one of the drive flanks; the map is
             linear beyond.
         compliance: of shafts, bearings and bodies in series with the mesh [um/N].
         deviation: material that manufacturing deviations remove besides from the drive flanks [um], shape (pairs,
-            slices, positions) of the mesh; linear between its positions. None for perfect gears.
+            slices, positions) of the mesh; linear between its positions. None for nominal gears.
 
     Returns:
         the mesh force, differentiable with respect to every number. Where the number of pairs was left open, is too
@@ -91,7 +91,7 @@ def force_and_mesh(
 ) -> tuple[AbstractMeshForce, Mesh]:  # fmt: skip
     """`mesh_force`, and the mesh that it was made on."""
     check_mesh("mesh_force", mesh)
-    torque = operation_of("mesh_force", torque, mesh.slice_width.dtype).torque
+    torque = operating_point_of("mesh_force", torque, mesh.slice_width.dtype).torque
     check("mesh_force", "torque", torque, "N m", low=0.0, open_low=True)
     series = _number("compliance", compliance, "um/N", mesh, low=0.0)
     farthest = _number("reach", reach, "", mesh, low=1.0)

@@ -18,19 +18,20 @@ SIMPSON = (1 / 6, 4 / 6, 1 / 6)  # weights of the three places of a step
 
 
 class History(NamedTuple):
-    """Approach and force over some recorded cycles, in three places of every step, one step after the other.
+    """DTE and force over some recorded cycles, in three places of every step, one step after the other.
 
     Attributes:
         phase: where every step begins [base pitches], from 0 at the begin of the first cycle on.
         length: of every step [base pitches].
-        approach: of the flanks [um]; in the middle of a step by the cubic that fits values and velocities at its ends.
-        velocity: of the approach at the begin of every step [um/s].
+        dte: dynamic transmission error (DTE) [um]; in the middle of a step by the cubic that fits values and
+            velocities at its ends.
+        velocity: of the DTE at the begin of every step [um/s].
         force: elastic force of the mesh [N], on the step's side where it jumps.
     """
 
     phase: Samples
     length: Samples
-    approach: Thirds
+    dte: Thirds
     velocity: Samples
     force: Thirds
 
@@ -52,17 +53,17 @@ def history(oscillator: Oscillator, states: Recorded, end: State, steps: Steps, 
 
     def of_step(x, v, x_end, v_end, step):
         last = step.phase + step.length
-        begin, finish = oscillator.approach(step.phase, x), oscillator.approach(last, x_end)
-        rate = oscillator.approach_rate(step.phase, v, mesh_frequency)
-        change = rate - oscillator.approach_rate(last, v_end, mesh_frequency)
+        begin, finish = oscillator.dte(step.phase, x), oscillator.dte(last, x_end)
+        rate = oscillator.dte_rate(step.phase, v, mesh_frequency)
+        change = rate - oscillator.dte_rate(last, v_end, mesh_frequency)
         middle = 0.5 * (begin + finish) + step.length / mesh_frequency * change / 8
         force = oscillator.mesh_force.force
         forces = force(step.first, begin), force(step.middle, middle), force(step.last, finish)
         return jnp.stack([begin, middle, finish]), rate, jnp.stack(forces)
 
-    approach, velocity, force = jax.vmap(of_step, out_axes=(1, 0, 1))(x, v, x_end, v_end, repeated)
+    dte, velocity, force = jax.vmap(of_step, out_axes=(1, 0, 1))(x, v, x_end, v_end, repeated)
     cycle = jnp.repeat(jnp.arange(count, dtype=steps.phase.dtype), size)
-    return History(repeated.phase + cycle, repeated.length, approach, velocity, force)
+    return History(repeated.phase + cycle, repeated.length, dte, velocity, force)
 
 
 def mean(of: History, values: Thirds) -> Scalar:
@@ -100,4 +101,4 @@ def smallest(values: Thirds) -> Scalar:
 
 def share(of: History, holds: Array) -> Scalar:
     """Share of the time in which something holds, shape (3, samples); it has no derivative."""
-    return mean(of, holds.astype(of.approach.dtype))
+    return mean(of, holds.astype(of.dte.dtype))

@@ -11,17 +11,17 @@ from .static import Rest
 
 Scalar = Float[Array, ""]
 
-_POSITIONS = 16  # of the first harmonic of the static approach
+_POSITIONS = 16  # of the first harmonic of the static transmission error
 _QUARTER = 0.25  # of a mesh cycle
-_FLAT = 1e-6  # a static approach with a smaller harmonic, as part of its deflection, has no softest position
+_FLAT = 1e-6  # a static transmission error with a smaller harmonic, as part of its deflection, has no softest position
 
 
 class Kick(NamedTuple):
     """How flanks are thrown apart.
 
     Attributes:
-        apart: largest approach less that at rest [um], negative.
-        acceleration: of the approach where the flanks are apart [um/s^2].
+        apart: largest DTE less that at rest [um], negative.
+        acceleration: of the DTE where the flanks are apart [um/s^2].
         phase: mesh position of the largest distance, from -1/2 to 1/2 [base pitches].
         on: whether they are thrown at all.
     """
@@ -37,7 +37,7 @@ def kick_of(oscillator: Oscillator, rest: Rest, factor: Scalar) -> Kick:
 
     With the static deflection d of the mesh stiffness at mesh position 0, flanks that a constant force closes over a
     gap g are pressed to the deflection d + (d^2 + 2 g d)^(1/2): a dynamic factor K needs g = ((K - 1)^2 - 1) d / 2. Up
-    to K = 2 contact is kept, and the approach is released from (K - 1) d behind that at rest. Where the backlash is
+    to K = 2 contact is kept, and the DTE is released from (K - 1) d behind that at rest. Where the backlash is
     less than the gap, the coast flanks throw them back harder.
 
     Orbits of two mesh cycles are farthest apart a quarter of a cycle behind the softest mesh position, when the mesh
@@ -51,7 +51,7 @@ def kick_of(oscillator: Oscillator, rest: Rest, factor: Scalar) -> Kick:
     swing = factor - 1
     apart = jnp.where(swing > 1, 0.5 * (1 + swing**2), swing) * deflection
     phases = jnp.arange(_POSITIONS, dtype=deflection.dtype) / _POSITIONS
-    static = jax.vmap(lambda at: oscillator.mesh_force.static_approach(at, rest.force))(phases)
+    static = jax.vmap(lambda at: oscillator.mesh_force.static_te(at, rest.force))(phases)
     cosine, sine = (jnp.mean(static * of(2 * jnp.pi * phases)) for of in (jnp.cos, jnp.sin))
     varies = jnp.hypot(cosine, sine) > _FLAT * deflection
     softest = jnp.where(varies, jnp.arctan2(sine, cosine) / (2 * jnp.pi), -_QUARTER)
@@ -61,13 +61,13 @@ def kick_of(oscillator: Oscillator, rest: Rest, factor: Scalar) -> Kick:
 
 
 def kicked(oscillator: Oscillator, start: State, kick: Kick, mesh_frequency: Scalar) -> State:
-    """A start with its approach thrown so that it would stand still, the farthest away, at the mesh position of a kick.
+    """A start with its DTE thrown so that it would stand still, the farthest away, at the mesh position of a kick.
 
     At mesh position 0 the flanks are on their way there, or on their way back, under the static force alone.
     """
     x, v = start
     time = kick.phase / mesh_frequency
-    fallen = jnp.minimum(0.5 * kick.acceleration * time**2, -kick.apart)  # no farther than to the approach at rest
+    fallen = jnp.minimum(0.5 * kick.acceleration * time**2, -kick.apart)  # no farther than to the DTE at rest
     along = oscillator.direction / oscillator.mass
     share = along / jnp.sum(oscillator.direction * along)
     speed = -jnp.sign(time) * jnp.sqrt(2 * kick.acceleration * fallen)

@@ -19,8 +19,8 @@ class Motion(Checked):
 
     Attributes:
         phase: mesh position [base pitches], shape (samples,).
-        approach: of the flanks [um], shape (samples,).
-        approach_rate: [um/s], shape (samples,).
+        dte: dynamic transmission error (DTE) [um], shape (samples,).
+        dte_rate: [um/s], shape (samples,).
         force: elastic force of the mesh [N], shape (samples,): zero where nothing touches, negative on the coast
             flanks.
         support_force: by which springs and dampers to ground and between coordinates hold every coordinate [N], shape
@@ -28,8 +28,8 @@ class Motion(Checked):
     """
 
     phase: Samples = result()
-    approach: Samples = result("um")
-    approach_rate: Samples = result("um/s")
+    dte: Samples = result("um")
+    dte_rate: Samples = result("um/s")
     force: Samples = result("N")
     support_force: Float[Array, "samples coordinates"] = result("N")
 
@@ -58,7 +58,7 @@ def _moved(oscillator: Oscillator, frequency, start, nodes, periods: int) -> Mot
     _, states = cycles(oscillator, start, steps, frequency, periods)
 
     def of_step(step, phase, x, v):
-        q, rate = oscillator.approach(phase, x), oscillator.approach_rate(phase, v, frequency)
+        q, rate = oscillator.dte(phase, x), oscillator.dte_rate(phase, v, frequency)
         return phase, q, rate, oscillator.mesh_force.force(step.first, q), oscillator.support_force(x, v)
 
     def of_cycle(number, x, v):

@@ -34,15 +34,15 @@ class Orbit(Checked):
         mesh_frequency: [Hz].
         periods: number of mesh cycles after which the state repeats.
         phase: where the samples lie [base pitches], from 0 to `periods`, shape (samples,).
-        approach: of the flanks [um], shape (samples,).
-        approach_rate: its velocity [um/s], shape (samples,).
+        dte: dynamic transmission error (DTE) [um], shape (samples,).
+        dte_rate: its velocity [um/s], shape (samples,).
         force: elastic force of the mesh [N], shape (samples,).
         dynamic_factor: largest force over the static one, which is the mean over the cycle at rest where springs carry
             some of the load.
-        approach_rms: root mean square of the approach about its mean [um].
-        approach_mean, approach_min, approach_max: [um].
-        no_contact, coast_contact: share of the time without force, and with force on the coast flanks; they have no
-            derivative.
+        dte_rms: root mean square of the DTE about its mean [um].
+        dte_mean, dte_min, dte_max: [um].
+        contact_loss_share, back_side_contact: share of the time without force, and with force on the coast flanks;
+            they have no derivative.
         monodromy: derivative of the state after the orbit by the state before, of displacements and of velocities
             divided by 2 pi times the mesh frequency, shape (2 coordinates, 2 coordinates).
         residual: largest change of those unknowns over the orbit [um].
@@ -53,16 +53,16 @@ class Orbit(Checked):
     velocity: Coordinates = result("um/s")
     mesh_frequency: Scalar = result("Hz")
     phase: Samples = result()
-    approach: Samples = result("um")
-    approach_rate: Samples = result("um/s")
+    dte: Samples = result("um")
+    dte_rate: Samples = result("um/s")
     force: Samples = result("N")
     dynamic_factor: Scalar = result()
-    approach_rms: Scalar = result("um")
-    approach_mean: Scalar = result("um")
-    approach_min: Scalar = result("um")
-    approach_max: Scalar = result("um")
-    no_contact: Scalar = result()
-    coast_contact: Scalar = result()
+    dte_rms: Scalar = result("um")
+    dte_mean: Scalar = result("um")
+    dte_min: Scalar = result("um")
+    dte_max: Scalar = result("um")
+    contact_loss_share: Scalar = result()
+    back_side_contact: Scalar = result()
     monodromy: Float[Array, "unknowns unknowns"] = result()
     residual: Scalar = result("um")
     converged: Bool[Array, ""] = result()
@@ -245,16 +245,16 @@ def orbit_at(oscillator: Oscillator, z, steps, frequency: Scalar, periods: int) 
         velocity=v,
         mesh_frequency=frequency,
         phase=of.phase,
-        approach=of.approach[0],
-        approach_rate=of.velocity,
+        dte=of.dte[0],
+        dte_rate=of.velocity,
         force=of.force[0],
         dynamic_factor=largest(of.force) / static_force(oscillator),
-        approach_rms=rms(of, of.approach),
-        approach_mean=mean(of, of.approach),
-        approach_min=smallest(of.approach),
-        approach_max=largest(of.approach),
-        no_contact=share(of, of.force == 0),
-        coast_contact=share(of, of.force < 0),
+        dte_rms=rms(of, of.dte),
+        dte_mean=mean(of, of.dte),
+        dte_min=smallest(of.dte),
+        dte_max=largest(of.dte),
+        contact_loss_share=share(of, of.force == 0),
+        back_side_contact=share(of, of.force < 0),
         monodromy=monodromy,
         residual=residual,
         converged=residual <= _tolerance(z, monodromy),

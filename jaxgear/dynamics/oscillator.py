@@ -24,7 +24,7 @@ class Excitation(Checked):
         load: amplitudes of the load relative to its mean, shape (orders,): 1 + sum load_n cos(2 pi n phase + angle_n).
         load_angle: [rad], shape (orders,).
         displacement: amplitudes of a displacement between the gears [um], for instance a cumulated pitch deviation,
-            shape (orders,); it is taken off the approach that the flanks feel.
+            shape (orders,); it is taken off the DTE that the flanks feel.
         displacement_angle: [rad], shape (orders,).
         orders: multiples of the mesh frequency, shape (orders,).
     """
@@ -48,9 +48,9 @@ class Oscillator(Checked):
     Attributes:
         mesh_force: of the mesh.
         mass: [kg], shape (coordinates,).
-        direction: what a unit of every coordinate adds to the approach, shape (coordinates,).
+        direction: what a unit of every coordinate adds to the DTE, shape (coordinates,).
         load: static load on every coordinate [N], shape (coordinates,).
-        mesh_damping: viscous damping of the approach, in contact and out of it [N s/um].
+        mesh_damping: viscous damping of the DTE, in contact and out of it [N s/um].
         stiffness: to ground and between coordinates [N/um], shape (coordinates, coordinates).
         damping: likewise [N s/um].
         excitation: None for none.
@@ -79,8 +79,8 @@ class Oscillator(Checked):
         """Derivative of the state where the place of the mesh force is known already."""
         x, v = y
         error, error_rate, extra = self._excited(phase, mesh_frequency)
-        approach, speed = self._along(x) - error, self._along(v) - error_rate
-        inner = self.mesh_force.force(place, approach) + self.mesh_damping * speed
+        dte, speed = self._along(x) - error, self._along(v) - error_rate
+        inner = self.mesh_force.force(place, dte) + self.mesh_damping * speed
         total = self.load * (1 + extra) - self.direction * inner - self.support_force(x, v)
         return v, self.newton * total / self.mass
 
@@ -98,12 +98,12 @@ class Oscillator(Checked):
         """Whether the contacts that its mesh force was made of have been found; a force in closed form has none."""
         return jnp.asarray(getattr(self.mesh_force, "converged", True))
 
-    def approach(self, phase: Scalar, x: Coordinates) -> Scalar:
-        """Approach of the flanks [um]."""
+    def dte(self, phase: Scalar, x: Coordinates) -> Scalar:
+        """Dynamic transmission error of the flanks (DTE) [um]."""
         return self._along(x) - self._excited(phase, jnp.zeros_like(phase))[0]
 
-    def approach_rate(self, phase: Scalar, v: Coordinates, mesh_frequency: Scalar) -> Scalar:
-        """Velocity of the approach [um/s]."""
+    def dte_rate(self, phase: Scalar, v: Coordinates, mesh_frequency: Scalar) -> Scalar:
+        """Velocity of the DTE [um/s]."""
         return self._along(v) - self._excited(phase, mesh_frequency)[1]
 
     def _along(self, x: Coordinates) -> Scalar:

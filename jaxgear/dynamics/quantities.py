@@ -26,7 +26,7 @@ class Kind(NamedTuple):
 
     Attributes:
         field: of `SpeedResponse`.
-        at_speed: at the speed of the operation; otherwise at all speeds of the settings.
+        at_speed: at the speed of the operating point; otherwise at all speeds of the settings.
         unit: "" for a pure number.
         meaning: in a few words.
     """
@@ -39,9 +39,9 @@ class Kind(NamedTuple):
 
 _FIELDS = (
     ("dynamic_factor", "", "largest mesh force over the static one"),
-    ("approach_rms", "um", "rms of the approach of the flanks about its mean"),
-    ("no_contact", "", "share of the time without contact, which has no derivative"),
-    ("coast_contact", "", "share of the time on the coast flanks, which has no derivative"),
+    ("dte_rms", "um", "rms of the dynamic transmission error about its mean"),
+    ("contact_loss_share", "", "share of the time without contact, which has no derivative"),
+    ("back_side_contact", "", "share of the time on the coast flanks, which has no derivative"),
 )
 DYNAMIC_QUANTITIES: Mapping[str, Kind] = {
     **{name: Kind(name, True, unit, f"{meaning}, at the speed of the pinion") for name, unit, meaning in _FIELDS},
@@ -60,11 +60,11 @@ def _numbers_of(given: WithSettings, cycle: MeshCycle) -> Numbers:
 
 def _swept(given: WithSettings, cycle: MeshCycle, kind: Kind) -> tuple[SteadyNumbers, Bool[Array, ""]]:
     settings = given.settings
-    mesh, operation = cycle.mesh_for(given.name), cycle.operation
+    mesh, operating_point = cycle.mesh_for(given.name), cycle.operating_point
     if kind.at_speed:
-        if operation.speed is None:
-            raise ValueError(f"{given.name}: needs a speed, solve with Operation(torque, speed)")
-        frequency = mesh_frequency(cycle.kinematics.pair.pinion.teeth, operation.speed)
+        if operating_point.speed is None:
+            raise ValueError(f"{given.name}: needs a speed, solve with OperatingPoint(torque, speed)")
+        frequency = mesh_frequency(cycle.kinematics.pair.pinion.teeth, operating_point.speed)
         settings = dataclasses.replace(settings, mesh_frequencies=frequency[None])
     oscillator = settings.oscillator_of(cycle, mesh)
     return settings.numbers(oscillator), oscillator.converged

@@ -23,7 +23,7 @@ class Found(NamedTuple):
 
     numbers: Numbers
     period: Int[Array, ""]
-    approach: Float[Array, " points"]
+    dte: Float[Array, " points"]
     velocity: Float[Array, " points"]
     state: State
 
@@ -45,33 +45,33 @@ def steady_state(
     y, period = settled(oscillator, y, speed, limits.tolerance, limits.most_cycles, sizes.most_periods)
     orders = jnp.asarray(sizes.orders, frequency.dtype)
     zero = jnp.zeros((), frequency.dtype)
-    origin = oscillator.approach(zero, y[0])
+    origin = oscillator.dte(zero, y[0])
     cycles = jnp.where(period > 0, period, sizes.points)
 
     def on(carry):
         return carry[0] < cycles
 
     def recorded(carry):
-        cycle, y, sums, approaches, velocities = carry
-        q, v = oscillator.approach(zero, y[0]), oscillator.approach_rate(zero, y[1], frequency)
+        cycle, y, sums, dtes, velocities = carry
+        q, v = oscillator.dte(zero, y[0]), oscillator.dte_rate(zero, y[1], frequency)
         # an orbit's points repeat, so that there are as many for every speed
         here = jnp.arange(sizes.points) % cycles == cycle
-        approaches, velocities = jnp.where(here, q, approaches), jnp.where(here, v, velocities)
+        dtes, velocities = jnp.where(here, q, dtes), jnp.where(here, v, velocities)
 
         def more(carry, step, nodes):
             y, sums = carry
             return with_step(sums, oscillator, y, step, frequency, waves=waves[nodes], origin=origin)
 
         nothing = no_sums(orders)
-        begin = sums._replace(force=nothing.force, approach=nothing.approach)
+        begin = sums._replace(force=nothing.force, dte=nothing.dte)
         y, of_cycle = speed.over_cycle(more, (y, begin))
         sums = with_cycle(sums, of_cycle, cycle, orders)
-        return cycle + 1, y, sums, approaches, velocities
+        return cycle + 1, y, sums, dtes, velocities
 
     nothing = jnp.zeros(sizes.points, frequency.dtype)
     begin = jnp.zeros_like(cycles), y, no_sums(orders), nothing, nothing
-    _, y, sums, approaches, velocities = jax.lax.while_loop(on, recorded, begin)
+    _, y, sums, dtes, velocities = jax.lax.while_loop(on, recorded, begin)
     count = cycles.astype(frequency.dtype)
     numbers = numbers_of(sums, frequency, cycles=count, orders=orders, origin=origin, static_force=static)
     period = jnp.where(numbers.dynamic_factor > _BALANCED, period, 0)
-    return Found(numbers, period, approaches, velocities, y)
+    return Found(numbers, period, dtes, velocities, y)

@@ -25,16 +25,16 @@ class SpeedResponse(Checked):
     Attributes:
         mesh_frequency: [Hz], increasing, shape (speeds,).
         dynamic_factor: largest elastic mesh force of the orbit over the static force (K_v), shape (speeds,).
-        approach_rms: rms of the approach about its mean [um], shape (speeds,).
-        approach_mean, approach_min, approach_max: [um], shape (speeds,).
+        dte_rms: rms of the dynamic transmission error (DTE) about its mean [um], shape (speeds,).
+        dte_mean, dte_min, dte_max: [um], shape (speeds,).
         force_harmonics: amplitudes of the elastic mesh force at the orders [N], shape (speeds, orders); 0 at orders
             that the orbit cannot have.
-        velocity_harmonics: amplitudes of the rate of the approach [um/s], shape (speeds, orders).
-        no_contact: share of the time without contact, shape (speeds,).
-        coast_contact: share of the time with contact of the coast flanks, shape (speeds,).
+        velocity_harmonics: amplitudes of the rate of the DTE [um/s], shape (speeds, orders).
+        contact_loss_share: share of the time without contact, shape (speeds,).
+        back_side_contact: share of the time with contact of the coast flanks, shape (speeds,).
         period: mesh cycles after which the orbit repeats, 0 where it does not within the largest number tried, shape
             (speeds,).
-        poincare_approach, poincare_velocity: approach [um] and its rate [um/s] at mesh position 0 of successive cycles,
+        poincare_dte, poincare_velocity: DTE [um] and its rate [um/s] at mesh position 0 of successive cycles,
             shape (speeds, points); they repeat where the orbit does.
         settled: whether a steady state was reached, of a mesh force whose contacts were found, shape (speeds,); where
             it is not, the numbers are of a motion that is aperiodic, or still on its way, or of no such force.
@@ -45,16 +45,16 @@ class SpeedResponse(Checked):
 
     mesh_frequency: Float[Array, "*batch speeds"] = result("Hz")
     dynamic_factor: Float[Array, "*batch speeds"] = result()
-    approach_rms: Float[Array, "*batch speeds"] = result("um")
-    approach_mean: Float[Array, "*batch speeds"] = result("um")
-    approach_min: Float[Array, "*batch speeds"] = result("um")
-    approach_max: Float[Array, "*batch speeds"] = result("um")
+    dte_rms: Float[Array, "*batch speeds"] = result("um")
+    dte_mean: Float[Array, "*batch speeds"] = result("um")
+    dte_min: Float[Array, "*batch speeds"] = result("um")
+    dte_max: Float[Array, "*batch speeds"] = result("um")
     force_harmonics: Float[Array, "*batch speeds orders"] = result("N")
     velocity_harmonics: Float[Array, "*batch speeds orders"] = result("um/s")
-    no_contact: Float[Array, "*batch speeds"] = result()
-    coast_contact: Float[Array, "*batch speeds"] = result()
+    contact_loss_share: Float[Array, "*batch speeds"] = result()
+    back_side_contact: Float[Array, "*batch speeds"] = result()
     period: Int[Array, "*batch speeds"] = result()
-    poincare_approach: Float[Array, "*batch speeds points"] = result("um")
+    poincare_dte: Float[Array, "*batch speeds points"] = result("um")
     poincare_velocity: Float[Array, "*batch speeds points"] = result("um/s")
     settled: Bool[Array, "*batch speeds"] = result()
     state: tuple[Float[Array, "*batch speeds coordinates"], Float[Array, "*batch speeds coordinates"]] = result()
@@ -72,10 +72,10 @@ class Sums(NamedTuple):
 
     Attributes:
         peak: largest elastic mesh force [N].
-        lowest, highest: of the approach [um].
-        mean, square: integrals of the approach from where it began, and of its square [um, um^2].
+        lowest, highest: of the DTE [um].
+        mean, square: integrals of the DTE from where it began, and of its square [um, um^2].
         apart, coast: time without contact and with coast flanks [cycles].
-        force, approach: complex Fourier integrals, shape (orders,).
+        force, dte: complex Fourier integrals, shape (orders,).
     """
 
     peak: Scalar
@@ -86,7 +86,7 @@ class Sums(NamedTuple):
     apart: Scalar
     coast: Scalar
     force: Array
-    approach: Array
+    dte: Array
 
 
 def no_sums(orders: Float[Array, " orders"]) -> Sums:
@@ -121,31 +121,31 @@ def with_step(
         step: one.
         mesh_frequency: [Hz].
         waves: as `waves_of` gives them at the begin, in the middle and at the end of the step.
-        origin: approach from which mean and square are taken [um].
+        origin: DTE from which mean and square are taken [um].
     """
     end = one_step(oscillator, y, step, mesh_frequency)
     begin = jax.tree.map(lambda part: part[None, None], y)
     of = history(oscillator, begin, end, jax.tree.map(lambda part: part[None], step), mesh_frequency)
-    off = of.approach - origin
+    off = of.dte - origin
 
     def integral(values):
         return step.length * mean(of, values)
 
     # a product of matrices, so that no compiler works the force out once more for every order
     weights = step.length * jnp.asarray(SIMPSON, off.dtype)
-    spectra = (weights[None] * jnp.stack([of.force[:, 0], of.approach[:, 0]])) @ waves
-    force, approach = jax.lax.complex(*jnp.split(spectra, 2, axis=1))
+    spectra = (weights[None] * jnp.stack([of.force[:, 0], of.dte[:, 0]])) @ waves
+    force, dte = jax.lax.complex(*jnp.split(spectra, 2, axis=1))
 
     return end, Sums(
         jnp.maximum(sums.peak, largest(of.force)),
-        jnp.minimum(sums.lowest, smallest(of.approach)),
-        jnp.maximum(sums.highest, largest(of.approach)),
+        jnp.minimum(sums.lowest, smallest(of.dte)),
+        jnp.maximum(sums.highest, largest(of.dte)),
         sums.mean + integral(off),
         sums.square + integral(off**2),
         sums.apart + step.length * share(of, of.force == 0),
         sums.coast + step.length * share(of, of.force < 0),
         sums.force + force,
-        sums.approach + approach,
+        sums.dte + dte,
     )
 
 
@@ -160,22 +160,22 @@ def with_cycle(before: Sums, of_cycle: Sums, cycle: Int[Array, ""], orders: Floa
     """
     angle = 2 * jnp.pi * orders * cycle.astype(orders.dtype)
     turn = jax.lax.complex(jnp.cos(angle), -jnp.sin(angle))
-    force, approach = before.force + turn * of_cycle.force, before.approach + turn * of_cycle.approach
-    return of_cycle._replace(force=force, approach=approach)
+    force, dte = before.force + turn * of_cycle.force, before.dte + turn * of_cycle.dte
+    return of_cycle._replace(force=force, dte=dte)
 
 
 class Numbers(NamedTuple):
     """What the sums of a whole orbit amount to; names and units of `SpeedResponse`."""
 
     dynamic_factor: Scalar
-    approach_rms: Scalar
-    approach_mean: Scalar
-    approach_min: Scalar
-    approach_max: Scalar
+    dte_rms: Scalar
+    dte_mean: Scalar
+    dte_min: Scalar
+    dte_max: Scalar
     force_harmonics: Float[Array, " orders"]
     velocity_harmonics: Float[Array, " orders"]
-    no_contact: Scalar
-    coast_contact: Scalar
+    contact_loss_share: Scalar
+    back_side_contact: Scalar
 
 
 def numbers_of(
@@ -211,7 +211,7 @@ def numbers_of(
         sums.lowest,
         sums.highest,
         amplitudes(sums.force),
-        amplitudes(sums.approach) * 2 * jnp.pi * orders * mesh_frequency,
+        amplitudes(sums.dte) * 2 * jnp.pi * orders * mesh_frequency,
         sums.apart / cycles,
         sums.coast / cycles,
     )

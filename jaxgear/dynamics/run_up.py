@@ -28,15 +28,15 @@ class RunUp(Checked):
         time: at the end of every stretch [s], shape (samples,).
         mesh_frequency: there [Hz], shape (samples,).
         dynamic_factor: largest elastic mesh force of the stretch over the static force, shape (samples,).
-        approach_min, approach_max: of the stretch [um], shape (samples,).
+        dte_min, dte_max: of the stretch [um], shape (samples,).
         state: coordinates [um] and velocities [um/s] at the end of every stretch, each of shape (samples, coordinates).
     """
 
     time: Samples = result("s")
     mesh_frequency: Samples = result("Hz")
     dynamic_factor: Samples = result()
-    approach_min: Samples = result("um")
-    approach_max: Samples = result("um")
+    dte_min: Samples = result("um")
+    dte_max: Samples = result("um")
     state: tuple[Float[Array, "samples coordinates"], Float[Array, "samples coordinates"]] = result()
 
 
@@ -133,8 +133,8 @@ def _run(
             end,
             moving.time + step.length / frequency,
             jnp.maximum(moving.peak, largest(of.force)),
-            jnp.minimum(moving.lowest, smallest(of.approach)),
-            jnp.maximum(moving.highest, largest(of.approach)),
+            jnp.minimum(moving.lowest, smallest(of.dte)),
+            jnp.maximum(moving.highest, largest(of.dte)),
         )
 
     def stretch(carry, _):
@@ -152,7 +152,7 @@ def _run(
         time=found.time,
         mesh_frequency=frequency_at(position.astype(ends.dtype)),
         dynamic_factor=found.peak / static_force(oscillator),
-        approach_min=found.lowest,
-        approach_max=found.highest,
+        dte_min=found.lowest,
+        dte_max=found.highest,
         state=found.y,
     )

@@ -47,8 +47,8 @@ class Dynamics(Checked):
 
     Attributes:
         mesh_frequencies: [Hz], increasing, shape (speeds,).
-        damping_ratio: of the approach, to the critical damping at the mean stiffness; 0.05 without it or `damping`.
-        damping: viscous damping of the approach, in place of the ratio.
+        damping_ratio: of the DTE, to the critical damping at the mean stiffness; 0.05 without it or `damping`.
+        damping: viscous damping of the DTE, in place of the ratio.
         pinion_inertia: polar moment of inertia of the pinion and what turns with it; that of the body without it.
         wheel_inertia: the same of the wheel.
         compliance: of what lies between the teeth and the inertias, in series with the mesh.
@@ -111,7 +111,7 @@ class Dynamics(Checked):
         pinion: AbstractModification | None = None,
         wheel: AbstractModification | None = None,
     ) -> Oscillator:
-        """What vibrates: the approach of the flanks, and on bearings the centres of both gears.
+        """What vibrates: the dynamic transmission error, and on bearings the centres of both gears.
 
         Args:
             mesh: prepared mesh.
@@ -231,10 +231,10 @@ class Dynamics(Checked):
         """A dynamic quantity for objectives, constraints, sweeps and Pareto fronts, with these settings.
 
         Args:
-            name: "dynamic_factor", "approach_rms", "no_contact" or "coast_contact" at the speed of the operation, the
-                worse of the motions from rest and from a kick; with "worst_" before it, the worst of all runs and
-                speeds. The first two are differentiable where the steady state is an orbit of up to four mesh cycles;
-                elsewhere their derivative is zero.
+            name: "dynamic_factor", "dte_rms", "contact_loss_share" or "back_side_contact" at the speed of the
+                operating point, the worse of the motions from rest and from a kick; with "worst_" before it, the worst
+                of all runs and speeds. The first two are differentiable where the steady state is an orbit of up to
+                four mesh cycles; elsewhere their derivative is zero.
 
         Raises:
             ValueError: for another name.

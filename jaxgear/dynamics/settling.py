@@ -104,11 +104,11 @@ def _state(scaled: Unknowns, scale: Unknowns) -> State:
 
 
 def _seen(oscillator: Oscillator, past: Float[Array, "states unknowns"]) -> Array:
-    """What repeats, all in um: of coordinates that nothing holds only the approach does."""
+    """What repeats, all in um: of coordinates that nothing holds only the DTE does."""
     zero = jnp.zeros((), past.dtype)
     x, v = jnp.split(past, 2, axis=1)
-    approach = jax.vmap(lambda x: oscillator.approach(zero, x))(x)
-    seen = jnp.stack([approach, v @ oscillator.direction], axis=1)
+    dte = jax.vmap(lambda x: oscillator.dte(zero, x))(x)
+    seen = jnp.stack([dte, v @ oscillator.direction], axis=1)
     return seen if oscillator.stiffness is None else jnp.concatenate([seen, past], axis=1)
 
 

@@ -24,7 +24,7 @@ Speeds = Float[Array, " speeds"]
 
 ORDERS = tuple(half / 2 for half in range(1, 13))
 
-# Steps over a period of the approach's natural frequency and of the highest one, which no more than has to be stable,
+# Steps over a period of the DTE's natural frequency and of the highest one, which no more than has to be stable,
 # and over a cycle: dynamic factor and rms are then within 0.1 % of those of many more.
 _STEPS_PER_PERIOD, _STEPS_PER_HIGHEST_PERIOD, _FEWEST_STEPS = 40, 8, 64
 # With fewer steps over a period of the highest frequency the method of order four diverges: 2 pi over its limit, 2.83
@@ -277,7 +277,7 @@ def swept(
         mesh_frequency=frequencies,
         **found.numbers._asdict(),
         period=found.period,
-        poincare_approach=found.approach,
+        poincare_dte=found.dte,
         poincare_velocity=found.velocity,
         # a map of contacts that were not found is no force
         settled=(found.period > 0) & oscillator.converged,

@@ -7,12 +7,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import number, program, pseudo_inverse, safe_divide
-from .force import AbstractMeshForce, approach_under
+from .force import AbstractMeshForce, te_under
 from .oscillator import Coordinates, Oscillator
 
 Scalar = Float[Array, ""]
 
-# Share of the approach that no spring holds, by mass, above which it is free: rounding of single precision is less.
+# Share of the DTE that no spring holds, by mass, above which it is free: rounding of single precision is less.
 _FREE = 1e-5
 # Stiffness against a motion over the largest one, in rounding errors per coordinate, that is more than rounding.
 _SINGULAR = 10.0
@@ -35,30 +35,30 @@ class Rest(NamedTuple):
 def at_rest(oscillator: Oscillator, phase: Scalar) -> Rest:
     """Equilibrium under the mean load at a mesh position [base pitches].
 
-    Loads that do not balance accelerate the whole; the rest is then that of the approach. Where springs hold every
-    motion that changes the approach, they and the mesh share the load, else the mesh carries what the load demands.
+    Loads that do not balance accelerate the whole; the rest is then that of the DTE. Where springs hold every
+    motion that changes the DTE, they and the mesh share the load, else the mesh carries what the load demands.
     """
     mesh_force, root_mass = oscillator.mesh_force, jnp.sqrt(oscillator.mass)
     along, load = oscillator.direction / root_mass, oscillator.load / root_mass
-    error = -oscillator.approach(phase, jnp.zeros_like(load))
+    error = -oscillator.dte(phase, jnp.zeros_like(load))
     if oscillator.stiffness is None:
         free, held = along, jnp.zeros_like(load)
-        approach = mesh_force.static_approach(phase, along @ load / (along @ along))
-        force, slope = _with_slope(mesh_force, phase, approach)
+        dte = mesh_force.static_te(phase, along @ load / (along @ along))
+        force, slope = _with_slope(mesh_force, phase, dte)
     else:
         ground = oscillator.stiffness / (root_mass[:, None] * root_mass[None])
         yields = pseudo_inverse((ground + ground.T) / 2, _SINGULAR * len(ground) * float(jnp.finfo(ground.dtype).eps))
         free = along - ground @ (yields @ along)
         is_free = free @ along > _FREE * (along @ along)
         free = jnp.where(is_free, free, 0.0)
-        # the springs as one beside the mesh, without load at the approach that they alone would take
+        # the springs as one beside the mesh, without load at the DTE that they alone would take
         spring = jnp.where(is_free, 0.0, safe_divide(1.0, along @ yields @ along))
         alone = along @ yields @ load - error
         wanted = jnp.where(is_free, safe_divide(free @ load, free @ along), spring * alone)
-        approach = approach_under(_BesideSpring(mesh_force, spring), mesh_force.at(phase), wanted)
-        force, slope = _with_slope(mesh_force, phase, approach)
+        dte = te_under(_BesideSpring(mesh_force, spring), mesh_force.at(phase), wanted)
+        force, slope = _with_slope(mesh_force, phase, dte)
         held = yields @ (load - along * force)
-    moved = free * safe_divide(approach + error - along @ held, free @ along)
+    moved = free * safe_divide(dte + error - along @ held, free @ along)
     return Rest((held + moved) / root_mass, force, slope)
 
 
@@ -74,7 +74,7 @@ def static_force(oscillator: Oscillator) -> Scalar:
 
 
 class _BesideSpring(AbstractMeshForce):
-    """A mesh and a spring [N/um] that the same approach deflects."""
+    """A mesh and a spring [N/um] that the same DTE deflects."""
 
     mesh: AbstractMeshForce
     spring: Scalar = number("N/um")
@@ -82,20 +82,20 @@ class _BesideSpring(AbstractMeshForce):
     def at(self, phase: Scalar) -> Any:
         return self.mesh.at(phase)
 
-    def force(self, place: Any, approach: Scalar) -> Scalar:
-        return self.mesh.force(place, approach) + self.spring * approach
+    def force(self, place: Any, dte: Scalar) -> Scalar:
+        return self.mesh.force(place, dte) + self.spring * dte
 
 
-def _with_slope(mesh_force: AbstractMeshForce, phase: Scalar, approach: Scalar) -> tuple[Scalar, Scalar]:
+def _with_slope(mesh_force: AbstractMeshForce, phase: Scalar, dte: Scalar) -> tuple[Scalar, Scalar]:
     place = mesh_force.at(phase)
-    return jax.jvp(lambda q: mesh_force.force(place, q), (approach,), (jnp.ones_like(approach),))
+    return jax.jvp(lambda q: mesh_force.force(place, q), (dte,), (jnp.ones_like(dte),))
 
 
 class Natural(NamedTuple):
     """Natural frequencies [Hz] with the mean stiffness of the mesh.
 
     Attributes:
-        mesh: of the approach alone, all coordinates free.
+        mesh: of the DTE alone, all coordinates free.
         highest: of all coordinates.
     """
 

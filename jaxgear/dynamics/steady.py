@@ -31,9 +31,9 @@ class SteadyNumbers(NamedTuple):
     """
 
     dynamic_factor: Numbers
-    approach_rms: Numbers
-    no_contact: Numbers
-    coast_contact: Numbers
+    dte_rms: Numbers
+    contact_loss_share: Numbers
+    back_side_contact: Numbers
     exact: Bool[Array, "responses speeds"]
 
 
@@ -72,13 +72,13 @@ def _settled_on(of: SpeedResponse):
 
 def _recorded(of: SpeedResponse) -> SteadyNumbers:
     """The numbers of a response, without derivatives."""
-    found = of.dynamic_factor, of.approach_rms, of.no_contact, of.coast_contact, jnp.zeros_like(of.settled)
+    found = of.dynamic_factor, of.dte_rms, of.contact_loss_share, of.back_side_contact, jnp.zeros_like(of.settled)
     return jax.lax.stop_gradient(SteadyNumbers(*found))
 
 
 def _of_orbit(oscillator, frequency, start, periods: int, steps: int, recorded: SteadyNumbers) -> SteadyNumbers:
     orbit, same = _orbit_of(oscillator, frequency, start, periods, steps, recorded)
-    exact = recorded._replace(dynamic_factor=orbit.dynamic_factor, approach_rms=orbit.approach_rms, exact=same)
+    exact = recorded._replace(dynamic_factor=orbit.dynamic_factor, dte_rms=orbit.dte_rms, exact=same)
     return jax.tree.map(lambda there, otherwise: jnp.where(same, there, otherwise), exact, recorded)
 
 
@@ -87,9 +87,9 @@ def _orbit_of(
 ) -> tuple[Orbit, Bool[Array, ""]]:
     """The orbit through a state that the motion has settled on, and whether it is that of the motion."""
     orbit = find_orbit(oscillator, frequency, start, periods=periods, steps=steps)
-    scale = recorded.approach_rms + jnp.finfo(orbit.approach_rms.dtype).eps ** 0.5 * jnp.abs(orbit.approach_mean)
+    scale = recorded.dte_rms + jnp.finfo(orbit.dte_rms.dtype).eps ** 0.5 * jnp.abs(orbit.dte_mean)
     same = jnp.abs(orbit.dynamic_factor - recorded.dynamic_factor) <= _SAME * recorded.dynamic_factor
-    return orbit, same & (jnp.abs(orbit.approach_rms - recorded.approach_rms) <= _SAME * scale) & orbit.converged
+    return orbit, same & (jnp.abs(orbit.dte_rms - recorded.dte_rms) <= _SAME * scale) & orbit.converged
 
 
 class SteadyForce(NamedTuple):
@@ -99,14 +99,14 @@ class SteadyForce(NamedTuple):
         force: elastic force at mesh positions of successive cycles [N], shape (cycles, positions), negative on the
             coast flanks; as many cycles as any orbit that is looked for repeats in.
         dynamic_factor: largest force at any time over the static one.
-        coast_contact: whether the coast flanks touch at any time.
+        back_side_contact: whether the coast flanks touch at any time.
         found: whether the motion has settled on an orbit, of a mesh force whose contacts were found; forces are the
             static one otherwise.
     """
 
     force: Float[Array, "cycles positions"]
     dynamic_factor: Scalar
-    coast_contact: Bool[Array, ""]
+    back_side_contact: Bool[Array, ""]
     found: Bool[Array, ""]
 
 
@@ -131,7 +131,7 @@ def steady_force(
             orbit, same = _orbit_of(oscillator, frequency, start, periods, steps, recorded)
             force = jnp.tile(_at_positions(oscillator, orbit, phase), (most // periods, 1))
             same &= oscillator.converged
-            return SteadyForce(jnp.where(same, force, even), orbit.dynamic_factor, orbit.coast_contact > 0, same)
+            return SteadyForce(jnp.where(same, force, even), orbit.dynamic_factor, orbit.back_side_contact > 0, same)
 
         return found
 
@@ -143,16 +143,16 @@ def steady_force(
 
 
 def _at_positions(oscillator: Oscillator, orbit: Orbit, phase: Positions) -> Float[Array, "cycles positions"]:
-    """Force of an orbit of even steps at mesh positions, by the cubics through its approach and the rate of that."""
+    """Force of an orbit of even steps at mesh positions, by the cubics through its DTE and the rate of that."""
     count = len(orbit.phase)
     steps = count // orbit.periods
     place = ((phase - jnp.floor(phase))[None] + jnp.arange(orbit.periods, dtype=phase.dtype)[:, None]) * steps
     left = jnp.floor(place)
     share, first = place - left, left.astype(jnp.int32) % count
     last, step = (first + 1) % count, 1 / (steps * orbit.mesh_frequency)
-    rise = step * orbit.approach_rate
-    change = orbit.approach[last] - orbit.approach[first]
+    rise = step * orbit.dte_rate
+    change = orbit.dte[last] - orbit.dte[first]
     bend = (1 - share) * (rise[first] - change) - share * (rise[last] - change)
-    approach = orbit.approach[first] + share * (change + (1 - share) * bend)
+    dte = orbit.dte[first] + share * (change + (1 - share) * bend)
     at = jax.vmap(oscillator.mesh_force)
-    return jax.vmap(lambda cycle: at(phase, cycle))(approach)
+    return jax.vmap(lambda cycle: at(phase, cycle))(dte)

@@ -66,7 +66,7 @@ def torsional(
     mean_stiffness=None,
     excitation: Excitation | None = None,
 ) -> Oscillator:
-    """The relative rotation of two gears on the line of action, one coordinate: the approach q [um].
+    """The relative rotation of two gears on the line of action, one coordinate: the DTE q [um].
 
     m q'' + c q' + F(phase, q) = T_1 / r_b1
 
@@ -79,7 +79,7 @@ def torsional(
         inertias: of pinion and wheel [kg m2]; None for `inertia_of` the gears.
         mean_stiffness: k of the damping ratio [N/um]; None for the `mean_tangent_stiffness` of the mesh force under the
             static load.
-        excitation: None for none. Its displacement is taken off the approach.
+        excitation: None for none. Its displacement is taken off the DTE.
 
     Raises:
         ValueError: in one line for both or neither of damping and damping_ratio, or a number outside its range.
@@ -140,7 +140,7 @@ def on_bearings(
     """Two gears whose centres move on flexible bearings: five coordinates [um].
 
     In order: the relative rotation u = r_b1 theta_1 - r_b2 theta_2; the centre of the pinion along the line of action,
-    in the direction in which it pushes the wheel, and across; the centre of the wheel likewise. The approach is
+    in the direction in which it pushes the wheel, and across; the centre of the wheel likewise. The DTE is
     q = u + along_1 - along_2; the bearings carry the mesh force, so that at rest the pinion gives way by -F / k_1 and
     the wheel by F / k_2.
 
@@ -204,7 +204,7 @@ def _force(owner: str, pair: GearPair, torque) -> Scalar:
 
 
 def _damping(owner: str, mesh_force, mass, force, ratio, damping, stiffness) -> Scalar:
-    """Viscous damping of the approach [N s/um]."""
+    """Viscous damping of the DTE [N s/um]."""
     if (ratio is None) == (damping is None):
         raise ValueError(f"{owner}: give either damping_ratio or damping [N s/um]")
     if ratio is None:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..compliance import AbstractCompliance
-from ..contact import Mesh, Operation, Resolution, begin_contact, fewest_pairs, prepare
+from ..contact import Mesh, OperatingPoint, Resolution, begin_contact, fewest_pairs, prepare
 from ..geometry import GearPair
 from ..metrics import Lubricant, Strength
 from ..metrics.plausibility import LIMITS
@@ -192,7 +192,7 @@ class DesignFile:
             return self.mesh(resolution)
         return FileMesh(self._pair, self._model, self._misalignment, resolution)
 
-    def operation(self, parameters: Mapping[str, Any]) -> Operation:
+    def operating_point(self, parameters: Mapping[str, Any]) -> OperatingPoint:
         """Torque, speed and friction; pure and traceable.
 
         Args:
@@ -227,14 +227,14 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
     flanks = [*pinion_flank, *wheel_flank]
     pair, quality = pair_of(top, pinion, wheel), quality_of(pinion_says, wheel_says)
     load = sections.load_of(top.load)
-    operation = template.part_of("load", load, Operation)
+    operating_point = template.part_of("load", load, OperatingPoint)
     stiffness = decode("model", top.model or {}, schema.ModelSection)
     model = model_part(stiffness)
     optimize = sections.optimize_of(top, stiffness)
     axes = template.part_of(
         "misalignment", decode("misalignment", top.misalignment or {}, schema.MisalignmentSection), Misalignment
     )
-    open_case = [*pair.free(), *model.free(), *axes.free(), *operation.free()]
+    open_case = [*pair.free(), *model.free(), *axes.free(), *operating_point.free()]
     open_flanks = [free for part in flanks for free in part.free()]
     both = {"pinion": pinion_says, "wheel": wheel_says}
     empty = [f"{name}.modification" for name, says_of in both.items() if says_of.given().get("modification") == []]
@@ -249,7 +249,7 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
     uneven = [key for key, both in built.items() if any(one.varies_along_face for one in both)]
     if axes.key not in uneven:  # zeros are parallel axes
         axes = replace(axes, fields={})
-    usual = operation.build(middle)
+    usual = operating_point.build(middle)
     torque = float(usual.torque)
     tolerance, sweep = sections.tolerance_of(top, quality), sections.sweep_of(top)
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
@@ -292,6 +292,6 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
         _compliance=model.build(middle),
         _misalignment=axes,
         _support=RigidSupport(usual_pair, axes.build(middle)) if axes.fields else None,
-        _load=operation,
+        _load=operating_point,
         _resolution=resolution,
     )

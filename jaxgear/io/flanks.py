@@ -29,7 +29,7 @@ _AMOUNTS = {MEASURED: -1.0, _REMOVED: 1.0, _WORN: 1.0, _DESIGN: -1.0}
 _ALONG, _ACROSS, _GEAR, _LIFE = "roll_length_mm", "face_coordinate_mm", "gear", "revolutions"
 _SAME_LIFE = 1e-5  # relative: lives are asked for as they are printed, with six digits
 
-Method = Literal["linear", "cubic2", "monotonic"]
+Method = Literal["linear", "natural_cubic", "monotonic"]
 
 
 def read_flank(

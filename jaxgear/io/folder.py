@@ -40,7 +40,7 @@ RESULT_FILES = frozenset(
         "face_load_over_torque.png",
         "responses.csv",
         "dynamic_factor.png",
-        "approach_rms.png",
+        "dte_rms.png",
         "waterfall.png",
         "order_tracks.png",
         "run_up.csv",

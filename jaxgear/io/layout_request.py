@@ -8,7 +8,7 @@ from ..conditions import LoadSpectrum
 from ..layout import (
     Endurance,
     FlankLineTolerance,
-    WoehlerLine,
+    SNCurve,
     flank_line_tolerance,
     helix_slope_limits,
     without_housing,
@@ -73,7 +73,7 @@ def layout_request(design: DesignFile, *, quick: bool = False) -> LayoutRequest:
             "gear": section.gear,
             "further": further,
             "share": section.edge_share,
-            "hollow": section.hollow,
+            "negative_crowning": section.negative_crowning,
             "stations": min(section.stations, _QUICK_STATIONS) if quick else section.stations,
             **_life(section),
         }
@@ -144,9 +144,9 @@ def _life(section: LayoutSection) -> dict:
     return {"duty_cycle": load, "endurance": Endurance(*lines)}
 
 
-def _woehler(name: str, table) -> WoehlerLine:
+def _woehler(name: str, table) -> SNCurve:
     key = f"layout.{name}"
-    return part_of(key, decode(key, table, WoehlerSection), WoehlerLine).build({})
+    return part_of(key, decode(key, table, WoehlerSection), SNCurve).build({})
 
 
 def _profile(layout: LayoutSection, quick: bool) -> ProfileSection | None:

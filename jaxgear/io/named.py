@@ -63,7 +63,7 @@ def _missing(design: DesignFile, stands: WithoutSettings) -> str:
         return f"{stands.table}.{stands.needs}" if unset else ""
     if stands.otherwise is None:
         return f"the table [{stands.table}]"
-    for name in stands.operation:
+    for name in stands.operating_point:
         if getattr(design, name) is None:
             return f"load.{name}" + (f" or the table [{stands.table}]" if name != "speed" else "")
     return ""

@@ -53,5 +53,5 @@ def options_of(section: schema_optimize.OptimizeSection, name: str, *, of_the_fi
         why = f' with method "{name}"'
         refuse_given("optimize", section, [key for key in ("starts", "steps") if key not in taken], why)
         if "seed" not in taken and section.manufactured is None:
-            refuse_given("optimize", section, ["seed"], f"{why} and perfect gears")
+            refuse_given("optimize", section, ["seed"], f"{why} and nominal gears")
     return options | {key: value for key, value in shared.items() if key in taken and value is not None}

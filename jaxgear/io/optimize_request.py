@@ -30,7 +30,7 @@ from .optimize_method import CURVE, PARETO, check_method, check_options, made_by
 from .ranges import outside
 from .toml import decode
 
-_DEFAULT_METHOD = "minimax"
+_DEFAULT_METHOD = "slp"
 _FRONT = ("ppte", "max_contact_pressure")  # of a Pareto front where the file names no objectives
 _MEASURES: Mapping[str, Callable[..., AbstractMeasure]] = {
     "mean": Mean,
@@ -41,7 +41,7 @@ _MEASURES: Mapping[str, Callable[..., AbstractMeasure]] = {
 _WITH_LEVEL = ("quantile", "cvar")
 # Options of a quick look.
 _QUICK: Mapping[str, dict[str, Any]] = {
-    "minimax": {"starts": 4, "rounds": 1, "steps": 10},
+    "slp": {"starts": 4, "rounds": 1, "steps": 10},
     "adam": {"starts": 4, "steps": 40},
     "lbfgs": {"starts": 4, "steps": 30},
     "genetic": {"population": 20, "generations": 10},

@@ -12,10 +12,10 @@ import numpy as np
 
 from .. import shafts
 from ..compliance import AbstractBody, AbstractContact, AbstractTooth, Compliance
-from ..contact import Operation, Resolution
+from ..contact import OperatingPoint, Resolution
 from ..dynamics import Dynamics
 from ..geometry import Gear, GearPair, Material
-from ..layout import WoehlerLine
+from ..layout import SNCurve
 from ..metrics import Lubricant, Strength, quantities
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
@@ -86,7 +86,7 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     yield '[[pinion.modification]] of type "file"', schema.FlankFileSection, None
     for name, cls in family(AbstractCurve, users=False).items():
         yield f'curve of type "{name}"', section_of(cls), cls
-    yield "[load]", schema.LoadSection, Operation
+    yield "[load]", schema.LoadSection, OperatingPoint
     yield "[model]", schema.ModelSection, Compliance
     for key, base in (("tooth", AbstractTooth), ("body", AbstractBody), ("contact", AbstractContact)):
         for name, cls in family(base, users=False).items():
@@ -119,7 +119,7 @@ def _gearbox_tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] |
     yield "[meshes.misalignment]", schema_shafts.MisalignmentSection, shafts.Misalignment
     yield "[housing]", schema_shafts.HousingSection, None
     yield "[layout]", schema_shafts.LayoutSection, None
-    yield "[layout.pitting] and [layout.bending]", schema_shafts.WoehlerSection, WoehlerLine
+    yield "[layout.pitting] and [layout.bending]", schema_shafts.WoehlerSection, SNCurve
     yield "[layout.profile]", schema_shafts.ProfileSection, None
 
 

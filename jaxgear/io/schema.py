@@ -7,7 +7,7 @@ there: None means that the key is absent.
 from typing import Annotated, Any
 
 from ..compliance import Compliance
-from ..contact import Operation, Resolution
+from ..contact import OperatingPoint, Resolution
 from ..geometry import Gear, GearPair
 from ..manufacture import ToothThickness
 from ..numerics import Number
@@ -147,7 +147,7 @@ class FlankFileSection(Section):
     gear: Annotated[str | None, choice("pinion", "wheel")] = None
     design: Annotated[str | None, text()] = None
     revolutions: Annotated[float | None, real(Number("", low=0.0))] = None
-    method: Annotated[str, choice("linear", "cubic2", "monotonic")] = "linear"
+    method: Annotated[str, choice("linear", "natural_cubic", "monotonic")] = "linear"
 
 
 class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[misc]
@@ -164,7 +164,7 @@ class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[mi
 MisalignmentSection = section_of(Misalignment)
 
 
-class LoadSection(section_of(Operation)):  # type: ignore[misc]
+class LoadSection(section_of(OperatingPoint)):  # type: ignore[misc]
     """Under what the pair runs.
 
     Attributes:

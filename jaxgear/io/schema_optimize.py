@@ -22,7 +22,7 @@ class OptimizeSection(Section):
     """A search for the best values of the variables, or for flanks without any.
 
     Attributes:
-        method: name of the method; "minimax" without it.
+        method: name of the method; "slp" without it.
         objective: a quantity to be made small, or large where that is better; several for "pareto"; "ppte" without it.
         measure: joins the cases of several torques or manufactured gears into one number; "mean" without it.
         level: of the measures "quantile" and "cvar".
@@ -30,7 +30,7 @@ class OptimizeSection(Section):
         weights: of the torques.
         manufactured: pairs of manufactured gears under every torque; needs [tolerance].
         seed: of random searches and of the manufactured gears.
-        starts: searches, of methods "minimax", "adam" and "lbfgs".
+        starts: searches, of methods "slp", "adam" and "lbfgs".
         steps: most steps of every search, of the same methods.
         application_factor: K_A of the rule-based relief.
         verify: whether the designs are evaluated with the finite-element structure too; without it they are where the

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from ..layout import WoehlerLine
+from ..layout import SNCurve
 from ..numerics import Number
 from ..shafts import Bearing, Coupling, GearMesh, MatrixBearing, Misalignment, MountedGear, ShaftLoad
 from ..shafts import Section as ShaftPart
@@ -23,7 +23,7 @@ MatrixBearingSection = section_of(MatrixBearing, open=False)
 CouplingSection = section_of(Coupling, open=False)
 LoadOnShaftSection = section_of(ShaftLoad, open=False)
 MisalignmentSection = section_of(Misalignment, open=False)
-WoehlerSection = section_of(WoehlerLine, open=False)
+WoehlerSection = section_of(SNCurve, open=False)
 
 
 class ShaftSection(Section):
@@ -102,7 +102,7 @@ class LayoutSection(Section):
         further_crowning: "rule" takes C_b = f_Hbeta of ISO 6336-1 Annex B for both gears and more where that does not
             suffice; "least" as little as keeps the load off the edges.
         edge_share: of the largest load inside, up to which the end of a face may be loaded.
-        hollow: whether the crowning of step 1 may be negative.
+        negative_crowning: whether the crowning of step 1 may be negative.
         stations: over the face, of the one-dimensional analysis.
         torques: on the pinion, of a duty cycle; the load is levelled at the design torque without it.
         hours: at every torque.
@@ -118,7 +118,7 @@ class LayoutSection(Section):
     direction: Annotated[str, choice("counterclockwise", "clockwise")] = "counterclockwise"
     further_crowning: Annotated[str, choice("rule", "least")] = "rule"
     edge_share: Annotated[float, real(Number(low=0.0, high=1.0, open_low=True))] = 1.0
-    hollow: Annotated[bool, switch()] = False
+    negative_crowning: Annotated[bool, switch()] = False
     stations: Annotated[int, count(5, 1001)] = 41
     torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
     hours: Annotated[list[float] | None, _HOURS] = None

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..conditions import LoadSpectrum
-from ..contact import Operation
+from ..contact import OperatingPoint
 from ..metrics import Quantity
 from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
@@ -35,7 +35,7 @@ class SweepRequest:
 
     Attributes:
         plan: the variants.
-        load: torques and their weights, or the operation as a function of the variables.
+        load: torques and their weights, or the operating point as a function of the variables.
         highest_torque: that a variant can have [N m].
         results: names of results, or quantities.
         part_rows: variants per file of the table, None for the library's default.
@@ -44,7 +44,7 @@ class SweepRequest:
     """
 
     plan: AbstractPlan
-    load: LoadSpectrum | Callable[[Mapping[str, Any]], Operation]
+    load: LoadSpectrum | Callable[[Mapping[str, Any]], OperatingPoint]
     highest_torque: float
     results: tuple[str | Quantity, ...]
     part_rows: int | None
@@ -126,7 +126,7 @@ def _load(design: DesignFile, section: SweepSection):
     key, name = next(iter(variables.items()))
     refuse_given("sweep", section, ["torques", "weights"], f', {key} is "{name}"')
     torque = variables.get("load.torque")
-    return design.operation, design.torque if torque is None else design.bounds[torque][1]
+    return design.operating_point, design.torque if torque is None else design.bounds[torque][1]
 
 
 def _check_keys(section: SweepSection) -> None:

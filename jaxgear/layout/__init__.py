@@ -21,7 +21,7 @@ from .flank_line import FlankLine as FlankLine
 from .flank_line import level_load as level_load
 from .life import Damage as Damage
 from .life import Endurance as Endurance
-from .life import WoehlerLine as WoehlerLine
+from .life import SNCurve as SNCurve
 from .life import damage as damage
 from .life import gear_lives as gear_lives
 from .lives_in_cases import lives_in_cases as lives_in_cases

@@ -55,7 +55,12 @@ class FlankLine(Checked):
 
 
 def level_load(
-    support: AbstractSupport, torque=None, *, hollow: bool = False, stiffness=None, stations: int | None = None
+    support: AbstractSupport,
+    torque=None,
+    *,
+    negative_crowning: bool = False,
+    stiffness=None,
+    stations: int | None = None,
 ) -> FlankLine:
     """The flank line with the most even load over the face at a torque, by least squares of the line load.
 
@@ -67,8 +72,8 @@ def level_load(
     Args:
         support: shafts at the mesh, `support` of a gearbox or `RigidSupport`.
         torque: on the pinion [N m]; None for that of the couplings, which are scaled for another one.
-        hollow: whether the crowning may be negative; otherwise it is 0 where that would be best, and the slope is the
-            best without it.
+        negative_crowning: whether the crowning may be negative; otherwise it is 0 where that would be best, and the
+            slope is the best without it.
         stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1, see `mesh_stiffness`.
         stations: over the face; None for 41, or those that `Stations` have.
 
@@ -78,7 +83,7 @@ def level_load(
     Raises:
         ValueError: for a torque that is missing or out of range.
     """
-    return _level(at_stations(support, torque, stations=stations), stiffness, hollow)
+    return _level(at_stations(support, torque, stations=stations), stiffness, negative_crowning)
 
 
 def coordinates(face: Stations) -> tuple[Float[Array, " slices"], Float[Array, " slices"]]:
@@ -88,7 +93,7 @@ def coordinates(face: Stations) -> tuple[Float[Array, " slices"], Float[Array, "
 
 
 @program
-def _level(face: Stations, stiffness, hollow: bool) -> FlankLine:
+def _level(face: Stations, stiffness, negative_crowning: bool) -> FlankLine:
     slope, crowning = coordinates(face)
 
     def loaded(line):
@@ -112,7 +117,7 @@ def _level(face: Stations, stiffness, hollow: bool) -> FlankLine:
 
     both = best((slope, crowning))
     line = FlankLine(both[0], both[1])
-    if not hollow:
+    if not negative_crowning:
         alone, concave = best((slope,)), line.crowning < 0
         line = FlankLine(jnp.where(concave, alone[0], line.slope), jnp.where(concave, 0.0, line.crowning))
     found = loaded(line).converged

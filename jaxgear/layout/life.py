@@ -32,7 +32,7 @@ OfGears = Float[Array, "gears torques"]
 _MINUTES = 60.0  # in an hour
 
 
-class WoehlerLine(Checked):
+class SNCurve(Checked):
     """Cycles that a stress can be borne, N = cycles (endurance / stress)^exponent, without an end below.
 
     Attributes:
@@ -54,8 +54,8 @@ class Endurance(Checked):
         bending: against the nominal stress in the tooth root of ISO 6336-3.
     """
 
-    pitting: WoehlerLine
-    bending: WoehlerLine
+    pitting: SNCurve
+    bending: SNCurve
 
 
 class Damage(Checked):

@@ -32,7 +32,7 @@ def longest_life(
     load: LoadSpectrum,
     endurance: Endurance | tuple[Endurance, Endurance],
     *,
-    hollow: bool = False,
+    negative_crowning: bool = False,
     stations: int = STATIONS,
 ) -> FlankLine:
     """The flank line of the smallest damage sum under a duty cycle, of both gears and of pitting and bending.
@@ -45,7 +45,7 @@ def longest_life(
     Args:
         support: shafts at the mesh; couplings are scaled to every torque.
         load, endurance, stations: as for `damage`.
-        hollow: whether the crowning may be negative.
+        negative_crowning: whether the crowning may be negative.
 
     Returns:
         the flank line over the common face, of numbers: what it is made of has no derivatives, the damage with it has.
@@ -68,9 +68,9 @@ def longest_life(
             "afloat in its clearances?"
         )
     worst = int(np.argmax(np.sum(unmodified.pitting, axis=0)))
-    start = level_load(support, load.torques[worst], hollow=hollow, stations=stations)
+    start = level_load(support, load.torques[worst], negative_crowning=negative_crowning, stations=stations)
     point = np.array([float(start.slope), float(start.crowning)])
-    bounds = [(None, None), (None if hollow else 0.0, None)]
+    bounds = [(None, None), (None if negative_crowning else 0.0, None)]
     for sharpness in _SHARPNESS:
 
         def soft(at, sharpness=sharpness):

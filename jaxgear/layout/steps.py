@@ -137,7 +137,7 @@ def layout_flank_lines(
     gear: GearName = "wheel",
     further=None,
     share: float = 1.0,
-    hollow: bool = False,
+    negative_crowning: bool = False,
     stations: int = STATIONS,
 ) -> FlankLineLayout:
     """Steps 1 and 2 of the layout of a mesh.
@@ -157,7 +157,7 @@ def layout_flank_lines(
         gear: whose flank line levels the load.
         further: C_b of pinion and wheel over the common face [um]; None for as little as it takes.
         share: of the largest load inside, up to which an end may be loaded.
-        hollow: whether the crowning of step 1 may be negative.
+        negative_crowning: whether the crowning of step 1 may be negative.
         stations: over the face.
 
     Raises:
@@ -177,9 +177,9 @@ def layout_flank_lines(
         raise ValueError("layout_flank_lines: tolerances must not be empty")
     face = at_stations(support, torque, stations=stations)
     if duty_cycle is None or endurance is None:
-        line = level_load(face, hollow=hollow)
+        line = level_load(face, negative_crowning=negative_crowning)
     else:
-        line = longest_life(support, duty_cycle, endurance, hollow=hollow, stations=stations)
+        line = longest_life(support, duty_cycle, endurance, negative_crowning=negative_crowning, stations=stations)
     each = [crowning_off_the_edges(face, one, line=line, share=share) for one in several.values()]
     needed = jnp.max(jnp.stack(each))
     if not bool(jnp.isfinite(line.slope)):

@@ -41,7 +41,7 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
         "iso_6336_20"  c = 0.060, X_R = Ra^0.25
         "iso_6336_22"  c = 0.045, X_R = 2.2 (Ra / rho)^0.25
 
-    A coefficient that the cycle was solved with (`Operation.friction`) counts in its place.
+    A coefficient that the cycle was solved with (`OperatingPoint.friction`) counts in its place.
 
     Raises:
         ValueError: for a cycle without a speed, or of speed 0.
@@ -50,8 +50,8 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
         L. Schlenk, Untersuchungen zur Fresstragfaehigkeit von Grosszahnraedern, TU Muenchen 1994; ISO/TR 13989-1
         (ISO/TS 6336-20); ISO/TR 15144-1 (ISO/TS 6336-22).
     """
-    if cycle.operation.friction is not None:
-        return cycle.operation.friction
+    if cycle.operating_point.friction is not None:
+        return cycle.operating_point.friction
     speed = _running("friction_coefficient", cycle)
     check("friction_coefficient", "speed", speed, "rpm", low=0.0, open_low=True)
     contact = cycle.kinematics.path_of_contact
@@ -178,16 +178,18 @@ def _center_distance(cycle: MeshCycle) -> Scalar:
 
 
 def _friction(owner: str, cycle: MeshCycle, lubricant: Lubricant | None) -> Scalar:
-    if cycle.operation.friction is not None:
-        return cycle.operation.friction
+    if cycle.operating_point.friction is not None:
+        return cycle.operating_point.friction
     if lubricant is None:
-        raise ValueError(f"{owner}: needs a coefficient of friction, solve with Operation(torque, speed, friction)")
+        raise ValueError(
+            f"{owner}: needs a coefficient of friction, solve with OperatingPoint(torque, speed, friction)"
+        )
     return friction_coefficient(cycle, lubricant)
 
 
 def _running(owner: str, cycle: MeshCycle) -> Scalar:
     """Speed of the pinion [rpm]."""
-    speed = cycle.operation.speed
+    speed = cycle.operating_point.speed
     if speed is None:
-        raise ValueError(f"{owner}: needs a speed, solve with Operation(torque, speed)")
+        raise ValueError(f"{owner}: needs a speed, solve with OperatingPoint(torque, speed)")
     return speed

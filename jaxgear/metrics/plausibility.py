@@ -125,7 +125,7 @@ def plausibility(
     lubricant: Lubricant | None = None,
     compliance: AbstractCompliance | None = None,
     verified: float | None = None,
-    given_way: float = 0.0,
+    support_deflection: float = 0.0,
 ) -> tuple[Doubt, ...]:
     """What of a solved design is not usual; empty where nothing is.
 
@@ -140,16 +140,16 @@ def plausibility(
         lubricant: the oil; None without one.
         compliance: by which it was solved, which the cycle does not tell; None for one that is composed of models.
         verified: PPTE of the same design by the finite-element structure, where it is known [um].
-        given_way: mean transmission error that is that of shafts, bearings and housing, not of the teeth [um].
+        support_deflection: mean transmission error that is that of shafts, bearings and housing, not of the teeth [um].
     """
     flanks = tuple(given or own or NoModification() for given, own in ((pinion, cycle.pinion), (wheel, cycle.wheel)))
-    rpm = cycle.operation.speed if speed is None else speed
-    coefficient = cycle.operation.friction if friction is None else friction
+    rpm = cycle.operating_point.speed if speed is None else speed
+    coefficient = cycle.operating_point.friction if friction is None else friction
     # without the flanks: one program serves every kind of them
     bare = replace(cycle, pinion=None, wheel=None, kinematics=cycle.kinematics.explicit)
     gears, results, sides, overhangs = _numbers(bare)
     (name, where, deflection), *others = results
-    deflection = float(deflection) - 1e-3 * given_way / float(cycle.kinematics.pair.pinion.module)
+    deflection = float(deflection) - 1e-3 * support_deflection / float(cycle.kinematics.pair.pinion.module)
     numbers = [_doubt(*each) for each in (*gears, (name, where, deflection), *others)]
     sizes, common = cycle.kinematics.resolution, float(sides[0].common_width)
     numbers[len(gears) : len(gears)] = [

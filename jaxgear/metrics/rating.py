@@ -39,15 +39,15 @@ Load = Float[Array, "pairs slices positions"]
 
 
 def _flash(cycle: MeshCycle) -> Load:
-    operation = cycle.operation
-    if operation.speed is None:
-        raise ValueError("max_flash_temperature: needs a speed, solve with Operation(torque, speed)")
-    options = {} if operation.friction is None else {"friction": operation.friction}
-    return flash_temperature(cycle, operation.speed, **options)
+    operating_point = cycle.operating_point
+    if operating_point.speed is None:
+        raise ValueError("max_flash_temperature: needs a speed, solve with OperatingPoint(torque, speed)")
+    options = {} if operating_point.friction is None else {"friction": operating_point.friction}
+    return flash_temperature(cycle, operating_point.speed, **options)
 
 
 def _oiled(name: str, of: Any, unit: str, meaning: str, needs: str | None = None, **options: Any) -> Quantity:
-    alone = {key: options.pop(key) for key in ("otherwise", "operation") if key in options}
+    alone = {key: options.pop(key) for key in ("otherwise", "operating_point") if key in options}
     stands = WithoutSettings(name, "jaxgear.metrics.Lubricant", "lubricant", of, needs, **alone)
     return Quantity(name, stands, unit, meaning, **options)
 
@@ -78,7 +78,7 @@ LUBRICATED = (
         reduction=Max(),
         local=True,
         otherwise=_flash,
-        operation=("speed",),
+        operating_point=("speed",),
     ),
     _oiled("friction_coefficient", friction_coefficient, "", "mean coefficient of friction"),
     _oiled(
@@ -87,7 +87,7 @@ LUBRICATED = (
         "W",
         "power that friction of the flanks takes",
         otherwise=loss_power,
-        operation=("speed", "friction"),
+        operating_point=("speed", "friction"),
     ),
     _oiled(
         "mesh_efficiency",
@@ -96,7 +96,7 @@ LUBRICATED = (
         "share of the power that the flanks pass on",
         better="larger",
         otherwise=mesh_efficiency,
-        operation=("friction",),
+        operating_point=("friction",),
     ),
     _oiled("bulk_temperature", bulk_temperature, "degC", "of the teeth between two contacts"),
     _oiled(

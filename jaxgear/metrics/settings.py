@@ -74,7 +74,7 @@ class WithoutSettings:
         of: computes it from a cycle and the settings; None where the class does it by itself.
         needs: field of the settings that must be given.
         otherwise: computes it from a cycle alone; None where nothing can.
-        operation: what the load must say for that: fields of an `Operation`.
+        operating_point: what the load must say for that: fields of an `OperatingPoint`.
         given: computes it from the settings as plain data and a cycle, where that takes more than `of`; None for `of`.
     """
 
@@ -84,7 +84,7 @@ class WithoutSettings:
     of: Callable[[MeshCycle, Any], Any] | None = None
     needs: str | None = None
     otherwise: Callable[[MeshCycle], Any] | None = None
-    operation: tuple[str, ...] = ()
+    operating_point: tuple[str, ...] = ()
     given: Callable[[WithSettings, MeshCycle], Any] | None = None
 
     def __call__(self, cycle: MeshCycle) -> Any:

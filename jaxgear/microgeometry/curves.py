@@ -105,4 +105,4 @@ class Spline(AbstractCurve):
     def __call__(self, d):
         d = jnp.asarray(d)
         depths = jnp.linspace(0.0, 1.0, self.values.shape[0], dtype=d.dtype)
-        return interpolate(d, depths, self.values, "cubic2")
+        return interpolate(d, depths, self.values, "natural_cubic")

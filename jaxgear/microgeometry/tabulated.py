@@ -18,13 +18,13 @@ class TabulatedProfile(AbstractModification):
         position: increasing table positions, shape (points,).
         amount: material removed, shape (points,).
         coordinate: what the positions are: "roll_length" [mm] (default) or "roll_angle" [deg].
-        method: "linear", or "cubic2" for a natural cubic spline, or "monotonic" for a shape-preserving cubic.
+        method: "linear", or "natural_cubic" for a natural cubic spline, or "monotonic" for a shape-preserving cubic.
     """
 
     position: Float[Array, " points"] = number("mm or deg", shape=("points",))
     amount: Float[Array, " points"] = number("um", shape=("points",))
     coordinate: Literal["roll_length", "roll_angle"] = eqx.field(default="roll_length", static=True)
-    method: Literal["linear", "cubic2", "monotonic"] = eqx.field(default="linear", static=True)
+    method: Literal["linear", "natural_cubic", "monotonic"] = eqx.field(default="linear", static=True)
 
     varies_along_face = False
 
@@ -52,13 +52,13 @@ class TabulatedFlank(AbstractModification):
         roll_length: increasing, shape (points,).
         face_coordinate: increasing, from the middle of the face, shape (faces,).
         amount: material removed, shape (points, faces).
-        method: along the profile: "linear", "cubic2" or "monotonic".
+        method: along the profile: "linear", "natural_cubic" or "monotonic".
     """
 
     roll_length: Float[Array, " points"] = number("mm", shape=("points",), fewest=2)
     face_coordinate: Float[Array, " faces"] = number("mm", shape=("faces",), fewest=2)
     amount: Float[Array, "points faces"] = number("um", shape=("points", "faces"))
-    method: Literal["linear", "cubic2", "monotonic"] = eqx.field(default="linear", static=True)
+    method: Literal["linear", "natural_cubic", "monotonic"] = eqx.field(default="linear", static=True)
 
     def check_together(self):
         wanted = self.roll_length.shape + self.face_coordinate.shape

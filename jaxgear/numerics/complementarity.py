@@ -7,7 +7,7 @@ For every position the unknowns are the line loads q[p, s] >= 0 of P springs in 
 
 C is symmetric positive semi-definite and h increases, so this is the optimality condition of a strictly convex
 programme: the solution exists and is unique. It is found by Newton's method on the active set; slices meet only in d,
-so each step is P x P eliminations and one scalar equation, and where they feel each other (`coupling`) a small dense
+so each step is P x P eliminations and one scalar equation, and where they are coupled (`coupling`) a small dense
 system at every position. Derivatives of any order come from the implicit function
 theorem at the final active set, never from the iteration. Where d is prescribed instead of the load, the scalar
 equation drops out and everything else stays.
@@ -58,7 +58,7 @@ _OWN_STEPS = 3
 # Newton steps with secants that follow the logarithm of the load: from where they lead, one step with the laws is down
 # to the rounding of single precision, as a rule, at a third of the cost of another one with the laws.
 _LOGARITHM_STEPS = 2
-# Steps with the laws where slices feel each other: their active sets settle later, and of 400 random gaps that arch
+# Steps with the laws where slices are coupled: their active sets settle later, and of 400 random gaps that arch
 # over the slices 45 % still need a second step in double precision after one of these, 0.5 % after two.
 _LAW_STEPS_COUPLED = 2
 # A secant follows the logarithm between these multiples of the load at the start, and changes per logarithm by this
@@ -163,7 +163,7 @@ def _iterate(
         load = carried_by(v)
         secant, left = secants_under(problem, load), opening(problem, load, approach)
         residual = _residual(problem, load, approach, secant, left, common)
-        # slices that feel each other are corrected by what is left; others are cheaper to open once more than to keep
+        # coupled slices are corrected by what is left; others are cheaper to open once more than to keep
         return v, approach, secant, None if problem.coupling is None else left, residual
 
     def advance(state):

@@ -20,8 +20,8 @@ class ContactProblem(eqx.Module):
         approach: prescribed common approach d, shape (positions,); None where the load is.
         start_law: a law like h that many problems share, which spares each of them the evaluations that its solution
             starts from; None for h.
-        coupling: how slices feel each other, whose `weight` then is that of the slices over their mean, None where all
-            have one; None where only the approach is common.
+        coupling: how slices are elastically coupled, whose `weight` then is that of the slices over their mean,
+            None where all have one; None where only the approach is common.
 
     Raises:
         ValueError: unless one of load and approach is given.

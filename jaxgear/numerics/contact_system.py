@@ -1,4 +1,4 @@
-"""The linear systems of a contact problem, with slices that feel each other or not, and what its loads deflect."""
+"""The linear systems of a contact problem, with coupled slices or not, and what its loads deflect."""
 
 import equinox as eqx
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""Elimination of a contact problem whose slices feel each other.
+"""Elimination of a contact problem whose slices are coupled.
 
 Every slice is eliminated on its own, as if nothing but the rest of the compliance held it: A = rest C + slope. With the
 deflections p of the modes as unknowns, and b those of the support with the common approach in the first one, the active

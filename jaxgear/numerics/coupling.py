@@ -1,4 +1,4 @@
-"""Slices of a contact problem that feel each other, by few modes over the slices.
+"""Coupled slices of a contact problem, by few modes over the slices.
 
 The deflection of spring p in slice s under all line loads is
 
@@ -64,7 +64,7 @@ class Other(eqx.Module):
 
 
 class Coupling(eqx.Module):
-    """How slices feel each other.
+    """How slices are elastically coupled.
 
     Attributes:
         modes: V, orthonormal, the constant first; with the weights w of the slices, V^T w V = 1, where they differ.

@@ -1,4 +1,4 @@
-"""Unilateral contact of many points that all feel each other, under one common approach.
+"""Unilateral contact of many points that are all coupled, under one common approach.
 
 Forces f >= 0 and openings y >= 0 of n points with a dense, symmetric positive definite compliance M:
 

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-Method = Literal["linear", "cubic2", "monotonic"]
+Method = Literal["linear", "natural_cubic", "monotonic"]
 Points = Float[Array, " points"]
 Table = Float[Array, "points *columns"]
 
@@ -22,7 +22,7 @@ def interpolate(x: Float[Array, "..."], positions: Points, values: Points, metho
         x: where.
         positions: increasing, at least 2.
         values: at the positions.
-        method: "linear", "cubic2" (natural cubic spline) or "monotonic" (no overshoot between the points).
+        method: "linear", "natural_cubic" (natural cubic spline) or "monotonic" (no overshoot between the points).
     """
     return interpolate_columns(x, positions, values[:, None], method)(jnp.zeros_like(x, int))
 
@@ -36,7 +36,7 @@ def interpolate_columns(x: Float[Array, "..."], positions: Points, values: Table
     t = (x - positions[left]) / width
     if method == "linear":
         return lambda column: (1 - t) * values[left, column] + t * values[left + 1, column]
-    slopes = (_natural_slopes if method == "cubic2" else _monotonic_slopes)(positions, values)
+    slopes = (_natural_slopes if method == "natural_cubic" else _monotonic_slopes)(positions, values)
 
     def at(column):
         low, high = values[left, column], values[left + 1, column]

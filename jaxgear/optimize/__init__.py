@@ -16,7 +16,6 @@ from .goal import Constraint as Constraint
 from .iteration import iterate_from_low_pressure as iterate_from_low_pressure
 from .iteration import iterate_transmission_error as iterate_transmission_error
 from .methods import METHODS as METHODS
-from .minimax import Minimax as Minimax
 from .minimize import minimize as minimize
 from .pareto_search import Pareto as Pareto
 from .pareto_search import pareto as pareto
@@ -31,6 +30,7 @@ from .result import Limit as Limit
 from .result import Optimum as Optimum
 from .search import AbstractMethod as AbstractMethod
 from .search import Record as Record
+from .slp import SLP as SLP
 from .verdict import judged as judged
 from .verification import Verified as Verified
 from .verification import begin_verification as begin_verification

@@ -18,11 +18,11 @@ from ..sizing import iso_relief
 from ..tolerance import Tolerance
 from .goal import Constraint
 from .linearizer import Linearizer
-from .minimax import Search, follow
 from .problem import Problem, Roughness
 from .refine import POSITIONS, refined
 from .result import Optimum
 from .search import Record
+from .slp import Search, follow
 from .verdict import optimum_of
 
 _FEWEST = 4  # values per flank

@@ -14,11 +14,11 @@ from ..numerics import Callback, check, whole
 from .goal import Constraint
 from .iterated_flanks import Flanks
 from .levelling import Levelled, Pressure, levelled
-from .minimax import Minimax
 from .minimize import minimize
 from .refine import POSITIONS, on_finer_meshes
 from .result import Limit, Optimum
 from .search import AbstractMethod
+from .slp import SLP
 
 
 def iterate_transmission_error(
@@ -136,7 +136,7 @@ def iterate_from_low_pressure(
     mesh: Mesh,
     torque,
     max_relief: float = 7.0,
-    method: AbstractMethod = Minimax(),
+    method: AbstractMethod = SLP(),
     callback: Callback | None = None,
     **options,
 ) -> Optimum:

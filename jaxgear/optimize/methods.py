@@ -6,14 +6,14 @@ from .evolution import CMAES, DifferentialEvolution, Genetic
 from .factorial import Factorial
 from .first_order import Adam
 from .genetic import BinaryGenetic
-from .minimax import Minimax
 from .quasi_newton import LBFGS
 from .search import AbstractMethod
+from .slp import SLP
 
 # Known by name, here and in design files, where the fields of a class are its options. A method of your own joins them
 # by `METHODS["name"] = Class`.
 METHODS: dict[str, type[AbstractMethod]] = {
-    "minimax": Minimax,
+    "slp": SLP,
     "adam": Adam,
     "lbfgs": LBFGS,
     "genetic": Genetic,

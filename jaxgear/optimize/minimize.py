@@ -28,7 +28,7 @@ def minimize(
     tolerance: Tolerance | None = None,
     samples: int | None = None,
     seed: int = 0,
-    method: str | AbstractMethod = "minimax",
+    method: str | AbstractMethod = "slp",
     starts: int | None = None,
     steps: int | None = None,
     positions: int | None = POSITIONS,
@@ -46,11 +46,11 @@ def minimize(
         measure: of the objective over torques and manufactured gears: `Mean()`, `Worst()`, `Quantile(level)` or
             `CVaR(level)`; None for the mean.
         constraints: limits that hold in every case.
-        tolerance: of manufactured gears, of which `samples` run under every torque; None for perfect gears.
+        tolerance: of manufactured gears, of which `samples` run under every torque; None for nominal gears.
         samples: manufactured gears; None for 64 with a tolerance.
         seed: of their random numbers, and of a method that draws some.
-        method: name of one of `METHODS`, such as "minimax" (sequential linear programming); or a method with its
-            options, such as `Minimax(starts=8)`.
+        method: name of one of `METHODS`, such as "slp" (sequential linear programming); or a method with its
+            options, such as `SLP(starts=8)`.
         starts: start points of a gradient method that is given by name.
         steps: steps of every start, likewise.
         positions: of the finer mesh on which the search ends and its result is evaluated, at least those of `mesh`. An

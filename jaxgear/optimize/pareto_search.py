@@ -16,11 +16,11 @@ from .front_designs import END, Chebyshev, Descent, Met
 from .goal import Constraint, Objective
 from .linear_model import Model
 from .linearizer import Linearizer
-from .minimax import Search, follow
 from .problem import Problem, make_problem
 from .refine import POSITIONS, at_more_positions, fine_enough, on_finer_meshes
 from .result import Front
 from .search import Record
+from .slp import Search, follow
 from .starts import start_points
 from .verdict import PROBE, optimum_of
 
@@ -33,7 +33,7 @@ class Pareto(Checked):
     """Pareto front by the augmented Chebyshev scalarization (Steuer and Choo 1983), one weight per design.
 
     Every design minimizes the largest weighted distance from the ideal point, which reaches concave parts of the front
-    too, by sequential linear programming as in `Minimax`: all of them advance together. Ideal and nadir follow the
+    too, by sequential linear programming as in `SLP`: all of them advance together. Ideal and nadir follow the
     designs that have been met. The first round seeks the ends of the front, the best designs of one objective each,
     from start points all over the box. The others seek the designs of evenly spread weights, each from the best one
     that has been met for its weight. On a finer mesh the designs of the front go on, each by the weight that leads to

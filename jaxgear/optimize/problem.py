@@ -55,7 +55,7 @@ class Score(NamedTuple):
 class Roughness(eqx.Module):
     """Penalty on the largest absolute value of linear forms of the parameters, such as the curvature of a table.
 
-    The method "minimax" alone follows it.
+    The method "slp" alone follows it.
 
     Attributes:
         forms: coefficients over the unit box, shape (forms, parameters).

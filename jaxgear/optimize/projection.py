@@ -90,7 +90,7 @@ def project(optimum: Optimum, curve: str = "power") -> Projection:
     """
     if curve not in CURVES:
         raise ValueError(f'project: curve = "{curve}" is not known, must be one of {", ".join(CURVES)}')
-    mesh, torque = optimum.mesh, optimum.cycle.operation
+    mesh, torque = optimum.mesh, optimum.cycle.operating_point
     fits = [_fit(side, flank, curve) for side, flank in zip(mesh.sides, (optimum.pinion, optimum.wheel))]
     pinion, wheel = (relief for relief, _ in fits)
     cycle = solve_case(mesh, torque, pinion, wheel)

@@ -12,9 +12,9 @@ from .evaluate import scores
 from .goal import FEASIBLE, counted
 from .linear_model import Model, NoObjective
 from .linearizer import Linearizer
-from .minimax import Ledger, Search, follow
 from .problem import Problem
 from .search import Record
+from .slp import Ledger, Search, follow
 from .starts import points_nearby, start_points
 
 POSITIONS = 512

@@ -81,7 +81,7 @@ class Optimum(eqx.Module):
         parameters: value of every free parameter; none where the flanks themselves were sought.
         pinion, wheel: the modifications.
         mesh: prepared mesh on which it was evaluated.
-        cycle: mesh cycle of the optimum, of perfect gears under the torque (of a load spectrum, its heaviest weight).
+        cycle: mesh cycle of the optimum, of nominal gears under the torque (of a load spectrum, its heaviest weight).
         ppte: peak-to-peak transmission error of that cycle [um].
         objective: least value found of what was minimized, in its unit.
         objective_unit: "" for a pure number.

@@ -17,7 +17,7 @@ from .search import AbstractMethod, Record
 # wide, where most positions pull, to narrow, where the soft objective is within about a percent of the true one.
 STAGE_WIDTHS = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 _FIRST_RATE, _LAST_RATE = 0.05, 0.002  # step sizes in the unit box, first and last stage
-_LEAST_SCALE = 1e-3  # [um] of the objective, where the start is perfect already
+_LEAST_SCALE = 1e-3  # [um] of the objective, where the start is best already
 _STIFFNESS = 10.0  # of the penalty: objective per squared relative violation, relative to the scale
 
 

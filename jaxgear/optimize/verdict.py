@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..conditions import in_words, solve_case, solved
-from ..contact import Operation
+from ..contact import OperatingPoint
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from .goal import FEASIBLE, Constraint
@@ -97,7 +97,9 @@ def judged(
     cases = problem.cases
     if cases.count == 1 and cases.removed is None:  # the program that solves the one case serves every modification
         speed = None if cases.speed is None else np.asarray(cases.speed)[0]
-        cycle = solve_case(problem.mesh, Operation(np.asarray(cases.torque)[0], speed, cases.friction), pinion, wheel)
+        cycle = solve_case(
+            problem.mesh, OperatingPoint(np.asarray(cases.torque)[0], speed, cases.friction), pinion, wheel
+        )
         if all(of.local for of in problem.objectives):  # they know nothing of the flanks but what is removed
             cycle = replace(cycle, pinion=None, wheel=None)
         else:

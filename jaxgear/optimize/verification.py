@@ -53,11 +53,11 @@ class Verification:
         """Both numbers of a design.
 
         Args:
-            cycle: of the design on the mesh; its operation is that of the PPTE.
+            cycle: of the design on the mesh; its operating point is that of the PPTE.
             objectives: as `judged` by the problem on the mesh.
             pinion, wheel: its modifications.
         """
-        found = solve_case(self._mesh, cycle.operation, pinion, wheel)
+        found = solve_case(self._mesh, cycle.operating_point, pinion, wheel)
         others = {} if self._problem is None else judged(self._problem, pinion, wheel)
         return Verified(_ppte(cycle), _ppte(found), objectives, others, found)
 

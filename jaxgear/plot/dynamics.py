@@ -15,7 +15,7 @@ FREQUENCY_LABEL = "mesh frequency [Hz]"
 _APPROACH_LABEL = "dynamic transmission error [µm]"
 _RESPONSES = {
     "dynamic_factor": "dynamic factor $K_v$ [-]",
-    "approach_rms": "rms of the dynamic\ntransmission error [µm]",
+    "dte_rms": "rms of the dynamic\ntransmission error [µm]",
 }
 _RUNS = ("-", (0, (4, 1.5)), (0, (1, 1)))  # lines of the runs of a design, in their order
 RunUps = Mapping[str, RunUp]
@@ -31,7 +31,7 @@ _BIFURCATIONS = {"fold": ("o", "#D55E00"), "flip": ("D", "#009E73"), "Neimark-Sa
 
 def speed_response(
     responses: Mapping[str, Runs | RunUps],
-    of: Literal["dynamic_factor", "approach_rms"] = "dynamic_factor",
+    of: Literal["dynamic_factor", "dte_rms"] = "dynamic_factor",
     ax: Axes | None = None,
     *,
     title: str = "",
@@ -41,7 +41,7 @@ def speed_response(
     Args:
         responses: of every design, by its name: those of several runs, by what the legend says of each ("falling,
             kicked"); in a sequence each has its direction. Run-ups, which have no rms, go with them or alone.
-        of: which number: the dynamic factor or the rms of the approach about its mean.
+        of: which number: the dynamic factor or the rms of the DTE about its mean.
         ax: Axes to draw into; None for a new figure.
         title: over the Axes and the legend.
     """
@@ -92,7 +92,7 @@ def waterfall(
 
     Args:
         response: of one run.
-        of: spectrum of the mesh force or of the velocity of approach.
+        of: spectrum of the mesh force or of the velocity of the DTE.
         ax: Axes to draw into; None for a new figure.
         title: over the Axes and the legend.
         most: amplitude at the upper end of the colours [N or mm/s], for Axes that are to be compared; None for the
@@ -119,7 +119,7 @@ def waterfall(
         ax.set_ylim(0, float(orders.max() * frequency.max()))
         _name_orders(ax, orders, float(frequency.max()))
         bar = ax.figure.colorbar(lines, ax=ax, pad=0.09)
-        bar.set_label(f"amplitude of the {'mesh force' if of == 'force' else 'velocity of approach'} [{unit}]")
+        bar.set_label(f"amplitude of the {'mesh force' if of == 'force' else 'velocity of the DTE'} [{unit}]")
         bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
         ax.set(xlabel=FREQUENCY_LABEL, ylabel="frequency [Hz]")
         _entitle(ax, title, 0)
@@ -179,7 +179,7 @@ def speed_scale(ax: Axes, teeth: float) -> None:
 
 
 def bifurcation(responses: Runs, ax: Axes | None = None, *, title: str = "") -> Axes:
-    """Bifurcation diagram: the approach once per mesh cycle over the mesh frequency.
+    """Bifurcation diagram: the DTE once per mesh cycle over the mesh frequency.
 
     An orbit of one mesh cycle shows as one point, one of two as two, an aperiodic one as a cloud.
 
@@ -190,7 +190,7 @@ def bifurcation(responses: Runs, ax: Axes | None = None, *, title: str = "") -> 
     """
     with report_axes(ax) as ax:
         for index, (run, response) in enumerate(_named(responses)):
-            points = np.asarray(response.poincare_approach)
+            points = np.asarray(response.poincare_dte)
             frequency = np.broadcast_to(np.asarray(response.mesh_frequency)[:, None], points.shape)
             style = {"color": line_style(1 + index)["color"], "marker": "^v"[index % 2]}
             label = f"speed {run}"
@@ -202,7 +202,7 @@ def bifurcation(responses: Runs, ax: Axes | None = None, *, title: str = "") -> 
 
 def branches(
     found: Sequence[Branch],
-    of: Literal["dynamic_factor", "approach_rms"] = "dynamic_factor",
+    of: Literal["dynamic_factor", "dte_rms"] = "dynamic_factor",
     ax: Axes | None = None,
     *,
     responses: Sequence[SpeedResponse] = (),
@@ -212,7 +212,7 @@ def branches(
 
     Args:
         found: of one oscillator.
-        of: which number: the dynamic factor or the rms of the approach about its mean.
+        of: which number: the dynamic factor or the rms of the DTE about its mean.
         ax: Axes to draw into; None for a new figure.
         responses: runs through the speeds, whose steady states are marked.
         title: over the Axes and the legend.
@@ -260,18 +260,18 @@ def _curve(branch: Branch, of: str):
     return at, values, np.insert(np.asarray(branch.stable), places, np.ones(len(places), bool))
 
 
-def phase_portrait(approach, velocity, force, ax: Axes | None = None, *, once: Any = None, title: str = "") -> Axes:
-    """An orbit in the plane of approach and velocity, coloured by what is in contact.
+def phase_portrait(dte, velocity, force, ax: Axes | None = None, *, once: Any = None, title: str = "") -> Axes:
+    """An orbit in the plane of DTE and velocity, coloured by what is in contact.
 
     Args:
-        approach: of the flanks at equal steps of one period [um], shape (steps,).
-        velocity: of approach [um/s], shape (steps,).
+        dte: of the flanks at equal steps of one period [um], shape (steps,).
+        velocity: of DTE [um/s], shape (steps,).
         force: of the mesh [N], shape (steps,): positive on the drive flanks, negative on the coast flanks.
-        once: (approach, velocity) once per mesh cycle, each of shape (points,); None for no marks.
+        once: (dte, velocity) once per mesh cycle, each of shape (points,); None for no marks.
         ax: Axes to draw into; None for a new figure.
         title: over the Axes and the legend.
     """
-    x, y, f = np.asarray(approach), 1e-3 * np.asarray(velocity), np.asarray(force)
+    x, y, f = np.asarray(dte), 1e-3 * np.asarray(velocity), np.asarray(force)
     closed = np.stack([np.append(x, x[0]), np.append(y, y[0])], axis=1)
     segments = np.stack([closed[:-1], closed[1:]], axis=1)
     states = dict(zip(_STATES, (f > 0, f == 0, f < 0)))

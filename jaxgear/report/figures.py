@@ -34,7 +34,7 @@ CAPTIONS = {
     "iterations_relief": "Relief after every iteration of the search.",
     "iterations_transmission_error": "Transmission error after every iteration of the search.",
     "dynamic_factor": "Dynamic factor over the mesh frequency, speed going up and down.",
-    "approach_rms": "Root mean square of the dynamic transmission error about its mean over the mesh frequency.",
+    "dte_rms": "Root mean square of the dynamic transmission error about its mean over the mesh frequency.",
     "waterfall": "Campbell diagram: amplitudes of the mesh force by order over the mesh frequency.",
     "order_tracks": "Level of the orders of the mesh force over the mesh frequency, rms values re 1 µN (ISO 1683).",
     "run_up": "Largest mesh force over the static one while the speed rises at constant acceleration.",

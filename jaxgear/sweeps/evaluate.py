@@ -113,8 +113,8 @@ def _numbers(task: _Task, data, values):
     variants, measures = eqx.combine(data, task.rest)
     variant = variants(values)
 
-    def of_case(operation, deviation):
-        cycle = solve_case(variant.mesh, operation, variant.pinion, variant.wheel, deviation).on(variant.mesh)
+    def of_case(operating_point, deviation):
+        cycle = solve_case(variant.mesh, operating_point, variant.pinion, variant.wheel, deviation).on(variant.mesh)
         numbers = jnp.stack([of(cycle) for of in task.results])
         return numbers, solved(cycle) & jnp.all(jnp.isfinite(numbers))
 

@@ -222,7 +222,7 @@ def _measures(conditions: Conditions, given: Sequence[AbstractMeasure] | None) -
             return Mean(), Quantile()
         return (Mean(), Worst()) if conditions.count > 1 else ()
     if conditions.count == 1:
-        raise ValueError("sweep: measures have no effect: one torque and perfect gears are a single case")
+        raise ValueError("sweep: measures have no effect: one torque and nominal gears are a single case")
     names = [label(measure) for measure in given]
     if not names or len(set(names)) != len(names):
         raise ValueError(f"sweep: measures {', '.join(names) or '(none)'} must be different and at least one")

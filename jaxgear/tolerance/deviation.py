@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from ..contact import Mesh, RemovedMaterial, removed_material
-from ..contact.operation import operation_of
+from ..contact.operating_point import operating_point_of
 from ..contact.slide import nominal_material
 from ..microgeometry import AbstractModification, Flank, LeadSlope, NoModification, ProfileSlope
 from ..numerics import Checked, number, program, real, result, spread, whole
@@ -157,7 +157,9 @@ def flank_basis(mesh: Mesh, torque) -> Float[Array, "terms pairs slices position
 
     def removed(side: str, modification: AbstractModification) -> Load:
         flanks = {"pinion": NoModification(), "wheel": NoModification(), side: modification}
-        return nominal_material(mesh, operation_of("flank_basis", torque, mesh.slice_width.dtype).torque, **flanks)
+        return nominal_material(
+            mesh, operating_point_of("flank_basis", torque, mesh.slice_width.dtype).torque, **flanks
+        )
 
     def terms(side: str):
         yield removed(side, ProfileSlope(unit))[None]

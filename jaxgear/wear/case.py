@@ -10,9 +10,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..conditions import LoadSpectrum, solved
-from ..contact import Mesh, MeshCycle, Operation, RemovedMaterial, removed_material, solve_removed
+from ..contact import Mesh, MeshCycle, OperatingPoint, RemovedMaterial, removed_material, solve_removed
 from ..contact.face_coupling import check_torque
-from ..contact.operation import operation_of
+from ..contact.operating_point import operating_point_of
 from ..contact.prescribed import solve_forces
 from ..contact.pressure import FLATTEST, flank_pressure
 from ..contact.slide import slid_material
@@ -74,7 +74,7 @@ class Case(eqx.Module):
     """
 
     mesh: Mesh
-    loads: Operation
+    loads: OperatingPoint
     weights: Float[Array, " torques"] | None
     law: Constant | OfLubrication
     pinion: AbstractModification
@@ -97,7 +97,7 @@ class Case(eqx.Module):
         """Where every load wears the flanks, leading axis (torques,)."""
         return jax.vmap(lambda load: deposit(self.mesh, load.torque, self.points))(self.loads)
 
-    def under(self, load: Operation, place: Deposit, depth: Depth) -> Analysis:
+    def under(self, load: OperatingPoint, place: Deposit, depth: Depth) -> Analysis:
         """The contact of worn flanks under one load, and how fast that wears them by one passage."""
         flanks = self._worn(place.roll_length, depth)
         removed = removed_material(self.mesh, load, **flanks) + self.deviation
@@ -134,7 +134,7 @@ class Case(eqx.Module):
             return rate, usable & jnp.all(contact.converged)
 
         rates, usable = jax.lax.map(of_cycle, motion.force)
-        return jnp.mean(rates, axis=0), jnp.all(usable) & motion.found & ~motion.coast_contact
+        return jnp.mean(rates, axis=0), jnp.all(usable) & motion.found & ~motion.back_side_contact
 
     def flanks(self, roll_length, depth: Depth) -> dict[str, AbstractModification]:
         """Both flanks with what is worn off them."""
@@ -144,9 +144,9 @@ class Case(eqx.Module):
     def cycles(self, roll_length, marched: March) -> MeshCycle:
         """The mesh on all flanks of a march, leading axis (lives,); (lives, torques) under a load spectrum."""
 
-        def under(flanks, load: Operation, found) -> MeshCycle:
+        def under(flanks, load: OperatingPoint, found) -> MeshCycle:
             return MeshCycle(
-                kinematics=self.mesh.kinematics, margins=self.mesh.margins, operation=load, **flanks, **found
+                kinematics=self.mesh.kinematics, margins=self.mesh.margins, operating_point=load, **flanks, **found
             )
 
         def on(depth, found, known) -> MeshCycle:
@@ -166,12 +166,12 @@ class Case(eqx.Module):
         wide as their own loads and curvatures make them instead of as one pair that carries the full load.
         """
 
-        def largest(depth, cycle: MeshCycle, load: Operation, line_load):
+        def largest(depth, cycle: MeshCycle, load: OperatingPoint, line_load):
             flanks = self._worn(roll_length, depth)
             removed = slid_material(self.mesh, load.torque, flanks["pinion"], flanks["wheel"], line_load)
             return jnp.max(flank_pressure(cycle.kinematics, cycle.line_load, removed.bend))
 
-        def under(depth, load: Operation, cycle: MeshCycle):
+        def under(depth, load: OperatingPoint, cycle: MeshCycle):
             own = cycle.line_load / jnp.maximum(1 + cycle.bend, FLATTEST)
             given = cycle.line_load if self.mesh.compliance.averages_over_loaded_width else None
             here = largest(depth, cycle, load, given)
@@ -278,10 +278,10 @@ def _deviation(owner: str, mesh: Mesh, deviation: Any) -> Float[Array, "*shape"]
     return deviation
 
 
-def _loads(owner: str, torque: Any, dtype) -> tuple[Operation, Float[Array, " torques"] | None]:
+def _loads(owner: str, torque: Any, dtype) -> tuple[OperatingPoint, Float[Array, " torques"] | None]:
     """Operations with a leading axis (torques,), and the shares of a spectrum; None for a single load."""
     if not isinstance(torque, LoadSpectrum):
-        single = operation_of(owner, torque, dtype)
+        single = operating_point_of(owner, torque, dtype)
         return jax.tree.map(lambda number: number[None], single), None
     if torque.duration is not None and torque.speeds is None:
         raise ValueError(f"{owner}: a load spectrum with a duration needs speeds, for the shares of the revolutions")
@@ -289,7 +289,7 @@ def _loads(owner: str, torque: Any, dtype) -> tuple[Operation, Float[Array, " to
     friction = None if load.friction is None else jnp.broadcast_to(load.friction, load.torques.shape)
 
     def each(torque, speed, friction):
-        return Operation(torque, speed, friction)
+        return OperatingPoint(torque, speed, friction)
 
     weights = load.weights
     if load.duration is not None and load.speeds is not None:

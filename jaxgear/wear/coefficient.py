@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..contact import MeshCycle, Operation
+from ..contact import MeshCycle, OperatingPoint
 from ..metrics.flash import flash_temperature
 from ..numerics import check, real
 
@@ -34,9 +34,9 @@ class OfLubrication(eqx.Module):
     of: Callable[..., Any]
 
     def __call__(self, cycle: MeshCycle) -> Field:
-        kinematics, speed = cycle.kinematics, cycle.operation.speed
+        kinematics, speed = cycle.kinematics, cycle.operating_point.speed
         assert speed is not None  # `wear_law` has asked for it
-        friction = {} if cycle.operation.friction is None else {"friction": cycle.operation.friction}
+        friction = {} if cycle.operating_point.friction is None else {"friction": cycle.operating_point.friction}
         contact = kinematics.path_of_contact
         sliding = contact.sliding_speed(jnp.clip(kinematics.path, contact.start, contact.end), speed)
         pressure = cycle.contact_pressure + cycle.corner_pressure
@@ -59,7 +59,7 @@ class OfLubrication(eqx.Module):
         return jnp.where(loaded, jnp.stack([jnp.broadcast_to(field, shape) for field in fields]), 0.0)
 
 
-def wear_law(coefficient: Any, loads: Operation, dtype) -> Constant | OfLubrication:
+def wear_law(coefficient: Any, loads: OperatingPoint, dtype) -> Constant | OfLubrication:
     """What gives the coefficient of both gears at every contact of a cycle, (gears, pairs, slices, positions).
 
     Raises:
@@ -67,7 +67,7 @@ def wear_law(coefficient: Any, loads: Operation, dtype) -> Constant | OfLubricat
     """
     if callable(coefficient):
         if loads.speed is None:
-            raise ValueError("wear: coefficient is a function, which needs a speed: give Operation(torque, speed)")
+            raise ValueError("wear: coefficient is a function, which needs a speed: give OperatingPoint(torque, speed)")
         return OfLubrication(coefficient)
     values = real(coefficient).astype(dtype)
     if values.shape not in ((), (_GEARS,)):

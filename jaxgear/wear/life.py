@@ -121,25 +121,25 @@ def wear(
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m], an `Operation`, or a `LoadSpectrum`. Its weights are shares of the revolutions;
-            those of one with a duration, `LoadSpectrum.from_hours`, are shares of the hours and count times the speeds.
+        torque: on the pinion [N m], an `OperatingPoint`, or a `LoadSpectrum`. Its weights are shares of the
+            revolutions; those of one with a duration, `LoadSpectrum.from_hours`, are shares of the hours and count
+            times the speeds.
         revolutions: of the pinion, all together.
         coefficient: of wear [m2/N] of both gears, or a pair of numbers, (pinion, wheel); from 1e-18 for good films to
             5e-16 for mild wear of mixed lubrication. Or a function of the state of lubrication at every contact, of
             pressure [MPa], sliding speed [m/s] and flash temperature [K], arrays of shape (pairs, slices, positions),
             to such an array or a pair of them; traced, and asked where there is load. It needs the speed of an
-            `Operation`. Flanks that NaN or a negative number have worn are not `known`. Where it depends on numbers
-            of its own to differentiate by, they may be fields of an `equinox.Module`.
+            `OperatingPoint`. Flanks that NaN or a negative number have worn are not `known`. Where it depends on
+            numbers of its own to differentiate by, they may be fields of an `equinox.Module`.
         pinion, wheel: modifications of the new flanks; None for nominal involutes.
         deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions);
-            None for perfect gears.
+            None for nominal gears.
         blocks: of equal length, even: two and two are compared with one of double length.
         points: of the grid on each flank, evenly spaced from the start of the active profile to the tip; None for
-            one and a half times the positions, from 33 to 97.
-            Points nearer to each other than the contact is wide
-            show no more, and pile up at the tip what the contact there would wear beyond it.
-        dynamics: what vibrates, its speeds aside: the motion is that at the speed of an `Operation`, or of every load
-            of a spectrum. None for no vibration.
+            one and a half times the positions, from 33 to 97. Points nearer to each other than the contact is wide show
+            no more, and pile up at the tip what the contact there would wear beyond it.
+        dynamics: what vibrates, its speeds aside: the motion is that at the speed of an `OperatingPoint`, or of every
+            load of a spectrum. None for no vibration.
         line_load: "dynamic" for the flanks to wear under the elastic force of the steady motion that begins at rest,
             found anew in every contact analysis: the contact at every mesh position is that under the force of the
             motion there, and the wear is the mean of the mesh cycles of its orbit, as if every tooth took part in each

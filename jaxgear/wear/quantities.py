@@ -134,7 +134,7 @@ def blocks_are_short(life: WearLife) -> Bool[Array, ""]:
 def _life(name: str, settings: Any, cycle: MeshCycle) -> WearLife:
     mesh = cycle.mesh_for(name)
     flanks = {"pinion": cycle.pinion, "wheel": cycle.wheel}
-    load = cycle.operation if settings.loads is None else None
+    load = cycle.operating_point if settings.loads is None else None
     return settings.life(mesh, load, **flanks, deviation=deviation_of(cycle, mesh))
 
 

@@ -73,7 +73,7 @@ class Wear(Checked):
 
         Args:
             mesh: prepared mesh.
-            torque: on the pinion [N m], or an `Operation`; None, and only then, where the settings have loads.
+            torque: on the pinion [N m], or an `OperatingPoint`; None, and only then, where the settings have loads.
             pinion, wheel: modifications of the new flanks.
             deviation: material that manufacturing deviations remove besides [um].
 

@@ -6,7 +6,7 @@ import equinox as eqx
 import jax
 from jaxtyping import Array, Float
 
-from ..contact import Mesh, Operation
+from ..contact import Mesh, OperatingPoint
 from ..dynamics import Dynamics, mesh_frequency, steps_for
 from ..dynamics.from_contact import interpolated, resized
 from ..dynamics.steady import SteadyForce
@@ -27,7 +27,7 @@ class Vibration(eqx.Module):
         mesh: prepared at the positions of the mesh force.
         coast: modifications of the coast flanks of (pinion, wheel), which do not wear.
         deviation: material that manufacturing deviations remove from the drive flanks at these positions [um]; None
-            for perfect gears.
+            for nominal gears.
         steps: of the integrator per mesh cycle.
         wears: whether the flanks wear under the forces of the motion.
     """
@@ -39,7 +39,7 @@ class Vibration(eqx.Module):
     steps: int = eqx.field(static=True)
     wears: bool = eqx.field(static=True)
 
-    def force(self, flanks: Flanks, load: Operation, phase: Float[Array, " positions"]) -> SteadyForce:
+    def force(self, flanks: Flanks, load: OperatingPoint, phase: Float[Array, " positions"]) -> SteadyForce:
         """Force of the steady motion from rest, at mesh positions [base pitches]."""
         assert load.speed is not None  # `vibration_of` has asked for it
         more: dict[str, Any] = {"coast": self.coast, "deviation": self.deviation}
@@ -51,7 +51,7 @@ class Vibration(eqx.Module):
 def vibration_of(
     owner: str,
     mesh: Mesh,
-    loads: Operation,
+    loads: OperatingPoint,
     settings: Dynamics | None,
     line_load: LineLoad | None,
     flanks: Flanks,
@@ -78,7 +78,9 @@ def vibration_of(
     if settings is None:
         return None
     if loads.speed is None:
-        raise ValueError(f"{owner}: dynamics needs a speed: give Operation(torque, speed), or speeds of the spectrum")
+        raise ValueError(
+            f"{owner}: dynamics needs a speed: give OperatingPoint(torque, speed), or speeds of the spectrum"
+        )
     check(owner, "speed with dynamics", loads.speed, "rpm", low=0.0, open_low=True)
     check(owner, "torque with dynamics", loads.torque, "N m", low=0.0, open_low=True)
     numbers, rest = eqx.partition(settings, eqx.is_array)

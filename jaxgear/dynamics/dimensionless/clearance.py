@@ -37,7 +37,7 @@ class PolynomialClearance(AbstractMeshForce):
         range: largest |x|.
 
     Raises:
-        ValueError: for a concrete approach out of range.
+        ValueError: for a concrete DTE out of range.
     """
 
     coefficients: Float[Array, " terms"] = number("", shape=("terms",))
@@ -66,12 +66,12 @@ class PolynomialClearance(AbstractMeshForce):
     def at(self, phase: Scalar) -> tuple:
         return ()
 
-    def force(self, place, approach: Scalar) -> Scalar:
-        known, most = concrete(approach), concrete(self.range)
+    def force(self, place, dte: Scalar) -> Scalar:
+        known, most = concrete(dte), concrete(self.range)
         if known is not None and most is not None:
-            check("PolynomialClearance", "approach", known, "", low=-most, high=most)
-        inside = jnp.abs(approach) <= self.range
-        x = jnp.where(inside, approach, 0.0)
+            check("PolynomialClearance", "dte", known, "", low=-most, high=most)
+        inside = jnp.abs(dte) <= self.range
+        x = jnp.where(inside, dte, 0.0)
         return jnp.where(inside, self.polynomial(x), jnp.nan)
 
     def polynomial(self, x: Scalar) -> Scalar:

@@ -57,7 +57,7 @@ def from_mesh(
         cycle: loaded mesh, one design under one torque above 0.
         mass: equivalent mass on the line of action [kg], m = I_1 I_2 / (I_1 r_b2^2 + I_2 r_b1^2).
         damping_ratio: zeta; or
-        damping: of the approach [N s/um], zeta = c / (2 sqrt(m k_mean)).
+        damping: of the DTE [N s/um], zeta = c / (2 sqrt(m k_mean)).
         half_clearance: b on the line of action [um]; None for half of the pair's backlash.
         torque_fluctuation: F_aT over F_m, at one order.
         torque_order: of the mesh frequency.

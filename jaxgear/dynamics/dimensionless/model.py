@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...numerics import Checked, check, number, real
-from ..force import AbstractMeshForce, DeadZone, approach_under
+from ..force import AbstractMeshForce, DeadZone, te_under
 from ..oscillator import Excitation, Oscillator
 from .clearance import PolynomialClearance, warn_of_false_well
 from .relief import CycleRelief
@@ -20,7 +20,7 @@ Orders = Float[Array, " orders"]
 ReliefForm = Literal["exact", "first order", "first order as printed"]
 
 
-def loaded_approach(clearance: AbstractMeshForce, load: Scalar) -> Scalar:
+def loaded_te(clearance: AbstractMeshForce, load: Scalar) -> Scalar:
     """x > 0 with f(x) = load > 0."""
     if isinstance(clearance, PolynomialClearance):
         return clearance.loaded(load)
@@ -77,13 +77,13 @@ class DimensionlessForce(AbstractMeshForce):
         moved = jnp.where(place == first, ends[0], jnp.where(place == second, ends[1], even))
         return jnp.sort(moved)
 
-    def static_approach(self, phase: Scalar, force: Scalar) -> Scalar:
+    def static_te(self, phase: Scalar, force: Scalar) -> Scalar:
         """x that takes a force; of the exact form C + f^-1(force / stiffness), outside of a false double well."""
         place = self.at(phase)
         if self.relief_form != "exact":
-            return approach_under(self, place, force)
+            return te_under(self, place, force)
         _, stiffness, taken = place
-        size = loaded_approach(self.clearance, jnp.abs(force) / stiffness)
+        size = loaded_te(self.clearance, jnp.abs(force) / stiffness)
         return taken + jnp.where(force < 0, -size, size)
 
     def at(self, phase: Scalar) -> Any:
@@ -93,16 +93,16 @@ class DimensionlessForce(AbstractMeshForce):
         taken = jnp.zeros_like(stiffness) if self.relief is None else self.relief(phase)
         return self.clearance.at(phase), stiffness, taken
 
-    def force(self, place: Any, approach: Scalar) -> Scalar:
+    def force(self, place: Any, dte: Scalar) -> Scalar:
         inner, stiffness, taken = place
         if self.relief_form == "exact":
-            return stiffness * self.clearance.force(inner, approach - taken)
+            return stiffness * self.clearance.force(inner, dte - taken)
         sign = 1.0 if self.relief_form == "first order as printed" else -1.0
 
         def of(x):
             return self.clearance.force(inner, x)
 
-        value, change = jax.jvp(of, (approach,), (taken,))
+        value, change = jax.jvp(of, (dte,), (taken,))
         return stiffness * (value + sign * change)
 
 
@@ -111,9 +111,9 @@ class DimensionlessModel(Checked):
         = F_m + sum F_aT cos(n Omega t + phi_T) + sum F_ah (n Omega)^2 cos(n Omega t + phi_h)
 
     Lengths are over the half clearance b, times times omega_0 = sqrt(k_mean / m), forces over b k_mean; Omega is the
-    mesh frequency over omega_0. x is the approach of the flanks, 0 in the middle of the clearance. The study of dynamic
-    modification writes one harmonic each of F_aT and F_ah, at frequencies of their own: here at any multiples n of the
-    mesh frequency.
+    mesh frequency over omega_0. x is the dynamic transmission error, 0 in the middle of the clearance. The study of
+    dynamic modification writes one harmonic each of F_aT and F_ah, at frequencies of their own: here at any multiples n
+    of the mesh frequency.
 
     F_ah is the amplitude of a displacement e between the gears: with the coordinate q = x + e of an `Oscillator` the
     right-hand side has no Omega^2, and -e'' brings it about for x.
@@ -169,7 +169,7 @@ class DimensionlessModel(Checked):
         )
 
     def oscillator(self) -> Oscillator:
-        """The model as a vector field of x + e, x = `oscillator.approach`; its mesh frequency is Omega / (2 pi)."""
+        """The model as a vector field of x + e, x = `oscillator.dte`; its mesh frequency is Omega / (2 pi)."""
         excitation = Excitation(
             self.torque / self.load, self.torque_angles, self.displacement, self.displacement_angles, self.orders
         )

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from ...numerics import Checked, program, real, result, safe_sqrt
-from .model import DimensionlessModel, loaded_approach
+from .model import DimensionlessModel, loaded_te
 
 Scalar = Float[Array, ""]
 Lines = Complex[Array, " orders"]
@@ -109,7 +109,7 @@ def loaded_mean(model: DimensionlessModel) -> LoadedMean:
         return x - (jnp.mean(over_cycle(x)) - model.load) / jnp.mean(first(x))
 
     shift = 0.0 if model.relief is None else jnp.mean(jax.vmap(model.relief)(phase))
-    start = loaded_approach(model.clearance, model.load) + shift
+    start = loaded_te(model.clearance, model.load) + shift
     x = jax.lax.fori_loop(0, _NEWTON, newton, start)
     orders = real(np.arange(1, _HIGHEST + 1)).astype(phase.dtype)
     turn = turned(-2 * jnp.pi * orders[:, None] * phase[None])

@@ -186,7 +186,7 @@ def _static_amplitude(model: DimensionlessModel, relief: CycleRelief) -> Scalar:
     """Half of the range of x where the mesh force equals F_m at every position: x = C + f^-1(F_m / stiffness)."""
     force = with_relief(model, relief).mesh_force
     phase = real(np.arange(_POSITIONS) / _POSITIONS)
-    static = jax.vmap(force.static_approach, in_axes=(0, None))(phase, model.load)
+    static = jax.vmap(force.static_te, in_axes=(0, None))(phase, model.load)
     return 0.5 * spread(static, axis=-1)
 
 

@@ -14,7 +14,7 @@ _SAME_RATIO = 1e-3  # by which two contact ratios may differ and still be those 
 
 
 class CycleRelief(Checked):
-    """Tip relief of both gears as what it takes off the approach of the whole mesh, C(phase).
+    """Tip relief of both gears as what it takes off the DTE of the whole mesh, C(phase).
 
     One pair at the distance t from the begin of its path of contact has lost `amount * curve(delta)`, with delta = s /
     length from 0 where the relief starts to 1 at the tip, on either end of the path. Of two pairs in contact, equally
@@ -67,7 +67,7 @@ class CycleRelief(Checked):
 
 
 def cycle_relief(relief: TipRelief, pair: GearPair, half_clearance) -> CycleRelief:
-    """What one tip relief on both gears takes off the approach of their mesh.
+    """What one tip relief on both gears takes off the DTE of their mesh.
 
     Args:
         relief: of either gear.

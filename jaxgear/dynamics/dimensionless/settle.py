@@ -7,7 +7,7 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from ...numerics import Checked, check, kernel, program, real, result, safe_divide, whole
 from ..orbit import settled_orbit
-from .model import DimensionlessModel, loaded_approach
+from .model import DimensionlessModel, loaded_te
 
 Scalar = Float[Array, ""]
 
@@ -20,7 +20,7 @@ class Settled(Checked):
 
     Attributes:
         phase: mesh positions of the samples [base pitches], shape (samples,).
-        approach: x there, shape (samples,).
+        dte: x there, shape (samples,).
         force: of the mesh over b k_mean, shape (samples,).
         weight: share of the recorded time that a sample stands for, shape (samples,).
         amplitude: half of the range of x, S1's alpha_max.
@@ -30,7 +30,7 @@ class Settled(Checked):
     """
 
     phase: Float[Array, " samples"] = result("base pitches")
-    approach: Float[Array, " samples"] = result()
+    dte: Float[Array, " samples"] = result()
     force: Float[Array, " samples"] = result()
     weight: Float[Array, " samples"] = result()
     amplitude: Scalar = result()
@@ -41,11 +41,11 @@ class Settled(Checked):
     @property
     def mean(self) -> Scalar:
         """Of x."""
-        return jnp.sum(self.weight * self.approach)
+        return jnp.sum(self.weight * self.dte)
 
     def harmonic(self, order) -> Complex[Array, ""]:
         """Complex amplitude c of x ~ Re(c e^(2 pi i order phase))."""
-        return _harmonic(self.phase, self.weight * self.approach, real(order))
+        return _harmonic(self.phase, self.weight * self.dte, real(order))
 
 
 def settled_vibration(
@@ -74,7 +74,7 @@ def settled_vibration(
 
 def at_rest(model: DimensionlessModel) -> Float[Array, " two"]:
     """The loaded mean without vibration: (x_m, 0)."""
-    mean = loaded_approach(model.clearance, model.load)
+    mean = loaded_te(model.clearance, model.load)
     shift = jnp.zeros_like(mean) if model.relief is None else jnp.mean(jax.vmap(model.relief)(_phases(64)))
     return jnp.stack([mean + shift, jnp.zeros_like(mean)])
 
@@ -84,15 +84,15 @@ def _settle(model: DimensionlessModel, frequency: Scalar, begin, settling: int, 
     start = begin[:1], begin[1:]
     orbit = settled_orbit(model.oscillator(), frequency / (2 * jnp.pi), start, steps, settling, periods)
     length = jnp.diff(orbit.phase, append=jnp.full(1, periods, orbit.phase.dtype))
-    residual = safe_divide(orbit.residual, jnp.max(jnp.abs(orbit.approach)))
+    residual = safe_divide(orbit.residual, jnp.max(jnp.abs(orbit.dte)))
     return Settled(
         phase=orbit.phase,
-        approach=orbit.approach,
+        dte=orbit.dte,
         force=orbit.force,
         weight=0.5 * (length + jnp.roll(length, 1)) / periods,
-        amplitude=0.5 * (orbit.approach_max - orbit.approach_min),
+        amplitude=0.5 * (orbit.dte_max - orbit.dte_min),
         residual=residual,
-        settled=jnp.isfinite(orbit.approach).all() & orbit.stable & (residual < _SETTLED),
+        settled=jnp.isfinite(orbit.dte).all() & orbit.stable & (residual < _SETTLED),
         start=jnp.concatenate(orbit.start),
     )
 

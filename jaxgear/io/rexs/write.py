@@ -111,7 +111,7 @@ def write_rexs(
 
 
 def _of_cycle(pair, cycle: MeshCycle, pinion, wheel, torque, speed, friction):
-    """What a cycle says of its modifications and operation."""
+    """What a cycle says of its modifications and operating point."""
     for name, given in (("pinion", pinion), ("wheel", wheel), ("torque", torque)):
         if given is not None:
             raise ValueError(f"write_rexs: {name} has no effect with cycle, leave it out")
@@ -124,12 +124,12 @@ def _of_cycle(pair, cycle: MeshCycle, pinion, wheel, torque, speed, friction):
         raise ValueError("write_rexs: cycle is of another pair")
     if cycle.pinion is None or cycle.wheel is None:
         raise ValueError("write_rexs: cycle does not hold its modifications, it comes from solve_removed")
-    operation = cycle.operation
-    speed = operation.speed if speed is None else speed
+    operating_point = cycle.operating_point
+    speed = operating_point.speed if speed is None else speed
     return (
         cycle.pinion,
         cycle.wheel,
-        operation.torque,
+        operating_point.torque,
         None if speed is None else float(speed),
-        operation.friction if friction is None else friction,
+        operating_point.friction if friction is None else friction,
     )

@@ -8,8 +8,8 @@ from ..numerics import Checked, check, number, real
 Scalar = Float[Array, ""]
 
 
-class Operation(Checked):
-    """One state of operation; many are made with `jax.vmap`.
+class OperatingPoint(Checked):
+    """Load and speed of a mesh; many are made with `jax.vmap`.
 
     Attributes:
         torque: on the pinion [N m].
@@ -25,18 +25,18 @@ class Operation(Checked):
     friction: Scalar | None = number("", low=0.0, optional=True, default=None)
 
 
-def operation_of(owner: str, torque, dtype) -> Operation:
-    """An operation in the precision of a mesh, of a torque [N m] or of an operation.
+def operating_point_of(owner: str, torque, dtype) -> OperatingPoint:
+    """An operating point in the precision of a mesh, of a torque [N m] or of an operating point.
 
     Raises:
         ValueError: for a negative or non-finite torque, or an array of torques; the message names the owner.
     """
-    if not isinstance(torque, Operation):
+    if not isinstance(torque, OperatingPoint):
         torque = real(torque, f"{owner}: torque")
         if torque.ndim:
             raise ValueError(
                 f"{owner}: torque has shape {torque.shape}, must be a single number; solve for many with jax.vmap"
             )
         check(owner, "torque", torque, "N m", low=0.0)
-        torque = Operation(torque)
+        torque = OperatingPoint(torque)
     return jax.tree.map(lambda part: part.astype(dtype), torque)

@@ -23,7 +23,7 @@ _ACCEPT, _POOR, _GOOD = 0.05, 0.25, 0.75  # actual over predicted decrease
 _SHRINK, _GROW = 0.35, 2.0
 
 
-class Minimax(Checked, AbstractMethod):
+class SLP(Checked, AbstractMethod):
     """Trust-region sequential linear programming from many start points, then again from around the best design.
 
     Each step solves a linear program in which every position of the transmission error is linear and the extremes are
@@ -45,7 +45,7 @@ class Minimax(Checked, AbstractMethod):
 
     @property
     def name(self) -> str:
-        return "minimax"
+        return "slp"
 
     def search(self, problem: Problem, record: Record) -> None:
         """Advances all searches of a round until none finds a better step."""
