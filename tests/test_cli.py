@@ -33,8 +33,8 @@ from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
 from jaxgear.io.schema_optimize import METHODS_WITHOUT_VARIABLES
 from jaxgear.manufacture import over_balls
-from jaxgear.metrics import Doubt
-from jaxgear.metrics.plausibility import Limit
+from jaxgear.metrics import Finding
+from jaxgear.metrics.findings import Limit
 from jaxgear.microgeometry import NoModification
 from jaxgear.optimize import result as optimum_result
 from jaxgear.report import read_table
@@ -210,9 +210,11 @@ def test_the_summary_says_what_was_computed(analyzed):
     assert model["plane"] == "auto" and model["compliance"]["body"]["type"] == "elastic_ring"
     assert "bores: pinion 24.75 mm (half the root diameter, as none is given), wheel" in analyzed.out
     assert "; centre distance 100.5 mm, backlash on the line of action 0 um\n" in analyzed.out
-    doubts = {name: [doubt["name"] for doubt in of["doubts"]] for name, of in analyzed.summary["designs"].items()}
-    assert doubts == {"unmodified": ["corner pressure"], "modified": []}
-    assert analyzed.out.count("please check") == 1
+    findings = {
+        name: [finding["name"] for finding in of["findings"]] for name, of in analyzed.summary["designs"].items()
+    }
+    assert findings == {"unmodified": ["corner pressure"], "modified": []}
+    assert analyzed.out.count("warning") == 1
 
 
 def test_shafts_that_an_analysis_leaves_out_are_told(folder, analyzed):
@@ -227,18 +229,18 @@ def test_shafts_that_an_analysis_leaves_out_are_told(folder, analyzed):
 def test_what_is_not_usual_is_said_once_of_all_designs_it_concerns():
     usual, range_ = Limit(0.0, 1650.0, "MPa", "case-hardened"), Limit(0.0, 0.5, "", "steel")
     found = {
-        "unmodified": (Doubt("friction", "", 3.7, range_), Doubt("corner pressure", "", 4689.0, usual)),
+        "unmodified": (Finding("friction", "", 3.7, range_), Finding("corner pressure", "", 4689.0, usual)),
         "optimum": (
-            Doubt("friction", "", 3.7, range_),
-            Doubt("corner pressure", "", 1837.0, usual),
-            Doubt("flank pressure", "", 3383.0, usual),
+            Finding("friction", "", 3.7, range_),
+            Finding("corner pressure", "", 1837.0, usual),
+            Finding("flank pressure", "", 3383.0, usual),
         ),
     }
-    assert list(report.doubt_lines(found)) == [
-        "please check: friction 3.7 is more than 0.5 (steel)",
-        "please check: unmodified 4689 MPa, optimum 1837 MPa: corner pressure 1837 MPa is more than 1650 MPa "
+    assert list(report.finding_lines(found)) == [
+        "warning: friction 3.7 is more than 0.5 (steel)",
+        "warning: unmodified 4689 MPa, optimum 1837 MPa: corner pressure 1837 MPa is more than 1650 MPa "
         "(case-hardened)",
-        "please check: optimum: flank pressure 3383 MPa is more than 1650 MPa (case-hardened)",
+        "warning: optimum: flank pressure 3383 MPa is more than 1650 MPa (case-hardened)",
     ]
 
 

@@ -25,6 +25,7 @@ from jaxgear.layout import (
     crowning_off_the_edges,
     damage,
     face_load_over_torques,
+    findings_of,
     flank_line_tolerance,
     gear_lives,
     helix_slope_limits,
@@ -32,7 +33,6 @@ from jaxgear.layout import (
     level_load,
     lives_in_cases,
     longest_life,
-    plausibility,
     tolerance_cases,
     vary_profiles,
     without_housing,
@@ -291,13 +291,15 @@ def softened(radial):
     )
 
 
-def test_usual_shafts_raise_no_doubt_and_slips_of_a_unit_do(layout):
-    (thick,) = plausibility(layout, SUPPORT)  # a bore of 40 mm on a shaft of 45 mm
+def test_usual_shafts_have_no_finding_and_slips_of_a_unit_do(layout):
+    (thick,) = findings_of(layout, SUPPORT)  # a bore of 40 mm on a shaft of 45 mm
     assert (thick.name, thick.where, thick.value) == ("shaft diameter over bore", 'gear "w2"', 45.0 / 40.0)
     soft = softened(0.1)
     options = {"torque": OWN_TORQUE, "gear": "pinion", "stations": STATIONS}
     found = layout_flank_lines(soft, FlankLineTolerance(8.0), further=helix_slope_limits(SUPPORT.pair, 6), **options)
-    told = {(doubt.name, doubt.where): doubt for doubt in plausibility(found, soft) if doubt.name != thick.name}
+    told = {
+        (finding.name, finding.where): finding for finding in findings_of(found, soft) if finding.name != thick.name
+    }
     bearings = {("radial stiffness", f'bearing "{name}"') for name in "CE"}
     moved = {("radial displacement in modules", f'bearing "{name}"') for name in "CE"}
     flank = {("K_Hbeta", "without modification"), ("slope and crowning in modules", "pinion")}
@@ -307,19 +309,19 @@ def test_usual_shafts_raise_no_doubt_and_slips_of_a_unit_do(layout):
     # nearly all of the load is on one of the stations
     few = told["K_Hbeta", "without modification"]
     assert few.value > 0.5 * STATIONS and few.limit.high == STATIONS / 4
-    stiff = plausibility(layout, softened(5e5))
-    assert {doubt.name for doubt in stiff} == {"radial stiffness", thick.name}
+    stiff = findings_of(layout, softened(5e5))
+    assert {finding.name for finding in stiff} == {"radial stiffness", thick.name}
     assert str(stiff[0]).startswith('bearing "C", radial stiffness 5e+05 N/um is more than 2e+04 N/um (')
 
 
-def test_crowning_that_costs_more_than_bending_raises_a_doubt():
+def test_crowning_that_costs_more_than_bending_is_a_finding():
     """Of rigid axes, on which unmodified flanks carry evenly; the contact says the same, or worse."""
     tolerance, lines = FlankLineTolerance(4.0, 2.0), (12.0, 12.0)
     found = layout_flank_lines(rigid(), tolerance, torque=TORQUE, further=lines, stations=STATIONS)
     (level, *_), (crowned, *_) = (of["tolerance"].face_load_factor for of in (found.unmodified, found.after))
     assert float(level) == pytest.approx(1.0) and float(crowned) > 1.2 and float(found.needed) < 0.5 * sum(lines)
     contact = {"unmodified": [1.176, 1.5], "step 1": [1.0, 1.45], "step 2": [1.856, 1.9]}
-    told = {(each.name, each.where): each for each in plausibility(found, rigid(), contact={"tolerance": contact})}
+    told = {(each.name, each.where): each for each in findings_of(found, rigid(), contact={"tolerance": contact})}
     name, worst = "K_Hbeta without deviations", "K_Hbeta of the worst case"
     of_contact = worst, "after step 2, tolerance deviations, contact analysis"
     of_annex_e = worst, "after step 2, tolerance deviations"
@@ -329,10 +331,10 @@ def test_crowning_that_costs_more_than_bending_raises_a_doubt():
         "after step 2, contact analysis, K_Hbeta without deviations 1.856 is more than 1.411 (more than 1.2 times that"
     )
     least = layout_flank_lines(rigid(), tolerance, torque=TORQUE, stations=STATIONS)
-    assert not plausibility(least, rigid(), contact={"tolerance": contact | {"step 2": [1.3, 1.4]}})
+    assert not findings_of(least, rigid(), contact={"tolerance": contact | {"step 2": [1.3, 1.4]}})
 
 
-def test_slips_that_the_load_does_not_show_raise_a_doubt(layout, monkeypatch):
+def test_slips_that_the_load_does_not_show_are_findings(layout, monkeypatch):
     """Clearance and axes in mm, a bearing under the teeth, gears that mesh with nothing and hit each other."""
     box = gearbox()
     into, out = box.shafts
@@ -344,11 +346,11 @@ def test_slips_that_the_load_does_not_show_raise_a_doubt(layout, monkeypatch):
     box = replace(box, shafts=(into, out), meshes=meshes)
     # none of these is a matter of how far the bearings move
     still = SimpleNamespace(names=box.bearing_names, shaft=np.zeros((4, 5)))
-    asked = importlib.import_module("jaxgear.layout.plausibility")
+    asked = importlib.import_module("jaxgear.layout.findings")
     monkeypatch.setattr(asked, "bearing_reactions", lambda gearbox: still)
     cases = replace(layout.before["maximum"], slope=1e-3 * layout.before["maximum"].slope)
     told = {
-        (each.name, each.where) for each in plausibility(replace(layout, before={"maximum": cases}), support(box, 0))
+        (each.name, each.where) for each in findings_of(replace(layout, before={"maximum": cases}), support(box, 0))
     }
     assert told == {
         ("clearance", 'bearing "A"'),
@@ -363,7 +365,7 @@ def test_slips_that_the_load_does_not_show_raise_a_doubt(layout, monkeypatch):
     # of step 3, in mm on one gear and far too deep on the other
     amounts = {"pinion_amount": np.array([0.0, 0.02]), "wheel_amount": np.array([0.0, 900.0])}
     tried = SimpleNamespace(table=SimpleNamespace(column=amounts.get))
-    told = {(each.name, each.where) for each in plausibility(layout, rigid(), profiles=tried)}
+    told = {(each.name, each.where) for each in findings_of(layout, rigid(), profiles=tried)}
     deep = ("depth of the modification in modules", "wheel")
     assert told == {("depth of the modification", "pinion"), deep}
 
@@ -536,11 +538,11 @@ def test_layout_for_a_duty_cycle_tells_relative_lives(bent):
     assert 0 < float(worst.largest) < 1
     fast = replace(load, speeds=1e3 * load.speeds)
     spent = replace(found, damage=(*found.damage[:2], replace(worst, pitting=worst.pitting * 1.5 / worst.largest)))
-    usual = {each.name for each in plausibility(found, bent, duty_cycle=load)}
+    usual = {each.name for each in findings_of(found, bent, duty_cycle=load)}
     for layout, cycle, name in ((found, fast, "pitch line velocity"), (spent, load, "damage by the duty cycle")):
-        (doubt,) = [each for each in plausibility(layout, bent, duty_cycle=cycle) if each.name not in usual]
-        assert doubt.name == name
-    assert doubt.value == pytest.approx(1.5) and doubt.where == "after step 2"
+        (finding,) = [each for each in findings_of(layout, bent, duty_cycle=cycle) if each.name not in usual]
+        assert finding.name == name
+    assert finding.value == pytest.approx(1.5) and finding.where == "after step 2"
 
 
 def test_lives_in_cases_are_those_of_misaligned_axes():

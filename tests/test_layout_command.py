@@ -123,11 +123,11 @@ def laid_out(path, folder):
     """Summary and output of the command, after what holds with and without a housing."""
     done = call("layout", str(path), "--output", str(folder), "--report")
     assert done.code == 0, done.err
-    doubts = [line for line in done.out.splitlines() if line.startswith("please check")]
-    assert len(doubts) == 1 and doubts[0].startswith(
-        'please check: gear "wheel", shaft diameter over bore 1.023 is more'
+    findings = [line for line in done.out.splitlines() if line.startswith("warning")]
+    assert len(findings) == 1 and findings[0].startswith(
+        'warning: gear "wheel", shaft diameter over bore 1.023 is more'
     )
-    assert "please check" in (folder / "report.html").read_text()
+    assert "warning" in (folder / "report.html").read_text()
     names = {entry.name for entry in folder.iterdir()}
     figures = {"tolerance_cases.png", "face_load_factors.png", "face_load_over_torque.png", "shaft_deflection.png"}
     assert names == {"summary.json", "report.html", "flanks.csv", *figures} <= RESULT_FILES
@@ -166,7 +166,7 @@ def laid_out(path, folder):
     assert "life relative to the even load" in done.out and "life after step 1 [h]" in done.out
     assert found["profiles"] == {}
     for one in found["layouts"].values():
-        assert [(each["name"], each["where"]) for each in one["doubts"]] == [
+        assert [(each["name"], each["where"]) for each in one["findings"]] == [
             ("shaft diameter over bore", 'gear "wheel"')
         ]
     return found, done.out

@@ -307,7 +307,7 @@ def test_a_constraint_ends_a_step_and_a_violation_comes_first():
 def test_a_limit_that_is_reached_leaves_no_decrease(excess):
     """A falling objective against a rising constraint; what passes the limit within the tolerance is no gain."""
     at_limit = model([[2.0, 0.0]], [[[-1.0], [0.0]]], [0.5], excess=[excess], excess_slope=[[10.0]])
-    assert at_limit.decrease_left(1e-3) == pytest.approx(1.0 if excess == -1e-2 else 0.0, abs=1e-9)
+    assert at_limit.optimality(1e-3) == pytest.approx(1.0 if excess == -1e-2 else 0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -354,5 +354,5 @@ def test_a_failed_solution_has_no_value():
         Linearization((Pieces(pieces, slope, pieces, slope),), (), np.False_),
     )
     assert not failed.fine
-    assert np.isnan(failed.decrease_left(1e-3))
+    assert np.isnan(failed.optimality(1e-3))
     assert failed.value == np.inf

@@ -101,11 +101,11 @@ def test_compromise_is_a_design_of_the_front_next_to_the_ideal(searched):
 def test_every_design_of_the_front_has_first_order_evidence(searched, volume_per_amount):
     """What is left is what no direction improves in both objectives; beside the front there is such a direction."""
     front = searched
-    assert front.decrease_left.shape == (len(front.values),)
-    assert np.isfinite(front.decrease_left).all() and (front.decrease_left >= 0).all()
+    assert front.optimality.shape == (len(front.values),)
+    assert np.isfinite(front.optimality).all() and (front.optimality >= 0).all()
     # most designs were sought, each until no step was left
-    assert np.median(front.decrease_left) < 0.05
-    assert front.compromise.decrease_left == front.decrease_left[front.chosen]
+    assert np.median(front.optimality) < 0.05
+    assert front.compromise.optimality == front.optimality[front.chosen]
 
 
 def three_within(known, most, **options):

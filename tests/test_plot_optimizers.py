@@ -40,7 +40,7 @@ def optimum(method="slp", history=(np.inf, 3.0, 1.0), spent=(0, 10, 100), **othe
         "objective_unit": "um",
         "positions": 64,
         "grid_change": 0.0,
-        "decrease_left": 0.0,
+        "optimality": 0.0,
         "active_bounds": {},
         "constraints": {},
         "violation": 0.0,

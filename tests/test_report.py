@@ -161,10 +161,10 @@ def test_what_nobody_looked_at_is_not_called_usual(tmp_path):
     pair = {name: {"teeth": 19} for name in ("pinion", "wheel", "pair")}
     data = {"versions": {"jaxgear": "1"}, "geometry": pair}
     asked = document.Document(("analyze", "pair.toml"), source, datetime.datetime.now())
-    for doubts, said in (((), True), (None, False), (["please check: this"], False)):
-        asked.write(tmp_path, design, data, document.Found(["line"], doubts=doubts))
+    for findings, said in (((), True), (None, False), (["warning: this"], False)):
+        asked.write(tmp_path, design, data, document.Found(["line"], findings=findings))
         page = (tmp_path / "report.html").read_text("utf-8")
-        assert ("within the usual ranges" in page) == said and ("please check: this" in page) == bool(doubts)
+        assert ("within the usual ranges" in page) == said and ("warning: this" in page) == bool(findings)
         assert "no limit is passed" in page
     asked.write(tmp_path, design, data, document.Found(["line"], ["NOT CONVERGED"]))
     page = (tmp_path / "report.html").read_text("utf-8")

@@ -16,7 +16,7 @@ from jaxgear import plot
 from jaxgear.compliance import face_ends, slice_basis
 from jaxgear.contact import end_relief_widths
 from jaxgear.io import DesignFileError, load_design
-from jaxgear.metrics import edge_load_factor, face_load_factor, face_load_factors, mean_removed_material, plausibility
+from jaxgear.metrics import edge_load_factor, face_load_factor, face_load_factors, findings_of, mean_removed_material
 from jaxgear.numerics import Coupling
 from jaxgear.shafts import Misalignment, RigidSupport, TabulatedSupport
 
@@ -441,13 +441,13 @@ def test_design_file(tmp_path):
             load_design(path)
 
 
-def test_few_slices_over_an_end_relief_are_a_doubt(mesh):
+def test_few_slices_over_an_end_relief_are_a_finding(mesh):
     """Parts of 1.8 mm: one slice and a half from either end; two slices from the positive one."""
     cycle = jg.solve(mesh, TORQUE)
 
     def shown(*relief):
-        found = plausibility(cycle, pinion=jg.EndRelief(10.0, *relief))
-        return [doubt.value for doubt in found if doubt.name == "slices over the end relief"]
+        found = findings_of(cycle, pinion=jg.EndRelief(10.0, *relief))
+        return [finding.value for finding in found if finding.name == "slices over the end relief"]
 
     assert shown(3.6) == [1.5] and shown(5.4) == [] and shown(1.8) == [1.0]
     assert shown(5.3, jg.Linear(), "positive") == [pytest.approx(1 + 3.5 / 3.6, abs=1e-6)]

@@ -24,7 +24,7 @@ from jaxgear.cli import devices, progress, sweep_figures
 from jaxgear.cli import sweep as sweep_command
 from jaxgear.cli.sweep_chosen import said_of_best
 from jaxgear.io import load_design, read_variants, sweep_request
-from jaxgear.metrics.plausibility import LIMITS
+from jaxgear.metrics.findings import LIMITS
 from jaxgear.sweeps import SweepTable, evaluate
 from jaxgear.sweeps.columns import Column
 
@@ -64,7 +64,7 @@ def test_the_best_variant_says_what_a_finer_mesh_would_change_and_what_is_unusua
     assert told in (folder / "out" / "report.html").read_text("utf-8")
     monkeypatch.setitem(LIMITS, "flank pressure", LIMITS["flank pressure"]._replace(high=1.0))
     _, (unusual,) = said_of_best(file, best, size)
-    assert unusual.startswith(f"please check: variant {best.column('variant')[0]} at 50 N m: flank pressure ")
+    assert unusual.startswith(f"warning: variant {best.column('variant')[0]} at 50 N m: flank pressure ")
 
 
 def test_the_report_shows_the_best_variants(folder):

@@ -9,8 +9,8 @@ import pytest
 from catalogue import LINE, gear_pair, ppte
 
 import jaxgear as jg
-from jaxgear.metrics import plausibility
-from jaxgear.metrics.plausibility import doubt_of_claim
+from jaxgear.metrics import findings_of
+from jaxgear.metrics.findings import finding_of_claim
 
 TORQUES = (30.0, 50.0)
 BOX = {"amount": (0.0, 15.0)}
@@ -107,21 +107,21 @@ def test_free_flanks_on_the_finite_element_structure(tabulated):
         jg.optimize.verify(free)
 
 
-def test_claims_beyond_a_model_are_doubted(best, flat, tabulated):
+def test_claims_beyond_a_model_are_findings(best, flat, tabulated):
     """Each structure has its own limit, the second opinion is named, and rough designs are believed."""
-    of_default = {claim: doubt_of_claim(claim, flat.compliance, 0.0712) for claim in (0.11, 0.05, 0.02)}
-    of_tables = {claim: doubt_of_claim(claim, tabulated.compliance) for claim in (0.11, 0.05, 0.02)}
+    of_default = {claim: finding_of_claim(claim, flat.compliance, 0.0712) for claim in (0.11, 0.05, 0.02)}
+    of_tables = {claim: finding_of_claim(claim, tabulated.compliance) for claim in (0.11, 0.05, 0.02)}
     assert [len(found) for found in of_default.values()] == [0, 1, 1]
     assert [len(found) for found in of_tables.values()] == [0, 0, 1]
     expected = "PPTE 0.05 um is less than 0.1 um (finer than the model can claim of modified flanks; "
     assert str(of_default[0.05][0]) == expected + "with finite-element structure: 0.0712 um)"
     level = eqx.tree_at(lambda each: each.ppte, best, 0.02)
-    assert "PPTE 0.02 um is less than 0.1 um" in str(level) and "please check" not in str(best)
+    assert "PPTE 0.02 um is less than 0.1 um" in str(level) and "warning" not in str(best)
 
 
 def test_an_unmodified_pair_claims_nothing(flat):
     """Little load makes little transmission error, and that to a few per cent."""
     light = jg.solve(flat, 0.5)
-    assert float(jg.peak_to_peak(light.transmission_error)) < 0.1 and plausibility(light) == ()
+    assert float(jg.peak_to_peak(light.transmission_error)) < 0.1 and findings_of(light) == ()
     relief = jg.TipRelief(0.2, 3.0)
-    assert [doubt.name for doubt in plausibility(jg.solve(flat, 0.5, pinion=relief, wheel=relief))] == ["PPTE"]
+    assert [finding.name for finding in findings_of(jg.solve(flat, 0.5, pinion=relief, wheel=relief))] == ["PPTE"]

@@ -56,7 +56,7 @@ _INPUTS = (
 _OF_OPTIMUM = {
     "feasible": "all constraints met",
     "objective_change_at_twice_the_positions": "change of the objective at twice the positions, in its unit",
-    "decrease_left_per_range": "first-order optimality, in the unit of the objective",
+    "first_order_optimality": "first-order optimality, in the unit of the objective",
     "evaluations": "contact analyses",
 }
 _ELSEWHERE = ("title", "design_file", "project", "versions", "geometry", "drawing", "iso_6336")
@@ -69,7 +69,7 @@ class Found:
     Attributes:
         lines: its results in words.
         warnings: what is not to be trusted, or is not reached.
-        doubts: what is not usual; None where nobody looked.
+        findings: what is not usual; None where nobody looked.
         tables: those that it prints.
         figures: files of its pictures.
         pages: further parts.
@@ -81,7 +81,7 @@ class Found:
 
     lines: Sequence[str]
     warnings: Sequence[str] = ()
-    doubts: Sequence[str] | None = None
+    findings: Sequence[str] | None = None
     tables: Sequence[rich.table.Table] = ()
     figures: Sequence[Path] = ()
     pages: Sequence[Section] = ()
@@ -204,7 +204,7 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
         lines.append("Every solution converged, and no limit is passed.")
     if data.get("quick"):
         lines.append("Quick run, coarse positions and a short search: a preview, do not use for design.")
-    if found.doubts is not None and not found.doubts:
+    if found.findings is not None and not found.findings:
         lines.append("Inputs and results lie within the usual ranges.")
     lines += found.details
     checks = []
@@ -218,7 +218,7 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
     optimum = data.get("optimum", {})
     checks += [(said, text(optimum[key])) for key, said in _OF_OPTIMUM.items() if key in optimum]
     tables = [Table(("", "value"), tuple(checks), "checks")] if checks else []
-    return Section("Convergence and validity", lines, found.warnings, found.doubts or (), tables)
+    return Section("Convergence and validity", lines, found.warnings, found.findings or (), tables)
 
 
 def _inputs(design: DesignFile, data: Mapping[str, Any], found: Found) -> Section:

@@ -19,9 +19,9 @@ from ..layout import (
     at_stations,
     at_torque,
     face_load_over_torques,
+    findings_of,
     flank_line_contact,
     layout_flank_lines,
-    plausibility,
     vary_profiles,
 )
 from ..numerics import real
@@ -88,7 +88,7 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
             slices_change = {which: face_change(cycle, between[which]) for which, cycle in cycles.items()}
     duty_cycle = request.options.get("duty_cycle")
     unusual = {
-        name: plausibility(
+        name: findings_of(
             layout,
             request.supports[name],
             duty_cycle=duty_cycle,
@@ -213,7 +213,7 @@ run_layout = StudyCommand(
     layout_tables.tables,
     layout_report.verdict,
     layout_report.failures,
-    doubts=layout_report.doubts,
+    findings=layout_report.findings,
     takes_shafts=True,
     omits=partial(manufactured.left_out, why="flank lines deviate by the limits of [layout]"),
 )

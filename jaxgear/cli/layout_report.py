@@ -12,7 +12,7 @@ from . import report
 from .geometry import gears
 from .layout_study import STEPS, Study, designs, lives, root_factor
 from .study import grid_line
-from .written import doubt_data, identity, versions
+from .written import finding_data, identity, versions
 
 
 def verdict(study: Study) -> Iterator[str]:
@@ -82,9 +82,9 @@ def failures(study: Study) -> Iterator[str]:
             yield "every profile modification has contact shock: larger amounts are needed"
 
 
-def doubts(study: Study) -> Iterator[str]:
+def findings(study: Study) -> Iterator[str]:
     """What is not usual."""
-    return report.doubt_lines(study.unusual)
+    return report.finding_lines(study.unusual)
 
 
 def summary(study: Study) -> dict[str, Any]:
@@ -97,7 +97,7 @@ def summary(study: Study) -> dict[str, Any]:
             for name, one in study.request.tolerances.items()
         },
         "layouts": {
-            name: {**_layout(layout), "doubts": [doubt_data(doubt) for doubt in study.unusual[name]]}
+            name: {**_layout(layout), "findings": [finding_data(finding) for finding in study.unusual[name]]}
             for name, layout in study.layouts.items()
         },
         "face_load_over_torque": {"torque_Nm": study.request.torques, **_by_step(study.over_torque)},

@@ -8,7 +8,7 @@ import numpy as np
 from ..contact import Mesh, MeshCycle
 from ..io import DesignFile, LayoutRequest
 from ..layout import FlankLine, FlankLineLayout, ProfileLayout, gear_lives
-from ..metrics import Doubt
+from ..metrics import Finding
 from ..microgeometry import AbstractModification
 from ..shafts import root_face_load_factor, tooth_height
 
@@ -50,7 +50,7 @@ class Study:
     cycles: Mapping[str, MeshCycle]
     factors: Mapping[str, Mapping[str, float]]
     profiles: Mapping[str, ProfileLayout]
-    unusual: Mapping[str, tuple[Doubt, ...]]
+    unusual: Mapping[str, tuple[Finding, ...]]
     stations_change: Mapping[str, Mapping[str, float]]
     slices_change: Mapping[str, Mapping[str, float]]
 

@@ -70,7 +70,7 @@ def search_lines(optimum: Optimum, front: Front | None, projection: Projection |
         )
     if projection is not None:
         yield from str(projection).splitlines()
-    left = optimum.decrease_left if front is None else float(np.nanmax(front.decrease_left, initial=0.0))
+    left = optimum.optimality if front is None else float(np.nanmax(front.optimality, initial=0.0))
     if np.isfinite(left):
         of = (
             f"{left:.2g} {optimum.objective_unit}".rstrip()

@@ -14,7 +14,7 @@ from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.cases import quality_classes
 from ..io.results import unit_of
-from ..metrics import Doubt, plausibility
+from ..metrics import Finding, findings_of
 from ..numerics import program
 from ..optimize import Verified
 from .study import Evaluation, grid_line
@@ -63,7 +63,7 @@ _ROWS = {
 }
 _UNITS = {metric.rpartition("_")[2] for metric, (label, _) in _ROWS.items() if label.endswith("]")}
 _BY_FINITE_ELEMENTS = "  by finite elements"
-PLEASE_CHECK = "please check: "
+WARNING = "warning: "
 _HARRIS_CURVES = 7
 _ORDERS = 8  # of the transmission error that are drawn
 _TITLE = 9.0  # [pt]
@@ -112,7 +112,7 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
             )
 
 
-def doubts(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, tuple[Doubt, ...]]:
+def findings(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, tuple[Finding, ...]]:
     """What is not usual of every design."""
     options: dict[str, Any] = {"torque_range": file.torque_range, "speed": file.speed, "friction": file.friction}
     options |= {"compliance": mesh.compliance, "lubricant": file.lubricant}
@@ -124,7 +124,7 @@ def doubts(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, 
         if mesh.support is not None:
             options["support_deflection"] = float(_support_deflection(mesh, design.cycle.line_load))
         options["verified"] = design.verified and design.verified.ppte
-        found[name] = plausibility(design.cycle, **options)
+        found[name] = findings_of(design.cycle, **options)
     return found
 
 
@@ -134,20 +134,20 @@ def _support_deflection(mesh: Mesh, line_load) -> Float[Array, ""]:
     return jnp.mean(mesh.support_deflection(line_load))
 
 
-def doubt_lines(found: Mapping[str, tuple[Doubt, ...]]) -> Iterator[str]:
+def finding_lines(found: Mapping[str, tuple[Finding, ...]]) -> Iterator[str]:
     """A line for everything that is not usual, with the designs that have it and their numbers where they differ."""
-    grouped: dict[tuple[str, str], dict[str, Doubt]] = {}
+    grouped: dict[tuple[str, str], dict[str, Finding]] = {}
     for design, several in found.items():
-        for doubt in several:
-            grouped.setdefault((doubt.name, doubt.where), {})[design] = doubt
+        for finding in several:
+            grouped.setdefault((finding.name, finding.where), {})[design] = finding
     for same in grouped.values():
-        doubt = list(same.values())[-1]  # the last is the one that the run is about
+        finding = list(same.values())[-1]  # the last is the one that the run is about
         numbers = {design: f"{each.value:.4g} {each.limit.unit}".rstrip() for design, each in same.items()}
         if len(set(numbers.values())) > 1:
             said = f"{', '.join(f'{design} {number}' for design, number in numbers.items())}: "
         else:
             said = "" if len(same) == len(found) else f"{', '.join(same)}: "
-        yield f"{PLEASE_CHECK}{said}{doubt}"
+        yield f"{WARNING}{said}{finding}"
 
 
 def grid(evaluations: Evaluations, more: str = "") -> str:

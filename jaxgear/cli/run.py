@@ -48,7 +48,7 @@ from .study import Evaluation, evaluate
 
 _TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
 _QUICK_POSITIONS = 16
-_USUAL = "nothing: inputs and results lie within the usual ranges"
+_USUAL = "none, inputs and results lie within the usual ranges"
 
 Modifications = tuple[AbstractModification, AbstractModification]
 
@@ -152,8 +152,8 @@ class Run:
             of = self.design, self._mesh, self._evaluations
             self._evaluations = manufactured.scattered(*of, self._tolerance, quick=self._quick)
         self._stages.begin("writing the results")
-        self._doubts = report.doubts(self.design, self._mesh, self._evaluations)
-        data = written.summary(self.design, self._mesh, self._evaluations, self._torques, self._doubts)
+        self._findings = report.findings(self.design, self._mesh, self._evaluations)
+        data = written.summary(self.design, self._mesh, self._evaluations, self._torques, self._findings)
         if self._optimum is not None:
             data["optimum"] = optimum_report.summary(self.design, self._optimum, self._projection)
         data["quick"] = self._quick
@@ -166,7 +166,7 @@ class Run:
         files = self._draw() if figures else []
         if document is not None:
             first = list(self._first())
-            said = list(self._lines()), self._failures(), list(self._doubt_lines()), list(self._tables())
+            said = list(self._lines()), self._failures(), list(self._finding_lines()), list(self._tables())
             pages = manufactured.pages(self.design, self._evaluations)
             details = list(self._details())
             found = Found(*said, files, pages, left_out=self.design.left_out, first=first, details=details)
@@ -187,8 +187,8 @@ class Run:
             report.say_rows(block)
         for table in self._tables():
             report.console().print(table)
-        doubts = [] if first else self._doubt_lines()
-        report.say(*self._lines(), *doubts, *self._details())
+        findings = [] if first else self._finding_lines()
+        report.say(*self._lines(), *findings, *self._details())
         report.say(f"results in {self._target}{os.sep}, {self._stages.elapsed:.1f} s")
         failures = self._failures()
         for line in [self.design.left_out] * bool(self.design.left_out) + failures:
@@ -212,8 +212,10 @@ class Run:
         for line in (*report.failures(self._evaluations), *manufactured.failures(self._evaluations)):
             yield "failed", line
         yield from (("note", line) for line in self._notes())
-        doubts = [line.removeprefix(report.PLEASE_CHECK) for line in self._doubt_lines()]
-        yield from ((report.PLEASE_CHECK.rstrip(": "), line) for line in doubts or [_USUAL])
+        findings = [line.removeprefix(report.WARNING) for line in self._finding_lines()]
+        yield from (("warning", line) for line in findings)
+        if not findings:
+            yield "warnings", _USUAL
 
     def _lines(self) -> Iterator[str]:
         """The results in words, where there is no optimum that says them first."""
@@ -233,8 +235,8 @@ class Run:
         if self._optimum is not None:
             yield from optimum_report.search_lines(self._optimum, self._front, self._projection)
 
-    def _doubt_lines(self) -> Iterator[str]:
-        return report.doubt_lines(self._doubts)
+    def _finding_lines(self) -> Iterator[str]:
+        return report.finding_lines(self._findings)
 
     def _failures(self) -> list[str]:
         """What is not to be trusted, or not reached."""

@@ -38,7 +38,7 @@ class StudyCommand(Generic[S]):
         verdict: the results in words.
         failures: a line for everything that is not to be trusted; the command fails where there is one.
         assumptions: of the study, for a report.
-        doubts: a line for everything that is not usual; None where it is not checked.
+        findings: a line for everything that is not usual; None where it is not checked.
         takes_shafts: whether the study is on the shafts of the file at every load.
         omits: what else of the file is not part of the study and why, "" for nothing; None where it is not checked.
     """
@@ -53,7 +53,7 @@ class StudyCommand(Generic[S]):
     verdict: Callable[[S], Iterable[str]]
     failures: Callable[[S], Iterable[str]]
     assumptions: tuple[str, ...] = ()
-    doubts: Callable[[S], Iterable[str]] | None = None
+    findings: Callable[[S], Iterable[str]] | None = None
     takes_shafts: bool = False
     omits: Callable[[DesignFile], str] | None = None
 
@@ -94,12 +94,12 @@ class StudyCommand(Generic[S]):
                 files = self.draw(folder, study) if figures else []
                 tables, lines = list(self.tables(study)), list(self.verdict(study))
                 failures = list(self.failures(study))
-                doubts = None if self.doubts is None else list(self.doubts(study))
+                findings = None if self.findings is None else list(self.findings(study))
                 if asked is not None:
                     found = Found(
                         lines,
                         failures,
-                        doubts,
+                        findings,
                         tables=tables,
                         figures=files,
                         assumptions=(*self.assumptions, *([f"{omitted}."] if omitted else [])),
@@ -110,7 +110,7 @@ class StudyCommand(Generic[S]):
                 putting_in_place.callback(finish)
         for table in tables:
             report.console().print(table)
-        report.say(*lines, *(doubts or ()))
+        report.say(*lines, *(findings or ()))
         if quick:
             report.say(f"quick run, {self.coarse}: a preview, do not use for design")
         report.say(f"results in {target}{os.sep}, {stages.elapsed:.1f} s")

@@ -10,7 +10,7 @@ import rich.table
 
 from ..contact import Mesh, Resolution
 from ..io import DesignFile
-from ..metrics import plausibility
+from ..metrics import findings_of
 from ..microgeometry import NoModification
 from ..sweeps import SweepTable, over_torques
 from . import report
@@ -29,7 +29,7 @@ class Chosen:
         tables: side by side with the unmodified pair, best first.
         figures: files of their pictures.
         pages: those of each variant alone, by its name.
-        doubts: what is not usual of them; None where they are not evaluated.
+        findings: what is not usual of them; None where they are not evaluated.
         failures: what is not to be trusted.
         lines: why they are not evaluated.
     """
@@ -37,7 +37,7 @@ class Chosen:
     tables: Sequence[rich.table.Table] = ()
     figures: Sequence[Path] = ()
     pages: Mapping[str, Sequence[Path]] = field(default_factory=dict)
-    doubts: Sequence[str] | None = None
+    findings: Sequence[str] | None = None
     failures: Sequence[str] = ()
     lines: Sequence[str] = ()
 
@@ -71,9 +71,9 @@ def evaluate_best(
         found = {name: evaluate(design, mesh, torques, *flanks) for name, flanks in modifications.items()}
         drawn = report.write_figures(folder, design, mesh, found, torques) if figures else []
         pages = _alone(folder, mesh, found) if figures else {}
-    doubts = report.doubt_lines(report.doubts(design, mesh, found))
+    findings = report.finding_lines(report.findings(design, mesh, found))
     best_first = {name: found[name] for name in ("unmodified", *reversed(list(found)))}
-    return Chosen([report.table(design, best_first)], drawn, pages, list(doubts), list(report.failures(found)))
+    return Chosen([report.table(design, best_first)], drawn, pages, list(findings), list(report.failures(found)))
 
 
 def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tuple[str, list[str]]:
@@ -85,9 +85,9 @@ def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tupl
     pinion, wheel = design.design(parameters)
     (cycle,) = over_torques(mesh, np.asarray([torque]), pinion=pinion, wheel=wheel)
     name = f"variant {best.column('variant')[0]} at {torque:g} N m"
-    doubts = plausibility(cycle, pinion=pinion, wheel=wheel, compliance=mesh.compliance)
+    findings = findings_of(cycle, pinion=pinion, wheel=wheel, compliance=mesh.compliance)
     grid = grid_line(f"{size.positions} positions", {name: grid_change(mesh, cycle, pinion, wheel)})
-    return grid, [f"{report.PLEASE_CHECK}{name}: {doubt}" for doubt in doubts]
+    return grid, [f"{report.WARNING}{name}: {finding}" for finding in findings]
 
 
 def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, list[Path]]:

@@ -79,7 +79,7 @@ def write(
     }
     pictures = [*chosen.figures, *figures]
     shown = pages if len(best) else ()
-    found = Found(lines, warnings, chosen.doubts, chosen.tables, pictures, shown, left_out=design.left_out)
+    found = Found(lines, warnings, chosen.findings, chosen.tables, pictures, shown, left_out=design.left_out)
     asked.write(folder, design, data, found)
 
 

@@ -13,7 +13,7 @@ from ..contact import Mesh, Resolution
 from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.layout import snake
-from ..metrics import Doubt
+from ..metrics import Finding
 from ..numerics import Number, fields_of
 from ..optimize import Verified
 from ..shafts import RigidSupport
@@ -29,9 +29,9 @@ def summary(
     mesh: Mesh,
     evaluations: Evaluations,
     torques: np.ndarray,
-    found: Mapping[str, tuple[Doubt, ...]],
+    found: Mapping[str, tuple[Finding, ...]],
 ) -> dict[str, Any]:
-    """Contents of `summary.json`, with the doubts that were `found` of every design."""
+    """Contents of `summary.json`, with the findings that were `found` of every design."""
     of_gears = gears(file)
     return {
         **identity(file),
@@ -46,7 +46,7 @@ def summary(
         **{name: _numbers(part) for name in ("lubricant", "strength") if (part := getattr(file, name)) is not None},
         "model": model(mesh),
         "designs": {
-            name: {**_design(evaluations[name]), "doubts": [doubt_data(doubt) for doubt in several]}
+            name: {**_design(evaluations[name]), "findings": [finding_data(finding) for finding in several]}
             for name, several in found.items()
         },
         "ppte_reduction_percent": reduction(evaluations),
@@ -160,6 +160,6 @@ def _options(part: eqx.Module) -> dict[str, Any]:
     return data
 
 
-def doubt_data(doubt: Doubt) -> dict[str, Any]:
-    """A doubt by name, place, value and what is usual."""
-    return {"name": doubt.name, "where": doubt.where, "value": doubt.value, **doubt.limit._asdict()}
+def finding_data(finding: Finding) -> dict[str, Any]:
+    """A finding by name, place, value and what is usual."""
+    return {"name": finding.name, "where": finding.where, "value": finding.value, **finding.limit._asdict()}

@@ -13,7 +13,7 @@ from ..compliance import AbstractCompliance
 from ..contact import Mesh, OperatingPoint, Resolution, begin_contact, fewest_pairs, prepare
 from ..geometry import GearPair
 from ..metrics import Lubricant, Strength
-from ..metrics.plausibility import LIMITS
+from ..metrics.findings import LIMITS
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness

@@ -6,7 +6,7 @@ layout_flank_lines           both together
 vary_profiles                3: profile modifications in all combinations
 flank_line_contact           the loaded tooth contact of the flank lines alone
 damage                       pitting and bending under a duty cycle, as a differentiable number
-plausibility                 what of a layout is not usual
+findings_of                 what of a layout is not usual
 gear_lives                   life of either gear by the face load factors of a contact
 lives_in_cases               what is left of the life in the five cases
 face_load_over_torques       K_Hbeta over the torque
@@ -17,6 +17,7 @@ References:
     U. Kissling's three-step layout of modifications.
 """
 
+from .findings import findings_of as findings_of
 from .flank_line import FlankLine as FlankLine
 from .flank_line import level_load as level_load
 from .life import Damage as Damage
@@ -27,7 +28,6 @@ from .life import gear_lives as gear_lives
 from .lives_in_cases import lives_in_cases as lives_in_cases
 from .longest_life import longest_life as longest_life
 from .over_torque import face_load_over_torques as face_load_over_torques
-from .plausibility import plausibility as plausibility
 from .profiles import ProfileLayout as ProfileLayout
 from .profiles import flank_line_contact as flank_line_contact
 from .profiles import vary_profiles as vary_profiles

@@ -23,6 +23,8 @@ from .face_load import face_load_factor as face_load_factor
 from .face_load import face_load_factors as face_load_factors
 from .face_load import root_face_load_factor as root_face_load_factor
 from .factors import rating_factors as rating_factors
+from .findings import Finding as Finding
+from .findings import findings_of as findings_of
 from .flank import FlankSurface as FlankSurface
 from .flank import flank_surface as flank_surface
 from .flank import gear_volume as gear_volume
@@ -47,8 +49,6 @@ from .lubrication import loss_power as loss_power
 from .lubrication import lubricated_flash_temperature as lubricated_flash_temperature
 from .lubrication import mesh_efficiency as mesh_efficiency
 from .lubrication import specific_film_thickness as specific_film_thickness
-from .plausibility import Doubt as Doubt
-from .plausibility import plausibility as plausibility
 from .quantity import Quantity as Quantity
 from .quantity import quantities as quantities
 from .quantity import quantity_of as quantity_of

@@ -46,7 +46,7 @@ class FlankSurface(NamedTuple):
 
 @program
 def flank_surface(side: Side, modification: AbstractModification) -> FlankSurface:
-    """The active flank of one gear with its modification: what charts, tables and doubts show."""
+    """The active flank of one gear with its modification: what charts, tables and findings show."""
     roll = _roll_lengths(side, _SHOWN_POINTS)
     face = jnp.linspace(-0.5, 0.5, _SHOWN_LINES, dtype=roll.dtype) * side.face_width
     removed = removed_at(side, modification, roll, face)

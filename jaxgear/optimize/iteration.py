@@ -117,7 +117,7 @@ def iterate_transmission_error(
         objective_unit="um",
         positions=mesh.resolution.positions,
         grid_change=float("nan"),
-        decrease_left=float("nan"),
+        optimality=float("nan"),
         active_bounds={},
         constraints=limits,
         violation=excess,

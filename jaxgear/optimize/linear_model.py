@@ -151,7 +151,7 @@ class Model:
         step, predicted = found
         return Step(step, self.merit - predicted - offset)
 
-    def decrease_left(self, reach: float) -> float:
+    def optimality(self, reach: float) -> float:
         """Fastest decrease of the objective that is left, per unit of distance; NaN where no slopes are known.
 
         A constraint that is passed within the tolerance counts as met exactly: to meet it costs or gains nothing.

@@ -153,7 +153,7 @@ def pareto(
         units=tuple(of.unit for of in posed.objectives),
         values=values * np.asarray([of.sign for of in posed.objectives]),
         parameters={name: parameters[:, index] for index, name in enumerate(posed.names)},
-        decrease_left=left,
+        optimality=left,
         compromise=compromise,
         chosen=chosen,
     )
@@ -168,7 +168,7 @@ def _evidence(record: Record, points, values, span, batch: int) -> np.ndarray:
         record.spend(len(points[rows]), analyses=posed.gradient_cost)
         for index, found in zip(range(rows.start, rows.stop), linearizer(points[rows])):
             way = Descent(values[index], span)
-            left[index] = Model(posed, points[index], found, way).decrease_left(PROBE)
+            left[index] = Model(posed, points[index], found, way).optimality(PROBE)
     return left
 
 

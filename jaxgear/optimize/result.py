@@ -6,7 +6,7 @@ import equinox as eqx
 import numpy as np
 
 from ..contact import Mesh, MeshCycle
-from ..metrics.plausibility import doubt_of_claim
+from ..metrics.findings import finding_of_claim
 from ..microgeometry import AbstractModification
 from ..numerics import Checked
 from .problem import Problem
@@ -88,7 +88,7 @@ class Optimum(eqx.Module):
         positions: of the mesh on which objective, cycle and constraints were evaluated, per base pitch.
         grid_change: by how much the objective changes when these are doubled, in its unit; NaN where nobody looked,
             as where the search was told to stay on its mesh.
-        decrease_left: fastest decrease of the objective that is left within bounds and constraints, per step of the
+        optimality: fastest decrease of the objective that is left within bounds and constraints, per step of the
             full range of every parameter; 0 at an optimum. It comes from the linearized problem (`linear_model`) and
             counts the kinks of extremes, where the plain gradient does not vanish. NaN where there are no parameters,
             and where the slopes are not finite.
@@ -118,7 +118,7 @@ class Optimum(eqx.Module):
     objective_unit: str = eqx.field(static=True)
     positions: int
     grid_change: float
-    decrease_left: float
+    optimality: float
     active_bounds: dict[str, str]
     constraints: dict[str, "Limit"]
     violation: float
@@ -147,8 +147,8 @@ class Optimum(eqx.Module):
         yield "contact analyses", f"{self.evaluations} in {self.seconds:.2f} s"
         if np.isfinite(self.grid_change):
             yield "at twice the positions", f"{self.grid_change:+.2g} {self.objective_unit}".rstrip()
-        if np.isfinite(self.decrease_left):
-            yield "decrease left", f"{self.decrease_left:.2g} per full range"
+        if np.isfinite(self.optimality):
+            yield "optimality", f"{self.optimality:.2g} (predicted decrease over the full range of a variable)"
         if len(self.parameters) > _SHOWN_PARAMETERS:
             yield "parameters", f"{len(self.parameters)} values"
         else:
@@ -157,8 +157,8 @@ class Optimum(eqx.Module):
                 yield name, f"{value:.4g}" + (f" (at its {bound} bound)" if bound else "")
         for name, limit in self.constraints.items():
             yield name, str(limit)
-        for doubt in doubt_of_claim(self.ppte, self.mesh.compliance):
-            yield "please check", str(doubt)
+        for finding in finding_of_claim(self.ppte, self.mesh.compliance):
+            yield "warning", str(finding)
         if not self.feasible:
             yield "NOT FEASIBLE", f"a limit is passed by {100 * self.violation:.2g} %"
 
@@ -171,7 +171,7 @@ class Optimum(eqx.Module):
             "ppte_um": self.ppte,
             "positions": self.positions,
             "objective_change_at_twice_the_positions": self.grid_change,
-            "decrease_left_per_range": self.decrease_left,
+            "first_order_optimality": self.optimality,
             "active_bounds": self.active_bounds,
             "feasible": self.feasible,
             "constraints": {name: limit.summary() for name, limit in self.constraints.items()},
@@ -189,7 +189,7 @@ class Front(Checked):
         units: their units.
         values: shape (designs, objectives), sorted by the first objective.
         parameters: value of every free parameter, each of shape (designs,).
-        decrease_left: first-order evidence of every design, shape (designs,): the fastest decrease of all objectives at
+        optimality: first-order evidence of every design, shape (designs,): the fastest decrease of all objectives at
             once that is left within bounds and constraints, in spans of the front per step of the full range of every
             parameter. It is 0 where no direction improves all of them.
         compromise: the design whose worst distance from the ideal point, in spans of the front, is about the least; its
@@ -201,7 +201,7 @@ class Front(Checked):
     units: tuple[str, ...] = eqx.field(static=True)
     values: np.ndarray
     parameters: dict[str, np.ndarray]
-    decrease_left: np.ndarray
+    optimality: np.ndarray
     compromise: Optimum
     chosen: int
 
@@ -209,5 +209,6 @@ class Front(Checked):
         spans = zip(self.objectives, self.units, self.values.min(axis=0), self.values.max(axis=0))
         lines = [f"Front of {len(self.values)} designs"]
         lines += [f"  {name:<22} {low:.4g} to {high:.4g} {unit}".rstrip() for name, unit, low, high in spans]
-        left = float(np.nanmax(self.decrease_left, initial=0.0))
-        return "\n".join([*lines, f"  decrease left          at most {left:.2g} spans per full range"])
+        left = float(np.nanmax(self.optimality, initial=0.0))
+        said = f"at most {left:.2g} spans, the largest predicted decrease over the full range of a variable"
+        return "\n".join([*lines, f"  optimality             {said}"])

@@ -39,7 +39,7 @@ def optimum_of(
     parameters, (pinion, wheel) = problem.parameters(x), problem.modifications(x)
     heaviest = np.asarray(problem.cases.torque)[np.asarray(problem.cases.weight).argmax()]
     cycle = solve_case(problem.mesh, heaviest, pinion, wheel)
-    left = _decrease_left(record) if left is None else left  # before the analyses are counted
+    left = _optimality(record) if left is None else left  # before the analyses are counted
     several = len(problem.objectives) > 1
     sign = 1 if several else problem.objectives[0].sign
     return Optimum(
@@ -55,7 +55,7 @@ def optimum_of(
         objective=sign * record.value,
         positions=problem.mesh.resolution.positions,
         grid_change=grid_change,
-        decrease_left=left,
+        optimality=left,
         active_bounds=_active_bounds(problem.names, record.point),
         constraints=_limits(problem, x),
         violation=max(record.violation - FEASIBLE, 0.0),  # as an excess is counted from inside a limit
@@ -68,7 +68,7 @@ def optimum_of(
     )
 
 
-def _decrease_left(record: Record) -> float:
+def _optimality(record: Record) -> float:
     """Fastest decrease of the objective at the best point, per step of the full range of every parameter."""
     model = record.model
     if model is None:
@@ -76,7 +76,7 @@ def _decrease_left(record: Record) -> float:
         record.spend(1, analyses=problem.gradient_cost)
         (found,) = Linearizer(problem, 1)(record.point[None])
         model = Model(problem, record.point, found)
-    return model.decrease_left(PROBE)
+    return model.optimality(PROBE)
 
 
 def objective_name(problem: Problem) -> str:

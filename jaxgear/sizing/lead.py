@@ -113,6 +113,6 @@ def iso_end_relief(
     """Linear end relief on both ends: `end_relief_amount` over `end_relief_length`.
 
     For a gear that ends with the common face. On one that is wider than its mate the relief lies at its own ends,
-    outside of the contact as far as the gear overhangs (a doubt of `plausibility`): give it to the narrower gear.
+    outside of the contact as far as the gear overhangs (a finding of `findings_of`): give it to the narrower gear.
     """
     return EndRelief(end_relief_amount(helix_tolerance, shaft_deflection, kind=kind), end_relief_length(pair))

@@ -9,11 +9,11 @@ from catalogue import LINE, gear_pair, high_contact_ratio_pair
 
 import jaxgear as jg
 from jaxgear.contact.kinematics import kinematics
-from jaxgear.metrics import Lubricant, plausibility
+from jaxgear.metrics import Lubricant, findings_of
 
 
 def names(cycle, **options):
-    return {(doubt.name, doubt.where) for doubt in plausibility(cycle, **options)}
+    return {(finding.name, finding.where) for finding in findings_of(cycle, **options)}
 
 
 def oil(**values):
@@ -43,9 +43,9 @@ def replaced(cycle, where, **values):
     return cycle
 
 
-def test_a_usual_design_raises_no_doubt(cycle):
-    assert plausibility(cycle, torque_range=(25.0, 100.0), speed=3000.0, friction=0.06) == ()
-    assert plausibility(cycle, oil_friction=0.06, bulk_temperature=95.0, lubricant=oil()) == ()
+def test_a_usual_design_has_no_finding(cycle):
+    assert findings_of(cycle, torque_range=(25.0, 100.0), speed=3000.0, friction=0.06) == ()
+    assert findings_of(cycle, oil_friction=0.06, bulk_temperature=95.0, lubricant=oil()) == ()
     assert names(cycle, pinion=jg.ProfileSlope(-4.0) + jg.LeadCrowning(-4.0)) == set()  # which may have either sign
 
 
@@ -109,11 +109,11 @@ def test_end_reliefs_beyond_the_mate(cycle):
     assert relief not in names(aside, pinion=jg.EndRelief(7.0, 1.9, side="positive"))
 
 
-@pytest.mark.parametrize("wider, doubted", [(0.7, False), (2.0, True)])
-def test_one_slice_does_not_show_load_beside_an_overhang(cycle, wider, doubted):
+@pytest.mark.parametrize("wider, found_so", [(0.7, False), (2.0, True)])
+def test_one_slice_does_not_show_load_beside_an_overhang(cycle, wider, found_so):
     wheel = cycle.kinematics.pair.wheel
     wide = replaced(cycle, "pinion", face_width=float(wheel.face_width + wider * wheel.module))
-    assert (("overhang in modules, one slice", "") in names(wide)) == doubted
+    assert (("overhang in modules, one slice", "") in names(wide)) == found_so
 
 
 def test_wide_teeth_are_not_in_plane_stress(cycle):
@@ -137,7 +137,7 @@ def test_nominal_stress_is_not_made_for_contact_ratios_above_two(cycle):
     assert ("contact ratio", "") in names(replace(cycle, kinematics=slim))
 
 
-def test_a_doubt_reads_like_a_question_of_a_colleague(cycle):
-    (doubt,) = plausibility(cycle, friction=3.7)
+def test_a_finding_reads_like_a_question_of_a_colleague(cycle):
+    (finding,) = findings_of(cycle, friction=3.7)
     usual = "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"
-    assert str(doubt) == f"coefficient of friction 3.7 is more than 0.5 ({usual})"
+    assert str(finding) == f"coefficient of friction 3.7 is more than 0.5 ({usual})"

@@ -1,6 +1,6 @@
 """Numbers that can be computed but hardly be meant: what an experienced engineer would ask about.
 
-One table of limits serves inputs and results alike. Nothing is refused here: a doubt is a question.
+One table of limits serves inputs and results alike. Nothing is refused here: a finding is a warning.
 """
 
 from collections.abc import Iterator
@@ -90,7 +90,7 @@ LIMITS = {
 _RELIEFS = TipRelief, RootRelief, EndRelief
 
 
-class Doubt(NamedTuple):
+class Finding(NamedTuple):
     """A number that is not usual.
 
     Attributes:
@@ -112,7 +112,7 @@ class Doubt(NamedTuple):
         return f"{f'{self.where}, ' if self.where else ''}{number.rstrip()} is {bound.rstrip()} ({remark})"
 
 
-def plausibility(
+def findings_of(
     cycle: MeshCycle,
     *,
     pinion: AbstractModification | None = None,
@@ -126,7 +126,7 @@ def plausibility(
     compliance: AbstractCompliance | None = None,
     verified: float | None = None,
     support_deflection: float = 0.0,
-) -> tuple[Doubt, ...]:
+) -> tuple[Finding, ...]:
     """What of a solved design is not usual; empty where nothing is.
 
     Args:
@@ -150,7 +150,7 @@ def plausibility(
     gears, results, sides, overhangs = _numbers(bare)
     (name, where, deflection), *others = results
     deflection = float(deflection) - 1e-3 * support_deflection / float(cycle.kinematics.pair.pinion.module)
-    numbers = [_doubt(*each) for each in (*gears, (name, where, deflection), *others)]
+    numbers = [_finding(*each) for each in (*gears, (name, where, deflection), *others)]
     sizes, common = cycle.kinematics.resolution, float(sides[0].common_width)
     numbers[len(gears) : len(gears)] = [
         *_of_flanks(sides, flanks),
@@ -158,52 +158,52 @@ def plausibility(
     ]
     pair = cycle.kinematics.pair
     if any(float(gear.tooth_thickness_tolerance) for gear in (pair.pinion, pair.wheel)):
-        numbers.append(_doubt("least backlash", "", pair.backlash_limits[0]))
+        numbers.append(_finding("least backlash", "", pair.backlash_limits[0]))
     if rpm is not None:
         # from numbers, as a product of arrays compiles anew in every process
         diameter = float(pair.pinion.module) * float(pair.pinion.teeth)
         velocity = float(rpm) * np.pi / 60 * diameter * 1e-3
-        numbers.append(_doubt("pitch line velocity", "", velocity))
+        numbers.append(_finding("pitch line velocity", "", velocity))
     if coefficient is not None:
-        numbers.append(_doubt("coefficient of friction", "", coefficient))
+        numbers.append(_finding("coefficient of friction", "", coefficient))
     elif oil_friction is not None:
-        numbers.append(_doubt("coefficient of friction of the oil", "", oil_friction))
+        numbers.append(_finding("coefficient of friction of the oil", "", oil_friction))
     if bulk_temperature is not None:
-        numbers.append(_doubt("bulk temperature", "", bulk_temperature))
+        numbers.append(_finding("bulk temperature", "", bulk_temperature))
     if lubricant is not None:
-        numbers.append(_doubt("temperature of the oil", "", lubricant.temperature))
-        numbers.append(_doubt("cooling factor", "", lubricant.cooling_factor))
+        numbers.append(_finding("temperature of the oil", "", lubricant.temperature))
+        numbers.append(_finding("cooling factor", "", lubricant.cooling_factor))
     if torque_range is not None:
         low, high = torque_range
-        numbers.append(_doubt("torque", "", cycle.torque, low=low, high=high))
-    found = [doubt for doubt in numbers if not doubt.limit.low <= doubt.value <= doubt.limit.high]
+        numbers.append(_finding("torque", "", cycle.torque, low=low, high=high))
+    found = [finding for finding in numbers if not finding.limit.low <= finding.value <= finding.limit.high]
     if not all(isinstance(flank, NoModification) for flank in flanks):
-        found += doubt_of_claim(float(np.ptp(np.asarray(cycle.transmission_error))), compliance, verified)
+        found += finding_of_claim(float(np.ptp(np.asarray(cycle.transmission_error))), compliance, verified)
     return tuple(found)
 
 
-def doubt_of_claim(
+def finding_of_claim(
     ppte: float, compliance: AbstractCompliance | None = None, verified: float | None = None
-) -> tuple[Doubt, ...]:
-    """The doubt about a PPTE of modified flanks that is less than a model can tell; else nothing.
+) -> tuple[Finding, ...]:
+    """The finding about a PPTE of modified flanks that is less than a model can tell; else nothing.
 
     Args:
         ppte: claimed [um].
         compliance: by which it was found; None for one that is composed of models.
         verified: PPTE of the same design by the finite-element structure, where it is known [um].
     """
-    doubt = _doubt("PPTE by finite elements" if isinstance(compliance, TabulatedCompliance) else "PPTE", "", ppte)
+    finding = _finding("PPTE by finite elements" if isinstance(compliance, TabulatedCompliance) else "PPTE", "", ppte)
     if verified is not None:
-        remark = f"{doubt.limit.remark}; with finite-element structure: {verified:.3g} um"
-        doubt = doubt._replace(limit=doubt.limit._replace(remark=remark))
-    return () if doubt.value >= doubt.limit.low else (doubt,)
+        remark = f"{finding.limit.remark}; with finite-element structure: {verified:.3g} um"
+        finding = finding._replace(limit=finding.limit._replace(remark=remark))
+    return () if finding.value >= finding.limit.low else (finding,)
 
 
-def _doubt(name: str, where: str, value, *, low: float | None = None, high: float | None = None) -> Doubt:
-    """A doubt if the value is outside the usual range, which may be known better than the table has it."""
+def _finding(name: str, where: str, value, *, low: float | None = None, high: float | None = None) -> Finding:
+    """A finding if the value is outside the usual range, which may be known better than the table has it."""
     usual = LIMITS[name]
     limit = usual._replace(low=usual.low if low is None else low, high=usual.high if high is None else high)
-    return Doubt(name, where, float(value), limit)
+    return Finding(name, where, float(value), limit)
 
 
 @program
@@ -238,20 +238,20 @@ def _numbers(cycle: MeshCycle):
     return gears, results, cycle.sides, pair.overhangs
 
 
-def _of_flanks(sides, flanks) -> Iterator[Doubt]:
+def _of_flanks(sides, flanks) -> Iterator[Finding]:
     for where, side, modification in zip(("pinion", "wheel"), sides, flanks):
         if isinstance(modification, NoModification):
             continue
         surface = flank_surface(side, modification)
         depth = float(np.abs(surface.removed).max())
         if depth > 0:
-            yield _doubt("depth of the modification", where, depth)
-        yield _doubt("depth of the modification in modules", where, depth / 1e3 / float(side.gear.module))
+            yield _finding("depth of the modification", where, depth)
+        yield _finding("depth of the modification in modules", where, depth / 1e3 / float(side.gear.module))
         start, *_, tip = np.asarray(surface.roll_length)
         for amount in _amounts(modification):
-            yield _doubt("amount of the modification", where, amount)
+            yield _finding("amount of the modification", where, amount)
         for length, longest in _lengths(modification, tip - start, 0.5 * float(side.face_width)):
-            yield _doubt("length of the modification", where, length, high=longest)
+            yield _finding("length of the modification", where, length, high=longest)
 
 
 def _amounts(modification: AbstractModification) -> Iterator[float]:
@@ -269,17 +269,19 @@ def _lengths(modification: AbstractModification, profile: float, half_face: floa
             yield float(term.length), half_face if getattr(term, "varies_along_face", False) else profile
 
 
-def _of_end_reliefs(sizes: Resolution, face_width: float, overhangs, flanks) -> Iterator[Doubt]:
+def _of_end_reliefs(sizes: Resolution, face_width: float, overhangs, flanks) -> Iterator[Finding]:
     """Whether end reliefs reach the common face, at both ends where they are at both, and slices that show them."""
     for where, ends, modification in zip(("pinion", "wheel"), overhangs, flanks):
         for term in jax.tree.leaves(modification, is_leaf=lambda part: isinstance(part, EndRelief)):
             if isinstance(term, EndRelief) and term.varies_along_face:
                 sides = {"negative": (0,), "positive": (1,), "both": (0, 1)}[term.side]
-                yield _doubt("length of the end relief", where, term.length, low=max(float(ends[end]) for end in sides))
+                yield _finding(
+                    "length of the end relief", where, term.length, low=max(float(ends[end]) for end in sides)
+                )
                 reach = {end: (float(term.length) - float(ends[end])) / face_width for end in sides}
                 shown = [_slices_over(sizes, end, share) for end, share in reach.items() if share > 0]
                 if sizes.slices > 1 and shown:
-                    yield _doubt("slices over the end relief", where, min(shown))
+                    yield _finding("slices over the end relief", where, min(shown))
 
 
 def _slices_over(sizes: Resolution, end: int, share: float) -> float:

@@ -1,6 +1,6 @@
 """Layouts that can be computed but hardly be meant: what an experienced engineer would ask about.
 
-Nothing is refused here: a doubt is a question. The limits are of this project where no source is named.
+Nothing is refused here: a finding is a warning. The limits are of this project where no source is named.
 """
 
 from collections.abc import Iterator, Mapping
@@ -9,9 +9,9 @@ import numpy as np
 
 from ..conditions import LoadSpectrum
 from ..geometry import GearPair
-from ..metrics import Doubt
-from ..metrics.plausibility import LIMITS as LIMITS_OF_MESH
-from ..metrics.plausibility import Limit
+from ..metrics import Finding
+from ..metrics.findings import LIMITS as LIMITS_OF_MESH
+from ..metrics.findings import Limit
 from ..shafts import AbstractSupport, Gearbox, Shaft, ShaftSupport, bearing_reactions
 from ..shafts.places import tip_clearances
 from ..shafts.shaft import facts_of
@@ -74,14 +74,14 @@ ContactCases = Mapping[str, Mapping[str, np.ndarray]]
 _Factors = dict[str, list]  # of every step, by the deviations
 
 
-def plausibility(
+def findings_of(
     layout: FlankLineLayout,
     support: AbstractSupport,
     *,
     duty_cycle: LoadSpectrum | None = None,
     profiles: ProfileLayout | None = None,
     contact: ContactCases | None = None,
-) -> tuple[Doubt, ...]:
+) -> tuple[Finding, ...]:
     """What of a layout and of the shafts that it was made for is not usual; empty where nothing is.
 
     Args:
@@ -106,20 +106,20 @@ def plausibility(
     return tuple(each for each in numbers if not each.limit.low <= each.value <= each.limit.high)
 
 
-def _doubt(name: str, where: str, value, limit: Limit | None = None) -> Doubt:
-    return Doubt(name, where, float(value), limit or LIMITS[name])
+def _finding(name: str, where: str, value, limit: Limit | None = None) -> Finding:
+    return Finding(name, where, float(value), limit or LIMITS[name])
 
 
-def _of_load(layout: FlankLineLayout) -> Iterator[Doubt]:
+def _of_load(layout: FlankLineLayout) -> Iterator[Finding]:
     cases = list(layout.after.values())
     stations = cases[0].load.line_load.shape[-1]
     limit = LIMITS["K_Hbeta"]._replace(high=2 * stations / _FEWEST)
     worst = max(float(np.max(each.face_load_factor)) for each in cases)
     for where, factor in zip(("without modification", "after step 1", "after step 2"), (*layout.factors, worst)):
-        yield _doubt("K_Hbeta", where, factor, limit)
+        yield _finding("K_Hbeta", where, factor, limit)
 
 
-def _of_crowning(layout: FlankLineLayout, contact: ContactCases) -> Iterator[Doubt]:
+def _of_crowning(layout: FlankLineLayout, contact: ContactCases) -> Iterator[Finding]:
     """What step 2 costs without deviations, and whether it saves anything in the worst case, by both analyses."""
     by_annex_e: _Factors = {
         f"{name} deviations": [of[name].face_load_factor for of in layout.cases] for name in layout.before
@@ -135,74 +135,74 @@ def _of_crowning(layout: FlankLineLayout, contact: ContactCases) -> Iterator[Dou
             if where == next(iter(analysis)):
                 place = "after step 2" + (", contact analysis" if number else "")
                 name = "K_Hbeta without deviations"
-                yield _doubt(name, place, crowned, LIMITS[name]._replace(high=_COST * unmodified))
+                yield _finding(name, place, crowned, LIMITS[name]._replace(high=_COST * unmodified))
             name = "K_Hbeta of the worst case"
-            yield _doubt(name, f"after step 2, {where}", worst, LIMITS[name]._replace(high=min(others)))
+            yield _finding(name, f"after step 2, {where}", worst, LIMITS[name]._replace(high=min(others)))
 
 
-def _of_flank_lines(layout: FlankLineLayout) -> Iterator[Doubt]:
+def _of_flank_lines(layout: FlankLineLayout) -> Iterator[Finding]:
     for where, line, gear in zip(("pinion", "wheel"), (layout.pinion, layout.wheel), layout.pair.gears):
         removed = abs(float(line.slope)) + abs(float(line.crowning))
-        yield _doubt("slope and crowning in modules", where, 1e-3 * removed / float(gear.module))
+        yield _finding("slope and crowning in modules", where, 1e-3 * removed / float(gear.module))
 
 
-def _of_bearings(gearbox: Gearbox, shafts: list[Shaft], module: float) -> Iterator[Doubt]:
+def _of_bearings(gearbox: Gearbox, shafts: list[Shaft], module: float) -> Iterator[Finding]:
     found = bearing_reactions(gearbox)
     moved = dict(zip(found.names, np.hypot(*np.asarray(found.shaft)[:, :2].T)))
     for bearing in (bearing for shaft in shafts for bearing in shaft.bearings):
         where = f'bearing "{bearing.name}"'
-        yield _doubt("radial displacement in modules", where, 1e-3 * moved[bearing.name] / module)
+        yield _finding("radial displacement in modules", where, 1e-3 * moved[bearing.name] / module)
         for stiffness in np.unique(np.diagonal(np.asarray(bearing.matrix))[:2]):
             if stiffness > 0:
-                yield _doubt("radial stiffness", where, stiffness)
+                yield _finding("radial stiffness", where, stiffness)
         if bearing.play is not None and bearing.play > 0:
-            yield _doubt("clearance", where, bearing.play)
+            yield _finding("clearance", where, bearing.play)
     for shaft in shafts:
         for bearing in shaft.bearings:
             beside = [
                 abs(float(bearing.position - gear.position)) - 0.5 * float(gear.gear.face_width) for gear in shaft.gears
             ]
-            yield _doubt("distance from the face", f'bearing "{bearing.name}"', min(beside))
+            yield _finding("distance from the face", f'bearing "{bearing.name}"', min(beside))
 
 
-def _of_bores(shaft: Shaft) -> Iterator[Doubt]:
+def _of_bores(shaft: Shaft) -> Iterator[Finding]:
     for mounted, thickest in zip(shaft.gears, np.asarray(facts_of(shaft).thickest)):
         gear, body = mounted.gear, mounted.body_diameter
         integral = body is not None and float(body) >= 2 * float(gear.root_circle_radius)
         if gear.bore_diameter is not None and not integral:
-            yield _doubt("shaft diameter over bore", f'gear "{mounted.name}"', thickest / float(gear.bore_diameter))
+            yield _finding("shaft diameter over bore", f'gear "{mounted.name}"', thickest / float(gear.bore_diameter))
 
 
-def _of_meshes(gearbox: Gearbox) -> Iterator[Doubt]:
+def _of_meshes(gearbox: Gearbox) -> Iterator[Finding]:
     """Gears that nothing meshes with or that run into others, and axes that deviate by next to nothing."""
     names = [name for mesh in gearbox.meshes for name in (mesh.pinion, mesh.wheel)]
     for shaft in gearbox.shafts:
         for gear in shaft.gears:
-            yield _doubt("number of meshes", f'gear "{gear.name}"', names.count(gear.name))
+            yield _finding("number of meshes", f'gear "{gear.name}"', names.count(gear.name))
     for where, room in tip_clearances(gearbox).items():
-        yield _doubt("tip clearance", where, room)
+        yield _finding("tip clearance", where, room)
     for index, mesh in enumerate(gearbox.meshes):
         yield from _of_misalignment(
             f'"{mesh.pinion}" and "{mesh.wheel}"', mesh.misalignment.over_face(gearbox.pair(index))
         )
 
 
-def _of_axes(layout: FlankLineLayout) -> Iterator[Doubt]:
+def _of_axes(layout: FlankLineLayout) -> Iterator[Finding]:
     for name, cases in layout.before.items():
         _, both, apart, *_ = np.asarray(cases.slope)  # +f_Hb +f_ma, +f_Hb -f_ma
         yield from _of_misalignment(f"{name} deviations", 0.5 * (both - apart))
 
 
-def _of_misalignment(where: str, value) -> Iterator[Doubt]:
+def _of_misalignment(where: str, value) -> Iterator[Finding]:
     if value != 0:
-        yield _doubt("misalignment over the face", where, abs(float(value)))
+        yield _finding("misalignment over the face", where, abs(float(value)))
 
 
-def _of_duty_cycle(layout: FlankLineLayout, duty_cycle: LoadSpectrum) -> Iterator[Doubt]:
+def _of_duty_cycle(layout: FlankLineLayout, duty_cycle: LoadSpectrum) -> Iterator[Finding]:
     if duty_cycle.speeds is not None:
-        yield _doubt("pitch line velocity", "", _velocity(layout.pair, np.max(duty_cycle.speeds)))
+        yield _finding("pitch line velocity", "", _velocity(layout.pair, np.max(duty_cycle.speeds)))
     if layout.damage and duty_cycle.duration is not None:
-        yield _doubt("damage by the duty cycle", "after step 2", layout.damage[-1].largest)
+        yield _finding("damage by the duty cycle", "after step 2", layout.damage[-1].largest)
 
 
 def _velocity(pair: GearPair, speed) -> float:
@@ -210,9 +210,9 @@ def _velocity(pair: GearPair, speed) -> float:
     return 1e-3 * float(pair.pinion.pitch_radius) * 2 * np.pi / 60 * float(speed)
 
 
-def _of_profiles(profiles: ProfileLayout, module: float) -> Iterator[Doubt]:
+def _of_profiles(profiles: ProfileLayout, module: float) -> Iterator[Finding]:
     for where, name in zip(("pinion", "wheel"), AMOUNTS):
         deepest = float(np.max(profiles.table.column(name)))
         if deepest > 0:
-            yield _doubt("depth of the modification", where, deepest)
-        yield _doubt("depth of the modification in modules", where, 1e-3 * deepest / module)
+            yield _finding("depth of the modification", where, deepest)
+        yield _finding("depth of the modification in modules", where, 1e-3 * deepest / module)
