@@ -1,5 +1,6 @@
 """Wear under the force of the steady motion: its limits over speed, what is worn off, and the dynamic factor."""
 
+import functools
 from dataclasses import replace
 
 import equinox as eqx
@@ -267,20 +268,21 @@ def test_settings_and_lives_without_dynamics_are_refused(resonant):
         over_life(life, "dynamic_factor")
 
 
+@eqx.filter_jit
 def worn(mesh, frequency, amount):
     """PPTE and dynamic factor of worn flanks with reliefs of some height."""
     relief = jg.TipRelief(amount, 2.0)
-    life = life_of(mesh, frequency, blocks=4, pinion=relief, wheel=relief)
+    life = life_of(mesh, frequency, pinion=relief, wheel=relief)
     return jnp.stack([over_life(life, "ppte")[-1], life.dynamic_factor[-1]])
 
 
 @pytest.mark.slow
 def test_slopes_of_worn_flanks_are_those_of_differences(mesh, natural):
-    of = jax.jit(lambda amount: worn(mesh, 0.5 * natural, amount))
-    step, amount = 1e-3, 8.0
+    of = functools.partial(worn, mesh, 0.5 * natural)
+    step, amount = 1e-3, jnp.asarray(8.0)
     difference = (of(amount + step) - of(amount - step)) / (2 * step)
-    forward = jax.jit(jax.jacfwd(lambda amount: worn(mesh, 0.5 * natural, amount)))(amount)
-    backward = jax.jit(jax.jacrev(lambda amount: worn(mesh, 0.5 * natural, amount)))(amount)
+    forward = jax.jit(jax.jacfwd(of))(amount)
+    backward = jax.jit(jax.jacrev(of))(amount)
     np.testing.assert_allclose(forward, difference, rtol=1e-4)
     np.testing.assert_allclose(backward, forward, rtol=1e-7)
     assert np.abs(difference).min() > 1e-4
@@ -290,7 +292,7 @@ def test_slopes_of_worn_flanks_are_those_of_differences(mesh, natural):
 def test_designs_side_by_side_are_each_as_alone(mesh, natural):
     amounts = jnp.asarray([4.0, 8.0])
     together = jax.jit(jax.vmap(lambda amount: worn(mesh, natural, amount)))(amounts)
-    alone = [jax.jit(lambda amount: worn(mesh, natural, amount))(amount) for amount in amounts]
+    alone = [worn(mesh, natural, amount) for amount in amounts]
     np.testing.assert_allclose(together, np.stack(alone), rtol=1e-7)
 
 
