@@ -126,7 +126,7 @@ def over_meshes(x):
 
 
 def over_lines(x):
-    return level_load(support(stage(1.0, radial=300.0 * x)), hollow=True, stations=11).slope
+    return level_load(support(stage(1.0, radial=300.0 * x)), negative_crowning=True, stations=11).slope
 
 
 def over_tables(x):

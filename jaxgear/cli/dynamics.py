@@ -130,7 +130,7 @@ def _grid_change(study: Study) -> dict[str, dict[str, float]]:
             steps=[2 * count for count in study.steps[near]],
             kicks=settings.kicks_of(run),
         )
-        found[name] = {"max_dynamic_factor": peak(again, "dynamic_factor")[0] - largest}
+        found[name] = {"worst_dynamic_factor": peak(again, "dynamic_factor")[0] - largest}
     return found
 
 

@@ -14,7 +14,7 @@ from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.cases import quality_classes
 from ..io.results import unit_of
-from ..metrics import Finding, findings_of
+from ..metrics import Finding, Quantity, findings_of, quantities
 from ..numerics import program
 from ..optimize import Verified
 from .study import Evaluation, grid_line
@@ -26,42 +26,34 @@ from .terminal import warn as warn
 Evaluations = Mapping[str, Evaluation]
 
 
-def _of_gears(key: str, label: str, form: str) -> dict[str, tuple[str, str]]:
-    return {f"{gear}_{key}": (f"{gear} {label}", form) for gear in ("pinion", "wheel")}
-
-
-# metric -> label and format; a metric without contact outside the path is 0 and says so
-_ROWS = {
-    "ppte_um": ("PPTE [um]", ".3f"),
-    "relative_ppte": ("PPTE over mean transmission error", ".4f"),
-    "mean_te_um": ("mean transmission error [um]", ".3f"),
-    "force_excitation_N": ("force excitation, peak to peak [N]", ".1f"),
-    "max_flank_pressure_MPa": ("max flank pressure [MPa]", ".0f"),
-    "max_corner_pressure_MPa": ("max corner pressure [MPa]", ".0f"),
-    "contact_ratio": ("contact ratio", ".3f"),
-    "effective_contact_ratio": ("effective contact ratio", ".3f"),
-    **_of_gears("root_stress_MPa", "root stress, ISO 6336-3 [MPa]", ".1f"),
-    **_of_gears("local_root_stress_MPa", "root stress, contact analysis [MPa]", ".1f"),
-    "face_load_factor": ("face load factor K_Hbeta", ".3f"),
-    "mesh_loss_factor": ("mesh loss factor H_V", ".4f"),
-    "friction_coefficient": ("mean coefficient of friction", ".4f"),
-    "loss_power_W": ("power loss of the flanks [W]", ".4g"),
-    "mesh_efficiency": ("efficiency of the mesh", ".5f"),
-    "max_flash_temperature_K": ("max flash temperature [K]", ".1f"),
-    "bulk_temperature_degC": ("bulk temperature [degC]", ".1f"),
-    "max_contact_temperature_degC": ("max contact temperature [degC]", ".1f"),
-    "min_film_thickness_um": ("min film thickness [um]", ".3f"),
-    "min_specific_film_thickness": ("min specific film thickness", ".3f"),
-    **_of_gears("pitting_safety", "pitting safety S_H", ".2f"),
-    **_of_gears("root_safety", "root safety S_F", ".2f"),
-    **_of_gears("local_root_safety", "root safety, contact analysis", ".2f"),
-    "pressure_safety": ("pressure safety p_lim / p_max", ".2f"),
-    **_of_gears("pitting_damage", "pitting damage per 1e6 revolutions", ".3g"),
-    **_of_gears("root_damage", "root damage per 1e6 revolutions", ".3g"),
-    "micropitting_safety": ("micropitting safety S_lambda", ".2f"),
-    "scuffing_safety": ("scuffing safety S_B", ".2f"),
-}
-_UNITS = {metric.rpartition("_")[2] for metric, (label, _) in _ROWS.items() if label.endswith("]")}
+# quantities of the table, in its order; those that a design does not have are left out
+_TABLE = (
+    "ppte",
+    "relative_ppte",
+    "mean_te",
+    "force_excitation",
+    "max_flank_pressure",
+    "max_corner_pressure",
+    "contact_ratio",
+    "effective_contact_ratio",
+    "pinion_root_stress",
+    "wheel_root_stress",
+    "pinion_local_root_stress",
+    "wheel_local_root_stress",
+    "face_load_factor",
+    "mesh_loss_factor",
+    *("friction_coefficient", "loss_power", "mesh_efficiency"),
+    *("max_flash_temperature", "bulk_temperature", "max_contact_temperature"),
+    *("min_film_thickness", "min_specific_film_thickness"),
+    *(
+        f"{gear}_{kind}"
+        for kind in ("pitting_safety", "root_safety", "local_root_safety")
+        for gear in ("pinion", "wheel")
+    ),
+    "pressure_safety",
+    *(f"{gear}_{kind}" for kind in ("pitting_damage", "root_damage") for gear in ("pinion", "wheel")),
+    *("micropitting_safety", "scuffing_safety"),
+)
 _BY_FINITE_ELEMENTS = "  by finite elements"
 WARNING = "warning: "
 _HARRIS_CURVES = 7
@@ -77,20 +69,20 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
         result.add_column(name, justify="right", no_wrap=True)
     first = next(iter(evaluations.values()))
     second = verified(evaluations)
-    asked = [metric for metric in _ROWS if _objective(metric) in first.objectives]
+    rows = [quantities[name] for name in _TABLE]
+    asked = [quantity for quantity in rows if _objective(quantity) in first.objectives]
     for label in objectives(evaluations):
         result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
         if second:
             result.add_row(_BY_FINITE_ELEMENTS, *(format(each.objectives[label], ".4g") for each in second))
-    for metric in dict.fromkeys([*asked, *_ROWS]):  # what was asked for stands first
-        label, form = _ROWS[metric]
-        cells = [evaluation.metrics.get(metric) for evaluation in evaluations.values()]
+    for quantity in dict.fromkeys([*asked, *rows]):  # what was asked for stands first
+        cells = [evaluation.metrics.get(quantity.key) for evaluation in evaluations.values()]
         if None not in cells:
-            result.add_row(label, *(format(cell, form) for cell in cells))
-        if second and metric == "ppte_um":
-            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.ppte, form) for each in second))
-        elif second and metric in asked:
-            result.add_row(_BY_FINITE_ELEMENTS, *(format(each.objectives[_objective(metric)], form) for each in second))
+            result.add_row(quantity.heading, *(format(cell, quantity.form) for cell in cells))
+        if second and (quantity.name == "ppte" or quantity in asked):
+            objective = _objective(quantity)
+            found = [each.ppte if quantity.name == "ppte" else each.objectives[objective] for each in second]
+            result.add_row(_BY_FINITE_ELEMENTS, *(format(each, quantity.form) for each in found))
     result.add_section()
     flanks = [dict(_flank_cells(evaluation)) for evaluation in evaluations.values()]
     for label in dict.fromkeys(label for cells in flanks for label in cells):
@@ -165,14 +157,13 @@ def diameters(gear: Gear):
 
 def objectives(evaluations: Evaluations) -> list[str]:
     """What an optimization made small, without what is a row of the table anyhow."""
-    known = {_objective(metric) for metric in _ROWS}
+    known = {_objective(quantities[name]) for name in _TABLE}
     return [label for label in next(iter(evaluations.values())).objectives if label not in known]
 
 
-def _objective(metric: str) -> str:
-    """What a row of the table is called as an objective: "ppte [um]" for "ppte_um"."""
-    name, _, unit = metric.rpartition("_")
-    return f"{name} [{unit}]" if unit in _UNITS else metric
+def _objective(quantity: Quantity) -> str:
+    """What a quantity is called as an objective, "ppte [um]"."""
+    return f"{quantity.name} [{quantity.unit}]" if quantity.unit else quantity.name
 
 
 def verified(evaluations: Evaluations) -> list[Verified]:

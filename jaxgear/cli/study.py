@@ -18,14 +18,8 @@ from ..optimize import Verified
 from ..sweeps import Scatter, over_torques
 
 _SURFACE_REACH, _SURFACE_TORQUES = 2.0, 21
-# numbers that depend on the grid, by name and unit: the extremes over the positions, K_Hbeta over the face and K_v
-_EXTREMES = {
-    "ppte_um": ("PPTE", " um"),
-    "force_excitation_N": ("force excitation", " N"),
-    "max_flank_pressure_MPa": ("max flank pressure", " MPa"),
-    "max_corner_pressure_MPa": ("max corner pressure", " MPa"),
-}
-_LABELS = {"face_load_factor": ("K_Hbeta", ""), "max_dynamic_factor": ("largest dynamic factor", ""), **_EXTREMES}
+# extremes over the positions, which depend on their number
+_EXTREMES = "ppte_um", "force_excitation_N", "max_flank_pressure_MPa", "max_corner_pressure_MPa"
 
 
 @dataclass(frozen=True)
@@ -127,13 +121,14 @@ def grid_line(grid: str, changes: Mapping[str, Mapping[str, float]], more: str =
     """How fine a grid was, and what twice that would change; `changes` by the name of the design."""
     said = [more] * bool(more)
     for metric in next(iter(changes.values())):
-        label, unit = _LABELS[metric]
+        quantity = quantities[metric]
+        unit = f" {quantity.unit}".rstrip()
         # the same extreme: at a position that both grids have
         each = (
             f"{name} by {by:+.2g}{unit}" if (by := change[metric]) else f"{name} not"
             for name, change in changes.items()
         )
-        said.append(f"{label}: {', '.join(each)}")
+        said.append(f"{quantity.words}: {', '.join(each)}")
     return f"evaluated at {grid}; twice as many change {'; '.join(said)}"
 
 

@@ -77,7 +77,8 @@ def mesh_frequency(teeth, speed):
 
 def _quantity(name: str, kind: Kind) -> Quantity:
     stands = WithoutSettings(name, "jaxgear.dynamics.Dynamics", "dynamics", given=_numbers_of)
-    return Quantity(name, stands, kind.unit, kind.meaning, Max())
+    label = "largest dynamic factor" if name == "worst_dynamic_factor" else ""
+    return Quantity(name, stands, kind.unit, kind.meaning, Max(), label=label)
 
 
 quantities.add(*(_quantity(name, kind) for name, kind in DYNAMIC_QUANTITIES.items()), package=__package__)

@@ -35,6 +35,8 @@ class Quantity:
         better: whether small or large values are the better ones: what is minimized, worst, or on a front.
         local: whether the array has positions last and its values at a position depend on the material removed at that
             position alone, as those of transmission error, line load and pressure do. It only saves time.
+        label: as tables and figures call it; "" for the name in words.
+        form: how tables format the number, as in `format`.
     """
 
     name: str
@@ -44,6 +46,18 @@ class Quantity:
     reduction: AbstractReduction = Value()
     better: Literal["smaller", "larger"] = "smaller"
     local: bool = False
+    label: str = ""
+    form: str = ".4g"
+
+    @property
+    def words(self) -> str:
+        """The label, or else the name in words."""
+        return self.label or self.name.replace("_", " ")
+
+    @property
+    def heading(self) -> str:
+        """In words with the unit: `PPTE [um]`, `contact ratio`."""
+        return f"{self.words} [{self.unit}]" if self.unit else self.words
 
     @property
     def key(self) -> str:

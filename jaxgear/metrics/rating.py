@@ -60,7 +60,8 @@ def _borne(name: str, of: Any, meaning: str, needs: str, **options: Any) -> Quan
 def _of_gears(kind: str, of: Any, meaning: str, needs: str, **options: Any) -> Iterator[Quantity]:
     """A quantity of pinion and wheel, which `of` gives together."""
     for number, gear in enumerate(("pinion", "wheel")):
-        yield _borne(f"{gear}_{kind}", partial(_one, of, number), f"{meaning}, {gear}", needs, **options)
+        labelled = options | {"label": f"{gear} {options['label']}"}
+        yield _borne(f"{gear}_{kind}", partial(_one, of, number), f"{meaning}, {gear}", needs, **labelled)
 
 
 def _one(of: Any, number: int, cycle: MeshCycle, strength: Any) -> Any:
@@ -79,8 +80,16 @@ LUBRICATED = (
         local=True,
         otherwise=_flash,
         operating_point=("speed",),
+        form=".1f",
     ),
-    _oiled("friction_coefficient", friction_coefficient, "", "mean coefficient of friction"),
+    _oiled(
+        "friction_coefficient",
+        friction_coefficient,
+        "",
+        "mean coefficient of friction",
+        label="mean coefficient of friction",
+        form=".4f",
+    ),
     _oiled(
         "loss_power",
         loss_power,
@@ -88,6 +97,7 @@ LUBRICATED = (
         "power that friction of the flanks takes",
         otherwise=loss_power,
         operating_point=("speed", "friction"),
+        label="power loss of the flanks",
     ),
     _oiled(
         "mesh_efficiency",
@@ -97,17 +107,32 @@ LUBRICATED = (
         better="larger",
         otherwise=mesh_efficiency,
         operating_point=("friction",),
+        label="efficiency of the mesh",
+        form=".5f",
     ),
-    _oiled("bulk_temperature", bulk_temperature, "degC", "of the teeth between two contacts"),
+    _oiled("bulk_temperature", bulk_temperature, "degC", "of the teeth between two contacts", form=".1f"),
     _oiled(
-        "max_contact_temperature", contact_temperature, "degC", "largest temperature in the contact", reduction=Max()
+        "max_contact_temperature",
+        contact_temperature,
+        "degC",
+        "largest temperature in the contact",
+        reduction=Max(),
+        form=".1f",
     ),
-    _oiled("min_film_thickness", film_thickness, "um", "smallest thickness of the oil film, at most 1000", **_LEAST),
+    _oiled(
+        "min_film_thickness",
+        film_thickness,
+        "um",
+        "smallest thickness of the oil film, at most 1000",
+        form=".3f",
+        **_LEAST,
+    ),
     _oiled(
         "min_specific_film_thickness",
         specific_film_thickness,
         "",
         "lambda, smallest thickness of the oil film over roughness",
+        form=".3f",
         **_LEAST,
     ),
     _oiled(
@@ -116,6 +141,8 @@ LUBRICATED = (
         "",
         "S_lambda, specific over permissible film thickness",
         "permissible_film",
+        label="micropitting safety S_lambda",
+        form=".2f",
         **_LEAST,
     ),
     _oiled(
@@ -124,12 +151,28 @@ LUBRICATED = (
         "",
         "S_B, rise to the scuffing temperature over that to the contact temperature",
         "scuffing_temperature",
+        label="scuffing safety S_B",
+        form=".2f",
         **_LEAST,
     ),
 )
 RATED = (
-    *_of_gears("pitting_safety", pitting_safety, "S_H, pitting strength over nominal contact stress", "pitting"),
-    *_of_gears("root_safety", root_safety, "S_F, bending strength over root stress after ISO 6336-3", "bending"),
+    *_of_gears(
+        "pitting_safety",
+        pitting_safety,
+        "S_H, pitting strength over nominal contact stress",
+        "pitting",
+        label="pitting safety S_H",
+        form=".2f",
+    ),
+    *_of_gears(
+        "root_safety",
+        root_safety,
+        "S_F, bending strength over root stress after ISO 6336-3",
+        "bending",
+        label="root safety S_F",
+        form=".2f",
+    ),
     *_of_gears(
         "local_root_safety",
         local_root_safety,
@@ -137,6 +180,8 @@ RATED = (
         "bending",
         **_LEAST,
         local=True,
+        label="root safety, contact analysis",
+        form=".2f",
     ),
     _borne(
         "pressure_safety",
@@ -145,6 +190,8 @@ RATED = (
         "pressure",
         reduction=Min(),
         local=True,
+        label="pressure safety p_lim / p_max",
+        form=".2f",
     ),
     *_of_gears(
         "pitting_damage",
@@ -152,6 +199,8 @@ RATED = (
         "share of the life that pitting takes in 1e6 revolutions of the pinion",
         "pitting_exponent",
         better="smaller",
+        label="pitting damage per 1e6 revolutions",
+        form=".3g",
     ),
     *_of_gears(
         "root_damage",
@@ -159,6 +208,8 @@ RATED = (
         "share of the life that bending takes in 1e6 revolutions of the pinion",
         "bending_exponent",
         better="smaller",
+        label="root damage per 1e6 revolutions",
+        form=".3g",
     ),
 )
 LUBRICANT_QUANTITIES = tuple(quantity.name for quantity in LUBRICATED)

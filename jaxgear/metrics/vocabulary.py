@@ -60,14 +60,25 @@ def _of_flanks(function):
 
 
 quantities.add(
-    Quantity("ppte", _te, "um", "peak-to-peak transmission error", Range(), local=True),
+    Quantity("ppte", _te, "um", "peak-to-peak transmission error", Range(), local=True, label="PPTE", form=".3f"),
     Quantity(
         "relative_ppte",
         relative_transmission_error,
         meaning="peak-to-peak over mean transmission error",
         reduction=Range(),
+        label="PPTE over mean transmission error",
+        form=".4f",
     ),
-    Quantity("mean_te", _te, "um", "mean transmission error", Average(), local=True),
+    Quantity(
+        "mean_te",
+        _te,
+        "um",
+        "mean transmission error",
+        Average(),
+        local=True,
+        label="mean transmission error",
+        form=".3f",
+    ),
     Quantity("te_rms", _te, "um", "rms of the transmission error about its mean", Rms(), local=True),
     Quantity(
         "unloaded_ppte",
@@ -89,16 +100,34 @@ quantities.add(
         for order in (1, 2, 3)
     ),
     Quantity(
-        "max_flank_pressure", lambda c: c.contact_pressure, "MPa", "largest Hertzian flank pressure", Max(), local=True
+        "max_flank_pressure",
+        lambda c: c.contact_pressure,
+        "MPa",
+        "largest Hertzian flank pressure",
+        Max(),
+        local=True,
+        form=".0f",
     ),
     Quantity(
-        "max_corner_pressure", lambda c: c.corner_pressure, "MPa", "largest pressure of a tip edge", Max(), local=True
+        "max_corner_pressure",
+        lambda c: c.corner_pressure,
+        "MPa",
+        "largest pressure of a tip edge",
+        Max(),
+        local=True,
+        form=".0f",
     ),
     Quantity(
         "max_contact_pressure", _contact_pressure, "MPa", "largest pressure of flanks and tip edges", Max(), local=True
     ),
     Quantity("max_line_load", lambda c: c.line_load, "N/mm", "largest line load", Max(), local=True),
-    Quantity("face_load_factor", face_load_factor, meaning="K_Hbeta, largest over mean line load over the face"),
+    Quantity(
+        "face_load_factor",
+        face_load_factor,
+        meaning="K_Hbeta, largest over mean line load over the face",
+        label="face load factor K_Hbeta",
+        form=".3f",
+    ),
     Quantity("root_face_load_factor", root_face_load_factor, meaning="K_Fbeta, the same for root stress"),
     Quantity("edge_load_factor", edge_load_factor, meaning="line load at an end of the face over its mean"),
     Quantity(
@@ -106,16 +135,33 @@ quantities.add(
         lambda c: c.kinematics.path_of_contact.contact_ratio,
         meaning="theoretical contact ratio",
         better="larger",
+        form=".3f",
     ),
     Quantity(
-        "effective_contact_ratio", effective_contact_ratio, meaning="mean number of loaded pairs", better="larger"
+        "effective_contact_ratio",
+        effective_contact_ratio,
+        meaning="mean number of loaded pairs",
+        better="larger",
+        form=".3f",
     ),
     Quantity("corner_contact_length", _corner_length, "mm", "loaded path beyond the theoretical path of contact"),
     Quantity("corner_force", corner_force, "N", "largest force on a pair there", Max(), local=True),
     Quantity(
-        "pinion_root_stress", lambda c: nominal_root_stress(c).pinion, "MPa", "root stress after ISO 6336-3, pinion"
+        "pinion_root_stress",
+        lambda c: nominal_root_stress(c).pinion,
+        "MPa",
+        "root stress after ISO 6336-3, pinion",
+        label="pinion root stress, ISO 6336-3",
+        form=".1f",
     ),
-    Quantity("wheel_root_stress", lambda c: nominal_root_stress(c).wheel, "MPa", "root stress after ISO 6336-3, wheel"),
+    Quantity(
+        "wheel_root_stress",
+        lambda c: nominal_root_stress(c).wheel,
+        "MPa",
+        "root stress after ISO 6336-3, wheel",
+        label="wheel root stress, ISO 6336-3",
+        form=".1f",
+    ),
     Quantity(
         "pinion_local_root_stress",
         lambda c: root_stress(c).pinion,
@@ -123,6 +169,8 @@ quantities.add(
         "largest root stress of the contact analysis, pinion",
         Max(),
         local=True,
+        label="pinion root stress, contact analysis",
+        form=".1f",
     ),
     Quantity(
         "wheel_local_root_stress",
@@ -131,6 +179,8 @@ quantities.add(
         "largest root stress of the contact analysis, wheel",
         Max(),
         local=True,
+        label="wheel root stress, contact analysis",
+        form=".1f",
     ),
     Quantity(
         "pinion_contact_stress",
@@ -159,13 +209,21 @@ quantities.add(
         "min_backlash", _backlash_limit(0), "um", "least backlash, of the thickest teeth allowed", better="larger"
     ),
     Quantity("max_backlash", _backlash_limit(1), "um", "largest backlash, of the thinnest teeth allowed"),
-    Quantity("mesh_loss_factor", loss_factor, meaning="loss power per input power and coefficient of friction"),
+    Quantity(
+        "mesh_loss_factor",
+        loss_factor,
+        meaning="loss power per input power and coefficient of friction",
+        label="mesh loss factor H_V",
+        form=".4f",
+    ),
     Quantity(
         "force_excitation",
         force_excitation,
         "N",
         "peak to peak of stiffness times transmission error about its mean",
         Range(),
+        label="force excitation, peak to peak",
+        form=".1f",
     ),
     Quantity(
         "min_tangent_stiffness",
