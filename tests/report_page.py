@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+import jaxgear as jg
+
 VOID = {"meta", "img", "br", "hr"}
 FORBIDDEN = {"script", "link", "iframe", "object", "embed", "base", "form"}
 REFERENCES = {"src", "href", "srcset", "data", "action", "poster", "xlink:href"}
@@ -105,6 +107,8 @@ def check_numbers(page: Page, summary: dict) -> None:
 
 def in_words(name: str) -> str:
     """A name of `summary.json` as the report has it."""
+    if name in jg.quantities:
+        return jg.quantities[name].heading
     found = re.fullmatch(r"(.+?)_(mm3|mm|um|deg|MPa|K|s|N|Nm|N_per_mm)", name)
     if found is None:
         return name.replace("_", " ")

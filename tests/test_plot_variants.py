@@ -93,7 +93,7 @@ def draw(table, scatter):
 
 UNITS = {
     "pareto": ("PPTE [µm]", "max flank pressure [MPa]"),
-    "pareto of three": ("PPTE [µm]", "mesh loss factor [-]"),
+    "pareto of three": ("PPTE [µm]", "mesh loss factor H_V [-]"),
     "fan": ("mesh phase [base pitches]", "transmission error [µm]"),
     "histogram": ("peak-to-peak transmission error [µm]", "share of the gears [%]"),
 }
@@ -122,7 +122,7 @@ def test_a_given_ax_is_used_and_legends_cover_no_data(draw, name):
         "ppte_um": "PPTE [µm]",
         "max_line_load_N_per_mm": "max line load [N/mm]",
         "min_tangent_stiffness_N_per_um": "min tangent stiffness [N/µm]",
-        "mesh_loss_factor": "mesh loss factor [-]",
+        "mesh_loss_factor": "mesh loss factor H_V [-]",
         "ppte_um_50Nm_q95": "PPTE at 50 N m, q95 over gears [µm]",
         "ppte_um_12.5Nm": "PPTE at 12.5 N m [µm]",
         "corner_force_N_worst": "corner force worst [N]",
@@ -158,7 +158,7 @@ def test_radar_writes_values_and_units_and_marks_the_best(table):
     first, second = ([text for text in panel.texts] for panel in panels)
     assert [text.get_text().replace("\n", " ") for text in first] == [
         "noise 3.38 dB",
-        "mesh loss factor 0.160",
+        "mesh loss factor H_V 0.160",
         "max flank pressure 730 MPa",
         "effective contact ratio 1.75",
     ]

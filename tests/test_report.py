@@ -129,7 +129,7 @@ def test_every_picture_has_its_caption():
         ("thermal_contact_coefficient_N_per_(ms^0.5K)", "thermal contact coefficient [N/(m s^0.5 K)]"),
         ("viscosity_40_mm2_per_s", "viscosity 40 [mm2/s]"),
         ("bulk_temperature_degC", "bulk temperature [degC]"),
-        ("loss_power_W", "loss power [W]"),
+        ("loss_power_W", "power loss of the flanks [W]"),
         ("contact_ratio", "contact ratio"),
         ("teeth", "teeth"),
     ],

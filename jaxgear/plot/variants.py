@@ -5,6 +5,8 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
+from ..metrics import quantities
+
 Table = Mapping[str, np.ndarray]
 Labels = Mapping[str, str]
 
@@ -28,7 +30,6 @@ _UNITS = {
 # what may follow the unit: the torque, or a statistic over torques and samples
 _STATISTIC = r"_[-+.\de]+(?:Nm|rpm)|_mean|_worst|_q[.\d]+|_cvar[.\d]+"
 _NAME = re.compile(rf"(?P<what>.+?)(_(?P<unit>{'|'.join(_UNITS)}))?(?P<of>({_STATISTIC})*)")
-_ACRONYMS = {"ppte": "PPTE", "te": "TE"}
 
 
 def label(name: str, labels: Labels | None = None) -> str:
@@ -42,7 +43,7 @@ def label(name: str, labels: Labels | None = None) -> str:
         return labels[name]
     match = _NAME.fullmatch(name)
     what, unit, of = (match["what"], _UNITS.get(match["unit"], "-"), match["of"]) if match else (name, "-", "")
-    words = " ".join(_ACRONYMS.get(word, word) for word in what.split("_"))
+    words = quantities[what].words if what in quantities else what.replace("_", " ")
     return f"{words}{_in_words(re.findall(_STATISTIC, of))} [{unit}]"
 
 

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from ..metrics import quantities
+
 # ending of a name -> unit; the first that fits counts
 _UNITS = {
     "N_per_(ms^0.5K)": "N/(m s^0.5 K)",
@@ -39,6 +41,8 @@ _BETWEEN = " / "  # names of a number inside of another
 
 def heading(name: str) -> str:
     """A name of `summary.json` in words: "max_flank_pressure_MPa" becomes "max flank pressure [MPa]"."""
+    if name in quantities:
+        return quantities[name].heading
     for ending, unit in _UNITS.items():
         if name.endswith(f"_{ending}"):
             return f"{name.removesuffix(f'_{ending}').replace('_', ' ')} [{unit}]"
