@@ -14,7 +14,7 @@ from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.cases import quality_classes
 from ..io.results import unit_of
-from ..metrics import Finding, Quantity, findings_of, quantities
+from ..metrics import Finding, findings_of, quantities
 from ..numerics import program
 from ..optimize import Verified
 from .study import Evaluation, grid_line
@@ -70,7 +70,7 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
     first = next(iter(evaluations.values()))
     second = verified(evaluations)
     rows = [quantities[name] for name in _TABLE]
-    asked = [quantity for quantity in rows if _objective(quantity) in first.objectives]
+    asked = [quantity for quantity in rows if quantity.named in first.objectives]
     for label in objectives(evaluations):
         result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
         if second:
@@ -80,8 +80,7 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
         if None not in cells:
             result.add_row(quantity.heading, *(format(cell, quantity.form) for cell in cells))
         if second and (quantity.name == "ppte" or quantity in asked):
-            objective = _objective(quantity)
-            found = [each.ppte if quantity.name == "ppte" else each.objectives[objective] for each in second]
+            found = [each.ppte if quantity.name == "ppte" else each.objectives[quantity.named] for each in second]
             result.add_row(_BY_FINITE_ELEMENTS, *(format(each, quantity.form) for each in found))
     result.add_section()
     flanks = [dict(_flank_cells(evaluation)) for evaluation in evaluations.values()]
@@ -157,13 +156,8 @@ def diameters(gear: Gear):
 
 def objectives(evaluations: Evaluations) -> list[str]:
     """What an optimization made small, without what is a row of the table anyhow."""
-    known = {_objective(quantities[name]) for name in _TABLE}
+    known = {quantities[name].named for name in _TABLE}
     return [label for label in next(iter(evaluations.values())).objectives if label not in known]
-
-
-def _objective(quantity: Quantity) -> str:
-    """What a quantity is called as an objective, "ppte [um]"."""
-    return f"{quantity.name} [{quantity.unit}]" if quantity.unit else quantity.name
 
 
 def verified(evaluations: Evaluations) -> list[Verified]:

@@ -60,6 +60,11 @@ class Quantity:
         return f"{self.words} [{self.unit}]" if self.unit else self.words
 
     @property
+    def named(self) -> str:
+        """Name with the unit in brackets, as objectives carry it: `ppte [um]`."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    @property
     def key(self) -> str:
         """Name with the unit, as tables and summaries carry it: `ppte_um`, `max_line_load_N_per_mm`."""
         suffix = self.unit.replace(" ", "").replace("/", "_per_")
@@ -127,12 +132,13 @@ class Vocabulary(Mapping[str, Quantity]):
             own[quantity.name] = quantity
 
     def __getitem__(self, name: str) -> Quantity:
-        if self._find(name) is None:
-            self._read_all()
-        found = self._find(name)
+        found = self._known(name)
         if found is None:
             raise KeyError(f"quantities: {self.not_known(name)}")
         return found
+
+    def __contains__(self, name: object) -> bool:
+        return self._known(name) is not None  # without the search for the nearest name, which takes long
 
     def __iter__(self) -> Iterator[str]:
         self._read_all()
@@ -149,10 +155,16 @@ class Vocabulary(Mapping[str, Quantity]):
         hint = f'did you mean "{near[0]}"?' if near else f"must be one of {', '.join(self)}"
         return f'"{name}" is not known, {hint}'
 
-    def _find(self, name: str) -> Quantity | None:
+    def _known(self, name: object) -> Quantity | None:
+        """A quantity, looked for in packages that are not imported yet too."""
+        if self._find(name) is None:
+            self._read_all()
+        return self._find(name)
+
+    def _find(self, name: object) -> Quantity | None:
         for known in self._by_package.values():
             if name in known:
-                return known[name]
+                return known[str(name)]
             for quantity in known.values():
                 if quantity.key == name:
                     return quantity

@@ -1,5 +1,9 @@
 """The quantities of this package."""
 
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -57,6 +61,17 @@ def _backlash_limit(end: int):
 
 def _of_flanks(function):
     return lambda cycle: function(cycle.kinematics, pinion=cycle.pinion, wheel=cycle.wheel)
+
+
+def _stresses(name: str, of: Any, meaning: str, label: str = "", **options: Any) -> Iterator[Quantity]:
+    """A stress of pinion and wheel, which `of` gives together."""
+    for gear in ("pinion", "wheel"):
+        labelled = options | {"label": f"{gear} {label}" * bool(label)}
+        yield Quantity(f"{gear}_{name}", partial(_one, of, gear), "MPa", f"{meaning}, {gear}", **labelled)
+
+
+def _one(of: Any, gear: str, cycle: MeshCycle) -> Any:
+    return getattr(of(cycle), gear)
 
 
 quantities.add(
@@ -146,54 +161,19 @@ quantities.add(
     ),
     Quantity("corner_contact_length", _corner_length, "mm", "loaded path beyond the theoretical path of contact"),
     Quantity("corner_force", corner_force, "N", "largest force on a pair there", Max(), local=True),
-    Quantity(
-        "pinion_root_stress",
-        lambda c: nominal_root_stress(c).pinion,
-        "MPa",
-        "root stress after ISO 6336-3, pinion",
-        label="pinion root stress, ISO 6336-3",
-        form=".1f",
+    *_stresses(
+        "root_stress", nominal_root_stress, "root stress after ISO 6336-3", "root stress, ISO 6336-3", form=".1f"
     ),
-    Quantity(
-        "wheel_root_stress",
-        lambda c: nominal_root_stress(c).wheel,
-        "MPa",
-        "root stress after ISO 6336-3, wheel",
-        label="wheel root stress, ISO 6336-3",
-        form=".1f",
-    ),
-    Quantity(
-        "pinion_local_root_stress",
-        lambda c: root_stress(c).pinion,
-        "MPa",
-        "largest root stress of the contact analysis, pinion",
-        Max(),
+    *_stresses(
+        "local_root_stress",
+        root_stress,
+        "largest root stress of the contact analysis",
+        "root stress, contact analysis",
+        reduction=Max(),
         local=True,
-        label="pinion root stress, contact analysis",
         form=".1f",
     ),
-    Quantity(
-        "wheel_local_root_stress",
-        lambda c: root_stress(c).wheel,
-        "MPa",
-        "largest root stress of the contact analysis, wheel",
-        Max(),
-        local=True,
-        label="wheel root stress, contact analysis",
-        form=".1f",
-    ),
-    Quantity(
-        "pinion_contact_stress",
-        lambda c: nominal_contact_stress(c).pinion,
-        "MPa",
-        "nominal contact stress after ISO 6336-2, pinion",
-    ),
-    Quantity(
-        "wheel_contact_stress",
-        lambda c: nominal_contact_stress(c).wheel,
-        "MPa",
-        "nominal contact stress after ISO 6336-2, wheel",
-    ),
+    *_stresses("contact_stress", nominal_contact_stress, "nominal contact stress after ISO 6336-2"),
     *(
         Quantity(f"{gear}_{name}", _margin(f"{gear}_{name}"), "mm", f"{meaning}, {gear}", better="larger")
         for gear in ("pinion", "wheel")

@@ -107,8 +107,7 @@ def judged(
         values = np.asarray(_of_one(problem.objectives, cycle))
     else:
         values = np.asarray(_score_of(problem, pinion, wheel).value)
-    units = (f" [{of.unit}]" if of.unit else "" for of in problem.objectives)
-    names = (f"{_over_cases(problem)}{of.name}{unit}" for of, unit in zip(problem.objectives, units))
+    names = (f"{_over_cases(problem)}{of.named}" for of in problem.objectives)
     return {name: of.sign * float(value) for name, of, value in zip(names, problem.objectives, values)}
 
 
