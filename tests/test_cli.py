@@ -876,10 +876,18 @@ def test_a_new_design_file_runs_as_it_is(tmp_path):
     assert result.code == 0 and "modified" in result.out
 
 
-def test_the_cache_is_a_private_folder_and_never_an_obstacle(tmp_path, monkeypatch):
+@pytest.fixture
+def no_cache_of_jax():
+    """What users have, of whom few tell JAX to keep programs itself."""
+    before = jax.config.jax_compilation_cache_dir
+    jax.config.update("jax_compilation_cache_dir", None)
+    yield
+    jax.config.update("jax_compilation_cache_dir", before)
+
+
+def test_the_cache_is_a_private_folder_and_never_an_obstacle(tmp_path, monkeypatch, no_cache_of_jax):
     kept = []
     monkeypatch.setattr(cache, "keep", kept.append)
-    monkeypatch.delenv("JAX_COMPILATION_CACHE_DIR", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     folder = cache.enable_cache()
     assert len(kept) == 1 and folder.is_relative_to(tmp_path)
@@ -906,6 +914,6 @@ def test_the_cache_is_a_private_folder_and_never_an_obstacle(tmp_path, monkeypat
     assert cache.enable_cache() is None
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     folder.chmod(0o700)
-    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", "/elsewhere")
+    jax.config.update("jax_compilation_cache_dir", "/elsewhere")  # its variable sets it too
     assert cache.enable_cache() is None
     assert len(kept) == 1

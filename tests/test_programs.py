@@ -119,23 +119,10 @@ def test_errors_are_those_of_the_function(shelf):
         refuse(jnp.ones(2))
 
 
-@pytest.fixture(scope="module")
-def of_contacts():
-    """What the contacts of this file are solved with."""
-    return Shelf()
-
-
-@pytest.fixture
-def contacts(of_contacts):
-    keep(Store(of_contacts))
-    yield
-    keep(None)
-
-
 CONTACT = "_arrays_of", "slid_material", "_solve_removed"
 
 
-def test_a_contact_compiles_what_it_has_not_begun_and_what_its_programs_read(contacts, traced):
+def test_a_contact_compiles_what_it_has_not_begun_and_what_its_programs_read(shelf, traced):
     pair, compliance, relief = gear_pair(), jg.default_compliance(), jg.TipRelief(5.0, 3.0)
     begin_contact(pair, compliance, LINE, LINE)
     before = [name for name in traced if name in ("_arrays_of", "_solve_removed")]
@@ -294,7 +281,7 @@ slide_steps = 0
 
 
 @pytest.mark.slow
-def test_a_second_command_with_another_number_compiles_nothing_and_finds_the_same(tmp_path, contacts):
+def test_a_second_command_with_another_number_compiles_nothing_and_finds_the_same(tmp_path):
     # without optimization it compiles in a quarter of the time
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "JAX_DISABLE_MOST_OPTIMIZATIONS": "1"}
     environment["XLA_FLAGS"] = "--xla_backend_optimization_level=0"  # nothing is compiled to try options

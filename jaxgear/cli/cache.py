@@ -18,9 +18,10 @@ def enable_cache() -> Path | None:
     """Keeps compiled programs in a private folder of the user's cache directory.
 
     Returns:
-        the folder, or None where there is none: it cannot be made, is not private, or the user set JAX's own variable.
+        the folder, or None where there is none: it cannot be made, is not private, or JAX keeps programs itself.
     """
-    if os.environ.get("JAX_COMPILATION_CACHE_DIR"):
+    # by its variable or its configuration; a program that JAX has loaded lacks half of itself when it is written again
+    if jax.config.jax_compilation_cache_dir:
         return None
     folder = user_folder("jaxgear", "programs")
     if folder is None:
