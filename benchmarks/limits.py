@@ -20,7 +20,7 @@ from rich.table import Table
 import jaxgear as jg
 from jaxgear.contact import OperatingPoint
 from jaxgear.metrics import Lubricant, Quantity, Strength
-from jaxgear.numerics import quick
+from jaxgear.numerics import programs
 
 # What is made best and what is limited; every problem of a row shares its programs.
 ROWS = (
@@ -226,7 +226,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--objective", nargs="+", default=known, choices=known, metavar="NAME", help="of these alone")
     given = parser.parse_args(arguments)
     jax.config.update("jax_enable_x64", True)
-    quick.compile_quickly()
+    programs.compile_quickly()
     console, refused = Console(), Counter[str]()
     rows = [row for row in ROWS if row[0] in given.objective]
     found = [each for seed in given.seed for each in answers(console, rows, given.problems, seed, refused)]

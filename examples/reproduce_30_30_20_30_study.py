@@ -352,7 +352,7 @@ def draw(found):
 
     from jaxgear import plot
     from jaxgear.plot.figure import line_style, report_axes
-    from jaxgear.plot.history import PHASE_LABEL, two_pitches
+    from jaxgear.plot.mesh_cycle import PHASE_LABEL, two_pitches
 
     relief = f"relief {RELATIVE[MIDDLE] * LARGEST:.0f} µm"
     worn, alone = found["worn_cycles"], found["path_alone_cycles"]  # of each design: QSTE and stiffness, new and worn

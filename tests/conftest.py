@@ -44,16 +44,16 @@ def _before_the_workers():
 
     To split a program among threads costs work, and gains nothing where every core has a worker.
     """
-    from jaxgear.numerics import durable, quick
+    from jaxgear.numerics import durable, programs
 
     with contextlib.suppress(OSError):
         durable.forget_the_oldest(Path(jax.config.jax_compilation_cache_dir), MOST_KEPT)
     for name, value in ALLOCATOR.items():
         os.environ.setdefault(name, value)
     if "XLA_FLAGS" not in os.environ:
-        wanted = {**quick.OPTIONS, "xla_cpu_parallel_codegen_split_count": 1}
+        wanted = {**programs.OPTIONS, "xla_cpu_parallel_codegen_split_count": 1}
         del wanted[OPTIMIZATION]  # the configuration says it, which a test can change
-        flags = (f"--{name}={str(value).lower()}" for name, value in quick.known_of(wanted).items())
+        flags = (f"--{name}={str(value).lower()}" for name, value in programs.known_of(wanted).items())
         os.environ["XLA_FLAGS"] = " ".join(flags)
 
 

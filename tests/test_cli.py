@@ -25,13 +25,12 @@ from report_page import Page, check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import app, cache, drawing, main, manufactured, optimum_report, report, run, study
-from jaxgear.cli.front import front_rows, front_table
-from jaxgear.cli.gains import gains
+from jaxgear.cli import app, cache, geometry, main, manufactured, optimum_report, report, run, study
 from jaxgear.cli.geometry import gears
+from jaxgear.cli.optimum_report import front_rows, front_table, gains
 from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
-from jaxgear.io.schema_optimize import METHODS_WITHOUT_VARIABLES
+from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
 from jaxgear.manufacture import over_balls
 from jaxgear.metrics import Finding
 from jaxgear.metrics.findings import Limit
@@ -298,7 +297,7 @@ def test_the_reports_hold_what_was_found(folder, analyzed, optimized):
         assert width == pytest.approx(30e-3 * times, rel=1e-9 if key == "span" else 0.05)
     chosen = "span = [22.85, 22.88]\nteeth_spanned = 3"
     (folder / "thin.toml").write_text(file.read_text().replace("[pinion]", "[pinion]\n" + chosen, 1))
-    (teeth, ball, quality), (free, *_) = drawing.chosen(load_design(folder / "thin.toml"))
+    (teeth, ball, quality), (free, *_) = geometry.chosen(load_design(folder / "thin.toml"))
     assert (float(teeth), ball, float(quality.quality_class), free) == (3.0, None, 5.0, None)
     factors = [one["pinion_form_factor"] for one in analyzed.summary["iso_6336"].values()]
     assert rows["pinion form factor, Y_F"] == [f"{factor:.6g}" for factor in factors] and factors[0] > 1

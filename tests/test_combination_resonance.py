@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from jaxgear.dynamics import Oscillator, bifurcation_of, find_orbit, follow_orbits
 from jaxgear.dynamics.bifurcation import tests_of as numbers_of
-from jaxgear.dynamics.corrector import Corrected
+from jaxgear.dynamics.poincare import Corrected
 
 STEPS = 200
 TWO_PI = 2 * np.pi

@@ -11,10 +11,9 @@ from catalogue import LINE, gear_pair, kahraman_gear, prepare
 import jaxgear as jg
 from jaxgear.compliance.edge import cut_off
 from jaxgear.contact import solve_removed
-from jaxgear.contact.corner import corner_gap
-from jaxgear.contact.kinematics import contacts
+from jaxgear.contact.kinematics import contacts, corner_gap
 from jaxgear.contact.slide import nothing_removed
-from jaxgear.io.sizes import resolution_of
+from jaxgear.io.model import resolution_of
 
 # Gap [um] of the approach corner when the mate stays, over the distance before A in base pitches, and its parabola.
 TABLE = {

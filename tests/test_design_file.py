@@ -27,15 +27,13 @@ from jaxgear.io import (
     reference,
     result_folder,
     schema,
-    schema_optimize,
-    schema_sweep,
     sweep_request,
     write_design,
     write_summary,
 )
-from jaxgear.io.cases import tolerance_of
 from jaxgear.io.layout import family, section_of
-from jaxgear.io.schema_optimize import METHODS_WITHOUT_VARIABLES
+from jaxgear.io.requests import tolerance_of
+from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, NoModification, ParabolicLinear
 from jaxgear.numerics import number
 
@@ -734,8 +732,8 @@ def test_whatever_is_written_in_a_file_it_is_read_or_refused_in_one_line(load, t
 def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
     text = reference()
     sections = [schema.FileSection, schema.GearSection, schema.LoadSection, schema.ModelSection]
-    sections.append(schema_optimize.optimize_section())
-    sections += [*schema_optimize.method_options().values(), schema_sweep.SweepSection, schema_sweep.ToleranceSection]
+    sections.append(schema.optimize_section())
+    sections += [*schema.method_options().values(), schema.SweepSection, schema.ToleranceSection]
     sections += [section_of(cls) for cls in (*family(AbstractModification, users=False).values(), jg.Material)]
     for section in sections:
         assert not [name for name in section.model_fields if f"| `{name}` | " not in text]

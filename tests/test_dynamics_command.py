@@ -14,7 +14,7 @@ from report_page import check_report
 
 from jaxgear.cli import interrupt
 from jaxgear.cli.dynamics_report import _bodies, _far_from_resonance, _still_rising
-from jaxgear.cli.kept import Kept, SpeedResponses
+from jaxgear.cli.study import Kept, SpeedResponses
 from jaxgear.dynamics import Oscillator, RectangularStiffness, SpeedResponse
 from jaxgear.io import DesignFileError, dynamics_request, load_design, sweep_request
 from jaxgear.io.folder import RESULT_FILES

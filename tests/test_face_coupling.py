@@ -16,7 +16,7 @@ from jaxgear.compliance import face_kernel, few_modes
 from jaxgear.contact.prescribed import solve_series
 from jaxgear.numerics import ContactProblem, Coupling
 from jaxgear.optimize.refine import _with_positions
-from jaxgear.optimize.verification import verification
+from jaxgear.optimize.verdict import verification
 from jaxgear.shafts import Misalignment, RigidSupport, TabulatedSupport, support
 
 WIDTH, CHORD = 18.0, 8.189371

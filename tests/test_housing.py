@@ -23,7 +23,7 @@ from jaxgear.shafts import (
     with_and_without_housing,
     write_housing,
 )
-from jaxgear.shafts.equilibrium import Patterns, solve, system
+from jaxgear.shafts.loads import Patterns, solve, system
 
 SEATS = "ABCD"
 NODES = tuple(f"{seat}.{way}" for seat in SEATS for way in "xyz")

@@ -7,7 +7,7 @@ import pytest
 from catalogue import TWO_PAIRS, gear_pair, kahraman_gear, ppte
 
 import jaxgear as jg
-from jaxgear.contact.parts import parts
+from jaxgear.contact.mesh import parts
 from jaxgear.optimize.refine import POSITIONS
 
 TORQUE = 200.0  # [N m]

@@ -39,7 +39,7 @@ from jaxgear.layout import (
 )
 from jaxgear.layout.life import damage_of, under_loads
 from jaxgear.metrics import removed_at
-from jaxgear.metrics.root_stress import root_factors
+from jaxgear.metrics.stress import root_factors
 from jaxgear.shafts import (
     Housing,
     Misalignment,
@@ -50,7 +50,7 @@ from jaxgear.shafts import (
     mesh_stiffness,
     support,
 )
-from jaxgear.shafts.places import axes_of, tip_clearances
+from jaxgear.shafts.gearbox import axes_of, tip_clearances
 from jaxgear.tolerance import ToleranceClass
 
 PAIR = jg.GearPair(PINION, WHEEL)

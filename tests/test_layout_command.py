@@ -11,7 +11,7 @@ from report_page import check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import layout_figures
+from jaxgear.cli import layout_report
 from jaxgear.cli.layout_report import failures
 from jaxgear.io import layout_request, load_design
 from jaxgear.io.folder import RESULT_FILES
@@ -204,7 +204,7 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
     for name in others:
         monkeypatch.setattr(plot, name, lambda *given, **options: None)
     monkeypatch.setattr(plot, "radar", lambda *given, **options: drawn.append((*given, options["maximize"])))
-    monkeypatch.setattr(layout_figures.report, "save_figures", lambda folder, axes: list(axes))
+    monkeypatch.setattr(layout_report.report, "save_figures", lambda folder, axes: list(axes))
     profile = SimpleNamespace(
         table=SimpleNamespace(column=lambda name: np.asarray([1.2, 1.0, np.nan])),
         radar_variants=lambda: ([0, 1], ["no profile modification", "best"]),
@@ -213,14 +213,14 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
     study = SimpleNamespace(
         design=design, request=request, main=layout, over_torque={}, cycles={}, profile=profile, profiles={}
     )
-    assert layout_figures.write_figures(None, study)[-1] == "radar"
+    assert layout_report.write_figures(None, study)[-1] == "radar"
     ((values, columns, *_, maximized),) = drawn
     assert columns[-2:] == ["pinion_life_h", "wheel_life_h"] and maximized == set(columns[-2:])
     for name in columns[-2:]:
         uneven, even, none = values[name]
         assert uneven / even == pytest.approx(1.2**-6.6, rel=1e-9) and np.isnan(none)
     study.request = SimpleNamespace(**{**vars(request), "options": {}})
-    layout_figures.write_figures(None, study)
+    layout_report.write_figures(None, study)
     assert drawn[1][1] == columns[:-2] and not drawn[1][-1]
 
 

@@ -9,7 +9,7 @@ from catalogue import LINE, gear_pair
 
 import jaxgear as jg
 from jaxgear.contact import OperatingPoint
-from jaxgear.contact.parts import parts
+from jaxgear.contact.mesh import parts
 from jaxgear.metrics import Lubricant, Strength
 from jaxgear.optimize import SLP, Genetic, Pareto
 from jaxgear.optimize.evaluate import scores

@@ -11,8 +11,7 @@ from catalogue import FACE, SLIDING
 import jaxgear as jg
 from benchmarks import cases
 from jaxgear.contact import RemovedMaterial, removed_material
-from jaxgear.contact.loaded_width import loaded_material
-from jaxgear.contact.slide import slid_material
+from jaxgear.contact.slide import loaded_material, slid_material
 from jaxgear.optimize.problem import make_problem
 
 CASE = cases.Case("L", "stress", 300.0, "linshort")  # a steep relief on stub teeth

@@ -10,9 +10,9 @@ import pytest
 from catalogue import LINE, gear_pair
 
 import jaxgear as jg
-from jaxgear.contact.pressure import corner_pressure
+from jaxgear.contact.cycle import corner_pressure
 from jaxgear.metrics import quantities
-from jaxgear.metrics.root_stress import single_contact_root_stress
+from jaxgear.metrics.stress import single_contact_root_stress
 
 
 # FZG type C gears with untrimmed tips: published form and stress correction factors and loss factor

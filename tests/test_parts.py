@@ -9,8 +9,8 @@ import pytest
 from catalogue import LINE, gear_pair, prepare
 
 import jaxgear as jg
-from jaxgear.contact.parts import half_way, parts
-from jaxgear.optimize.linearizer import Linearizer
+from jaxgear.contact.mesh import half_way, parts
+from jaxgear.optimize.linear_model import Linearizer
 from jaxgear.optimize.problem import make_problem
 
 TORQUE, COARSE, COUNT = 50.0, 8, LINE.positions // 8

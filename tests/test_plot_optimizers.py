@@ -15,7 +15,7 @@ import jaxgear as jg
 from jaxgear import plot
 from jaxgear.optimize import Front, Iterate, Optimum
 from jaxgear.plot.figure import point_style
-from jaxgear.plot.objectives import objective_label
+from jaxgear.plot.front import objective_label
 
 pytestmark = pytest.mark.usefixtures("clean_figures")
 

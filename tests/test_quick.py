@@ -5,14 +5,14 @@ import jax
 import jax.numpy as jnp
 import pytest
 
-from jaxgear.numerics import quick, quick_jit
+from jaxgear.numerics import programs, quick_jit
 
 
 @pytest.fixture
 def compiler(monkeypatch):
     """The options that every program was compiled with, where the user has not said how to compile."""
-    monkeypatch.setattr(quick, "quick_options", lambda: {"xla_backend_optimization_level": 0})
-    monkeypatch.setattr(quick, "_everything", False)
+    monkeypatch.setattr(programs, "quick_options", lambda: {"xla_backend_optimization_level": 0})
+    monkeypatch.setattr(programs, "_everything", False)
     given, whole = [], eqx.filter_jit
 
     def recorded(function, **options):
@@ -24,7 +24,7 @@ def compiler(monkeypatch):
 
         return run
 
-    monkeypatch.setattr(quick.eqx, "filter_jit", recorded)
+    monkeypatch.setattr(programs.eqx, "filter_jit", recorded)
     return given
 
 
@@ -46,7 +46,7 @@ def test_what_runs_for_long_is_quickly_compiled_where_all_is(compiler):
     before = jax.config.read("jax_disable_most_optimizations")
     try:
         square(jnp.ones(3))
-        quick.compile_quickly()
+        programs.compile_quickly()
         square(jnp.ones(3))
         assert jax.config.read("jax_disable_most_optimizations")
     finally:
@@ -56,12 +56,12 @@ def test_what_runs_for_long_is_quickly_compiled_where_all_is(compiler):
 
 def test_the_compiler_is_asked_what_it_knows(monkeypatch):
     known = {"xla_backend_optimization_level": 0}
-    assert quick.known_of(known) == quick.known_of({**known, "xla_of_another_version": True}) == known
+    assert programs.known_of(known) == programs.known_of({**known, "xla_of_another_version": True}) == known
     monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_enable_fast_math=false")
-    found = quick.quick_options.__wrapped__()
-    assert found["xla_backend_optimization_level"] == 0 and set(found) <= set(quick.OPTIONS)
+    found = programs.quick_options.__wrapped__()
+    assert found["xla_backend_optimization_level"] == 0 and set(found) <= set(programs.OPTIONS)
 
 
 def test_whoever_says_how_to_compile_is_heard(monkeypatch):
     monkeypatch.setenv("XLA_FLAGS", "--xla_backend_optimization_level=2")
-    assert quick.quick_options.__wrapped__() is None
+    assert programs.quick_options.__wrapped__() is None

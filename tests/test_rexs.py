@@ -14,8 +14,8 @@ from rexs_schema import FOLDER, faults
 import jaxgear as jg
 from jaxgear.io import describe, read_rexs, write_rexs
 from jaxgear.io.layout import family
-from jaxgear.io.rexs.frame import frames
 from jaxgear.io.rexs.gears import _SPANS as SPANS
+from jaxgear.io.rexs.values import frames
 from jaxgear.manufacture import span
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, TabulatedFlank
 from jaxgear.numerics import number

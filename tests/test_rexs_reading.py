@@ -18,7 +18,7 @@ from catalogue import LINE, gear_pair, prepare
 import jaxgear as jg
 from jaxgear.cli import main
 from jaxgear.io import DesignFileError, load_design, read_rexs, write_rexs
-from jaxgear.io.rexs.frame import frames
+from jaxgear.io.rexs.values import frames
 from jaxgear.manufacture import over_balls, span
 
 PAIR = jg.GearPair(

@@ -18,7 +18,7 @@ from jaxgear.dynamics import (
 )
 from jaxgear.dynamics.dimensionless import CycleRelief, PolynomialClearance, dimensionless_model
 from jaxgear.dynamics.dimensionless.model import DimensionlessForce
-from jaxgear.dynamics.static import at_rest, static_force
+from jaxgear.dynamics.oscillator import at_rest, static_force
 
 DOUBLE, SINGLE, SHARE = 300.0, 200.0, 0.37
 RECTANGULAR = RectangularStiffness(DOUBLE, SINGLE, SHARE)

@@ -16,8 +16,8 @@ from scipy.stats.mstats import hdquantiles
 import jaxgear as jg
 from jaxgear.dynamics import DYNAMIC_QUANTITIES
 from jaxgear.metrics import LUBRICANT_QUANTITIES, STRENGTH_QUANTITIES, quantities
-from jaxgear.sweeps.selection import front, smallest
 from jaxgear.sweeps.store import Store, load_manifest
+from jaxgear.sweeps.table import front, smallest
 from jaxgear.wear import WEAR_QUANTITIES
 
 BOUNDS = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.5)}

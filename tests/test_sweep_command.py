@@ -20,9 +20,9 @@ from commands import FREE, SWEEP, assert_refused, call
 from report_page import assert_row, check_report
 
 import jaxgear as jg
-from jaxgear.cli import devices, progress, sweep_figures
+from jaxgear.cli import devices, progress, sweep_report
 from jaxgear.cli import sweep as sweep_command
-from jaxgear.cli.sweep_chosen import said_of_best
+from jaxgear.cli.sweep_report import said_of_best
 from jaxgear.io import load_design, read_variants, sweep_request
 from jaxgear.metrics.findings import LIMITS
 from jaxgear.sweeps import SweepTable, evaluate
@@ -125,11 +125,11 @@ def test_pictures_show_every_variant_or_an_even_share(folder, tmp_path, monkeypa
         "transmission_error_orders",
         "k_chart",
     } < names  # of the best, for the report
-    monkeypatch.setattr(sweep_figures, "_DRAWN", 20)
+    monkeypatch.setattr(sweep_report, "_DRAWN", 20)
     drawn = {}
-    monkeypatch.setattr("jaxgear.plot.pareto", lambda table, *names, **_: drawn.update(table) or plt.subplots()[1])
+    monkeypatch.setattr("jaxgear.plot.front", lambda table, *names, **_: drawn.update(table) or plt.subplots()[1])
     table = jg.open_sweep(folder / "out" / "table")
-    sweep_figures.write_figures(tmp_path, table, ("ppte", "effective_contact_ratio"))
+    sweep_report.write_figures(tmp_path, table, ("ppte", "effective_contact_ratio"))
     front = table.pareto(["ppte_um", "effective_contact_ratio"]).column("ppte_um")
     assert set(drawn["ppte_um"]) == {*table.column("ppte_um")[::3], *front}
 

@@ -22,12 +22,10 @@ from jaxgear.wear import (
     worn_volume,
 )
 from jaxgear.wear import wear as worn_flanks
-from jaxgear.wear.archard import worn
-from jaxgear.wear.case import case_of, marched
-from jaxgear.wear.deposit import deposit, grid
+from jaxgear.wear.case import case_of, marched, worn_through
+from jaxgear.wear.deposit import deposit, grid, worn
 from jaxgear.wear.life import life_of as life_from
 from jaxgear.wear.march import Analysis, march
-from jaxgear.wear.worn_flank import worn_through
 
 # contacts that stay at their nominal places: sliding down a kinked flank they see rounding, by up to 1e-3 um
 SIZES = LINE

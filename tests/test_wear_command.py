@@ -21,7 +21,7 @@ import jaxgear as jg
 from jaxgear import plot
 from jaxgear.cli import wear_report, wear_scatter
 from jaxgear.cli.compared import compared, sought
-from jaxgear.cli.kept import Kept, Marches
+from jaxgear.cli.study import Kept, Marches
 from jaxgear.contact import removed_material
 from jaxgear.io import (
     DesignFileError,
@@ -33,8 +33,8 @@ from jaxgear.io import (
     wear_request,
     write_worn,
 )
-from jaxgear.io.cases import tolerance_of
 from jaxgear.io.folder import RESULT_FILES
+from jaxgear.io.requests import tolerance_of
 from jaxgear.tolerance import deviated_material, sample_deviations
 from jaxgear.wear import March, mean_over_life, over_life, wear, wear_depth, wear_in_steps
 

@@ -61,7 +61,7 @@ def new(
     A file that is there is never replaced.
     """
     with interrupt.importing():
-        from .new import new
+        from .convert import new
     new(file, teeth, module=module, torque=torque, face_width=face_width, speed=speed)
     return OK
 

@@ -21,7 +21,7 @@ def enable_cache() -> Path | None:
         the folder, or None where there is none: it cannot be made, is not private, or JAX keeps programs itself.
     """
     # by its variable or its configuration; a program that JAX has loaded lacks half of itself when it is written again
-    if jax.config.jax_compilation_cache_dir:
+    if jax.config.jax_compilation_cache_dir:  # type: ignore[attr-defined]
         return None
     folder = user_folder("jaxgear", "programs")
     if folder is None:

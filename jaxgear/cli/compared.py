@@ -8,13 +8,13 @@ import jax
 
 from ..contact import Mesh, prepare
 from ..io import DesignFile, OptimizeRequest, optimize_request
-from ..io.schema_optimize import METHODS_WITHOUT_VARIABLES
+from ..io.schema import METHODS_WITHOUT_VARIABLES
 from ..microgeometry import AbstractModification, NoModification
 from ..optimize import Front, Optimum
 from .commands import rule_based
-from .kept import Kept, runs_beside
 from .progress import Stages
 from .run import coarse
+from .study import Kept, runs_beside
 
 Modifications = tuple[AbstractModification, AbstractModification]
 

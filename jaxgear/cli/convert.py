@@ -1,4 +1,4 @@
-"""What the command `convert` does: a design file as a REXS file, and the other way round."""
+"""What the commands `new` and `convert` do: a design file to begin with, and to and from REXS."""
 
 import os
 from pathlib import Path
@@ -9,6 +9,7 @@ import jax
 from ..geometry import GearPair
 from ..io import DesignFileError, load_design, read_rexs, write_design, write_rexs
 from ..io.toml import read
+from ..io.write_design import write_starter
 from . import interrupt, report
 
 _REXS, _DESIGN = (".rexs", ".xml", ".rexsj", ".json"), (".toml",)
@@ -87,4 +88,17 @@ def _say(target: Path, pair: GearPair) -> None:
     report.say(
         f"{target}: {int(pinion.teeth)}/{int(wheel.teeth)} teeth, module {float(pinion.module):g} mm, "
         f"centre distance {float(pair.working_center_distance):.6g} mm"
+    )
+
+
+def new(
+    path: Path, teeth: tuple[int, int], *, module: float, torque: float, face_width: float, speed: float | None
+) -> None:
+    """Writes a design file; a file that is there is never replaced."""
+    jax.config.update("jax_enable_x64", True)
+    with interrupt.held(f"{path} is there"):
+        pair = write_starter(path, teeth, module=module, torque=torque, face_width=face_width, speed=speed)
+    report.say(
+        f"{path}: {teeth[0]}/{teeth[1]} teeth, module {module:g} mm, centre distance "
+        f"{float(pair.working_center_distance):.6g} mm; jaxgear optimize {path} finds its tip reliefs"
     )

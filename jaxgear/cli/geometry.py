@@ -1,15 +1,128 @@
-"""The geometry of a pair as an engineer lists it."""
+"""The geometry of a pair as an engineer lists it, and as a drawing says it."""
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Gear, GearPair, PathOfContact, diameter, margins, outline, path_of_contact
 from ..io import DesignFile
+from ..io.requests import quality_classes
+from ..manufacture import measures
 from ..numerics import program
-from . import drawing
+from ..report import Section, Table, heading, text
+from ..tolerance import ToleranceClass, iso_rounded
+
+_CHOSEN = "teeth_spanned", "ball_diameter_mm"  # by a file, or by `measures`
+# numbers and the symbols of the standards, in the order of the tables
+_MEASURES = {
+    "teeth_spanned": "k",
+    "span_upper_limit_mm": "W_k",
+    "span_lower_limit_mm": "W_k",
+    "ball_diameter_mm": "D_M",
+    "over_balls_upper_limit_mm": "M_dK",
+    "over_balls_lower_limit_mm": "M_dK",
+}
+_CLASS = "flank_tolerance_class"
+_DEVIATIONS = {
+    "single_pitch": "f_p",
+    "total_pitch": "F_p",
+    "profile_slope": "f_Halpha",
+    "profile_form": "f_falpha",
+    "profile_total": "F_alpha",
+    "helix_slope": "f_Hbeta",
+    "helix_form": "f_fbeta",
+    "helix_total": "F_beta",
+}
+_FACTORS = {
+    "tangential_force_N": "F_t",
+    "face_load_factor": "K_Hbeta",
+    "zone_factor": "Z_H",
+    "elasticity_factor_sqrt_MPa": "Z_E",
+    "contact_ratio_factor": "Z_epsilon",
+    "nominal_contact_stress_MPa": "sigma_H0",
+    "pinion_single_pair_contact_factor": "Z_B",
+    "wheel_single_pair_contact_factor": "Z_D",
+    "pinion_contact_stress_MPa": "sigma_H",
+    "wheel_contact_stress_MPa": "sigma_H",
+    "root_face_load_factor": "K_Fbeta",
+    "pinion_form_factor": "Y_F",
+    "wheel_form_factor": "Y_F",
+    "pinion_stress_correction_factor": "Y_S",
+    "wheel_stress_correction_factor": "Y_S",
+    "pinion_nominal_root_stress_MPa": "sigma_F0",
+    "wheel_nominal_root_stress_MPa": "sigma_F0",
+    "pinion_root_stress_MPa": "sigma_F",
+    "wheel_root_stress_MPa": "sigma_F",
+}
+_RATING_NOTE = (
+    "Factors of application, dynamics and transverse load distribution belong into the torque and are 1 here; so are "
+    "Y_beta, Y_B and Y_DT, for spur gears with solid bodies and contact ratios up to 2. K_Hbeta is that of the contact "
+    "analysis, 1 on one slice."
+)
+_TOLERANCE_NOTE = (
+    "Slopes and pitch are limits of either sign, form and total deviations are widths of a band, about the flank as "
+    "modified (ISO 1328-1:2013)."
+)
+
+Factors = Mapping[str, float]
+Scalar = Float[Array, ""]
+
+
+def chosen(file: DesignFile) -> tuple[Any, ...]:
+    """Teeth spanned and ball diameter of either gear where the file names them, and its flank tolerance class."""
+    classes = quality_classes(file) or (None, None)
+    given = (file.drawn[name] for name in ("pinion", "wheel"))
+    measured = ([np.asarray(one[key], float) if key in one else None for key in _CHOSEN] for one in given)
+    return tuple((*beside, quality) for beside, quality in zip(measured, classes))
+
+
+def numbers(gear: Gear, teeth, ball, quality: ToleranceClass | None) -> tuple[tuple[Scalar, ...], ...]:
+    """`_MEASURES`, and `_DEVIATIONS` where the gear has a class; to be traced."""
+    upper = gear.tooth_thickness_allowance
+
+    def measured(allowance):
+        thick = replace(gear, tooth_thickness_allowance=allowance, tooth_thickness_tolerance=jnp.zeros_like(allowance))
+        return measures(thick, teeth, ball)
+
+    of = jax.vmap(measured)(jnp.stack([upper, upper - gear.tooth_thickness_tolerance]))
+    stated = () if quality is None else tuple(iso_rounded(getattr(quality, name)) for name in _DEVIATIONS)
+    return (of.teeth[0], *of.span, of.ball[0], *of.over_balls), stated
+
+
+def drawing(found: tuple[tuple[Any, ...], ...], quality: ToleranceClass | None) -> dict[str, Any]:
+    """`numbers` of a gear by name and unit; what would miss the involute is left out."""
+    measured, deviations = ([np.asarray(number).item() for number in several] for several in found)
+    data: dict[str, Any] = {name: value for name, value in zip(_MEASURES, measured) if np.isfinite(value)}
+    data["teeth_spanned"] = int(data["teeth_spanned"])
+    if quality is not None:
+        data[_CLASS] = int(quality.quality_class)
+    return data | {f"{name}_deviation_um": value for name, value in zip(_DEVIATIONS, deviations)}
+
+
+def drawing_table(found: Mapping[str, Mapping[str, Any]]) -> Table:
+    """`drawing` as a table of the report."""
+    symbols = _MEASURES | {_CLASS: ""} | {f"{name}_deviation_um": symbol for name, symbol in _DEVIATIONS.items()}
+    names = [name for name in symbols if any(name in gear for gear in found.values())]
+    rows = tuple((_label(name, symbols), *(text(gear.get(name)) for gear in found.values())) for name in names)
+    return Table(("", *found), rows, "drawing data", _TOLERANCE_NOTE if _CLASS in names else "")
+
+
+def rating_page(designs: Mapping[str, Factors]) -> Section:
+    """The factors of ISO 6336 of several designs, side by side."""
+    rows = tuple((_label(name, _FACTORS), *(text(each[name]) for each in designs.values())) for name in _FACTORS)
+    return Section("Rating by ISO 6336", tables=[Table(("", *designs), rows, note=_RATING_NOTE)])
+
+
+def _label(name: str, symbols: Mapping[str, str]) -> str:
+    """A number in words, with its symbol and unit."""
+    words, bracket, unit = heading(name).partition(" [")
+    return f"{words}, {symbols[name]}".rstrip(", ") + bracket + unit
+
 
 # the names of ISO 21771 with the unit, in the order of their numbers below
 _GEAR = (
@@ -50,8 +163,6 @@ _PAIR = (
     "largest_backlash_on_line_of_action_um",
 )
 
-Scalar = Float[Array, ""]
-
 
 def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
     """What every `summary.json` says of the gears: their geometry with that of the pair, and their drawing data.
@@ -61,16 +172,16 @@ def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
     active root diameter on.
     """
     # gears without backlash have it up to rounding, which is no -0
-    chosen = drawing.chosen(file)
-    shape, drawn = _numbers(file.pair(), chosen)
+    choices = chosen(file)
+    shape, drawn = _numbers(file.pair(), choices)
     pinion, wheel, together = jax.tree.map(lambda number: np.where(np.abs(number) < 1e-9, 0.0, number), shape)
     geometry = {
         "pinion": dict(zip(_GEAR, pinion, strict=True)),
         "wheel": dict(zip(_GEAR, wheel, strict=True)),
         "pair": dict(zip(_PAIR, together, strict=True)),
     }
-    of = zip(("pinion", "wheel"), drawn, chosen)
-    return {"geometry": geometry, "drawing": {name: drawing.drawing(found, given[-1]) for name, found, given in of}}
+    of = zip(("pinion", "wheel"), drawn, choices)
+    return {"geometry": geometry, "drawing": {name: drawing(found, given[-1]) for name, found, given in of}}
 
 
 def mounting(file: DesignFile) -> str:
@@ -87,7 +198,7 @@ def mounting(file: DesignFile) -> str:
 
 
 @program
-def _numbers(pair: GearPair, chosen):
+def _numbers(pair: GearPair, choices):
     contact, room = path_of_contact(pair), margins(pair)
     pitch = contact.pinion_pitch_roll_length, contact.wheel_pitch_roll_length
     lowest = contact.pinion_roll_length(contact.start), contact.wheel_roll_length(contact.end)
@@ -96,7 +207,7 @@ def _numbers(pair: GearPair, chosen):
         _gear(pair.wheel, pitch[1], lowest[1], room.wheel_tip_clearance),
         _together(pair, contact, room.backlash),
     )
-    return shape, [drawing.numbers(gear, *given) for gear, given in zip(pair.gears, chosen)]
+    return shape, [numbers(gear, *given) for gear, given in zip(pair.gears, choices)]
 
 
 def _gear(gear: Gear, pitch: Scalar, lowest: Scalar, tip_clearance: Scalar) -> tuple[Scalar, ...]:

@@ -26,8 +26,8 @@ from ..layout import (
 )
 from ..numerics import real
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
-from . import layout_figures, layout_report, layout_tables, manufactured
-from .layout_study import Study, designs, flank_lines
+from . import layout_report, manufactured
+from .layout_report import Study, designs, flank_lines
 from .progress import Stages
 from .run import coarse
 from .study import face_change
@@ -209,8 +209,8 @@ run_layout = StudyCommand(
     _plan,
     layout_report.summary,
     _write,
-    layout_figures.write_figures,
-    layout_tables.tables,
+    layout_report.write_figures,
+    layout_report.tables,
     layout_report.verdict,
     layout_report.failures,
     findings=layout_report.findings,

@@ -1,18 +1,112 @@
-"""What `jaxgear layout` says and writes."""
+"""What `jaxgear layout` has found, says, writes and draws."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
 
-from ..io import describe
-from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, ToleranceCases
-from ..shafts import bearing_reactions
+from ..contact import Mesh, MeshCycle
+from ..io import DesignFile, LayoutRequest, describe
+from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, ToleranceCases, gear_lives
+from ..metrics import Finding
+from ..microgeometry import AbstractModification
+from ..shafts import bearing_reactions, root_face_load_factor, tooth_height
 from . import report
 from .geometry import gears
-from .layout_study import STEPS, Study, designs, lives, root_factor
 from .study import grid_line
 from .written import finding_data, identity, versions
+
+STEPS = ("unmodified", "step 1", "step 2")
+LIVES = ("pinion_life_h", "wheel_life_h")
+
+
+@dataclass(frozen=True)
+class Study:
+    """What has been found.
+
+    Attributes:
+        design: the design file.
+        request: what it asks for.
+        layouts: flank lines, by the name of the support; the first is that of the design.
+        over_torque: K_Hbeta of the design after every of the `STEPS` at the torques of the request, without deviations.
+        meshes: of step 3, by the name of the support; empty without it.
+        contacts: what the contact says of the flank lines of every step on their shafts, by the names of the support
+            and of the step; empty without step 3 on shafts.
+        contact_cases: K_Hbeta of the contact in the five cases of deviations, by the names of the support, of the
+            tolerance and of the step, likewise.
+        cycles: contact of the first support without modification and with all three steps, likewise.
+        factors: K_Hbeta of the one-dimensional analysis at the same torque and on as many stations, likewise.
+        profiles: profile modifications of step 3, by the name of the support.
+        unusual: what of every layout is not usual, by the name of the support.
+        stations_change: by how much K_Hbeta of the one-dimensional analysis changes at twice the stations, of the
+            design at the torque of the profiles, by step; empty in a quick run.
+        slices_change: by how much numbers of `cycles` change at twice the slices, by name and unit; empty in a quick
+            run.
+    """
+
+    design: DesignFile
+    request: LayoutRequest
+    layouts: Mapping[str, FlankLineLayout]
+    over_torque: Mapping[str, np.ndarray]
+    meshes: Mapping[str, Mesh]
+    contacts: Mapping[str, Mapping[str, Mapping[str, float]]]
+    contact_cases: Mapping[str, Mapping[str, Mapping[str, np.ndarray]]]
+    cycles: Mapping[str, MeshCycle]
+    factors: Mapping[str, Mapping[str, float]]
+    profiles: Mapping[str, ProfileLayout]
+    unusual: Mapping[str, tuple[Finding, ...]]
+    stations_change: Mapping[str, Mapping[str, float]]
+    slices_change: Mapping[str, Mapping[str, float]]
+
+    @property
+    def profile(self) -> ProfileLayout | None:
+        """The profile modifications of the design; None without step 3."""
+        return next(iter(self.profiles.values()), None)
+
+    @property
+    def main(self) -> FlankLineLayout:
+        """The layout of the design."""
+        return next(iter(self.layouts.values()))
+
+
+def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine]]:
+    """Flank lines of pinion and wheel over their own faces, after every of the `STEPS`."""
+    none = FlankLine()
+    level = layout.line.on(layout.pair, layout.gear)
+    first = (level, none) if layout.gear == "pinion" else (none, level)
+    return dict(zip(STEPS, ((none, none), first, (layout.pinion, layout.wheel))))
+
+
+def lives(study: Study, profile: ProfileLayout) -> dict[str, np.ndarray]:
+    """Life [h] of pinion and wheel with every profile modification, by K_Hbeta of its contact; empty without a duty
+    cycle. That factor is of the torque of step 3 and stands for every load."""
+    load, endurance = (study.request.options.get(name) for name in ("duty_cycle", "endurance"))
+    if load is None or endurance is None:
+        return {}
+    found = gear_lives(study.design.pair(), load, endurance, profile.table.column("face_load_factor"))
+    return dict(zip(LIVES, np.asarray(found).T))
+
+
+def root_factor(layout: FlankLineLayout, factor) -> np.ndarray:
+    """K_Fbeta of K_Hbeta."""
+    pair = layout.pair
+    return np.asarray(root_face_load_factor(np.maximum(factor, 1.0), pair.face_width, tooth_height(pair)))
+
+
+def designs(study: Study) -> dict[str, tuple[AbstractModification, AbstractModification]]:
+    """Modifications of pinion and wheel after every step."""
+    _, first, _ = flank_lines(study.main).values()
+    pinion, wheel = study.main.modifications
+    found = {"step 1": (first[0].modification, first[1].modification), "step 2": (pinion, wheel)}
+    if study.profile is not None:
+        # the profile was made on the further crowning, which the flank line has as well
+        of_pinion, of_wheel = study.profile.profiles
+        found["step 3"] = pinion + of_pinion, wheel + of_wheel
+    return found
 
 
 def verdict(study: Study) -> Iterator[str]:
@@ -195,3 +289,163 @@ def _profile(study: Study, profile: ProfileLayout) -> dict[str, Any]:
         "unmodified": {name: column[0] for name, column in values.items()},
         "best": {name: column[profile.best] for name, column in values.items()},
     }
+
+
+def tables(study: Study) -> Iterator[Table]:
+    """The steps, what the contact says of them, and the bearings."""
+    yield _steps(study)
+    if study.contacts:
+        yield _contacts(study)
+        yield _contact_cases(study)
+    yield _bearings(study)
+
+
+def _steps(study: Study) -> Table:
+    result = Table(title=f"{study.design.title}: flank lines", title_justify="left", box=SIMPLE_HEAD)
+    result.add_column("", no_wrap=True)
+    for name in study.layouts:
+        result.add_column(name, justify="right", no_wrap=True)
+
+    def row(text: str, values: Iterator[str]) -> None:
+        result.add_row(text, *values)
+
+    each = list(study.layouts.values())
+    row("torque of the layout [N m]", (f"{float(one.torque):g}" for one in each))
+    row("K_Hbeta without modification", (f"{float(one.factors[0]):.3f}" for one in each))
+    row("K_Fbeta without modification", (f"{float(root_factor(one, one.factors[0])):.3f}" for one in each))
+    result.add_section()
+    row(f"step 1, {study.main.gear}: slope [um]", (f"{float(one.line.slope):.2f}" for one in each))
+    row("  crowning [um]", (f"{float(one.line.crowning):.2f}" for one in each))
+    row("  K_Hbeta", (f"{float(one.factors[1]):.3f}" for one in each))
+    row("  K_Fbeta", (f"{float(root_factor(one, one.factors[1])):.3f}" for one in each))
+    result.add_section()
+    for index, gear in enumerate(("pinion", "wheel")):
+        row(f"step 2, {gear}: crowning C_b [um]", (f"{float(one.further[index]):.2f}" for one in each))
+    row("  least of both together [um]", (f"{float(one.needed):.2f}" for one in each))
+    for name in study.request.tolerances:
+        result.add_section()
+        tolerance = study.request.tolerances[name]
+        row(
+            f"{name}: f_Hb {float(tolerance.helix_slope):.1f}, f_ma {float(tolerance.misalignment):.1f} um",
+            ("unmodified / step 1 / step 2" for _ in each),
+        )
+        for number, case in enumerate(CASES):
+            row(
+                f"  K_Hbeta, {case}",
+                (" / ".join(_cell(of[name], number) for of in one.cases) for one in each),
+            )
+        row("  K_Fbeta, worst case", (_worst_root(one, name) for one in each))
+        if study.main.damage:
+            row("  life, worst case [h]", (_worst_life(one, name) for one in each))
+    if study.main.damage:
+        result.add_section()
+        for number, text in enumerate(("without modification", "after step 1", "after step 2")):
+            row(f"life {text} [h]", (f"{float(one.damage[number].life):.4g}" for one in each))
+    result.caption = "* largest load at an edge" + ("; last rows: no deviation" if study.main.damage else "")
+    return result
+
+
+def _cell(cases: ToleranceCases, number: int) -> str:
+    return f"{float(cases.face_load_factor[number]):.3f}{'*' if bool(cases.edge_contact[number]) else ' '}"
+
+
+def _worst_root(layout: FlankLineLayout, name: str) -> str:
+    worst = (np.max(of[name].face_load_factor) for of in layout.cases)
+    return " / ".join(f"{float(root_factor(layout, factor)):.3f} " for factor in worst)
+
+
+def _worst_life(layout: FlankLineLayout, name: str) -> str:
+    return " / ".join(f"{float(np.min(lives)):.4g} " for lives in layout.lives[name])
+
+
+def _contacts(study: Study) -> Table:
+    """The contact analysis of every step, beside the one-dimensional one at the same torque."""
+    title = f"contact analysis at {study.request.profile_torque:g} N m, without deviations"
+    result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
+    for name in ("", "K_Hbeta", "K_Fbeta", "edge load factor", "K_Hbeta of Annex E"):
+        result.add_column(name, justify="right" if name else "left", no_wrap=True)
+    for support, steps in study.contacts.items():
+        for step, found in steps.items():
+            cells = [_number(found[name]) for name in FACTORS]
+            given = study.factors[support].get(step)
+            result.add_row(f"{support}: {step}", *cells, "" if given is None else _number(given))
+    return result
+
+
+def _contact_cases(study: Study) -> Table:
+    """K_Hbeta of the contact analysis in the five cases."""
+    title = f"K_Hbeta of the contact analysis at {study.request.profile_torque:g} N m in the cases of deviations"
+    result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
+    for number, name in enumerate(("", *CASES)):
+        result.add_column(name, justify="right" if number else "left", no_wrap=True)
+    for support, tolerances in study.contact_cases.items():
+        for tolerance, steps in tolerances.items():
+            for step, factors in steps.items():
+                result.add_row(f"{support}, {tolerance}: {step}", *map(_number, factors))
+    return result
+
+
+FACTORS = ("face_load_factor", "root_face_load_factor", "edge_load_factor")
+
+
+def _number(value: float) -> str:
+    return f"{value:.3f}"
+
+
+def _bearings(study: Study) -> Table:
+    """Displacements of the shafts at the bearings."""
+    result = Table(title="bearings: displacement of the shaft [um]", title_justify="left", box=SIMPLE_HEAD)
+    result.add_column("bearing", no_wrap=True)
+    result.add_column("force [N]", justify="right")
+    found = {name: bearing_reactions(support.gearbox) for name, support in study.request.supports.items()}
+    for name in found:
+        for way in "xy":
+            result.add_column(f"{way}, {name}", justify="right", no_wrap=True)
+    first = next(iter(found.values()))
+    for number, name in enumerate(first.names):
+        force = float(np.hypot(*np.asarray(first.force)[number, :2]))
+        moved = [f"{float(each.shaft[number, way]):.2f}" for each in found.values() for way in range(2)]
+        result.add_row(name, f"{force:.0f}", *moved)
+    return result
+
+
+_PANEL, _HEIGHT = 92.0, 90.0  # [mm]
+
+
+def write_figures(folder: Path, study: Study) -> list[Path]:
+    """Writes the figures of the cases, K_Hbeta over the torque, shafts, profiles and the contact; gives the files."""
+    import matplotlib
+
+    matplotlib.use("Agg")  # the command line never shows a window
+    from .. import plot
+
+    layout = study.main
+    name = list(layout.after)[-1]
+    axes: dict[str, Any] = {}
+    with plot.figure.report_axes(None, columns=3, width=3 * _PANEL, height=_HEIGHT) as panels:
+        for panel, of, title in zip(np.ravel(panels), layout.cases, STEPS):
+            plot.tolerance_line_load(of[name], panel, title=f"{title}, {name} deviations")
+        for panel in panels[1:]:
+            panel.set_ylabel("")
+    axes["tolerance_cases"] = panels
+    shown = {f"{step}, {kind}": one for step, of in zip(STEPS, layout.cases) for kind, one in of.items()}
+    axes["face_load_factors"] = plot.face_load_factors(shown)
+    axes["face_load_over_torque"] = plot.face_load_over_torque(
+        study.request.torques, study.over_torque, design_torque=study.design.torque
+    )
+    axes["shaft_deflection"] = plot.shaft_deflection(next(iter(study.request.supports.values())).gearbox)
+    if study.cycles:
+        axes["transmission_error"] = plot.transmission_error(study.cycles)
+        axes["load_sharing"] = plot.load_sharing(study.cycles)
+        for step, cycle in study.cycles.items():
+            axes[f"contact_pattern_{step}"] = plot.contact_pattern(cycle)
+        mesh = next(iter(study.meshes.values()))
+        axes["lead_chart"] = plot.lead_chart(mesh, designs(study))
+    if study.profile is not None:
+        rows, names = study.profile.radar_variants()
+        results = ["ppte_um", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure_MPa"]
+        values = {one: study.profile.table.column(one) for one in results}
+        of_gears = lives(study, study.profile)
+        values |= {one: hours for one, hours in of_gears.items() if np.isfinite(hours[rows]).all()}
+        axes["radar"] = plot.radar(values, list(values), rows, names, maximize=set(of_gears) & set(values))
+    return report.save_figures(folder, axes)

@@ -1,21 +1,233 @@
 """What a run says and writes about its optimum, alike for every method."""
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
+from rich import table as terminal_table
 
-from ..contact import Mesh
+from ..contact import Mesh, Side
 from ..io import DesignFile, describe
-from ..optimize import Front, Optimum, Projection
+from ..io.results import unit_of
+from ..metrics import flank_surface
+from ..microgeometry import AbstractModification
+from ..optimize import Front, Optimum, Problem, Projection
 from ..optimize.result import PENALIZED
 from ..report import Table
 from . import report
-from .front import front_rows, others_of
-from .gains import gains
-from .grinding import to_grind
 from .study import response_surface
+
+_PPTE = "ppte [um]"
+_SAME = 0.05  # [%]; a smaller change rounds to nothing
+_NO_RATIO = ("degC",)  # units whose zero is a convention
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A number by which designs are compared.
+
+    Attributes:
+        label: name in words.
+        unit: "" for a pure number.
+        sign: 1 where small values are the better ones, else -1.
+        values: by the name of the design.
+        verified: the same with the finite-element structure; empty where that was not asked for.
+    """
+
+    label: str
+    unit: str
+    sign: int
+    values: Mapping[str, float]
+    verified: Mapping[str, float]
+
+    def change(self, before: float, after: float, than: str) -> str:
+        """What becomes of a number: "31.1 % less than unmodified"; "" where nobody can say."""
+        if not (math.isfinite(before) and math.isfinite(after)):
+            return ""
+        worse = " (worse)" if self.sign * (after - before) > 0 else ""
+        if self.unit in _NO_RATIO or before <= 0:
+            return f"{after - before:+.3g} {self.unit}".rstrip() + f"{worse} against {than}"
+        percent = 100 * (after / before - 1)
+        if abs(percent) < _SAME:
+            return f"as {than}"
+        return f"{abs(percent):.1f} % {'more' if percent > 0 else 'less'}{worse} than {than}"
+
+    def row(self, values: Mapping[str, float]) -> str:
+        """The main design, which is the last, against the first and against those between."""
+        form = ".3f" if self.unit == "um" else ".4g"
+        (first, before), *others, (_, after) = values.items()
+        changes = [self.change(before, after, first)]
+        changes += [self.change(value, after, f"{other} ({value:{form}})") for other, value in others]
+        said = ", ".join(change for change in changes if change)
+        return f"{before:{form}} -> {after:{form}} {self.unit}".rstrip() + f": {said}" * bool(said)
+
+
+def gains(evaluations: report.Evaluations, problem: Problem | None) -> Iterator[tuple[str, str]]:
+    """Rows of label and text: the objectives, then PPTE where it is none of them, each by finite elements too.
+
+    Args:
+        evaluations: designs by their names, the first of which is unmodified.
+        problem: by whose measure they were judged; None for PPTE alone.
+    """
+    main = report.main_name(evaluations)
+    compared = {name: found for name, found in evaluations.items() if not name.startswith("as ")}
+    compared = {name: compared[name] for name in (*(name for name in compared if name != main), main)}
+    for judged in _numbers(compared, problem):
+        yield judged.label, judged.row(judged.values)
+        if judged.verified:
+            yield "  by finite elements", judged.row(judged.verified)
+
+
+def _numbers(evaluations: report.Evaluations, problem: Problem | None) -> Iterator[Judged]:
+    signs = [of.sign for of in problem.objectives] if problem is not None else []
+    labels = list(next(iter(evaluations.values())).objectives)
+    several = all(found.verified is not None for found in evaluations.values())
+    for label, sign in zip(labels, signs):
+        name, _, unit = label.partition(" [")
+        verified = {of: found.verified.objectives[label] for of, found in evaluations.items() if found.verified}
+        values = {of: found.objectives[label] for of, found in evaluations.items()}
+        yield Judged(words(name), unit.rstrip("]"), sign, values, verified if several else {})
+    if _PPTE not in labels:
+        verified = {of: found.verified.ppte for of, found in evaluations.items() if found.verified}
+        values = {of: float(found.metrics["ppte_um"]) for of, found in evaluations.items()}
+        yield Judged(words("ppte"), "um", 1, values, verified if several else {})
+
+
+def words(name: str) -> str:
+    """Name of a quantity as a table says it."""
+    return name.replace("ppte", "PPTE").replace("_", " ")
+
+
+COMPROMISE = "compromise"  # what the design of a front is called that the run shows
+_SHOWN_PARAMETERS = 6  # more columns than these are for a file
+
+
+def others_of(front: Front, evaluations: report.Evaluations) -> dict[str, np.ndarray]:
+    """Values of the objectives of the designs that the front is compared with, by their names."""
+    return {
+        name: np.asarray(list(found.objectives.values()))
+        for name, found in evaluations.items()
+        if name != COMPROMISE and len(found.objectives) == len(front.objectives)
+    }
+
+
+def front_table(front: Front, evaluations: report.Evaluations, of_variables: Mapping[str, str]) -> terminal_table.Table:
+    """All designs of a front, with the others below; variables with their units."""
+    title = f"Pareto front, {len(front.values)} designs, all in front.csv"
+    result = terminal_table.Table(title=title, title_justify="left")
+    result.add_column("")
+    names = list(front.parameters) if len(front.parameters) <= _SHOWN_PARAMETERS else []
+    for name, unit in zip(front.objectives, front.units):
+        result.add_column(f"{words(name)}\n[{unit}]" if unit else words(name), justify="right")
+    for name in names:
+        unit = of_variables.get(name, "")
+        result.add_column(f"{name}\n[{unit}]" if unit else name, justify="right")
+    for row, values in enumerate(front.values):
+        cells = [*values, *(front.parameters[name][row] for name in names)]
+        label = f"{row + 1}, {COMPROMISE}" if row == front.chosen else f"{row + 1}"
+        result.add_row(label, *(f"{value:.4g}" for value in cells))
+    result.add_section()
+    for name, values in others_of(front, evaluations).items():
+        result.add_row(name, *(f"{value:.4g}" for value in values), *("-" for _ in names))
+    return result
+
+
+def front_rows(front: Front, signs: Sequence[int], evaluations: report.Evaluations) -> Iterator[tuple[str, str]]:
+    """What the main design of a front is, and how many of the front beat the other designs.
+
+    Args:
+        front: the front.
+        signs: of the objectives, 1 where small values are the better ones, else -1.
+        evaluations: designs by their names.
+    """
+    yield COMPROMISE, "the design of the front whose worst distance from the best of each objective is least"
+    for name, values in others_of(front, evaluations).items():
+        better = ((front.values - values) * np.asarray(signs) < 0).all(axis=1)
+        found = ", ".join(str(row + 1) for row in np.flatnonzero(better)) or "none"
+        rows = "all" if better.all() else found
+        yield "front", f"better than {name} in every objective: {rows} of its {len(front.values)} designs"
+
+
+_NOTHING = "nothing, the involute stays"
+_DIGITS = {"um": ".2f", "mm": ".3f"}
+_MOST = 4  # numbers of a curve that are written out
+
+
+def to_grind(
+    mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, design: str = ""
+) -> Iterator[tuple[str, str]]:
+    """Rows of gear and text, one for every part of both modifications.
+
+    Args:
+        mesh: prepared mesh.
+        pinion, wheel: modifications of concrete numbers.
+        design: what they are called, where several designs are listed.
+    """
+    for gear, side, modification in zip(("pinion", "wheel"), mesh.sides, (pinion, wheel)):
+        label = f"{gear}, {design}" if design else gear
+        for part in describe(modification) or [{}]:
+            yield label, _part(part, side, modification) if part else _NOTHING
+            label = ""
+
+
+def _part(part: Mapping[str, Any], side: Side, modification: AbstractModification) -> str:
+    """One part: "tip relief 5.60 um over 5.581 mm of roll length, parabolic, from diameter 59.931 mm to the tip"."""
+    rest = dict(part)
+    kind = rest.pop("type")
+    if isinstance(rest.get("amount"), list):
+        values = np.asarray(rest["amount"])
+        return (
+            f"{kind.replace('_', ' ')} of {values.size} values, {values.min():.2f} to {values.max():.2f} um, flanks.csv"
+        )
+    text = kind.replace("_", " ")
+    if "amount" in rest:
+        text += f" {_number(rest.pop('amount'), unit_of(kind, 'amount'))}"
+    length = rest.pop("length", None)
+    if length is not None:
+        text += f" over {_number(length, unit_of(kind, 'length'))}"
+        text += " of roll length" * (kind in _ENDS)
+    if "curve" in rest:
+        text += f", {_curve(rest.pop('curve'))}"
+    for name, value in rest.items():
+        text += f", {name.replace('_', ' ')} {_number(value, unit_of(kind, name))}"
+    return text + (_ENDS[kind](side, modification, length) if kind in _ENDS and length else "")
+
+
+def _from_tip(side: Side, modification: AbstractModification, length: float) -> str:
+    return f", from {_place(side, modification, -1, -length)} to the tip"
+
+
+def _to_root(side: Side, modification: AbstractModification, length: float) -> str:
+    return f", from the start of the active profile to {_place(side, modification, 0, length)}"
+
+
+_ENDS = {"tip_relief": _from_tip, "root_relief": _to_root}
+
+
+def _place(side: Side, modification: AbstractModification, end: int, further: float) -> str:
+    """Diameter and roll angle of a roll length, counted from an end of the active profile."""
+    surface = jax.tree.map(np.asarray, flank_surface(side, modification))
+    base = np.sqrt((0.5 * surface.diameter[-1]) ** 2 - surface.roll_length[-1] ** 2)
+    roll = max(float(surface.roll_length[end]) + further, 0.0)
+    return f"diameter {2 * np.hypot(base, roll):.3f} mm (roll angle {np.rad2deg(roll / base):.2f} deg)"
+
+
+def _curve(curve: Mapping[str, Any]) -> str:
+    given = [np.ravel(value) for name, value in curve.items() if name != "type"]
+    numbers = [f"{number:.3g}" for of in given for number in of]
+    shown = numbers if len(numbers) <= _MOST else [f"of {len(numbers)} values"]
+    return " ".join([curve["type"].replace("_", " "), *shown])
+
+
+def _number(value: Any, unit: str) -> str:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return f"{value:{_DIGITS.get(unit, '.4g')}} {unit}".rstrip()
+    return str(value)
+
 
 _SHOWN_BOUNDS = 8
 

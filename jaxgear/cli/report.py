@@ -12,7 +12,7 @@ from rich.table import Table
 from ..contact import Mesh
 from ..geometry import Gear
 from ..io import DesignFile, describe
-from ..io.cases import quality_classes
+from ..io.requests import quality_classes
 from ..io.results import unit_of
 from ..metrics import Finding, findings_of, quantities
 from ..numerics import program

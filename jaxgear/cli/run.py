@@ -23,8 +23,8 @@ from ..io import (
     write_front,
     write_summary,
 )
-from ..io.cases import tolerance_of
 from ..io.errors import naming
+from ..io.requests import tolerance_of
 from ..microgeometry import AbstractModification
 from ..optimize import (
     Front,
@@ -41,8 +41,8 @@ from ..report import Table as Block
 from . import interrupt, manufactured, optimum_report, report, written
 from .cache import enable_cache
 from .document import Document, Found
-from .front import COMPROMISE, front_table
 from .geometry import mounting
+from .optimum_report import COMPROMISE, front_table
 from .progress import Stages
 from .study import Evaluation, evaluate
 

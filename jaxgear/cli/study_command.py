@@ -14,9 +14,9 @@ from ..numerics import compile_quickly
 from . import interrupt, report
 from .commands import import_ahead
 from .document import Found, document
-from .kept import note_runs
 from .progress import Stages
 from .run import default_folder, opened
+from .study import note_runs
 
 S = TypeVar("S")
 # Works the study out: result folder, stages -> study, and what is to be done when its results are in place.

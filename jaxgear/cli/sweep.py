@@ -11,12 +11,11 @@ from rich.table import Table
 
 from ..io import sweep_request, writing
 from ..sweeps import SweepTable, sweep
-from . import interrupt, report, sweep_document
+from . import interrupt, report, sweep_report
 from .document import document
 from .progress import Meter
 from .run import coarse, default_folder, opened
-from .sweep_chosen import evaluate_best, said_of_best
-from .sweep_figures import write_figures
+from .sweep_report import evaluate_best, said_of_best, write_figures
 
 _QUICK_SAMPLES = 4096
 _TABLE, _BEST_FILE = "table", "best.csv"  # apart: readers of the table take its folder for theirs alone
@@ -69,7 +68,7 @@ def run_sweep(
     files = write_figures(target, table, request.results) if figures and len(chosen) else []
     if asked is not None:
         closer = evaluate_best(target, design, chosen, size, quick=quick, figures=figures)
-        sweep_document.write(
+        sweep_report.write(
             target, asked, design, table, chosen, closer, files, request.results, size=size, quick=quick, grid=grid
         )
     interrupt.note(f"all results are in {target}{os.sep}")

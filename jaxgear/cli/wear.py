@@ -6,14 +6,14 @@ from pathlib import Path
 
 from ..contact import OperatingPoint
 from ..io import DesignFile, WearRequest, wear_request, write_worn
-from ..io.cases import tolerance_of
 from ..io.errors import naming
+from ..io.requests import tolerance_of
 from ..numerics import optional_real, real
 from ..wear import WearLife, wear_in_steps
 from . import wear_report, wear_scatter
 from .compared import compared, first_mesh, search_of, sought
-from .kept import Kept, Marches, runs_beside
 from .progress import Stages
+from .study import Kept, Marches, runs_beside
 from .study_command import Make, StudyCommand
 from .wear_report import Study
 

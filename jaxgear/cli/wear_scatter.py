@@ -18,7 +18,7 @@ from ..tolerance import Tolerance
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import LIVES_AHEAD, number_of
 from . import manufactured, report
-from .kept import Kept
+from .study import Kept
 
 # of every manufactured pair of a design, by name of the quantity, shape (pairs,); NaN where it has failed
 Samples = Mapping[str, np.ndarray]
@@ -121,7 +121,7 @@ def tables(design: DesignFile, settings: Wear, scatters: Mapping[str, Samples]) 
         result.add_column(heading, justify="right")
     for name, samples in scatters.items():
         cells = [f"{of(samples, key):.3f}" for key in (_PPTE, _DEPTH) for of in (_mean, _bound)]
-        cells += [_life(settings, key, _lasts(samples, key, _LEVEL)) for key in lives]
+        cells += [_life_text(settings, key, _lasts(samples, key, _LEVEL)) for key in lives]
         result.add_row(name, *cells, str(failed(samples)))
     yield result
 
@@ -194,7 +194,7 @@ def _lasts(samples: Samples, name: str, share: float) -> float:
     return found if np.isfinite(found) else np.nan
 
 
-def _life(settings: Wear, name: str, value: float) -> str:
+def _life_text(settings: Wear, name: str, value: float) -> str:
     """Revolutions; a lower bound where the life is longer than what is looked at."""
     most = _LIVES[name][1] * float(settings.revolutions)
     return f"> {most:.3g}" if value >= most else f"{value:.3g}"

@@ -2,21 +2,21 @@
 
 from .cases import Cases as Cases
 from .cases import Conditions as Conditions
+from .cases import LoadSpectrum as LoadSpectrum
 from .cases import conditions as conditions
 from .join import Better as Better
 from .join import in_words as in_words
 from .join import joined as joined
 from .join import label as label
 from .join import ranked as ranked
-from .load import LoadSpectrum as LoadSpectrum
-from .solved import deviation_of as deviation_of
-from .solved import solve_case as solve_case
-from .solved import solved as solved
 from .variant import Design as Design
 from .variant import Modifications as Modifications
 from .variant import Parameters as Parameters
 from .variant import Variant as Variant
 from .variant import Variants as Variants
 from .variant import check_used as check_used
+from .variant import deviation_of as deviation_of
+from .variant import solve_case as solve_case
+from .variant import solved as solved
 from .variant import two_modifications as two_modifications
 from .variant import variants as variants

@@ -12,17 +12,46 @@ from ..compliance import AbstractCompliance, default_compliance
 from ..compliance.hertz import contact_geometry
 from ..compliance.plane import contact_plane
 from ..compliance.toothload import tooth_load
-from ..geometry import GearPair, Margins, PathOfContact, explicit
+from ..geometry import GearPair, Margins, Outline, PathOfContact, explicit, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
 from ..numerics import AbstractSpring, Coupling, changed, on_both, program
 from ..numerics.programs import begin
 from .covering import check_cover, closing, pairs_for
-from .face_coupling import check_modes, check_support, coupling_of
-from .face_spreading import ends_together, spreading_of
-from .gears import Gears, gears_of
+from .face_coupling import check_modes, check_support, coupling_of, ends_together, spreading_of
 from .kinematics import Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution
 from .support import AbstractSupport
+
+
+class Gears(eqx.Module):
+    """Both gears, without any position of the mesh.
+
+    Attributes:
+        outlines: of their teeth.
+        margins: how far the pair is from what cannot run.
+        compliance: the model, with what it knows of these gears alone.
+    """
+
+    outlines: tuple[Outline, Outline]
+    margins: Margins
+    compliance: AbstractCompliance
+
+
+@program
+def gears_of(pair: GearPair, compliance: AbstractCompliance, count: int) -> Gears:
+    """Both gears of an `explicit` pair.
+
+    A program of its own: half of what a mesh compiles is the same for all numbers of positions and slices.
+
+    Args:
+        pair: gear pair.
+        compliance: compliance model.
+        count: tooth pairs that are carried along.
+    """
+    outlines = on_both(outline, pair.pinion, pair.wheel)
+    margins = margins_between(*outlines, path_of_contact(pair), pair.center_distance, pair.face_overlap)
+    return Gears(outlines, margins, compliance.of_gears(*outlines, count))
+
 
 Scalar = Float[Array, ""]
 Field = Float[Array, "pairs positions"]
@@ -290,3 +319,59 @@ def _steps(edge: Float[Array, "2"], beyond: Float[Array, " positions"]) -> Float
     edge, beyond = jax.lax.stop_gradient((edge, beyond))
     one = jnp.maximum(jnp.abs(edge[0] - edge[1]), 1e-6 * edge[0])
     return jnp.abs(beyond - edge[0]) / one
+
+
+def half_way(mesh: Mesh) -> Mesh:
+    """The same mesh half a position later: both together have twice the positions."""
+    return later(mesh, 0.5)
+
+
+def later(mesh: Mesh, share: float) -> Mesh:
+    """The same mesh a share of a position later."""
+    first = np.asarray(mesh.kinematics.first_phase) + share / mesh.resolution.positions
+    moved = prepare_from(first, mesh.pair, mesh.compliance, mesh.resolution, mesh.support, mesh.even)
+    return replace(moved, automatic=mesh.automatic)
+
+
+def parts(mesh: Mesh, positions: int) -> list[Mesh]:
+    """Meshes of so many positions each, evenly over the base pitch, that together have those of a concrete mesh.
+
+    The mesh itself where it has no multiple of so many.
+    """
+    count, left = divmod(mesh.resolution.positions, positions)
+    if left or count == 1:
+        return [mesh]
+    return [_part(np.asarray(first), count, mesh) for first in range(count)]
+
+
+@program
+def _part(first, count: int, mesh: Mesh) -> Mesh:
+    """Every so many positions from the first one on."""
+
+    def take(leaf):
+        rows = leaf.reshape(*leaf.shape[:-1], -1, count)
+        return jax.lax.dynamic_index_in_dim(rows, first, axis=-1, keepdims=False)
+
+    moving = mesh.kinematics
+    positions = moving.resolution.positions
+    taken = jax.tree.map(take, _by_position(mesh))
+    taken[0] = taken[0] / count  # as far out, over larger steps
+    phase = moving.first_phase + first.astype(moving.first_phase.dtype) / positions
+    resolution = replace(moving.resolution, positions=positions // count)
+    moved = replace(moving, first_phase=phase, resolution=resolution)
+    return eqx.tree_at(lambda m: [*_by_position(m), m.kinematics], mesh, [*taken, moved])
+
+
+def _by_position(mesh: Mesh) -> list:
+    """Everything whose last axis is that of the positions."""
+    return [
+        mesh.outer_steps,
+        mesh.outer_gap,
+        mesh.outer_lever,
+        mesh.corner_gap,
+        mesh.lever,
+        mesh.structure,
+        mesh.law,
+        mesh.width_factor,
+        *(side.contact_roll_length for side in mesh.sides),
+    ]

@@ -9,10 +9,9 @@ from jaxtyping import Array, Bool, Float
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, ContactProblem, check, program, real, result, solve_contact, tangent_stiffness
 from .face_coupling import check_torque
-from .loaded_width import for_contact, loaded_material
 from .mesh import Mesh
 from .operating_point import operating_point_of
-from .slide import RemovedMaterial
+from .slide import RemovedMaterial, for_contact, loaded_material
 from .solve import check_mesh, flanks_of, outermost
 
 # Newton steps of a mesh of several slices from the approach of all springs in series to that of the teeth: the force of

@@ -1,4 +1,4 @@
-"""Where loaded flanks touch on a modification: the contact slides down its slope towards the thicker material.
+"""Where loaded flanks touch on a modification, and over which width it is averaged.
 
 Two flanks of relative radius R, from which material c has been removed, touch where bulge and removed material together
 are least: over the distance u along the flank from the nominal contact
@@ -15,8 +15,13 @@ weight of the pressure, which kinks and corners of a table do not upset, and the
 gap. Against a fine search with more points the gap is off by 0.03 um on reliefs and crowning, 0.1 um on a root relief
 of 8 um over 1.5 mm, and 0.3 um on a table that jumps by several um from millimetre to millimetre (19/48, module 3).
 Everything is differentiated as it is computed, so that derivatives of any order belong to these very numbers.
+
+Finite elements have no width of their own: what their contacts meet of a relief follows from the load that each of them
+carries. Where the structure is as accurate as that, it shows: on steep reliefs the wider mean makes PPTE up
+to 9 % too small, and the loaded width leaves 2.5 % at worst.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -24,8 +29,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..microgeometry import AbstractModification
-from ..numerics import Checked, program, real, result, stored
+from ..compliance import default_compliance
+from ..microgeometry import AbstractModification, NoModification
+from ..numerics import Checked, changed, program, real, result, stored
 from .mesh import Mesh
 from .patch import Node, Place, flank_at, patch_nodes, place_of, probe, secant_slope, terms_of, varies_along_profile
 from .resolution import Resolution
@@ -172,3 +178,57 @@ def _gain_jvp(primals, tangents):
 def _within(x: Real, low: Real, high: Real) -> Real:
     # no nested maxima: the derivative of a tie is a division
     return jnp.where(x < low, low, jnp.where(x > high, high, x))
+
+
+# Largest relative violation of the contact conditions at which loads still tell how wide the contacts are.
+_WIDTHS_KNOWN = 1e-4
+
+Curve = Float[Array, " positions"]
+
+
+def loaded_material(
+    mesh: Mesh,
+    torque: Scalar,
+    pinion: AbstractModification,
+    wheel: AbstractModification,
+    first_contact: Callable[[RemovedMaterial], tuple[Load, Curve]],
+) -> RemovedMaterial:
+    """Material removed, over contacts as wide as the compliance asks for; its arguments in the precision of the mesh.
+
+    Args:
+        mesh: prepared mesh.
+        torque: on the pinion [N m].
+        pinion, wheel: modifications.
+        first_contact: line loads [N/mm] and residual of the contact on material that has been removed.
+    """
+    if isinstance(pinion, NoModification) and isinstance(wheel, NoModification):
+        return nothing_removed(mesh.resolution, torque.dtype)
+    sizes = mesh.resolution
+    prepared = _unlabelled(mesh, sizes.of_material)
+    if not mesh.compliance.averages_over_loaded_width:
+        return slid_material(prepared, torque, pinion, wheel)
+    full = 1e3 * torque / (mesh.pair.pinion.base_radius * mesh.pair.face_width)
+    line_load = jnp.broadcast_to(full, (sizes.chosen_pairs, sizes.slices, sizes.positions))
+    line_load, residual = first_contact(slid_material(prepared, torque, pinion, wheel, line_load))
+    # once: what the loads of a second solution change is below the error of the model
+    removed = slid_material(prepared, torque, pinion, wheel, line_load)
+    # written so that NaN counts as not known
+    known = jnp.where(residual < max(_WIDTHS_KNOWN, sizes.rtol or 0.0), removed.amount, jnp.nan)
+    return RemovedMaterial(known, removed.shift, removed.bend)
+
+
+def for_contact(mesh: Mesh) -> Mesh:
+    """The mesh for programs that solve its contact for material that is known."""
+    return _unlabelled(mesh, mesh.resolution.of_contact)
+
+
+def _unlabelled(mesh: Mesh, resolution: Resolution) -> Mesh:
+    """The mesh for programs that read its prepared arrays alone: one serves all whose arrays are of the same shapes.
+
+    It is without its own models, of sizes that the program asks for, and its pair is of the gears of its sides, for
+    which it makes no difference which diameters were given.
+    """
+    pinion, wheel = (side.gear for side in mesh.sides)
+    pair = changed(mesh.pair, pinion=pinion, wheel=wheel)
+    own = {"compliance": default_compliance(), "support": None, "automatic": False, "even": False}
+    return changed(mesh, kinematics=changed(mesh.kinematics, pair=pair, resolution=resolution), **own)

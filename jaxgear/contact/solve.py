@@ -15,13 +15,11 @@ from ..microgeometry import AbstractModification, NoModification, terms
 from ..numerics import ContactProblem, concrete, minimum, program, solve_contact, stored, tangent_stiffness
 from ..numerics.programs import begin
 from .cycle import MeshCycle
-from .face_coupling import check_torque, holds_at
-from .face_spreading import ends_together
-from .loaded_width import for_contact, loaded_material
+from .face_coupling import check_torque, ends_together, holds_at
 from .mesh import Mesh, begin_mesh, prepare
 from .operating_point import OperatingPoint, operating_point_of
 from .resolution import Resolution
-from .slide import RemovedMaterial, as_removed, nothing_removed
+from .slide import RemovedMaterial, as_removed, for_contact, loaded_material, nothing_removed
 from .support import AbstractSupport
 
 _MOST_PAIRS = 12

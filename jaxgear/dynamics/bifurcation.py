@@ -1,15 +1,29 @@
-"""Where branches of periodic orbits turn or lose stability: the kinds of these points, and how they are noticed."""
+"""Where branches of periodic orbits turn or lose stability: the kinds of these points, and where they lie."""
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
-from ..numerics import Checked, result
-from .corrector import Corrected
+from ..numerics import Checked, kernel, real, result
 from .orbit import Orbit, outside
+from .poincare import (
+    STEPS,
+    Corrected,
+    Family,
+    Place,
+    Scales,
+    change,
+    corrected,
+    family_of,
+    first_direction,
+    held,
+    nodes_of,
+    scaled,
+)
 
 Scalar = Float[Array, ""]
 Kind = Literal["fold", "flip", "Neimark-Sacker"]
@@ -100,3 +114,197 @@ def critical(kind: Kind, multipliers: np.ndarray) -> complex:
         return 1.0 if kind == "fold" else -1.0
     apart = np.where(multipliers.imag > _REAL, np.abs(np.abs(multipliers) - 1), np.inf)
     return complex(multipliers[np.argmin(apart)])
+
+
+_TRIALS = 40  # a bifurcation is found in about eight
+_FLAT = 1e-8  # of the number that is zero at a bifurcation
+_NARROW = 1e-7  # distance along a branch, scaled, to which a bifurcation is enclosed
+_FIRST = 1e-3  # first step along a branch
+_FURTHER, _FARTHEST = 1.5, 0.1  # factor on a secant that has not enclosed the bifurcation, and the longest step
+# Half of the distance, as part of the size of an orbit, over which the growth of deviations is measured: what it
+# leaves of the third derivative and of single precision is of the same size, 1e-5.
+_ASIDE = 3e-3
+
+
+class BifurcationPoint(Checked):
+    """Result of `bifurcation_of`.
+
+    Attributes:
+        parameter: at which it lies; for an oscillator the mesh frequency [Hz]; differentiable.
+        displacement, velocity: start of the orbit there [um], [um/s], without derivatives, shape (coordinates,).
+        test: the number that is zero there. For a fold the slope of the parameter over the branch, both scaled: not
+            zero where the branch has a corner. For a flip the product of 1 + multiplier, for a Neimark-Sacker point
+            the modulus of the pair less one.
+        converged: whether a bifurcation was found.
+    """
+
+    parameter: Scalar = result()
+    displacement: Float[Array, " coordinates"] = result("um")
+    velocity: Float[Array, " coordinates"] = result("um/s")
+    test: Scalar = result()
+    converged: Bool[Array, ""] = result()
+
+
+def bifurcation_of(oscillator: Any, near: Bifurcation, *, steps: Any = STEPS) -> BifurcationPoint:
+    """The bifurcation of the same kind next to one that was found, as a function of every number of the oscillator.
+
+    The branch is followed to where a number is zero: the slope of the parameter at a fold, the distance of a
+    multiplier from -1 at a flip, of a pair from the unit circle at a Neimark-Sacker point. With the equations
+    E(y, parameter, p) of the bifurcation, which are the change of the unknowns y over the orbit and, but at a fold,
+    the modulus of the critical multiplier, and the left null vector w of their derivative, w dE/dy = 0 (at a fold the
+    first rows of the system of Moore and Spence, SIAM J. Numer. Anal. 17 (1980) 567-576), the orbit drops out:
+
+        d parameter / d p = -(w dE/dp) / (w dE/d parameter).
+
+    Of a multiplier mu with the eigenvectors phi and psi, psi phi = 1, d mu = psi d(M phi), where M phi is taken as the
+    difference of two orbits on both sides along phi. So no second derivatives are needed, which a force with a kink
+    does not have. Derivatives of first order are exact; those of higher order are not.
+
+    Args:
+        oscillator: that moves, or a function of a parameter that gives an oscillator and a mesh frequency [Hz]; for
+            derivatives a function that is an `equinox.Module` and holds what they are taken by.
+        near: a bifurcation of the same or a similar oscillator, from `Branch.bifurcations`.
+        steps: of a mesh cycle, as for `find_orbit`.
+
+    Raises:
+        TypeError: for something else than an oscillator or a function, or than a bifurcation.
+        ValueError: for steps out of order.
+    """
+    if not isinstance(near, Bifurcation):
+        raise TypeError(f"bifurcation_of: near is of type {type(near).__name__}, must be a Bifurcation")
+    dtype = near.orbit.displacement.dtype
+    parameter = real(near.parameter).astype(dtype)
+    nodes = nodes_of("bifurcation_of", steps)
+    z = scaled(near.orbit.start, near.orbit.mesh_frequency)
+    normal = jnp.append(near.direction, 0.0) if near.kind == "fold" else first_direction(len(z) + 1, dtype, 1.0)
+    known = critical(near.kind, np.linalg.eigvals(np.asarray(near.orbit.monodromy)))
+    multiplier = jnp.asarray(known, np.result_type(dtype, np.complex64) if isinstance(known, complex) else dtype)
+    given = z, parameter, normal.astype(dtype), multiplier
+    return _moved(family_of(oscillator), given, nodes, near.kind, near.orbit.periods)
+
+
+@kernel
+def _moved(family: Family, given, nodes, kind: Kind, periods: int) -> BifurcationPoint:
+    z, parameter, normal, multiplier = held(given)
+    scales = Scales(jnp.linalg.norm(z), parameter)
+    begin = scales.place(z, parameter)
+    search = held(_searched(held(family), kind, begin, normal, multiplier, scales, held(nodes), periods))
+    place = search.point.place
+    pairs = held(_growing(search.point.monodromy, _critical(kind, search.point.monodromy, multiplier)))
+
+    def equations(place, family):
+        def over(place):
+            return change(family, place, scales, nodes, periods)
+
+        if kind == "fold":
+            return over(place)
+        growths = [left @ (over(place + by) - over(place - by)) / (2 * _ASIDE) for left, by in pairs]
+        return jnp.append(over(place), sum(growths))
+
+    unknowns = jax.jacfwd(lambda place: equations(place, held(family)))(place)
+    left = held(_without(unknowns[:, :-1], unknowns[:, -1]))
+    moved = left @ equations(place, family)
+    at, value = scales.unknowns(place)
+    _, frequency = held(family)(value)
+    x, v = jnp.split(at, 2)
+    return BifurcationPoint(
+        parameter=value - scales.parameter * (moved - held(moved)) / held(left @ unknowns[:, -1]),
+        displacement=x,
+        velocity=v * 2 * jnp.pi * frequency,
+        test=search.tests[1],
+        converged=search.point.converged & search.found,
+    )
+
+
+def _critical(kind: Kind, monodromy, near):
+    """The critical multiplier of an orbit, that next to a known one."""
+    if kind != "Neimark-Sacker":
+        return near
+    multipliers = jnp.linalg.eigvals(monodromy)
+    return multipliers[jnp.argmin(jnp.abs(multipliers - near))]
+
+
+def _growing(monodromy, multiplier):
+    """Vectors of which the modulus of a multiplier is the sum of left M right, and places aside along the right ones.
+
+    With the eigenvectors M phi = mu phi, psi M = mu psi and psi phi = 1 the modulus is Re(conj(mu) / |mu| psi M phi).
+    """
+    away = monodromy.astype(multiplier.dtype) - multiplier * jnp.eye(len(monodromy), dtype=multiplier.dtype)
+    left, _, right = jnp.linalg.svd(away)
+    left, right = left[:, -1].conj(), right[-1].conj()
+    unit = multiplier / jnp.abs(multiplier).astype(multiplier.dtype)
+    left = left * unit.conj() / (left @ right)
+    pairs = (left.real, right.real), (-left.imag, right.imag)
+    return [(one, jnp.append(_ASIDE * other, 0.0)) for one, other in pairs[: 2 if jnp.iscomplexobj(right) else 1]]
+
+
+def _without(unknowns, along):
+    """The combination of equations in which the unknowns do not appear but the parameter does."""
+    left, sizes, _ = jnp.linalg.svd(unknowns)
+    sizes = jnp.zeros(len(along), along.dtype).at[: len(sizes)].set(sizes)
+    # squared, so that no other direction has a say; coordinates that turn freely have null vectors of their own, in
+    # which the parameter does not appear
+    rounding = 10 * jnp.finfo(along.dtype).eps ** 0.5 * jnp.max(sizes)
+    combined = left @ ((along @ left) / (sizes**2 + rounding**2))
+    return combined / jnp.linalg.norm(combined)
+
+
+class _Search(NamedTuple):
+    """Two places on the branch, the distance to try next, and how far the search is."""
+
+    point: Corrected
+    distances: Scalar
+    tests: Scalar
+    trial: Scalar
+    bracketed: Bool[Array, ""]
+    trials: Array
+
+    @property
+    def found(self) -> Bool[Array, ""]:
+        """Whether a test of zero has been met or enclosed; at the corner of a branch it can only be enclosed."""
+        apart = jnp.abs(self.distances[1] - self.distances[0])
+        return (self.trials > 1) & ((jnp.abs(self.tests[1]) < _FLAT) | (self.bracketed & (apart < _NARROW)))
+
+
+def _searched(family: Family, kind: Kind, begin: Place, normal: Place, multiplier, scales, nodes, periods) -> _Search:
+    """Where the test of a kind is zero over the distance along a normal: false position (Illinois).
+
+    Until the test has changed its sign, secants that go somewhat too far.
+    """
+
+    def at(distance):
+        point = corrected(family, begin + distance * normal, normal, scales, nodes, periods)
+        if kind == "fold":
+            return point, point.tangent[-1] / jnp.sum(point.tangent * normal)
+        if kind == "flip":
+            return point, jnp.linalg.det(point.monodromy + jnp.eye(len(point.monodromy), dtype=normal.dtype))
+        return point, jnp.abs(_critical(kind, point.monodromy, multiplier)) - 1
+
+    def go_on(search):
+        return ~search.found & search.point.converged & (search.trials < _TRIALS)
+
+    def advance(search):
+        point, test = at(search.trial)
+        other, last = search.distances
+        old, newest = search.tests
+        # the new place and that across the zero from it; one that stays for a second time counts half
+        stays = search.bracketed & (test * newest > 0)
+        distances = jnp.stack([jnp.where(stays, other, last), search.trial])
+        tests = jnp.stack([jnp.where(stays, 0.5 * old, newest), test])
+        bracketed = (tests[0] * tests[1] < 0) & (search.trials > 0)
+        trial = _next(distances, tests, bracketed, search.trials)
+        return _Search(point, distances, tests, trial, bracketed, search.trials + 1)
+
+    zero = jnp.zeros((), begin.dtype)
+    monodromy = jnp.eye(len(begin) - 1, dtype=begin.dtype)
+    nothing = Corrected(begin, normal, monodromy, zero, jnp.array(True))
+    start = _Search(nothing, jnp.stack([zero, zero]), jnp.stack([zero, zero]), zero, jnp.array(False), jnp.array(0))
+    return jax.lax.while_loop(go_on, advance, start)
+
+
+def _next(distances, tests, bracketed, trials) -> Scalar:
+    """The distance to try after two tests."""
+    rise = tests[1] - tests[0]
+    secant = -tests[1] * (distances[1] - distances[0]) / jnp.where(rise == 0, 1.0, rise)
+    ahead = jnp.where(bracketed, secant, jnp.clip(_FURTHER * secant, -_FARTHEST, _FARTHEST))
+    return jnp.where(trials == 0, _FIRST, distances[1] + ahead)

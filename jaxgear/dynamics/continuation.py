@@ -10,9 +10,19 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from ..numerics import Checked, check, kernel, real, result, whole
 from .bifurcation import Bifurcation, Kind, Tests, bifurcation_at, tests_of
-from .corrector import Corrected, OverSpeed, Scales, corrected, family_of, first_direction
 from .orbit import Orbit, orbit_at
-from .poincare import STEPS, nodes_of, scaled, steps_at
+from .poincare import (
+    STEPS,
+    Corrected,
+    OverSpeed,
+    Scales,
+    corrected,
+    family_of,
+    first_direction,
+    nodes_of,
+    scaled,
+    steps_at,
+)
 
 Scalar = Float[Array, ""]
 Ended = Literal["range", "points", "closed", "joined", "lost"]

@@ -15,11 +15,10 @@ from ..contact.operating_point import operating_point_of
 from ..contact.solve import check_mesh
 from ..microgeometry import AbstractModification
 from ..numerics import check, concrete, real, whole
-from ..numerics.quick import is_eager
+from ..numerics.programs import is_eager
 from .flanks import Both, Flanks, Static, coast_flanks, drive_flanks, static
 from .force import AbstractMeshForce
-from .force_map import ForceMap, tabulate
-from .force_models import LoadedError, Tangent, VaryingStiffness
+from .force_map import ForceMap, LoadedError, Tangent, VaryingStiffness, tabulate
 
 Scalar = Float[Array, ""]
 Model = Literal["map", "varying stiffness", "loaded error", "tangent"]

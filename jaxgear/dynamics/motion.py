@@ -1,15 +1,17 @@
-"""A motion of an oscillator over time: what phase portraits and time histories show."""
+"""Motions over time: phase portraits and time histories at one speed, run-up and run-down."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Float, Int
 
-from ..numerics import Checked, kernel, result, whole
-from .integrate import cycles
-from .oscillator import Oscillator
+from ..numerics import Checked, check, concrete, kernel, real, result, whole
+from .integrate import cycle_of, cycles, history, largest, one_step, smallest, step_of
+from .oscillator import Oscillator, State, at_rest, static_force
 from .poincare import STEPS, checked, steps_at
+from .speed_sweep import check_single, start_of, steps_for
 
 Samples = Float[Array, " samples"]
 
@@ -66,3 +68,146 @@ def _moved(oscillator: Oscillator, frequency, start, nodes, periods: int) -> Mot
 
     found = jax.vmap(of_cycle)(jnp.arange(periods, dtype=frequency.dtype), *states)
     return Motion(*(part.reshape(-1, *part.shape[2:]) for part in found))
+
+
+Scalar = Float[Array, ""]
+
+
+SAMPLES = 200  # stretches for which extremes are given
+
+
+class RunUp(Checked):
+    """Vibration during a change of speed, sampled over stretches of whole mesh cycles.
+
+    Attributes:
+        time: at the end of every stretch [s], shape (samples,).
+        mesh_frequency: there [Hz], shape (samples,).
+        dynamic_factor: largest elastic mesh force of the stretch over the static force, shape (samples,).
+        dte_min, dte_max: of the stretch [um], shape (samples,).
+        state: coordinates [um] and velocities [um/s] at the end of every stretch, each of shape (samples, coordinates).
+    """
+
+    time: Samples = result("s")
+    mesh_frequency: Samples = result("Hz")
+    dynamic_factor: Samples = result()
+    dte_min: Samples = result("um")
+    dte_max: Samples = result("um")
+    state: tuple[Float[Array, "samples coordinates"], Float[Array, "samples coordinates"]] = result()
+
+
+def run_up(
+    oscillator: Oscillator,
+    *,
+    first: float,
+    last: float,
+    duration: float,
+    samples: int = SAMPLES,
+    start: State | None = None,
+    steps: int | None = None,
+) -> RunUp:
+    """A change of speed at constant acceleration; a run-down where `last` is below `first`.
+
+    Steps are equal in mesh position, so that the mesh force is met at the same positions in every cycle. With the
+    frequency f(t) = first + (last - first) t / duration, f^2 is linear in the mesh position: over a step of length L
+    it grows by 2 L (last - first) / duration. A step is integrated at the frequency that covers it in its time.
+
+    Args:
+        oscillator: one oscillator.
+        first, last: mesh frequencies between which the speed changes [Hz].
+        duration: [s]; it is rounded to a whole number of mesh cycles per sample.
+        samples: stretches for which extremes are given.
+        start: coordinates and velocities at mesh position 0; None for the static equilibrium.
+        steps: of the integrator per mesh cycle, even; None for as many as the lower speed needs.
+
+    Raises:
+        ValueError: in one line for a number outside its range, a change too short for so many samples, or what is
+            being traced.
+    """
+    owner = "run_up"
+    low, high = _number(owner, "first", first, "Hz"), _number(owner, "last", last, "Hz")
+    time = _number(owner, "duration", duration, "s")
+    samples = whole(owner, "samples", samples)
+    check_single(owner, oscillator)
+    cycles = int(np.floor((low + high) / 2 * time / samples))
+    if cycles < 1:
+        raise ValueError(
+            f"{owner}: duration = {time:g} s holds {(low + high) / 2 * time:.3g} mesh cycles, must be at least one for "
+            f"each of {samples} samples"
+        )
+    size = steps_for(oscillator, [min(low, high)])[0] if steps is None else whole(owner, "steps", steps, low=8)
+    if size % 2:
+        raise ValueError(f"{owner}: steps = {size} must be even")
+    dtype = oscillator.mass.dtype
+    ends = jnp.asarray([low, high], dtype)
+    return _run(oscillator, start_of(owner, oscillator, start), ends, jnp.asarray(cycles), samples, size)
+
+
+def _number(owner: str, name: str, value, unit: str) -> float:
+    known = concrete(real(value))
+    if known is None or known.ndim:
+        raise ValueError(f"{owner}: {name} must be one concrete number")
+    check(owner, name, known, unit, low=0.0, open_low=True)
+    return float(known)
+
+
+class _Moving(NamedTuple):
+    y: State
+    time: Scalar
+    peak: Scalar
+    lowest: Scalar
+    highest: Scalar
+
+
+@kernel
+def _run(
+    oscillator: Oscillator,
+    start: State | None,
+    ends: Float[Array, "2"],
+    cycles: Int[Array, ""],
+    samples: int,
+    size: int,
+) -> RunUp:
+    cycle = cycle_of(oscillator, size)
+    rest = at_rest(oscillator, jnp.zeros((), ends.dtype))
+    y = (rest.coordinates, jnp.zeros_like(rest.coordinates)) if start is None else start
+    total = (samples * cycles).astype(ends.dtype)
+
+    def frequency_at(position):
+        """Mesh frequency [Hz] after so many cycles."""
+        return jnp.sqrt(ends[0] ** 2 + (ends[1] ** 2 - ends[0] ** 2) * position / total)
+
+    def stepped(index, moving: _Moving, done) -> _Moving:
+        step = step_of(cycle, index % size, jnp.asarray(2))
+        position = (done + index // size).astype(ends.dtype) + step.phase
+        # the acceleration is constant in time: the mean of both ends covers the step in its time
+        frequency = (frequency_at(position) + frequency_at(position + step.length)) / 2
+        end = one_step(oscillator, moving.y, step, frequency)
+        begin = jax.tree.map(lambda part: part[None, None], moving.y)
+        of = history(oscillator, begin, end, jax.tree.map(lambda part: part[None], step), frequency)
+        return _Moving(
+            end,
+            moving.time + step.length / frequency,
+            jnp.maximum(moving.peak, largest(of.force)),
+            jnp.minimum(moving.lowest, smallest(of.dte)),
+            jnp.maximum(moving.highest, largest(of.dte)),
+        )
+
+    def stretch(carry, _):
+        (y, time), number = carry
+        far = jnp.full((), jnp.inf, ends.dtype)
+        done = number * cycles
+        begin = _Moving(y, time, -far, far, -far)
+        moving = jax.lax.fori_loop(0, cycles * size, lambda i, moving: stepped(i, moving, done), begin)
+        return ((moving.y, moving.time), number + 1), moving
+
+    begin = ((y, jnp.zeros((), ends.dtype)), jnp.zeros_like(cycles))
+    (_, _), found = jax.lax.scan(stretch, begin, length=samples)
+    position = cycles * jnp.arange(1, samples + 1)
+    return RunUp(
+        time=found.time,
+        mesh_frequency=frequency_at(position.astype(ends.dtype)),
+        dynamic_factor=found.peak / static_force(oscillator),
+        dte_min=found.lowest,
+        dte_max=found.highest,
+        state=found.y,
+    )

@@ -10,11 +10,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..numerics import Checked, check, count, implicit_root, kernel, real, result, whole, with_jacobian
-from .history import history, largest, mean, rms, share, smallest
-from .integrate import cycles
-from .oscillator import Coordinates, Oscillator, State
+from .integrate import cycles, history, largest, mean, rms, share, smallest
+from .oscillator import Coordinates, Oscillator, State, static_force
 from .poincare import STEPS, after, checked, moved, scaled, steps_at, unscaled
-from .static import static_force
 
 Scalar = Float[Array, ""]
 Samples = Float[Array, " samples"]

@@ -8,8 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from ..numerics import Checked, result
-from .history import SIMPSON, history, largest, mean, share, smallest
-from .integrate import Steps, one_step
+from .integrate import SIMPSON, Steps, history, largest, mean, one_step, share, smallest
 from .oscillator import Oscillator, State
 
 Scalar = Float[Array, ""]

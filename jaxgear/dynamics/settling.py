@@ -1,13 +1,14 @@
-"""Mesh cycles until the motion at one speed repeats, shortened where it can be foreseen where they lead."""
+"""Mesh cycles until the motion at one speed repeats, from where it starts to its record."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from .integrate import Cycle, nodes_of, one_step, step_of
-from .oscillator import Oscillator, State
+from .oscillator import Oscillator, Rest, State
+from .response import Numbers, no_sums, numbers_of, with_cycle, with_step
 
 Scalar = Float[Array, ""]
 Unknowns = Float[Array, " unknowns"]
@@ -153,3 +154,131 @@ def _period(away: Float[Array, " periods"], tolerance: Scalar) -> Int[Array, ""]
     nearer = jnp.concatenate([jnp.full((1,), jnp.inf, away.dtype), jax.lax.cummin(away)[:-1]])
     fits = closest & (nearer > _APART * tolerance)
     return jnp.where(jnp.any(fits), jnp.argmax(fits) + 1, 0)
+
+
+# Least dynamic factor of a steady motion: over an orbit the mesh force has the mean of the static one, but for a small
+# share where springs beside the mesh carry some of the load. A motion so slow beside the mesh that a cycle hardly moves
+# it repeats within any tolerance, and is not steady.
+_BALANCED = 0.99
+
+
+class Found(NamedTuple):
+    """Steady state at one speed; names and units of `SpeedResponse`."""
+
+    numbers: Numbers
+    period: Int[Array, ""]
+    dte: Float[Array, " points"]
+    velocity: Float[Array, " points"]
+    state: State
+
+
+def steady_state(
+    oscillator: Oscillator, y: State, speed: Speed, limits: Any, sizes: Any, static: Scalar, waves
+) -> Found:
+    """Steady state at one speed that a start leads to, and its record.
+
+    Args:
+        oscillator: one.
+        y: start.
+        speed: and the steps of its cycles.
+        limits, sizes: of the sweep, as `speed_sweep.prepared` gives them.
+        static: mesh force at rest [N].
+        waves: of the orders at the nodes of a cycle.
+    """
+    frequency = speed.frequency
+    y, period = settled(oscillator, y, speed, limits.tolerance, limits.most_cycles, sizes.most_periods)
+    orders = jnp.asarray(sizes.orders, frequency.dtype)
+    zero = jnp.zeros((), frequency.dtype)
+    origin = oscillator.dte(zero, y[0])
+    cycles = jnp.where(period > 0, period, sizes.points)
+
+    def on(carry):
+        return carry[0] < cycles
+
+    def recorded(carry):
+        cycle, y, sums, dtes, velocities = carry
+        q, v = oscillator.dte(zero, y[0]), oscillator.dte_rate(zero, y[1], frequency)
+        # an orbit's points repeat, so that there are as many for every speed
+        here = jnp.arange(sizes.points) % cycles == cycle
+        dtes, velocities = jnp.where(here, q, dtes), jnp.where(here, v, velocities)
+
+        def more(carry, step, nodes):
+            y, sums = carry
+            return with_step(sums, oscillator, y, step, frequency, waves=waves[nodes], origin=origin)
+
+        nothing = no_sums(orders)
+        begin = sums._replace(force=nothing.force, dte=nothing.dte)
+        y, of_cycle = speed.over_cycle(more, (y, begin))
+        sums = with_cycle(sums, of_cycle, cycle, orders)
+        return cycle + 1, y, sums, dtes, velocities
+
+    nothing = jnp.zeros(sizes.points, frequency.dtype)
+    begin = jnp.zeros_like(cycles), y, no_sums(orders), nothing, nothing
+    _, y, sums, dtes, velocities = jax.lax.while_loop(on, recorded, begin)
+    count = cycles.astype(frequency.dtype)
+    numbers = numbers_of(sums, frequency, cycles=count, orders=orders, origin=origin, static_force=static)
+    period = jnp.where(numbers.dynamic_factor > _BALANCED, period, 0)
+    return Found(numbers, period, dtes, velocities, y)
+
+
+_POSITIONS = 16  # of the first harmonic of the static transmission error
+_QUARTER = 0.25  # of a mesh cycle
+_FLAT = 1e-6  # a static transmission error with a smaller harmonic, as part of its deflection, has no softest position
+
+
+class Kick(NamedTuple):
+    """How flanks are thrown apart.
+
+    Attributes:
+        apart: largest DTE less that at rest [um], negative.
+        acceleration: of the DTE where the flanks are apart [um/s^2].
+        phase: mesh position of the largest distance, from -1/2 to 1/2 [base pitches].
+        on: whether they are thrown at all.
+    """
+
+    apart: Scalar
+    acceleration: Scalar
+    phase: Scalar
+    on: Array
+
+
+def kick_of(oscillator: Oscillator, rest: Rest, factor: Scalar) -> Kick:
+    """The distance from which flanks meet again with a dynamic factor, and where on the cycle they are to have it.
+
+    With the static deflection d of the mesh stiffness at mesh position 0, flanks that a constant force closes over a
+    gap g are pressed to the deflection d + (d^2 + 2 g d)^(1/2): a dynamic factor K needs g = ((K - 1)^2 - 1) d / 2. Up
+    to K = 2 contact is kept, and the DTE is released from (K - 1) d behind that at rest. Where the backlash is
+    less than the gap, the coast flanks throw them back harder.
+
+    Orbits of two mesh cycles are farthest apart a quarter of a cycle behind the softest mesh position, when the mesh
+    begins to stiffen. A gap there leads to them over a band of sizes somewhat below their own dynamic factor; an
+    impulse on flanks in contact does for scattered sizes only. The band narrows towards the speed at which the orbit
+    ends, and moves with speed, variation, damping and relief: 3.6 to 4.0 for unmodified gears at 1.36 times the natural
+    frequency, 2.5 to 2.8 for relieved ones at 1.75 times of it. One size does not do for all (`settings.KICKS`).
+    """
+    along = oscillator.direction / oscillator.mass
+    deflection = jnp.abs(rest.force) / rest.stiffness
+    swing = factor - 1
+    apart = jnp.where(swing > 1, 0.5 * (1 + swing**2), swing) * deflection
+    phases = jnp.arange(_POSITIONS, dtype=deflection.dtype) / _POSITIONS
+    static = jax.vmap(lambda at: oscillator.mesh_force.static_te(at, rest.force))(phases)
+    cosine, sine = (jnp.mean(static * of(2 * jnp.pi * phases)) for of in (jnp.cos, jnp.sin))
+    varies = jnp.hypot(cosine, sine) > _FLAT * deflection
+    softest = jnp.where(varies, jnp.arctan2(sine, cosine) / (2 * jnp.pi), -_QUARTER)
+    phase = softest + _QUARTER
+    acceleration = oscillator.newton * jnp.sum(oscillator.direction * along) * jnp.abs(rest.force)
+    return Kick(-apart, acceleration, phase - jnp.round(phase), factor > 1)
+
+
+def kicked(oscillator: Oscillator, start: State, kick: Kick, mesh_frequency: Scalar) -> State:
+    """A start with its DTE thrown so that it would stand still, the farthest away, at the mesh position of a kick.
+
+    At mesh position 0 the flanks are on their way there, or on their way back, under the static force alone.
+    """
+    x, v = start
+    time = kick.phase / mesh_frequency
+    fallen = jnp.minimum(0.5 * kick.acceleration * time**2, -kick.apart)  # no farther than to the DTE at rest
+    along = oscillator.direction / oscillator.mass
+    share = along / jnp.sum(oscillator.direction * along)
+    speed = -jnp.sign(time) * jnp.sqrt(2 * kick.acceleration * fallen)
+    return x + share * jnp.where(kick.on, kick.apart + fallen, 0.0), v + share * jnp.where(kick.on, speed, 0.0)

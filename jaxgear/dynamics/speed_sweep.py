@@ -12,12 +12,9 @@ from jaxtyping import Array, Bool, Float, Int
 
 from ..numerics import check, concrete, kernel, real, whole
 from .integrate import cycle_of
-from .kick import kick_of, kicked
-from .oscillator import Oscillator, State
-from .recording import steady_state
+from .oscillator import Oscillator, State, at_rest, natural_frequencies, static_force
 from .response import SpeedResponse, waves_of
-from .settling import Speed
-from .static import at_rest, natural_frequencies, static_force
+from .settling import Speed, kick_of, kicked, steady_state
 
 Scalar = Float[Array, ""]
 Speeds = Float[Array, " speeds"]

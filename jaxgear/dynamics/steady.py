@@ -8,9 +8,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from .orbit import Orbit, find_orbit
-from .oscillator import Oscillator
+from .oscillator import Oscillator, static_force
 from .response import SpeedResponse
-from .static import static_force
 
 Numbers = Float[Array, "responses speeds"]
 Positions = Float[Array, " positions"]

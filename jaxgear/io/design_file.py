@@ -17,15 +17,14 @@ from ..metrics.findings import LIMITS
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
-from . import held, rating, schema, schema_dynamics, schema_shafts, schema_sweep, schema_wear, sections, template
-from .as_function import FileDesign, FileMesh
+from . import gearbox, rating, schema, schema_shafts, template, variables
 from .errors import DesignFileError, naming, printable, refused
 from .flanks import check_files
 from .gearbox import layout_of, support_of
 from .gears import both_classes, drawing_of, gear_of, materials_of, pair_of, quality_of
-from .schema_optimize import OptimizeSection
-from .sizes import resolution_of
-from .stiffness import model_part, with_tables
+from .model import model_part, resolution_of, with_tables
+from .schema import OptimizeSection
+from .template import FileDesign, FileMesh
 from .toml import decode, read
 from .variables import read_variables
 
@@ -84,10 +83,10 @@ class DesignFile:
     drawn: dict[str, dict[str, Any]]
     values: dict[str, float]
     optimize: OptimizeSection
-    sweep: schema_sweep.SweepSection | None
-    tolerance: schema_sweep.ToleranceSection | None
-    dynamics: schema_dynamics.DynamicsSection | None
-    wear: schema_wear.WearSection | None
+    sweep: schema.SweepSection | None
+    tolerance: schema.ToleranceSection | None
+    dynamics: schema.DynamicsSection | None
+    wear: schema.WearSection | None
     lubricant: Lubricant | None
     strength: Strength | None
     layout: schema_shafts.LayoutSection | None
@@ -150,7 +149,7 @@ class DesignFile:
         if self.support is None:
             return ""
         vibrates = self.dynamics is not None
-        return held.left_out(self.support, self._resolution, open_gears=self._open_gears, vibrates=vibrates)
+        return gearbox.left_out(self.support, self._resolution, open_gears=self._open_gears, vibrates=vibrates)
 
     @property
     def _open_gears(self) -> bool:
@@ -159,7 +158,7 @@ class DesignFile:
     def _held(self, sizes: Resolution) -> AbstractSupport | None:
         if self.support is None or self.left_out:
             return self._support
-        return held.over_slices(self.support, sizes)
+        return gearbox.over_slices(self.support, sizes)
 
     def mesh(
         self, resolution: Resolution | None = None, support: AbstractSupport | None = None, *, rigid: bool = False
@@ -226,11 +225,11 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
     )
     flanks = [*pinion_flank, *wheel_flank]
     pair, quality = pair_of(top, pinion, wheel), quality_of(pinion_says, wheel_says)
-    load = sections.load_of(top.load)
+    load = variables.load_of(top.load)
     operating_point = template.part_of("load", load, OperatingPoint)
     stiffness = decode("model", top.model or {}, schema.ModelSection)
     model = model_part(stiffness)
-    optimize = sections.optimize_of(top, stiffness)
+    optimize = variables.optimize_of(top, stiffness)
     axes = template.part_of(
         "misalignment", decode("misalignment", top.misalignment or {}, schema.MisalignmentSection), Misalignment
     )
@@ -251,7 +250,7 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
         axes = replace(axes, fields={})
     usual = operating_point.build(middle)
     torque = float(usual.torque)
-    tolerance, sweep = sections.tolerance_of(top, quality), sections.sweep_of(top)
+    tolerance, sweep = variables.tolerance_of(top, quality), variables.sweep_of(top)
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
     layout = layout_of(top.layout, quality)
     if layout is not None and axes.fields:
@@ -278,8 +277,8 @@ def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
         optimize=optimize,
         sweep=sweep,
         tolerance=tolerance,
-        dynamics=sections.optional("dynamics", top.dynamics, schema_dynamics.DynamicsSection),
-        wear=sections.optional("wear", top.wear, schema_wear.WearSection),
+        dynamics=variables.optional("dynamics", top.dynamics, schema.DynamicsSection),
+        wear=variables.optional("wear", top.wear, schema.WearSection),
         lubricant=rating.lubricant_of(top.lubricant, load, bounds, file.parent),
         strength=rating.strength_of(top.strength, file.parent),
         layout=layout,

@@ -3,12 +3,11 @@
 from pathlib import Path
 
 from .design_file import DesignFile, read_design
-from .dynamics_request import dynamics_request
 from .errors import naming
 from .layout_request import check_layout
 from .optimize_request import check_optimize
+from .requests import dynamics_request, wear_request
 from .sweep_request import check_sweep
-from .wear_request import wear_request
 
 
 def load_design(path: str | Path) -> DesignFile:

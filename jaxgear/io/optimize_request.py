@@ -12,23 +12,69 @@ from ..optimize import (
     Constraint,
     Front,
     Optimum,
+    Pareto,
     free_form,
     iterate_from_low_pressure,
     iterate_transmission_error,
     minimize,
     pareto,
 )
+from ..optimize.free_form import CURVES
 from ..optimize.refine import POSITIONS
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import LIVES_AHEAD
-from . import schema_optimize
-from .cases import load_of, tolerance_of
+from . import schema
 from .design_file import DesignFile
-from .errors import DesignFileError, naming, refuse_given, refused, suggestion
-from .named import quantity_named
-from .optimize_method import CURVE, PARETO, check_method, check_options, made_by, options_of, tables
-from .ranges import outside
+from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
+from .kinds import outside
+from .layout import Section
+from .requests import load_of, quantity_named, tolerance_of
 from .toml import decode
+
+CURVE = "cubic"  # on which flanks without parameters are projected
+PARETO = "pareto"
+
+
+def check_method(name: str) -> None:
+    """Refuses a name that is no method."""
+    check_known("optimize.method", name, (*METHODS, PARETO, *schema.METHODS_WITHOUT_VARIABLES))
+
+
+def made_by(name: str) -> type[Any]:
+    """The class of a method with variables."""
+    return Pareto if name == PARETO else METHODS[name]
+
+
+def check_options(design: DesignFile, name: str, options: Mapping[str, Any]) -> None:
+    """Whether a method with variables can be made of its options, and a method without them of its curve."""
+    if name in schema.METHODS_WITHOUT_VARIABLES:
+        check_known(f"optimize.{name}.curve", options.get("curve", CURVE), CURVES)
+        return
+    levels = options.get("levels")
+    if isinstance(levels, dict) and set(levels) != set(design.bounds):
+        problem = f"must name all variables and nothing else: {', '.join(design.bounds)}"
+        raise DesignFileError("optimize.factorial.levels", problem)
+    refused(f"optimize.{name}", made_by(name), **options)
+
+
+def tables(section: schema.OptimizeSection) -> dict[str, Section]:
+    """The tables of all methods, decoded."""
+    layouts = schema.method_options().items()
+    return {key: decode(f"optimize.{key}", getattr(section, key) or {}, layout) for key, layout in layouts}
+
+
+def options_of(section: schema.OptimizeSection, name: str, *, of_the_file: bool) -> dict[str, Any]:
+    """The options of a method; the file may name others where it is not the file that asks for the method."""
+    options = {key: value for key, value in tables(section).get(name, ()) if value is not None}
+    shared = {"starts": section.starts, "steps": section.steps, "seed": section.seed or 0}
+    taken = {field.name for field in dataclasses.fields(METHODS[name])} if name in METHODS else set()
+    if of_the_file:
+        why = f' with method "{name}"'
+        refuse_given("optimize", section, [key for key in ("starts", "steps") if key not in taken], why)
+        if "seed" not in taken and section.manufactured is None:
+            refuse_given("optimize", section, ["seed"], f"{why} and nominal gears")
+    return options | {key: value for key, value in shared.items() if key in taken and value is not None}
+
 
 _DEFAULT_METHOD = "slp"
 _FRONT = ("ppte", "max_contact_pressure")  # of a Pareto front where the file names no objectives
@@ -87,7 +133,7 @@ class OptimizeRequest:
         if self.method not in METHODS or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
             return None
         kept = {name: value for name, value in self._common.items() if name in ("constraints", "seed")}
-        kept |= {"torque": load_of(self._design, "optimize", schema_optimize.OptimizeSection()), "positions": None}
+        kept |= {"torque": load_of(self._design, "optimize", schema.OptimizeSection()), "positions": None}
         kept |= {"objective": settings.quantity(_LASTING), "method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE)}
         return dataclasses.replace(self, method=_DEFAULT_METHOD, _common=kept)
 
@@ -148,7 +194,7 @@ def check_optimize(design: DesignFile) -> None:
 def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeRequest:
     section = design.optimize
     name = method or section.method or _DEFAULT_METHOD
-    flanks_alone = name in schema_optimize.METHODS_WITHOUT_VARIABLES
+    flanks_alone = name in schema.METHODS_WITHOUT_VARIABLES
     check_method(name)
     if not design.bounds and not flanks_alone:
         raise DesignFileError("variables", "missing, nothing to optimize; use jaxgear analyze")
@@ -174,7 +220,7 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
     return OptimizeRequest(name, curve, verify, design, common)
 
 
-def _common(design: DesignFile, section: schema_optimize.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
+def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
     """Objective, cases and constraints."""
     found: dict[str, Any] = {
         **_objective(design, section, name),
@@ -192,27 +238,27 @@ def _common(design: DesignFile, section: schema_optimize.OptimizeSection, name: 
 
 
 def _objectives(
-    design: DesignFile, section: schema_optimize.OptimizeSection, default: tuple[str, ...] = ()
+    design: DesignFile, section: schema.OptimizeSection, default: tuple[str, ...] = ()
 ) -> tuple[str | Quantity, ...]:
     asked = section.objective or default
     named = (asked,) if isinstance(asked, str) else tuple(asked)
     return tuple(quantity_named(design, "optimize.objective", each) for each in named)
 
 
-def _objective(design: DesignFile, section: schema_optimize.OptimizeSection, name: str) -> dict[str, Any]:
+def _objective(design: DesignFile, section: schema.OptimizeSection, name: str) -> dict[str, Any]:
     """What the function of a method takes for the objective; nothing where it knows its own."""
     objectives = _objectives(design, section, _FRONT if name == PARETO else ("ppte",))
     if (len(objectives) > 1) != (name == PARETO):
         problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
         raise DesignFileError("optimize.objective", problem)
-    if name in schema_optimize.METHODS_WITHOUT_VARIABLES:
+    if name in schema.METHODS_WITHOUT_VARIABLES:
         if objectives != ("ppte",):
             raise DesignFileError("optimize.objective", f'must be "ppte" with method "{name}"')
         return {}
     return {"objectives": objectives} if name == PARETO else {"objective": objectives[0]}
 
 
-def _measure(section: schema_optimize.OptimizeSection) -> AbstractMeasure:
+def _measure(section: schema.OptimizeSection) -> AbstractMeasure:
     kind = section.measure or "mean"
     if section.torques is None and section.manufactured is None:
         why = " on a single case: give optimize.torques or optimize.manufactured"
@@ -222,13 +268,13 @@ def _measure(section: schema_optimize.OptimizeSection) -> AbstractMeasure:
     return _MEASURES[kind]() if section.level is None else _MEASURES[kind](section.level)
 
 
-def _constraints(design: DesignFile, section: schema_optimize.OptimizeSection) -> tuple[Constraint, ...]:
+def _constraints(design: DesignFile, section: schema.OptimizeSection) -> tuple[Constraint, ...]:
     return tuple(_constraint(design, number, each) for number, each in enumerate(section.constraint))
 
 
-def _constraint(design: DesignFile, number: int, table: schema_optimize.Tables) -> Constraint:
+def _constraint(design: DesignFile, number: int, table: schema.Tables) -> Constraint:
     key = f"optimize.constraint[{number}]"
-    section = decode(key, table, schema_optimize.ConstraintSection)
+    section = decode(key, table, schema.ConstraintSection)
     of: Any = section.variables if section.of is None else section.of
     unit = ""
     if of is None or (section.of is not None and section.variables is not None):
@@ -259,7 +305,7 @@ def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: floa
         raise DesignFileError(key, f"{low:g} must be at most {most}: wear.revolutions = {looked_at:g}")
 
 
-def _check_iteration(design: DesignFile, start: str, section: schema_optimize.OptimizeSection) -> None:
+def _check_iteration(design: DesignFile, start: str, section: schema.OptimizeSection) -> None:
     """The iteration levels the transmission error at the design torque and knows nothing else."""
     keys = ("measure", "level", "torques", "weights", "manufactured", "constraint")
     refuse_given("optimize", section, keys, ' with method "te_iteration"')

@@ -7,9 +7,8 @@ from typing import Annotated, Any, TypeVar
 from ..metrics import Lubricant, Strength
 from ..numerics import Number
 from .errors import DesignFileError, referring
-from .kinds import text
+from .kinds import outside, text
 from .layout import Section, section_of
-from .ranges import outside
 from .schema import LoadSection, Tables
 from .template import part_of
 from .toml import decode, join, read

@@ -22,9 +22,9 @@ from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from ..shafts import Misalignment
 from ..tolerance import Tolerance
 from ..wear import Wear
-from . import rating, schema, schema_dynamics, schema_optimize, schema_shafts, schema_sweep, schema_wear
+from . import rating, schema, schema_shafts
+from .kinds import allowed
 from .layout import Section, family, meanings, section_of, snake, summary
-from .ranges import allowed
 
 _HEAD = """# Design files
 
@@ -94,14 +94,14 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     yield "[misalignment]", schema.MisalignmentSection, Misalignment
     yield "[resolution]", schema.ResolutionSection, Resolution
     yield "[variables.NAME]", schema.VariableSection, None
-    yield "[optimize]", schema_optimize.optimize_section(), None
-    yield "[[optimize.constraint]]", schema_optimize.ConstraintSection, None
-    for name, section in schema_optimize.method_options().items():
+    yield "[optimize]", schema.optimize_section(), None
+    yield "[[optimize.constraint]]", schema.ConstraintSection, None
+    for name, section in schema.method_options().items():
         yield f"[optimize.{name}]", section, METHODS.get(name, _EXTRAS.get(name))
-    yield "[sweep]", schema_sweep.SweepSection, None
-    yield "[tolerance]", schema_sweep.ToleranceSection, Tolerance
-    yield "[dynamics]", schema_dynamics.DynamicsSection, Dynamics
-    yield "[wear]", schema_wear.WearSection, Wear
+    yield "[sweep]", schema.SweepSection, None
+    yield "[tolerance]", schema.ToleranceSection, Tolerance
+    yield "[dynamics]", schema.DynamicsSection, Dynamics
+    yield "[wear]", schema.WearSection, Wear
     yield "[lubricant]", rating.LubricantSection, Lubricant
     yield "[strength]", rating.StrengthSection, Strength
     yield from _gearbox_tables()

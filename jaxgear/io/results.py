@@ -1,9 +1,12 @@
-"""Result files: `summary.json`, `flanks.csv` and `front.csv`."""
+"""Result files: summary, flanks, fronts, measuring charts and grinding wheels.
+
+Columns end in their unit; `design_um` and `measured_um` have the sign of the machines, positive for excess material.
+"""
 
 import csv
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +15,146 @@ import jax
 import numpy as np
 
 from ..contact import Kinematics, Mesh
+from ..manufacture import GrindingWheel, Trace, WheelProfile
 from ..metrics import flank_surface
 from ..microgeometry import AbstractModification, NoModification, Sum
-from ..numerics import fields_of
+from ..numerics import check, fields_of
 from ..optimize import Front
-from ..sweeps.headings import as_text
+from ..sweeps.columns import as_text
+from .folder import writing
 from .layout import family, snake
+
+_PLACE = {
+    "face_coordinate_mm": "face_coordinate",
+    "roll_angle_deg": "roll_angle",
+    "roll_length_mm": "roll_length",
+    "diameter_mm": "diameter",
+    "design_um": "design",
+    "upper_um": "upper",
+    "lower_um": "lower",
+}
+MEASURED = "measured_um"
+_SAME_PLACE = 1e-3  # mm, of a measured and a designed point
+_CHART_DIGITS = 9  # behind the decimal point: what is read and written again does not drift
+
+
+def write_traces(path: str | Path, traces: Sequence[Trace], measured: Sequence[Trace] | None = None) -> Path:
+    """Writes traces of a flank as CSV, one row per point, as measuring machines and their operators read them.
+
+    Columns: trace, face_coordinate_mm, roll_angle_deg, roll_length_mm, diameter_mm, design_um, upper_um, lower_um and,
+    with `measured`, measured_um. Limits are empty outside the evaluation range.
+
+    Args:
+        path: file to write.
+        traces: of one flank, of `profile_trace` and `helix_trace`.
+        measured: of the same places, trace by trace; None for the design alone.
+
+    Returns:
+        the path.
+
+    Raises:
+        ValueError: when the file cannot be written, or measured traces have other places.
+    """
+    columns = {name: [np.asarray(getattr(trace, field)) for trace in traces] for name, field in _PLACE.items()}
+    if measured is not None:
+        shapes = [[np.shape(trace.design) for trace in many] for many in (traces, measured)]
+        if shapes[0] != shapes[1]:
+            raise ValueError(f"write_traces: measured has traces of {shapes[1]} points, must be {shapes[0]}")
+        for number, (one, other) in enumerate(zip(traces, measured)):
+            for field in ("roll_length", "face_coordinate"):
+                if not np.allclose(getattr(one, field), getattr(other, field), rtol=0, atol=_SAME_PLACE):
+                    raise ValueError(f"write_traces: {field} of measured trace {number} is not that of the design")
+        columns[MEASURED] = [np.asarray(trace.design) for trace in measured]
+    with writing(path), Path(path).open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["trace", *columns])
+        for number, trace in enumerate(traces):
+            for row in zip(*(values[number] for values in columns.values())):
+                writer.writerow([trace.kind, *map(_text, row)])
+    return Path(path)
+
+
+def _text(value: float) -> str:
+    """The shortest text of a number, nothing for NaN."""
+    return "" if np.isnan(value) else repr(round(float(value), _CHART_DIGITS) + 0.0)
+
+
+_WHEEL_COLUMNS = ("flank", "x_mm", "y_mm", "gear_diameter_mm", "roll_length_mm", "modification_um")
+_WHEEL_DIGITS = 6  # behind the decimal point of a millimetre: a nanometre
+_MILLIMETRES = 4  # INSUNITS of DXF
+_LAYER = "WHEEL_PROFILE"
+_AXIS = "WHEEL_MIDDLE"
+
+
+def write_wheel_points(
+    path: str | Path, left: WheelProfile, right: WheelProfile | None = None, *, wheel: GrindingWheel | None = None
+) -> Path:
+    """Writes the active profile of a wheel as CSV, in its frame: origin on its outer diameter in the middle plane.
+
+    Args:
+        path: file to write.
+        left: of the flank at negative x.
+        right: of the flank at positive x; None where both are alike.
+        wheel: adds the radius of the wheel at every point.
+
+    Returns:
+        the path.
+
+    Raises:
+        ValueError: when the file cannot be written, or for a wheel whose axis the profile would reach.
+    """
+    if wheel is not None:
+        deepest = max(float(np.max(profile.y)) for _, _, profile in _sides(left, right))
+        check("write_wheel_points", "radius of wheel", wheel.radius, "mm", low=deepest, open_low=True)
+    columns = _WHEEL_COLUMNS if wheel is None else (*_WHEEL_COLUMNS, "wheel_radius_mm")
+    with writing(path), Path(path).open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        for name, sign, profile in _sides(left, right):
+            x, y, *rest = (np.asarray(values, float) for values in profile)
+            table = [sign * x, y, *rest] if wheel is None else [sign * x, y, *rest, float(wheel.radius) - y]
+            writer.writerows([name, *(f"{value + 0.0:.{_WHEEL_DIGITS}f}" for value in row)] for row in zip(*table))
+    return Path(path)
+
+
+def write_wheel_drawing(path: str | Path, left: WheelProfile, right: WheelProfile | None = None) -> Path:
+    """Writes the active profile of a wheel as DXF (R2010, mm): one polyline per flank, and the middle plane.
+
+    Args:
+        path: file to write.
+        left: of the flank at negative x.
+        right: of the flank at positive x; None where both are alike.
+
+    Returns:
+        the path.
+
+    Raises:
+        ValueError: when the file cannot be written.
+        ModuleNotFoundError: without the package ezdxf, which the extra `cad` installs.
+    """
+    try:
+        from ezdxf.filemanagement import new
+    except ModuleNotFoundError:
+        raise ModuleNotFoundError(
+            "write_wheel_drawing: DXF files need the package ezdxf: pip install jaxgear[cad]"
+        ) from None
+    drawing = new("R2010", units=_MILLIMETRES)
+    drawing.linetypes.add("CENTER", [2.0, 1.25, -0.25, 0.25, -0.25])
+    drawing.layers.add(_LAYER)
+    drawing.layers.add(_AXIS, linetype="CENTER")
+    plane = drawing.modelspace()
+    for _, sign, profile in _sides(left, right):
+        plane.add_lwpolyline(np.stack([sign * np.asarray(profile.x), profile.y], axis=1), dxfattribs={"layer": _LAYER})
+    plane.add_line((0.0, 0.0), (0.0, float(left.y[-1])), dxfattribs={"layer": _AXIS})
+    with writing(path):
+        drawing.saveas(path)
+    return Path(path)
+
+
+def _sides(left: WheelProfile, right: WheelProfile | None):
+    yield "left", -1.0, left
+    yield "right", 1.0, left if right is None else right
+
 
 Designs = Mapping[str, tuple[AbstractModification, AbstractModification]]
 

@@ -1,9 +1,17 @@
-"""Rows of a table, CSV or Parquet, each a text by the name of its column."""
+"""Rows of a table, CSV or Parquet, and variants listed in one."""
 
 import csv
+import csv as text
+import re
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from .errors import DesignFileError, check_file
+import numpy as np
+
+from ..sweeps import VariantList
+from ..sweeps.columns import from_text
+from .errors import DesignFileError, check_file, naming
 
 Rows = list[dict[str, str]]
 
@@ -71,3 +79,116 @@ def _check_table(names: list[str], rows: Rows) -> None:
             fields = len(names) + len(further)
             problem = f"point {number} has {fields} fields, the headings {len(names)}: numbers must have no commas"
             raise DesignFileError("", problem)
+
+
+_HEADING = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^]]*)\])?")  # as tables of sweeps are exported
+_LENGTHS = {"nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "m": 1.0}  # with micro sign and with mu
+
+
+def read_variants(
+    path: Path, bounds: Mapping[str, tuple[float, float]], units: Mapping[str, str] | None = None
+) -> VariantList:
+    """Reads a list of variants; other columns of the file are passed over, so the table of a sweep can be read again.
+
+    The numbers go through a temporary file on the disk: a list may be longer than fits the memory.
+
+    Args:
+        path: a .parquet file, or a CSV file in UTF-8 whose headings are the names, with or without a unit in brackets.
+        bounds: (low, high) of every parameter.
+        units: of the parameters; lengths in another unit are converted, anything else in another unit is refused.
+
+    Raises:
+        DesignFileError: when the file cannot be read, lacks a parameter or has it twice, or holds something else than
+            numbers within the bounds.
+    """
+    import pyarrow
+
+    names, rows = list(bounds), 0
+    with naming(path), tempfile.TemporaryFile() as scratch:  # the array on it outlives it
+        check_file(path)
+        try:
+            for piece in (_parquet if path.suffix.lower() == ".parquet" else _csv)(path, names, units or {}):
+                _check_bounds(piece, bounds, rows)
+                scratch.write(np.ascontiguousarray(piece, np.float64).tobytes())
+                rows += len(piece)
+        except UnicodeDecodeError:
+            raise DesignFileError("", "is not text in UTF-8: save it so, or as Parquet") from None
+        except (OSError, pyarrow.ArrowException) as error:
+            raise DesignFileError("", getattr(error, "strerror", None) or str(error).partition("\n")[0]) from None
+        if not rows:
+            raise DesignFileError("", "holds no variants")
+        scratch.flush()
+        return VariantList(names, np.memmap(scratch, np.float64, "r", shape=(rows, len(names))))
+
+
+def _csv(path: Path, names: Sequence[str], units: Mapping[str, str]) -> Iterator[np.ndarray]:
+    import pyarrow
+    from pyarrow import csv
+
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        headings = [from_text(heading.strip()) for heading in next(text.reader(file), [])]
+    places, factors = _columns([_parts(heading) for heading in headings], names, units)
+    numbered = [str(place) for place in range(len(headings))]  # headings that nobody asks for may be there twice
+    wanted = [numbered[place] for place in places]
+    options = csv.ConvertOptions(column_types=dict.fromkeys(wanted, pyarrow.float64()), include_columns=wanted)
+    read = csv.ReadOptions(column_names=numbered, skip_rows=1)
+    for batch in csv.open_csv(path, read_options=read, convert_options=options):
+        yield _numbers(batch) * factors
+
+
+def _parquet(path: Path, names: Sequence[str], units: Mapping[str, str]) -> Iterator[np.ndarray]:
+    import pyarrow
+    from pyarrow import parquet
+
+    with parquet.ParquetFile(path) as file:
+        fields = list(file.schema_arrow)
+        known = [(_parts(field.name)[0], _unit(field) or _parts(field.name)[1]) for field in fields]
+        places, factors = _columns(known, names, units)
+        wanted = [fields[place].name for place in places]
+        types = pyarrow.schema([(name, pyarrow.float64()) for name in wanted])
+        for batch in file.iter_batches(columns=wanted):
+            yield _numbers(batch.select(wanted).cast(types)) * factors
+
+
+def _columns(known: Sequence[tuple[str, str | None]], names: Sequence[str], units: Mapping[str, str]):
+    """Places of the parameters among the columns of the file, and what turns their numbers into their units."""
+    places = {name: [i for i, (other, _) in enumerate(known) if other == name] for name in names}
+    missing = [name for name in names if not places[name]]
+    if missing:
+        raise DesignFileError("", f"has no column {', '.join(missing)}")
+    for name in names:
+        if len(places[name]) > 1:
+            raise DesignFileError("", f"has {len(places[name])} columns {name}, must have one")
+    chosen = [places[name][0] for name in names]
+    return chosen, np.array([_factor(name, known[i][1], units.get(name)) for name, i in zip(names, chosen)])
+
+
+def _factor(name: str, given: str | None, wanted: str | None) -> float:
+    if given is None or wanted is None or given == wanted:
+        return 1.0
+    if given in _LENGTHS and wanted in _LENGTHS:
+        return float(f"{_LENGTHS[given] / _LENGTHS[wanted]:.1e}")  # a power of ten to the last bit
+    raise DesignFileError("", f"column {name} is in [{given}], must be in [{wanted or '-'}]")
+
+
+def _check_bounds(rows: np.ndarray, bounds: Mapping[str, tuple[float, float]], before: int) -> None:
+    for column, (name, (low, high)) in zip(rows.T, bounds.items()):
+        outside = np.flatnonzero((column < low) | (column > high))
+        if outside.size:
+            value, number = column[outside[0]], before + outside[0]
+            raise DesignFileError("", f"{name} = {value:g} of variant {number} must be from {low:g} to {high:g}")
+
+
+def _parts(heading: str) -> tuple[str, str | None]:
+    """Name and unit of a heading, None where it has none."""
+    match = _HEADING.fullmatch(heading)
+    return (heading, None) if match is None else (match["name"], match["unit"])
+
+
+def _unit(field) -> str | None:
+    unit = (field.metadata or {}).get(b"unit")
+    return unit.decode() if unit else None
+
+
+def _numbers(batch) -> np.ndarray:
+    return np.stack([column.to_numpy(zero_copy_only=False) for column in batch.columns], axis=1)

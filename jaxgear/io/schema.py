@@ -4,21 +4,34 @@ Numbers of modifications and curves may be the name of a variable instead. Defau
 there: None means that the key is absent.
 """
 
+import inspect
 from typing import Annotated, Any
+
+from pydantic import create_model
 
 from ..compliance import Compliance
 from ..contact import OperatingPoint, Resolution
+from ..dynamics import Dynamics
 from ..geometry import Gear, GearPair
 from ..manufacture import ToothThickness
 from ..numerics import Number
+from ..optimize import METHODS, Pareto
 from ..shafts import Misalignment
+from ..tolerance import Tolerance
+from ..wear import Wear
 from .kinds import (
+    LEVEL,
     QUALITY_CLASS,
+    QUALITY_CLASSES,
+    SEED,
+    WEIGHTS,
     choice,
+    count,
     either,
     list_of,
     positive,
     real,
+    switch,
     table,
     text,
 )
@@ -216,3 +229,190 @@ class VariableSection(Section):
     high: Annotated[float, _BOUND]
     value: Annotated[float | None, _BOUND] = None
     unit: Annotated[str | None, text(empty=True)] = None
+
+
+class DynamicsSection(section_of(Dynamics, ("mesh_frequencies",), open=False)):  # type: ignore[misc]
+    """At which speeds the pair runs, and what vibrates; for `jaxgear dynamics` and for the quantities that need it.
+
+    Attributes:
+        mesh_frequencies: lowest and highest frequency of the mesh; either these or `speeds`.
+        speeds: lowest and highest speed of the pinion.
+        number: of speeds, at equal steps.
+        torque_factors: torques of `jaxgear dynamics`, in design torques; 0.5, 1 and 2 without it.
+        run_up: duration of a change of speed from the lowest to the highest in `jaxgear dynamics`, at constant
+            acceleration; no run-up without it.
+    """
+
+    mesh_frequencies: Annotated[list[float] | None, list_of(positive("Hz"), length=2)] = None
+    speeds: Annotated[list[float] | None, list_of(positive("rpm"), length=2)] = None
+    number: Annotated[int, count(2, 10_000)] = 100
+    torque_factors: Annotated[list[float], list_of(positive(""))] = [0.5, 1.0, 2.0]
+    run_up: Annotated[float | None, positive("s")] = None
+
+
+class WearSection(section_of(Wear, ("dynamics", "loads"), open=False)):  # type: ignore[misc]
+    """How long the pair runs, and how fast it wears; for `jaxgear wear` and for the quantities that need it.
+
+    Attributes:
+        line_load: under which the flanks wear; "dynamic" is that of the steady motion, which needs the table
+            [dynamics] and load.speed.
+        largest_increment: depth that no block of the lives of `jaxgear wear` wears off beyond a tenth more; blocks of
+            equal length without it. Quantities and the search over the life take `blocks` in any case.
+        torques: on the pinion, of a spectrum whose loads wear one flank together; the load of the file without it.
+        weights: of the torques in the revolutions.
+        speeds: of the pinion at every torque; that of the file without it.
+    """
+
+    line_load: Annotated[str, choice("static", "dynamic")] = "static"
+    largest_increment: Annotated[float | None, positive("um")] = None
+    torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
+    weights: Annotated[list[float] | None, WEIGHTS] = None
+    speeds: Annotated[list[float] | None, list_of(positive("rpm"))] = None
+
+
+class SweepSection(Section):
+    """Variants to be evaluated.
+
+    Attributes:
+        sampling: how they are spread over the bounds of the variables.
+        samples: number of variants, of "sobol" and "latin_hypercube".
+        seed: of the same.
+        levels: values per variable, of "full_factorial": one number, or a number or list of values per variable.
+        file: CSV or Parquet file of the variants, of "list".
+        torques: on the pinion; the design torque alone without it.
+        weights: of the torques.
+        results: quantities to be listed.
+        part_rows: variants per file of the table; without it there are about 64 files.
+    """
+
+    sampling: Annotated[str, choice("sobol", "latin_hypercube", "full_factorial", "list")] = "sobol"
+    samples: Annotated[int | None, count(1, 2**40)] = None
+    seed: Annotated[int | None, SEED] = None
+    levels: Annotated[
+        int | dict[str, int | list[float]] | None,
+        either(
+            LEVEL,
+            table(either(LEVEL, list_of(real()), "a whole number or a list of values")),
+            "a whole number, or a table with one entry per variable",
+        ),
+    ] = None
+    file: Annotated[str | None, text()] = None
+    torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
+    weights: Annotated[list[float] | None, WEIGHTS] = None
+    results: Annotated[list[str] | None, list_of(text())] = None
+    part_rows: Annotated[int | None, count(1, 2**24)] = None
+
+
+class ToleranceSection(section_of(Tolerance, ("pinion", "wheel", "distribution"), open=False)):  # type: ignore[misc]
+    """Deviations of manufactured gears after ISO 1328-1: the scatter of all designs of analyze, optimize and wear.
+
+    Attributes:
+        quality_class: of both gears, or of pinion and wheel; that of the gears without it.
+        samples: manufactured pairs per design, or variant of a sweep.
+        seed: of their deviations.
+    """
+
+    quality_class: Annotated[int | list[int] | None, QUALITY_CLASSES] = None
+    samples: Annotated[int, count(2, 100_000)] = 64
+    seed: Annotated[int, SEED] = 0
+
+
+_NUMBER = real()
+_NAMES = either(text(), list_of(text()), "a string or a list of strings")
+_SHARE = real(Number(low=0.0, high=1.0, open_low=True, open_high=True))
+
+
+class OptimizeSection(Section):
+    """A search for the best values of the variables, or for flanks without any.
+
+    Attributes:
+        method: name of the method; "slp" without it.
+        objective: a quantity to be made small, or large where that is better; several for "pareto"; "ppte" without it.
+        measure: joins the cases of several torques or manufactured gears into one number; "mean" without it.
+        level: of the measures "quantile" and "cvar".
+        torques: on the pinion; the design torque alone without it.
+        weights: of the torques.
+        manufactured: pairs of manufactured gears under every torque; needs [tolerance].
+        seed: of random searches and of the manufactured gears.
+        starts: searches, of methods "slp", "adam" and "lbfgs".
+        steps: most steps of every search, of the same methods.
+        application_factor: K_A of the rule-based relief.
+        verify: whether the designs are evaluated with the finite-element structure too; without it they are where the
+            gears can be meshed. A quick run never does.
+        constraint: limits of quantities or of combinations of variables.
+    """
+
+    method: Annotated[str | None, text()] = None
+    objective: Annotated[str | list[str] | None, _NAMES] = None
+    measure: Annotated[str | None, choice("mean", "worst", "quantile", "cvar")] = None
+    level: Annotated[float | None, _SHARE] = None
+    torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
+    weights: Annotated[list[float] | None, WEIGHTS] = None
+    manufactured: Annotated[int | None, count(1, 10_000)] = None
+    seed: Annotated[int | None, SEED] = None
+    starts: Annotated[int | None, count(1, 4096)] = None
+    steps: Annotated[int | None, count(10, 100_000)] = None
+    application_factor: Annotated[float, real(Number(low=0.0, high=100.0, open_low=True))] = 1.0
+    verify: Annotated[bool | None, switch()] = None
+    constraint: Annotated[list[Tables], _TABLES] = []
+
+
+class ConstraintSection(Section):
+    """A limit, of either a quantity or a linear combination of variables.
+
+    Attributes:
+        of: name of a quantity.
+        variables: coefficient of every variable of the combination.
+        low: least value.
+        high: greatest value.
+    """
+
+    of: Annotated[str | None, text()] = None
+    variables: Annotated[dict[str, float] | None, table(_NUMBER)] = None
+    low: Annotated[float | None, real(plausible=False)] = None
+    high: Annotated[float | None, real(plausible=False)] = None
+
+
+class FactorialOptions(Section):
+    levels: Annotated[
+        int | dict[str, int] | None,
+        either(LEVEL, table(LEVEL), "a whole number, or a table with one entry per variable"),
+    ] = None
+
+
+class IterationOptions(Section):
+    start: Annotated[str, choice("unmodified", "given", "low_pressure")] = "unmodified"
+    max_relief: Annotated[float, positive("um")] = 7.0
+    max_pressure: Annotated[float | None, positive("MPa")] = None
+    rtol: Annotated[float | None, positive("")] = None
+    steps: Annotated[int | None, count(1, 1000)] = None
+    curve: Annotated[str | None, text()] = None
+
+
+class FreeFormOptions(Section):
+    points: Annotated[int | None, count(4, 500)] = None
+    max_relief: Annotated[float | None, positive("um")] = None
+    curvature: Annotated[float | None, real(Number(low=0.0))] = None
+    steps: Annotated[int | None, count(1, 10_000)] = None
+    curve: Annotated[str | None, text()] = None
+
+
+# They seek the flanks themselves.
+METHODS_WITHOUT_VARIABLES = ("te_iteration", "free_form")
+
+
+def method_options() -> dict[str, type[Section]]:
+    """The tables [optimize.<method>] of the methods that have one, of a user's own too: the fields of their classes."""
+    found = {name: section_of(cls, ("starts", "steps", "seed"), open=False) for name, cls in METHODS.items()}
+    found |= {"factorial": FactorialOptions, "pareto": section_of(Pareto)}
+    found |= {"te_iteration": IterationOptions, "free_form": FreeFormOptions}
+    return {name: section for name, section in found.items() if section.model_fields}
+
+
+def optimize_section() -> type[OptimizeSection]:
+    """The table [optimize] with those of the methods."""
+    methods = method_options()
+    texts = "".join(f"\n    {name}: options of the method." for name in methods)
+    tables: dict[str, Any] = {name: (Annotated[Tables | None, table()], None) for name in methods}
+    text = inspect.cleandoc(OptimizeSection.__doc__ or "") + texts  # Python 3.13 removes the indentation by itself
+    return create_model("OptimizeSection", __base__=OptimizeSection, __doc__=text, **tables)

@@ -11,12 +11,11 @@ from ..contact import OperatingPoint
 from ..metrics import Quantity
 from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
-from .cases import load_of, tolerance_of
 from .design_file import DesignFile
 from .errors import DesignFileError, naming, referring, refuse_given, refused
-from .named import quantity_named
-from .schema_sweep import SweepSection
-from .variants import read_variants
+from .requests import load_of, quantity_named, tolerance_of
+from .rows import read_variants
+from .schema import SweepSection
 
 # The keys that a kind of sampling takes, the first of which it needs; what another kind takes has no effect and is
 # refused.

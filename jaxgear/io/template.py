@@ -12,8 +12,10 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 
+from ..contact import Mesh, Resolution, prepare
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Number, fields_of, real
+from ..shafts import RigidSupport
 from .errors import DesignFileError, check_known, not_known, problem
 from .layout import Section, family, modules_of, section_of
 from .toml import decode, join
@@ -143,3 +145,44 @@ def _fill(value, parameters):
     if isinstance(value, list) and _open(value):
         return jnp.stack([jnp.asarray(_fill(item, parameters), float) for item in value])
     return value
+
+
+class FileDesign(eqx.Module):
+    """The flanks of a design file as a function of its free parameters; pure and traceable.
+
+    Attributes:
+        names: of the parameters.
+        pinion, wheel: the modifications, which are added up.
+    """
+
+    names: tuple[str, ...] = eqx.field(static=True)
+    pinion: list[Part]
+    wheel: list[Part]
+
+    def __call__(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
+        """Modifications of pinion and wheel.
+
+        Args:
+            parameters: value of every free parameter, scalar.
+        """
+        if set(parameters) != set(self.names):
+            raise ValueError(
+                f"design: parameters {', '.join(sorted(parameters)) or '(none)'} must be those of the file: "
+                f"{', '.join(sorted(self.names)) or '(none)'}"
+            )
+        return build(self.pinion, parameters), build(self.wheel, parameters)
+
+
+class FileMesh(eqx.Module):
+    """The prepared mesh of a design file as a function of its free parameters; pure and traceable."""
+
+    pair: Part
+    model: Part
+    misalignment: Part
+    resolution: Resolution
+
+    def __call__(self, parameters: Mapping[str, Any]) -> Mesh:
+        """The mesh."""
+        pair, compliance = self.pair.build(parameters), self.model.build(parameters)
+        axes = RigidSupport(pair, self.misalignment.build(parameters)) if self.misalignment.fields else None
+        return prepare(pair, compliance=compliance, resolution=self.resolution, support=axes)

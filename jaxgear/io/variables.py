@@ -1,11 +1,17 @@
-"""The table [variables]: numbers of the file that are left open."""
+"""The table [variables], and tables that make sense by themselves or beside one other."""
 
 import re
 from collections.abc import Iterable, Sequence
+from typing import Any, TypeVar
+
+from pydantic import BaseModel
 
 from . import schema, template
 from .errors import DesignFileError, suggestion
-from .ranges import outside
+from .gears import with_quality
+from .kinds import outside
+from .model import FINITE_ELEMENTS
+from .schema import METHODS_WITHOUT_VARIABLES
 from .toml import decode
 
 _QUANTITY = re.compile(r"\s*[-+]?[.,]?\d")
@@ -67,3 +73,43 @@ def increasing(key: str, low: float, high: float, unit: str = "") -> None:
     """Refuses an upper limit that is not above the lower one."""
     if high <= low:
         raise DesignFileError(key, f"{high:g}{unit} must be greater than {low:g}{unit}")
+
+
+S = TypeVar("S", bound=BaseModel)
+
+
+def optional(name: str, table: schema.Tables | None, section: type[S]) -> S | None:
+    """What a table says; None where the file has none of that name."""
+    return None if table is None else decode(name, table, section)
+
+
+def load_of(table: schema.Tables) -> schema.LoadSection:
+    """Of what the gears carry."""
+    load = decode("load", table, schema.LoadSection)
+    if load.torque_range is not None:
+        low, high = load.torque_range
+        increasing("load.torque_range[1]", low, high, unit=" N m")
+    return load
+
+
+def optimize_of(top: schema.FileSection, stiffness: schema.ModelSection) -> Any:
+    """The search, with its defaults where the file has no such table."""
+    optimize = decode("optimize", top.optimize or {}, schema.optimize_section())
+    if top.optimize is not None and not top.variables and optimize.method not in METHODS_WITHOUT_VARIABLES:
+        raise DesignFileError("optimize", "has no effect without [variables]")
+    if optimize.verify and stiffness.structure == FINITE_ELEMENTS:
+        raise DesignFileError("optimize.verify", f'has no effect with model.structure = "{FINITE_ELEMENTS}"')
+    return optimize
+
+
+def sweep_of(top: schema.FileSection) -> schema.SweepSection | None:
+    """Variants to be evaluated; None without such a table."""
+    if top.sweep is not None and not top.variables:
+        raise DesignFileError("sweep", "has no effect without [variables]")
+    return optional("sweep", top.sweep, schema.SweepSection)
+
+
+def tolerance_of(top: schema.FileSection, quality: Any) -> schema.ToleranceSection | None:
+    """Deviations of manufactured gears, by the quality classes of the gears where it names none; None without it."""
+    tolerance = optional("tolerance", top.tolerance, schema.ToleranceSection)
+    return None if tolerance is None else with_quality("tolerance", tolerance, quality)

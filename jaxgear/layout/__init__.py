@@ -19,21 +19,20 @@ References:
 
 from .findings import findings_of as findings_of
 from .flank_line import FlankLine as FlankLine
+from .flank_line import Stations as Stations
+from .flank_line import at_stations as at_stations
+from .flank_line import at_torque as at_torque
 from .flank_line import level_load as level_load
 from .life import Damage as Damage
 from .life import Endurance as Endurance
 from .life import SNCurve as SNCurve
 from .life import damage as damage
+from .life import face_load_over_torques as face_load_over_torques
 from .life import gear_lives as gear_lives
-from .lives_in_cases import lives_in_cases as lives_in_cases
-from .longest_life import longest_life as longest_life
-from .over_torque import face_load_over_torques as face_load_over_torques
+from .life import longest_life as longest_life
 from .profiles import ProfileLayout as ProfileLayout
 from .profiles import flank_line_contact as flank_line_contact
 from .profiles import vary_profiles as vary_profiles
-from .stations import Stations as Stations
-from .stations import at_stations as at_stations
-from .stations import at_torque as at_torque
 from .steps import FlankLineLayout as FlankLineLayout
 from .steps import layout_flank_lines as layout_flank_lines
 from .steps import without_housing as without_housing
@@ -43,4 +42,5 @@ from .tolerance_cases import ToleranceCases as ToleranceCases
 from .tolerance_cases import crowning_off_the_edges as crowning_off_the_edges
 from .tolerance_cases import flank_line_tolerance as flank_line_tolerance
 from .tolerance_cases import helix_slope_limits as helix_slope_limits
+from .tolerance_cases import lives_in_cases as lives_in_cases
 from .tolerance_cases import tolerance_cases as tolerance_cases

@@ -13,7 +13,7 @@ from ..metrics import Finding
 from ..metrics.findings import LIMITS as LIMITS_OF_MESH
 from ..metrics.findings import Limit
 from ..shafts import AbstractSupport, Gearbox, Shaft, ShaftSupport, bearing_reactions
-from ..shafts.places import tip_clearances
+from ..shafts.gearbox import tip_clearances
 from ..shafts.shaft import facts_of
 from .profiles import AMOUNTS, ProfileLayout
 from .steps import FlankLineLayout

@@ -13,12 +13,16 @@ from ..geometry import GearPair
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, check, real, result
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
-from .flank_line import FlankLine, GearName, level_load
-from .life import Damage, Endurance, damage
-from .lives_in_cases import lives_in_cases
-from .longest_life import longest_life
-from .stations import STATIONS, at_stations
-from .tolerance_cases import CASES, FlankLineTolerance, ToleranceCases, crowning_off_the_edges, tolerance_cases
+from .flank_line import STATIONS, FlankLine, GearName, at_stations, level_load
+from .life import Damage, Endurance, damage, longest_life
+from .tolerance_cases import (
+    CASES,
+    FlankLineTolerance,
+    ToleranceCases,
+    crowning_off_the_edges,
+    lives_in_cases,
+    tolerance_cases,
+)
 
 Scalar = Float[Array, ""]
 

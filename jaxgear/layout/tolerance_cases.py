@@ -1,8 +1,11 @@
-"""Step 2 of a layout: what tolerances make of the load over the face, and the crowning that keeps it off the edges.
+"""Step 2 of a layout: what tolerances make of the load over the face and of the life, and the crowning against it.
 
 References:
     U. Kissling's three-step layout of modifications: five cases of helix slope and axis deviations,
     equations 1 and 2; ISO 6336-1 Annexes B and E.
+
+Without deviations further crowning only gathers the load in the middle and shortens the life; what it saves, it saves
+where the flanks deviate.
 """
 
 from typing import Literal
@@ -12,12 +15,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from ..conditions import LoadSpectrum
 from ..geometry import GearPair
-from ..numerics import Checked, bracketed_root, check, concrete, maximum, number, program, real, result
+from ..numerics import Checked, bracketed_root, check, concrete, maximum, number, program, real, result, whole
 from ..shafts import AbstractSupport, FaceLoad, Misalignment, annex_e, axis_tolerance, face_load_factor
 from ..tolerance import ToleranceClass
-from .flank_line import FlankLine
-from .stations import Stations, at_stations
+from .flank_line import STATIONS, FlankLine, Stations, at_stations
+from .life import Endurance, damage_of, under_loads
 
 Scalar = Float[Array, ""]
 Cases = Float[Array, " cases"]
@@ -251,3 +255,47 @@ def _excess(line_load: Float[Array, "... slices"], share) -> Float[Array, "..."]
     ends = jnp.maximum(line_load[..., 0], line_load[..., -1])
     inner, mean = maximum(line_load[..., 1:-1], axis=-1), jnp.mean(line_load, axis=-1)
     return (ends - share * inner) / jnp.where(mean > 0, mean, 1.0)
+
+
+def lives_in_cases(
+    support: AbstractSupport,
+    load: LoadSpectrum,
+    endurance: Endurance | tuple[Endurance, Endurance],
+    tolerance: FlankLineTolerance,
+    *,
+    pinion: FlankLine | None = None,
+    wheel: FlankLine | None = None,
+    stations: int = STATIONS,
+) -> Float[Array, " cases"]:
+    """Life [h] without deviations and in the four combinations of the largest ones, see `CASES`.
+
+    Args:
+        support, load, endurance, pinion, wheel, stations: as for `damage`.
+        tolerance: the deviations.
+
+    Raises:
+        ValueError: as `damage` does.
+    """
+    both = endurance if isinstance(endurance, tuple) else (endurance, endurance)
+    whole("lives_in_cases", "stations", stations, 3, 1001)
+    faces = under_loads(support, load, stations=stations)
+    return _lives(faces, load, both, tolerance, pinion or FlankLine(), wheel or FlankLine())
+
+
+@program
+def _lives(
+    faces: Stations,
+    load: LoadSpectrum,
+    endurance: tuple[Endurance, Endurance],
+    tolerance: FlankLineTolerance,
+    pinion: FlankLine,
+    wheel: FlankLine,
+) -> Float[Array, " cases"]:
+    pair = jax.tree.map(lambda leaf: leaf[0], faces.pair)
+
+    def life(slope):
+        on_wheel = FlankLine(slope).on(pair, "wheel")
+        deviated = FlankLine(wheel.slope + on_wheel.slope, wheel.crowning + on_wheel.crowning)
+        return damage_of(faces, load, endurance, pinion, deviated).life
+
+    return jax.vmap(life)(jnp.asarray(tolerance.slopes))

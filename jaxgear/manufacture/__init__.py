@@ -5,7 +5,6 @@ contact, of `mesh.sides`, and the modification. Importing adds `pinion_quadratic
 others to the vocabulary of quantities.
 """
 
-from . import quantities as _quantities  # noqa: F401 - adds to the vocabulary
 from .chart import FlankDeviations as FlankDeviations
 from .chart import FlankPlace as FlankPlace
 from .chart import Trace as Trace
@@ -17,22 +16,20 @@ from .chart import profile_range as profile_range
 from .chart import profile_trace as profile_trace
 from .chart import start_of_relief as start_of_relief
 from .chart import table_traces as table_traces
-from .drawn import ToothThickness as ToothThickness
-from .drawn import drawn_gear as drawn_gear
-from .drawn import with_thickness as with_thickness
 from .spline import WheelSpline as WheelSpline
 from .spline import best_wheel_spline as best_wheel_spline
 from .spline import relief_start as relief_start
 from .spline import wheel_spline as wheel_spline
-from .tooth_space import SpaceFlank as SpaceFlank
-from .tooth_space import space_flank as space_flank
 from .tooth_thickness import Measures as Measures
+from .tooth_thickness import ToothThickness as ToothThickness
 from .tooth_thickness import allowance_of_balls as allowance_of_balls
 from .tooth_thickness import allowance_of_span as allowance_of_span
+from .tooth_thickness import drawn_gear as drawn_gear
 from .tooth_thickness import measures as measures
 from .tooth_thickness import over_balls as over_balls
 from .tooth_thickness import span as span
 from .tooth_thickness import teeth_spanned as teeth_spanned
+from .tooth_thickness import with_thickness as with_thickness
 from .volume import ReferenceVolumes as ReferenceVolumes
 from .volume import ground_area as ground_area
 from .volume import ground_volume as ground_volume
@@ -40,10 +37,12 @@ from .volume import reference_volumes as reference_volumes
 from .volume import relative_volume as relative_volume
 from .wheel import GrindingMargins as GrindingMargins
 from .wheel import GrindingWheel as GrindingWheel
+from .wheel import SpaceFlank as SpaceFlank
 from .wheel import WheelProfile as WheelProfile
 from .wheel import grinding_faults as grinding_faults
 from .wheel import grinding_margins as grinding_margins
 from .wheel import largest_wheel_radius as largest_wheel_radius
 from .wheel import run_out as run_out
 from .wheel import smallest_wheel_radius as smallest_wheel_radius
+from .wheel import space_flank as space_flank
 from .wheel import wheel_profile as wheel_profile

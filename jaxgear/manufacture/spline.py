@@ -27,7 +27,7 @@ from ..microgeometry import (
 )
 from ..numerics import Checked, check, concrete, maximum, program, result
 from ..numerics.fits import Criterion, fit
-from .tooth_space import space_point
+from .wheel import space_point
 
 Scalar = Float[Array, ""]
 Profile = Float[Array, " points"]

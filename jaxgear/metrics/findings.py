@@ -18,9 +18,9 @@ from ..geometry import Material
 from ..microgeometry import AbstractModification, EndRelief, NoModification, RootRelief, TipRelief
 from ..numerics import fields_of, program
 from .flank import flank_surface
-from .load import effective_contact_ratio
+from .load_distribution import effective_contact_ratio
 from .lubricant import Lubricant
-from .root_stress import nominal_root_stress
+from .stress import nominal_root_stress
 
 
 class Limit(NamedTuple):

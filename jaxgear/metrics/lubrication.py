@@ -1,4 +1,4 @@
-"""Friction, heat and film of a lubricated mesh, at the line loads of its contact analysis.
+"""Friction, heat, film and power loss of a lubricated mesh, at the line loads of its contact analysis.
 
 Loads, pressures and sliding are those of the cycle; what the standards work out at a few points of the path of contact
 with shares of the load and factors for its distribution, stands here at every contact point.
@@ -9,14 +9,92 @@ from jaxtyping import Array, Float
 
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle
-from ..geometry import reduced_radius
-from ..numerics import check, over_batch, safe_divide, safe_power
-from .flash import flash_temperature
-from .loss import loss_factor
+from ..geometry import GearPair, path_of_contact, reduced_radius
+from ..numerics import check, over_batch, real, safe_divide, safe_power, safe_sqrt
 from .lubricant import Lubricant
 
-Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
+
+_BLOK_FACTOR = 1.13  # 2 / sqrt(pi), semi-elliptic heat flux (ISO/TS 6336-20, where Blok's own 1.11 is rounded)
+
+
+def flash_temperature(cycle: MeshCycle, speed, *, friction=0.06) -> Float[Array, "*cycles pairs slices positions"]:
+    """Rise of the flank temperature in the contact [K], at the line loads of this cycle.
+
+        T_fl = 1.13 mu w |v1 - v2| / [(B1 sqrt(v1) + B2 sqrt(v2)) sqrt(2 b_H)]
+
+    Zero where the pair is apart, in corner contact (no flank curvature there), and at the pitch point.
+
+    Args:
+        cycle: solved mesh cycle.
+        speed: of the pinion [rpm], scalar.
+        friction: mean coefficient of friction; 0.06 is the leading constant of ISO/TR 13989-1 at unit load and speed
+            terms.
+
+    Raises:
+        ValueError: for a negative speed or friction.
+
+    References:
+        ISO/TS 6336-20 (ISO/TR 13989-1); H. Blok 1937.
+    """
+    check("flash_temperature", "speed", speed, "rpm", low=0.0)
+    check("flash_temperature", "friction", friction, "", low=0.0)
+    return _flash(cycle, real(speed), real(friction))
+
+
+@over_batch
+def _flash(cycle: MeshCycle, speed, friction) -> Load:
+    kinematics, (pinion, wheel) = cycle.kinematics, cycle.sides
+    pair = kinematics.pair
+    pinion_speed, wheel_speed = kinematics.path_of_contact.rolling_speeds(kinematics.path, speed)
+    reduced = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)
+    modulus = combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)
+    half_width = safe_sqrt(4 * cycle.line_load * reduced[:, None] / modulus / jnp.pi) * 1e-3  # [m]
+    heat = friction * cycle.line_load * 1e3 * jnp.abs(pinion_speed - wheel_speed)[:, None]
+    sink = pair.pinion.material.thermal_contact_coefficient * safe_sqrt(
+        pinion_speed
+    ) + pair.wheel.material.thermal_contact_coefficient * safe_sqrt(wheel_speed)
+    # no heat makes no rise, also where it is not conducted; heat that is not finite stays so
+    rise = _BLOK_FACTOR * safe_divide(heat, sink[:, None] * safe_sqrt(2 * half_width), default=0.0 * heat)
+    return jnp.where((kinematics.outside <= 0)[:, None], rise, 0.0)
+
+
+Scalar = Float[Array, ""]
+
+
+@over_batch
+def loss_factor(cycle: MeshCycle) -> Scalar:
+    """Loss factor H_VL of the loaded mesh: loss power = input power * friction coefficient * H_VL.
+
+        H_VL = 1 / (p_et b) int int (f_N b / F_bt) (v_g / v_tb) dx dy
+
+    with the line load f_N of this cycle, the sliding speed v_g and the speed of the base circles v_tb. Corner contact
+    counts with the sliding speed at its path position. Zero at zero torque.
+
+    References:
+        A. Wimmer, Lastverluste von Stirnradverzahnungen, TU Muenchen 2006.
+    """
+    contact = cycle.kinematics.path_of_contact
+    # sliding over base-circle speed: v_g / v_tb = |s| (1 / r_b1 + 1 / r_b2)
+    sliding = jnp.abs(cycle.kinematics.path) * (1 / contact.pinion_base_radius + 1 / contact.wheel_base_radius)
+    return safe_divide(jnp.sum(jnp.mean(cycle.pair_force * sliding, axis=-1)), cycle.force)
+
+
+def ohlendorf_loss_factor(pair: GearPair) -> Scalar:
+    """Loss factor H_v of the geometry alone, for contact ratios from 1 to 2.
+
+        H_v = pi (u + 1) / (z1 u) (1 - eps + eps1^2 + eps2^2)
+
+    References:
+        H. Ohlendorf, Verlustleistung und Erwaermung von Stirnraedern, TH Muenchen 1958; G. Niemann, H. Winter,
+        Maschinenelemente II.
+    """
+    path = path_of_contact(pair)
+    recess, approach = path.end / path.base_pitch, -path.start / path.base_pitch
+    ratio = pair.gear_ratio
+    share = 1 - (recess + approach) + recess**2 + approach**2
+    return jnp.pi * (ratio + 1) / (pair.pinion.teeth * ratio) * share
+
 
 # leading constants of the laws of friction
 _SCHLENK, _ISO_20, _ISO_22 = 0.048, 0.060, 0.045

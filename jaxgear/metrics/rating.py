@@ -12,12 +12,11 @@ from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
 from ..numerics.reductions import Max, Min
-from .damage import pitting_damage, root_damage
-from .flash import flash_temperature
 from .lubrication import (
     bulk_temperature,
     contact_temperature,
     film_thickness,
+    flash_temperature,
     friction_coefficient,
     loss_power,
     lubricated_flash_temperature,
@@ -28,8 +27,10 @@ from .quantity import Quantity
 from .safety import (
     local_root_safety,
     micropitting_safety,
+    pitting_damage,
     pitting_safety,
     pressure_safety,
+    root_damage,
     root_safety,
     scuffing_safety,
 )

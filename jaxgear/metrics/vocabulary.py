@@ -1,4 +1,4 @@
-"""The quantities of this package."""
+"""The quantities of this package, and a mesh cycle in a few of them."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -9,16 +9,22 @@ from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
 from ..geometry import margins
+from ..numerics import over_batch
 from ..numerics.reductions import Average, Harmonic, Max, Min, Range, Rms
-from .contact_stress import nominal_contact_stress
 from .excitation import force_excitation, relative_transmission_error
-from .face_load import edge_load_factor, face_load_factor, root_face_load_factor
 from .flank import max_relief, relief_reversal, removed_volume
-from .load import contact_shock, corner_force, effective_contact_ratio
-from .loss import loss_factor
+from .load_distribution import (
+    contact_shock,
+    corner_force,
+    edge_load_factor,
+    effective_contact_ratio,
+    face_load_factor,
+    root_face_load_factor,
+)
+from .lubrication import loss_factor
 from .quantity import Quantity, quantities
 from .rating import LUBRICATED, RATED
-from .root_stress import nominal_root_stress, root_stress
+from .stress import nominal_contact_stress, nominal_root_stress, root_stress
 
 Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
@@ -225,3 +231,39 @@ quantities.add(
     *RATED,
     package=__package__,
 )
+
+
+_SUMMARY = (
+    "ppte",
+    "relative_ppte",
+    "mean_te",
+    "unloaded_ppte",
+    "max_flank_pressure",
+    "max_corner_pressure",
+    "max_line_load",
+    "contact_ratio",
+    "effective_contact_ratio",
+    "corner_contact_length",
+    "corner_force",
+    "pinion_root_stress",
+    "wheel_root_stress",
+    "pinion_local_root_stress",
+    "wheel_local_root_stress",
+    "pinion_contact_stress",
+    "wheel_contact_stress",
+    "mesh_loss_factor",
+    "force_excitation",
+)
+
+_OVER_FACE = ("face_load_factor", "root_face_load_factor", "edge_load_factor")  # of several slices
+
+
+@over_batch
+def summary(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
+    """The numbers that engineers ask for first, by name and unit; traceable, so it can be vmapped."""
+    names = _SUMMARY if cycle.kinematics.resolution.slices == 1 else (*_SUMMARY, *_OVER_FACE)
+    return {
+        "torque_Nm": cycle.torque,
+        **{quantities[name].key: quantities[name](cycle) for name in names},
+        "converged": jnp.all(cycle.converged),
+    }

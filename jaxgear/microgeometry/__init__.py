@@ -20,9 +20,9 @@ from .curves import Power as Power
 from .curves import Quadratic as Quadratic
 from .curves import Sinusoidal as Sinusoidal
 from .curves import Spline as Spline
-from .lead import EndRelief as EndRelief
-from .lead import LeadCrowning as LeadCrowning
-from .lead import LeadSlope as LeadSlope
+from .profile import EndRelief as EndRelief
+from .profile import LeadCrowning as LeadCrowning
+from .profile import LeadSlope as LeadSlope
 from .profile import ProfileCrowning as ProfileCrowning
 from .profile import ProfileSlope as ProfileSlope
 from .profile import RootRelief as RootRelief

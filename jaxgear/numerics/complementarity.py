@@ -27,8 +27,16 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .contact_problem import ContactProblem, ContactSolution
-from .contact_state import active_of, carried_by, deflections_under, secants_under, slopes_under
+from .contact_problem import (
+    LOAD_FLOOR,
+    ContactProblem,
+    ContactSolution,
+    active_of,
+    carried_by,
+    deflections_under,
+    secants_under,
+    slopes_under,
+)
 from .contact_system import (
     correction,
     eliminable,
@@ -41,10 +49,9 @@ from .contact_system import (
     total,
     without_gap,
 )
-from .coupled_elimination import CoupledFactors
-from .spring import LOAD_FLOOR
-from .stored import unit
-from .tangents import jvp_of_given
+from .coupling import CoupledFactors
+from .implicit import jvp_of_given
+from .safe import unit
 
 Rows = list[Float[Array, "slices positions"]]
 Slopes = list[Float[Array, "#slices positions"]]  # one row where a secant is the same in every slice

@@ -1,10 +1,44 @@
-"""What a contact problem is given by, and what solves it; `complementarity` states the conditions."""
+"""What a contact problem is given by and what an iterate tells; `complementarity` states the conditions.
+
+The iterate v holds the load of every spring in contact, and of every other one minus the load that would open it as far
+as it is open.
+"""
+
+from abc import abstractmethod
+from functools import reduce
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from .coupling import Coupling
-from .spring import AbstractSpring
+from .elimination import Rows, Slopes
+
+Real = Float[Array, "..."]
+
+# Springs are linear below this load (of a contact: 0.01 N/mm), where those of elastic contacts have no finite slope.
+LOAD_FLOOR = 1e-2
+
+
+class AbstractSpring(eqx.Module):
+    """A deflection that increases with the load, elementwise; every leaf has shape (pairs, 1, positions)."""
+
+    @abstractmethod
+    def secant(self, load: Real) -> Real:
+        """Deflection per load, at positive loads."""
+
+    def slope(self, load: Real, secant: Real) -> Real:
+        """Derivative of the deflection with respect to the load, given the `secant` at this load."""
+        return secant + load * jax.jvp(self.secant, (load,), (jnp.ones_like(load),))[1]
+
+    def deflection(self, load: Real) -> Real:
+        """Deflection at any load that is not negative; zero at zero."""
+        return load * self.secant(jnp.maximum(load, LOAD_FLOOR))
+
+    def moved(self, distance: Real) -> "AbstractSpring":
+        """The spring of a contact that has moved by a distance; of most springs the same."""
+        return self
 
 
 class ContactProblem(eqx.Module):
@@ -63,3 +97,32 @@ class ContactSolution(eqx.Module):
     in_contact: Bool[Array, "pairs slices positions"]
     residual: Float[Array, " positions"]
     solved: Bool[Array, " positions"]
+
+
+def active_of(problem: ContactProblem, v: Rows) -> list[Bool[Array, "slices positions"]]:
+    """Where the iterate is not negative; if it is everywhere, the largest must bear the load."""
+    if problem.load is None:
+        return [row >= 0 for row in v]
+    floor = jnp.minimum(reduce(jnp.maximum, [jnp.max(row, axis=0) for row in v]), 0.0)
+    return [row >= floor[None] for row in v]
+
+
+def carried_by(v: Rows) -> Rows:
+    """Line loads of an iterate; differentiable at zero, where a spring in contact carries no load yet."""
+    return [jnp.where(row >= 0, row, 0.0) for row in v]
+
+
+def secants_under(problem: ContactProblem, load: Rows) -> Slopes:
+    """Deflection per load of every spring; all springs at once, so that a program holds the law once."""
+    return list(problem.law.secant(jnp.maximum(jnp.stack(load), LOAD_FLOOR)))
+
+
+def slopes_under(problem: ContactProblem, load: Rows, secant: Slopes) -> Slopes:
+    """Its derivative; the secants are those under the same loads."""
+    q, c = jnp.stack(load), jnp.stack(secant)
+    return list(jnp.where(q > LOAD_FLOOR, problem.law.slope(jnp.maximum(q, LOAD_FLOOR), c), c))
+
+
+def deflections_under(problem: ContactProblem, load: Rows) -> Float[Array, "pairs slices positions"]:
+    """Deflection of every spring."""
+    return problem.law.deflection(jnp.stack(load))

@@ -4,8 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from .contact_problem import ContactProblem
-from .coupled_elimination import CoupledFactors, Response, couple, respond, stiffness
-from .coupling import with_inverses
+from .coupling import CoupledFactors, Response, couple, respond, stiffness, with_inverses
 from .elimination import Curve, Factors, Rows, Slopes, at_approach, balance, factorize, product
 
 

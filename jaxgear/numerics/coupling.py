@@ -1,4 +1,4 @@
-"""Coupled slices of a contact problem, by few modes over the slices.
+"""Coupled slices of a contact problem, by few modes over the slices, and the elimination of their unknowns.
 
 The deflection of spring p in slice s under all line loads is
 
@@ -9,6 +9,17 @@ springs on bodies whose deflection at one place is felt at others, on a support 
 springs of a slice. Where the two bodies that make up C spread loads in their own way each, a second sum of this form
 follows, with the C of one of them and by how much its M and rest differ. Of slices of unequal weight, w times the line
 load of slice t stands for q in the sums over t, w being the weight over the mean of all.
+
+Every slice is eliminated on its own, as if nothing but the rest of the compliance held it: A = rest C + slope. With the
+deflections p of the modes as unknowns, and b those of the support with the common approach in the first one, the active
+springs obey
+
+    A q = known + X b - V p,     (C^-1 x M^-1) p = V^T q,     b = sqrt(n) approach e_1 - H z,     z = X^T q,
+
+X being the levers times the support's modes. Where slices differ in weight, w q is solved for in place of q, by
+w A^-1 in place of A^-1, w being the weight over the mean of all. So p follows from the symmetric, positive definite
+matrix C^-1 x M^-1 + V^T A^-1 V, a few unknowns at every position, and what is left are the equations of the support.
+What several loops read ends with a division, for compilers to store it.
 """
 
 from functools import reduce
@@ -18,12 +29,13 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
-from .elimination import small_inverse
-from .stored import stored
+from .dense import solve_dense
+from .elimination import Curve, Factors, Rows, Slopes, inverse_of, small_inverse
+from .safe import stored, unit
 
-Rows = list[Float[Array, "slices positions"]]
 Springs = Float[Array, "pairs pairs positions"]
 Blocks = Float[Array, "modes modes pairs pairs positions"]
 
@@ -162,3 +174,215 @@ def along(
 
 def _outer(weight: Float[Array, " modes"], row: Float[Array, "... positions"]) -> Float[Array, "modes ... positions"]:
     return weight.reshape(-1, *[1] * row.ndim) * row[None]
+
+
+Levers = Float[Array, "pairs positions"]
+Bends = Float[Array, "bends positions"]
+Inverse = list[list[Float[Array, "slices positions"]]]  # of every slice on its own, by springs
+Sides = Float[Array, "sides pairs positions"]  # right sides of the modal system, of one mode
+
+
+class _Block(NamedTuple):
+    """The columns of one mode in the block elimination of the modal system, L D L^T; from this mode on.
+
+    Attributes:
+        scaled: L D.
+        lower: L.
+        inverse: of D.
+    """
+
+    scaled: Float[Array, "modes pairs pairs positions"]
+    lower: Float[Array, "modes pairs pairs positions"]
+    inverse: Float[Array, "pairs pairs positions"]
+
+
+class CoupledFactors(NamedTuple):
+    """The active system, eliminated.
+
+    Attributes:
+        coupling: of the slices.
+        lever: of the springs.
+        inverse: of the matrices A, zero where springs are apart, by springs; with the weights of the slices.
+        blocks: of the modal system.
+        bent: L^-1 V^T A^-1 X by mode, and D^-1 times it.
+        force: z under unit b, symmetric.
+        yielding: b under unit H z, and under unit approach in its first column; see `_yielding`.
+        per_slope: load per opening of every spring, about.
+    """
+
+    coupling: Coupling
+    lever: Levers
+    inverse: Inverse
+    blocks: list[_Block]
+    bent: tuple[list[Sides], list[Sides]]
+    force: Float[Array, "bends bends positions"]
+    yielding: Float[Array, "bends bends positions"]
+    per_slope: Slopes
+
+
+class Response(NamedTuple):
+    """Line loads, common approach, and what presses the slices besides what is known: X b - V p."""
+
+    load: Rows
+    approach: Curve
+    pressed: Rows
+
+
+def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
+    """Eliminates what couples the slices.
+
+    Args:
+        coupling: with its inverses.
+        lever: what a spring closes per unit of common approach.
+        own: elimination of every slice with the local compliance and the slopes of the springs.
+    """
+    inverse = inverse_of(own)
+    if coupling.weight is not None:
+        inverse = [[coupling.weighted(x) for x in row] for row in inverse]
+    modal = _products(coupling.modes, inverse)
+    blocks = _eliminated(coupling, modal)
+    right, force = _of_support(coupling, lever, inverse, modal)
+    bent = _ahead(blocks, right)
+    force = force - _joined(bent[0], bent[1])
+    yielding = _yielding(coupling.support, force)
+    return CoupledFactors(coupling, lever, inverse, blocks, bent, force, yielding, own.per_slope)
+
+
+def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "_ pairs pairs positions"]]:
+    """V^T rows V: of every mode with itself and those after it, by mode."""
+    springs = range(len(rows))
+    half = [(i, j) for i in springs for j in range(i + 1)]
+    stack = jnp.stack([rows[i][j] for i, j in half])
+    place = np.array([[half.index((max(i, j), min(i, j))) for j in springs] for i in springs])
+    return [onto(mode[:, None] * modes[:, k:], stack)[:, place] for k, mode in enumerate(modes.T)]
+
+
+def _eliminated(coupling: Coupling, modal: list[Float[Array, "_ pairs pairs positions"]]) -> list[_Block]:
+    held = coupling.held
+    blocks: list[_Block] = []
+    assert held is not None  # whoever eliminates gives the inverses
+    for mode in range(len(modal)):
+        scaled = modal[mode] + held.column(mode)
+        for before, block in enumerate(blocks):
+            ahead = mode - before
+            scaled = scaled - _times(block.lower[ahead:], jnp.swapaxes(block.scaled[ahead], 0, 1))
+        scaled = scaled / unit(scaled)
+        inverse = small_inverse(scaled[0])
+        lower = _times(scaled, inverse)
+        blocks.append(_Block(scaled, lower / unit(lower), inverse))
+    return blocks
+
+
+def _times(first: Float[Array, "... rows pairs positions"], second: Float[Array, "pairs pairs positions"]):
+    """Products of small matrices at every position."""
+    wide = second.reshape(-1, *[1] * (first.ndim - 2), *second.shape[1:])
+    return sum(first[..., k, None, :] * wide[k] for k in range(len(second)))
+
+
+def _of_support(
+    coupling: Coupling, lever: Levers, inverse, modal
+) -> tuple[list[Sides], Float[Array, "bends bends positions"]]:
+    """V^T A^-1 X by mode, and X^T A^-1 X."""
+    if coupling.support_modes is None:
+        # what the common approach presses is the first mode
+        even = reduce(add, [modal[0][:, :, i] * height[None, None] for i, height in enumerate(lever)])
+        return list(even[:, None]), reduce(add, list(even[0] * lever))[None, None]
+    shapes = coupling.support_modes
+    pressed = jnp.stack([sum(x * height[None] for x, height in zip(row, lever)) for row in inverse])
+    right = [onto(mode[:, None] * shapes, pressed) for mode in coupling.modes.T]
+    force = jnp.sum(pressed * lever[:, None], axis=0)
+    return right, jnp.stack([onto(shape[:, None] * shapes, force) for shape in shapes.T])
+
+
+def _ahead(blocks: list[_Block], right: list[Sides]) -> tuple[list[Sides], list[Sides]]:
+    """L^-1 right, and D^-1 times it."""
+    whole: list[Sides] = []
+    divided: list[Sides] = []
+    for mode, value in enumerate(right):
+        for before, block in enumerate(blocks[:mode]):
+            value = value - _times(divided[before][:, None], jnp.swapaxes(block.scaled[mode - before], 0, 1))[:, 0]
+        # right sides may be tangents: what makes a compiler store them must not depend on them
+        kept = unit(blocks[mode].inverse[0])[None]
+        whole.append(value / kept)
+        divided.append(_times(whole[-1][:, None], blocks[mode].inverse)[:, 0] / kept)
+    return whole, divided
+
+
+def _joined(
+    first: list[Sides], second: list[Float[Array, "others pairs positions"]]
+) -> Float[Array, "sides others positions"]:
+    """Sum over modes and springs."""
+    return reduce(add, [jnp.sum(a[:, None] * b[None], axis=2) for a, b in zip(first, second)])
+
+
+def _back(
+    blocks: list[_Block], divided: list[Float[Array, "pairs positions"]]
+) -> list[Float[Array, "pairs positions"]]:
+    """Solution of the modal system by mode, from D^-1 L^-1 of its right side."""
+    found: dict[int, Float[Array, "pairs positions"]] = {}
+    for mode in reversed(range(len(blocks))):
+        value = divided[mode]
+        for later in range(mode + 1, len(blocks)):
+            value = value - jnp.sum(blocks[mode].lower[later - mode] * found[later][:, None], axis=0)
+        found[mode] = value / unit(blocks[mode].inverse[0])
+    return [found[mode] for mode in range(len(blocks))]
+
+
+def respond(
+    weight: Float[Array, " slices"], factors: CoupledFactors, known: Rows, *, load=None, approach=None
+) -> Response:
+    """Solves for a load or for an approach; see the top."""
+    coupling, count = factors.coupling, len(weight)
+    inside = [sum(x * row for x, row in zip(rows, known)) for rows in factors.inverse]  # A^-1 known
+    kept = unit(factors.inverse[0][0])
+    inside = [row / kept for row in inside]
+    stacked = jnp.stack(inside)
+    # mode by mode: compilers take a sum for all modes in every loop that reads one of them
+    _, divided = _ahead(factors.blocks, [onto(mode[:, None], stacked) for mode in coupling.modes.T])
+    force = sum(height[None] * row for height, row in zip(factors.lever, inside))
+    constant = jnp.full((count, 1), count**-0.5, force.dtype)
+    shapes = constant if coupling.support_modes is None else coupling.support_modes
+    carried = onto(shapes, force) - _joined(factors.bent[0], divided)[:, 0]
+    mean = weight[0] if coupling.weight is None else weight[0] / coupling.weight[0]
+    bends, approach = _bends(factors, carried, None if load is None else load / mean, approach)
+    eliminated = [a[0] + jnp.sum(b * bends[:, None], axis=0) for a, b in zip(divided, factors.bent[1])]
+    deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
+    even = along(shapes, bends)
+    pressed = [height[None] * even - deflected[:, i] for i, height in enumerate(factors.lever)]
+    pressed = [row / kept for row in pressed]
+    loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(inside, factors.inverse)]
+    if coupling.weight is not None:
+        loads = [row / coupling.weight[:, None] for row in loads]
+    return Response(loads, approach, pressed)
+
+
+def stiffness(weight: Float[Array, " slices"], factors: CoupledFactors) -> Curve:
+    """Load per unit of approach."""
+    return jnp.sum(weight) * jnp.sum(factors.force[0] * factors.yielding[:, 0], axis=0)
+
+
+def _bends(factors: CoupledFactors, carried: Bends, total, approach: Curve | None) -> tuple[Bends, Curve]:
+    """b and the approach, for that or for a total of the line loads; `carried` is z at b = 0."""
+    root = factors.coupling.modes.shape[0] ** 0.5
+    still, rise = _still(factors, carried), factors.yielding[:, 0]
+    if approach is None:
+        missing = total / root - carried[0] - jnp.sum(factors.force[0] * still, axis=0)
+        approach = missing / (root * jnp.sum(factors.force[0] * rise, axis=0))
+    return still + root * approach[None] * rise, approach
+
+
+def _still(factors: CoupledFactors, carried: Bends) -> Bends:
+    """b without approach: (1 + H force) b = -H carried."""
+    support = factors.coupling.support
+    if support is None:
+        return jnp.zeros_like(carried)
+    bent = jnp.tensordot(support, carried, 1)
+    return -jnp.sum(factors.yielding * bent[None], axis=1)
+
+
+def _yielding(support: Float[Array, "bends bends"] | None, force: Float[Array, "bends bends positions"]):
+    """Inverse of 1 + H force, which is not symmetric, at every position."""
+    if support is None:
+        return jnp.ones_like(force)
+    matrix = jnp.eye(len(support), dtype=force.dtype)[..., None] + jnp.tensordot(support, force, 1)
+    return jax.vmap(solve_dense, (-1, None), -1)(matrix, jnp.eye(len(support), dtype=force.dtype))

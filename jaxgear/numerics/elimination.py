@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .stored import unit
+from .safe import unit
 
 Rows = list[Float[Array, "slices positions"]]
 Slopes = list[Float[Array, "#slices positions"]]  # one row where a slope is the same in every slice

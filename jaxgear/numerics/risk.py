@@ -11,7 +11,7 @@ from jax.scipy.special import betainc
 from jaxtyping import Array, Float
 
 from .fields import Checked, number
-from .quick import quick_jit
+from .programs import quick_jit
 
 Scalar = Float[Array, ""]
 Values = Float[Array, " values"]

@@ -2,18 +2,57 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 
 from ..conditions import Design
 from ..contact import Mesh
 from ..numerics import AbstractMeasure, Callback
 from ..tolerance import Tolerance
 from .goal import Constraint, Objective
-from .methods import method_named
+from .gradient_search import LBFGS, Adam
+from .population import CMAES, BinaryGenetic, DifferentialEvolution, Factorial, Genetic
 from .problem import make_problem
 from .refine import POSITIONS, refined
 from .result import Optimum
 from .search import AbstractMethod, Record
+from .slp import SLP
 from .verdict import optimum_of
+
+# Known by name, here and in design files, where the fields of a class are its options. A method of your own joins them
+# by `METHODS["name"] = Class`.
+METHODS: dict[str, type[AbstractMethod]] = {
+    "slp": SLP,
+    "adam": Adam,
+    "lbfgs": LBFGS,
+    "genetic": Genetic,
+    "binary_genetic": BinaryGenetic,
+    "cma_es": CMAES,
+    "differential_evolution": DifferentialEvolution,
+    "factorial": Factorial,
+}
+
+
+def method_named(
+    method: str | AbstractMethod, *, starts: int | None = None, steps: int | None = None, seed: int = 0
+) -> AbstractMethod:
+    """A method from its name, with the options that it has.
+
+    Raises:
+        ValueError: for an unknown name, or starts or steps where they cannot be given.
+    """
+    given = {name: value for name, value in {"starts": starts, "steps": steps}.items() if value is not None}
+    if not isinstance(method, str):
+        if given:
+            raise ValueError(f"minimize: {min(given)} must be given to the method, {type(method).__name__}(...)")
+        return method
+    if method not in METHODS:
+        raise ValueError(f'minimize: method "{method}" is not known, must be one of {", ".join(METHODS)}')
+    make = METHODS[method]
+    options = {field.name for field in fields(make)}
+    for name in given:
+        if name not in options:
+            raise ValueError(f'minimize: {name} has no effect with method "{method}"')
+    return make(**given, **({"seed": seed} if "seed" in options else {}))
 
 
 def minimize(

@@ -8,14 +8,12 @@ import numpy as np
 
 from ..contact import Mesh, prepare
 from ..numerics import whole
-from .evaluate import scores
+from .evaluate import points_nearby, scores, start_points
 from .goal import FEASIBLE, counted
-from .linear_model import Model, NoObjective
-from .linearizer import Linearizer
+from .linear_model import Linearizer, Model, NoObjective
 from .problem import Problem
 from .search import Record
 from .slp import Ledger, Search, follow
-from .starts import points_nearby, start_points
 
 POSITIONS = 512
 _BOUND = 0.02  # change of the objective at twice the positions, relative to it, with which a mesh is fine enough

@@ -6,12 +6,11 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from ..conditions.batches import padded
+from ..conditions.join import padded
 from ..numerics import Callback
 from .evaluate import scores
 from .goal import counted
-from .linear_model import Model
-from .linearizer import Linearizer
+from .linear_model import Linearizer, Model
 from .problem import Problem, Score
 
 

@@ -1,4 +1,4 @@
-"""What a mesh does at speed: responses over the mesh frequency, spectra, bifurcations and phase portraits."""
+"""What a mesh does at speed: responses over the frequency, spectra and orders, bifurcations and phase portraits."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
@@ -7,8 +7,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
+from matplotlib.ticker import MaxNLocator
 
+from ..contact import MeshCycle
 from ..dynamics import Branch, RunUp, SpeedResponse
+from ..metrics import harmonics
+from ..numerics import program
 from .figure import GREY, legend_above, line_style, marker_style, report_axes
 
 FREQUENCY_LABEL = "mesh frequency [Hz]"
@@ -298,3 +302,38 @@ def _entitle(ax: Axes, title: str, lines: int) -> None:
     """A title over a legend of so many lines."""
     if title:
         ax.set_title(title, loc="left", pad=_PAD + _LINE * lines, fontsize=ax.xaxis.label.get_fontsize())
+
+
+_GROUP = 0.8  # of the distance between two orders, which the bars of all designs share
+
+
+def transmission_error_orders(cycles: Mapping[str, MeshCycle], ax: Axes | None = None, *, count: int = 8) -> Axes:
+    """Amplitudes of the mesh harmonics of the transmission error [um] as bars, design beside design.
+
+    Args:
+        cycles: solved cycles by the name of their design.
+        ax: Axes to draw into; None for a new figure.
+        count: number of harmonics, less than half the positions.
+
+    Raises:
+        ValueError: for more harmonics than the positions resolve.
+    """
+    width = _GROUP / max(len(cycles), 1)
+    orders = np.arange(1, count + 1)
+    with report_axes(ax) as ax:
+        for index, (name, cycle) in enumerate(cycles.items()):
+            amplitude = np.asarray(_amplitudes(cycle.transmission_error, count))
+            place = orders + (index - (len(cycles) - 1) / 2) * width
+            ax.bar(
+                place, amplitude, width, label=name, color=line_style(index)["color"], edgecolor="white", linewidth=0.3
+            )
+        ax.grid(False, axis="x")
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ax.set(xlim=(0.4, count + 0.6), xlabel="mesh order [-]", ylabel="amplitude of the\ntransmission error [µm]")
+        legend_above(ax)
+    return ax
+
+
+@program
+def _amplitudes(error, count: int):
+    return harmonics(error, count).amplitude

@@ -1,11 +1,30 @@
-"""Tables of variants as the pictures of many variants read them: columns, units, and which way is better."""
+"""Many variants and torques: tables read as pictures, response surfaces, scatter over manufactured gears."""
 
 import re
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.ticker import MaxNLocator
 
+from ..conditions import ranked
 from ..metrics import quantities
+from ..numerics import Quantile, real
+from ..sweeps import Scatter
+from .figure import (
+    ABOVE_MARKS,
+    FONT,
+    GREY,
+    laid_out_size,
+    legend_above,
+    line_style,
+    marker_style,
+    report_axes,
+    text_above,
+)
+from .mesh_cycle import PHASE_LABEL, two_pitches
 
 Table = Mapping[str, np.ndarray]
 Labels = Mapping[str, str]
@@ -99,3 +118,269 @@ def share_text(shown: int, total: int, failed: int = 0) -> str:
     """How many variants a picture shows of how many, and how many failed."""
     text = f"{total:,} variants" if shown >= total else f"{shown:,} of {total:,} variants"
     return text.replace(",", "\u2009") + (f", {failed} failed" if failed else "")
+
+
+_LEVELS = 11
+_EDGE = 0.04  # part of the Axes along its edges that is too close for a label
+
+
+def response_surface(
+    phase,
+    torques,
+    te,
+    unloaded,
+    ax: Axes | None = None,
+    *,
+    design_torque: float | None = None,
+    design: str | None = None,
+) -> Axes:
+    """Transmission error [um] as a surface over mesh phase and torque, with the unloaded one at its foot.
+
+    Args:
+        phase: mesh positions of one base pitch, shape (positions,).
+        torques: on the pinion [N m], such as up to twice the design torque; shape (torques,).
+        te: transmission error [um], shape (torques, positions).
+        unloaded: transmission error at vanishing load [um], shape (positions,).
+        ax: Axes to draw into; None for a new figure.
+        design_torque: [N m], drawn as a line; None for none.
+        design: name of the design, for a title; None for none.
+    """
+    torques, te = np.asarray(torques, float), np.asarray(te, float)
+    loaded = np.argsort(torques)
+    loaded = loaded[torques[loaded] > 0]
+    rows = np.concatenate([[0.0], torques[loaded]])
+    x, surface = two_pitches(phase, np.concatenate([np.asarray(unloaded, float)[None], te[loaded]]))
+    levels = MaxNLocator(_LEVELS).tick_values(surface.min(), surface.max())
+    with report_axes(ax) as ax:
+        ax.grid(False)
+        # cividis: even in lightness, so that it reads the same in grey and for every kind of colour vision
+        image = ax.contourf(x, rows, surface, levels, cmap="cividis")
+        bar = ax.figure.colorbar(image, ax=ax, pad=0.02)
+        bar.set_label("transmission error [µm]")
+        bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
+        ax.set(xlim=(0, 2), ylim=(0, rows[-1]), xlabel=PHASE_LABEL, ylabel="pinion torque [N m]")
+        if design_torque is not None:
+            text = f"design torque {float(design_torque):g} N m"
+            ax.axhline(float(design_torque), color="black", linewidth=1.2, linestyle=(0, (4, 2)), label=text)
+            legend_above(ax)
+        if design is not None:
+            pad = 24.0 if design_torque is not None else 6.0  # [pt], above the legend
+            ax.set_title(design, loc="left", pad=pad, fontsize=ax.xaxis.label.get_fontsize())
+        _labelled_lines(ax, x, rows, surface, levels)
+    return ax
+
+
+def _labelled_lines(ax: Axes, x, rows, surface, levels) -> None:
+    middle = 0.5 * (levels[0] + levels[-1])
+    colours = ["white" if level < middle else "black" for level in levels]
+    lines = ax.contour(x, rows, surface, levels, colors=colours, linewidths=0.6)
+    laid_out_size(ax)  # labels find their places in the size in which the Axes are drawn
+    places = [place for path in lines.get_paths() for place in _label_place(path.vertices, rows[-1])]
+    if places:
+        ax.clabel(lines, fmt=lambda level: f"{level:g}", fontsize=FONT - 1, manual=places)
+
+
+def _label_place(points, highest: float) -> list:
+    """The point of a contour nearest to the middle of the two pitches; none for contours along the edges."""
+    x, y = points.T / np.array([[2.0], [highest]])
+    inside = points[(np.minimum(x, 1 - x) > _EDGE) & (np.minimum(y, 1 - y) > _EDGE)]
+    return [tuple(inside[np.argmin(np.abs(inside[:, 0] - 1))])] if len(inside) else []
+
+
+_BANDS = ("#C6DBEF", "#6BAED6", "#3182BD")  # from the outside in; further bands repeat the last
+
+
+def fan(scatter: Scatter, ax: Axes | None = None) -> Axes:
+    """Bands between the lower and upper quantiles of the transmission error [um], with median and nominal design.
+
+    Over two base pitches: all teeth deviate alike, so the quantiles repeat, although single curves do not.
+
+    Args:
+        scatter: result of `monte_carlo`; its quantiles are paired from the outside in.
+        ax: Axes to draw into; None for a new figure.
+    """
+    levels = np.asarray(scatter.quantiles)
+    x, curves = two_pitches(scatter.phase, scatter.transmission_error_quantiles)
+    # failed samples make outer quantiles infinite: there is no such bound, and no band
+    curves = np.where(np.isfinite(curves), curves, np.nan)
+    with report_axes(ax) as ax:
+        for index in range(len(levels) // 2):
+            share = levels[-1 - index] - levels[index]
+            colour = _BANDS[min(index, len(_BANDS) - 1)]
+            ax.fill_between(
+                x,
+                curves[index],
+                curves[-1 - index],
+                color=colour,
+                linewidth=0,
+                label=f"{100 * share:.3g} % of the gears",
+            )
+        if len(levels) % 2:
+            middle = len(levels) // 2
+            name = "median" if np.isclose(levels[middle], 0.5) else f"{100 * levels[middle]:.3g} % quantile"
+            ax.plot(x, curves[middle], color="#08306B", linewidth=1.4, label=name)
+        ax.plot(*two_pitches(scatter.phase, scatter.nominal_transmission_error), label="nominal", **line_style(1))
+        ax.set(xlim=(0, 2), xlabel=PHASE_LABEL, ylabel="transmission error [µm]")
+        legend_above(ax)
+    return ax
+
+
+def ppte_histogram(scatter: Scatter, ax: Axes | None = None) -> Axes:
+    """Distribution of PPTE [um] over the samples, with the nominal design, the mean and the 95 % quantile.
+
+    Failed samples have no PPTE; the ordinate counts them in, and the label of the abscissa says how many there are.
+
+    Args:
+        scatter: result of `monte_carlo`.
+        ax: Axes to draw into; None for a new figure.
+    """
+    ppte = np.asarray(scatter.ppte)
+    fine = ppte[np.isfinite(ppte)]
+    marks = {
+        "nominal": scatter.nominal_ppte,
+        "mean": scatter.mean,
+        "95 % quantile": scatter.ppte_quantile95,
+    }
+    bins = int(np.clip(2 * np.cbrt(fine.size), 10, 80))
+    with report_axes(ax) as ax:
+        weights = np.full(fine.size, 100 / ppte.size)
+        ax.hist(fine, bins=bins, weights=weights, color=_BANDS[1], edgecolor="white", linewidth=0.3)
+        for index, (name, value) in enumerate(marks.items()):
+            if np.isfinite(value):
+                style = line_style((1, 0, 2)[index])
+                ax.axvline(float(value), label=f"{name} {float(value):.2f} µm", **style)
+        failed = f", {scatter.failed} of {ppte.size} failed" if scatter.failed else ""
+        ax.set_xlim(left=0)
+        ax.set(xlabel=f"peak-to-peak transmission error{failed} [µm]", ylabel="share of the gears [%]")
+        legend_above(ax)
+    return ax
+
+
+def ppte_distribution(
+    samples: Mapping[str, np.ndarray],
+    ax: Axes | None = None,
+    level: float = 0.95,
+    *,
+    of: str = "peak-to-peak transmission error",
+) -> Axes:
+    """Share of the manufactured gears whose PPTE stays below a value, of several designs.
+
+    Args:
+        samples: PPTE of every sample [um] by the name of the design; those that failed, NaN, stay below no value.
+        ax: Axes to draw into; None for a new figure.
+        level: share that a line marks; the legend has each design's quantile, as `Quantile` takes it.
+        of: what the samples are, in words.
+    """
+    with report_axes(ax) as ax:
+        for index, (name, values) in enumerate(samples.items()):
+            values = np.asarray(values)
+            ordered = np.sort(values[np.isfinite(values)])
+            share = 100 * np.arange(1, ordered.size + 1) / values.size
+            reached = float(ranked(Quantile(real(level)), values))
+            below = f", {100 * level:g} % below {reached:.2f} µm" if np.isfinite(reached) else ""
+            ax.plot(ordered, share, label=f"{name}{below}", **line_style(index))
+        ax.axhline(100 * level, color=GREY, linewidth=0.8, zorder=0.5)
+        ax.set_xlim(left=0)
+        ax.set_ylim(0, 100)
+        ax.set(xlabel=f"{of} [µm]", ylabel="share of the gears below [%]")
+        legend_above(ax)
+    return ax
+
+
+_DARK, _LIGHT = 0.0, 0.72  # part of the colour map that shows on white
+
+
+def ppte_over_torque(
+    torques, curves: Mapping[str, np.ndarray], ax: Axes | None = None, design_torque: float | None = None
+) -> Axes:
+    """PPTE [um] of several designs over the torque, with the torque they were designed for.
+
+    Args:
+        torques: on the pinion [N m], shape (torques,).
+        curves: PPTE [um] by the name of the design, each of shape (torques,).
+        ax: Axes to draw into; None for a new figure.
+        design_torque: [N m]; None for no mark.
+    """
+    with report_axes(ax) as ax:
+        _over_torque(ax, torques, curves, design_torque)
+        ax.set(ylim=(0, None), ylabel="peak-to-peak\ntransmission error [µm]")
+    return ax
+
+
+def face_load_over_torque(
+    torques, curves: Mapping[str, np.ndarray], ax: Axes | None = None, design_torque: float | None = None
+) -> Axes:
+    """Face load factor K_Hbeta of several designs over the torque; 1 is a load that is even over the face.
+
+    Args:
+        torques: on the pinion [N m], shape (torques,).
+        curves: `metrics.face_load_factor` by the name of the design, each of shape (torques,).
+        ax: Axes to draw into; None for a new figure.
+        design_torque: [N m]; None for no mark.
+    """
+    with report_axes(ax) as ax:
+        _over_torque(ax, torques, curves, design_torque)
+        highest = max((float(np.nanmax(np.asarray(curve))) for curve in curves.values()), default=1.0)
+        # an even load lies on the foot of the Axes, and is seen to be even
+        ax.set(ylim=(1, 1 + 1.06 * max(highest - 1, 0.1)), ylabel="face load factor K$_{H\\beta}$ [-]")
+    return ax
+
+
+def _over_torque(ax: Axes, torques, curves: Mapping[str, np.ndarray], design_torque: float | None) -> None:
+    for index, (name, curve) in enumerate(curves.items()):
+        ax.plot(np.asarray(torques), np.asarray(curve), label=name, clip_on=False, **marker_style(index))
+    if design_torque is not None:
+        ax.axvline(float(design_torque), color=GREY, linewidth=0.8, zorder=0.5)
+        text_above(ax, float(design_torque), f"design torque {float(design_torque):g} N m")
+    ax.set_xlim(left=0)
+    ax.set_xlabel("pinion torque [N m]")
+    legend_above(ax, distance=4.0 if design_torque is None else ABOVE_MARKS)
+
+
+def harris_map(phase, torques, te, ax: Axes | None = None, *, design: str | None = None) -> Axes:
+    """Transmission error over two base pitches at several torques (Harris 1958), each curve with its torque at the end.
+
+    Args:
+        phase: mesh positions of one base pitch, shape (positions,).
+        torques: on the pinion [N m], shape (torques,).
+        te: transmission error [um], shape (torques, positions).
+        ax: Axes to draw into; None for a new figure.
+        design: name of the design, for a title; None for none.
+    """
+    order = np.argsort(torques)
+    torques = np.asarray(torques)[order]
+    x, curves = two_pitches(phase, np.asarray(te)[order])
+    colours = ScalarMappable(Normalize(0, 1), "viridis").to_rgba(np.linspace(_DARK, _LIGHT, len(torques)))
+    with report_axes(ax) as ax:
+        for curve, colour in zip(curves, colours):
+            ax.plot(x, curve, color=colour, linewidth=1.3)
+        ax.set(xlim=(0, 2), xlabel=PHASE_LABEL, ylabel="transmission error [µm]")
+        if design is not None:
+            ax.set_title(design, loc="left", fontsize=ax.xaxis.label.get_fontsize())
+        heights = _spread(curves[:, -1], _line_height(ax))
+        for torque, height, colour in zip(torques, heights, colours):
+            text = f"{torque:.4g} N m"
+            ax.annotate(text, (2, height), xytext=(4, 0), textcoords="offset points", va="center", color=colour)
+    return ax
+
+
+def _line_height(ax: Axes) -> float:
+    """Height of a line of text in data units of the ordinate."""
+    low, high = ax.get_ylim()
+    return 1.15 * ax.yaxis.label.get_fontsize() / laid_out_size(ax)[1] * (high - low)
+
+
+def _spread(heights, gap: float) -> np.ndarray:
+    """Heights moved apart as little as possible so that neighbours keep a gap; their order stays."""
+    heights = np.asarray(heights, float)
+    order = np.argsort(heights, kind="stable")
+    # least squares under y[i+1] - y[i] >= gap is isotonic regression of the heights minus their stacked offsets
+    offsets = gap * np.arange(heights.size)
+    blocks: list[list[float]] = []
+    for value in heights[order] - offsets:
+        blocks.append([value])
+        while len(blocks) > 1 and np.mean(blocks[-2]) > np.mean(blocks[-1]):
+            blocks[-2:] = [blocks[-2] + blocks[-1]]
+    spread = np.empty_like(heights)
+    spread[order] = np.array([np.mean(block) for block in blocks for _ in block]) + offsets
+    return spread

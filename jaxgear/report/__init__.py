@@ -3,19 +3,19 @@
 It shows what it is handed, tables, lines and pictures, and computes nothing. Needs the extra `report`.
 """
 
-from .contents import Figure as Figure
-from .contents import Report as Report
-from .contents import Section as Section
-from .contents import Source as Source
-from .contents import Table as Table
-from .contents import read_table as read_table
-from .figures import CAPTIONS as CAPTIONS
-from .figures import figure as figure
-from .needed import needed as needed
+from .page import CAPTIONS as CAPTIONS
+from .page import Figure as Figure
+from .page import Report as Report
+from .page import Section as Section
+from .page import Source as Source
+from .page import Table as Table
+from .page import figure as figure
+from .page import heading as heading
+from .page import needed as needed
+from .page import numbers as numbers
+from .page import read_table as read_table
+from .page import text as text
 from .page import write_report as write_report
+from .variants import MOST_ROWS as MOST_ROWS
 from .variants import write_variants as write_variants
-from .words import heading as heading
-from .words import numbers as numbers
-from .words import text as text
-from .workbook import MOST_ROWS as MOST_ROWS
-from .workbook import write_workbook as write_workbook
+from .variants import write_workbook as write_workbook

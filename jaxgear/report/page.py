@@ -1,12 +1,147 @@
-"""The report as an HTML page."""
+"""The report: what it consists of, as plain text, and as an HTML page."""
 
+import base64
+import hashlib
+import importlib
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from unicodedata import category
 
+import numpy as np
+import rich.table
+
+from ..metrics import quantities
 from ..numerics.durable import write_durably
-from .contents import Report
-from .needed import needed
+
+
+def needed(*modules: str) -> None:
+    """Asks for libraries before long work begins.
+
+    Args:
+        modules: "jinja2" for a report, "xlsxwriter" for a workbook, "plotly" for a page of variants.
+
+    Raises:
+        ValueError: for the first that is not installed.
+    """
+    for module in modules:
+        try:
+            importlib.import_module(module)
+        except ImportError:
+            raise ValueError(f"--report needs the library {module}: pip install 'jaxgear[report]'") from None
+
+
+@dataclass(frozen=True)
+class Source:
+    """A design file as it was read.
+
+    Attributes:
+        name: of the file, without its folders.
+        text: what it holds.
+        sha256: hash of its bytes, in hexadecimal digits.
+    """
+
+    name: str
+    text: str
+    sha256: str
+
+    @classmethod
+    def of(cls, path: Path, content: bytes) -> "Source":
+        """The file of a path, from its bytes."""
+        return cls(path.name, content.decode("utf-8-sig", "replace"), hashlib.sha256(content).hexdigest())
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts.
+
+    Attributes:
+        header: one text per column.
+        rows: likewise, the first of a row names it.
+        title: over the table.
+        note: under the table.
+        ends: numbers of the rows that end a group.
+    """
+
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    title: str = ""
+    note: str = ""
+    ends: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture.
+
+    Attributes:
+        name: of its file without the ending.
+        caption: what it shows.
+        data: the PNG file as a data URI.
+        width: on paper at its own size [mm].
+    """
+
+    name: str
+    caption: str
+    data: str
+    width: float
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the report under its own title.
+
+    Attributes:
+        title: of the part.
+        lines: paragraphs.
+        warnings: paragraphs that must not be missed.
+        points: of a list.
+        tables, figures: in this order after the text.
+        literal: a text in which every blank counts.
+        new_page: whether it starts on a new page when printed.
+    """
+
+    title: str
+    lines: Sequence[str] = ()
+    warnings: Sequence[str] = ()
+    points: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    figures: Sequence[Figure] = ()
+    literal: str = ""
+    new_page: bool = False
+
+
+@dataclass(frozen=True)
+class Report:
+    """All of it.
+
+    Attributes:
+        title: of the design.
+        subtitle: what was done.
+        facts: name and text of what identifies the report, above its first section.
+        sections: the parts.
+    """
+
+    title: str
+    subtitle: str
+    facts: Sequence[tuple[str, str]]
+    sections: Sequence[Section]
+
+
+def read_table(printed: rich.table.Table) -> Table:
+    """The table that a command prints."""
+    columns = [[str(cell) for cell in column.cells] for column in printed.columns]
+    ends = tuple(number for number, row in enumerate(printed.rows) if row.end_section)
+    return Table(
+        header=tuple(str(column.header) for column in printed.columns),
+        rows=tuple(zip(*columns)),
+        title=str(printed.title or ""),
+        note=str(printed.caption or ""),
+        ends=ends,
+    )
+
 
 _TEMPLATES = Path(__file__).parent / "templates"
 # Between the margins of A4 are 180 mm: letters of a picture of this width [mm] shrink from 9 to 7.7 points, and
@@ -50,3 +185,154 @@ def printable(text: str) -> str:
     return "".join(
         sign if sign.isprintable() or sign in "\n\t\r" or category(sign) == "Zs" else "\ufffd" for sign in text
     )
+
+
+# in the order of the report; k-charts and other charts by the names of their files
+CAPTIONS = {
+    "transmission_error": "Loaded transmission error over two base pitches at the design torque, with its peak-to-peak "
+    "value (PPTE).",
+    "transmission_error_orders": "Amplitudes of the transmission error at the orders of the mesh frequency.",
+    "load_sharing": "Share of the load that one tooth pair carries on its way along the path of contact.",
+    "pressure": "Largest pressure of one tooth pair along the path of contact, of flanks and tip corners (dots).",
+    "pressure_map": "Pressure over path of contact and face width.",
+    "contact_pattern": "Contact pattern: largest pressure of every place of the flank over a whole mesh.",
+    "contact_pattern_unmodified": "Contact pattern without modification: largest pressure of every place of the flank.",
+    "contact_pattern_layout": "Contact pattern after all three steps: largest pressure of every place of the flank.",
+    "line_load": "Load per length over the face.",
+    "face_gap": "Gap over the face before the load closes it.",
+    "k_chart": "Profile modification of both gears over the roll angle, material removed downwards (K-chart). A shaded "
+    "band is the total profile tolerance of the quality class about the design that the legend names.",
+    "lead_chart": "Modification across the face, at the pitch point. A shaded band is the total helix tolerance of the "
+    "quality class about the design that the legend names.",
+    "ppte_over_torque": "PPTE over the torque.",
+    "ppte_distribution": "Share of the manufactured pairs whose PPTE stays below a value.",
+    "harris_map": "Harris map: transmission error over two base pitches at several torques.",
+    "response_surface": "Transmission error over phase and torque.",
+    "face_load_over_torque": "Face load factor over the torque.",
+    "convergence": "Course of the search: best objective over the contact analyses spent. Dotted: as judged "
+    "on the finer grid on which the search ends.",
+    "front": "Pareto front: designs of which none is better in every objective.",
+    "iterations_relief": "Relief after every iteration of the search.",
+    "iterations_transmission_error": "Transmission error after every iteration of the search.",
+    "dynamic_factor": "Dynamic factor over the mesh frequency, speed going up and down.",
+    "dte_rms": "Root mean square of the dynamic transmission error about its mean over the mesh frequency.",
+    "waterfall": "Campbell diagram: amplitudes of the mesh force by order over the mesh frequency.",
+    "order_tracks": "Level of the orders of the mesh force over the mesh frequency, rms values re 1 µN (ISO 1683).",
+    "run_up": "Largest mesh force over the static one while the speed rises at constant acceleration.",
+    "bifurcation": "Dynamic transmission error once per mesh cycle over the mesh frequency (bifurcation diagram).",
+    "phase_portrait": "Dynamic transmission error and its rate at the speed of the largest dynamic factor; marked once "
+    "per mesh cycle. The abscissae differ from panel to panel.",
+    "branches": "Stable and unstable periodic motions of the unmodified design.",
+    "shaft_deflection": "Elastic lines of the shafts at the design torque, exaggerated, with bearings and gears.",
+    "tolerance_cases": "Load over the face under the combinations of deviations within the tolerances.",
+    "face_load_factors": "Face load factor under the combinations of deviations within the tolerances.",
+    "worn_pinion": "Flank of the pinion at several lives.",
+    "worn_wheel": "Flank of the wheel at several lives.",
+    "ppte_over_life": "PPTE over the life.",
+    "depth_over_life": "Depth of wear over the life.",
+    "life_ppte_distribution": "Share of the manufactured pairs whose mean PPTE over the life stays below a value.",
+    "dynamic_factor_over_life": "Largest mesh force of the steady motion over the static one, over the life.",
+    "pareto": "Results of the variants against each other, with the Pareto front.",
+    "parallel_coordinates": "Variables and results of the variants, one line per variant.",
+    "radar": "Results of chosen variants side by side.",
+}
+
+_VARIANT = "_variant_"  # before the number in the name of a file
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_SIZE_AT = 16  # bytes before width and height (PNG specification, chunk IHDR)
+_DENSITY = b"pHYs"  # pixels per unit in both directions, and the unit
+_PER_METRE = 1
+_MM = 1000.0  # per m
+
+
+def figure(path: Path) -> Figure:
+    """A PNG file with its density written in it, to be embedded.
+
+    Raises:
+        ValueError: when it is no such file.
+    """
+    held = path.read_bytes()
+    place = held.find(_DENSITY)
+    if not held.startswith(_SIGNATURE) or place < 0:
+        raise ValueError(f"{path}: is not a PNG file that tells its density")
+    (pixels,) = struct.unpack_from(">I", held, _SIZE_AT)
+    density, _, unit = struct.unpack_from(">IIB", held, place + len(_DENSITY))
+    if unit != _PER_METRE or density == 0:
+        raise ValueError(f"{path}: does not tell its pixels per metre")
+    data = f"data:image/png;base64,{base64.b64encode(held).decode()}"
+    kind = path.stem.partition(_VARIANT)[0]  # of one variant: what is said of the picture of several
+    caption = CAPTIONS.get(kind, f"{path.stem.replace('_', ' ')}.")
+    return Figure(path.stem, caption, data, pixels / density * _MM)
+
+
+# ending of a name -> unit; the first that fits counts
+_UNITS = {
+    "N_per_(ms^0.5K)": "N/(m s^0.5 K)",
+    "kg_per_m^3": "kg/m^3",
+    "N_per_mm": "N/mm",
+    "N_per_um": "N/um",
+    "mm2_per_s": "mm2/s",
+    "m2_per_N": "m2/N",
+    "percent": "%",
+    "mm3": "mm3",
+    "mm2": "mm2",
+    "mm": "mm",
+    "um": "um",
+    "degC": "degC",
+    "deg": "deg",
+    "sqrt_MPa": "MPa^0.5",
+    "MPa": "MPa",
+    "Nm": "N m",
+    "rpm": "rpm",
+    "Hz": "Hz",
+    "kg": "kg",
+    "N": "N",
+    "W": "W",
+    "K": "K",
+    "h": "h",
+    "s": "s",
+}
+_DIGITS = 6  # of a number
+_MOST = 12  # numbers of a list that are written out
+_BETWEEN = " / "  # names of a number inside of another
+
+
+def heading(name: str) -> str:
+    """A name of `summary.json` in words: "max_flank_pressure_MPa" becomes "max flank pressure [MPa]"."""
+    if name in quantities:
+        return quantities[name].heading
+    for ending, unit in _UNITS.items():
+        if name.endswith(f"_{ending}"):
+            return f"{name.removesuffix(f'_{ending}').replace('_', ' ')} [{unit}]"
+    return name.replace("_", " ")
+
+
+def text(value: Any) -> str:
+    """A value in six digits, as the whole report writes it; "-" where there is none."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{heading(str(key))} {text(item)}" for key, item in value.items()) or "-"
+    if isinstance(value, list | tuple) or np.ndim(value):
+        items = list(value)
+        shown = ", ".join(text(item) for item in items[:_MOST])
+        return f"{shown}, ... ({len(items)} values)" if len(items) > _MOST else shown or "-"
+    if isinstance(value, str) or value is None:
+        return value or "-"
+    number = np.asarray(value)[()]
+    if isinstance(number, bool | np.bool_):
+        return "yes" if number else "no"
+    if isinstance(number, float | np.floating) and not np.isfinite(number):
+        return "-"
+    return f"{number:.{_DIGITS}g}" if isinstance(number, float | np.floating) else str(number)
+
+
+def numbers(data: Mapping[str, Any], within: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
+    """Name and text of everything that nested data hold, in their order."""
+    for name, value in data.items():
+        names = (*within, heading(str(name)))
+        if isinstance(value, Mapping) and value:
+            yield from numbers(value, names)
+        elif isinstance(value, list | tuple) and value and all(isinstance(item, Mapping) for item in value):
+            for place, item in enumerate(value, 1):
+                yield from numbers(item, (*names, str(place)))
+        else:
+            yield _BETWEEN.join(names), text(value)

@@ -1,20 +1,67 @@
-"""Shafts that mesh with each other in one housing."""
+"""Shafts that mesh with each other in one housing: where they lie, and which way the torque takes."""
 
-from typing import Literal
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from typing import Literal, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..geometry import GearPair, margins
 from ..numerics import Checked, concrete, number, program, within_limits
+from .beam import semidefinite
 from .housing import Housing
-from .matrices import semidefinite
 from .misalignment import Misalignment
-from .parts import MountedGear
-from .shaft import Shaft
-from .torque_path import Path, torque_path
+from .shaft import MountedGear, Shaft
+
+
+class Path(NamedTuple):
+    """Shafts and meshes as a tree.
+
+    Attributes:
+        turning: 1 for shafts that turn as the first one does, -1 for the others.
+        inwards: meshes from the farthest to the nearest of the shaft where the rest of the torque leaves, each with the
+            shaft on its far side.
+    """
+
+    turning: tuple[int, ...]
+    inwards: tuple[tuple[int, int], ...]
+
+
+def torque_path(shafts: Sequence[str], meshes: Sequence[tuple[int, int]], outlet: int) -> Path:
+    """The path through shafts that meshes (shaft of the pinion, shaft of the wheel) join.
+
+    Raises:
+        ValueError: for shafts that no mesh joins to the others, or that meshes join in a circle: how such meshes share
+            the torque depends on their play.
+    """
+    turning = {outlet: 1}
+    outwards: list[tuple[int, int]] = []
+    left = set(range(len(meshes)))
+    while True:
+        near = [k for k in sorted(left) if (meshes[k][0] in turning) != (meshes[k][1] in turning)]
+        if not near:
+            break
+        left.remove(near[0])
+        first, second = meshes[near[0]]
+        known, other = (first, second) if first in turning else (second, first)
+        turning[other] = -turning[known]
+        outwards.append((near[0], other))
+    lost = [name for index, name in enumerate(shafts) if index not in turning]
+    if lost:
+        raise ValueError(f'Gearbox: no mesh joins shaft "{lost[0]}" to "{shafts[outlet]}", where the torque leaves')
+    if left:
+        one, two = (shafts[index] for index in meshes[min(left)])
+        raise ValueError(
+            f'Gearbox: the mesh of shafts "{one}" and "{two}" closes a circle, which shares its torque by its play: '
+            "model the branches one by one"
+        )
+    start = turning[0]
+    return Path(tuple(start * turning[index] for index in range(len(shafts))), tuple(reversed(outwards)))
+
 
 Scalar = Float[Array, ""]
 Direction = Literal["counterclockwise", "clockwise"]
@@ -183,3 +230,64 @@ def _check_single(kind: str, names: list[str]) -> None:
 def _check_known(kind: str, name: str, names: list[str]) -> None:
     if name not in names:
         raise ValueError(f'Gearbox: {kind} "{name}" is not known, must be one of {", ".join(names)}')
+
+
+def axes_of(gearbox: Gearbox) -> np.ndarray:
+    """Left ends of all shafts in x, y, z, that of the first one at the origin, shape (shafts, 3) [mm].
+
+    Args:
+        gearbox: of concrete numbers; its meshes say how far and in which direction axes are apart.
+    """
+    at = {0: np.zeros(3)}
+    while len(at) < len(gearbox.shafts):
+        for index, mesh in enumerate(gearbox.meshes):
+            (one, pinion), (other, wheel) = gearbox.place(mesh.pinion), gearbox.place(mesh.wheel)
+            angle, distance = np.deg2rad(float(mesh.angle)), float(gearbox.pair(index).working_center_distance)
+            along = float(pinion.position + mesh.axial_offset - wheel.position)
+            step = np.array([distance * np.cos(angle), distance * np.sin(angle), along])
+            if one in at:
+                at.setdefault(other, at[one] + step)
+            elif other in at:
+                at[one] = at[other] - step
+    return np.stack([at[index] for index in range(len(gearbox.shafts))])
+
+
+def tip_clearances(gearbox: Gearbox) -> dict[str, float]:
+    """Room between the tips of gears and what passes them on other shafts: gears, but their mates, and the shafts [mm].
+
+    Args:
+        gearbox: of concrete numbers.
+    """
+    axes, meshing = axes_of(gearbox), {frozenset((mesh.pinion, mesh.wheel)) for mesh in gearbox.meshes}
+    bodies = [each for index, shaft in enumerate(gearbox.shafts) for each in _bodies(index, shaft, axes[index][2])]
+    found: dict[str, float] = {}
+    for one, other in combinations(bodies, 2):
+        pair = frozenset((one.gear, other.gear))
+        if one.shaft == other.shaft or pair in meshing or pair == {None}:
+            continue
+        if min(one.end, other.end) > max(one.start, other.start):
+            apart = float(np.hypot(*(axes[one.shaft] - axes[other.shaft])[:2]))
+            name, room = f"{one.name} and {other.name}", apart - one.radius - other.radius
+            found[name] = min(room, found.get(name, room))
+    return found
+
+
+class _Body(NamedTuple):
+    """A gear or a section of a shaft: names, the shaft, ends along z and radius [mm]."""
+
+    name: str
+    gear: str | None
+    shaft: int
+    start: float
+    end: float
+    radius: float
+
+
+def _bodies(index: int, shaft: Shaft, left: float) -> Iterator[_Body]:
+    for gear in shaft.gears:
+        ends = left + float(gear.start), left + float(gear.end)
+        yield _Body(f'gear "{gear.name}"', gear.name, index, *ends, float(gear.gear.tip_radius))
+    for section in shaft.sections:
+        end = left + float(section.length)
+        yield _Body(f'shaft "{shaft.name}"', None, index, left, end, 0.5 * float(section.diameter))
+        left = end

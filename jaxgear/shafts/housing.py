@@ -1,15 +1,50 @@
-"""The housing between the bearing seats: a matrix condensed from a finite-element model."""
+"""The housing between the bearing seats: a matrix condensed from a finite-element model, and its files.
 
+CSV: the first cell of the first row names kind and unit, "stiffness N/um" for instance, the others the columns; every
+further row begins with its name. Names are SEAT.DIRECTION, with the name of a bearing and x, y, z, rx or ry; rows and
+columns in the same order. Lines that begin with # are comments.
+
+    stiffness N/um, A.x, A.y
+    A.x, 812.4, -31.0
+    A.y, -31.0, 655.2
+
+npz: an array `stiffness` or `compliance`, and `nodes` and `unit` as strings.
+
+Units: N/um is the system um, mrad, N, N mm of this package; N/mm is mm, rad, N, N mm; N/m is m, rad, N, N m. Of a
+compliance the unit is the inverse: um/N, mm/N, m/N. Directions are the axes of the gearbox; rotations are rotations of
+the seat, forces act on the housing. The foundation is held.
+
+With K the stiffness matrix of the model, its foundation held, and W the nodal forces of a unit force or moment on each
+seat direction, the compliance between the seats is
+
+    C = W^T K^-1 W
+
+A seat moves by the mean of its nodes, weighted as W spreads the force (what FE programs call a distributing coupling,
+RBE3), so that force times displacement is the work done. Where W picks single degrees of freedom, C is the block of
+K^-1 that belongs to them, and its inverse the Schur complement K_rr - K_ri K_ii^-1 K_ir (Guyan's reduction, exact for
+static loads on what is retained).
+
+References:
+    R. J. Guyan, Reduction of stiffness and mass matrices, AIAA J. 3(2), 1965, p. 380.
+"""
+
+import csv
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Literal
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+import scipy.sparse
+import scipy.sparse.linalg
 from jaxtyping import Array, Bool, Float
+from threadpoolctl import threadpool_limits
 
 from ..numerics import Checked, concrete, number, positive_definite, solve_dense
-from .beam import DIRECTIONS
-from .matrices import check_symmetric, semidefinite, symmetric
+from .beam import DIRECTIONS, check_symmetric, semidefinite, symmetric
 
 Matrix = Float[Array, "rows columns"]
 Kind = Literal["stiffness", "compliance"]
@@ -115,3 +150,214 @@ def _check_definite(matrix: np.ndarray, kind: Kind, nodes: tuple[str, ...]) -> N
             f"Housing: {kind} must be positive semidefinite, but its smallest eigenvalue is {lowest:.3g} of its "
             "diagonal"
         )
+
+
+# what one unit of force, moment, displacement and rotation is in N, N mm, um and mrad
+_SYSTEMS = {"um": (1.0, 1.0, 1.0, 1.0), "mm": (1.0, 1.0, 1e3, 1e3), "m": (1.0, 1e3, 1e6, 1e3)}
+_UNITS = {
+    **{("stiffness", f"N/{length}"): length for length in _SYSTEMS},
+    **{("compliance", f"{length}/N"): length for length in _SYSTEMS},
+}
+
+
+def read_housing(path: str | Path) -> Housing:
+    """The housing of a CSV or npz file.
+
+    Raises:
+        ValueError: in one line that names the file and what is wrong with it: no such file, another ending, an unknown
+            kind, unit or node, rows and columns that differ, something else than a number, a matrix that is not square,
+            symmetric or positive definite.
+    """
+    path = Path(path)
+    readers = {".csv": _from_csv, ".npz": _from_npz}
+    if path.suffix.lower() not in readers:
+        raise ValueError(f"{path}: a housing is read from a .csv or .npz file")
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file")
+    try:
+        return _made(*readers[path.suffix.lower()](path))
+    except (ValueError, OSError, csv.Error, zipfile.BadZipFile, zlib.error) as error:
+        raise ValueError(f"{path}: {' '.join(str(error).split())}") from None
+
+
+def write_housing(path: str | Path, housing: Housing) -> None:
+    """Writes a housing as CSV or npz, in the units of this package.
+
+    Raises:
+        ValueError: for another ending.
+    """
+    path = Path(path)
+    unit = "N/um" if housing.kind == "stiffness" else "um/N"
+    matrix = np.asarray(housing.matrix)
+    if path.suffix.lower() == ".csv":
+        rows = [[f"{housing.kind} {unit}", *housing.nodes]]
+        rows += [[node, *map(repr, row)] for node, row in zip(housing.nodes, matrix.tolist())]
+        with path.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows(rows)
+    elif path.suffix.lower() == ".npz":
+        given = {housing.kind: matrix, "nodes": np.array(housing.nodes), "unit": np.array(unit)}
+        np.savez(path, **given)  # type: ignore[arg-type]
+    else:
+        raise ValueError(f"{path}: a housing is written to a .csv or .npz file")
+
+
+def _made(kind: str, unit: str, nodes: list[str], matrix: np.ndarray) -> Housing:
+    if (kind, unit) not in _UNITS:
+        known = ", ".join(" ".join(pair) for pair in _UNITS)
+        raise ValueError(f'"{kind} {unit}" is no kind and unit of a housing, must be one of {known}')
+    size = len(nodes)
+    if matrix.shape != (size, size):
+        raise ValueError(f"{kind} has shape {matrix.shape}, must be ({size}, {size}) as its nodes")
+    if not np.isfinite(matrix).all():
+        row, column = np.argwhere(~np.isfinite(matrix))[0]
+        raise ValueError(f"{kind} ({nodes[row]}, {nodes[column]}) = {matrix[row, column]} must be finite")
+    force, moment, displacement, rotation = _SYSTEMS[_UNITS[kind, unit]]
+    turns = np.array([node.rpartition(".")[2].startswith("r") for node in nodes])
+    forces, ways = np.where(turns, moment, force), np.where(turns, rotation, displacement)
+    if kind == "stiffness":
+        return Housing(tuple(nodes), forces[:, None] * matrix / ways, "stiffness")
+    return Housing(tuple(nodes), ways[:, None] * matrix / forces, "compliance")
+
+
+def _from_csv(path: Path) -> tuple[str, str, list[str], np.ndarray]:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError("must be text in UTF-8") from None
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    if not lines:
+        raise ValueError("is empty")
+    separator = ";" if ";" in lines[0] else ","
+    rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator)]
+    kind, _, unit = rows[0][0].partition(" ")
+    nodes = rows[0][1:]
+    if [row[0] for row in rows[1:]] != nodes:
+        raise ValueError("rows must have the names of the columns, in the same order")
+    numbers = np.empty((len(nodes), len(nodes)))
+    for index, row in enumerate(rows[1:]):
+        if len(row) != len(nodes) + 1:
+            raise ValueError(f"row {row[0]} has {len(row) - 1} numbers, must have {len(nodes)}")
+        for column, cell in enumerate(row[1:]):
+            numbers[index, column] = _number(cell, row[0], nodes[column])
+    return kind, unit.strip(), nodes, numbers
+
+
+def _number(cell: str, row: str, column: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        raise ValueError(f"({row}, {column}) = {cell!r} must be a number") from None
+
+
+def _from_npz(path: Path) -> tuple[str, str, list[str], np.ndarray]:
+    if not zipfile.is_zipfile(path):
+        raise ValueError("is no npz archive")
+    with np.load(path, allow_pickle=False) as given:
+        kinds = [kind for kind in ("stiffness", "compliance") if kind in given]
+        missing = [name for name in ("nodes", "unit") if name not in given]
+        if len(kinds) != 1 or missing:
+            wanted = "one of stiffness and compliance" if len(kinds) != 1 else missing[0]
+            raise ValueError(f"must hold {wanted}, holds {', '.join(given.files) or 'nothing'}")
+        kind: Kind = "stiffness" if kinds[0] == "stiffness" else "compliance"
+        matrix = np.asarray(given[kind])
+        if matrix.dtype.kind not in "fiu":
+            raise ValueError(f"{kind} must hold real numbers, holds {matrix.dtype}")
+        return kind, str(given["unit"]), [str(node) for node in np.ravel(given["nodes"])], matrix.astype(float)
+
+
+_ASYMMETRY = 1e-6  # of a stiffness matrix, relative to its largest entry
+_MISSED = 1e-6  # of unit loads, where the solution is one
+
+
+def spread_forces(
+    nodes: np.ndarray, center, degrees_of_freedom: np.ndarray, size: int, *, tilting: bool = False
+) -> np.ndarray:
+    """Nodal forces of unit forces (and moments) on a seat in the directions x, y, z (, rx, ry).
+
+    They are the smallest nodal forces with that resultant and no other: of a force equal on all nodes, where these lie
+    evenly around the centre.
+
+    Args:
+        nodes: coordinates of the nodes of the bore, shape (nodes, 3) [mm].
+        center: of the seat [mm].
+        degrees_of_freedom: rows of every node's x, y and z in the stiffness matrix, shape (nodes, 3).
+        size: number of rows of the stiffness matrix.
+        tilting: whether the seat takes moments.
+
+    Raises:
+        ValueError: for nodes that cannot carry the moments because they lie on one line, or rows that are not there.
+    """
+    arms = np.asarray(nodes, float) - np.asarray(center, float)
+    count = len(arms)
+    rows = np.asarray(degrees_of_freedom)
+    if rows.shape != (count, 3) or rows.min() < 0 or rows.max() >= size:
+        raise ValueError(
+            f"spread_forces: degrees_of_freedom of shape {rows.shape} must be {count} times 3 rows from 0 to "
+            f"{size - 1}: no node of a seat can be held"
+        )
+    # resultant of nodal forces: x, y, z and moments about the centre
+    zero, (x, y, z) = np.zeros(count), arms.T
+    one = np.ones(count)
+    resultant = np.stack(
+        [
+            np.stack([one, zero, zero], 1),
+            np.stack([zero, one, zero], 1),
+            np.stack([zero, zero, one], 1),
+            np.stack([zero, -z, y], 1),
+            np.stack([z, zero, -x], 1),
+            np.stack([-y, x, zero], 1),
+        ]
+    ).reshape(6, -1)
+    gram = resultant @ resultant.T
+    scale = 1 / np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    if np.linalg.matrix_rank(scale[:, None] * gram * scale) < 6:
+        raise ValueError(f"spread_forces: {count} nodes cannot carry forces and moments: they lie on one line")
+    spread = resultant.T @ np.linalg.inv(gram)
+    ways = 5 if tilting else 3
+    forces = np.zeros((size, ways))
+    np.add.at(forces, rows.ravel(), spread[:, :ways])
+    return forces
+
+
+def condense(stiffness, seats: Mapping[str, np.ndarray]) -> Housing:
+    """The housing of a finite-element model in mm, N and rad, as its compliance between the seats.
+
+    Args:
+        stiffness: sparse symmetric matrix [N/mm], with the rows of held degrees of freedom taken out.
+        seats: for every bearing name the nodal forces of unit loads in x, y, z (, rx, ry), for instance
+            `spread_forces`, shape (rows, 3 or 5).
+
+    Raises:
+        ValueError: for seats that do not fit the matrix, a matrix that is not symmetric, or a model that is not held.
+    """
+    matrix = scipy.sparse.csc_matrix(stiffness)
+    if matrix.shape[0] != matrix.shape[1] or abs(matrix - matrix.T).max() > _ASYMMETRY * abs(matrix).max():
+        raise ValueError(
+            f"condense: stiffness of shape {matrix.shape} must be square and symmetric, both of its triangles given"
+        )
+    nodes: list[str] = []
+    for name, forces in seats.items():
+        if forces.ndim != 2 or forces.shape[0] != matrix.shape[0] or forces.shape[1] not in (3, 5):
+            raise ValueError(
+                f'condense: seat "{name}" has nodal forces of shape {forces.shape}, must be ({matrix.shape[0]}, 3 or 5)'
+            )
+        nodes += [f"{name}.{way}" for way in DIRECTIONS[: forces.shape[1]]]
+    if not nodes:
+        raise ValueError("condense: seats must not be empty")
+    loads = np.concatenate(list(seats.values()), axis=1)
+    try:
+        with threadpool_limits(limits=1):  # many small blocks: threads only get in each other's way
+            factors = scipy.sparse.linalg.splu(
+                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            )
+            moved = factors.solve(loads)
+    except RuntimeError:  # exactly singular
+        raise ValueError("condense: stiffness is singular: is the housing fixed to its foundation?") from None
+    missed = np.abs(matrix @ moved - loads).max() / np.abs(loads).max()
+    if not missed < _MISSED:  # a model that floats is singular but for rounding
+        raise ValueError(
+            f"condense: stiffness is singular, forces are missed by {missed:.2g} of their size: is the housing fixed "
+            "to its foundation?"
+        )
+    compliance = loads.T @ moved  # mm and rad per N and N mm
+    return Housing(tuple(nodes), 1e3 * 0.5 * (compliance + compliance.T), "compliance")

@@ -1,13 +1,140 @@
-"""Meshes and other loads in the axes of a gearbox, for `equilibrium`."""
+"""Static equilibrium of all shafts of a gearbox on their bearings, under meshes and other loads.
+
+Unknown are the forces of all bearings on their shafts f and how every shaft moves as a whole q. With F the flexibility
+of the shafts held at their left ends, R what their points move with q, K the bearings and C the housing:
+
+    u_b = F_bb f + F_bp p + R_b q        bearings under their forces and the loads p
+    f = f_0 - K (u_b + C f)              the seats move by -C f
+    R_b^T f + R_p^T p = 0                every shaft is in equilibrium
+    u_p = F_pb f + F_pp p + R_p q
+
+A load p is a vector in x, y, z, rx, ry at each of several points; a displacement u_p is what it would do work on.
+"""
 
 from typing import NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import gauss_legendre
-from .equilibrium import Patterns
+from ..numerics import gauss_legendre, solve_dense
+from .beam import DIRECTIONS, flexibility, rigid
 from .gearbox import Gearbox
+
+_WAYS = len(DIRECTIONS)
+
+
+class Patterns(NamedTuple):
+    """Loads of one shaft, or what its displacements are weighted with.
+
+    Attributes:
+        at: positions [mm].
+        vectors: of every pattern, x, y, z, rx, ry at each position.
+    """
+
+    at: Float[Array, " points"]
+    vectors: Float[Array, "points 5 patterns"]
+
+
+class System(NamedTuple):
+    """The matrices of the equations above, bearings first.
+
+    Attributes:
+        flexibility: F.
+        moving: R, all shafts side by side.
+        bearings: K.
+        housing: C.
+        loose: 1 for movements that no bearing resists, which stay zero.
+        play: f_0, force of the bearings at no displacement by their tangent K, which misses the origin where they have
+            clearance [N, N mm]; zero of linear bearings.
+    """
+
+    flexibility: Float[Array, "n n"]
+    moving: Float[Array, "n movements"]
+    bearings: Float[Array, "b b"]
+    housing: Float[Array, "b b"]
+    loose: Float[Array, " movements"]
+    play: Float[Array, " b"]
+
+
+class Equilibrium(NamedTuple):
+    """One column for each load.
+
+    Attributes:
+        force: of the bearings on their shafts [N, N mm].
+        bearing: displacement of the shafts at the bearings [um, mrad].
+        seat: displacement of the seats [um, mrad].
+        pattern: displacement of every pattern.
+    """
+
+    force: Float[Array, "b loads"]
+    bearing: Float[Array, "b loads"]
+    seat: Float[Array, "b loads"]
+    pattern: Float[Array, "patterns loads"]
+
+
+def system(gearbox: Gearbox, patterns: list[Patterns]) -> System:
+    """The equations of a gearbox.
+
+    Args:
+        gearbox: shafts, bearings, housing.
+        patterns: for every shaft, equally many.
+    """
+    shafts = gearbox.shafts
+    count = sum(len(shaft.bearings) for shaft in shafts)
+    size = _WAYS * count + patterns[0].vectors.shape[-1]
+    held = [bearing.matrix for shaft in shafts for bearing in shaft.bearings]
+    total = jnp.zeros((size, size))
+    moving, loose, first = [], [], 0
+    for shaft, pattern in zip(shafts, patterns):
+        own = len(shaft.bearings)
+        at = jnp.concatenate([jnp.stack([bearing.position for bearing in shaft.bearings]), pattern.at])
+        unit = jnp.eye(_WAYS * own, _WAYS * count, _WAYS * first).reshape(own, _WAYS, -1)
+        vectors = jnp.zeros((len(at), _WAYS, size))
+        vectors = vectors.at[:own, :, : _WAYS * count].set(unit).at[own:, :, _WAYS * count :].set(pattern.vectors)
+        flat = vectors.reshape(-1, size)
+        total = total + flat.T @ flexibility(shaft.beam, at).reshape(len(flat), -1) @ flat
+        moving.append(flat.T @ rigid(at).reshape(-1, _WAYS))
+        axial = sum(matrix[2, 2] for matrix in held[first : first + own])
+        loose.append(jnp.zeros(_WAYS).at[2].set(jnp.where(axial > 0, 0.0, 1.0)))
+        first += own
+    stiffness = jnp.zeros((count, _WAYS, count, _WAYS))
+    for index, matrix in enumerate(held):
+        stiffness = stiffness.at[index, :, index].set(matrix)
+    stiffness = stiffness.reshape(_WAYS * count, -1)
+    housing = jnp.zeros_like(stiffness) if gearbox.housing is None else gearbox.housing.at(gearbox.bearing_names)
+    movements = jnp.concatenate(moving, axis=1), jnp.concatenate(loose)
+    return System(total, movements[0], stiffness, housing, movements[1], jnp.zeros(len(stiffness)))
+
+
+def solve(of: System, loads: Float[Array, "patterns loads"], *, actual: bool = False) -> Equilibrium:
+    """Forces and displacements under several loads, each a sum of the patterns.
+
+    Args:
+        of: the equations.
+        loads: share of every pattern in every load.
+        actual: whether the play of the bearings counts, as in a state; not in what a further load changes.
+    """
+    count = len(of.bearings)
+    inner, across = of.flexibility[:count, :count], of.flexibility[:count, count:] @ loads
+    here, there = of.moving[:count], of.moving[count:]
+    # a row of a stiff bearing and one of a soft one are brought to the same size
+    size = 1 + jnp.abs(of.bearings) @ jnp.max(jnp.abs(inner), axis=1)
+    upper = (
+        jnp.concatenate([jnp.eye(count) + of.bearings @ (inner + of.housing), of.bearings @ here], axis=1)
+        / size[:, None]
+    )
+    lower = jnp.concatenate([here.T, jnp.diag(of.loose)], axis=1)
+    given = of.play[:, None] * float(actual) - of.bearings @ across
+    right = jnp.concatenate([given / size[:, None], -there.T @ loads])
+    found = solve_dense(jnp.concatenate([upper, lower]), right)
+    force, moved = found[:count], found[count:]
+    return Equilibrium(
+        force,
+        inner @ force + across + here @ moved,
+        -of.housing @ force,
+        of.flexibility[count:, :count] @ force + of.flexibility[count:, count:] @ loads + there @ moved,
+    )
+
 
 Slices = Float[Array, " slices"]
 Scalar = Float[Array, ""]

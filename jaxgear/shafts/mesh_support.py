@@ -8,11 +8,9 @@ from jaxtyping import Array, Bool, Float
 from ..contact.support import AbstractSupport
 from ..geometry import GearPair, margins
 from ..numerics import concrete, number, program, real, whole, within_limits
-from .beam import twist
-from .equilibrium import solve
+from .beam import ROUNDING, check_symmetric, semidefinite, symmetric, twist
 from .gearbox import Gearbox
-from .loads import acting, load_pattern, mesh_patterns, side_by_side, torques_on
-from .matrices import ROUNDING, check_symmetric, semidefinite, symmetric
+from .loads import acting, load_pattern, mesh_patterns, side_by_side, solve, torques_on
 from .misalignment import Misalignment
 from .operating_point import system_under_load
 

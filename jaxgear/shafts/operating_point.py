@@ -19,9 +19,8 @@ from jaxtyping import Array, Float
 
 from ..numerics import implicit_root, solve_dense
 from .beam import DIRECTIONS
-from .equilibrium import Patterns, System, solve, system
 from .gearbox import Gearbox
-from .loads import load_pattern
+from .loads import Patterns, System, load_pattern, solve, system
 
 _WAYS = len(DIRECTIONS)
 # What may be left of the conditions, relative to the largest load, over the square root of rounding.

@@ -9,9 +9,8 @@ from jaxtyping import Array, Float
 
 from ..numerics import Checked, check, concrete, program, real, result
 from .beam import DIRECTIONS, twist
-from .equilibrium import Patterns, solve
 from .gearbox import Gearbox
-from .loads import load_pattern, side_by_side, torques_on
+from .loads import Patterns, load_pattern, side_by_side, solve, torques_on
 from .operating_point import system_under_load
 
 _WAYS = len(DIRECTIONS)

@@ -1,13 +1,34 @@
-"""Columns of the table: their names, their units, and which way is better."""
+"""Columns of the table: their names, their units, and which way is better.
 
-from collections.abc import Mapping, Sequence
+A text that begins like a formula gets an apostrophe in front, which spreadsheets take for "this is text"; who reads the
+file again leaves it out.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from ..conditions import Conditions, LoadSpectrum, label
+from ..conditions import Conditions, LoadSpectrum, label, solve_case
+from ..contact import Mesh, MeshCycle
 from ..metrics import Quantity
+from ..microgeometry import AbstractModification
 from ..numerics import AbstractMeasure
 from .plan import AbstractPlan
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+_TEXT = "'"
+
+
+def as_text(heading: str) -> str:
+    """A heading that no spreadsheet takes for a formula."""
+    return f"{_TEXT}{heading}" if heading.startswith(_FORMULA) else heading
+
+
+def from_text(heading: str) -> str:
+    """What `as_text` was given."""
+    plain = heading.removeprefix(_TEXT)
+    return plain if plain.startswith(_FORMULA) else heading
+
 
 VARIANT, CONVERGED = "variant", "converged"
 
@@ -78,3 +99,31 @@ def _labels(load: LoadSpectrum) -> list[str]:
     if load.speeds is None:
         return torques
     return [f"{torque}_{speed:.12g}rpm" for torque, speed in zip(torques, load.speeds.tolist())]
+
+
+def over_torques(
+    mesh: Mesh,
+    torques: Iterable[float],
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+) -> tuple[MeshCycle, ...]:
+    """One design under every one of several torques, by one compiled program whatever the kind of its modifications.
+
+    For figures and reports of a few designs; `jax.vmap` of `solve` is faster for many, and differentiable.
+
+    Args:
+        mesh: prepared mesh.
+        torques: on the pinion [N m], in any order.
+        pinion: modification of the pinion flank; None for the nominal involute.
+        wheel: modification of the wheel flank; None for the nominal involute.
+
+    Returns:
+        the mesh cycle under every torque.
+
+    Raises:
+        TypeError: for something else than a prepared mesh or a modification.
+        ValueError: for a negative or non-finite torque, or a modification that varies along the face on a mesh of one
+            slice.
+    """
+    return tuple(solve_case(mesh, float(torque), pinion, wheel) for torque in torques)

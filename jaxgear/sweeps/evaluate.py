@@ -11,7 +11,7 @@ import numpy as np
 from jax.sharding import Mesh as DeviceMesh
 
 from ..conditions import Variants, joined, solve_case, solved
-from ..conditions.batches import divided, everywhere, local_devices, over_devices, padded, side_by_side
+from ..conditions.join import divided, everywhere, local_devices, over_devices, padded, side_by_side
 from ..metrics import Quantity
 from ..numerics import AbstractMeasure, kernel, program
 from .columns import CONVERGED, result_columns

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..conditions import Better, joined, ranked, solved
-from ..conditions.batches import local_devices, over_devices, side_by_side
+from ..conditions.join import local_devices, over_devices, side_by_side
 from ..contact import Mesh, removed_material, solve_removed
 from ..metrics import Quantity, quantity_of
 from ..microgeometry import AbstractModification, NoModification

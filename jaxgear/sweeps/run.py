@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..conditions import Conditions, Design, Parameters, Variants, check_used, label, variants
-from ..conditions.batches import side_by_side
+from ..conditions.join import side_by_side
 from ..contact import Mesh, solve
 from ..metrics import Quantity, quantities, quantity_of
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole

@@ -9,10 +9,10 @@ from .deviation import Deviation as Deviation
 from .deviation import GearDeviation as GearDeviation
 from .deviation import deviated_material as deviated_material
 from .deviation import sample_deviations as sample_deviations
-from .distribution import AbstractDistribution as AbstractDistribution
-from .distribution import TruncatedNormal as TruncatedNormal
-from .distribution import Uniform as Uniform
-from .iso_1328 import ToleranceClass as ToleranceClass
-from .iso_1328 import iso_rounded as iso_rounded
+from .limits import AbstractDistribution as AbstractDistribution
 from .limits import GearTolerance as GearTolerance
 from .limits import Tolerance as Tolerance
+from .limits import ToleranceClass as ToleranceClass
+from .limits import TruncatedNormal as TruncatedNormal
+from .limits import Uniform as Uniform
+from .limits import iso_rounded as iso_rounded

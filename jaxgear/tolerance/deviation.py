@@ -12,8 +12,7 @@ from ..contact.operating_point import operating_point_of
 from ..contact.slide import nominal_material
 from ..microgeometry import AbstractModification, Flank, LeadSlope, NoModification, ProfileSlope
 from ..numerics import Checked, number, program, real, result, spread, whole
-from .distribution import AbstractDistribution
-from .limits import GearTolerance, Tolerance, check_slices
+from .limits import AbstractDistribution, GearTolerance, Tolerance, check_slices
 
 Real = Float[Array, "*samples"]
 Load = Float[Array, "pairs slices positions"]

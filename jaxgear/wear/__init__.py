@@ -1,9 +1,10 @@
 """Wear: the flank as a state over its life."""
 
-from .archard import passage_depth as passage_depth
-from .archard import specific_sliding as specific_sliding
+from .deposit import passage_depth as passage_depth
+from .deposit import specific_sliding as specific_sliding
 from .life import WearLife as WearLife
 from .life import wear as wear
+from .life import wear_in_steps as wear_in_steps
 from .march import March as March
 from .over_life import life_to as life_to
 from .over_life import life_to_depth as life_to_depth
@@ -14,4 +15,3 @@ from .over_life import wear_depth as wear_depth
 from .over_life import worn_volume as worn_volume
 from .quantities import WEAR_QUANTITIES as WEAR_QUANTITIES
 from .settings import Wear as Wear
-from .steps import wear_in_steps as wear_in_steps

@@ -1,5 +1,6 @@
 """A mesh that wears: what its flanks are made of, how fast they wear, and the cycles on them."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -11,22 +12,137 @@ from jaxtyping import Array, Bool, Float
 
 from ..conditions import LoadSpectrum, solved
 from ..contact import Mesh, MeshCycle, OperatingPoint, RemovedMaterial, removed_material, solve_removed
+from ..contact.cycle import FLATTEST, flank_pressure
 from ..contact.face_coupling import check_torque
 from ..contact.operating_point import operating_point_of
 from ..contact.prescribed import solve_forces
-from ..contact.pressure import FLATTEST, flank_pressure
 from ..contact.slide import slid_material
 from ..contact.solve import check_mesh, flanks_of
 from ..dynamics import Dynamics
 from ..dynamics.steady import SteadyForce
-from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
-from ..numerics import check, kernel, program, real, whole
-from .archard import worn
-from .coefficient import Constant, OfLubrication, wear_law
-from .deposit import PARTS, Deposit, deposit, grid
+from ..geometry import GearPair
+from ..geometry.involute import half_tooth_angle
+from ..metrics.lubrication import flash_temperature
+from ..microgeometry import AbstractModification, Flank, TabulatedFlank, TabulatedProfile
+from ..numerics import check, kernel, program, real, result, whole
+from .deposit import PARTS, Deposit, deposit, grid, worn
 from .march import Analysis, Depth, March, march
 from .vibration import Flanks, LineLoad, Vibration, vibration_of
-from .worn_flank import WornFlank, every_other, worn_through
+
+
+class WornFlank(AbstractModification):
+    """Material worn off at the points of an even grid, on the lines of the slices of a mesh; linear between points.
+
+    Constant beyond the ends, it is what `TabulatedProfile` and `TabulatedFlank` are at the slices of the mesh. They
+    search for the place of every contact, which takes far longer than the contact itself; here the place is a division.
+
+    Attributes:
+        roll_length: of the grid points, shape (points,).
+        amount: material removed, shape (slices, points).
+    """
+
+    roll_length: Float[Array, " points"] = result("mm")
+    amount: Float[Array, "slices points"] = result("um")
+
+    @property
+    def varies_along_face(self) -> bool:
+        return len(self.amount) > 1
+
+    def __call__(self, flank: Flank):
+        cells = self.amount.shape[-1] - 1
+        first, last = self.roll_length[0], self.roll_length[-1]
+        place = jnp.clip((flank.roll_length - first) * (cells / (last - first)), 0.0, cells)
+        left = jnp.minimum(jax.lax.stop_gradient(place).astype(jnp.int32), cells - 1)
+        line = jnp.arange(len(self.amount), dtype=jnp.int32)[None, :, None]
+        low, high = self.amount[line, left], self.amount[line, left + 1]
+        return low + (place - left.astype(place.dtype)) * (high - low)
+
+
+def every_other(depth: Float[Array, "*shape points"]) -> Float[Array, "*shape points"]:
+    """Depth that is known at every other point of an even grid only, linear between those; the last one is kept."""
+    between = 0.5 * (depth[..., :-2:2] + depth[..., 2::2])
+    return depth.at[..., 1:-1:2].set(between)
+
+
+def worn_through(
+    pair: GearPair, roll_length: Float[Array, "gears points"], depth: Float[Array, "gears parts slices points"]
+) -> Bool[Array, ""]:
+    """Whether nothing is left of a tooth of either gear somewhere up its flank.
+
+    Material taken off all over an involute turns it about the gear by depth over base radius; there is none left where
+    that is the angle of the tooth.
+    """
+    left = [
+        2e3 * half_tooth_angle(gear, lengths) * gear.base_radius - jnp.max(jnp.sum(worn, axis=0), axis=0)
+        for gear, lengths, worn in zip((pair.pinion, pair.wheel), roll_length, depth)
+    ]
+    return jnp.any(jnp.stack(left) <= 0)
+
+
+Field = Float[Array, "#gears #pairs #slices #positions"]
+_GEARS = 2
+
+# Lubricated steel has 1e-18 to 5e-16 m2/N, see `wear`; two hundred times the upper end is no such gear any more, and a
+# larger number most often one in mm2/N, which is 1e6 times as large.
+LARGEST_COEFFICIENT = 1e-13
+
+
+class Constant(eqx.Module):
+    """A coefficient of each gear [m2/N], shape (gears, 1, 1, 1)."""
+
+    value: Field
+
+    def __call__(self, cycle: MeshCycle) -> Field:
+        return self.value
+
+
+class OfLubrication(eqx.Module):
+    """A function of pressure [MPa], sliding speed [m/s] and flash temperature [K] at every contact that is loaded."""
+
+    of: Callable[..., Any]
+
+    def __call__(self, cycle: MeshCycle) -> Field:
+        kinematics, speed = cycle.kinematics, cycle.operating_point.speed
+        assert speed is not None  # `wear_law` has asked for it
+        friction = {} if cycle.operating_point.friction is None else {"friction": cycle.operating_point.friction}
+        contact = kinematics.path_of_contact
+        sliding = contact.sliding_speed(jnp.clip(kinematics.path, contact.start, contact.end), speed)
+        pressure = cycle.contact_pressure + cycle.corner_pressure
+        shape = cycle.line_load.shape
+        given = (
+            pressure,
+            jnp.broadcast_to(jnp.abs(sliding)[:, None], shape),
+            flash_temperature(cycle, speed, **friction),
+        )
+        # without load nothing wears, and the slope of a power of no pressure may be infinite
+        loaded = cycle.line_load > 0
+        found = self.of(*(jnp.where(loaded, field, 1.0) for field in given))
+        both = found if isinstance(found, tuple | list) else (found, found)
+        if len(both) != _GEARS:
+            raise ValueError(f"wear: coefficient gives {len(both)} values, must give one or a pair: pinion, wheel")
+        fields = [jnp.asarray(field, pressure.dtype) for field in both]
+        for field in fields:
+            if jnp.broadcast_shapes(field.shape, shape) != shape:
+                raise ValueError(f"wear: coefficient gives an array of shape {field.shape}, must be {shape}")
+        return jnp.where(loaded, jnp.stack([jnp.broadcast_to(field, shape) for field in fields]), 0.0)
+
+
+def wear_law(coefficient: Any, loads: OperatingPoint, dtype) -> Constant | OfLubrication:
+    """What gives the coefficient of both gears at every contact of a cycle, (gears, pairs, slices, positions).
+
+    Raises:
+        ValueError: for negative coefficients, more than two, and a function where the loads have no speed.
+    """
+    if callable(coefficient):
+        if loads.speed is None:
+            raise ValueError("wear: coefficient is a function, which needs a speed: give OperatingPoint(torque, speed)")
+        return OfLubrication(coefficient)
+    values = real(coefficient).astype(dtype)
+    if values.shape not in ((), (_GEARS,)):
+        raise ValueError(f"wear: coefficient has shape {values.shape}, must be one number or a pair: pinion, wheel")
+    check("wear", "coefficient", values, "m2/N", low=0.0, high=LARGEST_COEFFICIENT)
+    return Constant(jnp.broadcast_to(values, (_GEARS,))[:, None, None, None])
+
 
 # what a cycle holds that differs from flank to flank
 _FOUND = (

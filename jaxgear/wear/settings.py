@@ -12,7 +12,7 @@ from ..metrics import Quantity
 from ..metrics.settings import with_settings
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, count, number
-from .coefficient import LARGEST_COEFFICIENT
+from .case import LARGEST_COEFFICIENT
 from .life import BLOCKS, WearLife, check_blocks, wear
 from .vibration import LineLoad, check_line_load
 

@@ -12,7 +12,7 @@ from ..dynamics.from_contact import interpolated, resized
 from ..dynamics.steady import SteadyForce
 from ..microgeometry import AbstractModification
 from ..numerics import check
-from ..numerics.quick import is_eager
+from ..numerics.programs import is_eager
 
 LineLoad = Literal["static", "dynamic"]
 Flanks = dict[str, AbstractModification]  # of pinion and wheel

@@ -1,23 +1,30 @@
-"""A REXS model as data: components with attributes, relations between them, load cases.
+"""A REXS model as data, from and to the XML of a file.
 
 REXS, the Reusable Engineering EXchange Standard of FVA (https://www.rexs.info), describes a gear unit by its parts and
 what they have to do with each other. A file holds one model. Whatever is wrong with it is refused in one line that
 names component and attribute.
+
+A file comes from anywhere, so it is read without a document type: Expat reports the start of one before anything that
+it declares is looked at, and the file is refused there. Without declarations there are no entities to expand, inside
+the file or from elsewhere. REXS has a schema (XSD) and no document type, so that no proper file is lost.
 """
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from decimal import Decimal
 from typing import Any
+from xml.etree.ElementTree import Element, SubElement, TreeBuilder, indent, tostring
+from xml.parsers import expat
 
 import numpy as np
 
 from ...numerics import Number
 from ..errors import DesignFileError
-from ..ranges import outside
-from .values import kind_of, written
+from ..kinds import outside
+from .values import checked_version, decoded, kind_of, whole, written
 
 CUSTOM = "custom_jaxgear_"  # of attributes that REXS does not know: it leaves "custom_..." to programs
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -220,3 +227,149 @@ def attributes_of(values: dict[str, tuple[Any, str]]) -> dict[str, Attribute]:
     """Attributes from (value, unit); those of None are left out."""
     given = {name: pair for name, pair in values.items() if pair[0] is not None}
     return {name: Attribute(written(value), unit, kind_of(name, value, unit)) for name, (value, unit) in given.items()}
+
+
+_CASES = "1"  # id of the one load spectrum
+
+
+def xml(model: Model) -> bytes:
+    """The file: UTF-8 with a byte order mark, as REXS has it."""
+    root = Element("model", origin(model))
+    relations = SubElement(root, "relations")
+    for number, relation in enumerate(model.relations, 1):
+        order = {} if relation.order is None else {"order": str(relation.order)}
+        element = SubElement(relations, "relation", {"id": str(number), "type": relation.type, **order})
+        for role, part in relation.refs:
+            SubElement(element, "ref", id=str(part), role=role, hint=model.components[part].type)
+    _components(SubElement(root, "components"), model.components.values())
+    if model.cases:
+        spectrum = SubElement(root, "load_spectrum", id=_CASES)
+        for case, said in model.cases.items():
+            _components(SubElement(spectrum, "load_case", id=str(case)), said.values())
+    indent(root)
+    return b"\xef\xbb\xbf" + tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+
+
+def _components(parent: Element, components: Iterable[Component]) -> None:
+    for component in components:
+        name = {"name": component.name} if component.name else {}
+        element = SubElement(parent, "component", {"id": str(component.id), "type": component.type, **name})
+        for attribute, held in component.attributes.items():
+            unit = {} if held.unit is None else {"unit": held.unit}
+            item = SubElement(element, "attribute", {"id": attribute, **unit})
+            if isinstance(held.value, tuple):
+                array = SubElement(item, "array")
+                for value in held.value:
+                    SubElement(array, "c").text = value
+            else:
+                item.text = held.value
+
+
+def origin(model: Model) -> dict[str, str]:
+    """Version of REXS, program and time."""
+    return {
+        "version": model.version,
+        "applicationId": "jaxgear",
+        "applicationVersion": _own_version(),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _own_version() -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version("jaxgear")
+    except metadata.PackageNotFoundError:  # code that runs uninstalled
+        return "unknown"
+
+
+_DEEPEST = 16  # twice the depth of the schema
+
+
+def parse(content: bytes) -> Model:
+    """The model of a file.
+
+    Raises:
+        DesignFileError: for what is not well-formed XML, declares a document type or is no REXS model.
+    """
+    root = _tree(content)
+    if root.tag != "model":
+        raise DesignFileError("", f"<{root.tag}> is not the <model> of a REXS file")
+    model = Model(checked_version(root.get("version", "")))
+    for element in root.iterfind("components/component"):
+        model.put(_component(element))
+    model.relations = [_relation(element) for element in root.iterfind("relations/relation")]
+    for case in root.iterfind("load_spectrum/load_case"):
+        said = [_component(element) for element in case.iterfind("component")]
+        model.put_case(whole(case.get("id", ""), "load_case: id"), said)
+    return model
+
+
+def _tree(content: bytes) -> Element:
+    builder, depth = TreeBuilder(), 0
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > _DEEPEST:
+            raise DesignFileError("", f"line {parser.CurrentLineNumber}: elements are nested too deeply")
+        builder.start(name, attributes)
+
+    def end(name: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(name)
+
+    def doctype(*_: Any) -> None:
+        raise DesignFileError(
+            "", f"line {parser.CurrentLineNumber}: declares a document type, which REXS does not have"
+        )
+
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, doctype
+    try:
+        parser.Parse(content, True)
+    except expat.ExpatError as error:
+        problem = expat.errors.messages.get(error.code, "not well-formed")
+        raise DesignFileError("", f"line {error.lineno}, column {error.offset + 1}: no XML: {problem}") from None
+    except (ValueError, LookupError) as error:  # of an encoding
+        if isinstance(error, DesignFileError):
+            raise
+        raise DesignFileError("", f"no XML: {error}") from None
+    return builder.close()
+
+
+def _component(element: Element) -> Component:
+    component = Component(
+        whole(element.get("id", ""), "component: id"), element.get("type", ""), element.get("name", "")
+    )
+    for item in element.iterfind("attribute"):
+        name = item.get("id", "")
+        try:
+            component.attributes[current(component.type, name)] = Attribute(_value(item), item.get("unit"))
+        except ValueError as error:
+            raise component.refuse(name, str(error)) from None
+    return component
+
+
+def _value(element: Element) -> str | tuple[str, ...] | None:
+    array = element.find("array")
+    if array is not None:
+        if array.get("code"):
+            return decoded(array.text or "", array.get("code", ""))
+        return tuple((item.text or "").strip() for item in array.iterfind("c"))
+    return None if len(element) else (element.text or "").strip()
+
+
+def _relation(element: Element) -> Relation:
+    kind = element.get("type", "")
+    order = whole(element.get("order"), "relation: order") if "order" in element.keys() else None
+    return Relation(kind, tuple(_refs(element, kind)), order)
+
+
+def _refs(element: Element, kind: str) -> Iterator[tuple[str, int]]:
+    for ref in element.iterfind("ref"):
+        yield ref.get("role", ""), whole(ref.get("id", ""), f"relation {element.get('id', '')} ({kind}): ref: id")

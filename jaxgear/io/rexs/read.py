@@ -14,13 +14,12 @@ from ...geometry import GearPair
 from ...microgeometry import AbstractModification, NoModification
 from ..errors import DesignFileError, naming, refused
 from ..toml import content
-from .frame import Frame, frames
 from .gears import QUALITY, check_spur, read_gear, read_quality
 from .json_form import parse_json
-from .model import Component, Model
-from .parse import parse
+from .model import Component, Model, parse
 from .read_flank import read_modification
-from .terms import joined
+from .topography import joined
+from .values import Frame, frames
 
 _LOG = logging.getLogger("jaxgear")
 _OLDEST, _NEWEST = (1, 4), (2,)

@@ -22,9 +22,9 @@ from ...microgeometry import (
 )
 from ...numerics import real
 from ..errors import DesignFileError, problem
-from .frame import Frame, same
 from .model import Component
 from .topography import flank_of
+from .values import Frame, same
 
 _ARC_ERROR = 0.01  # um: less than any machine holds
 

@@ -12,12 +12,11 @@ from ...microgeometry import AbstractModification
 from ...numerics import check
 from ...numerics.durable import write_durably
 from ..folder import writing
-from .frame import frames
 from .gears import write_gear
 from .json_form import to_json
-from .model import Model
+from .model import Model, xml
 from .results import write_results
-from .text import xml
+from .values import frames
 from .write_flank import Writer
 
 _VERSION = "2.0.0"

@@ -21,11 +21,9 @@ from ...microgeometry import (
     TipRelief,
 )
 from ..errors import DesignFileError
-from .frame import Frame
 from .model import Component, Model
-from .terms import plain_terms, powers
-from .topography import points
-from .values import shifted
+from .topography import plain_terms, points, powers
+from .values import Frame, shifted
 
 _SHAPES = {1: "linear", 2: "parabolic"}  # of a relief, by the power of its depth
 

@@ -1,0 +1,105 @@
+"""The stiffness model and the array sizes that a design file asks for."""
+
+from pathlib import Path
+
+from ..compliance import AbstractCompliance, Compliance, finite_element_compliance, legacy_compliance
+from ..contact import Resolution
+from ..geometry import GearPair
+from . import schema, template
+from .errors import DesignFileError, check_file, referring, refuse_given, refused
+from .toml import decode
+
+# Slices where a modification varies along the face: the mean of a parabola over the middles of n slices is 1 / n^2 too
+# small, so that 11 show a lead crowning to 1 %.
+_SLICES = 11
+
+
+def resolution_of(table: schema.Tables, uneven: list[str], *, bent: bool) -> Resolution:
+    """The array sizes.
+
+    Args:
+        table: of that name.
+        uneven: keys of the modifications that vary along the face.
+        bent: shafts bend; slices show it where the file says nothing else.
+
+    Raises:
+        DesignFileError: for one slice where modifications vary along the face.
+    """
+    sizes = decode("resolution", table, schema.ResolutionSection).given()
+    if sizes.get("slice_widths") is not None:
+        sizes.setdefault("slices", len(sizes["slice_widths"]))
+    if bent:
+        sizes.setdefault("slices", _SLICES)
+    if uneven and sizes.setdefault("slices", _SLICES) == 1:
+        problem = f"must be at least 2, 1 cannot show {uneven[0]}, which varies along the face"
+        raise DesignFileError("resolution.slices", f"{problem} ({_SLICES} where the key is left out)")
+    return template.Part(Resolution, sizes, "resolution").build({})
+
+
+FINITE_ELEMENTS = "finite_element"
+_TABLES = "pinion_table", "wheel_table"
+# numbers of gears and pair that a table holds for whatever they are; the module too, where it moves no ratio
+_FREE = {
+    "face_width",
+    "center_distance",
+    "axial_offset",
+    "tip_edge_radius",
+    "tip_form_diameter",
+    "elastic_modulus",
+    "density",
+    "thermal_contact_coefficient",
+}
+
+
+def model_part(section: schema.ModelSection) -> template.Part:
+    """The model as far as it needs no gears: all of it, or the plane of what `finite_elements` makes."""
+    if section.structure == FINITE_ELEMENTS:
+        others = set(section.given()) - {"structure", "plane", *_TABLES}
+        if others:
+            raise DesignFileError(f"model.{min(others)}", f'cannot be combined with structure = "{FINITE_ELEMENTS}"')
+        return template.Part(Compliance, {}, "model")
+    refuse_given("model", section, _TABLES, f' without structure = "{FINITE_ELEMENTS}"')
+    if section.preset == "default":
+        return template.part_of("model", section, Compliance)
+    given = set(section.given()) - {"preset", "structure"}
+    if given:
+        raise DesignFileError(f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
+    return template.Part(legacy_compliance, {}, "model")
+
+
+def with_tables(
+    model: template.Part, section: schema.ModelSection, folder: Path, pair: template.Part, middle: GearPair
+) -> template.Part:
+    """The model, with the tables of the gears where the file asks for finite elements.
+
+    Args:
+        model: what `model_part` made.
+        section: what the file says.
+        folder: of the design file, in which paths begin.
+        pair: gears whose numbers may be variables.
+        middle: the gears with all variables in the middle of their bounds.
+    """
+    if section.structure != FINITE_ELEMENTS:
+        return model
+    for free in pair.free():
+        name = free.key.rpartition(".")[2]
+        moves = name == "module" and any(
+            g.tip_diameter is not None or g.bore_diameter is not None for g in _gears(middle)
+        )
+        if moves or name not in {*_FREE, "module"}:
+            problem = f'cannot be a variable with model.structure = "{FINITE_ELEMENTS}", whose tables are of one shape'
+            raise DesignFileError(free.key, problem)
+    paths = {name: folder / path for name in _TABLES if (path := getattr(section, name)) is not None}
+    for name, path in paths.items():
+        with referring(f"model.{name}", path.name):
+            check_file(path)
+    tabulated = refused("model", finite_element_compliance, middle, section.plane or "auto", **paths)
+    return template.Part(_as_it_is, {"compliance": tabulated}, "model")
+
+
+def _gears(pair: GearPair):
+    return pair.pinion, pair.wheel
+
+
+def _as_it_is(compliance: AbstractCompliance) -> AbstractCompliance:
+    return compliance

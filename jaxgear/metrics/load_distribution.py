@@ -1,0 +1,177 @@
+"""How pairs share the load, over which part of the path they carry it, and how uneven it is over the face.
+
+References:
+    ISO 6336-1, clause 7: K_Hbeta is the largest over the mean load per face width, K_Fbeta follows from it and the
+    height of the teeth over their width.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..contact import MeshCycle
+from ..numerics import Checked, maximum, minimum, over_batch, program, result, safe_divide
+from ..shafts import face_load_factor as factor_of
+from ..shafts import tooth_height
+from ..shafts.face_load import root_exponent
+
+Scalar = Float[Array, ""]
+
+
+class ContactShock(Checked):
+    """Contact beyond the theoretical path of contact.
+
+    Attributes:
+        approach: loaded path length before its start, where the wheel's tip corner touches.
+        recess: loaded path length after its end, where the pinion's tip corner touches.
+        force: largest force on a pair there.
+    """
+
+    approach: Scalar = result("mm")
+    recess: Scalar = result("mm")
+    force: Scalar = result("N")
+
+
+@over_batch
+def load_sharing(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
+    """Share of every pair in the total force; the shares of a position sum to 1, or are 0 at zero torque."""
+    return _shares(replace(cycle, pinion=None, wheel=None))
+
+
+@program
+def _shares(cycle: MeshCycle):
+    return safe_divide(cycle.pair_force, cycle.force)
+
+
+@over_batch
+def effective_contact_ratio(cycle: MeshCycle) -> Scalar:
+    """Loaded length of the path of contact in base pitches, the mean number of loaded pairs.
+
+    A pair counts as loaded where any of its slices is. Ends of contact are interpolated linearly between positions, so
+    the value changes continuously with the design. Above the theoretical contact ratio the teeth meet with their
+    corners.
+    """
+    return jnp.sum(jnp.mean(_loaded_fraction(cycle.opening), axis=-1))
+
+
+@over_batch
+def contact_shock(cycle: MeshCycle) -> ContactShock:
+    """Loaded path beyond its theoretical ends and the largest corner force there."""
+    kinematics, fraction = cycle.kinematics, _loaded_fraction(cycle.opening)
+    contact, path = kinematics.path_of_contact, kinematics.path
+    step = contact.base_pitch / kinematics.resolution.positions
+    # Every step [path, path + step] counts with its loaded length minus the part of it that lies on the theoretical
+    # path: contact is unbroken, so a step across an end of the path is loaded on the inside first.
+    before = jnp.clip(contact.start - path, 0.0, step)
+    after = jnp.clip(path + step - contact.end, 0.0, step)
+    return ContactShock(
+        jnp.sum(jnp.maximum(fraction * step - (step - before), 0.0)),
+        jnp.sum(jnp.maximum(fraction * step - (step - after), 0.0)),
+        maximum(corner_force(cycle)),
+    )
+
+
+def corner_force(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
+    """Force of every pair beyond the path of contact [N]."""
+    return jnp.where(cycle.kinematics.outside > 0, cycle.pair_force, 0.0)
+
+
+@partial(jax.jit, inline=True)
+def _loaded_fraction(opening: Float[Array, "pairs slices positions"]) -> Float[Array, "pairs positions"]:
+    """Loaded part of every step from one position to the next, per pair."""
+    depth = -minimum(opening, axis=1)
+    # after the last position every pair takes the place of its predecessor
+    arriving = jnp.concatenate([depth[:1, :1] * 0 - jnp.abs(depth[:1, -1:]), depth[:-1, :1]])
+    following = jnp.concatenate([depth[:, 1:], arriving], axis=1)
+    rising = following > depth
+    low, high = jnp.where(rising, depth, following), jnp.where(rising, following, depth)
+    crossing = (high > 0) & (low <= 0)
+    partial = high / jnp.where(crossing, high - low, 1.0)
+    return jnp.where(crossing, partial, (low > 0).astype(depth.dtype))
+
+
+Curve = Float[Array, " positions"]
+
+
+class _Face(NamedTuple):
+    """Line load over the face [N/mm], slices last, and the width of every slice [mm]."""
+
+    line_load: Float[Array, "... slices"]
+    width: Float[Array, " slices"]
+
+
+@over_batch
+def face_load_factors(cycle: MeshCycle) -> Curve:
+    """Of every position, largest over mean line load over the face of the pair with the largest line load there.
+
+    Raises:
+        ValueError: for a cycle of one slice.
+    """
+    return factor_of(*_at_positions("face_load_factors", cycle))
+
+
+@over_batch
+def face_load_factor(cycle: MeshCycle) -> Scalar:
+    """K_Hbeta: largest over mean line load over the face, of the pair and at the position with the largest line load.
+
+    Differentiable where that pair and position stay the same.
+
+    Raises:
+        ValueError: for a cycle of one slice.
+    """
+    return factor_of(*_worst("face_load_factor", cycle))
+
+
+@over_batch
+def root_face_load_factor(cycle: MeshCycle) -> Scalar:
+    """K_Fbeta = K_Hbeta^N_F of ISO 6336-1, Method B, from `face_load_factor` and the height of the teeth.
+
+    Raises:
+        ValueError: for a cycle of one slice.
+    """
+    pair = cycle.kinematics.pair
+    factor = factor_of(*_worst("root_face_load_factor", cycle))
+    return jnp.maximum(factor, 1.0) ** root_exponent(pair.face_width, tooth_height(pair))
+
+
+@over_batch
+def edge_load_factor(cycle: MeshCycle) -> Scalar:
+    """Larger line load of both end slices over the mean over the face, where `face_load_factor` is taken; 0 at ends
+    that carry nothing.
+
+    At a free end without relief it grows slowly with the number of slices.
+
+    Raises:
+        ValueError: for a cycle of one slice.
+    """
+    face = _worst("edge_load_factor", cycle)
+    mean = jnp.sum(face.line_load * face.width) / jnp.sum(face.width)
+    idle = mean <= 0
+    ends = jnp.maximum(face.line_load[0], face.line_load[-1])
+    return jnp.where(idle, 1.0, ends / jnp.where(idle, 1.0, mean))
+
+
+def over_several_slices(factor: Callable[[MeshCycle], Scalar], cycle: MeshCycle) -> Scalar | float:
+    """A factor of this module, 1 on one slice, over which the load is even."""
+    return factor(cycle) if cycle.kinematics.resolution.slices > 1 else 1.0
+
+
+def _at_positions(owner: str, cycle: MeshCycle) -> _Face:
+    """Of every position, the pair with the largest line load; shape (positions, slices)."""
+    slices = cycle.kinematics.resolution.slices
+    if slices == 1:
+        raise ValueError(f"{owner}: a mesh of 1 slice has no load over the face: prepare with Resolution(slices=11)")
+    load = jnp.moveaxis(cycle.line_load, 2, 0)  # positions, pairs, slices
+    most = jnp.argmax(jnp.max(load, axis=2), axis=1)
+    return _Face(jnp.take_along_axis(load, most[:, None, None], axis=1)[:, 0], cycle.kinematics.slice_width)
+
+
+def _worst(owner: str, cycle: MeshCycle) -> _Face:
+    """The pair and position with the largest line load; shape (slices,)."""
+    found = _at_positions(owner, cycle)
+    return found._replace(line_load=found.line_load[jnp.argmax(jnp.max(found.line_load, axis=1))])

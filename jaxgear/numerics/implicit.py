@@ -1,0 +1,237 @@
+"""Roots with exact derivatives, of one equation and of a few."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.custom_derivatives import SymbolicZero
+from jaxtyping import Array, Bool, Float
+
+from .dense import pseudo_inverse
+from .safe import stored
+
+
+def jvp_of_given(function, primal, tangent):
+    """`jax.jvp` along those leaves of the tangent that are not symbolically zero: the others cost nothing."""
+    tangents, structure = jax.tree.flatten(tangent, is_leaf=lambda leaf: isinstance(leaf, SymbolicZero))
+    primals = jax.tree.leaves(primal)
+    given = [i for i, leaf in enumerate(tangents) if not isinstance(leaf, SymbolicZero)]
+
+    def of_given(leaves):
+        everything = list(primals)
+        for i, leaf in zip(given, leaves):
+            everything[i] = leaf
+        return function(jax.tree.unflatten(structure, everything))
+
+    return jax.jvp(of_given, ([primals[i] for i in given],), ([tangents[i] for i in given],))
+
+
+def by_numbers(function):
+    """The function, with its derivative by every single number of its arguments formed in forward mode.
+
+    Reverse mode then keeps one array per number and result, the derivative by it, and none of what led there. That pays
+    where an elementwise chain follows from a few numbers. Arrays of several numbers are differentiated as always.
+    """
+    wrapped = eqx.filter_custom_jvp(function)
+
+    def rule(primals, tangents):
+        leaves, structure = jax.tree.flatten(tangents, is_leaf=_nothing)
+        values = jax.tree.leaves(primals, is_leaf=_nothing)
+        moving = [i for i, leaf in enumerate(leaves) if leaf is not None]
+        numbers = [i for i in moving if leaves[i].ndim == 0]
+        arrays = [i for i in moving if leaves[i].ndim > 0]
+
+        def along(places, directions):
+            def of_moving(moved):
+                everything = list(values)
+                for i, leaf in zip(places, moved):
+                    everything[i] = leaf
+                return function(*jax.tree.unflatten(structure, everything))
+
+            return jax.jvp(of_moving, ([values[i] for i in places],), (directions,))[1]
+
+        changes = [jax.tree.map(partial(_times, leaves[i]), along([i], [jnp.ones_like(values[i])])) for i in numbers]
+        if arrays:
+            changes.append(along(arrays, [leaves[i] for i in arrays]))
+        return wrapped(*primals), jax.tree.map(lambda *parts: sum(parts), *changes)
+
+    wrapped.def_jvp(rule)
+    return wrapped
+
+
+def _times(change, derivative):
+    return change * stored(derivative)
+
+
+def _nothing(leaf) -> bool:
+    return leaf is None
+
+
+_BISECTIONS = 24  # the bracket shrinks to 6e-8 of its width, from where two Newton steps reach machine precision
+_NEWTON_STEPS = 2
+
+
+@partial(jax.jit, static_argnames="function", inline=True)
+def bracketed_root(function, low, high, args):
+    """Root of an increasing or decreasing `function(x, args)` in [low, high], elementwise.
+
+    Bisection finds the root, Newton steps polish it. Derivatives of any order with respect to `args` come from the
+    implicit function theorem, never from the iteration. Where the function has no sign change the end nearer to a root
+    is returned, with derivatives of zero.
+
+    Args:
+        function: (x, args) -> residual, same shape as x. A function of a module, not one made at every call, outside of
+            compiled code: each compiles anew. It takes everything that is traced from `args`.
+        low: lower end, any shape.
+        high: upper end, same shape.
+        args: pytree that the function depends on; derivatives flow through it only.
+    """
+    return _root(function, low, high, args)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _root(function, low, high, args):
+    sign = jnp.where(function(high, args) >= function(low, args), 1.0, -1.0)
+
+    def halve(_, bracket):
+        a, b = bracket
+        middle = 0.5 * (a + b)
+        left = sign * function(middle, args) < 0
+        return jnp.where(left, middle, a), jnp.where(left, b, middle)
+
+    def polish(_, x):
+        value, slope = _with_slope(function, x, args)
+        return x - _quotient(value, slope)
+
+    a, b = jax.lax.fori_loop(0, _BISECTIONS, halve, (low, high))
+    x = 0.5 * (a + b)
+    at_end = (x - low <= 2 * (b - a)) | (high - x <= 2 * (b - a))
+    end = jnp.where(x - low < high - x, low, high)
+    polished = jax.lax.fori_loop(0, _NEWTON_STEPS, polish, x)
+    return jnp.where(at_end & ~((polished > low) & (polished < high)), end, polished)
+
+
+@partial(_root.defjvp, symbolic_zeros=True)
+def _root_jvp(function, primals, tangents):
+    """dx = -(df / dargs dargs) / (df / dx) inside the bracket; its ends stay where they are."""
+    (low, high, args), (_, _, args_dot) = primals, tangents
+    x = _root(function, low, high, args)
+    _, residual_dot = jvp_of_given(lambda args: function(x, args), args, args_dot)
+    _, slope = _with_slope(function, x, args)
+    inside = (x != low) & (x != high)
+    return x, jnp.where(inside, -_quotient(residual_dot, slope), 0.0)
+
+
+def _with_slope(function, x, args):
+    return jax.jvp(lambda t: function(t, args), (x,), (jnp.ones_like(x),))
+
+
+def _quotient(value, slope):
+    """value / slope, 0 where the function is flat."""
+    ok = slope != 0
+    return jnp.where(ok, value / jnp.where(ok, slope, jnp.ones_like(slope)), jnp.zeros_like(value))
+
+
+Vector = Float[Array, " unknowns"]
+Matrix = Float[Array, "unknowns unknowns"]
+Function = Callable[[Vector], Vector]
+
+# Newton's method has converged where its next step is this power of the rounding error of the unknowns: what is left
+# after that step is far below.
+_CONVERGED = 2 / 3
+# Directions in which the equations change by less than this many rounding errors have no say: nothing determines the
+# root along them, and it stays where it is.
+_SINGULAR = 1e3
+_LEAST_SHARE = 1 / 64  # of a Newton step; a root that needs smaller ones is out of reach
+
+
+class Found(NamedTuple):
+    """What Newton's method ended with.
+
+    Attributes:
+        root: the unknowns.
+        residual: of the equations there.
+        jacobian: of the equations there.
+        steps: that were taken.
+        converged: whether the next step would have been below the tolerance.
+    """
+
+    root: Vector
+    residual: Vector
+    jacobian: Matrix
+    steps: Array
+    converged: Bool[Array, ""]
+
+
+def newton(function: Function, start: Vector, *, most: int = 30) -> Found:
+    """A root near the start by Newton's method; steps that make the equations worse are halved.
+
+    It has no derivatives: those of a root are `implicit_root`'s.
+
+    Args:
+        function: the equations, scaled so that unknowns and residuals are comparable with each other.
+        start: first guess.
+        most: largest number of evaluations; NaN ends as not converged.
+    """
+
+    def evaluated(x):
+        value, jacobian = with_jacobian(function, x)
+        return value, jacobian, -solve(jacobian, value)
+
+    def go_on(state):
+        x, (_, _, step), share, count = state
+        return ~_is_small(step, x) & (count < most) & (share >= _LEAST_SHARE)
+
+    def advance(state):
+        x, (value, jacobian, step), share, count = state
+        ahead = x + share * step
+        there = evaluated(ahead)
+        # at most as large: rounding is all that is left of the residual of a root
+        better = jnp.linalg.norm(there[0]) <= jnp.linalg.norm(value)
+        x, here = jax.tree.map(partial(jnp.where, better), (ahead, there), (x, (value, jacobian, step)))
+        return x, here, jnp.where(better, jnp.minimum(2 * share, 1.0), 0.5 * share), count + 1
+
+    begin = start, evaluated(start), jnp.ones((), start.dtype), jnp.ones((), start.dtype)
+    x, (value, jacobian, step), _, count = jax.lax.while_loop(go_on, advance, begin)
+    return Found(x, value, jacobian, count, _is_small(step, x))
+
+
+def implicit_root(function: Function, start: Vector, *, most: int = 30) -> Vector:
+    """A root of equations, differentiable any number of times with respect to what the function encloses.
+
+    Derivatives come from the implicit function theorem, in forward and in reverse mode, never from the iteration.
+    Where that has not converged, which the residual tells, they have no meaning.
+
+    Args:
+        function, most: as for `newton`.
+        start: first guess; no derivative passes through it.
+    """
+
+    def tangent_solve(linear, of):
+        return solve(with_jacobian(linear, jnp.zeros_like(of))[1], of)
+
+    return jax.lax.custom_root(
+        function, jax.lax.stop_gradient(start), lambda f, x: newton(f, x, most=most).root, tangent_solve
+    )
+
+
+def with_jacobian(function: Callable, x: Vector, *, has_aux: bool = False) -> Any:
+    """(value, Jacobian), (value, Jacobian, auxiliary result) with `has_aux`, from one evaluation in forward mode."""
+
+    def along(direction):
+        return jax.jvp(function, (x,), (direction,), has_aux=has_aux)
+
+    axes = (None, 1, None) if has_aux else (None, 1)
+    return jax.vmap(along, out_axes=axes)(jnp.eye(len(x), dtype=x.dtype))
+
+
+def solve(matrix: Matrix, of: Vector) -> Vector:
+    """Solution of linear equations; of a singular matrix the shortest of the best."""
+    return pseudo_inverse(matrix, _SINGULAR * float(jnp.finfo(of.dtype).eps)) @ of
+
+
+def _is_small(step: Vector, x: Vector) -> Bool[Array, ""]:
+    return jnp.linalg.norm(step) <= jnp.finfo(x.dtype).eps ** _CONVERGED * jnp.maximum(jnp.linalg.norm(x), 1e-30)

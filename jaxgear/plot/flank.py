@@ -1,0 +1,397 @@
+"""What is removed from the flanks, and the load and pressure on them."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.ticker import MaxNLocator
+
+from ..contact import Mesh, MeshCycle, Side
+from ..manufacture import helix_trace, profile_trace
+from ..metrics import flank_surface, removed_at
+from ..microgeometry import AbstractModification, NoModification
+from ..tolerance import ToleranceClass
+from .figure import (
+    ABOVE,
+    GREY,
+    HEIGHT,
+    PALE,
+    legend_above,
+    legend_over_panels,
+    line_style,
+    mark_path,
+    marker_style,
+    report_axes,
+)
+from .mesh_cycle import PATH_LABEL, pair_history
+
+WIDTH = 150.0  # of the two panels together [mm]
+_BAND = "ISO 1328 tolerance about "  # the name of the design
+
+Design = tuple[AbstractModification | None, AbstractModification | None]
+Tolerances = tuple[ToleranceClass | None, ToleranceClass | None]
+
+
+# abscissa and material removed [um] of a flank, of one shape
+Trace = Callable[[Side, AbstractModification], tuple[np.ndarray, np.ndarray]]
+# the band of the tolerance about a flank of a class: abscissa, lower and upper limit of the material removed [um]
+Band = Callable[[Side, AbstractModification, ToleranceClass], tuple[np.ndarray, np.ndarray, np.ndarray]]
+# labels the abscissa of the panel of one gear, "pinion" or "wheel"
+Frame = Callable[[Axes, Side, str], None]
+
+
+def flank_panels(
+    mesh: Mesh,
+    designs: Mapping[str, Design],
+    ax,
+    trace: Trace,
+    frame: Frame,
+    *,
+    above: float = ABOVE,
+    tolerance: Tolerances | None = None,
+    about: str | None = None,
+    band: Band | None = None,
+) -> np.ndarray:
+    """The two Axes: material removed goes down, and the nominal involute is the zero line.
+
+    Args:
+        mesh: prepared mesh.
+        designs: (pinion, wheel) modifications by the name of the design; None for the nominal involute.
+        ax: two Axes, for pinion and wheel; None for a new figure.
+        trace: one line.
+        frame: labels of one panel.
+        above: distance of a legend from a panel of a given figure [pt].
+        tolerance: classes of pinion and wheel, for a band about a design.
+        about: the name of this design; None for the first.
+        band: what makes it of one panel.
+    """
+    own = ax is None
+    with report_axes(ax, columns=2, width=WIDTH, height=HEIGHT) as panels:
+        for index, (panel, title, side) in enumerate(zip(panels, ("pinion", "wheel"), mesh.sides)):
+            for style, (name, design) in enumerate(designs.items()):
+                abscissa, removed = trace(side, design[index] or NoModification())
+                panel.plot(abscissa, removed, label=name, **line_style(style))
+                panel.set_xlim(abscissa[0], abscissa[-1])
+            quality = tolerance[index] if tolerance else None
+            if band is not None and quality is not None:
+                name = next(iter(designs)) if about is None else about
+                middle = designs[name][index] or NoModification()
+                place, low, high = band(side, middle, quality)
+                panel.fill_between(place, low, high, color=PALE, zorder=0.4, linewidth=0, label=f"{_BAND}{name}")
+            frame(panel, side, title)
+        panels[0].set_ylabel("material removed [µm]")
+        _downwards(panels)
+        if own:
+            legend_over_panels(panels[0].figure, panels[0])
+        else:
+            legend_above(panels[0], distance=above)
+    return np.asarray(panels)
+
+
+def _downwards(panels) -> None:
+    """One common ordinate that points down and has the nominal involute in sight."""
+    lines = [line.get_ydata() for panel in panels for line in panel.lines]
+    bands = [path.vertices[:, 1] for panel in panels for band in panel.collections for path in band.get_paths()]
+    values = np.concatenate([[0.0], *lines, *bands])
+    low, high = values.min(), max(values.max(), values.min() + 1.0)
+    air = 0.06 * (high - low)
+    for panel in panels:
+        panel.set_ylim(high + air, low - air)
+
+
+_LEVELS = 9
+
+
+def topography(mesh: Mesh, design: Design, ax=None) -> np.ndarray:
+    """Material removed [um] from pinion and wheel over roll angle [deg] and face coordinate [mm], as contours.
+
+    Args:
+        mesh: prepared mesh.
+        design: (pinion, wheel) modifications; None for the nominal involute.
+        ax: two Axes, for pinion and wheel; None for a new figure.
+
+    Returns:
+        the two Axes.
+    """
+    flanks = zip(mesh.sides, design)
+    surfaces = [jax.tree.map(np.asarray, flank_surface(side, flank or NoModification())) for side, flank in flanks]
+    low = min(surface.removed.min() for surface in surfaces)
+    high = max(surface.removed.max() for surface in surfaces)
+    levels = np.linspace(low, high if high > low else low + 1.0, _LEVELS)
+    with report_axes(ax, columns=2, width=WIDTH, height=HEIGHT) as panels:
+        for panel, title, surface in zip(panels, ("pinion", "wheel"), surfaces):
+            panel.grid(False)
+            places = surface.roll_angle, surface.face_coordinate, surface.removed
+            filled = panel.contourf(*places, levels=levels, cmap="cividis_r")
+            panel.contour(*places, levels=levels[1:], colors="black", linewidths=0.3)
+            panel.set_xlabel(f"roll angle of the {title} [deg]")
+        panels[0].set_ylabel("face coordinate [mm]")
+        bar = panels[0].figure.colorbar(filled, ax=list(panels), pad=0.02, format="%.3g")
+        bar.set_label("material removed [µm]")
+        bar.ax.tick_params(labelsize=panels[0].xaxis.label.get_fontsize())
+    return np.asarray(panels)
+
+
+_POINTS = 201  # across the face
+
+
+def lead_chart(
+    mesh: Mesh,
+    designs: Mapping[str, Design],
+    ax=None,
+    *,
+    tolerance: Tolerances | None = None,
+    about: str | None = None,
+) -> np.ndarray:
+    """Material removed from pinion and wheel [um] across their own face widths [mm], at the pitch point.
+
+    Material removed goes down, as in the K-chart, which shows the profile in the middle of the face.
+
+    Args:
+        mesh: prepared mesh.
+        designs: (pinion, wheel) modifications by the name of the design; None for the nominal involute.
+        ax: two Axes, for pinion and wheel; None for a new figure.
+        tolerance: classes of pinion and wheel; shades the total helix tolerance about a design, over the evaluation
+            range.
+        about: the name of this design; None for the first.
+
+    Returns:
+        the two Axes.
+    """
+    return flank_panels(mesh, designs, ax, _line, _over_face, tolerance=tolerance, about=about, band=_lead_band)
+
+
+def _lead_band(side: Side, design: AbstractModification, quality: ToleranceClass):
+    trace = helix_trace(side, design, quality)
+    inside = np.isfinite(trace.upper)
+    return tuple(np.asarray(values)[inside] for values in (trace.face_coordinate, -trace.upper, -trace.lower))
+
+
+def _line(side: Side, modification: AbstractModification) -> tuple[np.ndarray, np.ndarray]:
+    """The flank line through the pitch point."""
+    face = jnp.linspace(-0.5, 0.5, _POINTS) * side.face_width
+    removed = removed_at(side, modification, jnp.reshape(side.pitch_roll_length, (1,)), face)
+    return np.asarray(face), np.asarray(removed)[:, 0]
+
+
+def _over_face(panel: Axes, side: Side, title: str) -> None:
+    panel.set_xlabel(f"face coordinate of the {title} [mm]")
+
+
+_ABOVE_DIAMETERS = 34.0  # [pt]; clears numbers and label of the upper axis
+
+
+def k_chart(
+    mesh: Mesh,
+    designs: Mapping[str, Design],
+    ax=None,
+    *,
+    tolerance: Tolerances | None = None,
+    about: str | None = None,
+) -> np.ndarray:
+    """Material removed from pinion and wheel [um] over the roll angle [deg], in the middle of the face.
+
+    From the start of the active profile to the tip; the nominal involute is the zero line, material removed goes down
+    as on the print of a gear measuring machine. The diameter [mm] stands on the upper axis.
+
+    Args:
+        mesh: prepared mesh.
+        designs: (pinion, wheel) modifications by the name of the design; None for the nominal involute.
+        ax: two Axes, for pinion and wheel; None for a new figure.
+        tolerance: classes of pinion and wheel; shades the total profile tolerance about a design, over the evaluation
+            range.
+        about: the name of this design; None for the first.
+
+    Returns:
+        the two Axes.
+    """
+    return flank_panels(
+        mesh,
+        designs,
+        ax,
+        _profile,
+        _over_roll_angle,
+        above=_ABOVE_DIAMETERS,
+        tolerance=tolerance,
+        about=about,
+        band=_profile_band,
+    )
+
+
+def _profile_band(side: Side, design: AbstractModification, quality: ToleranceClass):
+    trace = profile_trace(side, design, quality)
+    inside = np.isfinite(trace.upper)
+    return tuple(np.asarray(values)[inside] for values in (trace.roll_angle, -trace.upper, -trace.lower))
+
+
+def _profile(side: Side, modification: AbstractModification) -> tuple[np.ndarray, np.ndarray]:
+    """The active profile in the middle of the face."""
+    surface = flank_surface(side, modification)
+    return np.asarray(surface.roll_angle), np.asarray(surface.removed)[len(surface.removed) // 2]
+
+
+def _over_roll_angle(panel: Axes, side: Side, title: str) -> None:
+    panel.set_xlabel(f"roll angle of the {title} [deg]")
+    surface = jax.tree.map(np.asarray, flank_surface(side, NoModification()))
+    base = float(surface.diameter[-1] / np.hypot(1, np.deg2rad(surface.roll_angle[-1])))
+
+    def to_diameter(angle):
+        return base * np.hypot(1, np.deg2rad(angle))
+
+    def to_angle(diameter):
+        return np.rad2deg(np.sqrt(np.maximum((np.asarray(diameter) / base) ** 2 - 1, 0)))
+
+    upper: Any = panel.secondary_xaxis("top", functions=(to_diameter, to_angle))
+    upper.set_xlabel("diameter [mm]", fontsize=panel.xaxis.label.get_fontsize())
+    upper.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    upper.tick_params(labelsize=panel.xaxis.label.get_fontsize(), width=0.6, length=3)
+
+
+_FACE_LABEL = "face coordinate [mm]"
+
+
+def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
+    """Hertzian pressure [MPa] of one pair over its path of contact and the face width; white where the flanks part.
+
+    Args:
+        cycle: solved cycle, of several slices to show more than one row.
+        ax: Axes to draw into; None for a new figure.
+    """
+    path, face, flank = _pressed(cycle)
+    contact = cycle.kinematics.path_of_contact
+    with report_axes(ax) as ax:
+        _bar(ax, _draw(ax, path, face, flank, None))
+        mark_path(ax, contact, zorder=3)
+        air = 0.05 * float(contact.base_pitch)
+        ax.set_xlim(float(contact.start) - air, float(contact.end) + air)
+        ax.set(ylim=(face[0], face[-1]), xlabel=PATH_LABEL, ylabel=_FACE_LABEL)
+    return ax
+
+
+def contact_pattern(cycle: MeshCycle, ax=None) -> np.ndarray:
+    """Contact pattern: Hertzian pressure [MPa] over the roll angle and the face width of pinion and wheel.
+
+    Each over the active profile, from its start on the left to the tip on the right; white where the flanks part.
+
+    Args:
+        cycle: solved cycle, of several slices to show more than one row.
+        ax: two Axes, for pinion and wheel; None for a new figure.
+
+    Returns:
+        the two Axes.
+    """
+    path, face, flank = _pressed(cycle)
+    most = float(np.nanmax(flank, initial=0.0))
+    with report_axes(ax, columns=2, width=WIDTH) as panels:
+        for panel, title, side, sign in zip(panels, ("pinion", "wheel"), cycle.sides, (1.0, -1.0)):
+            pitch, base = float(side.pitch_roll_length), float(side.base_radius)
+            image = _draw(panel, np.rad2deg((pitch + sign * path) / base), face, flank, most)
+            ends = (float(length) for length in (side.start_roll_length, side.tip_roll_length))
+            panel.set_xlim(*np.rad2deg(np.array([*ends]) / base))
+            panel.set(ylim=(face[0], face[-1]), xlabel=f"roll angle of the {title} [deg]")
+        panels[0].set_ylabel(_FACE_LABEL)
+        _bar(panels[1], image)
+    return np.asarray(panels)
+
+
+def _pressed(cycle: MeshCycle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Edges of path positions and slices [mm], and the pressure between them [MPa]; NaN where the flanks part."""
+    path, flank = pair_history(cycle, cycle.contact_pressure)
+    step = path[1] - path[0]
+    face = cycle.kinematics.resolution.slice_edges * float(cycle.kinematics.pair.face_width)
+    return np.append(path, path[-1] + step) - 0.5 * step, face, np.where(flank > 0, flank, np.nan)
+
+
+def _draw(ax: Axes, along, face, flank, most: float | None) -> ScalarMappable:
+    ax.grid(False)
+    # cividis: even in lightness, so that it reads the same in grey and for every kind of colour vision
+    return ax.pcolormesh(along, face, flank, cmap="cividis_r", vmin=0, vmax=most)
+
+
+def _bar(ax: Axes, image: ScalarMappable) -> None:
+    bar = ax.figure.colorbar(image, ax=ax, pad=0.02)
+    bar.set_label("flank pressure [MPa]")
+    bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
+
+
+def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None = None) -> Axes:
+    """Line load [N/mm] of every loaded pair over the face at one mesh position, the mean over the face beside it.
+
+    Args:
+        cycle: solved cycle of several slices.
+        ax: Axes to draw into; None for a new figure.
+        position: number of the mesh position; None for that with the largest line load.
+    """
+    where = _heaviest(cycle)[1] if position is None else position
+    load = np.asarray(cycle.line_load)[:, :, where]
+    face, width = (np.asarray(of) for of in (cycle.kinematics.face_coordinate, cycle.kinematics.slice_width))
+    with report_axes(ax) as ax:
+        for index, pair in enumerate(np.flatnonzero(load.max(axis=1) > 0)):
+            style = marker_style(index)
+            mean = np.average(load[pair], weights=width)
+            name = f"pair {_place(cycle, int(pair), where)}, K = {load[pair].max() / mean:.2f}"
+            ax.plot(face, load[pair], label=name, **style)
+            ax.axhline(mean, color=style["color"], linewidth=0.6, zorder=0.6)
+        ax.set(ylim=(0, None), ylabel="line load [N/mm]")
+        _finish(ax, cycle, where)
+    return ax
+
+
+def face_gap(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None = None) -> Axes:
+    """Gap [um] between the flanks of the most loaded pair over the face at one mesh position, unloaded and under load.
+
+    Unloaded it is that of modifications, misalignment and other meshes on the shafts, from where the flanks touch
+    first; on bent shafts the same with what the load of this mesh makes of shafts, bearings and housing, where they
+    give way; under load what is left where the flanks do not touch.
+
+    Args:
+        cycle: solved cycle of several slices with its mesh, `cycle.on(mesh)`.
+        ax: Axes to draw into; None for a new figure.
+        position: number of the mesh position; None for that with the largest line load.
+
+    Raises:
+        ValueError: for a cycle without its mesh.
+    """
+    mesh = cycle.mesh_for("face_gap")
+    pair, where = _heaviest(cycle)
+    if position is not None:
+        where = position
+        pair = int(np.asarray(cycle.line_load)[:, :, where].max(axis=1).argmax())
+    unloaded, opening = (np.asarray(of)[pair, :, where] for of in (mesh.held(cycle.gap), cycle.opening))
+    face = np.asarray(cycle.kinematics.face_coordinate)
+    curves = {"unloaded": unloaded}
+    if mesh.support is not None:
+        force = np.asarray(cycle.line_load * mesh.lever[:, None] * mesh.slice_width[:, None])[:, :, where].sum(axis=0)
+        bent = np.asarray(mesh.support.influence(mesh.face_coordinate)) @ force
+        if bent.any():
+            curves["on bent shafts"] = unloaded + float(mesh.lever[pair, where]) * bent
+    curves = {name: curve - curve.min() for name, curve in curves.items()}
+    curves["under load"] = np.maximum(opening, 0.0)
+    with report_axes(ax) as ax:
+        for index, (name, curve) in enumerate(curves.items()):
+            ax.plot(face, curve, label=name, **marker_style(index))
+        ax.set(ylim=(0, None), ylabel="gap [µm]")
+        _finish(ax, cycle, where)
+    return ax
+
+
+def _heaviest(cycle: MeshCycle) -> tuple[int, int]:
+    """Pair and position with the largest line load."""
+    most = np.asarray(cycle.line_load).max(axis=1)
+    pair, where = np.unravel_index(int(most.argmax()), most.shape)
+    return int(pair), int(where)
+
+
+def _place(cycle: MeshCycle, pair: int, position: int) -> str:
+    return f"{float(np.asarray(cycle.kinematics.path)[pair, position]):+.2f} mm from the pitch point"
+
+
+def _finish(ax: Axes, cycle: MeshCycle, position: int) -> None:
+    half = 0.5 * float(cycle.kinematics.pair.face_width)
+    ax.set(xlim=(-half, half), xlabel=_FACE_LABEL)
+    ax.axvline(0.0, color=GREY, linewidth=0.4, zorder=0.5)
+    legend_above(ax)

@@ -1,0 +1,235 @@
+"""Curves over the mesh cycle: transmission error, load sharing, stiffness, pressure, and the path of contact."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from ..contact import MeshCycle
+from ..metrics import load_sharing as share
+from ..metrics import secant_stiffness
+from .figure import ABOVE_MARKS, GREY, legend_above, line_style, mark_path, report_axes
+
+PATH_LABEL = "path of contact from the pitch point [mm]"
+PHASE_LABEL = "mesh phase [base pitches]"
+
+
+def pair_history(cycle: MeshCycle, values) -> tuple[np.ndarray, np.ndarray]:
+    """What one pair goes through from first to last contact.
+
+    All pairs are alike and follow each other at one base pitch, so the pairs of a cycle, put in the order of their path
+    positions, are the stages of one pair.
+
+    Args:
+        cycle: solved mesh cycle.
+        values: shape (pairs, ..., positions).
+
+    Returns:
+        the path positions [mm], shape (pairs * positions,), and the values there, shape (..., pairs * positions).
+    """
+    path = np.asarray(cycle.kinematics.path).ravel()
+    stages = np.moveaxis(np.asarray(values), 0, -2)
+    stages = stages.reshape(*stages.shape[:-2], -1)
+    order = np.argsort(path, kind="stable")
+    return path[order], stages[..., order]
+
+
+def path_limits(cycles) -> tuple[float, float]:
+    """Path range that holds the path of contact and all loaded corner contact of these cycles, with some air [mm]."""
+    low, high = [], []
+    for cycle in cycles:
+        contact = cycle.kinematics.path_of_contact
+        loaded = np.asarray(cycle.kinematics.path)[np.asarray(cycle.pair_force) > 0]
+        air = 0.1 * float(contact.base_pitch)
+        low.append(min(float(contact.start), loaded.min(initial=np.inf)) - air)
+        high.append(max(float(contact.end), loaded.max(initial=-np.inf)) + air)
+    return min(low), max(high)
+
+
+def two_pitches(phase, curve) -> tuple[np.ndarray, np.ndarray]:
+    """Phase and curve over two base pitches, closed at the end.
+
+    Args:
+        phase: equally spaced over one base pitch, shape (positions,).
+        curve: periodic values, shape (..., positions).
+    """
+    phase, curve = np.asarray(phase), np.asarray(curve)
+    ends = [phase, phase + 1, phase[:1] + 2]
+    return np.concatenate(ends), np.concatenate([curve, curve, curve[..., :1]], axis=-1)
+
+
+def transmission_error(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
+    """Loaded transmission error [um] of several designs over two base pitches, with their PPTE in the legend.
+
+    Args:
+        cycles: solved cycles by the name of their design.
+        ax: Axes to draw into; None for a new figure.
+    """
+    with report_axes(ax) as ax:
+        for index, (name, cycle) in enumerate(cycles.items()):
+            ppte = np.ptp(np.asarray(cycle.transmission_error))
+            curve = two_pitches(cycle.phase, cycle.transmission_error)
+            ax.plot(*curve, label=f"{name} (PPTE {ppte:.2f} µm)", **line_style(index))
+        ax.set(xlim=(0, 2), xlabel=PHASE_LABEL, ylabel="transmission error [µm]")
+        legend_above(ax)
+    return ax
+
+
+def load_sharing(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
+    """Share of one pair in the total force over its whole path, corner contact before A and after E included.
+
+    Args:
+        cycles: solved cycles by the name of their design; the points A to E are those of the first.
+        ax: Axes to draw into; None for a new figure.
+    """
+    with report_axes(ax) as ax:
+        for index, (name, cycle) in enumerate(cycles.items()):
+            ax.plot(*pair_history(cycle, share(cycle)), label=name, **line_style(index))
+        if cycles:
+            mark_path(ax, next(iter(cycles.values())).kinematics.path_of_contact)
+            ax.set_xlim(path_limits(cycles.values()))
+        ax.set(ylim=(0, 1.05), xlabel=PATH_LABEL, ylabel="share of the pair in the load [-]")
+        legend_above(ax, distance=ABOVE_MARKS)
+    return ax
+
+
+def mesh_stiffness(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
+    """Secant and tangent mesh stiffness [N/um] of one design over two base pitches.
+
+    The secant is force over deflection, for static deflections; the tangent the local slope, for small vibrations.
+
+    Args:
+        cycle: solved cycle.
+        ax: Axes to draw into; None for a new figure.
+    """
+    curves = {"tangent": cycle.tangent_stiffness, "secant": secant_stiffness(cycle)}
+    with report_axes(ax) as ax:
+        for index, (name, values) in enumerate(curves.items()):
+            mean = float(np.mean(np.asarray(values)))
+            ax.plot(*two_pitches(cycle.phase, values), label=f"{name} (mean {mean:.0f} N/µm)", **line_style(index))
+        ax.set(xlim=(0, 2), xlabel=PHASE_LABEL, ylabel="mesh stiffness [N/µm]")
+        ax.set_ylim(bottom=0)
+        legend_above(ax)
+    return ax
+
+
+_DECADE = (1, 2, 5)  # ticks
+_LINEAR = 1.5  # share of the linear part of the scale [decades of the logarithmic one]
+
+
+def pressure(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
+    """Hertzian pressure [MPa] of one pair over its path of contact, the largest of all slices.
+
+    Lines on the path of contact are that of the flanks. Dots before A and after E are that of the tip corners, another
+    kind of contact, whose pressure depends on the tip edge radius; the legend has its largest value, to 10 MPa. It may
+    be many times that of the flanks: the scale is linear as far as these go, and logarithmic above.
+
+    Args:
+        cycles: solved cycles by the name of their design; the points A to E are those of the first.
+        ax: Axes to draw into; None for a new figure.
+    """
+    corners: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    highest = 0.0
+    with report_axes(ax) as ax:
+        for index, (name, cycle) in enumerate(cycles.items()):
+            path, flank = pair_history(cycle, np.asarray(cycle.contact_pressure).max(axis=1))
+            _, corner = pair_history(cycle, np.asarray(cycle.corner_pressure).max(axis=1))
+            contact = cycle.kinematics.path_of_contact
+            outside = (path < float(contact.start)) | (path > float(contact.end))
+            highest = max(highest, float(flank.max()))
+            label = name
+            if corner.max() > 0:
+                corners[index] = path[corner > 0], corner[corner > 0]
+                label = f"{name} (corners {round(corner.max(), -1):.0f} MPa)"
+            ax.plot(path, np.where(outside, np.nan, flank), label=label, **line_style(index))
+        for index, (path, corner) in corners.items():
+            ax.plot(path, corner, color=line_style(index)["color"], linestyle="none", marker="o", markersize=3)
+        if corners:
+            end = _two_scales(ax, highest, max(corner.max() for _, corner in corners.values()))
+            label = f"tip corner contact; scale logarithmic above {end:g} MPa"
+            ax.plot([], [], color=GREY, linestyle="none", marker="o", markersize=3, label=label)
+        if cycles:
+            mark_path(ax, next(iter(cycles.values())).kinematics.path_of_contact)
+            ax.set_xlim(path_limits(cycles.values()))
+        ax.set_ylim(bottom=0)
+        ax.set(xlabel=PATH_LABEL, ylabel="pressure [MPa]")
+        legend_above(ax, distance=ABOVE_MARKS)
+    return ax
+
+
+def _two_scales(ax: Axes, flank: float, corner: float) -> float:
+    """Makes the scale linear up to the first tick above the flank pressure, and logarithmic from there; that tick."""
+    linear = MaxNLocator(nbins=5).tick_values(0.0, max(flank, 1.0))
+    end = float(linear[-1])
+    ax.set_yscale("symlog", linthresh=end, linscale=_LINEAR)
+    decade = 10.0 ** np.floor(np.log10(end))
+    steps = np.outer(decade * 10.0 ** np.arange(4), _DECADE).ravel()
+    above = steps[(steps > end) & (steps < 2.5 * corner)]  # the first one beyond it, too
+    ax.set_yticks([*linear, *above], minor=False)
+    ax.set_yticks([], minor=True)
+    ax.yaxis.set_major_formatter("{x:g}")
+    return end
+
+
+_LOADED = 1e-3  # of the total force; a pair with less carries none
+_ARC = 400  # points of a circle
+_HIGH, _FLAT = 90.0, 0.6  # height of the figure [mm]; height of what is shown over its width
+_AIR = 0.35  # about the path of contact, in lengths of it
+
+
+def meshing_diagram(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
+    """Base, tip and pitch point in the transverse plane [mm], and every place where a loaded pair touches.
+
+    On the line of action flanks touch; beyond the points A and E, where a pair touches under load before and after its
+    theoretical path, the tip corner of one gear does, on its tip circle. The origin is the pitch point, the pinion
+    below; its contact moves to the right.
+
+    Args:
+        cycle: solved cycle.
+        ax: Axes to draw into; None for a new figure.
+    """
+    contact, pair = cycle.kinematics.path_of_contact, cycle.kinematics.pair
+    base = np.asarray([float(contact.pinion_base_radius), float(contact.wheel_base_radius)])
+    tangent = float(contact.pinion_pitch_roll_length) / base[0]
+    angle = np.arctan(tangent)
+    along = np.array([np.cos(angle), np.sin(angle)])
+    # foot of the perpendicular from each centre on the line of action, then the centre
+    centres = [np.array([0.0, -base[0] / np.cos(angle)]), np.array([0.0, base[1] / np.cos(angle)])]
+    start, end = float(contact.start), float(contact.end)
+    path, force = np.asarray(cycle.kinematics.path), np.asarray(cycle.pair_force)
+    touched = np.sort(path[force > _LOADED * float(cycle.force)])
+    places = np.array([_place(s, along, centres, base, start, end) for s in touched])
+    with report_axes(ax, height=_HIGH) as ax:
+        turn = np.linspace(0, 2 * np.pi, _ARC * 20)
+        for index, (centre, gear, name) in enumerate(zip(centres, (pair.pinion, pair.wheel), ("pinion", "wheel"))):
+            for radius, style, kind in ((float(gear.tip_radius), "-", "tip"), (base[index], ":", "base")):
+                circle = centre[:, None] + radius * np.stack([np.cos(turn), np.sin(turn)])
+                colour = line_style(index + 1)["color"]
+                ax.plot(*circle, color=colour, linestyle=style, linewidth=1.0, label=f"{kind} circle, {name}")
+        feet = np.stack(
+            [-float(contact.pinion_pitch_roll_length) * along, float(contact.wheel_pitch_roll_length) * along]
+        )
+        ax.plot(*feet.T, color=GREY, linewidth=0.8, label="line of action")
+        ax.plot(*places.T, color="black", marker=".", linestyle="", markersize=3.5, label="contact under load")
+        for name, position in (("A", start), ("C", 0.0), ("E", end)):
+            ax.annotate(name, position * along, xytext=(0, 6), textcoords="offset points", ha="center", color=GREY)
+        half = (0.5 + _AIR) * (end - start)
+        middle = 0.5 * (start + end) * along
+        ax.set_aspect("equal")
+        ax.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - _FLAT * half, middle[1] + _FLAT * half))
+        ax.set(xlabel="across the line of centres [mm]", ylabel="along the line of centres [mm]")
+        legend_above(ax)
+    return ax
+
+
+def _place(position: float, along, centres, base, start: float, end: float) -> np.ndarray:
+    """Point of contact [mm] of a pair at a path position: on the line of action, or with a tip corner beyond it."""
+    if start <= position <= end:
+        return position * along
+    # the corner that left the line at its end turns on with its gear
+    gear, last = (0, end) if position > end else (1, start)
+    turn = (position - last) / base[gear] * (1 if gear else -1)
+    arm = last * along - centres[gear]
+    rotated = np.array([np.cos(turn) * arm[0] - np.sin(turn) * arm[1], np.sin(turn) * arm[0] + np.cos(turn) * arm[1]])
+    return centres[gear] + rotated
