@@ -33,7 +33,7 @@ from jaxgear.io.folder import RESULT_FILES, result_folder
 from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
 from jaxgear.manufacture import over_balls
 from jaxgear.metrics import Finding
-from jaxgear.metrics.findings import Limit
+from jaxgear.metrics.findings import Range
 from jaxgear.microgeometry import NoModification
 from jaxgear.optimize import result as optimum_result
 from jaxgear.report import read_table
@@ -227,7 +227,7 @@ def test_shafts_that_an_analysis_leaves_out_are_told(folder, analyzed):
 
 
 def test_what_is_not_usual_is_said_once_of_all_designs_it_concerns():
-    usual, range_ = Limit(0.0, 1650.0, "MPa", "case-hardened"), Limit(0.0, 0.5, "", "steel")
+    usual, range_ = Range(0.0, 1650.0, "MPa", "case-hardened"), Range(0.0, 0.5, "", "steel")
     found = {
         "unmodified": (Finding("friction", "", 3.7, range_), Finding("corner pressure", "", 4689.0, usual)),
         "optimum": (
@@ -522,7 +522,7 @@ def not_searched(monkeypatch):
             self.evaluate(name, *modifications)
         self.evaluate("optimum", *beside["rule-based"])
 
-    monkeypatch.setattr(run.Run, "search", evaluated)
+    monkeypatch.setattr(run.CommandRun, "search", evaluated)
 
 
 def test_what_cannot_be_meshed_is_not_verified(tmp_path, not_searched):
@@ -787,9 +787,9 @@ def test_interruption_leaves_earlier_results_alone(folder, tmp_path, monkeypatch
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run.Run, "prepare", lambda self, **_: None)
-    monkeypatch.setattr(run.Run, "evaluate", interrupt)
-    monkeypatch.setattr(run.Run, "search", interrupt)
+    monkeypatch.setattr(run.CommandRun, "prepare", lambda self, **_: None)
+    monkeypatch.setattr(run.CommandRun, "evaluate", interrupt)
+    monkeypatch.setattr(run.CommandRun, "search", interrupt)
     name = {"analyze": "fixed", "optimize": "free"}[command]
     result = call(command, folder / f"{name}.toml", "-o", target)
     assert result.code == 130
@@ -802,7 +802,7 @@ def test_a_defect_of_the_program_is_one_line_too(folder, tmp_path, monkeypatch):
     def fail(*_, **__):
         raise TypeError("two\nlines")
 
-    monkeypatch.setattr(run.Run, "prepare", fail)
+    monkeypatch.setattr(run.CommandRun, "prepare", fail)
     target = tmp_path / "out"
     result = call("analyze", folder / "fixed.toml", "-o", target)
     assert_refused(result, "unexpected TypeError: two lines (JAXGEAR_DEBUG=1 shows where)")

@@ -14,7 +14,7 @@ from gearboxes import two_stages
 import jaxgear as jg
 from jaxgear.compliance import face_kernel, few_modes
 from jaxgear.contact.prescribed import solve_series
-from jaxgear.numerics import ContactProblem, Coupling
+from jaxgear.numerics import ContactProblem, SliceCoupling
 from jaxgear.optimize.refine import _with_positions
 from jaxgear.optimize.verdict import verification
 from jaxgear.shafts import Misalignment, RigidSupport, TabulatedSupport, support
@@ -139,7 +139,7 @@ def coupled_problem(seed, springs, slices, count, bends=0):
         shapes, held = np.linalg.qr(np.vander(np.linspace(-1, 1, slices), bends, increasing=True))[0], root @ root.T
         shapes[:, 0], held = slices**-0.5, jnp.asarray(0.01 * held)
         shapes = jnp.asarray(shapes)
-    coupling = Coupling(*modes_of(kernel(slices), count), shapes, held)
+    coupling = SliceCoupling(*modes_of(kernel(slices), count), shapes, held)
     problem = random_problem(seed, springs, slices, 6)
     return replace(problem, coupling=coupling, weight=jnp.full(slices, WIDTH / slices), load=jnp.asarray(2000.0))
 

@@ -81,9 +81,9 @@ def test_what_a_library_makes_of_it_does_not_matter(gear, tmp_path, monkeypatch,
             if made_of_it is not None:
                 raise made_of_it from None
 
-    monkeypatch.setattr(run.Run, "prepare", lambda self, **_: None)
-    monkeypatch.setattr(run.Run, "evaluate", evaluate)
-    monkeypatch.setattr(run.Run, "write", lambda self, **_: None)
+    monkeypatch.setattr(run.CommandRun, "prepare", lambda self, **_: None)
+    monkeypatch.setattr(run.CommandRun, "evaluate", evaluate)
+    monkeypatch.setattr(run.CommandRun, "write", lambda self, **_: None)
     result = call("analyze", gear, "-o", tmp_path / "out")
     assert (result.code, result.err) == (130, NOTHING)
     assert not (tmp_path / "out").exists()
@@ -98,9 +98,9 @@ def test_results_that_are_there_are_not_denied(gear, tmp_path, monkeypatch, late
         signal.raise_signal(signal.SIGINT)
         return original(*arguments)
 
-    monkeypatch.setattr(run.Run, "prepare", lambda self, **_: None)
-    monkeypatch.setattr(run.Run, "evaluate", lambda *_: None)
-    monkeypatch.setattr(run.Run, "write", written)
+    monkeypatch.setattr(run.CommandRun, "prepare", lambda self, **_: None)
+    monkeypatch.setattr(run.CommandRun, "evaluate", lambda *_: None)
+    monkeypatch.setattr(run.CommandRun, "write", written)
     where = "jaxgear.io.folder._replace" if late == "replace" else "jaxgear.cli.run.Run.show"
     original = __import__("jaxgear.io.folder", fromlist=["_replace"])._replace
     monkeypatch.setattr(where, press)
@@ -130,7 +130,7 @@ def test_at_any_moment(gear):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_leaves_no_folder_behind(gear, tmp_path, monkeypatch, number):
-    monkeypatch.setattr(run.Run, "prepare", lambda self, **_: signal.raise_signal(number))
+    monkeypatch.setattr(run.CommandRun, "prepare", lambda self, **_: signal.raise_signal(number))
     before = signal.getsignal(signal.SIGTERM)
     result = call("analyze", gear, "-o", tmp_path / "out")
     assert (result.code, result.err) == (130, NOTHING)

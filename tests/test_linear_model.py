@@ -13,7 +13,7 @@ from catalogue import LINE, POWER_BOX, gear_pair, power_reliefs, solve_any
 import jaxgear as jg
 from jaxgear.numerics.reductions import Range
 from jaxgear.optimize.goal import FEASIBLE
-from jaxgear.optimize.linear_model import PENALTY, Model
+from jaxgear.optimize.linear_model import PENALTY, LinearModel
 from jaxgear.optimize.linearization import Linearization, Pieces
 from jaxgear.optimize.problem import Roughness, make_problem
 from jaxgear.tolerance import GearTolerance
@@ -194,7 +194,7 @@ def model(values, slope, x, *, measure=None, weights=None, excess=None, excess_s
     excess_slope = np.zeros((0, len(x))) if excess_slope is None else np.asarray(excess_slope, float)
     objective = Pieces(values, slope, values, slope)
     limits = tuple(Pieces(over[None, None], rise[None, None]) for over, rise in zip(excess, excess_slope))
-    return Model(problem, x, Linearization((objective,), limits, np.True_), penalty=PENALTY)
+    return LinearModel(problem, x, Linearization((objective,), limits, np.True_), penalty=PENALTY)
 
 
 def test_chebyshev_polynomial():
@@ -348,7 +348,7 @@ def test_a_failed_solution_has_no_value():
     assert made.fine and np.isfinite(made.value)
     problem = SimpleNamespace(measure=jg.Mean(), cases=SimpleNamespace(weights=jnp.ones(1)), roughness=None)
     pieces, slope = np.zeros((1, 2)), np.zeros((1, 2, 1))
-    failed = Model(
+    failed = LinearModel(
         problem,
         np.array([0.2]),
         Linearization((Pieces(pieces, slope, pieces, slope),), (), np.False_),

@@ -20,7 +20,7 @@ from jaxgear.cli import cache
 from jaxgear.contact import begin_contact
 from jaxgear.numerics import programs
 from jaxgear.numerics.durable import forget_the_oldest
-from jaxgear.numerics.programs import Store, begin, keep, program
+from jaxgear.numerics.programs import ProgramStore, begin, keep, program
 
 
 class Shelf(dict):
@@ -34,7 +34,7 @@ class Shelf(dict):
 def shelf():
     """A shelf that this process uses."""
     found = Shelf()
-    keep(Store(found))
+    keep(ProgramStore(found))
     yield found
     keep(None)
 
@@ -165,7 +165,7 @@ def test_a_program_that_cannot_be_loaded_is_compiled_again(traced, monkeypatch):
             return pickle.dumps(({"values": programs._Shape((3,), "float64")}, (b"torn", None, None)))
 
     monkeypatch.setattr(programs, "_recipe", lambda made_of: b"recipe")
-    keep(Store(Full()))
+    keep(ProgramStore(Full()))
     np.testing.assert_array_equal(scaled(jnp.ones(3), "twice")["values"], 2 * np.ones(3))
     keep(None)
     assert traced == ["scaled"]

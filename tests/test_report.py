@@ -48,7 +48,7 @@ def without(monkeypatch):
 
 def written(path: Path, **parts) -> Page:
     """A page with one section."""
-    section = report.Section("Part", **parts)
+    section = report.Chapter("Part", **parts)
     report.write_report(path, report.Report(HOSTILE, HOSTILE, [("name", HOSTILE)], [section]))
     assert_well_formed(path.read_bytes())
     return Page(path.read_text("utf-8"))
@@ -89,7 +89,7 @@ def test_a_table_is_the_one_that_is_printed():
 
 def test_figures_are_numbered_through_all_sections(tmp_path):
     picture = report.Figure("a", "What it shows.", "data:image/png;base64,AAAA", 100.0)
-    sections = [report.Section("one", figures=[picture, picture]), report.Section("two", figures=[picture])]
+    sections = [report.Chapter("one", figures=[picture, picture]), report.Chapter("two", figures=[picture])]
     report.write_report(tmp_path / "page.html", report.Report("t", "s", FACTS, sections))
     page = (tmp_path / "page.html").read_text("utf-8")
     assert [page.count(f"Figure {number}. What it shows.") for number in range(1, 5)] == [1, 1, 1, 0]
@@ -162,11 +162,11 @@ def test_what_nobody_looked_at_is_not_called_usual(tmp_path):
     data = {"versions": {"jaxgear": "1"}, "geometry": pair}
     asked = document.Document(("analyze", "pair.toml"), source, datetime.datetime.now())
     for findings, said in (((), True), (None, False), (["warning: this"], False)):
-        asked.write(tmp_path, design, data, document.Found(["line"], findings=findings))
+        asked.write(tmp_path, design, data, document.CommandResult(["line"], findings=findings))
         page = (tmp_path / "report.html").read_text("utf-8")
         assert ("within the usual ranges" in page) == said and ("warning: this" in page) == bool(findings)
         assert "no limit is passed" in page
-    asked.write(tmp_path, design, data, document.Found(["line"], ["NOT CONVERGED"]))
+    asked.write(tmp_path, design, data, document.CommandResult(["line"], ["NOT CONVERGED"]))
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "no limit is passed" not in page and page.count("NOT CONVERGED") == 2
 
@@ -228,7 +228,7 @@ def test_a_file_that_is_not_there_is_one_line(tmp_path, command):
 def test_a_browser_prints_it(tmp_path):
     """Two short sections, one of which begins on a new page, on paper of the size A4."""
     page = tmp_path / "page.html"
-    sections = [report.Section("a", ["b"]), report.Section("c", ["d"], new_page=True)]
+    sections = [report.Chapter("a", ["b"]), report.Chapter("c", ["d"], new_page=True)]
     report.write_report(page, report.Report("title", "sub", FACTS, sections))
     paper = tmp_path / "page.pdf"
     options = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}")

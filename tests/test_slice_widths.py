@@ -17,7 +17,7 @@ from jaxgear.compliance import face_ends, slice_basis
 from jaxgear.contact import end_relief_widths
 from jaxgear.io import DesignFileError, load_design
 from jaxgear.metrics import edge_load_factor, face_load_factor, face_load_factors, findings_of, mean_removed_material
-from jaxgear.numerics import Coupling
+from jaxgear.numerics import SliceCoupling
 from jaxgear.shafts import Misalignment, RigidSupport, TabulatedSupport
 
 WIDTH, CHORD, TORQUE = 18.0, 8.189371, 50.0
@@ -135,7 +135,7 @@ def coupled_problem(bends):
         held = jnp.asarray(0.01 * made @ made.T)
         powers = np.linalg.qr(root * np.vander(np.linspace(-1, 1, 6), bends, increasing=True))[0] / root
         shapes = jnp.asarray(powers * np.sign(powers[0, 0]))
-    coupling = Coupling(*map(jnp.asarray, (modes / root, share, rest)), shapes, held, weight=jnp.asarray(WEIGHT))
+    coupling = SliceCoupling(*map(jnp.asarray, (modes / root, share, rest)), shapes, held, weight=jnp.asarray(WEIGHT))
     problem = random_problem(3, 2, 6, 6)
     return replace(problem, coupling=coupling, weight=jnp.asarray(3.0 * WEIGHT), load=jnp.asarray(2000.0))
 

@@ -267,7 +267,7 @@ def test_loads_of_the_table_wear_one_flank_together(file, monkeypatch):
 @pytest.mark.parametrize("weights, told", [("weights = [3.0, 1.0]", "for 75, 25 % of"), ("", "the same share of")])
 def test_the_shares_of_the_torques_are_told(file, weights, told):
     design = load_design(file(PAIR + LOADS.replace("weights = [3.0, 1.0]", weights)))
-    study = wear_report.Study(design, wear_request(design), {}, {}, {})
+    study = wear_report.WearStudy(design, wear_request(design), {}, {}, {})
     summary = wear_report.summary(study)
     assert (
         told in summary["shares_of_revolutions"]

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import jax
 
-from ..numerics.durable import Kept, forget_the_oldest, user_folder
-from ..numerics.programs import Store, keep
+from ..numerics.durable import KeptFiles, forget_the_oldest, user_folder
+from ..numerics.programs import ProgramStore, keep
 
 _MOST = 256 << 20  # bytes of all that is kept
 
@@ -30,11 +30,11 @@ def enable_cache() -> Path | None:
         forget_the_oldest(folder, _MOST)
     except OSError:
         return None
-    keep(Store(Files(folder)))
+    keep(ProgramStore(Files(folder)))
     return folder
 
 
-class Files(Kept):
+class Files(KeptFiles):
     """Programs as files of a folder, named by all that they depend on."""
 
     def __init__(self, folder: Path):

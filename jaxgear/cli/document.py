@@ -12,7 +12,7 @@ import rich.table
 from ..io import DesignFile
 from ..io.errors import naming
 from ..io.toml import content
-from ..report import Report, Section, Source, Table, figure, heading, needed, numbers, read_table, text, write_report
+from ..report import Chapter, Report, Source, Table, figure, heading, needed, numbers, read_table, text, write_report
 from .geometry import drawing_table, rating_page
 
 REPORT = "report.html"
@@ -63,7 +63,7 @@ _ELSEWHERE = ("title", "design_file", "project", "versions", "geometry", "drawin
 
 
 @dataclass(frozen=True)
-class Found:
+class CommandResult:
     """What a command has to say.
 
     Attributes:
@@ -84,7 +84,7 @@ class Found:
     findings: Sequence[str] | None = None
     tables: Sequence[rich.table.Table] = ()
     figures: Sequence[Path] = ()
-    pages: Sequence[Section] = ()
+    pages: Sequence[Chapter] = ()
     assumptions: Sequence[str] = ()
     left_out: str = ""
     first: Sequence[Table] = ()
@@ -115,7 +115,7 @@ class Document:
             ("command", shlex.join(("jaxgear", *self.command))),
         ]
 
-    def write(self, folder: Path, design: DesignFile, data: Mapping[str, Any], found: Found) -> None:
+    def write(self, folder: Path, design: DesignFile, data: Mapping[str, Any], found: CommandResult) -> None:
         """Writes the report.
 
         Args:
@@ -126,15 +126,15 @@ class Document:
         """
         versions = ("made by", ", ".join(f"{name} {version}" for name, version in data["versions"].items()))
         sections = [
-            Section("Results", found.lines, found.warnings, tables=[*found.first, *map(read_table, found.tables)]),
+            Chapter("Results", found.lines, found.warnings, tables=[*found.first, *map(read_table, found.tables)]),
             *found.pages,
             *_figures(found.figures),
             _validity(found, data),
             _inputs(design, data, found),
             *([rating_page(data["iso_6336"])] if "iso_6336" in data else []),
-            Section("Geometry", [_GEOMETRY_NOTE], tables=_gears(data), new_page=True),
+            Chapter("Geometry", [_GEOMETRY_NOTE], tables=_gears(data), new_page=True),
             *_all_numbers(data),
-            Section(
+            Chapter(
                 "Design file",
                 [f"{self.source.name} as it was read; the command on the first page repeats the calculation."],
                 literal=self.source.text,
@@ -190,14 +190,14 @@ def geometry_tables(geometry: Mapping[str, Mapping[str, Any]]) -> list[Table]:
     return [Table(("", "pinion", "wheel"), gears, "gears"), Table(("", "pair"), both, "pair")]
 
 
-def _figures(files: Iterable[Path]) -> list[Section]:
+def _figures(files: Iterable[Path]) -> list[Chapter]:
     pictures = [figure(path) for path in files]
     if not pictures:
         return []
-    return [Section("Figures", figures=pictures)]
+    return [Chapter("Figures", figures=pictures)]
 
 
-def _validity(found: Found, data: Mapping[str, Any]) -> Section:
+def _validity(found: CommandResult, data: Mapping[str, Any]) -> Chapter:
     """What the numbers can be trusted for."""
     lines = []
     if not found.warnings:
@@ -218,17 +218,17 @@ def _validity(found: Found, data: Mapping[str, Any]) -> Section:
     optimum = data.get("optimum", {})
     checks += [(said, text(optimum[key])) for key, said in _OF_OPTIMUM.items() if key in optimum]
     tables = [Table(("", "value"), tuple(checks), "checks")] if checks else []
-    return Section("Convergence and validity", lines, found.warnings, found.findings or (), tables)
+    return Chapter("Convergence and validity", lines, found.warnings, found.findings or (), tables)
 
 
-def _inputs(design: DesignFile, data: Mapping[str, Any], found: Found) -> Section:
+def _inputs(design: DesignFile, data: Mapping[str, Any], found: CommandResult) -> Chapter:
     """What was assumed."""
     given = {name: data[name] for name in _INPUTS if data.get(name) is not None}
     held = f"{found.left_out[:1].upper()}{found.left_out[1:]}." if found.left_out else _SUPPORTED
     points = [*_ASSUMED, *found.assumptions, _RIGID if design.support is None else held]
     if design.resolution().slices == 1:
         points.append(_EVEN)
-    return Section("Inputs and assumptions", (), (), points, [Table(("", "value"), tuple(numbers(given)), "inputs")])
+    return Chapter("Inputs and assumptions", (), (), points, [Table(("", "value"), tuple(numbers(given)), "inputs")])
 
 
 def _listed(title: str, data: Mapping[str, Any]) -> list[Table]:
@@ -249,7 +249,7 @@ def _split(title: str, data: Mapping[str, Any]) -> list[Table]:
     return [table for part in parts for table in _listed(title, {name: data[name] for name in part})]
 
 
-def _all_numbers(data: Mapping[str, Any]) -> list[Section]:
+def _all_numbers(data: Mapping[str, Any]) -> list[Chapter]:
     """What `summary.json` holds beside what stands in other sections."""
     rest = {name: value for name, value in data.items() if name not in (*_INPUTS, *_ELSEWHERE)}
     tables = []
@@ -261,5 +261,5 @@ def _all_numbers(data: Mapping[str, Any]) -> list[Section]:
         tables.insert(0, Table(("", "value"), tuple(numbers(loose)), ""))
     if not tables:
         return []
-    section = Section("All numbers", ["As in summary.json, which has every digit."], tables=tables, new_page=True)
+    section = Chapter("All numbers", ["As in summary.json, which has every digit."], tables=tables, new_page=True)
     return [section]

@@ -31,7 +31,7 @@ from ..io import DesignFile, DesignFileError, DynamicsRequest, dynamics_request
 from ..io.errors import naming
 from . import dynamics_figures, dynamics_report, manufactured
 from .compared import Modifications, compared, search_of
-from .dynamics_report import Study, next_to_design, peak
+from .dynamics_report import DynamicsStudy, next_to_design, peak
 from .progress import Stages
 from .study import Kept, SpeedResponses, runs_beside
 from .study_command import Make, StudyCommand
@@ -83,7 +83,7 @@ def _on(branch: Branch, response: SpeedResponse, place: int) -> bool:
 _BESIDE = 4  # speeds on either side of a peak that are gone through again on a finer grid
 
 
-def _plan(design: DesignFile, quick: bool) -> Make[Study]:
+def _plan(design: DesignFile, quick: bool) -> Make[DynamicsStudy]:
     request = dynamics_request(design, quick=quick)
     search = search_of(design, quick=quick)
 
@@ -112,7 +112,7 @@ def _study(
     stages: Stages,
     *,
     quick: bool,
-) -> Study:
+) -> DynamicsStudy:
     """All runs of all designs under all torques, and the branches of one; a quick look follows its first branch."""
     settings = request.settings
     oscillators: dict[str, dict[float, Oscillator]] = {}
@@ -155,10 +155,11 @@ def _study(
     frequencies = {
         name: {torque: float(of.mesh) for torque, of in several.items()} for name, several in natural.items()
     }
-    return Study(design, request, mesh, designs, oscillators, frequencies, responses, steps, tuple(branches), run_ups)
+    found = responses, steps, tuple(branches), run_ups
+    return DynamicsStudy(design, request, mesh, designs, oscillators, frequencies, *found)
 
 
-def _grid_change(study: Study) -> dict[str, dict[str, float]]:
+def _grid_change(study: DynamicsStudy) -> dict[str, dict[str, float]]:
     """By how much the largest dynamic factor of every design changes at twice the positions of the mesh force and the
     steps, which meet no more positions than they are themselves."""
     settings = study.request.settings

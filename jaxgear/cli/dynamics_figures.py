@@ -8,13 +8,13 @@ import numpy as np
 
 from ..dynamics import DOWN, KICKED, UP, Oscillator, SpeedResponse, motion
 from . import report
-from .dynamics_report import Study, peak
+from .dynamics_report import DynamicsStudy, peak
 
 _RUNS = {UP: "rising", DOWN: "falling", KICKED: "falling, kicked"}
 _PANEL, _HEIGHT, _WIDE = 92.0, 94.0, 130.0  # [mm]
 
 
-def write_figures(folder: Path, study: Study) -> list[Path]:
+def write_figures(folder: Path, study: DynamicsStudy) -> list[Path]:
     """Writes all figures: responses of all designs, and the first and the last design more closely; gives the files."""
     import matplotlib
 
@@ -55,7 +55,7 @@ def write_figures(folder: Path, study: Study) -> list[Path]:
     return report.save_figures(folder, axes)
 
 
-def _finish(panel, study: Study, number: int) -> None:
+def _finish(panel, study: DynamicsStudy, number: int) -> None:
     """One name of the ordinate for all panels, and speeds beside mesh frequencies."""
     from .. import plot
 
@@ -69,7 +69,7 @@ def _called(runs: Mapping[str, SpeedResponse]) -> dict[str, SpeedResponse]:
     return {_RUNS.get(name, name): response for name, response in runs.items()}
 
 
-def _draw(kind: str, panel, study: Study, name: str) -> None:
+def _draw(kind: str, panel, study: DynamicsStudy, name: str) -> None:
     from .. import plot
 
     runs = study.responses[name][study.torque]
@@ -90,7 +90,7 @@ def _draw(kind: str, panel, study: Study, name: str) -> None:
         _portrait(panel, study, study.oscillators[name][study.torque], worst, name)
 
 
-def _portrait(panel, study: Study, oscillator: Oscillator, response: SpeedResponse, name: str) -> None:
+def _portrait(panel, study: DynamicsStudy, oscillator: Oscillator, response: SpeedResponse, name: str) -> None:
     """The motion at the worst speed."""
     from .. import plot
 

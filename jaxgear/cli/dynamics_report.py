@@ -38,7 +38,7 @@ ASSUMED = "Both gears are rigid masses that vibrate on the force of this contact
 
 
 @dataclass(frozen=True)
-class Study:
+class DynamicsStudy:
     """What has been found of all designs.
 
     Attributes:
@@ -95,7 +95,7 @@ def peak(response: SpeedResponse | RunUp, field: str) -> tuple[float, float]:
     return float(values[place]), float(response.mesh_frequency[place])
 
 
-def table(study: Study) -> Table:
+def table(study: DynamicsStudy) -> Table:
     """The peaks of every run."""
     result = Table(title=f"{study.design.title}: largest values over the speed", title_justify="left", box=SIMPLE_HEAD)
     result.add_column("design", no_wrap=True)
@@ -117,7 +117,7 @@ def table(study: Study) -> Table:
     return result
 
 
-def verdict(study: Study) -> Iterator[str]:
+def verdict(study: DynamicsStudy) -> Iterator[str]:
     """The worst of every design over all runs and torques."""
     worst = {
         name: max(peak(response, "dynamic_factor")[0] for runs in of_torques.values() for response in runs.values())
@@ -146,7 +146,7 @@ def verdict(study: Study) -> Iterator[str]:
         yield f"no periodic motion was found at {aperiodic} of {total} speeds: their numbers are of a recorded time"
 
 
-def _still_rising(study: Study) -> Iterator[str]:
+def _still_rising(study: DynamicsStudy) -> Iterator[str]:
     """A line for designs whose largest dynamic factor is that of the highest speed, below the natural frequency."""
     highest = float(study.request.settings.mesh_frequencies[-1])
     rising = {
@@ -161,7 +161,7 @@ def _still_rising(study: Study) -> Iterator[str]:
         )
 
 
-def _far_from_resonance(study: Study) -> Iterator[str]:
+def _far_from_resonance(study: DynamicsStudy) -> Iterator[str]:
     """A line where every speed is far above or below what can resonate: then a mass is likely to be wrong."""
     natural = study.natural_frequencies["unmodified"][study.torque]
     low, high = (float(study.request.settings.mesh_frequencies[place]) / natural for place in (0, -1))
@@ -172,7 +172,7 @@ def _far_from_resonance(study: Study) -> Iterator[str]:
         )
 
 
-def _bodies(study: Study) -> Iterator[str]:
+def _bodies(study: DynamicsStudy) -> Iterator[str]:
     """A line for gears whose bore is left open, which is another for the compliance than for the inertia."""
     settings, pair = study.request.settings, study.design.pair()
     given = ("pinion", pair.pinion, settings.pinion_inertia), ("wheel", pair.wheel, settings.wheel_inertia)
@@ -185,7 +185,7 @@ def _bodies(study: Study) -> Iterator[str]:
             )
 
 
-def failures(study: Study) -> Iterator[str]:
+def failures(study: DynamicsStudy) -> Iterator[str]:
     """A line for every design whose contact was not found at some DTE."""
     for name, of_torques in study.oscillators.items():
         bad = [f"{torque:g}" for torque, of in of_torques.items() if not bool(of.converged)]
@@ -196,7 +196,7 @@ def failures(study: Study) -> Iterator[str]:
             )
 
 
-def summary(study: Study) -> dict[str, Any]:
+def summary(study: DynamicsStudy) -> dict[str, Any]:
     """Contents of `summary.json`."""
     settings = study.request.settings
     given = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
@@ -259,14 +259,14 @@ def _peaks(response: SpeedResponse) -> dict[str, float]:
     return found
 
 
-def write_tables(folder: Path, study: Study) -> None:
+def write_tables(folder: Path, study: DynamicsStudy) -> None:
     """The CSV files."""
     _write_responses(folder / "responses.csv", study)
     if study.run_ups:
         _write_run_ups(folder / "run_up.csv", study)
 
 
-def _write_run_ups(path: Path, study: Study) -> None:
+def _write_run_ups(path: Path, study: DynamicsStudy) -> None:
     """Every sample of every run-up."""
     per_hertz = 60 / float(study.mesh.pair.pinion.teeth)
     fields = {"time": "time_s", "mesh_frequency": "mesh_frequency_Hz"}
@@ -282,7 +282,7 @@ def _write_run_ups(path: Path, study: Study) -> None:
                     writer.writerow([name, f"{torque:g}", *(f"{value:.7g}" for value in values)])
 
 
-def _write_responses(path: Path, study: Study) -> None:
+def _write_responses(path: Path, study: DynamicsStudy) -> None:
     """Every speed of every run."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

@@ -14,7 +14,7 @@ from ..io import DesignFile
 from ..io.requests import quality_classes
 from ..manufacture import measures
 from ..numerics import program
-from ..report import Section, Table, heading, text
+from ..report import Chapter, Table, heading, text
 from ..tolerance import ToleranceClass, iso_rounded
 
 _CHOSEN = "teeth_spanned", "ball_diameter_mm"  # by a file, or by `measures`
@@ -112,10 +112,10 @@ def drawing_table(found: Mapping[str, Mapping[str, Any]]) -> Table:
     return Table(("", *found), rows, "drawing data", _TOLERANCE_NOTE if _CLASS in names else "")
 
 
-def rating_page(designs: Mapping[str, Factors]) -> Section:
+def rating_page(designs: Mapping[str, Factors]) -> Chapter:
     """The factors of ISO 6336 of several designs, side by side."""
     rows = tuple((_label(name, _FACTORS), *(text(each[name]) for each in designs.values())) for name in _FACTORS)
-    return Section("Rating by ISO 6336", tables=[Table(("", *designs), rows, note=_RATING_NOTE)])
+    return Chapter("Rating by ISO 6336", tables=[Table(("", *designs), rows, note=_RATING_NOTE)])
 
 
 def _label(name: str, symbols: Mapping[str, str]) -> str:

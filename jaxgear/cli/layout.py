@@ -27,19 +27,19 @@ from ..layout import (
 from ..numerics import real
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
 from . import layout_report, manufactured
-from .layout_report import Study, designs, flank_lines
+from .layout_report import LayoutStudy, designs, flank_lines
 from .progress import Stages
 from .run import coarse
 from .study import face_change
 from .study_command import Make, StudyCommand
 
 
-def _plan(design: DesignFile, quick: bool) -> Make[Study]:
+def _plan(design: DesignFile, quick: bool) -> Make[LayoutStudy]:
     request = layout_request(design, quick=quick)
     return lambda target, stages: (_study(design, request, stages, quick=quick), lambda: None)
 
 
-def _write(folder: Path, study: Study) -> None:
+def _write(folder: Path, study: LayoutStudy) -> None:
     design = study.design
     # the flanks need no mesh, which only step 3 has
     moving = kinematics(design.pair(), real(0.0), design.resolution(), "strain")
@@ -48,7 +48,7 @@ def _write(folder: Path, study: Study) -> None:
         study.profile.table.to_csv(folder / "profiles.csv")
 
 
-def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick: bool) -> Study:
+def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick: bool) -> LayoutStudy:
     layouts: dict[str, FlankLineLayout] = {}
     for name, support in request.supports.items():
         stages.begin(f"flank lines, {name}")
@@ -97,7 +97,7 @@ def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick:
         )
         for name, layout in layouts.items()
     }
-    return Study(
+    return LayoutStudy(
         design,
         request,
         layouts,

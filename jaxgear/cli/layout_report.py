@@ -25,7 +25,7 @@ LIVES = ("pinion_life_h", "wheel_life_h")
 
 
 @dataclass(frozen=True)
-class Study:
+class LayoutStudy:
     """What has been found.
 
     Attributes:
@@ -81,7 +81,7 @@ def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine
     return dict(zip(STEPS, ((none, none), first, (layout.pinion, layout.wheel))))
 
 
-def lives(study: Study, profile: ProfileLayout) -> dict[str, np.ndarray]:
+def lives(study: LayoutStudy, profile: ProfileLayout) -> dict[str, np.ndarray]:
     """Life [h] of pinion and wheel with every profile modification, by K_Hbeta of its contact; empty without a duty
     cycle. That factor is of the torque of step 3 and stands for every load."""
     load, endurance = (study.request.options.get(name) for name in ("duty_cycle", "endurance"))
@@ -97,7 +97,7 @@ def root_factor(layout: FlankLineLayout, factor) -> np.ndarray:
     return np.asarray(root_face_load_factor(np.maximum(factor, 1.0), pair.face_width, tooth_height(pair)))
 
 
-def designs(study: Study) -> dict[str, tuple[AbstractModification, AbstractModification]]:
+def designs(study: LayoutStudy) -> dict[str, tuple[AbstractModification, AbstractModification]]:
     """Modifications of pinion and wheel after every step."""
     _, first, _ = flank_lines(study.main).values()
     pinion, wheel = study.main.modifications
@@ -109,7 +109,7 @@ def designs(study: Study) -> dict[str, tuple[AbstractModification, AbstractModif
     return found
 
 
-def verdict(study: Study) -> Iterator[str]:
+def verdict(study: LayoutStudy) -> Iterator[str]:
     """The layout in words."""
     layout = study.main
     for name, line in (("pinion", layout.pinion), ("wheel", layout.wheel)):
@@ -134,7 +134,7 @@ def verdict(study: Study) -> Iterator[str]:
         yield grid_line(f"{study.design.resolution().slices} slices (contact analysis)", study.slices_change)
 
 
-def _profile_verdict(study: Study, profile: ProfileLayout, where: str) -> Iterator[str]:
+def _profile_verdict(study: LayoutStudy, profile: ProfileLayout, where: str) -> Iterator[str]:
     words = "tip relief" if profile.kind == "tip_relief" else "profile crowning"
     first, second = profile.amounts
     torque = study.request.profile_torque
@@ -150,7 +150,7 @@ def _profile_verdict(study: Study, profile: ProfileLayout, where: str) -> Iterat
     )
 
 
-def failures(study: Study) -> Iterator[str]:
+def failures(study: LayoutStudy) -> Iterator[str]:
     """What is not to be trusted or not reached."""
     for name, layout in study.layouts.items():
         cases = [one for of in layout.cases for one in of.values()]
@@ -176,12 +176,12 @@ def failures(study: Study) -> Iterator[str]:
             yield "every profile modification has contact shock: larger amounts are needed"
 
 
-def findings(study: Study) -> Iterator[str]:
+def findings(study: LayoutStudy) -> Iterator[str]:
     """What is not usual."""
     return report.finding_lines(study.unusual)
 
 
-def summary(study: Study) -> dict[str, Any]:
+def summary(study: LayoutStudy) -> dict[str, Any]:
     """Contents of `summary.json`."""
     return {
         **identity(study.design),
@@ -277,7 +277,7 @@ def _reactions(support) -> dict[str, Any]:
     }
 
 
-def _profile(study: Study, profile: ProfileLayout) -> dict[str, Any]:
+def _profile(study: LayoutStudy, profile: ProfileLayout) -> dict[str, Any]:
     values = {name: profile.table.column(name) for name in profile.table.results} | lives(study, profile)
     return {
         "type": profile.kind,
@@ -291,7 +291,7 @@ def _profile(study: Study, profile: ProfileLayout) -> dict[str, Any]:
     }
 
 
-def tables(study: Study) -> Iterator[Table]:
+def tables(study: LayoutStudy) -> Iterator[Table]:
     """The steps, what the contact says of them, and the bearings."""
     yield _steps(study)
     if study.contacts:
@@ -300,7 +300,7 @@ def tables(study: Study) -> Iterator[Table]:
     yield _bearings(study)
 
 
-def _steps(study: Study) -> Table:
+def _steps(study: LayoutStudy) -> Table:
     result = Table(title=f"{study.design.title}: flank lines", title_justify="left", box=SIMPLE_HEAD)
     result.add_column("", no_wrap=True)
     for name in study.layouts:
@@ -358,7 +358,7 @@ def _worst_life(layout: FlankLineLayout, name: str) -> str:
     return " / ".join(f"{float(np.min(lives)):.4g} " for lives in layout.lives[name])
 
 
-def _contacts(study: Study) -> Table:
+def _contacts(study: LayoutStudy) -> Table:
     """The contact analysis of every step, beside the one-dimensional one at the same torque."""
     title = f"contact analysis at {study.request.profile_torque:g} N m, without deviations"
     result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
@@ -372,7 +372,7 @@ def _contacts(study: Study) -> Table:
     return result
 
 
-def _contact_cases(study: Study) -> Table:
+def _contact_cases(study: LayoutStudy) -> Table:
     """K_Hbeta of the contact analysis in the five cases."""
     title = f"K_Hbeta of the contact analysis at {study.request.profile_torque:g} N m in the cases of deviations"
     result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
@@ -392,7 +392,7 @@ def _number(value: float) -> str:
     return f"{value:.3f}"
 
 
-def _bearings(study: Study) -> Table:
+def _bearings(study: LayoutStudy) -> Table:
     """Displacements of the shafts at the bearings."""
     result = Table(title="bearings: displacement of the shaft [um]", title_justify="left", box=SIMPLE_HEAD)
     result.add_column("bearing", no_wrap=True)
@@ -412,7 +412,7 @@ def _bearings(study: Study) -> Table:
 _PANEL, _HEIGHT = 92.0, 90.0  # [mm]
 
 
-def write_figures(folder: Path, study: Study) -> list[Path]:
+def write_figures(folder: Path, study: LayoutStudy) -> list[Path]:
     """Writes the figures of the cases, K_Hbeta over the torque, shafts, profiles and the contact; gives the files."""
     import matplotlib
 

@@ -10,7 +10,7 @@ import rich.table
 
 from ..contact import Mesh
 from ..io import DesignFile
-from ..report import Section, read_table
+from ..report import Chapter, read_table
 from ..sweeps import Scatter, monte_carlo
 from ..tolerance import Tolerance
 from . import report
@@ -66,7 +66,7 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
             yield f"CONTACT SOLUTION NOT CONVERGED: {name}, {count} manufactured pairs; they count as the worst"
 
 
-def pages(design: DesignFile, evaluations: Evaluations) -> list[Section]:
+def pages(design: DesignFile, evaluations: Evaluations) -> list[Chapter]:
     """The part of the report about robustness; nothing without a table [tolerance]."""
     scatters = _scatters(evaluations)
     if not scatters:
@@ -89,7 +89,7 @@ def pages(design: DesignFile, evaluations: Evaluations) -> list[Section]:
     )
     even = " Deviations along the face are left out, as one slice cannot show them."
     return [
-        Section("Robustness", [text + (even if design.resolution().slices == 1 else "")], tables=[read_table(table)])
+        Chapter("Robustness", [text + (even if design.resolution().slices == 1 else "")], tables=[read_table(table)])
     ]
 
 

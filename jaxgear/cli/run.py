@@ -40,7 +40,7 @@ from ..optimize import (
 from ..report import Table as Block
 from . import interrupt, manufactured, optimum_report, report, written
 from .cache import enable_cache
-from .document import Document, Found
+from .document import CommandResult, Document
 from .geometry import mounting
 from .optimum_report import COMPROMISE, front_table
 from .progress import Stages
@@ -53,7 +53,7 @@ _USUAL = "none, inputs and results lie within the usual ranges"
 Modifications = tuple[AbstractModification, AbstractModification]
 
 
-class Run:
+class CommandRun:
     """Collects the designs of one run and writes them into `folder`."""
 
     def __init__(self, design: DesignFile, target: Path, folder: Path, stages: Stages):
@@ -169,7 +169,7 @@ class Run:
             said = list(self._lines()), self._failures(), list(self._finding_lines()), list(self._tables())
             pages = manufactured.pages(self.design, self._evaluations)
             details = list(self._details())
-            found = Found(*said, files, pages, left_out=self.design.left_out, first=first, details=details)
+            found = CommandResult(*said, files, pages, left_out=self.design.left_out, first=first, details=details)
             document.write(self._folder, self.design, data, found)
 
     def _draw(self) -> list[Path]:
@@ -271,10 +271,10 @@ def default_folder(file: Path, *command: str, quick: bool = False) -> Path:
 
 
 @contextmanager
-def run(design: DesignFile, target: Path, stages: Stages) -> Iterator[Run]:
+def run(design: DesignFile, target: Path, stages: Stages) -> Iterator[CommandRun]:
     """Opens the result folder; the results appear when the block ends without an exception."""
     with ExitStack() as putting_in_place:
         with result_folder(target) as folder:
             stages.replaces(target)
-            yield Run(design, target, folder, stages)
+            yield CommandRun(design, target, folder, stages)
             putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))

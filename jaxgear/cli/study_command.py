@@ -13,7 +13,7 @@ from ..io import DesignFile, result_folder, write_summary
 from ..numerics import compile_quickly
 from . import interrupt, report
 from .commands import import_ahead
-from .document import Found, document
+from .document import CommandResult, document
 from .progress import Stages
 from .run import default_folder, opened
 from .study import note_runs
@@ -96,7 +96,7 @@ class StudyCommand(Generic[S]):
                 failures = list(self.failures(study))
                 findings = None if self.findings is None else list(self.findings(study))
                 if asked is not None:
-                    found = Found(
+                    found = CommandResult(
                         lines,
                         failures,
                         findings,

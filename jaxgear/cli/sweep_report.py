@@ -13,10 +13,10 @@ from ..contact import Mesh, Resolution
 from ..io import DesignFile
 from ..metrics import Quantity, findings_of, quantity_of
 from ..microgeometry import NoModification
-from ..report import Section, Table, figure, text, write_variants, write_workbook
+from ..report import Chapter, Table, figure, text, write_variants, write_workbook
 from ..sweeps import SweepTable, over_torques
 from . import report
-from .document import Document, Found, project_facts
+from .document import CommandResult, Document, project_facts
 from .geometry import gears
 from .progress import Stages
 from .run import Modifications, torques_of
@@ -239,7 +239,7 @@ def write(
     }
     pictures = [*chosen.figures, *figures]
     shown = pages if len(best) else ()
-    found = Found(lines, warnings, chosen.findings, chosen.tables, pictures, shown, left_out=design.left_out)
+    found = CommandResult(lines, warnings, chosen.findings, chosen.tables, pictures, shown, left_out=design.left_out)
     asked.write(folder, design, data, found)
 
 
@@ -247,16 +247,16 @@ def _with_unit(design: DesignFile, name: str) -> str:
     return f"{name} [{design.units[name]}]" if design.units[name] else name
 
 
-def _side_by_side(best: SweepTable) -> Section:
+def _side_by_side(best: SweepTable) -> Chapter:
     shown = best.take(range(min(_TABLE, len(best))))
     columns = [_values(shown, name) for name in shown.names if name != "variant"]
     names = (shown.headings[name] for name in shown.names if name != "variant")
     header = ("", *(f"variant {number}" for number in _values(shown, "variant")))
     rows = tuple((name, *column) for name, column in zip(names, columns))
-    return Section("Best variants", tables=[Table(header, rows, "best first")], new_page=True)
+    return Chapter("Best variants", tables=[Table(header, rows, "best first")], new_page=True)
 
 
-def _page(table: SweepTable, best: SweepTable, place: int, chosen: Chosen) -> Section:
+def _page(table: SweepTable, best: SweepTable, place: int, chosen: Chosen) -> Chapter:
     """One variant, and what it is among the others."""
     number = _values(best, "variant")[place]
     rows = []
@@ -267,7 +267,7 @@ def _page(table: SweepTable, best: SweepTable, place: int, chosen: Chosen) -> Se
         rows.append((best.headings[name], text(best.column(name)[place]), low, high, better))
     header = ("", f"variant {number}", "least of all", "largest of all", "better is")
     pictures = [figure(path) for path in chosen.pages.get(f"variant {number}", ())]
-    return Section(f"Variant {number}", tables=[Table(header, tuple(rows))], figures=pictures, new_page=True)
+    return Chapter(f"Variant {number}", tables=[Table(header, tuple(rows))], figures=pictures, new_page=True)
 
 
 def _values(table: SweepTable, name: str) -> list[str]:

@@ -15,12 +15,12 @@ from .compared import compared, first_mesh, search_of, sought
 from .progress import Stages
 from .study import Kept, Marches, runs_beside
 from .study_command import Make, StudyCommand
-from .wear_report import Study
+from .wear_report import WearStudy
 
 _MOST_BLOCKS = 1000  # of a life of manufactured gears
 
 
-def _plan(design: DesignFile, quick: bool) -> Make[Study]:
+def _plan(design: DesignFile, quick: bool) -> Make[WearStudy]:
     request = wear_request(design, quick=quick)
     search = search_of(design, quick=quick)
     # a step of the search wears a life: under the static load, which takes far less than a motion in every block
@@ -47,12 +47,12 @@ def _plan(design: DesignFile, quick: bool) -> Make[Study]:
             settings = dataclasses.replace(request.settings, blocks=blocks)
             of_pairs = Kept(runs_beside(target), wear_scatter.Arrays())
             scatters = wear_scatter.scattered(design, settings, mesh, designs, tolerance, of_pairs, quick=quick)
-        return Study(design, request, designs, lives, scatters), kept.remove
+        return WearStudy(design, request, designs, lives, scatters), kept.remove
 
     return make
 
 
-def _write(folder: Path, study: Study) -> None:
+def _write(folder: Path, study: WearStudy) -> None:
     wear_report.write_lives(folder / "life.csv", study)
     for name in ("worn_flanks.csv", "worn_flanks.parquet"):
         write_worn(folder / name, study.lives)

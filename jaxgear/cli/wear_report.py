@@ -47,7 +47,7 @@ ASSUMED = (
 
 
 @dataclass(frozen=True)
-class Study:
+class WearStudy:
     """The lives of all designs.
 
     Attributes:
@@ -65,7 +65,7 @@ class Study:
     scatters: Mapping[str, wear_scatter.Samples]
 
 
-def _numbers(study: Study, life: WearLife) -> dict[str, float]:
+def _numbers(study: WearStudy, life: WearLife) -> dict[str, float]:
     """What a life comes to."""
     ppte, settings = np.asarray(over_life(life, "ppte")), study.request.settings
     volume = np.asarray(worn_volume(life))[-1]
@@ -98,12 +98,12 @@ def _numbers(study: Study, life: WearLife) -> dict[str, float]:
     return {name: float(value) for name, value in found.items()}
 
 
-def tables(study: Study) -> list[Table]:
+def tables(study: WearStudy) -> list[Table]:
     """The lives of all designs, and their scatter over manufactured pairs where the file has tolerances."""
     return [_table(study), *wear_scatter.tables(study.design, study.request.settings, study.scatters)]
 
 
-def _table(study: Study) -> Table:
+def _table(study: WearStudy) -> Table:
     """One row per design."""
     settings = study.request.settings
     title = f"{study.design.title}: {float(settings.revolutions):.3g} revolutions at {_loads(study)}"
@@ -136,7 +136,7 @@ def _table(study: Study) -> Table:
     return result
 
 
-def _loads(study: Study) -> str:
+def _loads(study: WearStudy) -> str:
     """Under what the flanks wear."""
     settings, text = study.request.settings, _torques(study)
     if settings.dynamics is None:
@@ -146,14 +146,14 @@ def _loads(study: Study) -> str:
     return f"{text}, {settings.line_load} line load at {shown} rpm"
 
 
-def _torques(study: Study) -> str:
+def _torques(study: WearStudy) -> str:
     loads = study.request.settings.loads
     torques = [study.design.torque] if loads is None else loads.torques.tolist()
     text = ", ".join(f"{torque:g}" for torque in torques) + " N m"
     return text if loads is None else f"{text} ({_shares(study)})"
 
 
-def _shares(study: Study) -> str:
+def _shares(study: WearStudy) -> str:
     """Which shares of the revolutions the torques have."""
     assert study.design.wear is not None and study.request.settings.loads is not None
     if study.design.wear.weights is None:
@@ -171,7 +171,7 @@ def _cell(key: str, value: float, ended: float) -> str:
     return f"{value:.3g}" + f" {_BEYOND}" * (value > ended)  # NaN where the flanks are not known
 
 
-def verdict(study: Study) -> Iterator[str]:
+def verdict(study: WearStudy) -> Iterator[str]:
     """The best on the mean over the life, and how sure the depths are."""
     means = {name: float(mean_over_life(life, "ppte")) for name, life in study.lives.items()}
     found = {name: mean for name, mean in means.items() if np.isfinite(mean)}
@@ -190,7 +190,7 @@ def verdict(study: Study) -> Iterator[str]:
             yield f"{name}: the depth is uncertain {by}, take more blocks"
 
 
-def _sought(study: Study) -> str:
+def _sought(study: WearStudy) -> str:
     """Under what the relief that lasts has been sought."""
     settings = study.request.settings
     text = f"sought at {_torques(study)}, under the static line load, on gears without deviations"
@@ -198,7 +198,7 @@ def _sought(study: Study) -> str:
     return text + ", not under the dynamic one under which all designs wear here" * vibrates
 
 
-def failures(study: Study) -> Iterator[str]:
+def failures(study: WearStudy) -> Iterator[str]:
     """A line for every design whose contact was not found at some life, or whose blocks were too long."""
     for name, life in study.lives.items():
         found = np.asarray(life.cycles.converged)
@@ -216,7 +216,7 @@ def failures(study: Study) -> Iterator[str]:
     yield from wear_scatter.failures(study.scatters)
 
 
-def summary(study: Study) -> dict[str, Any]:
+def summary(study: WearStudy) -> dict[str, Any]:
     """Contents of `summary.json`."""
     settings = study.request.settings
     designs = {
@@ -253,7 +253,7 @@ def _without_none(settings: Any) -> dict[str, Any]:
     }
 
 
-def write_lives(path: Path, study: Study) -> None:
+def write_lives(path: Path, study: WearStudy) -> None:
     """Every life of every design as CSV."""
     vibrates = study.request.settings.dynamics is not None
     known = [quantity_of(name) for name in (*_QUANTITIES, *(["dynamic_factor"] if vibrates else []))]
@@ -269,7 +269,7 @@ def write_lives(path: Path, study: Study) -> None:
                 writer.writerow([name, *(f"{value:.7g}" for value in row)])
 
 
-def write_figures(folder: Path, study: Study) -> list[Path]:
+def write_figures(folder: Path, study: WearStudy) -> list[Path]:
     """Flanks at several lives, and PPTE and depth over the life; gives the files."""
     import matplotlib
 

@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float
 from ..compliance import AbstractCompliance, face_ends, face_kernel, few_modes, slice_basis
 from ..geometry import GearPair, is_even
 from ..geometry.outline import Outline
-from ..numerics import Coupling, Other, concrete
+from ..numerics import Other, SliceCoupling, concrete
 from .kinematics import Kinematics
 from .resolution import Resolution
 from .support import AbstractSupport
@@ -82,7 +82,7 @@ def coupling_of(
     spreading: Spreading,
     wheel: Float[Array, "pairs pairs positions"],
     support: AbstractSupport | None,
-) -> Coupling | None:
+) -> SliceCoupling | None:
     """The coupling of the slices; None where they are not coupled.
 
     A support bends in polynomials over the face, as many as the resolution has modes.
@@ -101,7 +101,7 @@ def coupling_of(
     weight = None if sizes.slice_weights is None else jnp.asarray(sizes.slice_weights, modes.dtype)
     if weight is not None:  # modes of the loads times the roots of the widths
         modes = modes / jnp.sqrt(weight)[:, None]
-    coupling = Coupling(modes, shares[0], rests[0], weight=weight)
+    coupling = SliceCoupling(modes, shares[0], rests[0], weight=weight)
     if len(kernels) > 1:
         coupling = replace(coupling, other=Other(wheel, shares[1] - shares[0], rests[1] - rests[0]))
     if support is None:

@@ -14,7 +14,7 @@ from ..compliance.plane import contact_plane
 from ..compliance.toothload import tooth_load
 from ..geometry import GearPair, Margins, Outline, PathOfContact, explicit, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import AbstractSpring, Coupling, changed, on_both, program
+from ..numerics import AbstractSpring, SliceCoupling, changed, on_both, program
 from ..numerics.programs import begin
 from .covering import check_cover, closing, pairs_for
 from .face_coupling import check_modes, check_support, coupling_of, ends_together, spreading_of
@@ -104,7 +104,7 @@ class Mesh(eqx.Module):
     width_factor: Field
     hub: Scalar
     slice_width: Float[Array, " slices"]
-    coupling: Coupling | None = None
+    coupling: SliceCoupling | None = None
     support: AbstractSupport | None = None
     support_gap: Float[Array, " slices"] | None = None
     support_torque: Scalar | None = None

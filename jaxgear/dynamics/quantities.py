@@ -21,7 +21,7 @@ from .steady import SteadyNumbers
 Numbers = Float[Array, "runs speeds"]
 
 
-class Kind(NamedTuple):
+class _Kind(NamedTuple):
     """A dynamic quantity before its settings are known.
 
     Attributes:
@@ -43,9 +43,9 @@ _FIELDS = (
     ("contact_loss_share", "", "share of the time without contact, which has no derivative"),
     ("back_side_contact", "", "share of the time on the coast flanks, which has no derivative"),
 )
-DYNAMIC_QUANTITIES: Mapping[str, Kind] = {
-    **{name: Kind(name, True, unit, f"{meaning}, at the speed of the pinion") for name, unit, meaning in _FIELDS},
-    **{f"worst_{name}": Kind(name, False, unit, f"{meaning}, at its worst speed") for name, unit, meaning in _FIELDS},
+DYNAMIC_QUANTITIES: Mapping[str, _Kind] = {
+    **{name: _Kind(name, True, unit, f"{meaning}, at the speed of the pinion") for name, unit, meaning in _FIELDS},
+    **{f"worst_{name}": _Kind(name, False, unit, f"{meaning}, at its worst speed") for name, unit, meaning in _FIELDS},
 }
 
 
@@ -58,7 +58,7 @@ def _numbers_of(given: WithSettings, cycle: MeshCycle) -> Numbers:
     return jnp.where(converged, getattr(found, kind.field), jnp.nan)
 
 
-def _swept(given: WithSettings, cycle: MeshCycle, kind: Kind) -> tuple[SteadyNumbers, Bool[Array, ""]]:
+def _swept(given: WithSettings, cycle: MeshCycle, kind: _Kind) -> tuple[SteadyNumbers, Bool[Array, ""]]:
     settings = given.settings
     mesh, operating_point = cycle.mesh_for(given.name), cycle.operating_point
     if kind.at_speed:
@@ -75,7 +75,7 @@ def mesh_frequency(teeth, speed):
     return teeth * speed / 60
 
 
-def _quantity(name: str, kind: Kind) -> Quantity:
+def _quantity(name: str, kind: _Kind) -> Quantity:
     stands = WithoutSettings(name, "jaxgear.dynamics.Dynamics", "dynamics", given=_numbers_of)
     label = "largest dynamic factor" if name == "worst_dynamic_factor" else ""
     return Quantity(name, stands, kind.unit, kind.meaning, Max(), label=label)

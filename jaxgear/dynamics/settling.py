@@ -162,7 +162,7 @@ def _period(away: Float[Array, " periods"], tolerance: Scalar) -> Int[Array, ""]
 _BALANCED = 0.99
 
 
-class Found(NamedTuple):
+class AtOneSpeed(NamedTuple):
     """Steady state at one speed; names and units of `SpeedResponse`."""
 
     numbers: Numbers
@@ -174,7 +174,7 @@ class Found(NamedTuple):
 
 def steady_state(
     oscillator: Oscillator, y: State, speed: Speed, limits: Any, sizes: Any, static: Scalar, waves
-) -> Found:
+) -> AtOneSpeed:
     """Steady state at one speed that a start leads to, and its record.
 
     Args:
@@ -218,7 +218,7 @@ def steady_state(
     count = cycles.astype(frequency.dtype)
     numbers = numbers_of(sums, frequency, cycles=count, orders=orders, origin=origin, static_force=static)
     period = jnp.where(numbers.dynamic_factor > _BALANCED, period, 0)
-    return Found(numbers, period, dtes, velocities, y)
+    return AtOneSpeed(numbers, period, dtes, velocities, y)
 
 
 _POSITIONS = 16  # of the first harmonic of the static transmission error

@@ -19,7 +19,7 @@ from ..numerics import Number, fields_of
 from .kinds import Kind, choice, either, list_of, real, rows_of, switch, table, text
 
 
-class Section(BaseModel):
+class FileTable(BaseModel):
     """A table of the file: its fields are the allowed keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -41,7 +41,7 @@ def section_of(
     *,
     most: tuple[tuple[str, int], ...] = (),
     open: bool = True,
-) -> type[Section]:
+) -> type[FileTable]:
     """The keys of a class: its fields that can be written in a file.
 
     Args:
@@ -63,7 +63,7 @@ def section_of(
             keys[field.name] = (Annotated[Any, kind], ... if needed else None)
         elif needed:
             raise TypeError(f"{cls.__name__}: {field.name} cannot be written in a design file")
-    return create_model(cls.__name__, __base__=Section, __doc__=cls.__doc__, **keys)
+    return create_model(cls.__name__, __base__=FileTable, __doc__=cls.__doc__, **keys)
 
 
 def modules_of(cls: type[eqx.Module]) -> dict[str, type[eqx.Module]]:

@@ -27,7 +27,7 @@ from . import schema
 from .design_file import DesignFile
 from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
 from .kinds import outside
-from .layout import Section
+from .layout import FileTable
 from .requests import load_of, quantity_named, tolerance_of
 from .toml import decode
 
@@ -57,7 +57,7 @@ def check_options(design: DesignFile, name: str, options: Mapping[str, Any]) -> 
     refused(f"optimize.{name}", made_by(name), **options)
 
 
-def tables(section: schema.OptimizeSection) -> dict[str, Section]:
+def tables(section: schema.OptimizeSection) -> dict[str, FileTable]:
     """The tables of all methods, decoded."""
     layouts = schema.method_options().items()
     return {key: decode(f"optimize.{key}", getattr(section, key) or {}, layout) for key, layout in layouts}

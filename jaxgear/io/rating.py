@@ -8,18 +8,18 @@ from ..metrics import Lubricant, Strength
 from ..numerics import Number
 from .errors import DesignFileError, referring
 from .kinds import outside, text
-from .layout import Section, section_of
+from .layout import FileTable, section_of
 from .schema import LoadSection, Tables
 from .template import part_of
 from .toml import decode, join, read
 
-S = TypeVar("S", bound=Section)
+S = TypeVar("S", bound=FileTable)
 
 _FILE = "file"
 _SPEED = Number("rpm", low=0.0, open_low=True)
 
 
-class FileKey(Section):
+class FileKey(FileTable):
     """Where the rest of a table stands.
 
     Attributes:

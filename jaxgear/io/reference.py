@@ -24,7 +24,7 @@ from ..tolerance import Tolerance
 from ..wear import Wear
 from . import rating, schema, schema_shafts
 from .kinds import allowed
-from .layout import Section, family, meanings, section_of, snake, summary
+from .layout import FileTable, family, meanings, section_of, snake, summary
 
 _HEAD = """# Design files
 
@@ -75,7 +75,7 @@ def _anchor(title: str) -> str:
     return re.sub(r"[^\w -]", "", title).strip().lower().replace(" ", "-")
 
 
-def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
+def _tables() -> Iterator[tuple[str, type[FileTable], Callable[..., Any] | None]]:
     yield "The top level", schema.FileSection, None
     yield "[project]", schema.ProjectSection, None
     yield "[pinion] and [wheel]", schema.GearSection, Gear
@@ -107,7 +107,7 @@ def _tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
     yield from _gearbox_tables()
 
 
-def _gearbox_tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] | None]]:
+def _gearbox_tables() -> Iterator[tuple[str, type[FileTable], Callable[..., Any] | None]]:
     yield "[[shafts]]", schema_shafts.ShaftSection, None
     yield "[[shafts.sections]]", schema_shafts.PartSection, shafts.Section
     yield "[[shafts.bearings]]", schema_shafts.BearingSection, shafts.Bearing
@@ -123,8 +123,8 @@ def _gearbox_tables() -> Iterator[tuple[str, type[Section], Callable[..., Any] |
     yield "[layout.profile]", schema_shafts.ProfileSection, None
 
 
-def _table(title: str, section: type[Section], of: Callable[..., Any] | None) -> Iterator[str]:
-    own = bool(section.__doc__) and section.__doc__ != Section.__doc__
+def _table(title: str, section: type[FileTable], of: Callable[..., Any] | None) -> Iterator[str]:
+    own = bool(section.__doc__) and section.__doc__ != FileTable.__doc__
     yield f"\n## {_heading(title)}\n"
     yield summary(section if own or of is None else of) + "\n"
     if not section.model_fields:

@@ -35,7 +35,7 @@ from .kinds import (
     table,
     text,
 )
-from .layout import Section, section_of
+from .layout import FileTable, section_of
 
 Tables = dict[str, Any]
 
@@ -43,7 +43,7 @@ _BOUND = real(plausible=False)
 _TABLES = list_of(table(), empty=True)
 
 
-class FileSection(Section):
+class FileSection(FileTable):
     """The tables of a file, and its title.
 
     Attributes:
@@ -95,7 +95,7 @@ class FileSection(Section):
     layout: Annotated[Tables | None, table()] = None
 
 
-class ProjectSection(Section):
+class ProjectSection(FileTable):
     """Whose gears these are: texts that stand in the head of the report and in `summary.json`.
 
     Attributes:
@@ -144,7 +144,7 @@ class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
     modification: Annotated[list[Tables], _TABLES] = []
 
 
-class FlankFileSection(Section):
+class FlankFileSection(FileTable):
     """A flank from a file, measured, computed or worn: points on a grid of roll_length_mm and, where it varies over the
     face, face_coordinate_mm, with measured_um (excess material), modification_um or wear_depth_um (material removed).
 
@@ -216,7 +216,7 @@ ResolutionSection = section_of(
 )
 
 
-class VariableSection(Section):
+class VariableSection(FileTable):
     """A number of the file that is left open: it is named in place of a number.
 
     Attributes:
@@ -270,7 +270,7 @@ class WearSection(section_of(Wear, ("dynamics", "loads"), open=False)):  # type:
     speeds: Annotated[list[float] | None, list_of(positive("rpm"))] = None
 
 
-class SweepSection(Section):
+class SweepSection(FileTable):
     """Variants to be evaluated.
 
     Attributes:
@@ -322,7 +322,7 @@ _NAMES = either(text(), list_of(text()), "a string or a list of strings")
 _SHARE = real(Number(low=0.0, high=1.0, open_low=True, open_high=True))
 
 
-class OptimizeSection(Section):
+class OptimizeSection(FileTable):
     """A search for the best values of the variables, or for flanks without any.
 
     Attributes:
@@ -357,7 +357,7 @@ class OptimizeSection(Section):
     constraint: Annotated[list[Tables], _TABLES] = []
 
 
-class ConstraintSection(Section):
+class ConstraintSection(FileTable):
     """A limit, of either a quantity or a linear combination of variables.
 
     Attributes:
@@ -373,14 +373,14 @@ class ConstraintSection(Section):
     high: Annotated[float | None, real(plausible=False)] = None
 
 
-class FactorialOptions(Section):
+class FactorialOptions(FileTable):
     levels: Annotated[
         int | dict[str, int] | None,
         either(LEVEL, table(LEVEL), "a whole number, or a table with one entry per variable"),
     ] = None
 
 
-class IterationOptions(Section):
+class IterationOptions(FileTable):
     start: Annotated[str, choice("unmodified", "given", "low_pressure")] = "unmodified"
     max_relief: Annotated[float, positive("um")] = 7.0
     max_pressure: Annotated[float | None, positive("MPa")] = None
@@ -389,7 +389,7 @@ class IterationOptions(Section):
     curve: Annotated[str | None, text()] = None
 
 
-class FreeFormOptions(Section):
+class FreeFormOptions(FileTable):
     points: Annotated[int | None, count(4, 500)] = None
     max_relief: Annotated[float | None, positive("um")] = None
     curvature: Annotated[float | None, real(Number(low=0.0))] = None
@@ -401,7 +401,7 @@ class FreeFormOptions(Section):
 METHODS_WITHOUT_VARIABLES = ("te_iteration", "free_form")
 
 
-def method_options() -> dict[str, type[Section]]:
+def method_options() -> dict[str, type[FileTable]]:
     """The tables [optimize.<method>] of the methods that have one, of a user's own too: the fields of their classes."""
     found = {name: section_of(cls, ("starts", "steps", "seed"), open=False) for name, cls in METHODS.items()}
     found |= {"factorial": FactorialOptions, "pareto": section_of(Pareto)}

@@ -7,7 +7,7 @@ from ..numerics import Number
 from ..shafts import Bearing, Coupling, GearMesh, MatrixBearing, Misalignment, MountedGear, ShaftLoad
 from ..shafts import Section as ShaftPart
 from .kinds import QUALITY_CLASSES, choice, count, either, list_of, positive, real, switch, table, text
-from .layout import Section, section_of
+from .layout import FileTable, section_of
 
 Tables = dict[str, Any]
 
@@ -26,7 +26,7 @@ MisalignmentSection = section_of(Misalignment, open=False)
 WoehlerSection = section_of(SNCurve, open=False)
 
 
-class ShaftSection(Section):
+class ShaftSection(FileTable):
     """A stepped shaft with what sits on it.
 
     Attributes:
@@ -77,7 +77,7 @@ class MeshSection(section_of(GearMesh, ("pinion", "wheel", "misalignment"), open
     misalignment: Annotated[Tables | None, table()] = None
 
 
-class HousingSection(Section):
+class HousingSection(FileTable):
     """What holds the bearing seats.
 
     Attributes:
@@ -87,7 +87,7 @@ class HousingSection(Section):
     file: Annotated[str, text()]
 
 
-class LayoutSection(Section):
+class LayoutSection(FileTable):
     """What `jaxgear layout` does.
 
     Attributes:
@@ -128,7 +128,7 @@ class LayoutSection(Section):
     profile: Annotated[Tables | None, table()] = None
 
 
-class ProfileSection(Section):
+class ProfileSection(FileTable):
     """Profile modifications that step 3 tries, those of both gears in all combinations.
 
     Attributes:

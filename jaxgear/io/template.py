@@ -17,7 +17,7 @@ from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Number, fields_of, real
 from ..shafts import RigidSupport
 from .errors import DesignFileError, check_known, not_known, problem
-from .layout import Section, family, modules_of, section_of
+from .layout import FileTable, family, modules_of, section_of
 from .toml import decode, join
 
 # `tip_diameter = 3 mm must be`, `wheel module = 4 mm must be`: what the library says of a field
@@ -102,7 +102,7 @@ def parse(key: str, table: Mapping[str, Any] | str, cls: type[eqx.Module]) -> Pa
     return part_of(key, decode(key, table, section_of(cls)), cls)
 
 
-def part_of(key: str, section: Section, cls: type[eqx.Module], *, without: tuple[str, ...] = ()) -> Part:
+def part_of(key: str, section: FileTable, cls: type[eqx.Module], *, without: tuple[str, ...] = ()) -> Part:
     """An object from its decoded table, `without` some of its keys."""
     numbers, modules = fields_of(cls), modules_of(cls)
     fields: dict[str, Any] = {}

@@ -11,7 +11,7 @@ from ..conditions import LoadSpectrum
 from ..geometry import GearPair
 from ..metrics import Finding
 from ..metrics.findings import LIMITS as LIMITS_OF_MESH
-from ..metrics.findings import Limit
+from ..metrics.findings import Range
 from ..shafts import AbstractSupport, Gearbox, Shaft, ShaftSupport, bearing_reactions
 from ..shafts.gearbox import tip_clearances
 from ..shafts.shaft import facts_of
@@ -25,43 +25,43 @@ _COST = 1.2
 _FEWEST = 8
 
 LIMITS = {
-    "K_Hbeta": Limit(
+    "K_Hbeta": Range(
         0.0,
         np.inf,
         "",
         f"fewer than {_FEWEST} stations carry the load, so that it depends on their number: more stations? are the "
         "units of bearings, shafts and housing right?",
     ),
-    "K_Hbeta without deviations": Limit(
+    "K_Hbeta without deviations": Range(
         0.0,
         np.inf,
         "",
         f"more than {_COST:g} times that of unmodified flanks; compare the worst cases of deviations, and try "
         'layout.further_crowning = "least"',
     ),
-    "K_Hbeta of the worst case": Limit(
+    "K_Hbeta of the worst case": Range(
         0.0, np.inf, "", 'no better than without the further crowning; try layout.further_crowning = "least"'
     ),
-    "slope and crowning in modules": Limit(
+    "slope and crowning in modules": Range(
         0.0, 0.04, "", "twice the tip relief of ISO 53:1974: are the units of bearings, shafts and housing right?"
     ),
-    "radial displacement in modules": Limit(
+    "radial displacement in modules": Range(
         0.0, 0.05, "", "about the backlash of a gear: center distance and contact ratio are those of shafts in place"
     ),
-    "radial stiffness": Limit(1.0, 20_000.0, "N/um", "rolling bearings have ten to some thousands: is it in N/um?"),
-    "clearance": Limit(0.1, 500.0, "um", "rolling bearings have 2 to 100 um to either side: is it in um?"),
-    "distance from the face": Limit(
+    "radial stiffness": Range(1.0, 20_000.0, "N/um", "rolling bearings have ten to some thousands: is it in N/um?"),
+    "clearance": Range(0.1, 500.0, "um", "rolling bearings have 2 to 100 um to either side: is it in um?"),
+    "distance from the face": Range(
         0.0, np.inf, "mm", "a bearing under the teeth holds a gear in its bore, but not a shaft: is its position right?"
     ),
-    "number of meshes": Limit(1.0, np.inf, "", "it turns idle, no force acts on it: is a mesh missing?"),
-    "tip clearance": Limit(
+    "number of meshes": Range(1.0, np.inf, "", "it turns idle, no force acts on it: is a mesh missing?"),
+    "tip clearance": Range(
         0.0, np.inf, "mm", "they run into each other: are angles of the meshes and positions right?"
     ),
-    "shaft diameter over bore": Limit(
+    "shaft diameter over bore": Range(
         0.0, 1.0, "", "only a gear that is cut into its shaft is on one thicker than its bore: integral?"
     ),
-    "misalignment over the face": Limit(0.1, np.inf, "um", "less than axes can be measured to: is it in mm?"),
-    "damage by the duty cycle": Limit(
+    "misalignment over the face": Range(0.1, np.inf, "um", "less than axes can be measured to: is it in mm?"),
+    "damage by the duty cycle": Range(
         1e-12, 1.0, "", "1 is a used-up life: are torques in N m, endurance in MPa and cycles single ones?"
     ),
     **{name: LIMITS_OF_MESH[name] for name in ("depth of the modification", "depth of the modification in modules")},
@@ -106,7 +106,7 @@ def findings_of(
     return tuple(each for each in numbers if not each.limit.low <= each.value <= each.limit.high)
 
 
-def _finding(name: str, where: str, value, limit: Limit | None = None) -> Finding:
+def _finding(name: str, where: str, value, limit: Range | None = None) -> Finding:
     return Finding(name, where, float(value), limit or LIMITS[name])
 
 

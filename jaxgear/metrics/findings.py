@@ -23,7 +23,7 @@ from .lubricant import Lubricant
 from .stress import nominal_root_stress
 
 
-class Limit(NamedTuple):
+class Range(NamedTuple):
     """What is usual of a number.
 
     Attributes:
@@ -38,53 +38,53 @@ class Limit(NamedTuple):
     remark: str
 
 
-def _of_field(cls: type[eqx.Module], name: str) -> Limit:
+def _of_field(cls: type[eqx.Module], name: str) -> Range:
     """What a class says is usual of its field."""
     field = fields_of(cls)[name]
     assert field.usual is not None
     low, high, remark = field.usual
-    return Limit(low, high, field.unit, remark)
+    return Range(low, high, field.unit, remark)
 
 
 LIMITS = {
-    "torque": Limit(0.0, np.inf, "N m", "the design torque lies outside the range of torques that is looked at"),
-    "module": Limit(0.05, 100.0, "mm", "ISO 54 lists 1 to 50 mm, fine mechanics goes down to 0.1 mm"),
+    "torque": Range(0.0, np.inf, "N m", "the design torque lies outside the range of torques that is looked at"),
+    "module": Range(0.05, 100.0, "mm", "ISO 54 lists 1 to 50 mm, fine mechanics goes down to 0.1 mm"),
     "elastic modulus": _of_field(Material, "elastic_modulus"),
-    "density": Limit(500.0, 25_000.0, "kg/m^3", "steel 7850 kg/m^3: is it in g/cm^3?"),
-    "bore to root diameter": Limit(0.1, 0.95, "", "a ring held at its bore, outside of the usual proportions"),
-    "face width in modules, plane stress": Limit(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
-    "face width in modules": Limit(2.0, 48.0, "", "as compared with finite elements; narrower contacts are softer"),
-    "overhang in modules, one slice": Limit(0.0, 1.0, "", "load gathers beside it, which takes Resolution(slices=9)"),
-    "tip edge radius in modules": Limit(0.0, 0.2, "", "an edge is broken by 0.01 to 0.1 modules"),
-    "least backlash": Limit(-0.1, np.inf, "um", "the thickest teeth that the tolerances allow jam"),
-    "coefficient of friction": Limit(0.0, 0.5, "", "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"),
-    "coefficient of friction of the oil": Limit(
+    "density": Range(500.0, 25_000.0, "kg/m^3", "steel 7850 kg/m^3: is it in g/cm^3?"),
+    "bore to root diameter": Range(0.1, 0.95, "", "a ring held at its bore, outside of the usual proportions"),
+    "face width in modules, plane stress": Range(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
+    "face width in modules": Range(2.0, 48.0, "", "as compared with finite elements; narrower contacts are softer"),
+    "overhang in modules, one slice": Range(0.0, 1.0, "", "load gathers beside it, which takes Resolution(slices=9)"),
+    "tip edge radius in modules": Range(0.0, 0.2, "", "an edge is broken by 0.01 to 0.1 modules"),
+    "least backlash": Range(-0.1, np.inf, "um", "the thickest teeth that the tolerances allow jam"),
+    "coefficient of friction": Range(0.0, 0.5, "", "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"),
+    "coefficient of friction of the oil": Range(
         0.01, 0.2, "", "lubricated gears 0.03 to 0.12: the law is not made for it"
     ),
-    "bulk temperature": Limit(
+    "bulk temperature": Range(
         -np.inf, 180.0, "degC", "case-hardened steel softens there, and mineral oil ages above 120"
     ),
-    "temperature of the oil": Limit(
+    "temperature of the oil": Range(
         -30.0, np.inf, "degC", "mineral gear oils stop flowing at -10 to -30 degC, synthetic ones at -30 to -60"
     ),
-    "cooling factor": Limit(0.2, 1.2, "", "ISO/TS 6336-20: X_S is 0.2 for submerged teeth, 1 for dip, 1.2 for spray"),
-    "contact ratio": Limit(1.0, 2.0, "", "stresses and safeties of ISO 6336-2 and -3 are made for 1 to 2"),
-    "pitch line velocity": Limit(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
-    "amount of the modification": Limit(0.0, np.inf, "um", "negative: material is added; positive removes it"),
+    "cooling factor": Range(0.2, 1.2, "", "ISO/TS 6336-20: X_S is 0.2 for submerged teeth, 1 for dip, 1.2 for spray"),
+    "contact ratio": Range(1.0, 2.0, "", "stresses and safeties of ISO 6336-2 and -3 are made for 1 to 2"),
+    "pitch line velocity": Range(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
+    "amount of the modification": Range(0.0, np.inf, "um", "negative: material is added; positive removes it"),
     "depth of the modification": _of_field(TipRelief, "amount"),
-    "depth of the modification in modules": Limit(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
-    "length of the modification": Limit(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
-    "length of the end relief": Limit(0.0, np.inf, "mm", "less than the gear is wider than its mate: it has no effect"),
-    "slices over the end relief": Limit(2.0, np.inf, "", "the load peaks beside it: jaxgear.contact.end_relief_widths"),
-    "mean transmission error in modules": Limit(0.0, 0.02, "", "the teeth bend beyond what the model is made for"),
-    "PPTE": Limit(0.1, np.inf, "um", "finer than the model can claim of modified flanks"),
-    "PPTE by finite elements": Limit(0.03, np.inf, "um", "finer than a model in two dimensions can claim"),
-    "flank pressure": Limit(0.0, 1650.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
-    "corner pressure": Limit(
+    "depth of the modification in modules": Range(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
+    "length of the modification": Range(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
+    "length of the end relief": Range(0.0, np.inf, "mm", "less than the gear is wider than its mate: it has no effect"),
+    "slices over the end relief": Range(2.0, np.inf, "", "the load peaks beside it: jaxgear.contact.end_relief_widths"),
+    "mean transmission error in modules": Range(0.0, 0.02, "", "the teeth bend beyond what the model is made for"),
+    "PPTE": Range(0.1, np.inf, "um", "finer than the model can claim of modified flanks"),
+    "PPTE by finite elements": Range(0.03, np.inf, "um", "finer than a model in two dimensions can claim"),
+    "flank pressure": Range(0.0, 1650.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
+    "corner pressure": Range(
         0.0, 1650.0, "MPa", "tip edges dig into the mates, which no flank endures: relieve the tips"
     ),
-    "root stress": Limit(0.0, 1050.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
-    "effective contact ratio": Limit(1.0, np.inf, "", "the teeth lose contact, and shocks follow"),
+    "root stress": Range(0.0, 1050.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
+    "effective contact ratio": Range(1.0, np.inf, "", "the teeth lose contact, and shocks follow"),
 }
 
 _RELIEFS = TipRelief, RootRelief, EndRelief
@@ -103,7 +103,7 @@ class Finding(NamedTuple):
     name: str
     where: str
     value: float
-    limit: Limit
+    limit: Range
 
     def __str__(self) -> str:
         low, high, unit, remark = self.limit

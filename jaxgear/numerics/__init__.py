@@ -9,8 +9,8 @@ from .conversion import Frozen as Frozen
 from .conversion import concrete as concrete
 from .conversion import optional_real as optional_real
 from .conversion import real as real
-from .coupling import Coupling as Coupling
 from .coupling import Other as Other
+from .coupling import SliceCoupling as SliceCoupling
 from .dense import positive_definite as positive_definite
 from .dense import pseudo_inverse as pseudo_inverse
 from .dense import solve_dense as solve_dense

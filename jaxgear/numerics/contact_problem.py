@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from .coupling import Coupling
+from .coupling import SliceCoupling
 from .elimination import Rows, Slopes
 
 Real = Float[Array, "..."]
@@ -69,7 +69,7 @@ class ContactProblem(eqx.Module):
     load: Float[Array, ""] | Float[Array, " positions"] | None = None
     approach: Float[Array, " positions"] | None = None
     start_law: AbstractSpring | None = None
-    coupling: Coupling | None = None
+    coupling: SliceCoupling | None = None
 
     def __check_init__(self):
         if (self.load is None) == (self.approach is None):

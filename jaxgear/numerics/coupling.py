@@ -75,7 +75,7 @@ class Other(eqx.Module):
     rest: Float[Array, ""]
 
 
-class Coupling(eqx.Module):
+class SliceCoupling(eqx.Module):
     """How slices are elastically coupled.
 
     Attributes:
@@ -127,7 +127,7 @@ class Coupling(eqx.Module):
         return along(self.support_modes, along(self.support, onto(self.support_modes, force)))
 
 
-def with_inverses(coupling: Coupling, compliance: Springs) -> Coupling:
+def with_inverses(coupling: SliceCoupling, compliance: Springs) -> SliceCoupling:
     """The coupling ready for eliminations; C has to be positive definite."""
     share = small_inverse(coupling.share[..., None])[..., 0]
     held = Held(coupling.rest * compliance, small_inverse(compliance), share)
@@ -210,7 +210,7 @@ class CoupledFactors(NamedTuple):
         per_slope: load per opening of every spring, about.
     """
 
-    coupling: Coupling
+    coupling: SliceCoupling
     lever: Levers
     inverse: Inverse
     blocks: list[_Block]
@@ -228,7 +228,7 @@ class Response(NamedTuple):
     pressed: Rows
 
 
-def couple(coupling: Coupling, lever: Levers, own: Factors) -> CoupledFactors:
+def couple(coupling: SliceCoupling, lever: Levers, own: Factors) -> CoupledFactors:
     """Eliminates what couples the slices.
 
     Args:
@@ -257,7 +257,7 @@ def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[
     return [onto(mode[:, None] * modes[:, k:], stack)[:, place] for k, mode in enumerate(modes.T)]
 
 
-def _eliminated(coupling: Coupling, modal: list[Float[Array, "_ pairs pairs positions"]]) -> list[_Block]:
+def _eliminated(coupling: SliceCoupling, modal: list[Float[Array, "_ pairs pairs positions"]]) -> list[_Block]:
     held = coupling.held
     blocks: list[_Block] = []
     assert held is not None  # whoever eliminates gives the inverses
@@ -280,7 +280,7 @@ def _times(first: Float[Array, "... rows pairs positions"], second: Float[Array,
 
 
 def _of_support(
-    coupling: Coupling, lever: Levers, inverse, modal
+    coupling: SliceCoupling, lever: Levers, inverse, modal
 ) -> tuple[list[Sides], Float[Array, "bends bends positions"]]:
     """V^T A^-1 X by mode, and X^T A^-1 X."""
     if coupling.support_modes is None:

@@ -42,7 +42,7 @@ def unsealed(kept: bytes) -> bytes | None:
     return content if kept == sealed(content) else None
 
 
-class Kept:
+class KeptFiles:
     """Bytes as files of a folder, named by all that they depend on.
 
     Args:

@@ -148,7 +148,7 @@ _SINGULAR = 1e3
 _LEAST_SHARE = 1 / 64  # of a Newton step; a root that needs smaller ones is out of reach
 
 
-class Found(NamedTuple):
+class NewtonRoot(NamedTuple):
     """What Newton's method ended with.
 
     Attributes:
@@ -166,7 +166,7 @@ class Found(NamedTuple):
     converged: Bool[Array, ""]
 
 
-def newton(function: Function, start: Vector, *, most: int = 30) -> Found:
+def newton(function: Function, start: Vector, *, most: int = 30) -> NewtonRoot:
     """A root near the start by Newton's method; steps that make the equations worse are halved.
 
     It has no derivatives: those of a root are `implicit_root`'s.
@@ -196,7 +196,7 @@ def newton(function: Function, start: Vector, *, most: int = 30) -> Found:
 
     begin = start, evaluated(start), jnp.ones((), start.dtype), jnp.ones((), start.dtype)
     x, (value, jacobian, step), _, count = jax.lax.while_loop(go_on, advance, begin)
-    return Found(x, value, jacobian, count, _is_small(step, x))
+    return NewtonRoot(x, value, jacobian, count, _is_small(step, x))
 
 
 def implicit_root(function: Function, start: Vector, *, most: int = 30) -> Vector:

@@ -1,7 +1,8 @@
 """Compiled functions, which a command keeps for the next process or compiles in a fraction of the time.
 
 `eqx.filter_jit` traces, lowers and compiles a function once per process, which takes seconds; JAX's own cache spares
-the last of the three. A `Store` keeps what comes out at the end by what it was made of: the next process loads it.
+the last of the three. A `ProgramStore` keeps what comes out at the end, by what it was made of: the next process loads
+it.
 """
 
 import functools
@@ -165,7 +166,7 @@ class _Program(NamedTuple):
         return _filled(self.result, self.run.result()(*arrays))
 
 
-class Store:
+class ProgramStore:
     """Programs by what they are made of, compiled in threads of their own.
 
     Args:
@@ -221,10 +222,10 @@ class Store:
         return _Program(self._pool.submit(compiled), result)
 
 
-_store: Store | None = None
+_store: ProgramStore | None = None
 
 
-def keep(store: Store | None) -> None:
+def keep(store: ProgramStore | None) -> None:
     """From now on the programs of this process come from a store; None for no store any more."""
     global _store
     _store = store

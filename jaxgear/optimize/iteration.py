@@ -23,7 +23,7 @@ from .search import AbstractMethod
 from .slp import SLP
 
 
-class Flanks:
+class IteratedFlanks:
     """Both flanks: the modifications of the start, and what is taken off beside them in the contact points."""
 
     def __init__(self, mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, most: float):
@@ -145,7 +145,7 @@ class Pressure:
 
 def levelled(
     mesh: Mesh,
-    flanks: Flanks,
+    flanks: IteratedFlanks,
     pressure: Pressure,
     rtol: float,
     steps: int,
@@ -176,7 +176,7 @@ def levelled(
 
 
 def _least_slant(
-    mesh: Mesh, flanks: Flanks, pressure: Pressure, *, limited: bool
+    mesh: Mesh, flanks: IteratedFlanks, pressure: Pressure, *, limited: bool
 ) -> tuple[AbstractModification, AbstractModification, MeshCycle, float, int]:
     """Both flanks with the least slant that keeps the pressure, or else the least pressure; solved, by how many."""
     tried: dict[float, tuple] = {}
@@ -306,7 +306,7 @@ def iterate_transmission_error(
     spent: list[int] = []
 
     def end_on(finer: Mesh, between: bool = True) -> tuple[Levelled, bool]:
-        flanks = Flanks(mesh, *given, float(max_relief))
+        flanks = IteratedFlanks(mesh, *given, float(max_relief))
         pressure = Pressure(limit, torque, parts(finer, mesh.resolution.positions))
         found = levelled(mesh, flanks, pressure, rtol, steps, spent, callback)
         return found, between and pressure.holds_between(found, finer)

@@ -157,7 +157,7 @@ class NoObjective(AbstractScalarization):
         return self._none, self._none
 
 
-class Model:
+class LinearModel:
     """A linearization on the host with what the problem says about it.
 
     Args:

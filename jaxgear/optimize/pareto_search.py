@@ -15,7 +15,7 @@ from ..numerics.pareto import pareto_front
 from ..tolerance import Tolerance
 from .evaluate import start_points
 from .goal import Constraint, Objective, counted
-from .linear_model import AbstractScalarization, Linearizer, Model
+from .linear_model import AbstractScalarization, Linearizer, LinearModel
 from .problem import Problem, make_problem
 from .refine import POSITIONS, at_more_positions, fine_enough, on_finer_meshes, seek_limits
 from .result import Front
@@ -66,7 +66,7 @@ class Met:
         """Counts contact analyses."""
         self.record.spend(designs, analyses=analyses)
 
-    def take(self, point: np.ndarray, model: Model) -> None:
+    def take(self, point: np.ndarray, model: LinearModel) -> None:
         """Keeps a design until the next look."""
         if np.isfinite(model.values).all() and not counted(model.violation):
             self._new.append((point, model.values))
@@ -300,7 +300,7 @@ def _evidence(record: Record, points, values, span, batch: int) -> np.ndarray:
         record.spend(len(points[rows]), analyses=posed.gradient_cost)
         for index, found in zip(range(rows.start, rows.stop), linearizer(points[rows])):
             way = Descent(values[index], span)
-            left[index] = Model(posed, points[index], found, way).optimality(PROBE)
+            left[index] = LinearModel(posed, points[index], found, way).optimality(PROBE)
     return left
 
 

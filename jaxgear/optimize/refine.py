@@ -10,7 +10,7 @@ from ..contact import Mesh, prepare
 from ..numerics import whole
 from .evaluate import points_nearby, scores, start_points
 from .goal import FEASIBLE, counted
-from .linear_model import Linearizer, Model, NoObjective
+from .linear_model import Linearizer, LinearModel, NoObjective
 from .problem import Problem
 from .search import Record
 from .slp import Ledger, Search, follow
@@ -109,7 +109,7 @@ def at_more_positions(record: Record, points: np.ndarray) -> tuple[np.ndarray, n
         twice = scores(problem.on(_with_positions(problem.mesh, 2 * own)), points)
         four = scores(problem.on(_with_positions(problem.mesh, 4 * own)), points) if problem.constraints else twice
         return np.asarray(twice.value), np.asarray(four.violation)
-    models = [[Model(problem, point, of) for of in both] for point, both in zip(points, finer)]
+    models = [[LinearModel(problem, point, of) for of in both] for point, both in zip(points, finer)]
     values = [[twice.value] if len(problem.objectives) == 1 else twice.values for twice, _ in models]
     return np.asarray(values), np.asarray([four.violation for _, four in models])
 
@@ -143,7 +143,7 @@ class _Judging:
         """Counts contact analyses."""
         self._record.spend(designs, analyses=analyses)
 
-    def take(self, point: np.ndarray, model: Model) -> None:
+    def take(self, point: np.ndarray, model: LinearModel) -> None:
         """Offers a design by its true objective."""
         self._record.offer(point, model.values[:1], model.violation)
 

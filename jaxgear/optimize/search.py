@@ -10,7 +10,7 @@ from ..conditions.join import padded
 from ..numerics import Callback
 from .evaluate import scores
 from .goal import counted
-from .linear_model import Linearizer, Model
+from .linear_model import Linearizer, LinearModel
 from .problem import Problem, Score
 
 
@@ -25,7 +25,7 @@ class Record:
         self.evaluations = 0
         self.point = np.full(len(problem.names), 0.5)
         self.value, self.violation = float("inf"), float("inf")
-        self.model: Model | None = None  # linearization at the best design, where the method made one
+        self.model: LinearModel | None = None  # linearization at the best design, where the method made one
         self.linearizer: Linearizer | None = None  # which made it
         self.history: list[tuple[int, float, int]] = []  # analyses, value, and positions of the mesh that it is of
         self._callback = callback
@@ -46,7 +46,7 @@ class Record:
         """Counts contact analyses: of so many designs in every case, each worth so many."""
         self.evaluations += designs * analyses * self.problem.cases.count
 
-    def offer(self, points, values, violations, model: Model | None = None) -> None:
+    def offer(self, points, values, violations, model: LinearModel | None = None) -> None:
         """Designs with their true objective and violation; anything that is not finite is no candidate."""
         points, values, violations = np.atleast_2d(points), np.ravel(values), np.ravel(violations)
         good = np.isfinite(values) & np.isfinite(violations)
@@ -71,7 +71,7 @@ class Record:
         self.offer(points, score.value[:, 0], score.violation)
         return score
 
-    def take(self, point, model: Model) -> None:
+    def take(self, point, model: LinearModel) -> None:
         """A design with its linearization."""
         self.offer(point, model.value, model.violation, model)
 

@@ -8,7 +8,7 @@ import numpy as np
 from ..numerics.fields import Checked, count, number
 from .evaluate import points_nearby, start_points
 from .goal import FEASIBLE
-from .linear_model import AbstractScalarization, Linearizer, Model
+from .linear_model import AbstractScalarization, Linearizer, LinearModel
 from .problem import Problem
 from .search import AbstractMethod, Record
 
@@ -75,7 +75,7 @@ class Ledger(Protocol):
     def spend(self, designs: int, *, analyses: int) -> None:
         """Counts contact analyses."""
 
-    def take(self, point: np.ndarray, model: Model) -> None:
+    def take(self, point: np.ndarray, model: LinearModel) -> None:
         """Is told of a design."""
 
     def look(self, step: int, steps: int) -> None:
@@ -93,7 +93,7 @@ class Search:
     def __init__(self, point: np.ndarray, scalarization: AbstractScalarization | None = None):
         self.trial, self.scalarization = point, scalarization
         self._point = point
-        self._model: Model | None = None
+        self._model: LinearModel | None = None
         self._radius, self._predicted = _FIRST_RADIUS, 0.0
 
     @property
@@ -110,7 +110,7 @@ class Search:
         # a violation that nobody notices is worth no step either
         return self._predicted > rtol * max(abs(self._model.value), FEASIBLE * self._model.penalty)
 
-    def take(self, model: Model) -> None:
+    def take(self, model: LinearModel) -> None:
         """Goes to the trial point if it is as good as its model says, and adapts the radius."""
         if self._model is None:
             self._model = model if model.fine else None
@@ -151,6 +151,6 @@ def _linearize(linearizer: Linearizer, ledger: Ledger, searches: Sequence[Search
     problem = linearizer.problem
     ledger.spend(len(searches), analyses=problem.gradient_cost)
     for search, found in zip(searches, linearizer(np.stack([search.trial for search in searches]))):
-        model = Model(problem, search.trial, found, search.scalarization, search.penalty)
+        model = LinearModel(problem, search.trial, found, search.scalarization, search.penalty)
         ledger.take(search.trial, model)
         search.take(model)

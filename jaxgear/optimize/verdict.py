@@ -16,7 +16,7 @@ from ..contact.mesh import begin_mesh
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from .goal import FEASIBLE, Constraint
-from .linear_model import Linearizer, Model
+from .linear_model import Linearizer, LinearModel
 from .problem import Problem
 from .result import PENALIZED, Limit, Optimum
 from .search import Record
@@ -78,7 +78,7 @@ def _optimality(record: Record) -> float:
         problem = record.problem
         record.spend(1, analyses=problem.gradient_cost)
         (found,) = Linearizer(problem, 1)(record.point[None])
-        model = Model(problem, record.point, found)
+        model = LinearModel(problem, record.point, found)
     return model.optimality(PROBE)
 
 

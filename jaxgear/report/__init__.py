@@ -4,9 +4,9 @@ It shows what it is handed, tables, lines and pictures, and computes nothing. Ne
 """
 
 from .page import CAPTIONS as CAPTIONS
+from .page import Chapter as Chapter
 from .page import Figure as Figure
 from .page import Report as Report
-from .page import Section as Section
 from .page import Source as Source
 from .page import Table as Table
 from .page import figure as figure

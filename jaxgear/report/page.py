@@ -90,7 +90,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Section:
+class Chapter:
     """A part of the report under its own title.
 
     Attributes:
@@ -127,7 +127,7 @@ class Report:
     title: str
     subtitle: str
     facts: Sequence[tuple[str, str]]
-    sections: Sequence[Section]
+    sections: Sequence[Chapter]
 
 
 def read_table(printed: rich.table.Table) -> Table:

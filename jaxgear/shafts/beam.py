@@ -62,7 +62,7 @@ DIRECTIONS = ("x", "y", "z", "rx", "ry")  # displacements and rotations of a cro
 _UM = 1e3  # um per mm, mrad per rad
 
 
-class Beam(NamedTuple):
+class SteppedBeam(NamedTuple):
     """Pieces of one cross-section each, from left to right; some may have no length.
 
     Attributes:
@@ -93,7 +93,7 @@ def shear_coefficient(bore_ratio: Float[Array, "..."], poisson_ratio: Float[Arra
     return 6 * (1 + poisson_ratio) * whole / ((7 + 6 * poisson_ratio) * whole + (20 + 12 * poisson_ratio) * square)
 
 
-def beam(edges: Float[Array, " edges"], diameter: Pieces, bore: Pieces, material: Material) -> Beam:
+def beam(edges: Float[Array, " edges"], diameter: Pieces, bore: Pieces, material: Material) -> SteppedBeam:
     """The pieces between neighbouring edges.
 
     Args:
@@ -106,7 +106,7 @@ def beam(edges: Float[Array, " edges"], diameter: Pieces, bore: Pieces, material
     inertia = jnp.pi / 64 * (diameter**4 - bore**4)
     shear_modulus = modulus / (2 * (1 + poisson_ratio))
     effective = shear_coefficient(bore / diameter, poisson_ratio) * area
-    return Beam(
+    return SteppedBeam(
         edges[:-1],
         edges[1:],
         _UM / (modulus * inertia),
@@ -116,7 +116,7 @@ def beam(edges: Float[Array, " edges"], diameter: Pieces, bore: Pieces, material
     )
 
 
-def flexibility(held: Beam, at: Points) -> Float[Array, "points 5 points 5"]:
+def flexibility(held: SteppedBeam, at: Points) -> Float[Array, "points 5 points 5"]:
     """Displacement at every point under unit loads at every other one, of the beam held at its left end.
 
     Args:
@@ -159,7 +159,7 @@ def rigid(at: Points) -> Float[Array, "points 5 5"]:
     return jnp.moveaxis(jnp.stack([jnp.stack(row) for row in rows]), 2, 0)
 
 
-def twist(held: Beam, at: Float[Array, "..."]) -> Float[Array, "..."]:
+def twist(held: SteppedBeam, at: Float[Array, "..."]) -> Float[Array, "..."]:
     """Twist between the left end and points under a unit torque [mrad per N mm]."""
     held = jax.tree.map(lambda leaf: jnp.expand_dims(leaf, tuple(range(at.ndim))), held)
     length = jnp.clip(at[..., None], held.start, held.end) - held.start

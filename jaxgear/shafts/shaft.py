@@ -18,7 +18,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..geometry import Gear, Material
 from ..numerics import Checked, concrete, number, positive_definite, program
-from .beam import Beam, beam, rigid
+from .beam import SteppedBeam, beam, rigid
 from .bearing import AbstractBearing
 
 Scalar = Float[Array, ""]
@@ -162,7 +162,7 @@ class Shaft(Checked):
         return sum((section.length for section in self.sections), jnp.zeros(()))
 
     @property
-    def beam(self) -> Beam:
+    def beam(self) -> SteppedBeam:
         """The pieces between all steps of the diameters, gear bodies included."""
         ends = jnp.cumsum(jnp.stack([section.length for section in self.sections]))
         bodies = [(gear, gear.body_diameter) for gear in self.gears if gear.body_diameter is not None]

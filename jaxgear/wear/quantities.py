@@ -19,7 +19,7 @@ from .life import WearLife
 from .over_life import life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth
 
 
-class Kind(NamedTuple):
+class _Kind(NamedTuple):
     """A quantity of worn flanks before its settings are known.
 
     Attributes:
@@ -59,48 +59,48 @@ def _pressure_error(life: WearLife):
     return maximum(may_be) - maximum(largest)
 
 
-WEAR_QUANTITIES: Mapping[str, Kind] = {
-    "worn_ppte": Kind(lambda life, _: over_life(life, "ppte")[-1], "um", "peak-to-peak transmission error when worn"),
-    "mean_ppte_over_life": Kind(
+WEAR_QUANTITIES: Mapping[str, _Kind] = {
+    "worn_ppte": _Kind(lambda life, _: over_life(life, "ppte")[-1], "um", "peak-to-peak transmission error when worn"),
+    "mean_ppte_over_life": _Kind(
         lambda life, _: mean_over_life(life, "ppte"), "um", "peak-to-peak transmission error, mean over the life"
     ),
-    "max_ppte_over_life": Kind(
+    "max_ppte_over_life": _Kind(
         lambda life, _: maximum(over_life(life, "ppte")), "um", "peak-to-peak transmission error, worst of the life"
     ),
-    "max_pressure_over_life": Kind(
+    "max_pressure_over_life": _Kind(
         lambda life, _: maximum(over_life(life, "max_contact_pressure")), "MPa", "largest pressure of the life"
     ),
-    "max_pressure_over_life_error": Kind(
+    "max_pressure_over_life_error": _Kind(
         lambda life, _: _pressure_error(life),
         "MPa",
         "error of the largest pressure of the life by grid and width of the contacts, as estimated",
     ),
-    "worn_dynamic_factor": Kind(
+    "worn_dynamic_factor": _Kind(
         lambda life, _: over_life(life, "dynamic_factor")[-1],
         "",
         "largest mesh force over the static one when worn, at the speed of the pinion",
         needs="dynamics",
     ),
-    "max_dynamic_factor_over_life": Kind(
+    "max_dynamic_factor_over_life": _Kind(
         lambda life, _: maximum(over_life(life, "dynamic_factor")),
         "",
         "largest mesh force over the static one, worst of the life, at the speed of the pinion",
         needs="dynamics",
     ),
-    "wear_depth": Kind(lambda life, _: wear_depth(life)[-1], "um", "largest wear depth of both gears"),
-    "pinion_wear_depth": Kind(lambda life, _: wear_depth(life, "pinion")[-1], "um", "largest wear depth, pinion"),
-    "wheel_wear_depth": Kind(lambda life, _: wear_depth(life, "wheel")[-1], "um", "largest wear depth, wheel"),
-    _ERROR: Kind(
+    "wear_depth": _Kind(lambda life, _: wear_depth(life)[-1], "um", "largest wear depth of both gears"),
+    "pinion_wear_depth": _Kind(lambda life, _: wear_depth(life, "pinion")[-1], "um", "largest wear depth, pinion"),
+    "wheel_wear_depth": _Kind(lambda life, _: wear_depth(life, "wheel")[-1], "um", "largest wear depth, wheel"),
+    _ERROR: _Kind(
         lambda life, _: life.error[-1], "um", "error of the wear depth by the length of the blocks, as estimated"
     ),
-    "life_to_depth": Kind(
+    "life_to_depth": _Kind(
         lambda life, settings: _at_most(LIVES_AHEAD * settings.revolutions, life_to_depth(life, settings.depth_limit)),
         "revolutions",
         "life to the limit of the wear depth, at most a thousand of those looked at",
         "larger",
         "depth_limit",
     ),
-    "life_to_ppte": Kind(
+    "life_to_ppte": _Kind(
         lambda life, settings: _at_most(settings.revolutions, life_to(life, "ppte", settings.ppte_limit)),
         "revolutions",
         "life to the limit of peak-to-peak transmission error, at most the life looked at",
@@ -138,7 +138,7 @@ def _life(name: str, settings: Any, cycle: MeshCycle) -> WearLife:
     return settings.life(mesh, load, **flanks, deviation=deviation_of(cycle, mesh))
 
 
-def _quantity(name: str, kind: Kind) -> Quantity:
+def _quantity(name: str, kind: _Kind) -> Quantity:
     stands = WithoutSettings(name, "jaxgear.wear.Wear", "wear", needs=kind.needs, given=_number)
     return Quantity(name, stands, kind.unit, kind.meaning, better=kind.better)
 

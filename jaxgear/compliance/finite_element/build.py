@@ -22,7 +22,7 @@ _PATCH_POINTS = 64  # of its quadrature
 _CLEAR = 2.0
 
 
-class Numbers(NamedTuple):
+class GearNumbers(NamedTuple):
     """Displacements of one gear along the load line under unit line load, for unit module and unit plane modulus.
 
     Attributes:
@@ -39,7 +39,7 @@ class Numbers(NamedTuple):
     neighbours: np.ndarray
 
 
-def build(shape: Shape, fineness: float = 1.0) -> Numbers:
+def build(shape: Shape, fineness: float = 1.0) -> GearNumbers:
     """Meshes a gear and solves it.
 
     Args:
@@ -63,7 +63,7 @@ def build(shape: Shape, fineness: float = 1.0) -> Numbers:
     local = surface - below - _law(tooth, patched) - _wedge(tooth, patched)
     # displacements of the neighbour are rows, loads are columns
     neighbours = found[1:, :POINTS, :POINTS].transpose(0, 2, 1)
-    return Numbers(rho, center.copy(), _extended(tooth.arc(patched), local, tooth.arc(rho)), neighbours.copy())
+    return GearNumbers(rho, center.copy(), _extended(tooth.arc(patched), local, tooth.arc(rho)), neighbours.copy())
 
 
 def hub(shape: Shape) -> float:

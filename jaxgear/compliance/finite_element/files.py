@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ...numerics.durable import write_durably
-from .build import Numbers
+from .build import GearNumbers
 from .shape import Shape
 from .table import GearTable, gear_table
 
@@ -79,7 +79,7 @@ def read_table(path: Path, shape: Shape, module: float, modulus: float, hub: flo
         if not np.array_equal(_increasing(path, "local", curves["local"]), rho):
             raise ValueError(f"{path}: line {curves['local'][0][0]}: loaded_mm of local must be that of center")
         local = np.array([row[5] for row in curves["local"]])
-    numbers = Numbers(rho, center, local, _neighbours(path, rows, rho))
+    numbers = GearNumbers(rho, center, local, _neighbours(path, rows, rho))
     _check_definite(path, numbers, single["hub"])
     return gear_table(shape, single["module"], single["modulus"], numbers, single["hub"])
 
@@ -167,7 +167,7 @@ def _neighbours(path: Path, rows: list[Row], rho: np.ndarray) -> np.ndarray:
     return np.stack([tables[k] for k in range(1, most + 1)]) if most else np.zeros((0, len(rho), len(rho)))
 
 
-def _check_definite(path: Path, numbers: Numbers, hub: float) -> None:
+def _check_definite(path: Path, numbers: GearNumbers, hub: float) -> None:
     """Loads on all teeth together at any one roll length must do work."""
     teeth = len(numbers.neighbours) + 1
     apart = np.abs(np.arange(teeth)[:, None] - np.arange(teeth)[None])

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...numerics.durable import Kept, user_folder
-from .build import VERSION, Numbers
+from ...numerics.durable import KeptFiles, user_folder
+from .build import VERSION, GearNumbers
 from .shape import Shape
 
 
@@ -17,7 +17,7 @@ def default_folder() -> Path | None:
     return user_folder("jaxgear", "compliance")
 
 
-def cached(folder: Path | None, shape: Shape, build: Callable[[Shape], Numbers]) -> Numbers:
+def cached(folder: Path | None, shape: Shape, build: Callable[[Shape], GearNumbers]) -> GearNumbers:
     """The numbers of a gear from the disk, or made and kept there; without a folder made.
 
     Raises:
@@ -29,12 +29,12 @@ def cached(folder: Path | None, shape: Shape, build: Callable[[Shape], Numbers])
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ValueError(f"finite_element_compliance: cache = {str(folder)!r}: {error.strerror}") from error
-    files = Kept(folder, f"finite elements {VERSION}".encode())
+    files = KeptFiles(folder, f"finite elements {VERSION}".encode())
     made_of = json.dumps(shape).encode()
     content = files.read(made_of)
     if content is not None:
         with np.load(io.BytesIO(content)) as arrays:
-            return Numbers(*(arrays[name] for name in Numbers._fields))
+            return GearNumbers(*(arrays[name] for name in GearNumbers._fields))
     numbers = build(shape)
     written = io.BytesIO()
     np.savez(written, **numbers._asdict())

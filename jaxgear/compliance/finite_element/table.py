@@ -11,7 +11,7 @@ from ...geometry import Gear
 from ...numerics import real
 from ...numerics.spline import cell
 from ..plane import Plane, plane_modulus, plane_poisson
-from .build import Numbers
+from .build import GearNumbers
 from .shape import Shape
 
 Scalar = Float[Array, ""]
@@ -86,7 +86,7 @@ class GearTable(eqx.Module):
         return low + t * (start + t * (3 * rise - 2 * start - end + t * (start + end - 2 * rise)))
 
 
-def gear_table(shape: Shape, module: float, modulus: float, numbers: Numbers, hub: float) -> GearTable:
+def gear_table(shape: Shape, module: float, modulus: float, numbers: GearNumbers, hub: float) -> GearTable:
     """A table of arrays that are those of a gear of that module [mm] and plane modulus [MPa]; fields as there."""
     unit = np.eye(len(numbers.roll_length))
     slopes = scipy.interpolate.CubicSpline(numbers.roll_length, unit)(numbers.roll_length, 1)
@@ -103,10 +103,10 @@ def gear_table(shape: Shape, module: float, modulus: float, numbers: Numbers, hu
     )
 
 
-def scaled(shape: Shape, numbers: Numbers, hub: float, module: float, modulus: float) -> GearTable:
+def scaled(shape: Shape, numbers: GearNumbers, hub: float, module: float, modulus: float) -> GearTable:
     """The table of a gear from numbers for unit module and unit plane modulus."""
     factor = 1e3 / modulus
-    sized = Numbers(numbers.roll_length * module, *(factor * field for field in numbers[1:]))
+    sized = GearNumbers(numbers.roll_length * module, *(factor * field for field in numbers[1:]))
     return gear_table(shape, module, modulus, sized, factor * hub)
 
 
