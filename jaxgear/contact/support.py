@@ -41,7 +41,7 @@ class AbstractSupport(Checked):
 
     @abstractmethod
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
-        """Gap that opens at y[s] under a unit force between the flanks at y[t] [um/N], symmetric, semidefinite."""
+        """Gap that opens at y[s] under a unit force between the flanks at y[t], in um/N, symmetric, semidefinite."""
 
     @abstractmethod
     def gap(self, y: Slices) -> Slices:

@@ -247,8 +247,8 @@ def wear_in_steps(
     """`wear` of concrete numbers, in blocks of equal length, or as long as their wear allows.
 
     Args:
-        mesh, torque, revolutions, coefficient, pinion, wheel, deviation, points, dynamics, line_load,
-            blocks: as for `wear`.
+        mesh, torque, revolutions, coefficient, pinion, wheel: as for `wear`.
+        deviation, points, dynamics, line_load, blocks: as for `wear`.
         largest_increment: depth that no block wears off beyond a tenth more [um], in place of `blocks`. It should stay
             below what the teeth deflect under their load.
         keep: called for every two blocks with all that they depend on and with what makes them; gives them, made now or
