@@ -27,7 +27,7 @@ import jax.numpy as jnp  # noqa: E402
 import jaxgear as jg  # noqa: E402
 from jaxgear import wear  # noqa: E402
 from jaxgear.wear.case import points_for  # noqa: E402
-from jaxgear.wear.deposit import grid  # noqa: E402
+from jaxgear.wear.worn_volume import grid  # noqa: E402
 
 TORQUES = {"30/30": 150.0, "20/30": 98.0}  # N m
 # The study's largest amount is not known: with 0.4 of it the pair that enters contact carries little at the boundary,

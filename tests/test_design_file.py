@@ -31,9 +31,9 @@ from jaxgear.io import (
     write_design,
     write_summary,
 )
-from jaxgear.io.layout import family, section_of
 from jaxgear.io.requests import tolerance_of
 from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
+from jaxgear.io.table_keys import family, section_of
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, NoModification, ParabolicLinear
 from jaxgear.numerics import number
 

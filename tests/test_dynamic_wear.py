@@ -15,7 +15,7 @@ from jaxgear.contact import removed_material
 from jaxgear.contact.prescribed import solve_forces
 from jaxgear.dynamics import Dynamics, natural_frequencies
 from jaxgear.wear import WEAR_QUANTITIES, Wear, mean_over_life, over_life, wear, wear_depth, wear_in_steps, worn_volume
-from jaxgear.wear.deposit import deposit
+from jaxgear.wear.worn_volume import deposit
 
 SIZES = LINE
 TORQUE, COEFFICIENT, REVOLUTIONS, BLOCKS = 100.0, 1e-18, 4e7, 2

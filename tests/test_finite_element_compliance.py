@@ -12,7 +12,7 @@ from catalogue import LINE
 import jaxgear as jg
 from benchmarks import cases
 from jaxgear.compliance import plane_stress_share, write_table
-from jaxgear.compliance.finite_element.kept import cached
+from jaxgear.compliance.finite_element.table_cache import cached
 from jaxgear.compliance.toothload import tooth_load
 from jaxgear.geometry import outline
 from jaxgear.io import DesignFileError, load_design

@@ -13,9 +13,9 @@ from rexs_schema import FOLDER, faults
 
 import jaxgear as jg
 from jaxgear.io import describe, read_rexs, write_rexs
-from jaxgear.io.layout import family
 from jaxgear.io.rexs.gears import _SPANS as SPANS
 from jaxgear.io.rexs.values import frames
+from jaxgear.io.table_keys import family
 from jaxgear.manufacture import span
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, TabulatedFlank
 from jaxgear.numerics import number

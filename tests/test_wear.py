@@ -23,9 +23,9 @@ from jaxgear.wear import (
 )
 from jaxgear.wear import wear as worn_flanks
 from jaxgear.wear.case import case_of, marched, worn_through
-from jaxgear.wear.deposit import deposit, grid, worn
 from jaxgear.wear.life import life_of as life_from
 from jaxgear.wear.march import Analysis, march
+from jaxgear.wear.worn_volume import deposit, grid, worn
 
 # contacts that stay at their nominal places: sliding down a kinked flank they see rounding, by up to 1e-3 um
 SIZES = LINE

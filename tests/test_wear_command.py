@@ -20,7 +20,7 @@ from report_page import check_report
 import jaxgear as jg
 from jaxgear import plot
 from jaxgear.cli import wear_report, wear_scatter
-from jaxgear.cli.compared import compared, sought
+from jaxgear.cli.comparison import compared, sought
 from jaxgear.cli.study import Kept, Marches
 from jaxgear.contact import removed_material
 from jaxgear.io import (
@@ -543,7 +543,7 @@ class Search:
 
 def test_what_a_search_has_found_is_not_sought_again(tmp_path, file, monkeypatch):
     """The mesh on which it ended, and the flanks, come from a few numbers beside the results."""
-    monkeypatch.setattr(importlib.import_module("jaxgear.cli.compared"), "prepare", prepared)
+    monkeypatch.setattr(importlib.import_module("jaxgear.cli.comparison"), "prepare", prepared)
     mesh, stages = load_design(file(PAIR)).mesh(), SimpleNamespace(step=None)
     search = Search({"amount": 12.3, "length": 2.1})
 

@@ -30,7 +30,7 @@ from ..dynamics.speed_sweep import STABLE_STEPS
 from ..io import DesignFile, DesignFileError, DynamicsRequest, dynamics_request
 from ..io.errors import naming
 from . import dynamics_figures, dynamics_report, manufactured
-from .compared import Modifications, compared, search_of
+from .comparison import Modifications, compared, search_of
 from .dynamics_report import DynamicsStudy, next_to_design, peak
 from .progress import Stages
 from .study import Kept, SpeedResponses, runs_beside

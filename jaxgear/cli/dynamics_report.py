@@ -18,7 +18,7 @@ from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
 from .geometry import gears
 from .study import grid_line
-from .written import identity, model, versions
+from .summary_file import identity, model, versions
 
 _COLUMNS = {
     "dynamic_factor": "dynamic_factor",

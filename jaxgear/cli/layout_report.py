@@ -18,7 +18,7 @@ from ..shafts import bearing_reactions, root_face_load_factor, tooth_height
 from . import report
 from .geometry import gears
 from .study import grid_line
-from .written import finding_data, identity, versions
+from .summary_file import finding_data, identity, versions
 
 STEPS = ("unmodified", "step 1", "step 2")
 LIVES = ("pinion_life_h", "wheel_life_h")

@@ -38,7 +38,7 @@ from ..optimize import (
     verification,
 )
 from ..report import Table as Block
-from . import interrupt, manufactured, optimum_report, report, written
+from . import interrupt, manufactured, optimum_report, report, summary_file
 from .cache import enable_cache
 from .document import CommandResult, Document
 from .geometry import mounting
@@ -153,7 +153,7 @@ class CommandRun:
             self._evaluations = manufactured.scattered(*of, self._tolerance, quick=self._quick)
         self._stages.begin("writing the results")
         self._findings = report.findings(self.design, self._mesh, self._evaluations)
-        data = written.summary(self.design, self._mesh, self._evaluations, self._torques, self._findings)
+        data = summary_file.summary(self.design, self._mesh, self._evaluations, self._torques, self._findings)
         if self._optimum is not None:
             data["optimum"] = optimum_report.summary(self.design, self._optimum, self._projection)
         data["quick"] = self._quick

@@ -21,7 +21,7 @@ from .geometry import gears
 from .progress import Stages
 from .run import Modifications, torques_of
 from .study import evaluate, grid_change, grid_line
-from .written import sizes, versions
+from .summary_file import sizes, versions
 
 _DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory does not grow with the table
 _CHARTS = 6  # radar charts

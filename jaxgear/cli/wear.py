@@ -11,7 +11,7 @@ from ..io.requests import tolerance_of
 from ..numerics import optional_real, real
 from ..wear import WearLife, wear_in_steps
 from . import wear_report, wear_scatter
-from .compared import compared, first_mesh, search_of, sought
+from .comparison import compared, first_mesh, search_of, sought
 from .progress import Stages
 from .study import Kept, Marches, runs_beside
 from .study_command import Make, StudyCommand

@@ -18,7 +18,7 @@ from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, 
 from ..wear.quantities import blocks_are_short, number_of
 from . import manufactured, report, wear_scatter
 from .geometry import gears
-from .written import identity, versions
+from .summary_file import identity, versions
 
 _QUANTITIES = (
     "ppte",

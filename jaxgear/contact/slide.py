@@ -32,8 +32,18 @@ from jaxtyping import Array, Float
 from ..compliance import default_compliance
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Checked, changed, program, real, result, stored
+from .contact_width import (
+    Node,
+    Place,
+    flank_at,
+    patch_nodes,
+    place_of,
+    probe,
+    secant_slope,
+    terms_of,
+    varies_along_profile,
+)
 from .mesh import Mesh
-from .patch import Node, Place, flank_at, patch_nodes, place_of, probe, secant_slope, terms_of, varies_along_profile
 from .resolution import Resolution
 
 Scalar = Float[Array, ""]

@@ -31,8 +31,8 @@ from ..shafts import Section as ShaftPart
 from . import schema_shafts as schema
 from .errors import DesignFileError, check_file, referring, refuse_given, refused
 from .gears import Materials, fixed_gear, fixed_material, with_quality
-from .layout import section_of
 from .schema import FileSection
+from .table_keys import section_of
 from .template import part_of
 from .toml import decode
 

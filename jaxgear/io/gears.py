@@ -12,8 +12,8 @@ from ..numerics import Number, fields_of
 from . import schema, template
 from .errors import DesignFileError, check_known
 from .flanks import flank_part
-from .kinds import not_of_kind
 from .toml import decode
+from .value_types import not_of_kind
 
 _STEEL = "STEEL"
 _BACKLASH = Number("um", low=0.0)

@@ -26,10 +26,10 @@ from ..wear.quantities import LIVES_AHEAD
 from . import schema
 from .design_file import DesignFile
 from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
-from .kinds import outside
-from .layout import FileTable
 from .requests import load_of, quantity_named, tolerance_of
+from .table_keys import FileTable
 from .toml import decode
+from .value_types import outside
 
 CURVE = "cubic"  # on which flanks without parameters are projected
 PARETO = "pareto"

@@ -7,11 +7,11 @@ from typing import Annotated, Any, TypeVar
 from ..metrics import Lubricant, Strength
 from ..numerics import Number
 from .errors import DesignFileError, referring
-from .kinds import outside, text
-from .layout import FileTable, section_of
 from .schema import LoadSection, Tables
+from .table_keys import FileTable, section_of
 from .template import part_of
 from .toml import decode, join, read
+from .value_types import outside, text
 
 S = TypeVar("S", bound=FileTable)
 

@@ -23,8 +23,8 @@ from ..shafts import Misalignment
 from ..tolerance import Tolerance
 from ..wear import Wear
 from . import rating, schema, schema_shafts
-from .kinds import allowed
-from .layout import FileTable, family, meanings, section_of, snake, summary
+from .table_keys import FileTable, family, meanings, section_of, snake, summary
+from .value_types import allowed
 
 _HEAD = """# Design files
 

@@ -22,7 +22,7 @@ from ..numerics import check, fields_of
 from ..optimize import Front
 from ..sweeps.columns import as_text
 from .folder import writing
-from .layout import family, snake
+from .table_keys import family, snake
 
 _PLACE = {
     "face_coordinate_mm": "face_coordinate",

@@ -19,7 +19,8 @@ from ..optimize import METHODS, Pareto
 from ..shafts import Misalignment
 from ..tolerance import Tolerance
 from ..wear import Wear
-from .kinds import (
+from .table_keys import FileTable, section_of
+from .value_types import (
     LEVEL,
     QUALITY_CLASS,
     QUALITY_CLASSES,
@@ -35,7 +36,6 @@ from .kinds import (
     table,
     text,
 )
-from .layout import FileTable, section_of
 
 Tables = dict[str, Any]
 

@@ -6,8 +6,8 @@ from ..layout import SNCurve
 from ..numerics import Number
 from ..shafts import Bearing, Coupling, GearMesh, MatrixBearing, Misalignment, MountedGear, ShaftLoad
 from ..shafts import Section as ShaftPart
-from .kinds import QUALITY_CLASSES, choice, count, either, list_of, positive, real, switch, table, text
-from .layout import FileTable, section_of
+from .table_keys import FileTable, section_of
+from .value_types import QUALITY_CLASSES, choice, count, either, list_of, positive, real, switch, table, text
 
 Tables = dict[str, Any]
 

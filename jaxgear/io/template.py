@@ -17,7 +17,7 @@ from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Number, fields_of, real
 from ..shafts import RigidSupport
 from .errors import DesignFileError, check_known, not_known, problem
-from .layout import FileTable, family, modules_of, section_of
+from .table_keys import FileTable, family, modules_of, section_of
 from .toml import decode, join
 
 # `tip_diameter = 3 mm must be`, `wheel module = 4 mm must be`: what the library says of a field

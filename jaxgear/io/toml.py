@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from .errors import DesignFileError, check_file, obeyed, suggestion
-from .kinds import TAGS, not_of_kind
+from .value_types import TAGS, not_of_kind
 
 S = TypeVar("S", bound=BaseModel)
 

@@ -9,10 +9,10 @@ from pydantic import BaseModel
 from . import schema, template
 from .errors import DesignFileError, suggestion
 from .gears import with_quality
-from .kinds import outside
 from .model import FINITE_ELEMENTS
 from .schema import METHODS_WITHOUT_VARIABLES
 from .toml import decode
+from .value_types import outside
 
 _QUANTITY = re.compile(r"\s*[-+]?[.,]?\d")
 

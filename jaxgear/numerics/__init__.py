@@ -1,5 +1,8 @@
 """Numerical tools without a gear word: fields, safe functions, extremes, quadrature, roots, complementarity, risk."""
 
+from .batching import on_both as on_both
+from .batching import once as once
+from .batching import over_batch as over_batch
 from .complementarity import solve_contact as solve_contact
 from .complementarity import tangent_stiffness as tangent_stiffness
 from .contact_problem import AbstractSpring as AbstractSpring
@@ -9,6 +12,8 @@ from .conversion import Frozen as Frozen
 from .conversion import concrete as concrete
 from .conversion import optional_real as optional_real
 from .conversion import real as real
+from .coupled_points import Pressed as Pressed
+from .coupled_points import press as press
 from .coupling import Other as Other
 from .coupling import SliceCoupling as SliceCoupling
 from .dense import positive_definite as positive_definite
@@ -32,14 +37,9 @@ from .implicit import implicit_root as implicit_root
 from .implicit import newton as newton
 from .implicit import solve as solve
 from .implicit import with_jacobian as with_jacobian
-from .leading import on_both as on_both
-from .leading import once as once
-from .leading import over_batch as over_batch
 from .pareto import decoded as decoded
 from .pareto import next_generation as next_generation
 from .pareto import random_strings as random_strings
-from .pressed import Pressed as Pressed
-from .pressed import press as press
 from .programs import compile_quickly as compile_quickly
 from .programs import kernel as kernel
 from .programs import program as program

@@ -1,7 +1,5 @@
 """Wear: the flank as a state over its life."""
 
-from .deposit import passage_depth as passage_depth
-from .deposit import specific_sliding as specific_sliding
 from .life import WearLife as WearLife
 from .life import wear as wear
 from .life import wear_in_steps as wear_in_steps
@@ -15,3 +13,5 @@ from .over_life import wear_depth as wear_depth
 from .over_life import worn_volume as worn_volume
 from .quantities import WEAR_QUANTITIES as WEAR_QUANTITIES
 from .settings import Wear as Wear
+from .worn_volume import passage_depth as passage_depth
+from .worn_volume import specific_sliding as specific_sliding

@@ -25,9 +25,9 @@ from ..geometry.involute import half_tooth_angle
 from ..metrics.lubrication import flash_temperature
 from ..microgeometry import AbstractModification, Flank, TabulatedFlank, TabulatedProfile
 from ..numerics import check, kernel, program, real, result, whole
-from .deposit import PARTS, Deposit, deposit, grid, worn
 from .march import Analysis, Depth, March, march
 from .vibration import Flanks, LineLoad, Vibration, vibration_of
+from .worn_volume import PARTS, Deposit, deposit, grid, worn
 
 
 class WornFlank(AbstractModification):

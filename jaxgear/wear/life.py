@@ -14,9 +14,9 @@ from ..geometry import Gear
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, check, maximum, program, quick_jit, real, result, whole
 from .case import Case, case_of, marched, tables
-from .deposit import arcs, grid
 from .march import BLOCKS_OF_A_PAIR, Depth, March
 from .vibration import LineLoad
+from .worn_volume import arcs, grid
 
 Scalar = Float[Array, ""]
 Lives = Float[Array, " lives"]

@@ -25,9 +25,9 @@ from ..plane import (
 from ..toothload import ToothLoad
 from .build import build, hub
 from .files import read_table
-from .kept import cached, default_folder
 from .shape import Shape
 from .table import GearTable, Scale, different, scaled, shape_of
+from .table_cache import cached, default_folder
 
 Matrix = Float[Array, "pairs pairs positions"]
 

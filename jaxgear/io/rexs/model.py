@@ -23,7 +23,7 @@ import numpy as np
 
 from ...numerics import Number
 from ..errors import DesignFileError
-from ..kinds import outside
+from ..value_types import outside
 from .values import checked_version, decoded, kind_of, whole, written
 
 CUSTOM = "custom_jaxgear_"  # of attributes that REXS does not know: it leaves "custom_..." to programs

@@ -1,4 +1,4 @@
-"""Kinds of values in a design file: what may stand after a key, how it is checked and how it is described.
+"""Types of values in a design file: what may stand after a key, how it is checked and how it is described.
 
 Pydantic finds its way through the tables and says where a value is wrong; these functions say what is wrong with it.
 """

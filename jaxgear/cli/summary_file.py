@@ -12,7 +12,7 @@ import numpy as np
 from ..contact import Mesh, Resolution
 from ..geometry import Gear
 from ..io import DesignFile, describe
-from ..io.layout import snake
+from ..io.table_keys import snake
 from ..metrics import Finding
 from ..numerics import Number, fields_of
 from ..optimize import Verified

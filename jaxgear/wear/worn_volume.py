@@ -38,8 +38,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import Mesh, MeshCycle
+from ..contact.contact_width import patch_nodes, place_of
 from ..contact.kinematics import contacts
-from ..contact.patch import patch_nodes, place_of
 from ..geometry import PathOfContact
 from ..numerics import check, program, real, safe_divide, safe_sqrt
 

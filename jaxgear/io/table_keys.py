@@ -16,7 +16,7 @@ import equinox as eqx
 from pydantic import BaseModel, ConfigDict, create_model
 
 from ..numerics import Number, fields_of
-from .kinds import Kind, choice, either, list_of, real, rows_of, switch, table, text
+from .value_types import Kind, choice, either, list_of, real, rows_of, switch, table, text
 
 
 class FileTable(BaseModel):
