@@ -70,7 +70,7 @@ def gearbox(housing=None):
 def housing(bad):
     """Compliance between the seats [um/N], as a finite-element model gives it: walls, foundation, and a missing foot.
 
-    A seat gives way by its own wall, less when its neighbours in the wall are loaded; all seats together sink and lean
+    A seat deflects with its own wall, less when its neighbours in the wall are loaded; all seats together sink and lean
     on the foundation, which moves the shafts alike. Where the foundation is bad, the back wall sinks under the
     intermediate shaft.
     """

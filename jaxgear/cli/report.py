@@ -121,7 +121,7 @@ def findings(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str
 
 @program
 def _support_deflection(mesh: Mesh, line_load) -> Float[Array, ""]:
-    """Mean transmission error that is that of what holds the gears [um]."""
+    """Mean transmission error by deflection of the support [um]."""
     return jnp.mean(mesh.support_deflection(line_load))
 
 

@@ -191,7 +191,7 @@ def verdict(study: WearStudy) -> Iterator[str]:
 
 
 def _sought(study: WearStudy) -> str:
-    """Under what the relief that lasts has been sought."""
+    """Conditions of the search for the lowest mean PPTE over the wear history."""
     settings = study.request.settings
     text = f"sought at {_torques(study)}, under the static line load, on gears without deviations"
     vibrates = settings.dynamics is not None and settings.line_load == "dynamic"

@@ -1,4 +1,4 @@
-"""Gear-body models: what the root of a loaded tooth, and of its neighbours, gives way.
+"""Gear-body models: deflection of the root of a loaded tooth and of its neighbours.
 
     delta = F cos^2 a / (E b) { L (u/S)^2 + M u/S + P (1 + Q tan^2 a) },   X = A/t^2 + B h^2 + C h/t + D/t + E h + F
 

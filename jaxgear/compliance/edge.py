@@ -13,7 +13,7 @@ soften it:
    delta_Hertz the approach of the full contact. It is the closed-form solution of the singular integral equation of the
    plane contact with one singular end; at tau = 1 the patch just reaches the corner and Phi = 0.
 2. The missing material. Behind the corner there is a wedge of interior angle 2 beta, not a half plane. Loaded at its
-   apex it gives way by q / E' K ln(r), K = sin^2 b / (b + sin(2b)/2) + cos^2 b / (b - sin(2b)/2), against 2 / pi for
+   apex it deflects by q / E' K ln(r), K = sin^2 b / (b + sin(2b)/2) + cos^2 b / (b - sin(2b)/2), against 2 / pi for
    the half plane (Flamant). The excess acts between the distance of the load from the corner and the size of the tooth
    tip. Its mean is taken over a semi-ellipse on the patch: the square-root singularity of the truncated half planes
    does not exist at the corner of a wedge, and would overstate the excess. Where the tip is chamfered, the wedge is the

@@ -171,7 +171,7 @@ def few_modes(
     rest = (jnp.trace(kernel, axis1=-2, axis2=-1) - jnp.trace(projected, axis1=-2, axis2=-1)) / (slices - count)
     if ends is not None:
         rest = _KEPT * rest
-    if ends is not None and parts is not None:  # wide slices beside narrow ones give way far less than their mean
+    if ends is not None and parts is not None:  # wide slices beside narrow ones deflect far less than their mean
         rest = jnp.minimum(rest, jnp.vectorize(_lowest, signature="(n,n)->()")(projected))
     shape = (1,) * len(gears) + (count, count)
     return modes, projected - rest[..., None, None] * jnp.eye(count, dtype=kernel.dtype).reshape(shape), rest

@@ -79,7 +79,7 @@ class MeshCycle(eqx.Module):
         operating_point: what the mesh was run at.
         pinion, wheel: modifications of the flanks; None where only the material removed was given (`solve_removed`).
         transmission_error: loaded, on the line of action, positive when the wheel lags [um], shape (positions,);
-            with what shafts, bearings and housing give way, where the mesh was prepared with them.
+            with the deflection of shafts, bearings and housing, where the mesh was prepared with them.
         unloaded_transmission_error: the same at vanishing load [um].
         line_load: [N/mm], shape (pairs, slices, positions).
         pair_force: force on the line of action that every pair contributes [N], shape (pairs, positions); the pairs of

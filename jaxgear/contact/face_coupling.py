@@ -91,7 +91,7 @@ def coupling_of(
         moving: kinematics of the pair.
         spreading: how both gears spread loads.
         wheel: compliance of the wheel, see `Mesh.structure`.
-        support: what holds the gears.
+        support: shafts, bearings and housing.
     """
     sizes = moving.resolution
     if not sizes.is_coupled:

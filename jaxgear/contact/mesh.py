@@ -81,7 +81,7 @@ class Mesh(eqx.Module):
             N/mm].
         slice_width: [mm], shape (slices,).
         coupling: how the slices are elastically coupled; None where they do not.
-        support: what holds the gears; None for rigid, parallel shafts.
+        support: shafts, bearings and housing; None for rigid, parallel shafts.
         support_gap: by which it opens the flanks without the force of this mesh [um], shape (slices,); None without.
         support_torque: at which the support holds [N m]; None where it does at every torque.
         support_valid: whether such a support can be; None without.
@@ -156,11 +156,11 @@ class Mesh(eqx.Module):
         return self.kinematics.face_coordinate
 
     def held(self, gap: Float[Array, "pairs slices positions"]) -> Float[Array, "pairs slices positions"]:
-        """A gap of the flanks [um] as what holds the gears leaves it."""
+        """A gap of the flanks [um] with the gap of the support."""
         return gap if self.support_gap is None else gap + self.lever[:, None] * self.support_gap[None, :, None]
 
     def support_deflection(self, line_load: Float[Array, "pairs slices positions"]) -> Float[Array, " positions"]:
-        """Transmission error by which the support gives way to all pairs alike under line loads [N/mm], in um."""
+        """Transmission error by deflection of the support, alike for all pairs, under line loads [N/mm], in um."""
         bent = None if self.coupling is None else self.coupling.support_deflection(self.lever, list(line_load))
         return jnp.zeros_like(line_load[0, 0]) if bent is None else jnp.min(bent, axis=0)
 
@@ -203,7 +203,7 @@ def prepare(
         support: what shafts, bearings, housing and misalignment do to the gap over the face, as `support` of a gearbox
             gives it; None for rigid, parallel shafts. It needs coupled slices, and bends over the face in
             as many polynomials as the resolution has `face_modes`. That of a gearbox holds at the gearbox's torque,
-            which `solve` and the like then ask for. Transmission error and stiffness contain what it gives way.
+            which `solve` and the like then ask for. Transmission error and stiffness contain its deflection.
 
     Returns:
         the mesh, to be shared by any number of modifications and torques.

@@ -141,8 +141,8 @@ def on_bearings(
 
     In order: the relative rotation u = r_b1 theta_1 - r_b2 theta_2; the centre of the pinion along the line of action,
     in the direction in which it pushes the wheel, and across; the centre of the wheel likewise. The DTE is
-    q = u + along_1 - along_2; the bearings carry the mesh force, so that at rest the pinion gives way by -F / k_1 and
-    the wheel by F / k_2.
+    q = u + along_1 - along_2; the bearings carry the mesh force, so that at rest the pinion is displaced by -F / k_1
+    and the wheel by F / k_2.
 
     Args:
         mesh_force, pair, torque, damping_ratio, damping, inertias, mean_stiffness, excitation: as for `torsional`.

@@ -62,7 +62,7 @@ class DesignFile:
         dynamics: likewise, see `dynamics_request`.
         wear: likewise, see `wear_request`.
         lubricant: the oil; None if the file has none.
-        strength: what the gears bear; None if the file does not say.
+        strength: permissible stresses of both gears; None if the file has none.
         layout: likewise, see `layout_request`.
         support: the mesh on its shafts; None without them.
         design: makes the modifications of pinion and wheel from the free parameters.
@@ -167,8 +167,8 @@ class DesignFile:
 
         Args:
             resolution: array sizes in place of the file's.
-            support: what holds the gears; None for the file's shafts, where they do the same at every torque (see
-                `left_out`), or its misalignment.
+            support: shafts, bearings and housing; None for those of the file, where they are the same at every torque
+                (see `left_out`), or its misalignment.
             rigid: without the file's shafts.
 
         Raises:

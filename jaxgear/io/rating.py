@@ -34,7 +34,7 @@ class LubricantSection(FileKey, section_of(Lubricant, open=False)):  # type: ign
 
 
 class StrengthSection(FileKey, section_of(Strength, open=False)):  # type: ignore[misc]
-    """What the gears bear, for the safety factors."""
+    """Permissible stresses, for the safety factors."""
 
 
 def lubricant_of(

@@ -64,7 +64,7 @@ class FileSection(FileTable):
         dynamics: at which speeds the pair runs, and what vibrates.
         wear: how long the pair runs, and how fast it wears.
         lubricant: the oil that they run in.
-        strength: what the gears bear.
+        strength: permissible stresses of both gears.
         shafts: that carry the gears, for `jaxgear layout`.
         meshes: of their gears; that of pinion and wheel alone without it.
         housing: that holds their bearings; rigid seats without it.
@@ -122,7 +122,7 @@ _GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance"))
 
 
 class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
-    """A gear and what is taken off its flanks.
+    """A gear and the modifications of its flanks.
 
     The tooth thickness stands in one of three ways: as the allowance E_sns, with the tolerance T_sn down to E_sni where
     there is one; as the span W_k over so many teeth; as the dimension over balls. A list of two is lower and upper
@@ -136,7 +136,7 @@ class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
         ball_diameter: D_M.
         material: name in [materials], "STEEL", or elastic constants.
         quality_class: flank tolerance class of ISO 1328-1, of [tolerance], [layout] and the charts.
-        modification: what is taken off the flank; several add up.
+        modification: modifications of the flank; several add up.
     """
 
     material: Annotated[Any, either(text(), table(), "the name of a material, or a table")] = None

@@ -107,7 +107,7 @@ class LayoutSection(FileTable):
         torques: on the pinion, of a duty cycle; the load is levelled at the design torque without it.
         hours: at every torque.
         speeds: of the pinion at every torque.
-        pitting: what the flanks bear, `endurance`, `exponent` and `cycles` of a Woehler line.
+        pitting: S-N curve of the flanks, with `endurance`, `exponent` and `cycles`.
         bending: what the tooth roots bear, likewise.
         profile: profile modifications to be tried in step 3; none without it.
     """

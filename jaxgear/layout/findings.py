@@ -1,4 +1,4 @@
-"""Layouts that can be computed but hardly be meant: what an experienced engineer would ask about.
+"""Layouts out of the usual range: what an experienced engineer would ask about.
 
 Nothing is refused here: a finding is a warning. The limits are of this project where no source is named.
 """
@@ -62,7 +62,7 @@ LIMITS = {
     ),
     "misalignment over the face": Range(0.1, np.inf, "um", "less than axes can be measured to: is it in mm?"),
     "damage by the duty cycle": Range(
-        1e-12, 1.0, "", "1 is a used-up life: are torques in N m, endurance in MPa and cycles single ones?"
+        1e-12, 1.0, "", "1 is the end of life: are torques in N m, endurance in MPa and cycles single ones?"
     ),
     **{name: LIMITS_OF_MESH[name] for name in ("depth of the modification", "depth of the modification in modules")},
     "pitch line velocity": LIMITS_OF_MESH["pitch line velocity"],

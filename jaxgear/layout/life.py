@@ -51,7 +51,7 @@ class SNCurve(Checked):
 
 
 class Endurance(Checked):
-    """What the material of a gear bears.
+    """S-N curve of the material of a gear.
 
     Attributes:
         pitting: against the nominal contact stress of ISO 6336-2, as `pitting` of `metrics.Strength`.

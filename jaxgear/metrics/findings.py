@@ -1,4 +1,4 @@
-"""Numbers that can be computed but hardly be meant: what an experienced engineer would ask about.
+"""Numbers out of the usual range: what an experienced engineer would ask about.
 
 One table of limits serves inputs and results alike. Nothing is refused here: a finding is a warning.
 """

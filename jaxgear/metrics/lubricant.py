@@ -1,4 +1,4 @@
-"""The oil between the flanks: viscosity, density, what pressure makes of them, and what the flanks bear with it.
+"""The lubricant: viscosity and density with their dependence on pressure, and its scuffing resistance.
 
 References:
     ASTM D341 and DIN 51563 (Ubbelohde, Walther) for viscosity over temperature; ISO/TS 6336-22 (ISO/TR 15144-1) for

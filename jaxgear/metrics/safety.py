@@ -28,7 +28,7 @@ LARGEST_SAFETY = 1000.0
 
 
 class Strength(Checked):
-    """Stresses that the gears bear under what they are to be safe from: factors of life, surface, size are in them.
+    """Permissible stresses of both gears; factors of life, surface and size are included.
 
     Attributes:
         pitting: nominal contact stress that the pinion bears, and the wheel where it has none of its own: sigma_HG
@@ -37,7 +37,7 @@ class Strength(Checked):
         bending: nominal stress in the tooth root that the pinion bears, with its notch, and the wheel where it has
             none of its own: sigma_FG of ISO 6336-3.
         wheel_bending: the same of the wheel; None for that of the pinion.
-        pressure: largest pressure of the contact analysis that the flanks bear, tip edges included.
+        pressure: permissible pressure of the contact analysis, tip edges included.
         pitting_exponent: p of the Woehler line N = `pitting_cycles` (pitting / stress)^p of both gears, for damage.
         pitting_cycles: that `pitting` is borne for.
         bending_exponent: of the Woehler line of the tooth roots, likewise.

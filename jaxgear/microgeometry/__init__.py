@@ -1,4 +1,4 @@
-"""What is taken off the flank: profile and lead modifications, composed with `+` and factors.
+"""Flank modifications: profile and lead modifications, composed with `+` and factors.
 
 Positive means material removed, in um, normal to the flank in the transverse plane (ISO 21771), which is along the line
 of action. Profile lengths are roll lengths in mm (differences of radii of curvature) and are counted from the tip for a

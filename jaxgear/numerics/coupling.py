@@ -5,7 +5,7 @@ The deflection of spring p in slice s under all line loads is
     y[p, s] = sum_j C[p, j] ( rest q[j, s] + sum_{k, l, t} V[s, k] M[k, l] V[t, l] q[j, t] )
             + lever[p] sum_{k, l, t} R[s, k] H[k, l] R[t, l] sum_j lever[j] q[j, t]:
 
-springs on bodies whose deflection at one place is felt at others, on a support that gives way under the force of all
+springs on bodies whose deflection at one place is felt at others, on a support that deflects under the force of all
 springs of a slice. Where the two bodies that make up C spread loads in their own way each, a second sum of this form
 follows, with the C of one of them and by how much its M and rest differ. Of slices of unequal weight, w times the line
 load of slice t stands for q in the sums over t, w being the weight over the mean of all.
@@ -120,7 +120,7 @@ class SliceCoupling(eqx.Module):
     def support_deflection(
         self, lever: Float[Array, "pairs positions"], load: Rows
     ) -> Float[Array, "slices positions"] | None:
-        """By how much the support gives way under line loads, per unit of lever; None without a support."""
+        """Deflection of the support under line loads, per unit of lever; None without a support."""
         if self.support is None or self.support_modes is None:
             return None
         force = self.weighted(sum(height[None] * q for height, q in zip(lever, load)))

@@ -51,7 +51,7 @@ class IteratedFlanks:
         self._extra = [np.zeros_like(self._path), np.zeros_like(self._path)]
 
     def modifications(self, slant: float = 0.0) -> tuple[AbstractModification, AbstractModification]:
-        """Of pinion and wheel, with what is taken off slanted towards the tips."""
+        """Of pinion and wheel, with the material removed slanted towards the tips."""
         made = []
         for index, (given, roll) in enumerate(zip(self._start, self._roll)):
             before = self._given[index]
@@ -255,7 +255,7 @@ def iterate_transmission_error(
 
     While one pair alone carries the load its deflection is given. Where two pairs share it the gears lag less, by
     h = q_max - q: that much is taken off both flanks there, off the pinion in recess and off the wheel in approach, so
-    that both pairs give way by it. It starts where the transmission error leaves its single-contact extreme, and is
+    that both pairs yield by it. It starts where the transmission error leaves its single-contact extreme, and is
     repeated with the flanks so made, because pairs that meet beyond the path of contact come in later the more is
     taken off.
 

@@ -346,7 +346,7 @@ def face_gap(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None =
 
     Unloaded it is that of modifications, misalignment and other meshes on the shafts, from where the flanks touch
     first; on bent shafts the same with what the load of this mesh makes of shafts, bearings and housing, where they
-    give way; under load what is left where the flanks do not touch.
+    deflect; under load what is left where the flanks do not touch.
 
     Args:
         cycle: solved cycle of several slices with its mesh, `cycle.on(mesh)`.

@@ -58,7 +58,7 @@ class Housing(Checked):
 
     Attributes:
         nodes: what each row and column is, "SEAT.DIRECTION" with the name of a bearing and x, y, z, rx or ry; a seat
-            does not give way in directions that are missing.
+            is rigid in directions that are missing.
         matrix: N/um, N/mrad, N mm/mrad, or their inverses for a compliance (um/N ...).
         kind: "stiffness" or "compliance". A stiffness must be positive definite: a housing that floats in space has to
             be fixed to its foundation. A compliance may have no deformation at all in some direction.

@@ -19,7 +19,7 @@ Scalar = Float[Array, ""]
 
 
 class RigidSupport(AbstractSupport):
-    """Axes that do not give way, but may not be parallel.
+    """Rigid axes, which need not be parallel.
 
     Attributes:
         gears: the pair.
@@ -75,7 +75,7 @@ class TabulatedSupport(AbstractSupport):
             if values[0] < -ROUNDING * values[-1]:
                 raise ValueError(
                     f"TabulatedSupport: matrix has the eigenvalue {values[0]:.6g} um/N, must not be negative: a "
-                    "support gives way under a force"
+                    "support deflects under a force"
                 )
         if self.opening is not None and len(self.opening) != len(self.matrix):
             raise ValueError(

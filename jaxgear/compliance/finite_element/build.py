@@ -28,7 +28,7 @@ class GearNumbers(NamedTuple):
     Attributes:
         roll_length: from the form circle to the tip, (points,).
         center: of the crossing of load line and centreline, bore held, (points,).
-        local: what the flank gives way against that point, beyond the depth-referenced law, (points,).
+        local: deflection of the flank against that point, beyond the depth-referenced law, (points,).
         neighbours: of the flank of the teeth counter-clockwise of the loaded one, where the load pushes
             counter-clockwise; shape (teeth, loaded point, point of the neighbour).
     """

@@ -37,7 +37,7 @@ def write_table(path: str | Path, table: GearTable) -> None:
     needs all k = 1 ... n, and k = -1 ... -n may be there too: table k over (rho, rho') is table -k over (rho', rho).
     All parts have the same increasing roll lengths. Without module and modulus they are those of the gear, without hub
     it is the torsion of the solid ring. `local` is the mean over the contact of what a flank under a Hertzian pressure
-    gives way beyond 2 q / (pi E') [asinh(h / a) - nu' h / (sqrt(h^2 + a^2) + h)], h the depth to the centreline.
+    deflects beyond 2 q / (pi E') [asinh(h / a) - nu' h / (sqrt(h^2 + a^2) + h)], h the depth to the centreline.
 
     Args:
         path: of the file.

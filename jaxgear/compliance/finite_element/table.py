@@ -39,7 +39,7 @@ _WORDS = {
 
 
 class GearTable(eqx.Module):
-    """What one gear gives way along its load lines, bore held; roll lengths from the form circle to the tip.
+    """Deflection of one gear along its load lines, bore fixed; roll lengths from the form circle to the tip.
 
     Attributes:
         shape: numbers of the gear that it is for, in the order of `Shape`.

@@ -205,7 +205,7 @@ def _said(model: Model, flank: Component) -> list[str]:
 
 
 def _modification(model: Model, gear: Component, flank: Component, frame: Frame) -> AbstractModification:
-    """The sum of what is taken off a flank."""
+    """The sum of the modifications of a flank."""
     parts = model.related("reference", "origin", flank.id, "referenced")
     for name in (_ALONG, _ACROSS):
         places = {part.number(name, "mm"): part for part in parts if name in part.attributes}
