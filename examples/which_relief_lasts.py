@@ -7,7 +7,8 @@ search has seen.
 
 Wear takes most where the flanks slide most, at root and tip: it deepens a tip relief. A relief that is right when new
 is soon too much, and its error grows from the first revolution on. The relief with the lowest mean PPTE over the wear
-history begins with less, wears into the right one and out of it again. On the 20/30 pair the best relief when new is over the life worse than none.
+history begins with less, wears into the right one and out of it again. On the 20/30 pair the best relief when new is
+over the life worse than none.
 
 Run it: `python examples/which_relief_lasts.py`. Most of the time it compiles.
 """
