@@ -17,7 +17,7 @@ from ..dynamics.response import FORCE_REFERENCE
 from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
 from .geometry import gears
-from .study import grid_line
+from .study import grid_lines
 from .summary_file import identity, model, versions
 
 _COLUMNS = {
@@ -136,7 +136,7 @@ def verdict(study: DynamicsStudy) -> Iterator[str]:
     if study.grid_change:
         steps = " to ".join(f"{count}" for count in dict.fromkeys((min(study.steps), max(study.steps))))
         grid = f"{study.request.settings.positions} positions of the mesh force and {steps} steps per mesh cycle"
-        yield grid_line(grid, study.grid_change)
+        yield from grid_lines(grid, study.grid_change)
     yield from _still_rising(study)
     yield from _far_from_resonance(study)
     yield from _bodies(study)

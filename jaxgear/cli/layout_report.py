@@ -17,7 +17,7 @@ from ..microgeometry import AbstractModification
 from ..shafts import bearing_reactions, root_face_load_factor, tooth_height
 from . import report
 from .geometry import gears
-from .study import grid_line
+from .study import grid_lines
 from .summary_file import finding_data, identity, versions
 
 STEPS = ("unmodified", "step 1", "step 2")
@@ -129,9 +129,9 @@ def verdict(study: LayoutStudy) -> Iterator[str]:
         yield from _profile_verdict(study, profile, f", {name}" if len(study.profiles) > 1 else "")
     if study.stations_change:
         grid = f"{study.request.options['stations']} stations (ISO 6336-1 Annex E)"
-        yield grid_line(grid, study.stations_change)
+        yield from grid_lines(grid, study.stations_change)
     if study.slices_change:
-        yield grid_line(f"{study.design.resolution().slices} slices (contact analysis)", study.slices_change)
+        yield from grid_lines(f"{study.design.resolution().slices} slices (contact analysis)", study.slices_change)
 
 
 def _profile_verdict(study: LayoutStudy, profile: ProfileLayout, where: str) -> Iterator[str]:

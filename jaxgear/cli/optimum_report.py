@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
@@ -265,7 +266,7 @@ def first_screen(
     judged_by = (
         *_feasibility(optimum),
         *_bounds(file, optimum),
-        ("grid", _positions(optimum, evaluations, searched_at)),
+        *zip(chain(("grid",), repeat("")), _positions(optimum, evaluations, searched_at)),
     )
     yield Table(("", ""), (*judged_by, *trust), "Whether to trust it")
 
@@ -368,13 +369,15 @@ def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:
         yield label, "no variable is at a bound"
 
 
-def _positions(optimum: Optimum, evaluations: report.Evaluations, searched_at: int) -> str:
+def _positions(optimum: Optimum, evaluations: report.Evaluations, searched_at: int) -> Iterator[str]:
     said = f"searched at {searched_at} positions, " if searched_at != optimum.positions else ""
     change = f"the objective by {optimum.grid_change:+.2g} {optimum.objective_unit}".rstrip()
     shown = {
         name: evaluations[name] for name in dict.fromkeys([next(iter(evaluations)), report.main_name(evaluations)])
     }
-    return said + report.grid(shown, change * bool(np.isfinite(optimum.grid_change)))
+    first, *others = report.grid(shown, change * bool(np.isfinite(optimum.grid_change)))
+    yield said + first
+    yield from others
 
 
 def _with_unit(file: DesignFile, name: str) -> str:

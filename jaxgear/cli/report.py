@@ -17,7 +17,7 @@ from ..io.results import unit_of
 from ..metrics import Finding, findings_of, quantities
 from ..numerics import program
 from ..optimize import Verified
-from .study import Evaluation, grid_line
+from .study import Evaluation, grid_lines
 from .terminal import console as console
 from .terminal import say as say
 from .terminal import say_rows as say_rows
@@ -141,11 +141,11 @@ def finding_lines(found: Mapping[str, tuple[Finding, ...]]) -> Iterator[str]:
         yield f"{WARNING}{said}{finding}"
 
 
-def grid(evaluations: Evaluations, more: str = "") -> str:
+def grid(evaluations: Evaluations, more: str = "") -> Iterator[str]:
     """How fine the mesh was, and what a finer one would change, besides `more`."""
     positions = next(iter(evaluations.values())).cycle.kinematics.resolution.positions
     changes = {name: evaluation.grid_change for name, evaluation in evaluations.items()}
-    return grid_line(f"{positions} positions", changes, more)
+    return grid_lines(f"{positions} positions", changes, more)
 
 
 @program

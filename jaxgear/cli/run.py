@@ -220,7 +220,7 @@ class CommandRun:
     def _lines(self) -> Iterator[str]:
         """The results in words, where there is no optimum that says them first."""
         if self._optimum is None:
-            yield from (report.grid(self._evaluations), *self._notes())
+            yield from (*report.grid(self._evaluations), *self._notes())
         yield mounting(self.design)
 
     def _notes(self) -> Iterator[str]:

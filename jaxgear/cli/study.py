@@ -6,7 +6,7 @@ import io
 import os
 import shutil
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
@@ -130,8 +130,8 @@ def face_change(before: MeshCycle, after: MeshCycle) -> dict[str, float]:
     return {name: found[1][name] - value for name, value in found[0].items()}
 
 
-def grid_line(grid: str, changes: Mapping[str, Mapping[str, float]], more: str = "") -> str:
-    """How fine a grid was, and what twice that would change; `changes` by the name of the design."""
+def grid_lines(grid: str, changes: Mapping[str, Mapping[str, float]], more: str = "") -> Iterator[str]:
+    """How fine a grid was, and what twice that would change, a quantity a line; `changes` by the name of the design."""
     said = [more] * bool(more)
     for metric in next(iter(changes.values())):
         quantity = quantities[metric]
@@ -142,7 +142,8 @@ def grid_line(grid: str, changes: Mapping[str, Mapping[str, float]], more: str =
             for name, change in changes.items()
         )
         said.append(f"{quantity.words}: {', '.join(each)}")
-    return f"evaluated at {grid}; twice as many change {'; '.join(said)}"
+    yield f"evaluated at {grid}; twice as many change {said[0]}"
+    yield from said[1:]
 
 
 def response_surface(mesh: Mesh, torque: float, pinion: AbstractModification, wheel: AbstractModification):

@@ -64,7 +64,7 @@ def run_sweep(
     with writing(target / _BEST_FILE):
         chosen.to_csv(target / _BEST_FILE)
     interrupt.note(f"the table and {_BEST_FILE} are complete in {target}{os.sep}, not all figures are drawn")
-    grid, findings = said_of_best(design, chosen, size) if len(chosen) else ("", [])
+    grid, findings = said_of_best(design, chosen, size) if len(chosen) else ([], [])
     files = write_figures(target, table, request.results) if figures and len(chosen) else []
     if asked is not None:
         closer = evaluate_best(target, design, chosen, size, quick=quick, figures=figures)
@@ -72,7 +72,7 @@ def run_sweep(
             target, asked, design, table, chosen, closer, files, request.results, size=size, quick=quick, grid=grid
         )
     interrupt.note(f"all results are in {target}{os.sep}")
-    fine = _show(table, chosen, target, meter, quick=quick, lines=[*[grid] * bool(grid), *findings])
+    fine = _show(table, chosen, target, meter, quick=quick, lines=[*grid, *findings])
     if design.left_out:
         report.warn(design.left_out)
     return fine

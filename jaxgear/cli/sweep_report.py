@@ -20,7 +20,7 @@ from .document import CommandResult, Document, project_facts
 from .geometry import gears
 from .progress import Stages
 from .run import Modifications, torques_of
-from .study import evaluate, grid_change, grid_line
+from .study import evaluate, grid_change, grid_lines
 from .summary_file import sizes, versions
 
 _DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory does not grow with the table
@@ -146,7 +146,7 @@ def evaluate_best(
     return Chosen([report.table(design, best_first)], drawn, pages, list(findings), list(report.failures(found)))
 
 
-def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tuple[str, list[str]]:
+def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tuple[list[str], list[str]]:
     """By how much the numbers of the best variant change on a finer mesh, and what is not usual of it."""
     parameters = best.take([0]).designs()[0]
     made = design.sweep_mesh(size)
@@ -156,8 +156,8 @@ def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tupl
     (cycle,) = over_torques(mesh, np.asarray([torque]), pinion=pinion, wheel=wheel)
     name = f"variant {best.column('variant')[0]} at {torque:g} N m"
     findings = findings_of(cycle, pinion=pinion, wheel=wheel, compliance=mesh.compliance)
-    grid = grid_line(f"{size.positions} positions", {name: grid_change(mesh, cycle, pinion, wheel)})
-    return grid, [f"{report.WARNING}{name}: {finding}" for finding in findings]
+    grid = grid_lines(f"{size.positions} positions", {name: grid_change(mesh, cycle, pinion, wheel)})
+    return [*grid], [f"{report.WARNING}{name}: {finding}" for finding in findings]
 
 
 def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, list[Path]]:
@@ -193,7 +193,7 @@ def write(
     *,
     size: Resolution,
     quick: bool,
-    grid: str,
+    grid: list[str],
 ) -> None:
     """Writes the workbook, the page of variants and the report.
 
@@ -219,8 +219,8 @@ def write(
         write_variants(folder / PAGE, design.title, facts, table, labels=labels_of(table), main=main)
     lines = [
         f"{len(table)} variants, ranked by {table.results[0]}; the best {len(best)} and the table are in {WORKBOOK}, "
-        f"with units and filters; {PAGE} is for looking around among them.",
-        grid,
+        f"with units and filters; {PAGE} is an interactive page of them.",
+        *grid,
         *chosen.lines,
     ]
     warnings = [*chosen.failures, *([f"{failed} variants failed and have no results"] if failed else [])]
