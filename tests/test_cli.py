@@ -174,7 +174,7 @@ def test_analyze_gives_what_the_library_gives(folder, analyzed):
         assert change == pytest.approx(float(value) - written[metric], abs=1e-7), metric
     change = changes["max_flank_pressure_MPa"]  # none where the largest is at a position that both grids have
     pressure = f"modified by {change:+.2g} MPa" if change else "modified not"
-    assert "; max flank pressure: unmodified by" in analyzed.out and pressure in analyzed.out
+    assert "\n  and max flank pressure: unmodified by" in analyzed.out and pressure in analyzed.out
     change = changes["ppte_um"]
     assert (
         "twice as many change PPTE: unmodified by" in analyzed.out and f"modified by {change:+.2g} um" in analyzed.out

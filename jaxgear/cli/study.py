@@ -143,7 +143,7 @@ def grid_lines(grid: str, changes: Mapping[str, Mapping[str, float]], more: str 
         )
         said.append(f"{quantity.words}: {', '.join(each)}")
     yield f"evaluated at {grid}; twice as many change {said[0]}"
-    yield from said[1:]
+    yield from (f"  and {change}" for change in said[1:])
 
 
 def response_surface(mesh: Mesh, torque: float, pinion: AbstractModification, wheel: AbstractModification):
