@@ -161,7 +161,8 @@ def main(fast=False) -> dict:
     algorithm finds here and one of the optimum.
     """
     # the published model has slices that are not coupled
-    resolution = jg.Resolution(positions=32 if fast else 64, slices=5 if fast else 11, coupled_slices=False)
+    sizes = {"positions": 32, "slices": 5, "pairs": 2} if fast else {"positions": 64, "slices": 11}
+    resolution = jg.Resolution(**sizes, coupled_slices=False)
     designs, torques, nominal = jnp.asarray(list(DESIGNS.values())), jnp.asarray(TORQUES), TORQUES.index(TORQUE)
     found = {}
     pair = gear_pair()

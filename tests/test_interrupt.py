@@ -113,7 +113,7 @@ def test_results_that_are_there_are_not_denied(gear, tmp_path, monkeypatch, late
 @pytest.mark.skipif(os.name != "posix", reason="other systems have no SIGINT for one process")
 def test_at_any_moment(gear):
     moments = random.Random(3)
-    for _ in range(8):
+    for _ in range(4):
         for path in (gear.parent / "out").glob("*"):
             path.unlink()
         command = [sys.executable, launcher.__file__, "analyze", "gear.toml", "-o", "out", "--no-figures"]

@@ -180,7 +180,7 @@ def test_twice_the_slices_are_those_of_the_file(file, tmp_path):
     """What twice the slices are said to change is what the contact of a file with so many has more."""
 
     def written(slices):
-        text = replaced(FACE, f"positions = 8\nslices = {slices}").replace('[housing]\nfile = "housing.csv"\n', "")
+        text = replaced("slices = 6", f"slices = {slices}").replace('[housing]\nfile = "housing.csv"\n', "")
         return file(text + ONE_PROFILE)
 
     done = call("layout", str(written(4)), "--output", str(tmp_path / "out"), "--no-figures")
