@@ -101,7 +101,7 @@ def test_results_that_are_there_are_not_denied(gear, tmp_path, monkeypatch, late
     monkeypatch.setattr(run.CommandRun, "prepare", lambda self, **_: None)
     monkeypatch.setattr(run.CommandRun, "evaluate", lambda *_: None)
     monkeypatch.setattr(run.CommandRun, "write", written)
-    where = "jaxgear.io.folder._replace" if late == "replace" else "jaxgear.cli.run.Run.show"
+    where = "jaxgear.io.folder._replace" if late == "replace" else "jaxgear.cli.run.CommandRun.show"
     original = __import__("jaxgear.io.folder", fromlist=["_replace"])._replace
     monkeypatch.setattr(where, press)
     result = call("analyze", gear, "-o", tmp_path / "out")

@@ -127,7 +127,7 @@ def test_pictures_show_every_variant_or_an_even_share(folder, tmp_path, monkeypa
     } < names  # of the best, for the report
     monkeypatch.setattr(sweep_report, "_DRAWN", 20)
     drawn = {}
-    monkeypatch.setattr("jaxgear.plot.front", lambda table, *names, **_: drawn.update(table) or plt.subplots()[1])
+    monkeypatch.setattr("jaxgear.plot.pareto", lambda table, *names, **_: drawn.update(table) or plt.subplots()[1])
     table = jg.open_sweep(folder / "out" / "table")
     sweep_report.write_figures(tmp_path, table, ("ppte", "effective_contact_ratio"))
     front = table.pareto(["ppte_um", "effective_contact_ratio"]).column("ppte_um")
