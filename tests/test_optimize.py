@@ -375,7 +375,7 @@ def test_manufactured_gears(known, best):
         (BOX, {"method": "genetic", "starts": 4}, "starts has no effect"),
         (BOX, {"method": jg.optimize.Adam(), "steps": 30}, "steps must be given to the method"),
         (BOX, {"objective": "noise"}, '"noise" is not known'),
-        (BOX, {"objective": ("ppte", "removed_volume")}, "jaxgear.pareto"),
+        (BOX, {"objective": ("ppte", "removed_volume")}, "jaxgear.optimize.pareto"),
         (BOX, {"constraints": [jg.Constraint({"lenght": 1.0}, high=5.0)]}, '"lenght" of a constraint'),
         (BOX, {"objective": jg.Quantity("te", lambda cycle: cycle.transmission_error)}, r"te: gives an array of shape"),
         (BOX, {"objective": "pptee"}, 'did you mean "ppte"'),

@@ -105,7 +105,7 @@ def minimize(
     """
     method = method_named(method, starts=starts, steps=steps, seed=seed)
     if not (isinstance(objective, str) or callable(objective)):
-        raise ValueError("minimize: objective must be one quantity; a front of several is found by jaxgear.pareto")
+        raise ValueError("minimize: objective must be one quantity; jaxgear.optimize.pareto finds a front of several")
     began = time.perf_counter()
     posed = make_problem(
         design,
