@@ -118,10 +118,7 @@ def profiles(support, lines, fast):
     amounts = np.round(deflection * np.linspace(0.6, 1.4, 3 if fast else 5))
     # as numbers, so that what is compiled for one stage serves the other
     support = layout.at_stations(support, torque, stations=SLICES)
-    # two pairs reach as far as this load does, and contacts at their nominal places show the same trends
-    quick = {"pairs": 2, "slide_steps": 0} if fast else {}
-    resolution = jg.Resolution(positions=32, slices=SLICES, **quick)
-    mesh = jg.prepare(support.pair, resolution=resolution, support=support)
+    mesh = jg.prepare(support.pair, resolution=jg.Resolution(positions=32, slices=SLICES), support=support)
     return layout.vary_profiles(mesh, torque, lines.modifications, amounts, amounts)
 
 
