@@ -21,7 +21,7 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 # Most of the time of a test goes into compiling a program that runs once: without optimization that takes a quarter.
 jax.config.update("jax_disable_most_optimizations", True)
-# No test asks which lines of which files an operation of a program comes from, which takes a twelfth of the time.
+# No test asks which lines of which files an operation of a program comes from, which takes a twentieth of the time.
 jax.config.update("jax_traceback_in_locations_limit", 0)
 
 
