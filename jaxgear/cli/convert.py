@@ -1,4 +1,4 @@
-"""What the commands `new` and `convert` do: a design file to begin with, and to and from REXS."""
+"""What the commands `new` and `convert` do: a design file to begin with, and its conversion to REXS and back."""
 
 import os
 from pathlib import Path
