@@ -14,6 +14,7 @@ PACKAGES = (
     "geometry microgeometry compliance compliance.finite_element contact shafts metrics tolerance conditions dynamics "
     "dynamics.dimensionless wear manufacture sizing sweeps optimize layout io io.rexs plot numerics"
 ).split()
+_NAMES = re.compile(r" +(?:\w+, )+\w+:")  # with which a line of a docstring begins
 
 
 def on_config(config):
@@ -57,9 +58,15 @@ class NamesTogether(griffe.Extension):
 
     def on_instance(self, *, obj: griffe.Object, **_) -> None:
         if obj.docstring is not None:
-            names = r"^( +)((?:\w+, )+\w+)(?=:)"
-            together = lambda found: found[1] + found[2].replace(", ", ",\N{NO-BREAK SPACE}")  # noqa: E731
-            obj.docstring.value = re.sub(names, together, obj.docstring.value, flags=re.MULTILINE)
+            obj.docstring.value = "\n".join(map(_together, obj.docstring.value.splitlines()))
+
+
+def _together(line: str) -> str:
+    """A line of a docstring with no-break spaces between the names with which it begins."""
+    names = _NAMES.match(line)
+    if names is None:
+        return line
+    return names[0].replace(", ", ",\N{NO-BREAK SPACE}") + line[names.end() :]
 
 
 def _page(package: str) -> str:

@@ -12,7 +12,7 @@ from .flanks import Flanks
 from .force import AbstractMeshForce
 
 Scalar = Float[Array, ""]
-Start = Float[Array, "sides"]
+Sides = Float[Array, "sides"]
 Table = Float[Array, "sides positions levels"]
 
 # slopes at the ends of an interval up to which a cubic rises (F. N. Fritsch, R. E. Carlson, SIAM J. Numer. Anal. 17,
@@ -32,7 +32,7 @@ class Rows(NamedTuple):
         rise: its slope over the number of the level [N], same shape.
     """
 
-    start: Start
+    start: Sides
     force: Float[Array, " nodes"]
     rise: Float[Array, " nodes"]
 
@@ -117,7 +117,7 @@ def between(phase: Scalar, first: Scalar, count: int):
     return index, (index + 1) % count, place - lower
 
 
-def closing(start: Start, dte: Scalar) -> tuple[Bool[Array, ""], Scalar]:
+def closing(start: Sides, dte: Scalar) -> tuple[Bool[Array, ""], Scalar]:
     """Whether the drive flanks are nearer than the coast flanks, and how far the nearer ones are past touching [um]."""
     drive = dte >= 0.5 * (start[0] - start[1])
     return drive, jnp.where(drive, dte - start[0], -dte - start[1])
@@ -155,7 +155,6 @@ def tabulate(flanks: Flanks, unloaded, compliance: Scalar, reach: Scalar, levels
     return force[flanks.order], slope[flanks.order], jnp.all(found.converged)
 
 
-Sides = Float[Array, "sides"]
 Curves = Float[Array, "sides positions"]
 
 
