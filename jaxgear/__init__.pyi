@@ -44,7 +44,6 @@ from .metrics import effective_contact_ratio as effective_contact_ratio
 from .metrics import harmonics as harmonics
 from .metrics import load_sharing as load_sharing
 from .metrics import peak_to_peak as peak_to_peak
-from .metrics import quantities as quantities
 from .metrics import secant_stiffness as secant_stiffness
 from .metrics import smooth_peak_to_peak as smooth_peak_to_peak
 from .metrics import summary as summary
@@ -85,5 +84,6 @@ from .sweeps import monte_carlo as monte_carlo
 from .sweeps import open_sweep as open_sweep
 from .sweeps import sweep as sweep
 from .tolerance import Tolerance as Tolerance
+from .vocabulary import quantities as quantities
 
 __version__: str

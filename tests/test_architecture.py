@@ -27,6 +27,7 @@ ORDER = (
     "dynamics",
     "wear",
     "manufacture",
+    "vocabulary",
     "sizing",
     "sweeps",
     "optimize",

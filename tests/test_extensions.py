@@ -17,11 +17,12 @@ from jaxtyping import Array
 import jaxgear as jg
 from jaxgear.compliance import AbstractCompliance, ContactGeometry, Plane
 from jaxgear.io import DesignFileError, describe, optimize_request
-from jaxgear.metrics import Quantity, quantities
+from jaxgear.metrics import AbstractSettings, Quantity
 from jaxgear.microgeometry import AbstractCurve, AbstractModification
 from jaxgear.numerics import AbstractSpring, Checked, number
 from jaxgear.numerics.fields import count
 from jaxgear.numerics.reductions import Harmonic
+from jaxgear.vocabulary import quantities
 
 ROLL_LENGTH = np.linspace(0.0, 60.0, 13)
 BY_FACTORIAL = FREE.replace("starts = 2\nsteps = 100", 'method = "factorial"')
@@ -147,8 +148,7 @@ SECOND = Quantity(
 @pytest.fixture
 def known(monkeypatch):
     """The vocabulary with a quantity more, until the end of the test."""
-    list(quantities)  # all packages have added theirs
-    monkeypatch.setattr(quantities, "_by_package", dict(quantities._by_package))
+    monkeypatch.setattr(quantities, "_known", dict(quantities._known))
     quantities.add(SECOND)
 
 
@@ -170,6 +170,55 @@ def test_a_quantity_of_a_user_is_swept_searched_limited_and_reported(known, tmp_
     assert said.code == 0, said.err
     assert re.search(r"te_second_harmonic \[um\] +[|│] +\d", said.out)
     assert re.search(r"te_second_harmonic \S+ um, met: at most 1\b", said.out)
+
+
+class Microphone(AbstractSettings):
+    """A user's own settings of a quantity.
+
+    Attributes:
+        distance: from the gears.
+    """
+
+    table = "microphone"
+    distance: jax.Array = number("m", low=0.0, open_low=True)
+
+
+def test_a_quantity_of_own_settings_is_swept_limited_and_compiled_once(monkeypatch):
+    """Other settings compile nothing, and a gradient goes through them."""
+    traced = []
+
+    def level(analysis, microphone):
+        traced.append(microphone)
+        return jg.peak_to_peak(analysis.cycle.transmission_error) / microphone.distance
+
+    monkeypatch.setattr(quantities, "_known", dict(quantities._known))
+    quantities.add(Quantity("level", level, "um/m", takes=Microphone, needs="distance"))
+    mesh = jg.prepare(gear_pair(), resolution=LINE)
+    plan = jg.VariantList(["amount"], [[0.0], [6.0]])
+
+    def swept(distance):
+        results = ("ppte", Microphone(distance).quantity("level"))
+        return jg.sweep(lambda v: (jg.TipRelief(v["amount"], 4.0), None), plan, mesh=mesh, torque=50.0, results=results)
+
+    near = swept(0.5)
+    assert near.column("level_um_per_m") == pytest.approx(2 * near.column("ppte_um"))
+    cycle = jg.solve(mesh, 50.0)
+    level_at = eqx.filter_jit(lambda quantity, cycle: quantity(cycle))
+    values = [level_at(Microphone(distance).quantity("level"), cycle) for distance in (0.5, 2.0)]
+    assert float(values[0]) == pytest.approx(4 * float(values[1]))
+    count = len(traced)
+    level_at(Microphone(3.0).quantity("level"), cycle)
+    assert len(traced) == count
+    slope = jax.grad(lambda distance: Microphone(distance).quantity("level")(cycle))(2.0)
+    assert float(slope) == pytest.approx(-float(values[1]) / 2.0)
+    limit = jg.Constraint(Microphone(0.5).quantity("level"), high=1.0)
+    assert (limit.name, limit.unit) == ("level", "um/m")
+    with pytest.raises(ValueError, match=r"^level: needs settings, give .*Microphone\(...\).quantity\("):
+        quantities["level"](cycle)
+    with pytest.raises(TypeError, match="^level: takes Microphone, not Strength"):
+        quantities["level"].with_settings(jg.metrics.Strength(1500.0))
+    with pytest.raises(ValueError, match='^Microphone: quantity "volume" is not known, must be one of level'):
+        Microphone(1.0).quantity("volume")
 
 
 class Scatter(Checked, jg.optimize.AbstractMethod):

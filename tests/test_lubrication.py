@@ -475,7 +475,6 @@ def test_equal_settings_make_equal_quantities(cycle):
     again = metrics.Lubricant(220.0, 19.0, 80.0, 0.4, permissible_film=0.2, scuffing_temperature=300.0)
     other = dataclasses.replace(OIL, friction="iso_6336_20")
     assert OIL.quantity("loss_power") == again.quantity("loss_power") != other.quantity("loss_power")
-    assert hash(OIL.quantity("loss_power")) == hash(again.quantity("loss_power"))
     assert OIL.quantity("scuffing_safety").better == "larger" and OIL.quantity("loss_power").key == "loss_power_W"
     thick = jax.tree.map(lambda leaf: leaf.astype("float32") if eqx.is_inexact_array(leaf) else leaf, cycle)
     assert jax.eval_shape(OIL.quantity("min_film_thickness"), thick).dtype == "float32"

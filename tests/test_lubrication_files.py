@@ -148,7 +148,7 @@ def test_what_is_wrong_in_the_file_of_the_oil_names_that_file(load, tmp_path):
 def test_a_constraint_and_a_column_need_their_table(load):
     design = load(PAIR + OIL + STRENGTH + RELIEF)
     (constraint,) = optimize_request(design)._common["constraints"]
-    assert constraint.of == design.lubricant.quantity("scuffing_safety")
+    assert constraint.quantity == design.lubricant.quantity("scuffing_safety")
     assert sweep_request(design).results[2] == design.strength.quantity("pinion_root_safety")
     for text, message in (
         (PAIR + STRENGTH + RELIEF, 'optimize.constraint[0].of: "scuffing_safety" needs the table [lubricant]'),

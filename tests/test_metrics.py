@@ -11,8 +11,8 @@ from catalogue import LINE, gear_pair
 
 import jaxgear as jg
 from jaxgear.contact.cycle import corner_pressure
-from jaxgear.metrics import quantities
 from jaxgear.metrics.stress import single_contact_root_stress
+from jaxgear.vocabulary import quantities
 
 
 # FZG type C gears with untrimmed tips: published form and stress correction factors and loss factor

@@ -70,7 +70,7 @@ def draw(mesh, designs, cycles, curves):
         "pressure_map": lambda ax=None: plot.pressure_map(cycles["long relief"], ax),
         "contact_pattern": lambda ax=None: plot.contact_pattern(cycles["long relief"], ax),
         "line_load": lambda ax=None: plot.line_load(cycles["long relief"], ax),
-        "face_gap": lambda ax=None: plot.face_gap(cycles["long relief"].on(mesh), ax),
+        "face_gap": lambda ax=None: plot.face_gap(cycles["long relief"], mesh, ax),
         "face_load_over_torque": lambda ax=None: plot.face_load_over_torque(TORQUES, factors, ax, design_torque=TORQUE),
         "ppte_over_torque": lambda ax=None: plot.ppte_over_torque(TORQUES, ppte, ax, design_torque=TORQUE),
         "harris_map": lambda ax=None: plot.harris_map(mesh.phase, TORQUES, curves["long relief"], ax),
@@ -263,7 +263,7 @@ def test_line_load_and_gap_over_the_face(cycles, mesh):
     most = load[:, :, position].max(axis=1).argmax()
     factor = load[most, :, position].max() / load[most, :, position].mean()
     assert any(f"K = {factor:.2f}" in line.get_label() for line in drawn)
-    gap = plot.face_gap(cycle.on(mesh))
+    gap = plot.face_gap(cycle, mesh)
     unloaded, under_load = (line.get_ydata() for line in gap.lines[:2])
     ends = (2 * np.asarray(mesh.face_coordinate) / float(mesh.pair.face_width)) ** 2
     np.testing.assert_allclose(unloaded, 4.0 * (ends - ends.min()), atol=1e-9)

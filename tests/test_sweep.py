@@ -15,9 +15,10 @@ from scipy.stats.mstats import hdquantiles
 
 import jaxgear as jg
 from jaxgear.dynamics import DYNAMIC_QUANTITIES
-from jaxgear.metrics import LUBRICANT_QUANTITIES, STRENGTH_QUANTITIES, quantities
+from jaxgear.metrics import LUBRICANT_QUANTITIES, STRENGTH_QUANTITIES
 from jaxgear.sweeps.store import Store, load_manifest
 from jaxgear.sweeps.table import front, smallest
+from jaxgear.vocabulary import quantities
 from jaxgear.wear import WEAR_QUANTITIES
 
 BOUNDS = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.5)}

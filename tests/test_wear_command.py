@@ -258,7 +258,7 @@ def test_loads_of_the_table_wear_one_flank_together(file, monkeypatch):
     monkeypatch.setattr(importlib.import_module("jaxgear.wear.settings"), "wear", recorded)
     mesh = load_design(file(PAIR)).mesh()
     with pytest.raises(Worn):
-        sweep_request(design).results[1](jg.solve(mesh, 150.0).on(mesh))
+        sweep_request(design).results[1](jg.metrics.Analysis(jg.solve(mesh, 150.0), mesh))
     assert asked["load"].torques.tolist() == [50.0, 150.0] and asked["load"].weights.tolist() == [0.75, 0.25]
     assert (float(asked["revolutions"]), asked["blocks"]) == (2e7, 4)
     np.testing.assert_array_equal(asked["coefficient"], 1e-18)
@@ -282,7 +282,7 @@ def test_a_quantity_under_loads_is_that_of_their_life(file):
     spectrum = jg.LoadSpectrum([50.0, 150.0], [3.0, 1.0])
     perfect = jnp.zeros((2, 1, 16))
     life = wear(mesh, spectrum, 2e7, coefficient=1e-18, blocks=4, deviation=perfect)
-    asked = sweep_request(design).results[1](jg.solve(mesh, 150.0).on(mesh))
+    asked = sweep_request(design).results[1](jg.metrics.Analysis(jg.solve(mesh, 150.0), mesh))
     assert float(asked) == pytest.approx(float(wear_depth(life)[-1]), rel=1e-12)
 
 
@@ -318,7 +318,7 @@ def test_dynamic_factors_over_the_life_are_results_of_a_file(file):
     asked = SWEEP.format(name="worn_dynamic_factor")
     for table in (TABLE, DYNAMIC):
         quantity = sweep_request(load_design(file(FAST + DYNAMICS + table + asked))).results[1]
-        settings = quantity.of.settings
+        settings = quantity.settings
         assert settings.dynamics.positions == 16
         assert settings.line_load == ("dynamic" if table is DYNAMIC else "static")
     for text, needs in (

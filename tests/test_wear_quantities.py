@@ -9,6 +9,7 @@ from catalogue import LINE, gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear.conditions import solve_case
+from jaxgear.metrics import Analysis
 from jaxgear.wear import (
     WEAR_QUANTITIES,
     Wear,
@@ -20,6 +21,7 @@ from jaxgear.wear import (
     wear,
     wear_depth,
 )
+from jaxgear.wear.quantities import number_of
 
 TORQUE = 100.0
 BLOCKS = 2  # everywhere, so that one program serves all lives
@@ -38,7 +40,7 @@ def test_quantities_are_those_of_the_life(mesh):
     relief = jg.TipRelief(5.0, 2.0)
     cycle = solve_case(mesh, TORQUE, relief, relief)
     life = SETTINGS.life(mesh, TORQUE, pinion=relief, wheel=relief, deviation=PERFECT)
-    found = {name: float(SETTINGS.quantity(name)(cycle.on(mesh))) for name in ("worn_ppte", "wear_depth")}
+    found = {name: float(SETTINGS.quantity(name)(Analysis(cycle, mesh))) for name in ("worn_ppte", "wear_depth")}
     assert found["worn_ppte"] == pytest.approx(float(over_life(life, "ppte")[-1]), rel=1e-9)
     assert found["wear_depth"] == pytest.approx(float(wear_depth(life)[-1]), rel=1e-9)
     expected = {
@@ -55,7 +57,7 @@ def test_quantities_are_those_of_the_life(mesh):
     vibrating = {"worn_dynamic_factor", "max_dynamic_factor_over_life"}
     assert {*expected, *found, *vibrating} == {*WEAR_QUANTITIES}
     for name, number in expected.items():
-        np.testing.assert_allclose(WEAR_QUANTITIES[name].of(life, SETTINGS), number, rtol=1e-12)
+        np.testing.assert_allclose(number_of(name, life, SETTINGS), number, rtol=1e-12)
 
 
 def test_the_pressure_of_worn_flanks_has_an_error_of_its_own(mesh):
@@ -86,15 +88,15 @@ def test_a_limit_that_is_never_reached_is_no_failure(mesh):
     life = SETTINGS.life(mesh, TORQUE, pinion=NONE, wheel=NONE, deviation=PERFECT)
     assert np.isinf(life_to(life, "ppte", 1e3))
     far = Wear(REVOLUTIONS, 1e-18, ppte_limit=1e3, depth_limit=1e6)
-    assert float(WEAR_QUANTITIES["life_to_ppte"].of(life, far)) == REVOLUTIONS
+    assert float(number_of("life_to_ppte", life, far)) == REVOLUTIONS
     idle = SETTINGS.life(mesh, 0.0, pinion=NONE, wheel=NONE, deviation=PERFECT)
     assert np.isinf(life_to_depth(idle, 1.0))
-    assert REVOLUTIONS < float(WEAR_QUANTITIES["life_to_depth"].of(idle, far)) < np.inf
+    assert REVOLUTIONS < float(number_of("life_to_depth", idle, far)) < np.inf
 
 
 def test_overlong_blocks_give_no_number_but_their_error(mesh):
     """Where flanks overshoot from block to block nobody knows what is left; the estimated error tells."""
-    cycle = solve_case(mesh, TORQUE, NONE, NONE).on(mesh)
+    cycle = Analysis(solve_case(mesh, TORQUE, NONE, NONE), mesh)
     long, enough = (Wear(revolutions, 1e-18, blocks=BLOCKS) for revolutions in (2e9, REVOLUTIONS))
     assert np.isnan(float(long.quantity("wear_depth")(cycle)))
     assert float(long.quantity("wear_depth_error")(cycle)) > 1.0
@@ -144,9 +146,17 @@ def test_refuses_in_one_line(make, message):
     assert "\n" not in str(refused.value)
 
 
-def test_settings_that_are_traced_make_no_quantity():
-    with pytest.raises(ValueError, match="Wear: revolutions is being traced, a quantity needs numbers"):
-        jax.jit(lambda n: Wear(n, 1e-18).quantity("wear_depth").sign)(1e7)
+def test_settings_may_be_traced(mesh):
+    """Revolutions times the coefficient of wear is all that counts."""
+    cycle = solve_case(mesh, TORQUE, NONE, NONE)
+
+    def depth(times):
+        settings = Wear(REVOLUTIONS / times, 1e-18 * times, blocks=BLOCKS)
+        return settings.quantity("wear_depth")(Analysis(cycle, mesh))
+
+    depth, slope = jax.jit(jax.value_and_grad(depth))(2.0)
+    alone = SETTINGS.quantity("wear_depth")(Analysis(cycle, mesh))
+    assert float(depth) == pytest.approx(float(alone), rel=1e-9) and abs(float(slope)) < 1e-9 * float(depth)
 
 
 class Power(eqx.Module):

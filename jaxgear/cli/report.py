@@ -14,9 +14,10 @@ from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.requests import quality_classes
 from ..io.results import unit_of
-from ..metrics import Finding, findings_of, quantities
+from ..metrics import Finding, findings_of
 from ..numerics import program
 from ..optimize import Verified
+from ..vocabulary import quantities
 from .study import Evaluation, grid_lines
 from .terminal import console as console
 from .terminal import say as say
@@ -218,7 +219,7 @@ def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: 
     maps = {"pressure_map": plot.pressure_map(cycle), "contact_pattern": plot.contact_pattern(cycle)}
     for drawn in maps.values():
         np.ravel(drawn)[0].set_title(name, loc="left", fontsize=_TITLE)
-    lines = {"line_load": plot.line_load(cycle), "face_gap": plot.face_gap(cycle.on(mesh))}
+    lines = {"line_load": plot.line_load(cycle), "face_gap": plot.face_gap(cycle, mesh)}
     for drawn in lines.values():
         drawn.get_legend().set(title=name, alignment="left")
     factors = {name: evaluation.face_load for name, evaluation in evaluations.items()}

@@ -19,13 +19,22 @@ from ..contact import Mesh, MeshCycle, OperatingPoint
 from ..contact.mesh import half_way
 from ..dynamics import SpeedResponse
 from ..io import DesignFile, quantities_of_tables, writing
-from ..metrics import excited_by, face_load_factor, quantities, rating_factors, summary
-from ..metrics.settings import of_tables
+from ..metrics import (
+    AbstractSettings,
+    Analysis,
+    Quantity,
+    excited_by,
+    face_load_factor,
+    rating_factors,
+    share_settings,
+    summary,
+)
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, optional_real, program, real
+from ..numerics import optional_real, program, real
 from ..numerics.durable import sealed, unsealed, write_durably
 from ..optimize import Verified
 from ..sweeps import Scatter, over_torques
+from ..vocabulary import quantities
 from ..wear import March
 from . import interrupt
 from .version import version
@@ -85,10 +94,8 @@ def evaluate(
     # without the flanks: one program serves every kind of them
     running = OperatingPoint(real(file.torque), optional_real(file.speed), optional_real(file.friction))
     bare = replace(cycles[0], pinion=None, wheel=None, operating_point=running)
-    # names and settings, which are arrays: one program serves all oils and strengths
-    further = tuple(quantity.name for quantity in quantities_of_tables(file))
-    tables = {"lubricant": file.lubricant, "strength": file.strength}
-    metrics, factors = jax.tree.map(lambda value: np.asarray(value).item(), _numbers(bare, further, tables))
+    further, settings = share_settings(tuple(quantities_of_tables(file)))
+    metrics, factors = jax.tree.map(lambda value: np.asarray(value).item(), _numbers(bare, further, settings))
     return Evaluation(
         pinion=pinion,
         wheel=wheel,
@@ -170,10 +177,10 @@ def _factor(cycle: MeshCycle):
 
 
 @program
-def _numbers(cycle: MeshCycle, further: tuple[str, ...], tables: Mapping[str, Checked | None]):
-    """The numbers of a cycle and some quantities of [lubricant] and [strength], and the factors of ISO 6336."""
-    numbers = summary(cycle) | {quantities[name].key: of_tables(name, tables, cycle) for name in further}
-    return numbers, rating_factors(cycle)
+def _numbers(cycle: MeshCycle, further: tuple[Quantity, ...], settings: tuple[AbstractSettings, ...]):
+    """The numbers of a cycle and some quantities with settings, and the factors of ISO 6336."""
+    analysis = Analysis(cycle, None, settings)
+    return summary(cycle) | {quantity.key: quantity(analysis) for quantity in further}, rating_factors(cycle)
 
 
 _Found = TypeVar("_Found")

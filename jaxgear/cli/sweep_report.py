@@ -11,10 +11,11 @@ import rich.table
 
 from ..contact import Mesh, Resolution
 from ..io import DesignFile
-from ..metrics import Quantity, findings_of, quantity_of
+from ..metrics import Quantity, findings_of
 from ..microgeometry import NoModification
 from ..report import Chapter, Table, figure, text, write_variants, write_workbook
 from ..sweeps import SweepTable, over_torques
+from ..vocabulary import quantity_of
 from . import report
 from .document import CommandResult, Document, project_facts
 from .geometry import gears

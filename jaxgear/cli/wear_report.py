@@ -12,8 +12,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..io import DesignFile, WearRequest, describe
-from ..metrics import quantity_of
 from ..microgeometry import AbstractModification
+from ..vocabulary import quantity_of
 from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth, worn_volume
 from ..wear.quantities import blocks_are_short, number_of
 from . import manufactured, report, wear_scatter

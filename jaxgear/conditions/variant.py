@@ -237,15 +237,3 @@ def solved(cycle: MeshCycle) -> Bool[Array, "*cycles"]:
     The transmission error is asked too: reductions of the backend can drop NaN.
     """
     return jnp.all(cycle.converged, axis=-1) & jnp.isfinite(jnp.sum(cycle.transmission_error, axis=-1))
-
-
-def deviation_of(cycle: MeshCycle, mesh: Mesh) -> Float[Array, "pairs slices positions"]:
-    """Material that deviations have removed from the gears of a cycle, besides its modifications [um].
-
-    Of a cycle whose modifications are not known it is all that was removed.
-    """
-    flanks = {"pinion": cycle.pinion, "wheel": cycle.wheel}
-    deviation = cycle.gap - mesh.corner_gap[:, None] - removed_material(mesh, cycle.torque, **flanks).amount
-    if cycle.pinion is None or cycle.wheel is None:
-        return deviation
-    return jax.lax.stop_gradient(deviation)  # of the design it does not depend but by rounding

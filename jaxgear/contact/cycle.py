@@ -1,7 +1,5 @@
 """The loaded mesh over one base pitch: what a solution holds, and its Hertzian pressure."""
 
-from dataclasses import replace
-
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -12,7 +10,6 @@ from ..geometry import Margins, reduced_radius
 from ..microgeometry import AbstractModification
 from ..numerics import over_batch, program, safe_sqrt
 from .kinematics import Kinematics, Side
-from .mesh import Mesh
 from .operating_point import OperatingPoint
 
 Load = Float[Array, "pairs slices positions"]
@@ -70,8 +67,9 @@ Curve = Float[Array, " positions"]
 class MeshCycle(eqx.Module):
     """Result of `solve`: one design under one torque, over one base pitch.
 
-    It holds what it was solved for, but not the prepared mesh, so that many can be kept and stacked. Of many cycles
-    made by `jax.vmap` every array has the batch axes in front, and so have properties and metrics.
+    It holds what it was solved for, but not the prepared mesh (see `metrics.Analysis`), so that many can be kept and
+    stacked. Of many cycles made by `jax.vmap` every array has the batch axes in front, and so have properties and
+    metrics.
 
     Attributes:
         kinematics: the pair, its path of contact and the array sizes.
@@ -95,7 +93,6 @@ class MeshCycle(eqx.Module):
         residual: largest relative violation of the contact conditions, shape (positions,).
         converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
             touch, and gears and support are valid, shape (positions,).
-        mesh: the prepared mesh, for quantities that solve further on it; None in every result, see `on`.
     """
 
     kinematics: Kinematics
@@ -114,7 +111,6 @@ class MeshCycle(eqx.Module):
     tangent_stiffness: Curve
     residual: Curve
     converged: Array
-    mesh: Mesh | None = None
 
     @property
     def batch_ndim(self) -> int:
@@ -140,28 +136,6 @@ class MeshCycle(eqx.Module):
     def force(self) -> Float[Array, "*cycles"]:
         """Total force on the line of action [N]."""
         return 1e3 * self.torque / self.kinematics.pair.pinion.base_radius
-
-    def on(self, mesh: Mesh) -> "MeshCycle":
-        """The cycle with the prepared mesh that it was solved on, for quantities that solve further on it.
-
-        Whoever evaluates quantities hands it to them and keeps the cycle without it.
-
-        Raises:
-            ValueError: for a cycle with batch axes: map over it with `jax.vmap`, so that the mesh is not repeated.
-        """
-        if self.batch_ndim:
-            raise ValueError("MeshCycle.on: the cycle has batch axes, use jax.vmap(lambda cycle: cycle.on(mesh))")
-        return replace(self, mesh=mesh)
-
-    def mesh_for(self, owner: str) -> Mesh:
-        """The mesh, for whoever needs it.
-
-        Raises:
-            ValueError: where the cycle does not hold it.
-        """
-        if self.mesh is None:
-            raise ValueError(f"{owner}: needs the prepared mesh besides the cycle, give it cycle.on(mesh)")
-        return self.mesh
 
     @property
     def sides(self) -> tuple[Side, Side]:

@@ -1,41 +1,22 @@
-"""Numbers of steady vibration in the vocabulary of quantities: objectives, limits, columns of sweeps.
+"""Numbers of steady vibration as quantities: objectives, limits, columns of sweeps.
 
 A name alone does not say at which speeds, with which masses and damping: `Dynamics.quantity` gives the quantity, and a
 design file has the table [dynamics].
 """
 
-import dataclasses
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ..contact import MeshCycle
-from ..metrics import Quantity, quantities
-from ..metrics.settings import WithoutSettings, WithSettings
-from ..numerics import once
+from ..metrics import Analysis, Quantity, Vocabulary
 from ..numerics.reductions import Max
+from .settings import Dynamics
 from .steady import SteadyNumbers
 
 Numbers = Float[Array, "runs speeds"]
-
-
-class _Kind(NamedTuple):
-    """A dynamic quantity before its settings are known.
-
-    Attributes:
-        field: of `SpeedResponse`.
-        at_speed: at the speed of the operating point; otherwise at all speeds of the settings.
-        unit: "" for a pure number.
-        meaning: in a few words.
-    """
-
-    field: str
-    at_speed: bool
-    unit: str
-    meaning: str
-
 
 _FIELDS = (
     ("dynamic_factor", "", "largest mesh force over the static one"),
@@ -43,31 +24,28 @@ _FIELDS = (
     ("contact_loss_share", "", "share of the time without contact, which has no derivative"),
     ("back_side_contact", "", "share of the time on the coast flanks, which has no derivative"),
 )
-DYNAMIC_QUANTITIES: Mapping[str, _Kind] = {
-    **{name: _Kind(name, True, unit, f"{meaning}, at the speed of the pinion") for name, unit, meaning in _FIELDS},
-    **{f"worst_{name}": _Kind(name, False, unit, f"{meaning}, at its worst speed") for name, unit, meaning in _FIELDS},
-}
+AT_SPEED = tuple(name for name, *_ in _FIELDS)  # at the speed of the operating point, the others at all of the settings
 
 
-def _numbers_of(given: WithSettings, cycle: MeshCycle) -> Numbers:
-    """The numbers of a cycle, whose worst counts."""
-    kind = DYNAMIC_QUANTITIES[given.name]
+def _numbers(field: str, at_speed: bool, analysis: Analysis, dynamics: Dynamics) -> Numbers:
+    """The numbers of a design, whose worst counts."""
+    name = field if at_speed else f"worst_{field}"
     # all quantities of the same settings come from one sweep
-    found, converged = once(cycle, (given.make, given.fields, kind.at_speed), lambda: _swept(given, cycle, kind))
+    found, converged = analysis.once(dynamics, ("runs", at_speed), lambda: _swept(name, at_speed, analysis, dynamics))
     # a map of contacts that were not found is no force
-    return jnp.where(converged, getattr(found, kind.field), jnp.nan)
+    return jnp.where(converged, getattr(found, field), jnp.nan)
 
 
-def _swept(given: WithSettings, cycle: MeshCycle, kind: _Kind) -> tuple[SteadyNumbers, Bool[Array, ""]]:
-    settings = given.settings
-    mesh, operating_point = cycle.mesh_for(given.name), cycle.operating_point
-    if kind.at_speed:
-        if operating_point.speed is None:
-            raise ValueError(f"{given.name}: needs a speed, solve with OperatingPoint(torque, speed)")
-        frequency = mesh_frequency(cycle.kinematics.pair.pinion.teeth, operating_point.speed)
-        settings = dataclasses.replace(settings, mesh_frequencies=frequency[None])
-    oscillator = settings.oscillator_of(cycle, mesh)
-    return settings.numbers(oscillator), oscillator.converged
+def _swept(name: str, at_speed: bool, analysis: Analysis, dynamics: Dynamics) -> tuple[SteadyNumbers, Bool[Array, ""]]:
+    mesh, speed = analysis.mesh_for(name), analysis.operating_point.speed
+    if at_speed:
+        if speed is None:
+            raise ValueError(f"{name}: needs a speed, solve with OperatingPoint(torque, speed)")
+        frequency = mesh_frequency(mesh.pair.pinion.teeth, speed)
+        dynamics = replace(dynamics, mesh_frequencies=frequency[None])
+    torque, deviation = analysis.cycle.torque, analysis.deviation(name)
+    oscillator, _ = dynamics.oscillator_and_mesh(mesh, torque, **analysis.flanks, deviation=deviation)
+    return dynamics.numbers(oscillator), oscillator.converged
 
 
 def mesh_frequency(teeth, speed):
@@ -75,10 +53,12 @@ def mesh_frequency(teeth, speed):
     return teeth * speed / 60
 
 
-def _quantity(name: str, kind: _Kind) -> Quantity:
-    stands = WithoutSettings(name, "jaxgear.dynamics.Dynamics", "dynamics", given=_numbers_of)
-    label = "largest dynamic factor" if name == "worst_dynamic_factor" else ""
-    return Quantity(name, stands, kind.unit, kind.meaning, Max(), label=label)
+def _quantities(at_speed: bool) -> Iterator[Quantity]:
+    for field, unit, meaning in _FIELDS:
+        name, where = (field, "the speed of the pinion") if at_speed else (f"worst_{field}", "its worst speed")
+        label = "largest dynamic factor" if name == "worst_dynamic_factor" else ""
+        of = partial(_numbers, field, at_speed)
+        yield Quantity(name, of, unit, f"{meaning}, at {where}", Max(), label=label, takes=Dynamics)
 
 
-quantities.add(*(_quantity(name, kind) for name, kind in DYNAMIC_QUANTITIES.items()), package=__package__)
+DYNAMIC_QUANTITIES = Vocabulary((*_quantities(True), *_quantities(False)))

@@ -8,13 +8,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..conditions import deviation_of
-from ..contact import Mesh, MeshCycle
+from ..contact import Mesh
 from ..geometry import GearPair
-from ..metrics import Quantity
-from ..metrics.settings import with_settings
+from ..metrics import AbstractSettings
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, concrete, count, number
+from ..numerics import concrete, count, number
 from .force import AbstractMeshForce
 from .from_contact import Model, force_and_mesh
 from .oscillator import Oscillator
@@ -42,8 +40,13 @@ _DIRECTIONS = 2
 _STEPS = 256
 
 
-class Dynamics(Checked):
+class Dynamics(AbstractSettings):
     """How a mesh is run: masses, damping and speeds.
+
+    `quantity` gives with it the numbers of the vibration, `DYNAMIC_QUANTITIES`: "dynamic_factor", "dte_rms",
+    "contact_loss_share" or "back_side_contact" at the speed of the operating point, the worse of the motions from rest
+    and from a kick; with "worst_" before it, the worst of all runs and speeds. The first two are differentiable where
+    the steady state is an orbit of up to four mesh cycles; elsewhere their derivative is zero.
 
     Attributes:
         mesh_frequencies: [Hz], increasing, shape (speeds,).
@@ -66,6 +69,7 @@ class Dynamics(Checked):
             that hang together with no other, and goes on with the strongest; 2.5, 3 and 3.7 without it or `kick`.
     """
 
+    table = "dynamics"
     mesh_frequencies: Float[Array, " speeds"] = number("Hz", low=0.0, open_low=True, shape=("speeds",))
     damping_ratio: Scalar | None = number("", low=0.0, high=1.0, optional=True, default=None)
     damping: Scalar | None = number("N s/um", low=0.0, optional=True, default=None)
@@ -78,7 +82,7 @@ class Dynamics(Checked):
     wheel_bearing_damping: Bearing | None = number("N s/um", low=0.0, shape=_AXES, optional=True, default=None)
     model: Model = "map"
     positions: int = count(low=16, high=4096, default=128)
-    kick: Scalar | None = number("", low=1.0, high=MOST_KICK, optional=True, default=None)
+    kick: float | None = number("", low=1.0, high=MOST_KICK, optional=True, static=True, default=None)
     steps: int | None = count(low=32, high=65_536, optional=True, default=None)
     kicks: Float[Array, " kicks"] | None = number(
         "", low=1.0, high=MOST_KICK, shape=("kicks",), optional=True, default=None
@@ -154,9 +158,8 @@ class Dynamics(Checked):
     @property
     def run_names(self) -> tuple[str, ...]:
         """What the speeds are gone through for: rising, falling, and falling with kicks."""
-        kick = None if self.kick is None else concrete(self.kick)
         falling = (DOWN,) if len(self.mesh_frequencies) > 1 else ()  # at one speed it is the rising run
-        return UP, *falling, *((KICKED,) if kick is None or kick > 1 else ())
+        return UP, *falling, *((KICKED,) if self.kick is None or self.kick > 1 else ())
 
     def run(self, oscillator: Oscillator, name: str, *, steps: Sequence[int] | int | None = None) -> SpeedResponse:
         """The steady states of one of the runs.
@@ -227,20 +230,6 @@ class Dynamics(Checked):
         """Of the integrator per mesh cycle where the natural frequency is being traced."""
         return _STEPS if self.steps is None else self.steps
 
-    def quantity(self, name: str) -> Quantity:
-        """A dynamic quantity for objectives, constraints, sweeps and Pareto fronts, with these settings.
-
-        Args:
-            name: "dynamic_factor", "dte_rms", "contact_loss_share" or "back_side_contact" at the speed of the
-                operating point, the worse of the motions from rest and from a kick; with "worst_" before it, the worst
-                of all runs and speeds. The first two are differentiable where the steady state is an orbit of up to
-                four mesh cycles; elsewhere their derivative is zero.
-
-        Raises:
-            ValueError: for another name.
-        """
-        return with_settings(name, self)
-
     def force(
         self, oscillator: Oscillator, mesh_frequency: Scalar, phase: Float[Array, " positions"], steps: int
     ) -> SteadyForce:
@@ -264,8 +253,3 @@ class Dynamics(Checked):
         steps = self.traced_steps
         runs = replace(self, steps=steps).runs(jax.lax.stop_gradient(oscillator))
         return differentiable(oscillator, tuple(runs.values()), steps)
-
-    def oscillator_of(self, cycle: MeshCycle, mesh: Mesh) -> Oscillator:
-        """What vibrates, of a design that a cycle on the mesh is of, its manufacturing deviations included."""
-        flanks = {"pinion": cycle.pinion, "wheel": cycle.wheel}
-        return self._oscillator(mesh, cycle.torque, **flanks, deviation=deviation_of(cycle, mesh))

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..contact import Mesh
-from ..metrics import Quantity, quantity_of
+from ..metrics import Quantity
 from ..numerics import AbstractMeasure, Callback, CVaR, Mean, Number, Quantile, Worst
 from ..optimize import (
     METHODS,
@@ -21,6 +21,7 @@ from ..optimize import (
 )
 from ..optimize.free_form import CURVES
 from ..optimize.refine import POSITIONS
+from ..vocabulary import quantity_of
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import LIVES_AHEAD
 from . import schema

@@ -16,11 +16,12 @@ from ..contact import OperatingPoint, Resolution
 from ..dynamics import Dynamics
 from ..geometry import Gear, GearPair, Material
 from ..layout import SNCurve
-from ..metrics import Lubricant, Strength, quantities
+from ..metrics import Lubricant, Strength
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from ..shafts import Misalignment
 from ..tolerance import Tolerance
+from ..vocabulary import quantities
 from ..wear import Wear
 from . import rating, schema, schema_shafts
 from .table_keys import FileTable, family, meanings, section_of, snake, summary

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from ..conditions import LoadSpectrum
-from ..dynamics import DYNAMIC_QUANTITIES, Dynamics
+from ..dynamics import Dynamics
 from ..dynamics.motion import SAMPLES
-from ..metrics import Quantity, quantities
-from ..metrics.settings import WithoutSettings, without_settings
+from ..dynamics.quantities import AT_SPEED
+from ..metrics import Quantity
 from ..tolerance import Tolerance, ToleranceClass
+from ..vocabulary import quantities
 from ..wear import WEAR_QUANTITIES, Wear
 from .design_file import DesignFile
 from .errors import DesignFileError, check_known, naming, problem, refuse_given, refused
@@ -131,7 +132,7 @@ def dynamic_quantity(design: DesignFile, key: str, name: str) -> Quantity:
         DesignFileError: without a speed that the quantity needs.
     """
     assert design.dynamics is not None  # `quantity_named` has looked
-    if DYNAMIC_QUANTITIES[name].at_speed and design.speed is None:
+    if name in AT_SPEED and design.speed is None:
         raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{name}" is that of all speeds of [dynamics]')
     return dynamics_of(design).quantity(name)
 
@@ -253,46 +254,45 @@ def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
         DesignFileError: for an unknown name, and for one that needs a table or a key that the file does not have.
     """
     check_known(key, name, quantities)
-    plain = quantities[name].name
-    stands = without_settings(quantities[plain])
-    if stands is None:
+    quantity = quantities[name]
+    if quantity.takes is None:
         return name
-    missing = _missing(design, stands)
+    missing = _missing(design, quantity)
     if missing:
-        raise DesignFileError(key, f'"{plain}" needs {missing}')
-    if plain in DYNAMIC_QUANTITIES:
-        return dynamic_quantity(design, key, plain)
-    if plain in WEAR_QUANTITIES:
-        return wear_quantity(design, plain)
-    settings = getattr(design, stands.table)
-    return name if settings is None else settings.quantity(plain)
+        raise DesignFileError(key, f'"{quantity.name}" needs {missing}')
+    if quantity.takes is Dynamics:
+        return dynamic_quantity(design, key, quantity.name)
+    if quantity.takes is Wear:
+        return wear_quantity(design, quantity.name)
+    settings = getattr(design, quantity.takes.table)
+    return name if settings is None else quantity.with_settings(settings)
 
 
 def quantities_of_tables(design: DesignFile) -> Iterator[Quantity]:
     """All quantities that need a speed, a lubricant or strengths, as far as a design file tells what they need."""
-    for name, quantity in quantities.items():
-        stands = without_settings(quantity)
-        if stands is None or stands.of is None or _missing(design, stands):
+    for quantity in quantities.values():
+        if quantity.takes in (None, Dynamics, Wear) or _missing(design, quantity):
             continue
-        settings = getattr(design, stands.table)
-        yield quantity if settings is None else settings.quantity(name)
+        settings = getattr(design, quantity.takes.table)
+        yield quantity if settings is None else quantity.with_settings(settings)
 
 
-def _missing(design: DesignFile, stands: WithoutSettings) -> str:
+def _missing(design: DesignFile, quantity: Quantity) -> str:
     """What a design file lacks for a quantity of one of its tables; "" for nothing."""
-    settings = getattr(design, stands.table)
-    if stands.needs == "dynamics":  # which other settings hold, and a file has a table for
-        for known, name in ((settings, f"the table [{stands.table}]"), (design.dynamics, "the table [dynamics]")):
+    assert quantity.takes is not None
+    table, settings = quantity.takes.table, getattr(design, quantity.takes.table)
+    if quantity.needs == "dynamics":  # which other settings hold, and a file has a table for
+        for known, name in ((settings, f"the table [{table}]"), (design.dynamics, "the table [dynamics]")):
             if known is None:
                 return name
         speeds = design.wear and design.wear.speeds  # the only such settings that have their own
         return "" if design.speed is not None or speeds else "load.speed"
     if settings is not None:
-        unset = stands.needs is not None and getattr(settings, stands.needs) is None
-        return f"{stands.table}.{stands.needs}" if unset else ""
-    if stands.otherwise is None:
-        return f"the table [{stands.table}]"
-    for name in stands.operating_point:
+        unset = quantity.needs and getattr(settings, quantity.needs) is None
+        return f"{table}.{quantity.needs}" if unset else ""
+    if quantity.without is None:
+        return f"the table [{table}]"
+    for name in quantity.without:
         if getattr(design, name) is None:
-            return f"load.{name}" + (f" or the table [{stands.table}]" if name != "speed" else "")
+            return f"load.{name}" + (f" or the table [{table}]" if name != "speed" else "")
     return ""

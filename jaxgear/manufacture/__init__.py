@@ -1,8 +1,8 @@
 """How flanks are made and measured: form-grinding wheel, volumes ground off, charts of the measuring machine.
 
 `drawn_gear` makes a gear from the tooth thickness on its drawing. Functions of flanks take one gear's side of the
-contact, of `mesh.sides`, and the modification. Importing adds `pinion_quadratic_deviation`, `pinion_removed_volume` and
-others to the vocabulary of quantities.
+contact, of `mesh.sides`, and the modification. The quantities `pinion_quadratic_deviation`, `pinion_removed_volume` and
+others are in the vocabulary.
 """
 
 from .chart import FlankDeviations as FlankDeviations
@@ -30,6 +30,7 @@ from .tooth_thickness import over_balls as over_balls
 from .tooth_thickness import span as span
 from .tooth_thickness import teeth_spanned as teeth_spanned
 from .tooth_thickness import with_thickness as with_thickness
+from .volume import GROUND_QUANTITIES as GROUND_QUANTITIES
 from .volume import ReferenceVolumes as ReferenceVolumes
 from .volume import ground_area as ground_area
 from .volume import ground_volume as ground_volume

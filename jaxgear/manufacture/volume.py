@@ -5,6 +5,7 @@ dynamic behavior" (Int J Adv Manuf Technol 2023, doi 10.1007/s00170-023-12340-x,
 of its reliefs with linear and parabolic ones from the pitch point of the same amount at the tip.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -12,7 +13,7 @@ from jaxtyping import Array, Float
 
 from ..contact import MeshCycle, Side
 from ..geometry import outline
-from ..metrics import Quantity, gear_volume, quantities, removed_at
+from ..metrics import Quantity, Vocabulary, gear_volume, removed_at
 from ..microgeometry import AbstractCurve, AbstractModification, Linear, NoModification, Quadratic, TipRelief
 from ..numerics import check, concrete, program, real, safe_divide
 from ..numerics.reductions import Max
@@ -142,30 +143,18 @@ def _relative(parabolic: bool):
     return lambda side, modification: relative_volume(side, modification, parabolic=parabolic)
 
 
-for _index, _gear in enumerate(("pinion", "wheel")):
-    quantities.add(
-        *(
-            Quantity(
-                f"{_gear}_{_name}_deviation",
-                _of_gear(_index, _deviation(_degree)),
-                "um",
-                f"of the flank from the best wheel of involute and {_name} polynomial, {_gear}",
-                Max(),
-            )
-            for _degree, _name in _DEGREES.items()
-        ),
-        Quantity(
-            f"{_gear}_ground_area", _of_gear(_index, _area), "mm2", f"area of the flanks that are ground, {_gear}"
-        ),
-        Quantity(f"{_gear}_removed_volume", _of_gear(_index, gear_volume), "mm3", f"material ground off, {_gear}"),
-        *(
-            Quantity(
-                f"{_gear}_volume_over_{_name}",
-                _of_gear(_index, _relative(_parabolic)),
-                "",
-                f"removed volume per that of a {_name} relief from the pitch point, {_gear}",
-            )
-            for _parabolic, _name in ((False, "linear"), (True, "parabolic"))
-        ),
-        package=__package__,
-    )
+def _quantities() -> Iterator[Quantity]:
+    for index, gear in enumerate(("pinion", "wheel")):
+        for degree, name in _DEGREES.items():
+            meaning = f"of the flank from the best wheel of involute and {name} polynomial, {gear}"
+            yield Quantity(f"{gear}_{name}_deviation", _of_gear(index, _deviation(degree)), "um", meaning, Max())
+        area = f"area of the flanks that are ground, {gear}"
+        yield Quantity(f"{gear}_ground_area", _of_gear(index, _area), "mm2", area)
+        yield Quantity(f"{gear}_removed_volume", _of_gear(index, gear_volume), "mm3", f"material ground off, {gear}")
+        for parabolic, name in ((False, "linear"), (True, "parabolic")):
+            meaning = f"removed volume per that of a {name} relief from the pitch point, {gear}"
+            of = _of_gear(index, _relative(parabolic))
+            yield Quantity(f"{gear}_volume_over_{name}", of, meaning=meaning)
+
+
+GROUND_QUANTITIES = Vocabulary(_quantities())

@@ -11,6 +11,7 @@ from ..numerics.reductions import Min as Min
 from ..numerics.reductions import Range as Range
 from ..numerics.reductions import Rms as Rms
 from ..numerics.reductions import Value as Value
+from .analysis import Analysis as Analysis
 from .excitation import Harmonics as Harmonics
 from .excitation import excited_by as excited_by
 from .excitation import force_excitation as force_excitation
@@ -49,9 +50,10 @@ from .lubrication import lubricated_flash_temperature as lubricated_flash_temper
 from .lubrication import mesh_efficiency as mesh_efficiency
 from .lubrication import ohlendorf_loss_factor as ohlendorf_loss_factor
 from .lubrication import specific_film_thickness as specific_film_thickness
+from .quantity import AbstractSettings as AbstractSettings
 from .quantity import Quantity as Quantity
-from .quantity import quantities as quantities
-from .quantity import quantity_of as quantity_of
+from .quantity import Vocabulary as Vocabulary
+from .quantity import share_settings as share_settings
 from .rating import LUBRICANT_QUANTITIES as LUBRICANT_QUANTITIES
 from .rating import STRENGTH_QUANTITIES as STRENGTH_QUANTITIES
 from .safety import Strength as Strength
@@ -72,5 +74,6 @@ from .stress import nominal_root_stress as nominal_root_stress
 from .stress import rating_factors as rating_factors
 from .stress import root_factors as root_factors
 from .stress import root_stress as root_stress
+from .vocabulary import MESH_QUANTITIES as MESH_QUANTITIES
 from .vocabulary import mean_removed_material as mean_removed_material
 from .vocabulary import summary as summary

@@ -12,9 +12,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, concrete, number
-from .quantity import Quantity
-from .settings import with_settings
+from ..numerics import concrete, number
+from .quantity import AbstractSettings
 
 Real = Float[Array, "..."]
 Given = Real | float
@@ -52,8 +51,10 @@ BASES: Mapping[str, BaseOil] = {
 }
 
 
-class Lubricant(Checked):
+class Lubricant(AbstractSettings):
     """An oil as it is used: its data sheet, its temperature, the flanks it runs on, and what tests have shown of it.
+
+    `quantity` gives with it the numbers of the lubricated mesh, `metrics.LUBRICANT_QUANTITIES`.
 
     Attributes:
         viscosity_40: kinematic viscosity at 40 degC.
@@ -71,6 +72,7 @@ class Lubricant(Checked):
         scuffing_temperature: contact temperature at which the oil fails, from a test.
     """
 
+    table = "lubricant"
     viscosity_40: Scalar = number("mm2/s", low=2.0)
     viscosity_100: Scalar = number("mm2/s", low=2.0)
     temperature: Scalar = number("degC", low=-60.0, high=250.0)
@@ -118,19 +120,6 @@ class Lubricant(Checked):
         reference = jnp.full_like(self.viscosity_40, _ISO_REFERENCE - _ISO_KELVIN)
         at_38 = base.pressure_viscosity * self.viscosity(reference) ** base.exponent
         return at_38 * (1 + _ISO_SLOPE * (1 / (temperature + _ISO_KELVIN) - 1 / _ISO_REFERENCE))
-
-    def quantity(self, name: str) -> Quantity:
-        """A quantity of the lubricated mesh for objectives, constraints, sweeps and tables, with this oil.
-
-        Args:
-            name: "friction_coefficient", "loss_power", "mesh_efficiency", "max_flash_temperature",
-                "bulk_temperature", "max_contact_temperature", "min_film_thickness", "min_specific_film_thickness",
-                "micropitting_safety" (needs `permissible_film`) or "scuffing_safety" (needs `scuffing_temperature`).
-
-        Raises:
-            ValueError: for another name, and for a number of the lubricant that is missing.
-        """
-        return with_settings(name, self)
 
 
 def _check_less(lubricant: Lubricant, name: str, other: str, unit: str) -> None:

@@ -1,24 +1,73 @@
-"""Named quantities of a mesh cycle: one open vocabulary for tables, objectives, limits, reports and design files."""
+"""Named quantities of a mesh cycle, for tables, objectives, limits, reports and design files, and their settings."""
 
 import difflib
-import importlib
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Literal
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..numerics import over_batch
+from ..numerics import Checked, over_batch
 from ..numerics.reductions import AbstractReduction, Value
+from .analysis import Analysis
 
 Numbers = Float[Array, "..."]
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """A number of a mesh cycle, with its name and unit; call it with a cycle.
+class AbstractSettings(Checked):
+    """What some quantities need besides a mesh cycle: an oil, strengths, what vibrates, how long it runs.
+
+    A quantity of settings names their class, and `quantity` gives it with them. A class of your own does as those of
+    the library do:
+
+        class Microphone(AbstractSettings):
+            table = "microphone"
+            distance: Array = number("m", low=0.0, open_low=True)
+
+        def level(analysis, microphone):
+            return jnp.ptp(analysis.cycle.transmission_error) / microphone.distance
+
+        quantities.add(Quantity("level", level, "um/m", takes=Microphone))
+        Microphone(distance=0.5).quantity("level")
+
+    Attributes:
+        table: of a design file, whose keys are the fields.
+    """
+
+    table: ClassVar[str] = ""
+
+    def quantity(self, name: str) -> "Quantity":
+        """A quantity of these settings, for objectives, constraints, sweeps, Pareto fronts and tables.
+
+        The settings may be traced: what is compiled for one quantity serves other numbers in them, too.
+
+        Args:
+            name: of the vocabulary, without the unit.
+
+        Raises:
+            ValueError: for the name of no quantity of these settings, and where a field is missing that it needs.
+        """
+        known = _OF_SETTINGS.get(type(self), {})
+        if name not in known:
+            raise ValueError(
+                f'{type(self).__name__}: quantity "{name}" is not known, must be one of {", ".join(known)}'
+            )
+        return known[name].with_settings(self)
+
+
+class Shared(eqx.Module):
+    """Stands in a quantity for the settings of this number that an `Analysis` shares, see `share_settings`."""
+
+    number: int = eqx.field(static=True)
+
+
+class Quantity(eqx.Module):
+    """A number of a mesh cycle, with its name and unit; call it with a cycle, or with an `Analysis`.
 
     A name of the vocabulary, or a quantity of your own, is taken wherever a quantity is asked for:
 
@@ -26,8 +75,9 @@ class Quantity:
 
     Attributes:
         name: as tables and design files call it.
-        of: computes it from one solved cycle: a single number, or an array that the reduction makes one of. Traced, so
-            it must be pure; every use of one quantity shares compiled programs as long as it is the same function.
+        of: computes it from one solved cycle, or with `takes` from an `Analysis` and the settings: a single number, or
+            an array that the reduction makes one of. Traced, so it must be pure; every use of one quantity shares
+            compiled programs as long as it is the same function.
         unit: "" for a pure number.
         meaning: in a few words.
         reduction: makes one number of an array, over all its axes. Linear programs keep the extremes of `Max`, `Min`
@@ -37,17 +87,26 @@ class Quantity:
             position alone, as those of transmission error, line load and pressure do. It only saves time.
         label: as tables and figures call it; "" for the name in words.
         form: how tables format the number, as in `format`.
+        takes: class of the settings that it is computed with; None for a cycle alone.
+        needs: field of the settings that must be given; "" for none.
+        without: fields of the operating point with which it is known without settings too, which are None for `of`
+            then; None where it always takes settings.
+        settings: that it is computed with, which may be traced; None in the vocabulary.
     """
 
-    name: str
-    of: Callable[[MeshCycle], Any]
-    unit: str = ""
-    meaning: str = ""
-    reduction: AbstractReduction = Value()
-    better: Literal["smaller", "larger"] = "smaller"
-    local: bool = False
-    label: str = ""
-    form: str = ".4g"
+    name: str = eqx.field(static=True)
+    of: Callable[..., Any] = eqx.field(static=True)
+    unit: str = eqx.field(static=True, default="")
+    meaning: str = eqx.field(static=True, default="")
+    reduction: AbstractReduction = eqx.field(static=True, default=Value())
+    better: Literal["smaller", "larger"] = eqx.field(static=True, default="smaller")
+    local: bool = eqx.field(static=True, default=False)
+    label: str = eqx.field(static=True, default="")
+    form: str = eqx.field(static=True, default=".4g")
+    takes: type[AbstractSettings] | None = eqx.field(static=True, default=None, kw_only=True)
+    needs: str = eqx.field(static=True, default="", kw_only=True)
+    without: tuple[str, ...] | None = eqx.field(static=True, default=None, kw_only=True)
+    settings: AbstractSettings | Shared | None = eqx.field(default=None, kw_only=True)
 
     @property
     def words(self) -> str:
@@ -75,17 +134,36 @@ class Quantity:
         """1 where small values are the better ones, else -1."""
         return 1 if self.better == "smaller" else -1
 
-    def __call__(self, cycle: MeshCycle) -> Numbers:
-        """The number, of every cycle where the cycle has leading axes from `jax.vmap`."""
-        return over_batch(lambda cycle: self.reduction(self.values(cycle).ravel()))(cycle)
+    def with_settings(self, settings: AbstractSettings) -> "Quantity":
+        """The quantity computed with settings.
 
-    def values(self, cycle: MeshCycle) -> Float[Array, "..."]:
+        Raises:
+            TypeError: for settings of another class than it takes.
+            ValueError: where a field is missing that it needs.
+        """
+        owner = type(settings).__name__
+        if self.takes is None or not isinstance(settings, self.takes):
+            raise TypeError(f"{self.name}: takes {getattr(self.takes, '__name__', 'no settings')}, not {owner}")
+        if self.needs and getattr(settings, self.needs) is None:
+            raise ValueError(f'{owner}: quantity "{self.name}" needs {self.needs}')
+        return replace(self, settings=settings)
+
+    def __call__(self, analysis: Analysis | MeshCycle) -> Numbers:
+        """The number, of every cycle where the cycle has leading axes from `jax.vmap`."""
+        if isinstance(analysis, MeshCycle):
+            return over_batch(lambda cycle: self(Analysis(cycle)))(analysis)
+        return self.reduction(self.values(analysis).ravel())
+
+    def values(self, analysis: Analysis | MeshCycle) -> Float[Array, "..."]:
         """What is reduced, of one cycle, in its own shape.
 
         Raises:
-            ValueError: when it is neither a number nor an array, or an array without a reduction.
+            ValueError: when it is neither a number nor an array, or an array without a reduction, and where settings
+                are missing.
         """
-        given = self.of(cycle)
+        if isinstance(analysis, MeshCycle):
+            analysis = Analysis(analysis)
+        given = self.of(analysis.cycle) if self.takes is None else self._with_settings(analysis, self.takes)
         try:
             values = jnp.asarray(given)
         except (TypeError, ValueError):
@@ -95,58 +173,58 @@ class Quantity:
                 f"{self.name}: gives an array of shape {values.shape}, must be a single number; "
                 "a Quantity(name, of, reduction=Max()) says what to make of it"
             )
-        return values.astype(cycle.transmission_error.dtype)
+        return values.astype(analysis.cycle.transmission_error.dtype)
+
+    def _with_settings(self, analysis: Analysis, takes: type[AbstractSettings]) -> Any:
+        settings = analysis.shared[self.settings.number] if isinstance(self.settings, Shared) else self.settings
+        if settings is not None:
+            return self.of(analysis, analysis.in_precision(settings))
+        if self.without is None:
+            name = f"{takes.__module__.rpartition('.')[0]}.{takes.__name__}"
+            table = f", or a design file with the table [{takes.table}]" if takes.table else ""
+            raise ValueError(f'{self.name}: needs settings, give {name}(...).quantity("{self.name}"){table}')
+        return self.of(analysis, None)
+
+
+# of every vocabulary, by the class of the settings and the name
+_OF_SETTINGS: dict[type[AbstractSettings], dict[str, Quantity]] = {}
 
 
 class Vocabulary(Mapping[str, Quantity]):
-    """Quantities by name. Packages add theirs; names are looked up in both spellings, "ppte" and "ppte_um".
+    """Quantities by name, looked up in both spellings, "ppte" and "ppte_um"."""
 
-    Which of the packages a program has imported, and in which order, changes neither what is known nor its order.
-    """
+    def __init__(self, known: Iterable[Quantity] = ()) -> None:
+        """Holds some quantities."""
+        self._known: dict[str, Quantity] = {}
+        self.add(*known)
 
-    def __init__(self, packages: tuple[str, ...] = ()) -> None:
-        """Holds nothing yet.
-
-        Args:
-            packages: those whose import adds quantities, in reading order; imported when a name is not found without.
-        """
-        self._by_package: dict[str, dict[str, Quantity]] = {package: {} for package in packages}
-        self._unread = [*reversed(packages)]
-
-    def add(self, *quantities: Quantity, package: str = "") -> None:
+    def add(self, *quantities: Quantity) -> None:
         """Adds quantities.
-
-        Args:
-            quantities: the quantities.
-            package: that they come with.
 
         Raises:
             ValueError: for a name that is taken.
         """
-        own = self._by_package.setdefault(package, {})
-        if not package:
-            self._read_all()  # what the packages call theirs is taken
         for quantity in quantities:
-            if self._find(quantity.name) is not None:
+            if quantity.name in self:
                 raise ValueError(f'quantities: "{quantity.name}" is there already')
-            own[quantity.name] = quantity
+            self._known[quantity.name] = quantity
+            if quantity.takes is not None:
+                _OF_SETTINGS.setdefault(quantity.takes, {})[quantity.name] = quantity
 
     def __getitem__(self, name: str) -> Quantity:
-        found = self._known(name)
+        found = self._find(name)
         if found is None:
             raise KeyError(f"quantities: {self.not_known(name)}")
         return found
 
     def __contains__(self, name: object) -> bool:
-        return self._known(name) is not None  # without the search for the nearest name, which takes long
+        return self._find(name) is not None  # without the search for the nearest name, which takes long
 
     def __iter__(self) -> Iterator[str]:
-        self._read_all()
-        return iter([name for known in self._by_package.values() for name in known])
+        return iter(self._known)
 
     def __len__(self) -> int:
-        self._read_all()
-        return sum(map(len, self._by_package.values()))
+        return len(self._known)
 
     def not_known(self, name: object) -> str:
         """That a name is not known, with the nearest known one."""
@@ -155,46 +233,62 @@ class Vocabulary(Mapping[str, Quantity]):
         hint = f'did you mean "{near[0]}"?' if near else f"must be one of {', '.join(self)}"
         return f'"{name}" is not known, {hint}'
 
-    def _known(self, name: object) -> Quantity | None:
-        """A quantity, looked for in packages that are not imported yet too."""
-        if self._find(name) is None:
-            self._read_all()
-        return self._find(name)
+    def quantity_of(self, of: str | Quantity | Callable[[MeshCycle], Any], owner: str = "quantity") -> Quantity:
+        """The quantity that is meant by a name in either spelling, a `Quantity`, or a function of a cycle.
+
+        Args:
+            of: the quantity; a function is taken for a quantity of its own name that gives a single number.
+            owner: who asks, for the message.
+
+        Raises:
+            ValueError: for an unknown name, with the nearest known one.
+        """
+        if isinstance(of, Quantity):
+            return of
+        if not isinstance(of, str):
+            return Quantity(getattr(of, "__name__", type(of).__name__), of)
+        found = self._find(of)
+        if found is None:
+            raise ValueError(f"{owner}: {self.not_known(of)}")
+        return found
 
     def _find(self, name: object) -> Quantity | None:
-        for known in self._by_package.values():
-            if name in known:
-                return known[str(name)]
-            for quantity in known.values():
-                if quantity.key == name:
-                    return quantity
-        return None
-
-    def _read_all(self) -> None:
-        while self._unread:  # popped first: a package looks names up while it is being imported
-            importlib.import_module(self._unread.pop())
+        if name in self._known:
+            return self._known[str(name)]
+        return next((quantity for quantity in self._known.values() if quantity.key == name), None)
 
 
-# later layers, so they are not imported here but when one of their names is asked for
-quantities = Vocabulary(
-    ("jaxgear.metrics", "jaxgear.dynamics", "jaxgear.wear", "jaxgear.manufacture"),
-)
+def share_settings(quantities: Sequence[Quantity]) -> tuple[tuple[Quantity, ...], tuple[AbstractSettings, ...]]:
+    """Quantities that can be static, and the settings of all of them, every one once.
 
-
-def quantity_of(of: str | Quantity | Callable[[MeshCycle], Any], owner: str = "quantity") -> Quantity:
-    """The quantity that is meant by a name in either spelling, a `Quantity`, or a function of a cycle.
+    An `Analysis` with these settings works out once what several quantities need of the same ones.
 
     Args:
-        of: the quantity; a function is taken for a quantity of its own name that gives a single number.
-        owner: who asks, for the message.
+        quantities: with their settings, concrete or traced.
 
-    Raises:
-        ValueError: for an unknown name, with the nearest known one.
+    Returns:
+        the quantities with a `Shared` in place of settings, and the settings, for `Analysis(cycle, mesh, settings)`.
     """
-    if isinstance(of, Quantity):
-        return of
-    if callable(of):
-        return Quantity(getattr(of, "__name__", type(of).__name__), of)
-    if of in quantities:
-        return quantities[of]
-    raise ValueError(f"{owner}: {quantities.not_known(of)}")
+    settings: list[AbstractSettings] = []
+    bare = []
+    for quantity in quantities:
+        own = quantity.settings
+        if isinstance(own, AbstractSettings):
+            number = next((number for number, known in enumerate(settings) if _same(known, own)), len(settings))
+            settings += [own] * (number == len(settings))
+            quantity = replace(quantity, settings=Shared(number))
+        bare.append(quantity)
+    return tuple(bare), tuple(settings)
+
+
+def _same(one: AbstractSettings, other: AbstractSettings) -> bool:
+    """Whether settings are the same object, or of equal concrete numbers."""
+    if one is other:
+        return True
+    flat: list[Any] = [jax.tree.flatten(settings) for settings in (one, other)]
+    (leaves, structure), (others, like) = flat
+    if structure != like:
+        return False
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in (*leaves, *others)):
+        return False
+    return all(np.shape(leaf) == np.shape(each) and np.array_equal(leaf, each) for leaf, each in zip(leaves, others))

@@ -4,7 +4,7 @@ A name alone does not say which: `Lubricant.quantity` and `Strength.quantity` gi
 the tables [lubricant] and [strength].
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -12,6 +12,8 @@ from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
 from ..numerics.reductions import Max, Min
+from .analysis import Analysis
+from .lubricant import Lubricant
 from .lubrication import (
     bulk_temperature,
     contact_temperature,
@@ -25,6 +27,7 @@ from .lubrication import (
 )
 from .quantity import Quantity
 from .safety import (
+    Strength,
     local_root_safety,
     micropitting_safety,
     pitting_damage,
@@ -34,54 +37,55 @@ from .safety import (
     root_safety,
     scuffing_safety,
 )
-from .settings import WithoutSettings
 
 Load = Float[Array, "pairs slices positions"]
 
 
-def _flash(cycle: MeshCycle) -> Load:
-    operating_point = cycle.operating_point
-    if operating_point.speed is None:
+def _of_cycle(of: Callable[[MeshCycle, Any], Any], analysis: Analysis, settings: Any) -> Any:
+    return of(analysis.cycle, settings)
+
+
+def _one(of: Callable[[MeshCycle, Any], Any], gear: int, analysis: Analysis, settings: Any) -> Any:
+    return of(analysis.cycle, settings)[gear]
+
+
+def _flash(analysis: Analysis, lubricant: Lubricant | None) -> Load:
+    if lubricant is not None:
+        return lubricated_flash_temperature(analysis.cycle, lubricant)
+    speed, friction = analysis.operating_point.speed, analysis.operating_point.friction
+    if speed is None:
         raise ValueError("max_flash_temperature: needs a speed, solve with OperatingPoint(torque, speed)")
-    options = {} if operating_point.friction is None else {"friction": operating_point.friction}
-    return flash_temperature(cycle, operating_point.speed, **options)
+    return flash_temperature(analysis.cycle, speed, **({} if friction is None else {"friction": friction}))
 
 
-def _oiled(name: str, of: Any, unit: str, meaning: str, needs: str | None = None, **options: Any) -> Quantity:
-    alone = {key: options.pop(key) for key in ("otherwise", "operating_point") if key in options}
-    stands = WithoutSettings(name, "jaxgear.metrics.Lubricant", "lubricant", of, needs, **alone)
-    return Quantity(name, stands, unit, meaning, **options)
+def _oiled(name: str, of: Any, unit: str, meaning: str, **options: Any) -> Quantity:
+    return Quantity(name, partial(_of_cycle, of), unit, meaning, takes=Lubricant, **options)
 
 
-def _borne(name: str, of: Any, meaning: str, needs: str, **options: Any) -> Quantity:
-    stands = WithoutSettings(name, "jaxgear.metrics.Strength", "strength", of, needs)
-    return Quantity(name, stands, meaning=meaning, **{"better": "larger", **options})
+def _rated(name: str, of: Any, meaning: str, **options: Any) -> Quantity:
+    return Quantity(name, of, meaning=meaning, takes=Strength, **{"better": "larger", **options})
 
 
-def _of_gears(kind: str, of: Any, meaning: str, needs: str, **options: Any) -> Iterator[Quantity]:
+def _of_gears(name: str, of: Any, meaning: str, **options: Any) -> Iterator[Quantity]:
     """A quantity of pinion and wheel, which `of` gives together."""
     for number, gear in enumerate(("pinion", "wheel")):
         labelled = options | {"label": f"{gear} {options['label']}"}
-        yield _borne(f"{gear}_{kind}", partial(_one, of, number), f"{meaning}, {gear}", needs, **labelled)
-
-
-def _one(of: Any, number: int, cycle: MeshCycle, strength: Any) -> Any:
-    return of(cycle, strength)[number]
+        yield _rated(f"{gear}_{name}", partial(_one, of, number), f"{meaning}, {gear}", **labelled)
 
 
 _LEAST: dict[str, Any] = {"reduction": Min(), "better": "larger"}
 
 LUBRICATED = (
-    _oiled(
+    Quantity(
         "max_flash_temperature",
-        lubricated_flash_temperature,
+        _flash,
         "K",
         "largest rise of the flank temperature",
-        reduction=Max(),
+        Max(),
         local=True,
-        otherwise=_flash,
-        operating_point=("speed",),
         form=".1f",
+        takes=Lubricant,
+        without=("speed",),
     ),
     _oiled(
         "friction_coefficient",
@@ -96,8 +100,7 @@ LUBRICATED = (
         loss_power,
         "W",
         "power that friction of the flanks takes",
-        otherwise=loss_power,
-        operating_point=("speed", "friction"),
+        without=("speed", "friction"),
         label="power loss of the flanks",
     ),
     _oiled(
@@ -106,8 +109,7 @@ LUBRICATED = (
         "",
         "share of the power that the flanks pass on",
         better="larger",
-        otherwise=mesh_efficiency,
-        operating_point=("friction",),
+        without=("friction",),
         label="efficiency of the mesh",
         form=".5f",
     ),
@@ -141,7 +143,7 @@ LUBRICATED = (
         micropitting_safety,
         "",
         "S_lambda, specific over permissible film thickness",
-        "permissible_film",
+        needs="permissible_film",
         label="micropitting safety S_lambda",
         form=".2f",
         **_LEAST,
@@ -151,7 +153,7 @@ LUBRICATED = (
         scuffing_safety,
         "",
         "S_B, rise to the scuffing temperature over that to the contact temperature",
-        "scuffing_temperature",
+        needs="scuffing_temperature",
         label="scuffing safety S_B",
         form=".2f",
         **_LEAST,
@@ -162,7 +164,7 @@ RATED = (
         "pitting_safety",
         pitting_safety,
         "S_H, pitting strength over nominal contact stress",
-        "pitting",
+        needs="pitting",
         label="pitting safety S_H",
         form=".2f",
     ),
@@ -170,7 +172,7 @@ RATED = (
         "root_safety",
         root_safety,
         "S_F, bending strength over root stress after ISO 6336-3",
-        "bending",
+        needs="bending",
         label="root safety S_F",
         form=".2f",
     ),
@@ -178,17 +180,17 @@ RATED = (
         "local_root_safety",
         local_root_safety,
         "bending strength over the largest root stress of the contact analysis",
-        "bending",
+        needs="bending",
         **_LEAST,
         local=True,
         label="root safety, contact analysis",
         form=".2f",
     ),
-    _borne(
+    _rated(
         "pressure_safety",
-        pressure_safety,
-        "pressure that is borne over the largest of flanks and tip edges",
-        "pressure",
+        partial(_of_cycle, pressure_safety),
+        "permissible pressure over the largest of flanks and tip edges",
+        needs="pressure",
         reduction=Min(),
         local=True,
         label="pressure safety p_lim / p_max",
@@ -198,7 +200,7 @@ RATED = (
         "pitting_damage",
         pitting_damage,
         "share of the life that pitting takes in 1e6 revolutions of the pinion",
-        "pitting_exponent",
+        needs="pitting_exponent",
         better="smaller",
         label="pitting damage per 1e6 revolutions",
         form=".3g",
@@ -207,7 +209,7 @@ RATED = (
         "root_damage",
         root_damage,
         "share of the life that bending takes in 1e6 revolutions of the pinion",
-        "bending_exponent",
+        needs="bending_exponent",
         better="smaller",
         label="root damage per 1e6 revolutions",
         form=".3g",

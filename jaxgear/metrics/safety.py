@@ -15,8 +15,7 @@ from ..contact import MeshCycle
 from ..numerics import Checked, number, over_batch
 from .lubricant import Lubricant
 from .lubrication import contact_temperature, specific_film_thickness
-from .quantity import Quantity
-from .settings import with_settings
+from .quantity import AbstractSettings
 from .stress import nominal_contact_stress, nominal_root_stress, root_stress
 
 Real = Float[Array, "..."]
@@ -27,8 +26,11 @@ Load = Float[Array, "pairs slices positions"]
 LARGEST_SAFETY = 1000.0
 
 
-class Strength(Checked):
+class Strength(AbstractSettings):
     """Permissible stresses of both gears; factors of life, surface and size are included.
+
+    `quantity` gives with them the safety factors and damages, `metrics.STRENGTH_QUANTITIES`, each where its strength is
+    given.
 
     Attributes:
         pitting: nominal contact stress that the pinion bears, and the wheel where it has none of its own: sigma_HG
@@ -44,6 +46,7 @@ class Strength(Checked):
         bending_cycles: that `bending` is borne for.
     """
 
+    table = "strength"
     pitting: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
     wheel_pitting: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
     bending: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
@@ -61,20 +64,6 @@ class Strength(Checked):
             for given, needed in pairs:
                 if getattr(self, given) is not None and getattr(self, needed) is None:
                     raise ValueError(f"Strength: {needed} must be given where {given} is")
-
-    def quantity(self, name: str) -> Quantity:
-        """A safety factor or damage for objectives, constraints, sweeps and tables, with these strengths.
-
-        Args:
-            name: "pinion_pitting_safety", "wheel_pitting_safety" (need `pitting`), "pinion_root_safety",
-                "wheel_root_safety", "pinion_local_root_safety", "wheel_local_root_safety" (need `bending`),
-                "pressure_safety" (needs `pressure`), "pinion_pitting_damage", "wheel_pitting_damage" (need
-                `pitting_exponent`), "pinion_root_damage" or "wheel_root_damage" (need `bending_exponent`).
-
-        Raises:
-            ValueError: for another name, and for a strength that is missing.
-        """
-        return with_settings(name, self)
 
 
 def safety_factor(borne: Real, reached: Real) -> Real:

@@ -22,7 +22,7 @@ from .load_distribution import (
     root_face_load_factor,
 )
 from .lubrication import loss_factor
-from .quantity import Quantity, quantities
+from .quantity import Quantity, Vocabulary
 from .rating import LUBRICATED, RATED
 from .stress import nominal_contact_stress, nominal_root_stress, root_stress
 
@@ -80,156 +80,162 @@ def _one(of: Any, gear: str, cycle: MeshCycle) -> Any:
     return getattr(of(cycle), gear)
 
 
-quantities.add(
-    Quantity("ppte", _te, "um", "peak-to-peak transmission error", Range(), local=True, label="PPTE", form=".3f"),
-    Quantity(
-        "relative_ppte",
-        relative_transmission_error,
-        meaning="peak-to-peak over mean transmission error",
-        reduction=Range(),
-        label="PPTE over mean transmission error",
-        form=".4f",
-    ),
-    Quantity(
-        "mean_te",
-        _te,
-        "um",
-        "mean transmission error",
-        Average(),
-        local=True,
-        label="mean transmission error",
-        form=".3f",
-    ),
-    Quantity("te_rms", _te, "um", "rms of the transmission error about its mean", Rms(), local=True),
-    Quantity(
-        "unloaded_ppte",
-        lambda cycle: cycle.unloaded_transmission_error,
-        "um",
-        "peak-to-peak transmission error, unloaded",
-        Range(),
-        local=True,
-    ),
-    *(
+MESH_QUANTITIES = Vocabulary(
+    (
+        Quantity("ppte", _te, "um", "peak-to-peak transmission error", Range(), local=True, label="PPTE", form=".3f"),
         Quantity(
-            f"te_harmonic_{order}",
+            "relative_ppte",
+            relative_transmission_error,
+            meaning="peak-to-peak over mean transmission error",
+            reduction=Range(),
+            label="PPTE over mean transmission error",
+            form=".4f",
+        ),
+        Quantity(
+            "mean_te",
             _te,
             "um",
-            f"amplitude of mesh harmonic {order} of the transmission error",
-            Harmonic(order),
+            "mean transmission error",
+            Average(),
             local=True,
-        )
-        for order in (1, 2, 3)
-    ),
-    Quantity(
-        "max_flank_pressure",
-        lambda c: c.contact_pressure,
-        "MPa",
-        "largest Hertzian flank pressure",
-        Max(),
-        local=True,
-        form=".0f",
-    ),
-    Quantity(
-        "max_corner_pressure",
-        lambda c: c.corner_pressure,
-        "MPa",
-        "largest pressure of a tip edge",
-        Max(),
-        local=True,
-        form=".0f",
-    ),
-    Quantity(
-        "max_contact_pressure", _contact_pressure, "MPa", "largest pressure of flanks and tip edges", Max(), local=True
-    ),
-    Quantity("max_line_load", lambda c: c.line_load, "N/mm", "largest line load", Max(), local=True),
-    Quantity(
-        "face_load_factor",
-        face_load_factor,
-        meaning="K_Hbeta, largest over mean line load over the face",
-        label="face load factor K_Hbeta",
-        form=".3f",
-    ),
-    Quantity("root_face_load_factor", root_face_load_factor, meaning="K_Fbeta, the same for root stress"),
-    Quantity("edge_load_factor", edge_load_factor, meaning="line load at an end of the face over its mean"),
-    Quantity(
-        "contact_ratio",
-        lambda c: c.kinematics.path_of_contact.contact_ratio,
-        meaning="theoretical contact ratio",
-        better="larger",
-        form=".3f",
-    ),
-    Quantity(
-        "effective_contact_ratio",
-        effective_contact_ratio,
-        meaning="mean number of loaded pairs",
-        better="larger",
-        form=".3f",
-    ),
-    Quantity("corner_contact_length", _corner_length, "mm", "loaded path beyond the theoretical path of contact"),
-    Quantity("corner_force", corner_force, "N", "largest force on a pair there", Max(), local=True),
-    *_stresses(
-        "root_stress", nominal_root_stress, "root stress after ISO 6336-3", "root stress, ISO 6336-3", form=".1f"
-    ),
-    *_stresses(
-        "local_root_stress",
-        root_stress,
-        "largest root stress of the contact analysis",
-        "root stress, contact analysis",
-        reduction=Max(),
-        local=True,
-        form=".1f",
-    ),
-    *_stresses("contact_stress", nominal_contact_stress, "nominal contact stress after ISO 6336-2"),
-    *(
-        Quantity(f"{gear}_{name}", _margin(f"{gear}_{name}"), "mm", f"{meaning}, {gear}", better="larger")
-        for gear in ("pinion", "wheel")
-        for name, meaning in (
-            ("tip_land", "thickness of the tooth at the tip"),
-            ("form_clearance", "usable involute below the first contact"),
-            ("tip_clearance", "from the tip to the mate's root circle"),
-            ("rim_thickness", "from the bore to the root circle"),
-        )
-    ),
-    Quantity("backlash", _margin("backlash"), "um", "play on the line of action", better="larger"),
-    Quantity(
-        "min_backlash", _backlash_limit(0), "um", "least backlash, of the thickest teeth allowed", better="larger"
-    ),
-    Quantity("max_backlash", _backlash_limit(1), "um", "largest backlash, of the thinnest teeth allowed"),
-    Quantity(
-        "mesh_loss_factor",
-        loss_factor,
-        meaning="loss power per input power and coefficient of friction",
-        label="mesh loss factor H_V",
-        form=".4f",
-    ),
-    Quantity(
-        "force_excitation",
-        force_excitation,
-        "N",
-        "peak to peak of stiffness times transmission error about its mean",
-        Range(),
-        label="force excitation, peak to peak",
-        form=".1f",
-    ),
-    Quantity(
-        "min_tangent_stiffness",
-        lambda c: c.tangent_stiffness,
-        "N/um",
-        "smallest mesh stiffness",
-        Min(),
-        better="larger",
-        local=True,
-    ),
-    Quantity(
-        "max_tangent_stiffness", lambda c: c.tangent_stiffness, "N/um", "largest mesh stiffness", Max(), local=True
-    ),
-    Quantity("removed_material", mean_removed_material, "um", "mean material removed from both flanks together"),
-    Quantity("max_relief", _of_flanks(max_relief), "um", "largest material removed from a flank"),
-    Quantity("relief_reversal", _of_flanks(relief_reversal), "um", "by how much removal fails to be monotone"),
-    Quantity("removed_volume", _of_flanks(removed_volume), "mm3", "material ground off all flanks"),
-    *LUBRICATED,
-    *RATED,
-    package=__package__,
+            label="mean transmission error",
+            form=".3f",
+        ),
+        Quantity("te_rms", _te, "um", "rms of the transmission error about its mean", Rms(), local=True),
+        Quantity(
+            "unloaded_ppte",
+            lambda cycle: cycle.unloaded_transmission_error,
+            "um",
+            "peak-to-peak transmission error, unloaded",
+            Range(),
+            local=True,
+        ),
+        *(
+            Quantity(
+                f"te_harmonic_{order}",
+                _te,
+                "um",
+                f"amplitude of mesh harmonic {order} of the transmission error",
+                Harmonic(order),
+                local=True,
+            )
+            for order in (1, 2, 3)
+        ),
+        Quantity(
+            "max_flank_pressure",
+            lambda c: c.contact_pressure,
+            "MPa",
+            "largest Hertzian flank pressure",
+            Max(),
+            local=True,
+            form=".0f",
+        ),
+        Quantity(
+            "max_corner_pressure",
+            lambda c: c.corner_pressure,
+            "MPa",
+            "largest pressure of a tip edge",
+            Max(),
+            local=True,
+            form=".0f",
+        ),
+        Quantity(
+            "max_contact_pressure",
+            _contact_pressure,
+            "MPa",
+            "largest pressure of flanks and tip edges",
+            Max(),
+            local=True,
+        ),
+        Quantity("max_line_load", lambda c: c.line_load, "N/mm", "largest line load", Max(), local=True),
+        Quantity(
+            "face_load_factor",
+            face_load_factor,
+            meaning="K_Hbeta, largest over mean line load over the face",
+            label="face load factor K_Hbeta",
+            form=".3f",
+        ),
+        Quantity("root_face_load_factor", root_face_load_factor, meaning="K_Fbeta, the same for root stress"),
+        Quantity("edge_load_factor", edge_load_factor, meaning="line load at an end of the face over its mean"),
+        Quantity(
+            "contact_ratio",
+            lambda c: c.kinematics.path_of_contact.contact_ratio,
+            meaning="theoretical contact ratio",
+            better="larger",
+            form=".3f",
+        ),
+        Quantity(
+            "effective_contact_ratio",
+            effective_contact_ratio,
+            meaning="mean number of loaded pairs",
+            better="larger",
+            form=".3f",
+        ),
+        Quantity("corner_contact_length", _corner_length, "mm", "loaded path beyond the theoretical path of contact"),
+        Quantity("corner_force", corner_force, "N", "largest force on a pair there", Max(), local=True),
+        *_stresses(
+            "root_stress", nominal_root_stress, "root stress after ISO 6336-3", "root stress, ISO 6336-3", form=".1f"
+        ),
+        *_stresses(
+            "local_root_stress",
+            root_stress,
+            "largest root stress of the contact analysis",
+            "root stress, contact analysis",
+            reduction=Max(),
+            local=True,
+            form=".1f",
+        ),
+        *_stresses("contact_stress", nominal_contact_stress, "nominal contact stress after ISO 6336-2"),
+        *(
+            Quantity(f"{gear}_{name}", _margin(f"{gear}_{name}"), "mm", f"{meaning}, {gear}", better="larger")
+            for gear in ("pinion", "wheel")
+            for name, meaning in (
+                ("tip_land", "thickness of the tooth at the tip"),
+                ("form_clearance", "usable involute below the first contact"),
+                ("tip_clearance", "from the tip to the mate's root circle"),
+                ("rim_thickness", "from the bore to the root circle"),
+            )
+        ),
+        Quantity("backlash", _margin("backlash"), "um", "play on the line of action", better="larger"),
+        Quantity(
+            "min_backlash", _backlash_limit(0), "um", "least backlash, of the thickest teeth allowed", better="larger"
+        ),
+        Quantity("max_backlash", _backlash_limit(1), "um", "largest backlash, of the thinnest teeth allowed"),
+        Quantity(
+            "mesh_loss_factor",
+            loss_factor,
+            meaning="loss power per input power and coefficient of friction",
+            label="mesh loss factor H_V",
+            form=".4f",
+        ),
+        Quantity(
+            "force_excitation",
+            force_excitation,
+            "N",
+            "peak to peak of stiffness times transmission error about its mean",
+            Range(),
+            label="force excitation, peak to peak",
+            form=".1f",
+        ),
+        Quantity(
+            "min_tangent_stiffness",
+            lambda c: c.tangent_stiffness,
+            "N/um",
+            "smallest mesh stiffness",
+            Min(),
+            better="larger",
+            local=True,
+        ),
+        Quantity(
+            "max_tangent_stiffness", lambda c: c.tangent_stiffness, "N/um", "largest mesh stiffness", Max(), local=True
+        ),
+        Quantity("removed_material", mean_removed_material, "um", "mean material removed from both flanks together"),
+        Quantity("max_relief", _of_flanks(max_relief), "um", "largest material removed from a flank"),
+        Quantity("relief_reversal", _of_flanks(relief_reversal), "um", "by how much removal fails to be monotone"),
+        Quantity("removed_volume", _of_flanks(removed_volume), "mm3", "material ground off all flanks"),
+        *LUBRICATED,
+        *RATED,
+    )
 )
 
 
@@ -264,6 +270,6 @@ def summary(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
     names = _SUMMARY if cycle.kinematics.resolution.slices == 1 else (*_SUMMARY, *_OVER_FACE)
     return {
         "torque_Nm": cycle.torque,
-        **{quantities[name].key: quantities[name](cycle) for name in names},
+        **{MESH_QUANTITIES[name].key: MESH_QUANTITIES[name](cycle) for name in names},
         "converged": jnp.all(cycle.converged),
     }

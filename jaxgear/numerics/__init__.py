@@ -1,7 +1,6 @@
 """Numerical tools without a gear word: fields, safe functions, extremes, quadrature, roots, complementarity, risk."""
 
 from .batching import on_both as on_both
-from .batching import once as once
 from .batching import over_batch as over_batch
 from .complementarity import solve_contact as solve_contact
 from .complementarity import tangent_stiffness as tangent_stiffness

@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 
 from ..conditions import Parameters, conditions, solve_case
 from ..contact import Mesh, MeshCycle, Side
-from ..metrics import peak_to_peak, quantities, removed_at
+from ..metrics import peak_to_peak, removed_at
 from ..microgeometry import (
     AbstractCurve,
     AbstractModification,
@@ -28,9 +28,10 @@ from ..microgeometry import (
 from ..numerics import AbstractMeasure, Callback, Mean, check, program, real, whole
 from ..sizing import iso_relief
 from ..tolerance import Tolerance
+from ..vocabulary import quantities
 from .goal import Constraint
 from .linear_model import Linearizer
-from .problem import Problem, Roughness
+from .problem import Problem, Roughness, goals_of
 from .refine import POSITIONS, refined
 from .result import Optimum
 from .search import Record
@@ -113,6 +114,7 @@ def free_form(
     judged = conditions("free_form", mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
     roll = _roll_lengths(mesh, points)
     width = len(str(points))
+    objectives, limits, settings = goals_of([quantities["ppte"]], constraints)
     problem = Problem(
         design=_Tables(roll),
         names=tuple(f"{gear} {number + 1:0{width}d}" for gear in ("pinion", "wheel") for number in range(points)),
@@ -121,9 +123,10 @@ def free_form(
         mesh=mesh,
         conditions=judged,
         cases=judged.on(mesh),
-        objectives=(quantities["ppte"],),
+        objectives=objectives,
         measure=measure or Mean(),
-        constraints=tuple(constraints),
+        constraints=limits,
+        settings=settings,
         roughness=_roughness(roll, max_relief, curvature),
     )
     heaviest = float(judged.load.torques[int(np.argmax(judged.load.weights))])

@@ -10,8 +10,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..metrics import Quantity, quantity_of
+from ..metrics import Quantity
 from ..numerics import Checked, check, optional_real
+from ..vocabulary import quantity_of
 
 Scalar = Float[Array, ""]
 Objective = str | Quantity | Callable[[MeshCycle], Any]
@@ -32,37 +33,29 @@ class Constraint(Checked):
     """A number of the design that has to stay within limits, in every case.
 
     Attributes:
-        of: a quantity, by its name ("max_flank_pressure"), as a `Quantity`, or as a function of a cycle; or
-            coefficients by the name of a free parameter, for a linear constraint on them.
+        quantity: that is limited, given by its name ("max_flank_pressure"), as a `Quantity`, or as a function of a
+            cycle; None for a linear constraint on the free parameters.
+        terms: of such a constraint, given as coefficients by the name of a parameter; else none.
         low, high: limits in the unit of the number; None for no limit.
     """
 
-    of: Quantity | tuple[tuple[str, float], ...] = eqx.field(static=True)
+    quantity: Quantity | None
+    terms: tuple[tuple[str, float], ...] = eqx.field(static=True)
     low: Scalar | None = eqx.field(converter=optional_real)
     high: Scalar | None = eqx.field(converter=optional_real)
 
     def __init__(self, of: Objective | Mapping[str, float], *, low=None, high=None):
-        # as a static field it has to be hashable
-        self.of = tuple(of.items()) if isinstance(of, Mapping) else quantity_of(of, "Constraint")
+        self.quantity = None if isinstance(of, Mapping) else quantity_of(of, "Constraint")
+        self.terms = tuple(of.items()) if isinstance(of, Mapping) else ()
         self.low, self.high = low, high
 
     def __check_init__(self):
-        if self.of == ():
+        if self.quantity is None and not self.terms:
             raise ValueError("Constraint: a linear constraint must name at least one free parameter")
         if self.low is None and self.high is None:
             raise ValueError("Constraint: low or high must be given")
         check("Constraint", "low", self.low, "")
         check("Constraint", "high", self.high, "", low=self.low)
-
-    @property
-    def quantity(self) -> Quantity | None:
-        """What it limits; None for a linear constraint on the free parameters."""
-        return self.of if isinstance(self.of, Quantity) else None
-
-    @property
-    def terms(self) -> tuple[tuple[str, float], ...]:
-        """Free parameters of a linear constraint and their coefficients."""
-        return () if isinstance(self.of, Quantity) else self.of
 
     def of_parameters(self, parameters: Mapping[str, Any]):
         """What a linear constraint limits."""
@@ -71,14 +64,14 @@ class Constraint(Checked):
     @property
     def name(self) -> str:
         """What it limits, in words."""
-        if isinstance(self.of, Quantity):
-            return self.of.name
-        return " + ".join(f"{factor:g} {name}" for name, factor in self.of)
+        if self.quantity is not None:
+            return self.quantity.name
+        return " + ".join(f"{factor:g} {name}" for name, factor in self.terms)
 
     @property
     def unit(self) -> str:
         """Of the limits; "" for a pure number and where it is not known."""
-        return self.of.unit if isinstance(self.of, Quantity) else ""
+        return "" if self.quantity is None else self.quantity.unit
 
     @property
     def sides(self) -> list[tuple[int, Scalar]]:

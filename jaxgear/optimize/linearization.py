@@ -2,14 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from functools import reduce
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..metrics import Quantity
+from ..conditions import solved
+from ..metrics import Analysis, Quantity
 
 Vector = Float[Array, " parameters"]
 Either = Array | np.ndarray  # traced, and taken to the host for a linear program
@@ -85,7 +86,7 @@ def pieces_of(quantity: Quantity, sloped: Sloped, sign: int) -> Pieces:
 
 
 def local_slopes(
-    quantities: Sequence[Quantity], solve: Callable, removed_of: Callable, x: Vector
+    quantities: Sequence[Quantity], solve: Callable[[Any], Analysis], removed_of: Callable, x: Vector
 ) -> tuple[list[Sloped], Bool[Array, ""]]:
     """Values and slopes of local quantities.
 
@@ -94,7 +95,7 @@ def local_slopes(
 
     Args:
         quantities: local ones.
-        solve: makes a cycle and whether it converged from the material removed.
+        solve: analyzes the material removed.
         removed_of: material removed at a point of the unit box: fields of shape (pairs, slices or 1, positions).
         x: the point.
     """
@@ -104,10 +105,10 @@ def local_slopes(
         return removed, removed
 
     def curves(removed):
-        cycle, fine = solve(removed)
-        each = [quantity.values(cycle) for quantity in quantities]
+        analysis = solve(removed)
+        each = [quantity.values(analysis) for quantity in quantities]
         each = [values.reshape(-1, values.shape[-1]) for values in each]
-        return jnp.concatenate(each), (each, fine)
+        return jnp.concatenate(each), (each, solved(analysis.cycle))
 
     slope, removed = jax.jacfwd(material, has_aux=True)(x)
     rows, back, (each, fine) = jax.vjp(curves, removed, has_aux=True)
@@ -136,13 +137,15 @@ def _along(share, slope, axes: str) -> Float[Array, "... positions parameters"]:
     return reduce(jnp.add, each)
 
 
-def any_slopes(quantities: Sequence[Quantity], cycle_of: Callable, x: Vector) -> tuple[list[Sloped], Bool[Array, ""]]:
-    """Values and slopes of any quantities; `cycle_of` makes a cycle and whether it converged from the point."""
+def any_slopes(
+    quantities: Sequence[Quantity], analyze: Callable[[Vector], Analysis], x: Vector
+) -> tuple[list[Sloped], Bool[Array, ""]]:
+    """Values and slopes of any quantities, and whether the contact of the point that `analyze` takes converged."""
 
     def numbers(x):
-        cycle, fine = cycle_of(x)
-        each = [quantity.values(cycle).ravel() for quantity in quantities]
-        return jnp.concatenate(each), (each, fine)
+        analysis = analyze(x)
+        each = [quantity.values(analysis).ravel() for quantity in quantities]
+        return jnp.concatenate(each), (each, solved(analysis.cycle))
 
     count = jax.eval_shape(numbers, x)[0].shape[0]
     differentiate = jax.jacrev if count <= x.shape[0] else jax.jacfwd

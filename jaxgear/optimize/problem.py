@@ -22,12 +22,13 @@ from ..conditions import (
     solved,
     two_modifications,
 )
-from ..contact import Mesh, MeshCycle, removed_material, solve_removed
-from ..metrics import Quantity, quantity_of
+from ..contact import Mesh, removed_material, solve_removed
+from ..metrics import AbstractSettings, Analysis, Quantity, share_settings
 from ..microgeometry import AbstractModification
-from ..numerics import AbstractMeasure, Mean, maximum, real
+from ..numerics import AbstractMeasure, Mean, changed, maximum, real
 from ..sweeps.plan import box
 from ..tolerance import Tolerance
+from ..vocabulary import quantity_of
 from .goal import Constraint, Objective, scale_of
 from .linearization import Linearization, Pieces, Sloped, any_slopes, local_slopes, pieces_of
 
@@ -82,6 +83,7 @@ class Problem(eqx.Module):
         objectives: quantities; those of which large values are the better ones are made large.
         measure: turns the numbers of the cases into one.
         constraints: limits that hold in every case.
+        settings: that objectives and constraints share, see `metrics.share_settings`.
         roughness: penalty on the parameters, None without.
     """
 
@@ -95,6 +97,7 @@ class Problem(eqx.Module):
     objectives: tuple[Quantity, ...] = eqx.field(static=True)
     measure: AbstractMeasure
     constraints: tuple[Constraint, ...] = ()
+    settings: tuple[AbstractSettings, ...] = ()
     roughness: Roughness | None = None
 
     def __str__(self) -> str:
@@ -141,12 +144,12 @@ class Problem(eqx.Module):
 
         Linear constraints on the free parameters do not apply to them.
         """
-        found = self.cases.each(lambda *case: self._judged(self._cycle((pinion, wheel), *case)))
+        found = self.cases.each(lambda *case: self._judged(self._analysis((pinion, wheel), *case)))
         return self._scored(found, jnp.zeros((0,), self.low.dtype))
 
-    def _judged(self, cycle: MeshCycle):
-        values = jnp.stack([of.sign * of(cycle) for of in self.objectives])
-        return values, self._excess(cycle), solved(cycle)
+    def _judged(self, analysis: Analysis):
+        values = jnp.stack([of.sign * of(analysis) for of in self.objectives])
+        return values, self._excess(analysis), solved(analysis.cycle)
 
     def _scored(self, found, linear) -> Score:
         numbers, excess, fine = found
@@ -167,9 +170,9 @@ class Problem(eqx.Module):
             contact solutions converged.
         """
 
-        def of_case(cycle: MeshCycle):
-            soft = [of.sign * of.reduction.soft(of.values(cycle).ravel(), width) for of in self.objectives]
-            return jnp.stack(soft), *self._judged(cycle)
+        def of_case(analysis: Analysis):
+            soft = [of.sign * of.reduction.soft(of.values(analysis).ravel(), width) for of in self.objectives]
+            return jnp.stack(soft), *self._judged(analysis)
 
         soft, true, excess, fine = self.over_cases(x, of_case)
         worst = maximum(excess, 0) if excess.size else excess[0]
@@ -200,19 +203,17 @@ class Problem(eqx.Module):
 
         def at(torque, deviation):
             def solve(removed):
-                cycle = solve_removed(self.mesh, torque, removed + deviation)
-                return cycle, solved(cycle)
+                return Analysis(solve_removed(self.mesh, torque, removed + deviation), None, self.settings)
 
-            def cycle_of(x):
-                cycle = self._cycle(self.modifications(x), torque, deviation)
-                return cycle, solved(cycle)
+            def analyze(x):
+                return self._analysis(self.modifications(x), torque, deviation)
 
             def removed_of(x):
                 pinion, wheel = self.modifications(x)
                 return removed_material(self.mesh, torque, pinion=pinion, wheel=wheel)
 
             found, fine = local_slopes(local, solve, removed_of, x) if local else ([], jnp.asarray(True))
-            more, well = any_slopes(others, cycle_of, x) if others else ([], jnp.asarray(True))
+            more, well = any_slopes(others, analyze, x) if others else ([], jnp.asarray(True))
             return found, more, fine & well
 
         found, more, fine = self.cases.each(at)
@@ -224,16 +225,16 @@ class Problem(eqx.Module):
         return Pieces(sign * value[None, None], sign * (factors * (self.high - self.low))[None, None])
 
     def over_cases(self, x: Vector, of_case: Callable):
-        """A function of the cycle in every case, cases leading."""
+        """A function of the analysis of every case, cases leading."""
         both = self.modifications(x)
-        return self.cases.each(lambda *case: of_case(self._cycle(both, *case)))
+        return self.cases.each(lambda *case: of_case(self._analysis(both, *case)))
 
-    def _cycle(self, both: Modifications, torque, deviation) -> MeshCycle:
-        return solve_case(self.mesh, torque, *both, deviation).on(self.mesh)
+    def _analysis(self, both: Modifications, torque, deviation) -> Analysis:
+        return Analysis(solve_case(self.mesh, torque, *both, deviation), self.mesh, self.settings)
 
-    def _excess(self, cycle: MeshCycle):
+    def _excess(self, analysis: Analysis):
         limited = [(limit, limit.quantity) for limit in self.constraints if limit.quantity is not None]
-        return self._stacked([limit.excess(quantity(cycle)) for limit, quantity in limited])
+        return self._stacked([limit.excess(quantity(analysis)) for limit, quantity in limited])
 
     def _linear_excess(self, x: Vector):
         parameters = self.parameters(x)
@@ -250,6 +251,17 @@ class Problem(eqx.Module):
 
 def _worst(excess):
     return jnp.maximum(maximum(excess), 0.0) if excess.size else jnp.zeros((), excess.dtype)
+
+
+def goals_of(
+    objectives: Sequence[Quantity], constraints: Sequence[Constraint]
+) -> tuple[tuple[Quantity, ...], tuple[Constraint, ...], tuple[AbstractSettings, ...]]:
+    """Objectives, constraints and settings of a problem: settings that several quantities have in common once."""
+    limited = [limit.quantity for limit in constraints if limit.quantity is not None]
+    bare, settings = share_settings([*objectives, *limited])
+    of_limits = iter(bare[len(objectives) :])
+    limits = (limit if limit.quantity is None else changed(limit, quantity=next(of_limits)) for limit in constraints)
+    return bare[: len(objectives)], tuple(limits), settings
 
 
 def make_problem(
@@ -272,7 +284,7 @@ def make_problem(
         ValueError: for empty or reversed bounds, unknown names of objectives or constrained parameters, and whatever
             the cases refuse.
     """
-    names, *limits = box(owner, bounds)
+    names, *ends = box(owner, bounds)
     several = [objective] if isinstance(objective, str | Quantity) or callable(objective) else list(objective)
     if not several:
         raise ValueError(f"{owner}: objective must name at least one quantity")
@@ -281,8 +293,8 @@ def make_problem(
             if name not in names:
                 raise ValueError(f'{owner}: "{name}" of a constraint must be one of {", ".join(names)}')
     judged = conditions(owner, mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
-    objectives = tuple(quantity_of(of, owner) for of in several)
-    low, high = (real(np.asarray(side, np.dtype(mesh.slice_width.dtype))) for side in limits)
+    objectives, limits, settings = goals_of([quantity_of(of, owner) for of in several], constraints)
+    low, high = (real(np.asarray(side, np.dtype(mesh.slice_width.dtype))) for side in ends)
     posed = Problem(
         design=design,
         names=names,
@@ -293,7 +305,8 @@ def make_problem(
         cases=judged.on(mesh),
         objectives=objectives,
         measure=measure or Mean(),
-        constraints=tuple(constraints),
+        constraints=limits,
+        settings=settings,
     )
     made = Variants(names, design, mesh, None, judged, posed.cases)
     check_used("minimize", names, made.traced(np.asarray(posed.low))[1])

@@ -13,6 +13,7 @@ from ..compliance import TabulatedCompliance, finite_element_compliance
 from ..conditions import in_words, solve_case, solved
 from ..contact import Mesh, MeshCycle, OperatingPoint, prepare
 from ..contact.mesh import begin_mesh
+from ..metrics import Analysis
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from .goal import FEASIBLE, Constraint
@@ -103,11 +104,10 @@ def judged(
         cycle = solve_case(
             problem.mesh, OperatingPoint(np.asarray(cases.torque)[0], speed, cases.friction), pinion, wheel
         )
+        mesh: Mesh | None = problem.mesh
         if all(of.local for of in problem.objectives):  # they know nothing of the flanks but what is removed
-            cycle = replace(cycle, pinion=None, wheel=None)
-        else:
-            cycle = cycle.on(problem.mesh)
-        values = np.asarray(_of_one(problem.objectives, cycle))
+            cycle, mesh = replace(cycle, pinion=None, wheel=None), None
+        values = np.asarray(_of_one(problem.objectives, cycle, mesh, problem.settings))
     else:
         values = np.asarray(_score_of(problem, pinion, wheel).value)
     names = (f"{_over_cases(problem)}{of.named}" for of in problem.objectives)
@@ -119,8 +119,9 @@ def _over_cases(problem: Problem) -> str:
 
 
 @program
-def _of_one(objectives, cycle):
-    values = jnp.stack([of.sign * of(cycle) for of in objectives])
+def _of_one(objectives, cycle, mesh, settings):
+    analysis = Analysis(cycle, mesh, settings)
+    values = jnp.stack([of.sign * of(analysis) for of in objectives])
     return jnp.where(solved(cycle) & jnp.all(jnp.isfinite(values)), values, jnp.inf)
 
 
@@ -160,7 +161,7 @@ def _constrained(problem: Problem, x) -> Sequence[np.ndarray]:
 @program
 def _numbers(problem: Problem, x):
     wanted = [limit.quantity for limit in problem.constraints if limit.quantity is not None]
-    return problem.over_cases(x, lambda cycle: [of(cycle) for of in wanted])
+    return problem.over_cases(x, lambda analysis: [of(analysis) for of in wanted])
 
 
 def _active_bounds(names, x) -> dict[str, str]:

@@ -341,7 +341,7 @@ def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None 
     return ax
 
 
-def face_gap(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None = None) -> Axes:
+def face_gap(cycle: MeshCycle, mesh: Mesh, ax: Axes | None = None, *, position: int | None = None) -> Axes:
     """Gap [um] between the flanks of the most loaded pair over the face at one mesh position, unloaded and under load.
 
     Unloaded it is that of modifications, misalignment and other meshes on the shafts, from where the flanks touch
@@ -349,14 +349,11 @@ def face_gap(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None =
     deflect; under load what is left where the flanks do not touch.
 
     Args:
-        cycle: solved cycle of several slices with its mesh, `cycle.on(mesh)`.
+        cycle: solved cycle of several slices.
+        mesh: prepared mesh that it was solved on.
         ax: Axes to draw into; None for a new figure.
         position: number of the mesh position; None for that with the largest line load.
-
-    Raises:
-        ValueError: for a cycle without its mesh.
     """
-    mesh = cycle.mesh_for("face_gap")
     pair, where = _heaviest(cycle)
     if position is not None:
         where = position

@@ -12,10 +12,10 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from ..metrics import quantities
 from ..numerics.pareto import pareto_front
 from ..optimize import Front
 from ..optimize.result import PENALIZED
+from ..vocabulary import quantities
 from .figure import FONT, GREY, HEIGHT, legend_above, line_style, point_style, report_axes
 from .variants import Labels, Table, columns_of, costs, label, parts, share_text, subsample
 

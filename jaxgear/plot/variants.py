@@ -10,9 +10,9 @@ from matplotlib.colors import Normalize
 from matplotlib.ticker import MaxNLocator
 
 from ..conditions import ranked
-from ..metrics import quantities
 from ..numerics import Quantile, real
 from ..sweeps import Scatter
+from ..vocabulary import quantities
 from .figure import (
     ABOVE_MARKS,
     FONT,

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..geometry import roll_angle
-from ..metrics import quantity_of
+from ..vocabulary import quantity_of
 from ..wear import WearLife, over_life, wear_depth
 from .figure import legend_above, line_style, marker_style, report_axes
 

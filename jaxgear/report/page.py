@@ -13,8 +13,8 @@ from unicodedata import category
 import numpy as np
 import rich.table
 
-from ..metrics import quantities
 from ..numerics.durable import write_durably
+from ..vocabulary import quantities
 
 
 def needed(*modules: str) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -12,7 +12,7 @@ from jax.sharding import Mesh as DeviceMesh
 
 from ..conditions import Variants, joined, solve_case, solved
 from ..conditions.join import divided, everywhere, local_devices, over_devices, padded, side_by_side
-from ..metrics import Quantity
+from ..metrics import Analysis, Quantity, share_settings
 from ..numerics import AbstractMeasure, kernel, program
 from .columns import CONVERGED, result_columns
 
@@ -26,7 +26,7 @@ FEW = 256
 class _Task(NamedTuple):
     """What is compiled for: everything that is neither an array nor its shape."""
 
-    rest: Variants
+    rest: tuple[Any, ...]
     results: tuple[Quantity, ...]
     batch: int
     devices: DeviceMesh
@@ -70,9 +70,10 @@ class Evaluator:
         batch = side_by_side(mesh, conditions.count)
         steps = max(-(-rows // (batch * self._devices.size)), LEAST_STEPS)
         self.capacity = steps * batch * self._devices.size
-        arrays, rest = eqx.partition((variants, tuple(measures)), eqx.is_array)
+        bare, settings = share_settings(results)
+        arrays, rest = eqx.partition((variants, tuple(measures), settings), eqx.is_array)
         self._evaluate = _evaluate_few if few else _evaluate
-        self._task = _Task(rest, tuple(results), batch, self._devices)
+        self._task = _Task(rest, bare, batch, self._devices)
         self._data = everywhere(arrays, self._devices)
         self._dtype = np.dtype(mesh.slice_width.dtype)
         jax.eval_shape(partial(_numbers, self._task, self._data), example.astype(self._dtype))
@@ -110,12 +111,13 @@ def _evaluate_few(task: _Task, rows, data):
 
 def _numbers(task: _Task, data, values):
     """Numbers of one variant in the order of the result columns, and whether all of it converged."""
-    variants, measures = eqx.combine(data, task.rest)
+    variants, measures, settings = eqx.combine(data, task.rest)
     variant = variants(values)
 
     def of_case(operating_point, deviation):
-        cycle = solve_case(variant.mesh, operating_point, variant.pinion, variant.wheel, deviation).on(variant.mesh)
-        numbers = jnp.stack([of(cycle) for of in task.results])
+        cycle = solve_case(variant.mesh, operating_point, variant.pinion, variant.wheel, deviation)
+        analysis = Analysis(cycle, variant.mesh, settings)
+        numbers = jnp.stack([of(analysis) for of in task.results])
         return numbers, solved(cycle) & jnp.all(jnp.isfinite(numbers))
 
     numbers, fine = variant.cases.each(of_case)

@@ -11,12 +11,13 @@ from jaxtyping import Array, Bool, Float
 from ..conditions import Better, joined, ranked, solved
 from ..conditions.join import local_devices, over_devices, side_by_side
 from ..contact import Mesh, removed_material, solve_removed
-from ..metrics import Quantity, quantity_of
+from ..metrics import AbstractSettings, Analysis, Quantity, share_settings
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import AbstractMeasure, Checked, Quantile, Worst, check, kernel, real, result, whole
 from ..tolerance import Tolerance
 from ..tolerance.deviation import deviation_field, deviation_of, flank_basis
 from ..tolerance.limits import check_slices
+from ..vocabulary import quantity_of
 
 Scalar = Float[Array, ""]
 
@@ -139,14 +140,16 @@ def monte_carlo(
     check("monte_carlo", "quantiles", levels, "", low=0.0, high=1.0)
     whole("monte_carlo", "samples", samples, 2)
     check_slices("monte_carlo", tolerance, mesh)
-    wanted = tuple(quantity_of(of, "monte_carlo") for of in results)
+    wanted, settings = share_settings([quantity_of(of, "monte_carlo") for of in results])
     flanks = pinion or NoModification(), wheel or NoModification()
     task = (mesh, real(torque), tolerance, *flanks, jax.random.key(seed))
-    curves, converged, numbers = _run(task, wanted, samples + 1)
+    curves, converged, numbers = _run(task, wanted, settings, samples + 1)
     return _scatter(mesh.phase, curves, converged, levels, {of.key: column for of, column in zip(wanted, numbers)})
 
 
-def _run(task, results: tuple[Quantity, ...], count: int) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+def _run(
+    task, results: tuple[Quantity, ...], settings: tuple[AbstractSettings, ...], count: int
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Transmission errors (count, positions), success (count,) and of every result (count,) on the host.
 
     Number 0 is the nominal design, which rides along without its own compilation.
@@ -156,7 +159,7 @@ def _run(task, results: tuple[Quantity, ...], count: int) -> tuple[np.ndarray, n
     batch = min(side_by_side(task[0]), share)
     block = -(-share // batch) * batch * devices.size
     parts = [
-        jax.device_get(_block(task, start + jnp.arange(block), results, batch, devices))
+        jax.device_get(_block(task, start + jnp.arange(block), results, settings, batch, devices))
         for start in range(0, count, block)
     ]
     curves, converged, *numbers = (np.concatenate(part)[:count] for part in zip(*parts))
@@ -164,10 +167,11 @@ def _run(task, results: tuple[Quantity, ...], count: int) -> tuple[np.ndarray, n
 
 
 @kernel
-def _block(task, numbers, results: tuple[Quantity, ...], batch: int, devices):
+def _block(task, numbers, results: tuple[Quantity, ...], settings, batch: int, devices):
     mesh, torque, tolerance, pinion, wheel, key = task
     design, basis = removed_material(mesh, torque, pinion=pinion, wheel=wheel), flank_basis(mesh, torque)
-    arrays, rest = eqx.partition((mesh, torque, tolerance, pinion, wheel, key, design, basis), eqx.is_array)
+    given = mesh, torque, tolerance, pinion, wheel, key, design, basis, settings
+    arrays, rest = eqx.partition(given, eqx.is_array)
 
     def one(arrays, number):
         return _solve_number(eqx.combine(arrays, rest), number, results)
@@ -177,12 +181,13 @@ def _block(task, numbers, results: tuple[Quantity, ...], batch: int, devices):
 
 def _solve_number(task, number, results: tuple[Quantity, ...]):
     """The sample of a number; the nominal design is number 0."""
-    mesh, torque, tolerance, pinion, wheel, key, design, basis = task
+    mesh, torque, tolerance, pinion, wheel, key, design, basis, settings = task
     deviation = deviation_of(tolerance, mesh, key, number - 1)
     field = deviation_field(deviation, basis)
     removed = design + jnp.where(number > 0, field, 0.0)
     cycle = solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
-    found = [of(cycle.on(mesh)) for of in results]
+    analysis = Analysis(cycle, mesh, settings)
+    found = [of(analysis) for of in results]
     fine = jnp.all(jnp.stack([solved(cycle), *map(jnp.isfinite, found)]))
     return cycle.transmission_error, fine, *found
 

@@ -18,9 +18,10 @@ import numpy as np
 from ..conditions import Conditions, Design, Parameters, Variants, check_used, label, variants
 from ..conditions.join import side_by_side
 from ..contact import Mesh, solve
-from ..metrics import Quantity, quantities, quantity_of
+from ..metrics import Analysis, Quantity, share_settings
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
 from ..tolerance import Tolerance
+from ..vocabulary import quantities, quantity_of
 from .columns import CONVERGED, VARIANT, Column, parameter_columns
 from .evaluate import FEW, LEAST_STEPS, Evaluator
 from .plan import AbstractPlan
@@ -275,10 +276,16 @@ def _own_digest(made: Variants, example: np.ndarray, results: Sequence[Quantity]
     def cycle(values):
         variant = made(values)
         first = variant.cases.first
-        return solve(variant.mesh, first, pinion=variant.pinion, wheel=variant.wheel).on(variant.mesh)
+        return solve(variant.mesh, first, pinion=variant.pinion, wheel=variant.wheel), variant.mesh
 
+    bare, settings = share_settings(own)
     shape = eqx.filter_eval_shape(cycle, jnp.asarray(example))
-    traced, _, _ = eqx.filter_make_jaxpr(lambda cycle: [of(cycle) for of in own])(shape)
+
+    def numbers(cycle, mesh):
+        analysis = Analysis(cycle, mesh, settings)
+        return [of(analysis) for of in bare]
+
+    traced, _, _ = eqx.filter_make_jaxpr(numbers)(*shape)
     return _design_digest(traced)
 
 

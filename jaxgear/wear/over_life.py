@@ -6,13 +6,16 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..conditions import joined, solved
-from ..metrics import Quantity, quantities, quantity_of
+from ..dynamics import DYNAMIC_QUANTITIES, Dynamics
+from ..metrics import MESH_QUANTITIES, Quantity, Vocabulary
 from ..numerics import AbstractMeasure, Mean, check, maximum, quick_jit, real
 from .life import WearLife
 
 Scalar = Float[Array, ""]
 Lives = Float[Array, " lives"]
 Worn = Literal["pinion", "wheel", "both"]
+
+_quantity_of = Vocabulary((*MESH_QUANTITIES.values(), *DYNAMIC_QUANTITIES.values())).quantity_of
 
 
 def over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Lives:
@@ -28,8 +31,8 @@ def over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure
         ValueError: for an unknown name, and for the dynamic factor of a life without dynamics.
     """
     _single("over_life", life)
-    quantity = quantity_of(of, "over_life")
-    if quantity.of is quantities["dynamic_factor"].of:
+    quantity = _quantity_of(of, "over_life")
+    if quantity.name == "dynamic_factor" and quantity.takes is Dynamics:
         if life.dynamic_factor is None:
             raise ValueError(
                 'over_life: "dynamic_factor" needs a life with dynamics: wear(..., dynamics=Dynamics(...))'
@@ -119,7 +122,7 @@ def life_to(life: WearLife, of: str | Quantity | Any, limit: Any, measure: Abstr
         life, of, measure: as for `over_life`.
         limit: in the unit of the quantity.
     """
-    quantity = quantity_of(of, "life_to")
+    quantity = _quantity_of(of, "life_to")
     limit = real(limit).astype(life.revolutions.dtype)
     check("life_to", "limit", limit, quantity.unit)
     values = over_life(life, quantity, measure)

@@ -1,41 +1,22 @@
-"""Numbers of worn flanks in the vocabulary of quantities: objectives, limits, columns of sweeps.
+"""Numbers of worn flanks as quantities: objectives, limits, columns of sweeps.
 
 A name alone does not say for how many revolutions, and with which coefficient of wear: `Wear.quantity` gives the
 quantity, and a design file has the table [wear].
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any, Literal, NamedTuple
+from functools import partial
+from typing import Any
 
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ..conditions import deviation_of, solved
-from ..contact import MeshCycle
-from ..metrics import Quantity, quantities
-from ..metrics.settings import WithoutSettings, WithSettings
-from ..numerics import maximum, once
+from ..conditions import solved
+from ..metrics import Analysis, Quantity, Vocabulary
+from ..numerics import maximum
 from .life import WearLife
 from .over_life import life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth
-
-
-class _Kind(NamedTuple):
-    """A quantity of worn flanks before its settings are known.
-
-    Attributes:
-        of: computes it from a life and its settings.
-        unit: "" for a pure number.
-        meaning: in a few words.
-        better: as of `Quantity`.
-        needs: field of the settings that must be given.
-    """
-
-    of: Callable[[WearLife, Any], Any]
-    unit: str
-    meaning: str
-    better: Literal["smaller", "larger"] = "smaller"
-    needs: str | None = None
-
+from .settings import Wear
 
 # A limit that is never reached is no failure, which not finite values of a quantity are. Nothing is known of the
 # transmission error beyond the life that was looked at; the depth goes on, but so far nobody extrapolates.
@@ -59,68 +40,38 @@ def _pressure_error(life: WearLife):
     return maximum(may_be) - maximum(largest)
 
 
-WEAR_QUANTITIES: Mapping[str, _Kind] = {
-    "worn_ppte": _Kind(lambda life, _: over_life(life, "ppte")[-1], "um", "peak-to-peak transmission error when worn"),
-    "mean_ppte_over_life": _Kind(
-        lambda life, _: mean_over_life(life, "ppte"), "um", "peak-to-peak transmission error, mean over the life"
-    ),
-    "max_ppte_over_life": _Kind(
-        lambda life, _: maximum(over_life(life, "ppte")), "um", "peak-to-peak transmission error, worst of the life"
-    ),
-    "max_pressure_over_life": _Kind(
-        lambda life, _: maximum(over_life(life, "max_contact_pressure")), "MPa", "largest pressure of the life"
-    ),
-    "max_pressure_over_life_error": _Kind(
-        lambda life, _: _pressure_error(life),
-        "MPa",
-        "error of the largest pressure of the life by grid and width of the contacts, as estimated",
-    ),
-    "worn_dynamic_factor": _Kind(
-        lambda life, _: over_life(life, "dynamic_factor")[-1],
-        "",
-        "largest mesh force over the static one when worn, at the speed of the pinion",
-        needs="dynamics",
-    ),
-    "max_dynamic_factor_over_life": _Kind(
-        lambda life, _: maximum(over_life(life, "dynamic_factor")),
-        "",
-        "largest mesh force over the static one, worst of the life, at the speed of the pinion",
-        needs="dynamics",
-    ),
-    "wear_depth": _Kind(lambda life, _: wear_depth(life)[-1], "um", "largest wear depth of both gears"),
-    "pinion_wear_depth": _Kind(lambda life, _: wear_depth(life, "pinion")[-1], "um", "largest wear depth, pinion"),
-    "wheel_wear_depth": _Kind(lambda life, _: wear_depth(life, "wheel")[-1], "um", "largest wear depth, wheel"),
-    _ERROR: _Kind(
-        lambda life, _: life.error[-1], "um", "error of the wear depth by the length of the blocks, as estimated"
-    ),
-    "life_to_depth": _Kind(
-        lambda life, settings: _at_most(LIVES_AHEAD * settings.revolutions, life_to_depth(life, settings.depth_limit)),
-        "revolutions",
-        "life to the limit of the wear depth, at most a thousand of those looked at",
-        "larger",
-        "depth_limit",
-    ),
-    "life_to_ppte": _Kind(
-        lambda life, settings: _at_most(settings.revolutions, life_to(life, "ppte", settings.ppte_limit)),
-        "revolutions",
-        "life to the limit of peak-to-peak transmission error, at most the life looked at",
-        "larger",
-        "ppte_limit",
-    ),
+# of a life and the settings that it was worn by, by the name of the quantity
+OF_LIFE: Mapping[str, Callable[[WearLife, Wear], Float[Array, ""]]] = {
+    "worn_ppte": lambda life, _: over_life(life, "ppte")[-1],
+    "mean_ppte_over_life": lambda life, _: mean_over_life(life, "ppte"),
+    "max_ppte_over_life": lambda life, _: maximum(over_life(life, "ppte")),
+    "max_pressure_over_life": lambda life, _: maximum(over_life(life, "max_contact_pressure")),
+    "max_pressure_over_life_error": lambda life, _: _pressure_error(life),
+    "worn_dynamic_factor": lambda life, _: over_life(life, "dynamic_factor")[-1],
+    "max_dynamic_factor_over_life": lambda life, _: maximum(over_life(life, "dynamic_factor")),
+    "wear_depth": lambda life, _: wear_depth(life)[-1],
+    "pinion_wear_depth": lambda life, _: wear_depth(life, "pinion")[-1],
+    "wheel_wear_depth": lambda life, _: wear_depth(life, "wheel")[-1],
+    _ERROR: lambda life, _: life.error[-1],
+    "life_to_depth": lambda life, wear: _at_most(LIVES_AHEAD * wear.revolutions, life_to_depth(life, wear.depth_limit)),
+    "life_to_ppte": lambda life, wear: _at_most(wear.revolutions, life_to(life, "ppte", wear.ppte_limit)),
 }
 
 
-def _number(given: WithSettings, cycle: MeshCycle):
-    settings = given.settings
-    # all quantities of the same settings come from one life
-    life = once(cycle, (given.make, given.fields), lambda: _life(given.name, settings, cycle))
-    return number_of(given.name, life, settings)
-
-
-def number_of(name: str, life: WearLife, settings: Any) -> Float[Array, ""]:
-    """A quantity of a life that was worn by `Wear` settings; NaN as `Wear.quantity` says."""
+def number_of(name: str, life: WearLife, settings: Wear) -> Float[Array, ""]:
+    """A quantity of a life that was worn by `Wear` settings; NaN as `Wear` says."""
     usable = jnp.all(solved(life.cycles)) & (name == _ERROR or blocks_are_short(life))
-    return jnp.where(usable, WEAR_QUANTITIES[name].of(life, settings), jnp.nan)
+    return jnp.where(usable, OF_LIFE[name](life, settings), jnp.nan)
+
+
+def _number(name: str, analysis: Analysis, wear: Wear) -> Float[Array, ""]:
+    # all quantities of the same settings come from one life
+    return number_of(name, analysis.once(wear, "life", lambda: _life(name, analysis, wear)), wear)
+
+
+def _life(name: str, analysis: Analysis, wear: Wear) -> WearLife:
+    load = analysis.operating_point if wear.loads is None else None
+    return wear.life(analysis.mesh_for(name), load, **analysis.flanks, deviation=analysis.deviation(name))
 
 
 def blocks_are_short(life: WearLife) -> Bool[Array, ""]:
@@ -131,16 +82,50 @@ def blocks_are_short(life: WearLife) -> Bool[Array, ""]:
     return ~overshoots & (life.error[-1] <= _LARGEST_ERROR * wear_depth(life)[-1])
 
 
-def _life(name: str, settings: Any, cycle: MeshCycle) -> WearLife:
-    mesh = cycle.mesh_for(name)
-    flanks = {"pinion": cycle.pinion, "wheel": cycle.wheel}
-    load = cycle.operating_point if settings.loads is None else None
-    return settings.life(mesh, load, **flanks, deviation=deviation_of(cycle, mesh))
+def _quantity(name: str, unit: str, meaning: str, **options: Any) -> Quantity:
+    return Quantity(name, partial(_number, name), unit, meaning, takes=Wear, **options)
 
 
-def _quantity(name: str, kind: _Kind) -> Quantity:
-    stands = WithoutSettings(name, "jaxgear.wear.Wear", "wear", needs=kind.needs, given=_number)
-    return Quantity(name, stands, kind.unit, kind.meaning, better=kind.better)
-
-
-quantities.add(*(_quantity(name, kind) for name, kind in WEAR_QUANTITIES.items()), package=__package__)
+WEAR_QUANTITIES = Vocabulary(
+    (
+        _quantity("worn_ppte", "um", "peak-to-peak transmission error when worn"),
+        _quantity("mean_ppte_over_life", "um", "peak-to-peak transmission error, mean over the life"),
+        _quantity("max_ppte_over_life", "um", "peak-to-peak transmission error, worst of the life"),
+        _quantity("max_pressure_over_life", "MPa", "largest pressure of the life"),
+        _quantity(
+            "max_pressure_over_life_error",
+            "MPa",
+            "error of the largest pressure of the life by grid and width of the contacts, as estimated",
+        ),
+        _quantity(
+            "worn_dynamic_factor",
+            "",
+            "largest mesh force over the static one when worn, at the speed of the pinion",
+            needs="dynamics",
+        ),
+        _quantity(
+            "max_dynamic_factor_over_life",
+            "",
+            "largest mesh force over the static one, worst of the life, at the speed of the pinion",
+            needs="dynamics",
+        ),
+        _quantity("wear_depth", "um", "largest wear depth of both gears"),
+        _quantity("pinion_wear_depth", "um", "largest wear depth, pinion"),
+        _quantity("wheel_wear_depth", "um", "largest wear depth, wheel"),
+        _quantity(_ERROR, "um", "error of the wear depth by the length of the blocks, as estimated"),
+        _quantity(
+            "life_to_depth",
+            "revolutions",
+            "life to the limit of the wear depth, at most a thousand of those looked at",
+            better="larger",
+            needs="depth_limit",
+        ),
+        _quantity(
+            "life_to_ppte",
+            "revolutions",
+            "life to the limit of peak-to-peak transmission error, at most the life looked at",
+            better="larger",
+            needs="ppte_limit",
+        ),
+    )
+)

@@ -8,10 +8,9 @@ from jaxtyping import Array, Float
 from ..conditions import LoadSpectrum
 from ..contact import Mesh
 from ..dynamics import Dynamics
-from ..metrics import Quantity
-from ..metrics.settings import with_settings
+from ..metrics import AbstractSettings
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, count, number
+from ..numerics import count, number
 from .case import LARGEST_COEFFICIENT
 from .life import BLOCKS, WearLife, check_blocks, wear
 from .vibration import LineLoad, check_line_load
@@ -19,8 +18,19 @@ from .vibration import LineLoad, check_line_load
 Scalar = Float[Array, ""]
 
 
-class Wear(Checked):
+class Wear(AbstractSettings):
     """How long a mesh runs, and how fast it wears.
+
+    `quantity` gives with it the numbers of worn flanks, `WEAR_QUANTITIES`. With `loads` these wear one flank together,
+    whatever the load under which the quantity is asked for. Without, every load of a spectrum and every manufactured
+    pair is taken to run the whole life, and the lives are joined as all numbers of such cases are. Under a spectrum
+    join them by `Worst()`: that is the life of a pair which runs at one of the loads, while a mean joins numbers of
+    different flanks, of which no pair has all.
+
+    A number is NaN where a contact was not found, and where blocks are so long that flanks overshoot: the error of the
+    depth, as `wear_depth_error` estimates it, is more than a tenth of the depth, or a block wears off more than twice
+    what the new teeth deflect. `wear_depth_error` itself is told in any case. The steps of the integrator are those of
+    the dynamics, or 256.
 
     Attributes:
         revolutions: of the pinion.
@@ -38,6 +48,7 @@ class Wear(Checked):
             under which a mesh is looked at.
     """
 
+    table = "wear"
     revolutions: Scalar = number("revolutions", low=0.0, open_low=True)
     coefficient: Scalar = number("m2/N", low=0.0, high=LARGEST_COEFFICIENT)
     wheel_coefficient: Scalar | None = number("m2/N", low=0.0, high=LARGEST_COEFFICIENT, optional=True, default=None)
@@ -86,27 +97,3 @@ class Wear(Checked):
         options |= {"dynamics": self.dynamics, "line_load": self.line_load}
         flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
         return wear(mesh, torque if self.loads is None else self.loads, self.revolutions, **flanks, **options)
-
-    def quantity(self, name: str) -> Quantity:
-        """A quantity of the life for objectives, constraints, sweeps and Pareto fronts, with these settings.
-
-        With `loads` these wear one flank together, whatever the load under which the quantity is asked for. Without,
-        every load of a spectrum and every manufactured pair is taken to run the whole life, and the lives are joined
-        as all numbers of such cases are. Under a spectrum join them by `Worst()`: that is the life of a pair which
-        runs at one of the loads, while a mean joins numbers of different flanks, of which no pair has all.
-
-        A number is NaN where a contact was not found, and where blocks are so long that flanks overshoot: the error of
-        the depth, as `wear_depth_error` estimates it, is more than a tenth of the depth, or a block wears off more than
-        twice what the new teeth deflect. `wear_depth_error` itself is told in any case.
-
-        Args:
-            name: one of `WEAR_QUANTITIES`: "worn_ppte", "mean_ppte_over_life", "max_ppte_over_life",
-                "max_pressure_over_life", "max_pressure_over_life_error", "wear_depth", "pinion_wear_depth",
-                "wheel_wear_depth", "wear_depth_error", "life_to_depth" (needs `depth_limit`), "life_to_ppte" (needs
-                `ppte_limit`), "worn_dynamic_factor" or "max_dynamic_factor_over_life" (both need `dynamics`). The steps
-                of the integrator are those of the dynamics, or 256.
-
-        Raises:
-            ValueError: for another name, and for a limit that is missing.
-        """
-        return with_settings(name, self)
