@@ -38,7 +38,11 @@ class Parabolic(AbstractCurve):
 
 
 class Power(AbstractCurve):
-    """d^exponent; 1.5 is Walker's form, 1 to 2 are usual. At exponents below 1 the slope at the start is infinite."""
+    """d^exponent; 1.5 is Walker's form, 1 to 2 are usual. At exponents below 1 the slope at the start is infinite.
+
+    Attributes:
+        exponent: of the relative depth.
+    """
 
     exponent: Float[Array, ""] = number("", low=0.0, open_low=True)
 
@@ -47,7 +51,11 @@ class Power(AbstractCurve):
 
 
 class Quadratic(AbstractCurve):
-    """b0 + b1 d + b2 d^2. A non-zero b0 is a step at the start of the relief."""
+    """b0 + b1 d + b2 d^2. A non-zero b0 is a step at the start of the relief.
+
+    Attributes:
+        b0, b1, b2: coefficients of the constant, linear and quadratic term.
+    """
 
     b0: Float[Array, ""] = number("")
     b1: Float[Array, ""] = number("")
@@ -58,7 +66,11 @@ class Quadratic(AbstractCurve):
 
 
 class Polynomial(AbstractCurve):
-    """sum_i coefficients[i] d^i, lowest power first."""
+    """sum_i coefficients[i] d^i, lowest power first.
+
+    Attributes:
+        coefficients: of the powers of the relative depth, lowest first, shape (terms,).
+    """
 
     coefficients: Float[Array, " terms"] = number("", shape=("terms",))
 
@@ -74,6 +86,9 @@ class ParabolicLinear(AbstractCurve):
 
     Value and slope are continuous in the depth and in the node. A node of 1 is the pure parabola; towards 0 the curve
     becomes the straight line.
+
+    Attributes:
+        node: relative depth at which the parabola ends and its tangent begins.
     """
 
     node: Float[Array, ""] = number("", low=0.0, open_low=True, high=1.0)
@@ -87,7 +102,11 @@ class ParabolicLinear(AbstractCurve):
 
 
 class Sinusoidal(AbstractCurve):
-    """sin(b0 d + b1) + cos(b0 d + b2). It starts from zero only if sin(b1) = -cos(b2)."""
+    """sin(b0 d + b1) + cos(b0 d + b2). It starts from zero only if sin(b1) = -cos(b2).
+
+    Attributes:
+        b0, b1, b2: factor of the relative depth, and phases of sine and cosine.
+    """
 
     b0: Float[Array, ""] = number("rad")
     b1: Float[Array, ""] = number("rad")
@@ -98,7 +117,11 @@ class Sinusoidal(AbstractCurve):
 
 
 class Spline(AbstractCurve):
-    """Natural cubic spline through `values` at equally spaced depths; the first value belongs to the start (d = 0)."""
+    """Natural cubic spline through `values` at equally spaced depths; the first value belongs to the start (d = 0).
+
+    Attributes:
+        values: relief divided by its amount at the knots, shape (knots,).
+    """
 
     values: Float[Array, " knots"] = number("", shape=("knots",), fewest=3)
 

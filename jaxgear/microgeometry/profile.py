@@ -28,6 +28,11 @@ class TipRelief(AbstractModification):
     """Tip relief C_alpha_a: `amount` at the tip, over the last `length` of roll length.
 
     A length of zero means no relief.
+
+    Attributes:
+        amount: material removed at the tip.
+        length: roll length over which the relief runs out, from the tip.
+        curve: shape of the relief over its depth.
     """
 
     amount: Float[Array, ""] = number("um", usual=AMOUNTS)
@@ -41,7 +46,13 @@ class TipRelief(AbstractModification):
 
 
 class RootRelief(AbstractModification):
-    """Root relief C_alpha_f: `amount` at the start of the active profile, over the first `length`."""
+    """Root relief C_alpha_f: `amount` at the start of the active profile, over the first `length`.
+
+    Attributes:
+        amount: material removed at the start of the active profile.
+        length: roll length over which the relief runs out, from the start of the active profile.
+        curve: shape of the relief over its depth.
+    """
 
     amount: Float[Array, ""] = number("um", usual=AMOUNTS)
     length: Float[Array, ""] = number("mm", low=0.0, high=LONGEST)
@@ -54,7 +65,11 @@ class RootRelief(AbstractModification):
 
 
 class ProfileCrowning(AbstractModification):
-    """Profile crowning C_alpha: parabola with zero in the middle of the active profile and `amount` at its ends."""
+    """Profile crowning C_alpha: parabola with zero in the middle of the active profile and `amount` at its ends.
+
+    Attributes:
+        amount: material removed at both ends of the active profile; negative for negative crowning.
+    """
 
     amount: Float[Array, ""] = number("um", usual=AMOUNTS)
 
@@ -66,7 +81,11 @@ class ProfileCrowning(AbstractModification):
 
 class ProfileSlope(AbstractModification):
     """Profile slope C_H_alpha: straight line, half the `amount` removed at the tip, half added at the start of the
-    active profile, so that the middle stays."""
+    active profile, so that the middle stays.
+
+    Attributes:
+        amount: difference of the material removed at the tip and at the start of the active profile.
+    """
 
     amount: Float[Array, ""] = number("um", usual=AMOUNTS)
 
@@ -84,7 +103,11 @@ def _from_middle(flank: Flank):
 
 
 class LeadCrowning(AbstractModification):
-    """Lead crowning C_beta: parabola with zero in the middle of the face and `amount` at both ends."""
+    """Lead crowning C_beta: parabola with zero in the middle of the face and `amount` at both ends.
+
+    Attributes:
+        amount: material removed at both ends of the face; negative for negative crowning.
+    """
 
     amount: Float[Array, ""] = number("um", usual=AMOUNTS)
 
@@ -98,7 +121,11 @@ class LeadCrowning(AbstractModification):
 
 class LeadSlope(AbstractModification):
     """Lead slope C_H_beta: straight line over the face, `amount` from end to end, zero in the middle, removing material
-    at positive face coordinates."""
+    at positive face coordinates.
+
+    Attributes:
+        amount: difference of the material removed at the end with positive and with negative face coordinate.
+    """
 
     amount: Float[Array, ""] = number("um", usual=AMOUNTS)
 
@@ -114,6 +141,9 @@ class EndRelief(AbstractModification):
     """End relief C_beta I and II: `amount` at the ends of the face, over `length`.
 
     Attributes:
+        amount: material removed at an end of the face.
+        length: part of the face over which the relief runs out, from its end.
+        curve: shape of the relief over its depth.
         side: "both", "negative" or "positive" (the end with negative or positive face coordinate).
     """
 

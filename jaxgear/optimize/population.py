@@ -1,7 +1,6 @@
 """Searches that follow no gradient: evolution, the genetic algorithm of bit strings, full factorial tables."""
 
 import functools
-import importlib
 from abc import abstractmethod
 from collections.abc import Mapping
 from contextlib import contextmanager
@@ -136,9 +135,10 @@ def _relaxed():
 
 def _evosax():
     try:
-        return importlib.import_module("evosax.algorithms")
+        import evosax.algorithms
     except ImportError:
         raise ValueError("evolutionary methods need the library evosax: pip install 'jaxgear[evolution]'") from None
+    return evosax.algorithms
 
 
 _MOST_BITS = 24  # as many as a number of single precision holds
