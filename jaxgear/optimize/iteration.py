@@ -349,9 +349,9 @@ def iterate_transmission_error(
 def iterate_from_low_pressure(
     design: Design,
     bounds: Mapping[str, tuple[float, float]],
-    *,
     mesh: Mesh,
     torque,
+    *,
     max_relief: float = 7.0,
     method: AbstractMethod = SLP(),
     callback: Callback | None = None,

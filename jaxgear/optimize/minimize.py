@@ -58,9 +58,9 @@ def method_named(
 def minimize(
     design: Design,
     bounds: Mapping[str, tuple[float, float]],
-    *,
     mesh: Mesh,
     torque,
+    *,
     objective: Objective = "ppte",
     measure: AbstractMeasure | None = None,
     constraints: Sequence[Constraint] = (),

@@ -220,9 +220,9 @@ class Pareto(Checked):
 def pareto(
     design: Design,
     bounds: Mapping[str, tuple[float, float]],
-    *,
     mesh: Mesh,
     torque,
+    *,
     objectives: Sequence[Objective] = ("ppte", "max_contact_pressure"),
     measure: AbstractMeasure | None = None,
     constraints: Sequence[Constraint] = (),

@@ -267,9 +267,9 @@ def goals_of(
 def make_problem(
     design: Design,
     bounds: Mapping[str, tuple[float, float]],
-    *,
     mesh: Mesh,
     torque,
+    *,
     objective: Objective | Sequence[Objective] = "ppte",
     measure: AbstractMeasure | None = None,
     constraints: Sequence[Constraint] = (),

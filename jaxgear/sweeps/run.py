@@ -38,9 +38,9 @@ _POLL = 0.2  # seconds between two looks for the parts of other processes
 def sweep(
     design: Design,
     plan: AbstractPlan,
-    *,
     mesh: Mesh | Callable[[Parameters], Mesh],
     torque,
+    *,
     results: Sequence[str | Quantity] = ("ppte",),
     measures: Sequence[AbstractMeasure] | None = None,
     output: str | Path | None = None,
