@@ -5,13 +5,15 @@ import os
 import stat
 import sys
 import uuid
+from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 TEMPORARY = ".tmp"  # end of the names of files that are being written
 _sum = hashlib.sha256
 
 
-def write_durably(path: Path, write) -> None:
+def write_durably(path: Path, write: Callable[[BinaryIO], object]) -> None:
     """Lets `write(file)` fill a temporary file that takes the place of `path` once it is on the disk."""
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}{TEMPORARY}")
     try:

@@ -10,6 +10,7 @@ from .safe import unit
 Rows = list[Float[Array, "slices positions"]]
 Slopes = list[Float[Array, "#slices positions"]]  # one row where a slope is the same in every slice
 Curve = Float[Array, " positions"]
+Load = Float[Array, ""] | Curve  # a scalar where it is the same everywhere
 
 
 class Factors(NamedTuple):
@@ -112,7 +113,7 @@ def product(weight: Float[Array, " slices"], factors: Factors, first: Rows, seco
     return jnp.sum(weight[:, None] * terms, axis=0)
 
 
-def balance(weight: Float[Array, " slices"], factors: Factors, known: Rows, load) -> tuple[Rows, Curve]:
+def balance(weight: Float[Array, " slices"], factors: Factors, known: Rows, load: Load) -> tuple[Rows, Curve]:
     """Solves (C + slope) q = known + lever d on the active rows, q = 0 on the others, with sum lever w q = load."""
     part = _of_known(factors, known)
     stiffness = product(weight, factors, factors.lever, factors.lever)

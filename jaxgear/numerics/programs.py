@@ -20,6 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.experimental.serialize_executable import deserialize_and_load, serialize
 from jax.extend.core import get_opaque_trace_state
+from jaxtyping import PyTree
 
 _Given = ParamSpec("_Given")
 _Found = TypeVar("_Found")
@@ -174,11 +175,11 @@ class ProgramStore:
         threads: that compile.
     """
 
-    def __init__(self, shelf: Shelf, threads: int = 2):
+    def __init__(self, shelf: Shelf, threads: int = 2) -> None:
         self._shelf, self._pool = shelf, ThreadPoolExecutor(threads, "compiler")
         self._programs: dict[Any, _Program] = {}
 
-    def program(self, function: Callable, arguments: Any, *, quick: bool) -> tuple[_Program, list] | None:
+    def program(self, function: Callable, arguments: PyTree, *, quick: bool) -> tuple[_Program, list] | None:
         """The program of a function for some arguments, and the arrays among them; None where JAX traces them."""
         leaves, tree = jax.tree.flatten(arguments)
         if any(map(_is_left_to_jax, leaves)) or not is_eager() or jax.process_count() > 1:
@@ -256,7 +257,7 @@ def _compiled(function: Callable[_Given, _Found], *, quick: bool) -> Callable[_G
     return run
 
 
-def begin(function: Callable, *args, **options) -> Any:
+def begin(function: Callable, *args: PyTree, **options: PyTree) -> PyTree | None:
     """Starts to compile a `program` or `kernel` for arguments of these shapes, where a store is in use.
 
     Returns:
@@ -344,11 +345,11 @@ class Recipe(pickle.Pickler):
     Equal objects are written alike, whether they are one object or two, which differs from process to process.
     """
 
-    def __init__(self, file: io.BytesIO):
+    def __init__(self, file: io.BytesIO) -> None:
         super().__init__(file)
         self.fast = True  # no references to what was written before
 
-    def persistent_id(self, obj):
+    def persistent_id(self, obj: object) -> tuple[object, ...] | None:
         if isinstance(obj, jax.sharding.Sharding | jax.sharding.Mesh):
             return "devices", repr(obj)
         if not isinstance(obj, type | types.FunctionType):
