@@ -9,8 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-Given = float | np.number | np.ndarray | jax.Array  # one number or an array of them, as whoever calls has them
-Numbers = Given | Sequence[Given] | Sequence[Sequence[Given]]  # whatever `real` makes an array of
+# one number or an array of them, as whoever calls has them; and whatever `real` makes an array of
+Given = float | np.floating | np.integer | np.ndarray | jax.Array
+Numbers = Given | Sequence[Given] | Sequence[Sequence[Given]]
 
 _SHOWN = 6  # numbers of an array that are printed; of a longer one its range is
 

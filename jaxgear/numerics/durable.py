@@ -53,7 +53,7 @@ class KeptFiles:
         executed: whether they may be executed, so that only files are read that nobody else can have written.
     """
 
-    def __init__(self, folder: Path, surroundings: bytes = b"", *, executed: bool = False):
+    def __init__(self, folder: Path, surroundings: bytes = b"", *, executed: bool = False) -> None:
         self._folder, self._here, self._executed = folder, surroundings, executed and os.name == "posix"
 
     def read(self, made_of: bytes) -> bytes | None:

@@ -13,7 +13,6 @@ from jaxtyping import Array, Bool, Float, PyTree
 from .dense import pseudo_inverse
 from .safe import stored
 
-
 Real = Float[Array, "..."]
 Vector = Float[Array, " unknowns"]
 Matrix = Float[Array, "unknowns unknowns"]
