@@ -225,7 +225,9 @@ def side_by_side(first: list[Patterns], second: list[Patterns]) -> list[Patterns
     return found
 
 
-def torques_on(gearbox: Gearbox, shaft: int, without: int | None = None):
+def torques_on(
+    gearbox: Gearbox, shaft: int, without: int | None = None
+) -> tuple[Float[Array, " points"], Float[Array, " points"]]:
     """Positions and torques on a shaft, positive where they drive it [N mm], those of all but one mesh.
 
     Meshes act evenly over their faces; the coupling without a torque of its own takes what is left.
