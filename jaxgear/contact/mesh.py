@@ -362,7 +362,7 @@ def _part(first, count: int, mesh: Mesh) -> Mesh:
     return eqx.tree_at(lambda m: [*_by_position(m), m.kinematics], mesh, [*taken, moved])
 
 
-def _by_position(mesh: Mesh) -> list:
+def _by_position(mesh: Mesh) -> list[Array | AbstractSpring]:
     """Everything whose last axis is that of the positions."""
     return [
         mesh.outer_steps,

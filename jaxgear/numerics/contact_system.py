@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 from .contact_problem import ContactProblem
 from .coupling import CoupledFactors, Response, couple, respond, stiffness, with_inverses
-from .elimination import Curve, Factors, Load, Rows, Slopes, at_approach, balance, factorize, product
+from .elimination import Active, Curve, Factors, Load, Rows, Slopes, at_approach, balance, factorize, product
 
 
 def eliminable(problem: ContactProblem) -> ContactProblem:
@@ -15,7 +15,7 @@ def eliminable(problem: ContactProblem) -> ContactProblem:
     return eqx.tree_at(lambda p: p.coupling, problem, with_inverses(problem.coupling, problem.compliance))
 
 
-def eliminate(problem: ContactProblem, active: list, slope: Slopes) -> Factors | CoupledFactors:
+def eliminate(problem: ContactProblem, active: Active, slope: Slopes) -> Factors | CoupledFactors:
     """Eliminates the active springs of an `eliminable` problem.
 
     Args:

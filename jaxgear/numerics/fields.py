@@ -209,7 +209,7 @@ def _plain(value):
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _check_field(owner: str, field: dataclasses.Field, value) -> None:
+def _check_field(owner: str, field: dataclasses.Field[Any], value: object) -> None:
     kind = field.metadata.get(_KEY)
     if kind is not None:
         if kind.checked:

@@ -163,7 +163,7 @@ class _Program(NamedTuple):
     run: Future[_Run]
     result: Any
 
-    def __call__(self, arrays: Sequence) -> Any:
+    def __call__(self, arrays: Sequence[jax.Array]) -> Any:
         return _filled(self.result, self.run.result()(*arrays))
 
 
@@ -179,7 +179,9 @@ class ProgramStore:
         self._shelf, self._pool = shelf, ThreadPoolExecutor(threads, "compiler")
         self._programs: dict[Any, _Program] = {}
 
-    def program(self, function: Callable, arguments: PyTree, *, quick: bool) -> tuple[_Program, list] | None:
+    def program(
+        self, function: Callable[..., Any], arguments: PyTree, *, quick: bool
+    ) -> tuple[_Program, list[Any]] | None:
         """The program of a function for some arguments, and the arrays among them; None where JAX traces them."""
         leaves, tree = jax.tree.flatten(arguments)
         if any(map(_is_left_to_jax, leaves)) or not is_eager() or jax.process_count() > 1:
@@ -197,7 +199,9 @@ class ProgramStore:
             )
         return known, [leaf for leaf, shape in zip(leaves, fixed) if isinstance(shape, _Shape)]
 
-    def _made(self, function: Callable, arguments: Any, precision: str, options: dict | None) -> _Program:
+    def _made(
+        self, function: Callable[..., Any], arguments: Any, precision: str, options: dict[str, Any] | None
+    ) -> _Program:
         made_of = _recipe((function, arguments, precision, options))
         kept = None if made_of is None else self._shelf.read(made_of)
         if kept is not None:
@@ -257,7 +261,7 @@ def _compiled(function: Callable[_Given, _Found], *, quick: bool) -> Callable[_G
     return run
 
 
-def begin(function: Callable, *args: PyTree, **options: PyTree) -> PyTree | None:
+def begin(function: Callable[..., Any], *args: PyTree, **options: PyTree) -> PyTree | None:
     """Starts to compile a `program` or `kernel` for arguments of these shapes, where a store is in use.
 
     Returns:
@@ -291,13 +295,13 @@ def _is_shape(leaf) -> bool:
     return isinstance(leaf, _Shape)
 
 
-def _filled(tree: Any, arrays: Iterable) -> Any:
+def _filled(tree: Any, arrays: Iterable[Any]) -> Any:
     """A tree with arrays in the places of their shapes."""
     left = iter(arrays)
     return jax.tree.map(lambda leaf: next(left) if _is_shape(leaf) else leaf, tree, is_leaf=_is_shape)
 
 
-def _lowered(function: Callable, arguments: Any) -> tuple[jax.stages.Lowered, Any]:
+def _lowered(function: Callable[..., Any], arguments: Any) -> tuple[jax.stages.Lowered, Any]:
     """A function of arrays alone, ready to be compiled, and what it returns."""
     shapes = [leaf.struct for leaf in jax.tree.leaves(arguments, is_leaf=_is_shape) if _is_shape(leaf)]
     results = []
