@@ -135,6 +135,84 @@ def test_numerics_has_no_gear_word():
         assert not [word for word in words if word in text], path.name
 
 
+# Packages whose public functions and methods say the type of every parameter and of their result.
+TYPED = (
+    "numerics",
+    "geometry",
+    "microgeometry",
+    "compliance",
+    "contact",
+    "shafts",
+    "tolerance",
+    "conditions",
+    "dynamics",
+    "manufacture",
+    "sizing",
+)
+# Their files that do not yet.
+TO_BE_TYPED = {
+    "conditions/variant.py",
+    "contact/cycle.py",
+    "contact/prescribed.py",
+    "contact/solve.py",
+    "dynamics/quantities.py",
+    "dynamics/response.py",
+    "dynamics/runs.py",
+    "dynamics/settings.py",
+    "dynamics/settling.py",
+    "dynamics/steady.py",
+    "manufacture/volume.py",
+    "numerics/batching.py",
+}
+OF_ANY_TYPE = {
+    "manufacture/tooth_thickness.py drawn_gear": "takes the arguments of two classes, each of a type of its own",
+    "numerics/fields.py count": "stands for the value of a field, whose annotation says the type",
+    "numerics/fields.py number": "likewise",
+    "numerics/fields.py result": "likewise",
+}
+
+
+def untyped(body, owner=""):
+    """Public functions and methods, with constructors and operators, that leave a type out or say `Any`."""
+    for node in body:
+        name = getattr(node, "name", "_")
+        if name.startswith("_") and not name.endswith("__"):
+            continue
+        if isinstance(node, ast.ClassDef):
+            yield from untyped(node.body, f"{owner}{name}.")
+        elif isinstance(node, ast.FunctionDef):
+            given = node.args
+            every = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
+            hints = [part.annotation for part in every if part and not (owner and part.arg in ("self", "cls"))]
+            if any(hint is None or ast.unparse(hint) == "Any" for hint in [*hints, node.returns]):
+                yield owner + name
+
+
+def test_public_signatures_are_typed():
+    found = {
+        f"{path.relative_to(PACKAGE).as_posix()} {name}"
+        for path in FILES
+        if layer(path) in TYPED and path.relative_to(PACKAGE).as_posix() not in TO_BE_TYPED
+        for name in untyped(ast.parse(path.read_text(encoding="utf-8")).body)
+    }
+    assert found == set(OF_ANY_TYPE)
+
+
+def test_the_check_sees_what_is_not_typed():
+    source = (
+        "def typed(a: int, *, b: tuple[Any, ...]) -> None: ...\n"
+        "def bare(a: int, b: Any) -> None: ...\n"
+        "def _own(a): ...\n"
+        "class Kind:\n"
+        "    def __init__(self, a) -> None: ...\n"
+        "    def at(self, *given) -> None: ...\n"
+        "    @property\n"
+        "    def size(self): ...\n"
+        "    def _own(self, a): ...\n"
+    )
+    assert [*untyped(ast.parse(source).body)] == ["bare", "Kind.__init__", "Kind.at", "Kind.size"]
+
+
 def in_a_new_process(script):
     return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
 

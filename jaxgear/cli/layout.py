@@ -170,8 +170,7 @@ def _factors(request: LayoutRequest, name: str, layout: FlankLineLayout, *, stat
     found = {}
     face = at_stations(request.supports[name], request.profile_torque, stations=stations)
     for step, (pinion, wheel) in flank_lines(layout).items():
-        on = {"pinion": pinion.modification, "wheel": wheel.modification}
-        load = annex_e(face, torque=face.torque, stations=stations, **on)
+        load = annex_e(face, face.torque, pinion=pinion.modification, wheel=wheel.modification, stations=stations)
         found[step] = float(load.face_load_factor)
     return found
 

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from ..geometry import GearPair, Outline
 from ..numerics import AbstractSpring, on_both
@@ -18,6 +18,7 @@ from .plane import PlaneState, check_plane_state, plane_stress_share, structure_
 from .toothload import ToothLoad
 
 Structures = Float[Array, "gears pairs pairs positions"]
+Outside = Float[Array, "pairs positions"]
 
 
 class AbstractCompliance(eqx.Module):
@@ -66,7 +67,7 @@ class AbstractCompliance(eqx.Module):
         geometry: ContactGeometry,
         pinion: ToothLoad,
         wheel: ToothLoad,
-        outside: Float[Array, "pairs positions"],
+        outside: Outside,
     ) -> AbstractSpring:
         """The prepared contact law, for contacts at a distance `outside` the path of contact [mm]."""
 
@@ -97,7 +98,7 @@ class Compliance(AbstractCompliance):
     plane: PlaneState = eqx.field(static=True, default="auto")
     edge_softening: bool = eqx.field(static=True, default=True)
 
-    def __check_init__(self):
+    def __check_init__(self) -> None:
         check_plane_state(self.plane)
 
     def of_gears(self, pinion: Outline, wheel: Outline, count: int) -> AbstractCompliance:
@@ -107,7 +108,7 @@ class Compliance(AbstractCompliance):
     def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Structures:
         return self.structure_on(pinion, wheel, None)
 
-    def structure_on(self, pinion: ToothLoad, wheel: ToothLoad, known: Any) -> Structures:
+    def structure_on(self, pinion: ToothLoad, wheel: ToothLoad, known: PyTree | None) -> Structures:
         """`structure` with what `body.of_gears` gives; None where that has not been asked."""
         planes = structure_planes(self.plane)
         shares = on_both(lambda load: plane_stress_share(load.outline, load.outline.gear.face_width), pinion, wheel)
@@ -119,7 +120,7 @@ class Compliance(AbstractCompliance):
     def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
         return jnp.stack([self.body.hub(pinion.outline), self.body.hub(wheel.outline)])
 
-    def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside) -> AbstractSpring:
+    def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside: Outside) -> AbstractSpring:
         law = self.contact.prepare(geometry)
         if not self.edge_softening:
             return law
@@ -139,7 +140,7 @@ class _OfGears(AbstractCompliance):
     def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
         return self.model.hub(pinion, wheel)
 
-    def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside) -> AbstractSpring:
+    def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside: Outside) -> AbstractSpring:
         return self.model.law(geometry, pinion, wheel, outside)
 
 
@@ -148,7 +149,7 @@ def with_edge(
     geometry: ContactGeometry,
     pinion: ToothLoad,
     wheel: ToothLoad,
-    outside: Float[Array, "pairs positions"],
+    outside: Outside,
 ) -> EdgeLaw:
     """The law of the uninterrupted flanks with the softening of the nearest tip corner."""
     truncation = 4e3 / jnp.pi * geometry.compliance

@@ -12,13 +12,12 @@ References:
 
 from abc import abstractmethod
 from functools import partial
-from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from ..geometry.outline import Outline
 from ..numerics import Checked, count, on_both
@@ -61,12 +60,12 @@ class AbstractBody(Checked):
             plane: "stress" or "strain"; what lies between them is put together from both.
         """
 
-    def of_gears(self, pinion: Outline, wheel: Outline, count: int, planes: tuple[Plane, ...]) -> Any:
+    def of_gears(self, pinion: Outline, wheel: Outline, count: int, planes: tuple[Plane, ...]) -> PyTree | None:
         """What `of_both` of so many pairs needs that is the same at all positions; None for nothing."""
         return None
 
     def of_both(
-        self, pinion: ToothLoad, wheel: ToothLoad, planes: tuple[Plane, ...], known: Any = None
+        self, pinion: ToothLoad, wheel: ToothLoad, planes: tuple[Plane, ...], known: PyTree | None = None
     ) -> tuple[Matrices, Matrices]:
         """`compliance` of driving and driven gear, each in several planes; `known` is what `of_gears` has given."""
         first, second = (

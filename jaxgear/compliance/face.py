@@ -25,7 +25,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import real
+from ..numerics import Given, real
 from ..numerics.dense import solve_dense
 from ..numerics.fits import orthonormal
 
@@ -43,7 +43,9 @@ _KEPT = 0.7
 _FEWEST_WAVES = 3  # beside modes that decay from the ends, the constant included
 
 
-def face_kernel(face_width, root_chord, slices: int, overhang: tuple | None = None) -> Kernel:
+def face_kernel(
+    face_width: Given, root_chord: Given, slices: int, overhang: tuple[Given, Given] | None = None
+) -> Kernel:
     """F: deflection of a slice under the line load of another, over that of a load uniform over the whole gear.
 
     Symmetric, positive definite. Its rows sum to one where nothing overhangs, else to less. Its eigenvalues are at most
@@ -114,7 +116,7 @@ def _uneven_waves(parts: tuple[int, ...]) -> np.ndarray:
     return waves * np.where(np.diagonal(upper) < 0, -1.0, 1.0)
 
 
-def face_ends(face_width, root_chord, slices: int) -> Float[Array, "slices ends"]:
+def face_ends(face_width: Given, root_chord: Given, slices: int) -> Float[Array, "slices ends"]:
     """Shapes that decay from both ends of the load as a kernel does: the rows of every F sum to a constant and these.
 
     Args:

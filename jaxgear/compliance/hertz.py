@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import reduced_radius
-from ..numerics import Checked, result
+from ..numerics import Checked, Given, result
 from .laws import AbstractLaw, LinearLaw, LogarithmicLaw, PowerLaw
 from .plane import Plane, plane_modulus, plane_poisson
 from .toothload import ToothLoad
@@ -71,7 +71,7 @@ class ContactGeometry(Checked):
         return 4 * reduced_radius(self.pinion.radius, self.wheel.radius) / jnp.pi * self.compliance
 
 
-def contact_geometry(pinion: ToothLoad, wheel: ToothLoad, plane: Plane, face_width) -> ContactGeometry:
+def contact_geometry(pinion: ToothLoad, wheel: ToothLoad, plane: Plane, face_width: Given) -> ContactGeometry:
     """Collects the local geometry of both flanks, arrays (pairs, positions), on a common shape."""
     shape = pinion.roll_length.shape
 

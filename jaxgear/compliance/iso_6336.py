@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import GearPair, path_of_contact
-from ..numerics import Checked, check, program, real, result
+from ..numerics import Checked, Given, check, program, real, result
 
 Scalar = Float[Array, ""]
 
@@ -32,7 +32,7 @@ class IsoStiffness(Checked):
     mesh: Scalar = result("N/(mm um)")
 
 
-def iso_stiffness(pair: GearPair, line_load=_LIGHT_LOAD) -> IsoStiffness:
+def iso_stiffness(pair: GearPair, line_load: Given = _LIGHT_LOAD) -> IsoStiffness:
     """Stiffness of ISO 6336-1 Method B.
 
     Args:

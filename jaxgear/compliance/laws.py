@@ -4,6 +4,7 @@ All prepared leaves have the shape (pairs, 1, positions).
 """
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -111,7 +112,7 @@ class LogarithmicLaw(AbstractLaw):
         return stretch - 0.5 * self.factor * widening
 
 
-def polynomial(coefficients, x: Real) -> Real:
+def polynomial(coefficients: Sequence[Real | float], x: Real) -> Real:
     """Coefficients with the lowest power first; zero without any."""
     value = jnp.zeros_like(x)
     for coefficient in reversed(coefficients):

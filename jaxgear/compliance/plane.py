@@ -30,7 +30,7 @@ Real = Float[Array, "..."]
 _FRACTION_TERMS = 10  # of a continued fraction for arguments up to 1: the next one adds less than 1e-19
 
 
-def plane_modulus(material: Material, plane: Plane):
+def plane_modulus(material: Material, plane: Plane) -> Real:
     """Young's modulus of the two-dimensional problem [MPa]: E, or E / (1 - nu^2) in plane strain."""
     check_plane(plane)
     if plane == "stress":
@@ -38,12 +38,12 @@ def plane_modulus(material: Material, plane: Plane):
     return material.elastic_modulus / (1 - material.poisson_ratio**2)
 
 
-def combined_modulus(first: Material, second: Material, plane: Plane):
+def combined_modulus(first: Material, second: Material, plane: Plane) -> Real:
     """E* of two bodies in contact [MPa]: 1 / E* = 1 / E'_1 + 1 / E'_2."""
     return 1 / (1 / plane_modulus(first, plane) + 1 / plane_modulus(second, plane))
 
 
-def plane_poisson(material: Material, plane: Plane):
+def plane_poisson(material: Material, plane: Plane) -> Real:
     """Poisson's ratio of the two-dimensional problem: nu, or nu / (1 - nu) in plane strain."""
     check_plane(plane)
     if plane == "stress":
@@ -51,7 +51,7 @@ def plane_poisson(material: Material, plane: Plane):
     return material.poisson_ratio / (1 - material.poisson_ratio)
 
 
-def shear_modulus(material: Material):
+def shear_modulus(material: Material) -> Real:
     """[MPa]"""
     return material.elastic_modulus / (2 * (1 + material.poisson_ratio))
 

@@ -26,7 +26,9 @@ MODES = ("moment", "shear", "normal")
 _HIGHEST_SHIFT = 3  # of a harmonic by the products of sines and cosines in the load modes
 
 
-def arc_compliance(half_angle: Scalar, thickness_ratio: Scalar, poisson: Scalar, spacing, harmonics: int):
+def arc_compliance(
+    half_angle: Scalar, thickness_ratio: Scalar, poisson: Scalar, spacing: Float[Array, " k"], harmonics: int
+) -> Float[Array, "k 3 3"]:
     """K between two root arcs, without the ring's rigid torsion.
 
     Args:

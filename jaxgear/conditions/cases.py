@@ -1,5 +1,8 @@
 """The loads and manufactured pairs with which a design is judged."""
 
+from collections.abc import Callable
+from typing import TypeVar
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,8 +10,8 @@ from jaxtyping import Array, Float
 
 from ..contact import Mesh, OperatingPoint
 from ..contact.face_coupling import check_torque
-from ..contact.operating_point import operating_point_of
-from ..numerics import Checked, check, concrete, number, optional_real, program, real, result, whole
+from ..contact.operating_point import Torque, operating_point_of
+from ..numerics import Checked, Given, Numbers, check, concrete, number, optional_real, program, real, result, whole
 from ..tolerance import Deviation, Tolerance, sample_deviations
 from ..tolerance.deviation import deviation_field, flank_basis
 
@@ -30,7 +33,14 @@ class LoadSpectrum(Checked):
     friction: Float[Array, ""] | None = number("", low=0.0, optional=True)
     duration: Float[Array, ""] | None = number("h", low=0.0, open_low=True, optional=True)
 
-    def __init__(self, torques, weights=None, speeds=None, friction=None, duration=None):
+    def __init__(
+        self,
+        torques: Numbers,
+        weights: Numbers | None = None,
+        speeds: Numbers | None = None,
+        friction: Given | None = None,
+        duration: Given | None = None,
+    ) -> None:
         """Makes the spectrum.
 
         Args:
@@ -76,7 +86,9 @@ class LoadSpectrum(Checked):
             raise ValueError("LoadSpectrum: torques must be different" + ", or their speeds" * (len(given) > 1))
 
     @staticmethod
-    def from_hours(torques, hours, speeds=None, friction=None) -> "LoadSpectrum":
+    def from_hours(
+        torques: Numbers, hours: Numbers, speeds: Numbers | None = None, friction: Given | None = None
+    ) -> "LoadSpectrum":
         """A duty cycle: every torque with the hours that it is run for.
 
         Args:
@@ -111,6 +123,9 @@ def _alone(number):
 
 
 SAMPLES = 64  # manufactured pairs, where nothing is said
+
+Loads = Torque | LoadSpectrum  # one load or several
+Result = TypeVar("Result")  # a tree of arrays
 
 
 class Conditions(Checked):
@@ -185,7 +200,7 @@ class Cases(Checked):
         """Weight of every case, torques first; sum 1."""
         return _repeated(self.weight, self.samples)
 
-    def each(self, function):
+    def each(self, function: Callable[[OperatingPoint, Float[Array, "..."]], Result]) -> Result:
         """function(operating_point, removed) in every case, with a leading axis (cases,); the torques run slowest.
 
         A single case is not mapped, so that it costs no more than a plain call.
@@ -206,7 +221,13 @@ class Cases(Checked):
 
 
 def conditions(
-    owner: str, mesh: Mesh, torque, *, tolerance: Tolerance | None = None, samples: int | None = None, seed: int = 0
+    owner: str,
+    mesh: Mesh,
+    torque: Loads,
+    *,
+    tolerance: Tolerance | None = None,
+    samples: int | None = None,
+    seed: int = 0,
 ) -> Conditions:
     """Conditions of a torque or a load spectrum, with manufactured gears where there is a tolerance.
 
@@ -222,8 +243,9 @@ def conditions(
     Raises:
         ValueError: for a negative torque, samples without a tolerance, and for lead deviations on a mesh of one slice.
     """
-    load = torque
-    if not isinstance(torque, LoadSpectrum):
+    if isinstance(torque, LoadSpectrum):
+        load = torque
+    else:
         load = LoadSpectrum.of(operating_point_of(owner, torque, real(0.0).dtype))
     if tolerance is None:
         if samples is not None:

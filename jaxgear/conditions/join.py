@@ -4,7 +4,8 @@ A quantile is that of Harrell and Davis everywhere. It follows many values, so t
 samples it scatters less than the value that happens to stand at the level; of many, both are the same number.
 """
 
-from typing import Literal
+from collections.abc import Callable
+from typing import Literal, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -14,12 +15,20 @@ from jax.sharding import NamedSharding, PartitionSpec
 from jaxtyping import Array, Float
 
 from ..contact import Mesh
-from ..numerics import AbstractMeasure, CVaR, Mean, Quantile, Worst
+from ..numerics import AbstractMeasure, CVaR, Mean, Numbers, Quantile, Worst
 
 Better = Literal["smaller", "larger"]
+Tree = TypeVar("Tree")  # of arrays, as are the next two
+Shared = TypeVar("Shared")
+Result = TypeVar("Result")
 
 
-def joined(measure: AbstractMeasure, values, weights, better: Better = "smaller") -> Float[Array, ""]:
+def joined(
+    measure: AbstractMeasure,
+    values: Float[Array, " cases"],
+    weights: Float[Array, " cases"],
+    better: Better = "smaller",
+) -> Float[Array, ""]:
     """One number for the values of many cases, with failed ones, NaN, beyond all others.
 
     Args:
@@ -86,7 +95,7 @@ def side_by_side(mesh: Mesh, cases: int = 1) -> int:
     return min(designs, _MOST_DESIGNS.get(platform, designs))
 
 
-def padded(rows, multiple: int):
+def padded(rows: Numbers, multiple: int) -> np.ndarray:
     """Rows repeated at the end up to a multiple.
 
     Whole batches only: a rest would be a program of its own, compiled for the length of the contact solution.
@@ -100,17 +109,19 @@ def local_devices() -> DeviceMesh:
     return DeviceMesh(np.asarray(jax.local_devices()), (_AXIS,))
 
 
-def everywhere(tree, devices: DeviceMesh):
+def everywhere(tree: Tree, devices: DeviceMesh) -> Tree:
     """Arrays copied to all devices, once and not per call."""
     return jax.device_put(tree, NamedSharding(devices, PartitionSpec()))
 
 
-def divided(rows, devices: DeviceMesh):
+def divided(rows: Tree, devices: DeviceMesh) -> Tree:
     """Rows shared out among the devices; their number is a multiple of the number of devices."""
     return jax.device_put(rows, NamedSharding(devices, PartitionSpec(_AXIS)))
 
 
-def over_devices(function, rows, shared, *, batch: int | None, devices: DeviceMesh):
+def over_devices(
+    function: Callable[[Shared, Tree], Result], rows: Tree, shared: Shared, *, batch: int | None, devices: DeviceMesh
+) -> Result:
     """function(shared, row) of every row, rows leading: each device takes its share, `batch` rows side by side.
 
     Args:

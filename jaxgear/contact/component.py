@@ -6,6 +6,7 @@ from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Frozen
 from .cycle import MeshCycle
 from .mesh import Mesh
+from .operating_point import Torque
 from .solve import check_mesh, solve
 
 
@@ -31,7 +32,7 @@ class ModifiedMesh(eqx.Module):
 
     def __init__(
         self, mesh: Mesh, *, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None
-    ):
+    ) -> None:
         check_mesh("ModifiedMesh", mesh)
         self.pinion = NoModification() if pinion is None else pinion
         self.wheel = NoModification() if wheel is None else wheel
@@ -45,6 +46,6 @@ class ModifiedMesh(eqx.Module):
     def __repr__(self) -> str:
         return f"ModifiedMesh({self.mesh!r}, pinion={self.pinion!r}, wheel={self.wheel!r})"
 
-    def __call__(self, torque) -> MeshCycle:
+    def __call__(self, torque: Torque) -> MeshCycle:
         """Mesh cycle under a torque on the pinion [N m]; see `solve`."""
         return solve(self.mesh, torque, pinion=self.pinion, wheel=self.wheel)

@@ -1,5 +1,6 @@
 """What the contacts see of a modification around a place on the flank: its mean, slope and curvature."""
 
+from collections.abc import Sequence
 from functools import reduce
 from operator import add
 from typing import NamedTuple
@@ -18,6 +19,7 @@ from .mesh import Mesh
 
 Scalar = Float[Array, ""]
 Real = Float[Array, "..."]
+Sided = tuple[int, AbstractModification]  # with the number of its gear
 
 # Least half width over which a modification is averaged, relative to the relative radius: without load a slope would be
 # 0/0. Contacts are as narrow at a thousandth of usual loads.
@@ -96,7 +98,7 @@ def _side(mesh: Mesh, side: Side, direction: float) -> PlaceSide:
     )
 
 
-def terms_of(mesh: Mesh, dtype, pinion: AbstractModification, wheel: AbstractModification):
+def terms_of(mesh: Mesh, dtype: np.dtype, pinion: AbstractModification, wheel: AbstractModification) -> list[Sided]:
     """Every term of both modifications with the number of its side, in the precision of the mesh.
 
     On their own, since most vary along the profile or along the face only.
@@ -113,7 +115,7 @@ def terms_of(mesh: Mesh, dtype, pinion: AbstractModification, wheel: AbstractMod
     ]
 
 
-def varies_along_profile(sided, place: Place) -> bool:
+def varies_along_profile(sided: Sided, place: Place) -> bool:
     """Whether a term has other values along the profile than across the face: its array then has those axes."""
     side, term = sided
     shape = eqx.filter_eval_shape(lambda: term(flank_at(side, place, jnp.zeros_like(place.radius)))).shape
@@ -165,7 +167,7 @@ class Probe(NamedTuple):
     curvature: Real
 
 
-def probe(sided_terms, place: Place, moved: Real, nodes: tuple[Node, ...]) -> Probe:
+def probe(sided_terms: Sequence[Sided], place: Place, moved: Real, nodes: tuple[Node, ...]) -> Probe:
     inverse = 1 / place.half_width
     each = []
     for side, term in sided_terms:
@@ -184,7 +186,7 @@ def _moments(term, points, shares):
     return tuple(sums)
 
 
-def secant_slope(sided_terms, place: Place, moved: Real) -> Real:
+def secant_slope(sided_terms: Sequence[Sided], place: Place, moved: Real) -> Real:
     """Slope of the removed material [um/mm] over the middle half of a contact that has moved from its nominal place."""
     half, each = 0.5 * place.half_width, []
     for side, term in sided_terms:

@@ -14,7 +14,7 @@ from ..compliance.plane import contact_plane
 from ..compliance.toothload import tooth_load
 from ..geometry import GearPair, Margins, Outline, PathOfContact, explicit, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import AbstractSpring, SliceCoupling, changed, on_both, program
+from ..numerics import AbstractSpring, Given, SliceCoupling, changed, on_both, program
 from ..numerics.programs import begin
 from .covering import check_cover, closing, pairs_for
 from .face_coupling import check_modes, check_support, coupling_of, ends_together, spreading_of
@@ -164,7 +164,7 @@ class Mesh(eqx.Module):
         bent = None if self.coupling is None else self.coupling.support_deflection(self.lever, list(line_load))
         return jnp.zeros_like(line_load[0, 0]) if bent is None else jnp.min(bent, axis=0)
 
-    def flanks(self, offset=0.0) -> tuple[Flank, Flank]:
+    def flanks(self, offset: Given = 0.0) -> tuple[Flank, Flank]:
         """Points of pinion and wheel that face each other at a distance from the centre of contact.
 
         Args:
@@ -226,7 +226,7 @@ def prepare(
 
 
 def prepare_from(
-    first_phase,
+    first_phase: Given,
     pair: GearPair,
     compliance: AbstractCompliance,
     resolution: Resolution,
@@ -362,7 +362,7 @@ def _part(first, count: int, mesh: Mesh) -> Mesh:
     return eqx.tree_at(lambda m: [*_by_position(m), m.kinematics], mesh, [*taken, moved])
 
 
-def _by_position(mesh: Mesh) -> list:
+def _by_position(mesh: Mesh) -> list[Array | AbstractSpring]:
     """Everything whose last axis is that of the positions."""
     return [
         mesh.outer_steps,

@@ -1,9 +1,10 @@
 """What a mesh is run at: torque, speed and friction."""
 
 import jax
+import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, check, number, real
+from ..numerics import Checked, Given, check, number, real
 
 Scalar = Float[Array, ""]
 
@@ -25,7 +26,10 @@ class OperatingPoint(Checked):
     friction: Scalar | None = number("", low=0.0, optional=True, default=None)
 
 
-def operating_point_of(owner: str, torque, dtype) -> OperatingPoint:
+Torque = Given | OperatingPoint  # a torque on the pinion [N m] alone, or with what belongs to it
+
+
+def operating_point_of(owner: str, torque: Torque, dtype: np.dtype) -> OperatingPoint:
     """An operating point in the precision of a mesh, of a torque [N m] or of an operating point.
 
     Raises:

@@ -6,7 +6,7 @@ from math import gcd
 import equinox as eqx
 import numpy as np
 
-from ..numerics import Checked, check, count, number, whole
+from ..numerics import Checked, Given, check, count, number, whole
 
 _SLIDING_NODES = 3  # a parabola
 _SLIDE_STEPS = 2
@@ -153,7 +153,7 @@ class Resolution(Checked):
         return reach(self.chosen_pairs)
 
 
-def end_relief_widths(face_width, length, slices: int = 11) -> tuple[int, ...]:
+def end_relief_widths(face_width: Given, length: Given, slices: int = 11) -> tuple[int, ...]:
     """Widths of slices that show an end relief, for `Resolution.slice_widths`.
 
     The load peaks where the relief begins: slices end there, and narrow to a sixth of its length on either side. Eleven
@@ -175,7 +175,7 @@ def end_relief_widths(face_width, length, slices: int = 11) -> tuple[int, ...]:
     check("end_relief_widths", "length", length, "mm", low=0.0, high=float(face_width) / 3, open_low=True)
     middle, best = slices - 2 * len(_END), None
     for unit in range(1, _FINEST + 1):  # parts of the face in the narrowest slice
-        wide = max(unit, round((_OVER_RELIEF * face_width / length - 2 * sum(_END)) * unit / middle))
+        wide = max(unit, round(float((_OVER_RELIEF * face_width / length - 2 * sum(_END)) * unit / middle)))
         end = [unit * width for width in _END]
         made = (*end, *[wide] * middle, *end[::-1])
         missed = abs(_OVER_RELIEF * unit / sum(made) * face_width / length - 1)

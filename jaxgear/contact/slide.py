@@ -22,7 +22,7 @@ to 9 % too small, and the loaded width leaves 2.5 % at worst.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -31,7 +31,7 @@ from jaxtyping import Array, Float
 
 from ..compliance import default_compliance
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import Checked, changed, program, real, result, stored
+from ..numerics import Checked, Numbers, changed, program, real, result, stored
 from .contact_width import (
     Node,
     Place,
@@ -73,12 +73,12 @@ class RemovedMaterial(Checked):
     __radd__ = __add__
 
 
-def nothing_removed(sizes: Resolution, dtype) -> RemovedMaterial:
+def nothing_removed(sizes: Resolution, dtype: np.dtype) -> RemovedMaterial:
     """That of nominal involutes."""
     return as_removed(sizes, np.zeros((sizes.chosen_pairs, sizes.slices, sizes.positions), dtype))
 
 
-def as_removed(sizes: Resolution, amount: Any) -> RemovedMaterial:
+def as_removed(sizes: Resolution, amount: Numbers) -> RemovedMaterial:
     """A bare amount [um], met at the nominal contact."""
     amount = real(amount)
     flat = real(np.zeros((sizes.chosen_pairs, 1, sizes.positions), amount.dtype))

@@ -1,16 +1,17 @@
 """Fields over the contacts of a mesh cycle as tables over one gear's flank: what wears it away, for one."""
 
-from typing import Any, Literal
+from typing import Literal
 
 import jax.numpy as jnp
 
 from ..microgeometry import TabulatedFlank, TabulatedProfile
+from ..numerics import Given
 from .kinematics import Kinematics
 
 
 def flank_table(
     kinematics: Kinematics,
-    field: Any,
+    field: Given,
     gear: Literal["pinion", "wheel"],
     method: Literal["linear", "natural_cubic", "monotonic"] = "linear",
 ) -> TabulatedFlank | TabulatedProfile:

@@ -1,15 +1,16 @@
 """Where branches of periodic orbits turn or lose stability: the kinds of these points, and where they lie."""
 
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..numerics import Checked, kernel, real, result
+from ..numerics import Checked, Numbers, kernel, real, result
 from .orbit import Orbit, outside
+from .oscillator import Oscillator
 from .poincare import (
     STEPS,
     Corrected,
@@ -145,7 +146,7 @@ class BifurcationPoint(Checked):
     converged: Bool[Array, ""] = result()
 
 
-def bifurcation_of(oscillator: Any, near: Bifurcation, *, steps: Any = STEPS) -> BifurcationPoint:
+def bifurcation_of(oscillator: Oscillator | Family, near: Bifurcation, *, steps: Numbers = STEPS) -> BifurcationPoint:
     """The bifurcation of the same kind next to one that was found, as a function of every number of the oscillator.
 
     The branch is followed to where a number is zero: the slope of the parameter at a fold, the distance of a

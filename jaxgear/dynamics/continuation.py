@@ -1,19 +1,21 @@
 """Branches of periodic orbits over a parameter, followed through folds by their arclength."""
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
-from ..numerics import Checked, check, kernel, real, result, whole
+from ..numerics import Checked, Given, Numbers, check, kernel, real, result, whole
 from .bifurcation import Bifurcation, Kind, Tests, bifurcation_at, tests_of
 from .orbit import Orbit, orbit_at
+from .oscillator import Oscillator
 from .poincare import (
     STEPS,
     Corrected,
+    Family,
     OverSpeed,
     Scales,
     corrected,
@@ -73,15 +75,15 @@ class Branch(Checked):
 
 
 def follow_orbits(
-    oscillator: Any,
+    oscillator: Oscillator | Family,
     start: Orbit | Bifurcation,
     *,
-    within: tuple[Any, Any],
+    within: tuple[float, float],
     direction: Literal["up", "down"] = "up",
-    parameter: Any = None,
+    parameter: Given | None = None,
     step: float = 0.02,
     points: int = 500,
-    steps: Any = STEPS,
+    steps: Numbers = STEPS,
     callback: Callable[[int, Orbit], None] | None = None,
 ) -> Branch:
     """Follows a branch of periodic orbits through its folds until the parameter leaves a range.

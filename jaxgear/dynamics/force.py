@@ -3,11 +3,12 @@
 from abc import abstractmethod
 from collections.abc import Callable
 from functools import partial
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Float, PyTree
 
 from ..numerics import Checked, bracketed_root, number, real
 
@@ -40,11 +41,11 @@ class AbstractMeshForce(Checked):
         return jnp.linspace(0.0, 1.0, steps + 1)
 
     @abstractmethod
-    def at(self, phase: Scalar) -> Any:
+    def at(self, phase: Scalar) -> PyTree[Array]:
         """A tree of arrays: what the force at a mesh position [base pitches, any number] depends on."""
 
     @abstractmethod
-    def force(self, place: Any, dte: Scalar) -> Scalar:
+    def force(self, place: PyTree[Array], dte: Scalar) -> Scalar:
         """Force [N] at a place that `at` has found and a DTE [um]."""
 
     def __call__(self, phase: Scalar, dte: Scalar) -> Scalar:
@@ -87,14 +88,14 @@ class AbstractMeshForce(Checked):
 
         return (1 - _TOUCHING) * force / self.over_cycle(deflection, force.dtype)
 
-    def over_cycle(self, of: Callable[[Scalar], Scalar], dtype: Any) -> Scalar:
+    def over_cycle(self, of: Callable[[Scalar], Scalar], dtype: np.dtype) -> Scalar:
         """Mean of a function of the mesh position over a cycle, each position for the step about it."""
         begin = self.nodes(_POSITIONS).astype(dtype)
         return jnp.sum(jnp.diff(begin) * jax.vmap(of)((begin[:-1] + begin[1:]) / 2))
 
 
 @partial(jax.jit, inline=True)
-def te_under(mesh_force: AbstractMeshForce, place: Any, force: Scalar) -> Scalar:
+def te_under(mesh_force: AbstractMeshForce, place: PyTree[Array], force: Scalar) -> Scalar:
     """Transmission error [um] at which a mesh force has a value [N]; NaN where it has it nowhere.
 
     A mesh force that is NaN from some DTE on counts as larger than any value there.
@@ -116,7 +117,7 @@ def te_under(mesh_force: AbstractMeshForce, place: Any, force: Scalar) -> Scalar
     return jnp.where(known, found, jnp.nan)
 
 
-def missing(dte: Scalar, args) -> Scalar:
+def missing(dte: Scalar, args: tuple[AbstractMeshForce, PyTree[Array], Scalar]) -> Scalar:
     """Force [N] at a DTE [um] less the wanted one; args are (mesh force, place, wanted force)."""
     mesh_force, place, force = args
     found = mesh_force.force(place, dte)
@@ -134,10 +135,10 @@ class DeadZone(AbstractMeshForce):
     stiffness_constant: Scalar = number("N/um", low=0.0, open_low=True, default=1.0)
     half_clearance: Scalar = number("um", low=0.0, default=1.0)
 
-    def at(self, phase: Scalar) -> tuple:
+    def at(self, phase: Scalar) -> tuple[()]:
         return ()
 
-    def force(self, place, dte: Scalar) -> Scalar:
+    def force(self, place: tuple[()], dte: Scalar) -> Scalar:
         half = self.half_clearance
         return self.stiffness_constant * (jnp.maximum(dte - half, 0.0) + jnp.minimum(dte + half, 0.0))
 

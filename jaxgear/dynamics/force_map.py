@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from ..contact.prescribed import solve_series
 from ..numerics import program, result
@@ -109,7 +109,7 @@ def distances(reach: Scalar, levels: int) -> Float[Array, " levels"]:
     return reach * (_FIRST_STEP + 2 * (1 - _FIRST_STEP) * share) / (levels - 1)
 
 
-def between(phase: Scalar, first: Scalar, count: int):
+def between(phase: Scalar, first: Scalar, count: int) -> tuple[Int[Array, ""], Int[Array, ""], Scalar]:
     """The places of a periodic grid on both sides of a mesh position, and what share of the way it is to the second."""
     place = (phase - first) * count
     lower = jnp.floor(place)
@@ -124,7 +124,9 @@ def closing(start: Sides, dte: Scalar) -> tuple[Bool[Array, ""], Scalar]:
 
 
 @program
-def tabulate(flanks: Flanks, unloaded, compliance: Scalar, reach: Scalar, levels: int):
+def tabulate(
+    flanks: Flanks, unloaded: Float[Array, " positions"], compliance: Scalar, reach: Scalar, levels: int
+) -> tuple[Float[Array, "positions levels"], Float[Array, "positions levels"], Bool[Array, ""]]:
     """Force [N] and slope [N/um] of one side at levels of the DTE, shape (positions, levels) each, and whether
     all of it has converged.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypedDict, Unpack, get_args
 
 import equinox as eqx
 import jax
@@ -11,10 +11,10 @@ from jaxtyping import Array, Float
 
 from ..contact import Mesh
 from ..contact.mesh import prepare_from
-from ..contact.operating_point import operating_point_of
+from ..contact.operating_point import Torque, operating_point_of
 from ..contact.solve import check_mesh
 from ..microgeometry import AbstractModification
-from ..numerics import check, concrete, real, whole
+from ..numerics import Given, check, concrete, real, whole
 from ..numerics.programs import is_eager
 from .flanks import Both, Flanks, Static, coast_flanks, drive_flanks, static
 from .force import AbstractMeshForce
@@ -31,18 +31,18 @@ _LEVELS, _REACH = 48, 5.0
 
 def mesh_force(
     mesh: Mesh,
+    torque: Torque,
     *,
-    torque: Any,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
     coast: Both | None = None,
     model: Model = "map",
     positions: int = 640,
     levels: int = _LEVELS,
-    reach: Any = _REACH,
-    compliance: Any = 0.0,
-    deviation: Any = None,
-) -> Any:
+    reach: Given = _REACH,
+    compliance: Given = 0.0,
+    deviation: Given | None = None,
+) -> AbstractMeshForce:
     """Force of a mesh as a function of mesh position and DTE, for oscillators.
 
     The DTE is that of the teeth, of the wind-up of the gear bodies (`mesh.hub`) and of `compliance` in series.
@@ -77,17 +77,26 @@ def mesh_force(
         ValueError: for a number outside its range, flanks that jam, or a modification that varies along the face on a
             mesh of one slice.
     """
-    flanks = {"pinion": pinion, "wheel": wheel, "coast": coast, "deviation": deviation}
     return force_and_mesh(
-        mesh, torque=torque, model=model, positions=positions, levels=levels, reach=reach, compliance=compliance,
-        **flanks,
+        mesh, torque, model=model, positions=positions, levels=levels, reach=reach, compliance=compliance,
+        pinion=pinion, wheel=wheel, coast=coast, deviation=deviation,
     )[0]  # fmt: skip
 
 
 def force_and_mesh(
-    mesh: Mesh, *, torque, model, positions, compliance, pinion=None, wheel=None, coast=None, deviation=None,
-    levels=_LEVELS, reach=_REACH,
-) -> tuple[AbstractMeshForce, Mesh]:  # fmt: skip
+    mesh: Mesh,
+    torque: Torque,
+    *,
+    model: Model,
+    positions: int,
+    compliance: Given,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+    coast: Both | None = None,
+    deviation: Given | None = None,
+    levels: int = _LEVELS,
+    reach: Given = _REACH,
+) -> tuple[AbstractMeshForce, Mesh]:
     """`mesh_force`, and the mesh that it was made on."""
     check_mesh("mesh_force", mesh)
     torque = operating_point_of("mesh_force", torque, mesh.slice_width.dtype).torque
@@ -101,15 +110,22 @@ def force_and_mesh(
     whole("mesh_force", "positions", positions, 4, 65536)
     given, mesh = mesh, resized(mesh, positions=positions)
     both = (pinion, wheel), _coast_of(coast, (pinion, wheel))
-    off = interpolated(deviation, given, mesh)
+    off = _besides(deviation, given, mesh)
     made = _made(mesh, torque, both, off, model, levels, farthest, series)
     while _is_too_narrow(mesh, made):
         mesh = resized(mesh, pairs=mesh.resolution.chosen_pairs + 1)
-        made = _made(mesh, torque, both, interpolated(deviation, given, mesh), model, levels, farthest, series)
+        made = _made(mesh, torque, both, _besides(deviation, given, mesh), model, levels, farthest, series)
     return made, mesh
 
 
-def resized(mesh: Mesh, **sizes: Any) -> Mesh:
+class Sizes(TypedDict, total=False):
+    """Of arrays, in place of those of a mesh."""
+
+    positions: int
+    pairs: int
+
+
+def resized(mesh: Mesh, **sizes: Unpack[Sizes]) -> Mesh:
     """The mesh in other array sizes, with its number of pairs fixed or open as before."""
     wanted = replace(mesh.resolution, **sizes)
     if wanted == mesh.resolution:
@@ -118,10 +134,8 @@ def resized(mesh: Mesh, **sizes: Any) -> Mesh:
     return replace(made, automatic=mesh.automatic)
 
 
-def interpolated(deviation: Any, of: Mesh, mesh: Mesh):
-    """Material that deviations remove on another mesh of the same gears; a number where there are none."""
-    if deviation is None:
-        return 0.0
+def interpolated(deviation: Given, of: Mesh, mesh: Mesh) -> Float[Array, "pairs slices positions"]:
+    """Material that deviations remove on another mesh of the same gears."""
     wanted = of.resolution.chosen_pairs, of.resolution.slices, of.resolution.positions
     if jnp.shape(deviation) != wanted:
         raise ValueError(
@@ -132,6 +146,11 @@ def interpolated(deviation: Any, of: Mesh, mesh: Mesh):
     rows = jnp.moveaxis(jnp.asarray(deviation)[::-1], 1, 0).reshape(of.resolution.slices, -1)
     found = jax.vmap(lambda row: jnp.interp(here, there, row))(rows)
     return jnp.moveaxis(found.reshape(len(rows), *mesh.path.shape), 0, 1)[::-1]
+
+
+def _besides(deviation: Given | None, of: Mesh, mesh: Mesh) -> Array | float:
+    """`interpolated`; a number where there are no deviations."""
+    return 0.0 if deviation is None else interpolated(deviation, of, mesh)
 
 
 def _number(name: str, value: Any, unit: str, mesh: Mesh, **limits) -> Scalar:

@@ -5,7 +5,7 @@ from jaxtyping import Array, Float
 
 from ..compliance import IsoStiffness, iso_stiffness
 from ..geometry import Gear, GearPair, path_of_contact
-from ..numerics import Checked, check, optional_real, program, real, result
+from ..numerics import Checked, Given, check, optional_real, program, real, result
 from ..tolerance import ToleranceClass
 
 Scalar = Float[Array, ""]
@@ -66,14 +66,14 @@ class IsoDynamicFactor(Checked):
 
 def iso_dynamic_factor(
     pair: GearPair,
+    torque: Given,
+    speed: Given,
     *,
-    torque,
-    speed,
-    quality_class=None,
-    tip_relief=0.0,
-    application_factor=1.0,
-    reduced_mass=None,
-    run_in=_RUN_IN,
+    quality_class: Given | None = None,
+    tip_relief: Given = 0.0,
+    application_factor: Given = 1.0,
+    reduced_mass: Given | None = None,
+    run_in: Given = _RUN_IN,
 ) -> IsoDynamicFactor:
     """K_v of a spur gear pair.
 
@@ -114,7 +114,7 @@ def iso_dynamic_factor(
     )
 
 
-def resonance_speed(teeth, mesh_stiffness, reduced_mass) -> Scalar:
+def resonance_speed(teeth: Given, mesh_stiffness: Given, reduced_mass: Given) -> Scalar:
     """n_E1 = 30000 / (pi z_1) sqrt(c_gamma_alpha / m_red) [rpm], where teeth come in at the natural frequency.
 
     Args:
@@ -125,7 +125,7 @@ def resonance_speed(teeth, mesh_stiffness, reduced_mass) -> Scalar:
     return 30_000 / (jnp.pi * real(teeth)) * jnp.sqrt(real(mesh_stiffness) / real(reduced_mass))
 
 
-def constants_of(contact_ratio) -> Float[Array, " seven"]:
+def constants_of(contact_ratio: Given) -> Float[Array, " seven"]:
     """C_v1 ... C_v7 at a total contact ratio above 1 (table 8 of ISO 6336-1:2006)."""
     ratio = real(contact_ratio)
     high = ratio > 2
@@ -145,7 +145,14 @@ def constants_of(contact_ratio) -> Float[Array, " seven"]:
     )
 
 
-def factor_of(resonance_ratio, main_begins, pitch, form, relief, constants) -> Scalar:
+def factor_of(
+    resonance_ratio: Given,
+    main_begins: Given,
+    pitch: Given,
+    form: Given,
+    relief: Given,
+    constants: Float[Array, " seven"],
+) -> Scalar:
     """K_v from N, N_S, B_p, B_f, B_k and C_v1 ... C_v7.
 
     Up to N_S it rises with N, to 1.15 it is that of the main resonance, from 1.5 on that of supercritical speed, and

@@ -1,16 +1,16 @@
 """Motions over time: phase portraits and time histories at one speed, run-up and run-down."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from ..numerics import Checked, check, concrete, kernel, real, result, whole
+from ..numerics import Checked, Given, Numbers, check, concrete, kernel, real, result, whole
 from .integrate import cycle_of, cycles, history, largest, one_step, smallest, step_of
 from .oscillator import Oscillator, State, at_rest, static_force
-from .poincare import STEPS, checked, steps_at
+from .poincare import STEPS, Start, checked, steps_at
 from .speed_sweep import check_single, start_of, steps_for
 
 Samples = Float[Array, " samples"]
@@ -36,7 +36,9 @@ class Motion(Checked):
     support_force: Float[Array, "samples coordinates"] = result("N")
 
 
-def motion(oscillator: Oscillator, mesh_frequency: Any, start: Any, *, periods: int = 1, steps: Any = STEPS) -> Motion:
+def motion(
+    oscillator: Oscillator, mesh_frequency: Given, start: Start, *, periods: int = 1, steps: Numbers = STEPS
+) -> Motion:
     """The motion from a state over some mesh cycles.
 
     Args:

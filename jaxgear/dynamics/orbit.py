@@ -1,7 +1,6 @@
 """Periodic orbits by Newton shooting on the Poincare map, with their Floquet multipliers and exact derivatives."""
 
 import dataclasses
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -9,10 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
-from ..numerics import Checked, check, count, implicit_root, kernel, real, result, whole, with_jacobian
-from .integrate import cycles, history, largest, mean, rms, share, smallest
+from ..numerics import Checked, Given, Numbers, check, count, implicit_root, kernel, real, result, whole, with_jacobian
+from .integrate import Steps, cycles, history, largest, mean, rms, share, smallest
 from .oscillator import Coordinates, Oscillator, State, static_force
-from .poincare import STEPS, after, checked, moved, scaled, steps_at, unscaled
+from .poincare import STEPS, Nodes, Start, Unknowns, after, checked, moved, scaled, steps_at, unscaled
 
 Scalar = Float[Array, ""]
 Samples = Float[Array, " samples"]
@@ -82,13 +81,13 @@ class Orbit(Checked):
         return ~jnp.any(outside(jnp.abs(jnp.linalg.eigvals(jax.lax.stop_gradient(self.monodromy)))), axis=-1)
 
 
-def outside(moduli):
+def outside(moduli: Float[Array | np.ndarray, "..."]) -> Bool[Array | np.ndarray, "..."]:
     """Which multipliers lie outside of the unit circle."""
     return ~(moduli <= 1 + _NEUTRAL * np.sqrt(jnp.finfo(moduli.dtype).eps))
 
 
 def find_orbit(
-    oscillator: Oscillator, mesh_frequency: Any, start: Any, *, periods: int = 1, steps: Any = STEPS
+    oscillator: Oscillator, mesh_frequency: Given, start: Start, *, periods: int = 1, steps: Numbers = STEPS
 ) -> Orbit:
     """The periodic orbit next to a state, stable or not.
 
@@ -114,7 +113,9 @@ def find_orbit(
     return _found(oscillator, frequency, start, nodes, whole("find_orbit", "periods", periods))
 
 
-def settle(oscillator: Oscillator, mesh_frequency: Any, start: Any, *, cycles: int = 100, steps: Any = STEPS) -> State:
+def settle(
+    oscillator: Oscillator, mesh_frequency: Given, start: Start, *, cycles: int = 100, steps: Numbers = STEPS
+) -> State:
     """The state after some mesh cycles, at mesh position 0; it has no derivatives.
 
     With a damping ratio zeta deviations decay by exp(-2 pi zeta f_n / f) per cycle.
@@ -132,12 +133,12 @@ def settle(oscillator: Oscillator, mesh_frequency: Any, start: Any, *, cycles: i
 
 def steady_orbit(
     oscillator: Oscillator,
-    mesh_frequency: Any,
-    start: Any,
+    mesh_frequency: Given,
+    start: Start,
     *,
     settle: int = 100,
     periods: int = 1,
-    steps: Any = STEPS,
+    steps: Numbers = STEPS,
 ) -> Orbit:
     """The orbit on which the motion from a start settles: a stable one, with exact derivatives.
 
@@ -160,12 +161,12 @@ def steady_orbit(
 
 def steady_orbits(
     oscillator: Oscillator,
-    mesh_frequencies: Any,
-    start: Any,
+    mesh_frequencies: Numbers,
+    start: Start,
     *,
     settle: int = 0,
     periods: int = 1,
-    steps: Any = STEPS,
+    steps: Numbers = STEPS,
 ) -> Orbit:
     """`steady_orbit` at many speeds, each from a state of its own: what objectives over a speed band are made of.
 
@@ -212,7 +213,9 @@ def _found(oscillator, frequency, start, nodes, periods: int) -> Orbit:
 
 
 @kernel
-def settled_orbit(oscillator: Oscillator, frequency: Scalar, start: State, nodes, settle: int, periods: int) -> Orbit:
+def settled_orbit(
+    oscillator: Oscillator, frequency: Scalar, start: State, nodes: Nodes, settle: int, periods: int
+) -> Orbit:
     """`steady_orbit` without checks.
 
     Where the motion does not settle on an orbit of so many cycles it is those cycles themselves: they have not
@@ -227,7 +230,7 @@ def settled_orbit(oscillator: Oscillator, frequency: Scalar, start: State, nodes
     return dataclasses.replace(orbit, converged=orbit.converged & orbit.stable & same)
 
 
-def orbit_at(oscillator: Oscillator, z, steps, frequency: Scalar, periods: int) -> Orbit:
+def orbit_at(oscillator: Oscillator, z: Unknowns, steps: Steps, frequency: Scalar, periods: int) -> Orbit:
     """What the orbit through some unknowns does."""
 
     def flown(z):

@@ -1,13 +1,14 @@
 """Masses on the line of action with one mesh between them: vector fields for any integrator, and the state of rest."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PyTree
 
-from ..numerics import Checked, number, program, pseudo_inverse, safe_divide
+from ..numerics import Checked, Given, number, program, pseudo_inverse, safe_divide
 from .force import AbstractMeshForce, te_under
 
 Scalar = Float[Array, ""]
@@ -72,11 +73,11 @@ class Oscillator(Checked):
     excitation: Excitation | None = None
     newton: float = eqx.field(static=True, default=NEWTON)
 
-    def __call__(self, t: Any, y: State, args: Any) -> State:
-        phase, frequency = args(t) if callable(args) else (t * args, args)
+    def __call__(self, t: Given, y: State, args: Scalar | Callable[[Given], tuple[Scalar, Scalar]]) -> State:
+        phase, frequency = args(t) if callable(args) else (args * t, args)
         return self.rate(self.mesh_force.at(phase), phase, y, frequency)
 
-    def rate(self, place: Any, phase: Scalar, y: State, mesh_frequency: Scalar) -> State:
+    def rate(self, place: PyTree[Array], phase: Scalar, y: State, mesh_frequency: Scalar) -> State:
         """Derivative of the state where the place of the mesh force is known already."""
         x, v = y
         error, error_rate, extra = self._excited(phase, mesh_frequency)

@@ -1,7 +1,7 @@
 """The map of a state over some mesh cycles, in scaled unknowns, and one point of a branch of its fixed points."""
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..numerics import check, concrete, newton, real, solve, whole
+from ..numerics import Given, Numbers, check, concrete, newton, real, solve, whole
 from .integrate import Steps, one_step, steps_of
 from .oscillator import Oscillator, State
 
@@ -46,9 +46,13 @@ def moved(oscillator: Oscillator, z: Unknowns, steps: Steps, mesh_frequency: Sca
 
 
 Nodes = int | Float[Array, " nodes"]
+Start = Sequence[Numbers]  # displacements [um] and velocities [um/s]
+_Tree = TypeVar("_Tree")
 
 
-def checked(owner: str, oscillator: Any, mesh_frequency: Any, start: Any, steps: Any) -> tuple[Scalar, State, Nodes]:
+def checked(
+    owner: str, oscillator: Oscillator, mesh_frequency: Given, start: Start, steps: Numbers
+) -> tuple[Scalar, State, Nodes]:
     """Mesh frequency and start as arrays of the oscillator's type, and what `steps_at` takes.
 
     Raises:
@@ -75,7 +79,7 @@ def checked(owner: str, oscillator: Any, mesh_frequency: Any, start: Any, steps:
     return frequency.astype(dtype), (x, v), nodes_of(owner, steps)
 
 
-def nodes_of(owner: str, steps: Any) -> Nodes:
+def nodes_of(owner: str, steps: Numbers) -> Nodes:
     """What `steps_at` takes, checked.
 
     Raises:
@@ -152,7 +156,7 @@ class Corrected(NamedTuple):
     converged: Bool[Array, ""]
 
 
-def family_of(oscillator: Any) -> Family:
+def family_of(oscillator: Oscillator | Family) -> Family:
     """The family that an oscillator stands for, that over the mesh frequency, or the given one.
 
     Raises:
@@ -166,14 +170,14 @@ def family_of(oscillator: Any) -> Family:
     return oscillator
 
 
-def change(family: Family, place: Place, scales: Scales, nodes, periods: int) -> Array:
+def change(family: Family, place: Place, scales: Scales, nodes: Nodes, periods: int) -> Array:
     """By how much the unknowns change over an orbit, divided by their scale."""
     z, parameter = scales.unknowns(place)
     oscillator, frequency = family(parameter)
     return moved(oscillator, z, steps_at(oscillator, nodes), frequency, periods) / scales.size
 
 
-def corrected(family: Family, guess: Place, normal: Place, scales: Scales, nodes, periods: int) -> Corrected:
+def corrected(family: Family, guess: Place, normal: Place, scales: Scales, nodes: Nodes, periods: int) -> Corrected:
     """The point of a branch on the plane through a guess across a normal, along which the tangent points."""
 
     def equations(place):
@@ -187,12 +191,12 @@ def corrected(family: Family, guess: Place, normal: Place, scales: Scales, nodes
     return Corrected(found.root, tangent / jnp.linalg.norm(tangent), monodromy, found.steps, found.converged)
 
 
-def first_direction(size: int, dtype, sign: float) -> Place:
+def first_direction(size: int, dtype: np.dtype, sign: float) -> Place:
     """The direction in which only the parameter changes."""
     return jnp.zeros(size, dtype).at[-1].set(sign)
 
 
-def held(tree: Any) -> Any:
+def held(tree: _Tree) -> _Tree:
     """A tree whose arrays pass no derivative."""
     arrays, rest = eqx.partition(tree, eqx.is_array)
     return eqx.combine(jax.lax.stop_gradient(arrays), rest)

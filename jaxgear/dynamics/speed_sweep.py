@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from ..numerics import check, concrete, kernel, real, whole
+from ..numerics import Numbers, check, concrete, kernel, real, whole
 from .integrate import cycle_of
 from .oscillator import Oscillator, State, at_rest, natural_frequencies, static_force
 from .response import SpeedResponse, waves_of
@@ -18,6 +18,7 @@ from .settling import Speed, kick_of, kicked, steady_state
 
 Scalar = Float[Array, ""]
 Speeds = Float[Array, " speeds"]
+Direction = Literal["up", "down"]
 
 ORDERS = tuple(half / 2 for half in range(1, 13))
 
@@ -44,9 +45,9 @@ class _Sizes(NamedTuple):
 
 def speed_sweep(
     oscillator: Oscillator,
-    mesh_frequencies,
+    mesh_frequencies: Numbers,
     *,
-    direction: Literal["up", "down"] = "up",
+    direction: Direction = "up",
     start: State | None = None,
     kick: float | None = None,
     carry: bool = True,
@@ -106,7 +107,7 @@ def speed_sweep(
     return dataclasses.replace(found, direction=direction)
 
 
-def checked_frequencies(owner: str, given) -> Speeds:
+def checked_frequencies(owner: str, given: Numbers) -> Speeds:
     """Mesh frequencies as an array; raises a one-line `ValueError` unless they increase from above zero."""
     frequencies = real(given)
     if frequencies.ndim != 1 or not len(frequencies):
@@ -118,7 +119,7 @@ def checked_frequencies(owner: str, given) -> Speeds:
     return frequencies
 
 
-def steps_for(oscillator: Oscillator, mesh_frequencies) -> tuple[int, ...]:
+def steps_for(oscillator: Oscillator, mesh_frequencies: Numbers) -> tuple[int, ...]:
     """Steps per mesh cycle that `speed_sweep` takes at each speed.
 
     Args:
@@ -162,23 +163,35 @@ class _Limits(NamedTuple):
 
 
 def prepared(
-    owner, oscillator, frequencies, *, direction="up", kick=None, carry=True, steps=None, tolerance=None,
-    most_cycles=500, most_periods=4, points=32, orders=ORDERS, kicks=(),
-) -> tuple[_Sizes, _Limits]:  # fmt: skip
-    """Options of a sweep, checked: what is static and what is not."""
+    owner: str,
+    oscillator: Oscillator | None,
+    frequencies: Speeds,
+    *,
+    direction: Direction = "up",
+    kick: float | None = None,
+    carry: bool = True,
+    steps: int | Sequence[int] | None = None,
+    tolerance: float | None = None,
+    most_cycles: int = 500,
+    most_periods: int = 4,
+    points: int = 32,
+    orders: Sequence[float] = ORDERS,
+    kicks: Sequence[float] = (),
+) -> tuple[_Sizes, _Limits]:
+    """Options of a sweep, checked: what is static and what is not; without an oscillator for given steps alone."""
     if direction not in ("up", "down"):
         raise ValueError(f'{owner}: direction = {direction!r} must be "up" or "down"')
     if not isinstance(carry, bool):
         raise ValueError(f"{owner}: carry = {carry!r} must be True or False")
     dtype = frequencies.dtype
     precision = float(jnp.finfo(dtype).eps)
-    tolerance = real(precision**0.5 if tolerance is None else tolerance)
-    kick, kicks = real(1.0 if kick is None else kick), real(kicks)
-    check(owner, "tolerance", tolerance, "", low=precision, high=0.1)
-    check(owner, "kick", kick, "", low=1.0, high=MOST_KICK)
-    if kicks.ndim != 1:
-        raise ValueError(f"{owner}: kicks has shape {kicks.shape}, must be a list of numbers")
-    check(owner, "kicks", kicks, "", low=1.0, high=MOST_KICK)
+    least_change = real(precision**0.5 if tolerance is None else tolerance)
+    first, further = real(1.0 if kick is None else kick), real(kicks)
+    check(owner, "tolerance", least_change, "", low=precision, high=0.1)
+    check(owner, "kick", first, "", low=1.0, high=MOST_KICK)
+    if further.ndim != 1:
+        raise ValueError(f"{owner}: kicks has shape {further.shape}, must be a list of numbers")
+    check(owner, "kicks", further, "", low=1.0, high=MOST_KICK)
     orders = tuple(float(order) for order in np.atleast_1d(np.asarray(orders, float)))
     check(owner, "orders", np.asarray(orders), "", low=0.0, open_low=True)
     most_cycles = whole(owner, "most_cycles", most_cycles)
@@ -190,10 +203,10 @@ def prepared(
     return sizes, _Limits(
         jnp.asarray(counts),
         jnp.asarray(direction == "down"),
-        tolerance.astype(dtype),
+        least_change.astype(dtype),
         jnp.asarray(most_cycles),
-        kick.astype(dtype),
-        kicks.astype(dtype),
+        first.astype(dtype),
+        further.astype(dtype),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Gear, GearPair
-from ..numerics import check, concrete, real
+from ..numerics import Given, Numbers, check, concrete, real
 from .force import AbstractMeshForce
 from .oscillator import NEWTON, Excitation, Oscillator
 
@@ -40,7 +40,7 @@ def _radii(gear: Gear) -> tuple[Scalar, Scalar]:
     return gear.pitch_radius * _MM, inner * _MM
 
 
-def equivalent_mass(pair: GearPair, inertias=None) -> Scalar:
+def equivalent_mass(pair: GearPair, inertias: Numbers | None = None) -> Scalar:
     """Mass on the line of action of two gears that turn against each other [kg].
 
     1 / m = r_b1^2 / I_1 + r_b2^2 / I_2
@@ -57,13 +57,13 @@ def equivalent_mass(pair: GearPair, inertias=None) -> Scalar:
 
 def torsional(
     mesh_force: AbstractMeshForce,
-    *,
     pair: GearPair,
-    torque,
-    damping_ratio=None,
-    damping=None,
-    inertias=None,
-    mean_stiffness=None,
+    torque: Given,
+    *,
+    damping_ratio: Given | None = None,
+    damping: Given | None = None,
+    inertias: Numbers | None = None,
+    mean_stiffness: Given | None = None,
     excitation: Excitation | None = None,
 ) -> Oscillator:
     """The relative rotation of two gears on the line of action, one coordinate: the DTE q [um].
@@ -94,13 +94,13 @@ def torsional(
 
 def two_gears(
     mesh_force: AbstractMeshForce,
-    *,
     pair: GearPair,
-    torque,
-    damping_ratio=None,
-    damping=None,
-    inertias=None,
-    mean_stiffness=None,
+    torque: Given,
+    *,
+    damping_ratio: Given | None = None,
+    damping: Given | None = None,
+    inertias: Numbers | None = None,
+    mean_stiffness: Given | None = None,
     excitation: Excitation | None = None,
 ) -> Oscillator:
     """Pinion and wheel as two coordinates, r_b1 theta_1 and r_b2 theta_2 [um], which nothing holds.
@@ -125,16 +125,16 @@ def two_gears(
 
 def on_bearings(
     mesh_force: AbstractMeshForce,
-    *,
     pair: GearPair,
-    torque,
-    bearing_stiffness,
-    bearing_damping=None,
-    masses=None,
-    damping_ratio=None,
-    damping=None,
-    inertias=None,
-    mean_stiffness=None,
+    torque: Given,
+    *,
+    bearing_stiffness: Numbers,
+    bearing_damping: Numbers | None = None,
+    masses: Numbers | None = None,
+    damping_ratio: Given | None = None,
+    damping: Given | None = None,
+    inertias: Numbers | None = None,
+    mean_stiffness: Given | None = None,
     excitation: Excitation | None = None,
 ) -> Oscillator:
     """Two gears whose centres move on flexible bearings: five coordinates [um].

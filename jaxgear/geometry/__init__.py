@@ -34,7 +34,7 @@ from .path import reduced_radius as reduced_radius
 STEEL: Material
 
 
-def __getattr__(name: str):
+def __getattr__(name: str) -> Material:
     if name == "STEEL":  # made when it is asked for, see `material`
         return _material.STEEL
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

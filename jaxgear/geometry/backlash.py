@@ -6,7 +6,7 @@ from typing import Literal
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import check, concrete, optional_real, program, real
+from ..numerics import Given, check, concrete, optional_real, program, real
 from .gear import Gear
 from .margins import play_between, thickening
 from .pair import GearPair
@@ -21,7 +21,13 @@ _ROUNDED = 1.0
 
 
 def pair_with_backlash(
-    pinion: Gear, wheel: Gear, backlash, *, center_distance=None, axial_offset=0.0, by: By = "both"
+    pinion: Gear,
+    wheel: Gear,
+    backlash: Given,
+    *,
+    center_distance: Given | None = None,
+    axial_offset: Given = 0.0,
+    by: By = "both",
 ) -> GearPair:
     """A pair with a given play between its unloaded, unmodified flanks, in the middle of their tolerances.
 

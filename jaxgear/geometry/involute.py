@@ -7,14 +7,12 @@ derivatives stay finite at the base circle.
 from typing import Protocol
 
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import safe_sqrt
+from ..numerics import Given, safe_sqrt
 
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
-Given = Float[Array | np.ndarray, "..."] | float  # by whoever asks for one relation alone
 
 
 class Toothed(Protocol):

@@ -29,7 +29,7 @@ class Material(Checked):
 STEEL: Material  # constants of gear steel
 
 
-def __getattr__(name: str):
+def __getattr__(name: str) -> Material:
     # Made when it is asked for: arrays made at import would start JAX before its devices, processes and precision can
     # be chosen.
     if name == "STEEL":

@@ -3,9 +3,9 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, bracketed_root, program, result
+from ..numerics import Checked, Given, bracketed_root, program, result
 from .gear import Gear
-from .involute import Given, involute
+from .involute import involute
 
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]

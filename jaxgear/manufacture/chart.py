@@ -14,7 +14,7 @@ from ..contact import Side
 from ..geometry import diameter, roll_angle
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
-from ..numerics import Checked, check, concrete, maximum, minimum, program, result, whole
+from ..numerics import Checked, Given, check, concrete, maximum, minimum, program, result, whole
 from ..tolerance import ToleranceClass, iso_rounded
 from .spline import relief_start
 
@@ -53,7 +53,7 @@ class Trace(Checked):
 
 
 class FlankPlace(NamedTuple):
-    """A place along the profile in the three ways that machines ask for it.
+    """A place along the profile, or several of them, in the three ways that machines ask for it.
 
     Attributes:
         roll_length: [mm].
@@ -61,9 +61,9 @@ class FlankPlace(NamedTuple):
         diameter: [mm].
     """
 
-    roll_length: Scalar
-    roll_angle: Scalar
-    diameter: Scalar
+    roll_length: Float[Array, "..."]
+    roll_angle: Float[Array, "..."]
+    diameter: Float[Array, "..."]
 
 
 class FlankDeviations(NamedTuple):
@@ -102,7 +102,7 @@ def helix_range(side: Side) -> tuple[Scalar, Scalar]:
     return -half, half
 
 
-def flank_place(side: Side, roll_length) -> FlankPlace:
+def flank_place(side: Side, roll_length: Float[Array, "..."]) -> FlankPlace:
     """A roll length [mm] as roll angle and diameter too."""
     return FlankPlace(roll_length, roll_angle(side.gear, roll_length), diameter(side.gear, roll_length))
 
@@ -117,7 +117,7 @@ def profile_trace(
     modification: AbstractModification,
     tolerance: ToleranceClass | None = None,
     *,
-    face_coordinate=0.0,
+    face_coordinate: Given = 0.0,
     roll_length: Points | None = None,
     points: int = _POINTS,
 ) -> Trace:
@@ -148,7 +148,7 @@ def helix_trace(
     modification: AbstractModification,
     tolerance: ToleranceClass | None = None,
     *,
-    roll_length=None,
+    roll_length: Given | None = None,
     face_coordinate: Points | None = None,
     points: int = _POINTS,
 ) -> Trace:

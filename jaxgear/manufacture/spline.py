@@ -25,7 +25,7 @@ from ..microgeometry import (
     TipRelief,
     terms,
 )
-from ..numerics import Checked, check, concrete, maximum, program, result
+from ..numerics import Checked, Given, check, concrete, maximum, program, result
 from ..numerics.fits import Criterion, fit
 from .wheel import space_point
 
@@ -86,7 +86,7 @@ class WheelSpline(Checked):
         return self.node_x + sum(steps)
 
 
-def relief_start(side: Side, modification: AbstractModification, threshold=START) -> Scalar:
+def relief_start(side: Side, modification: AbstractModification, threshold: Given = START) -> Scalar:
     """Roll length at which the relief of the tip starts [mm]; differentiable.
 
     Of a single `TipRelief`, beside modifications along the face, it is the start by definition. Of anything else it is
@@ -123,7 +123,7 @@ def wheel_spline(
     *,
     degree: Degree = 2,
     criterion: Criterion = "minimax",
-    node=None,
+    node: Given | None = None,
     tangent: bool = False,
 ) -> WheelSpline:
     """Fits involute and polynomial to the flank of a design; compiled and differentiable.

@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import Gear, outline
 from ..geometry.involute import involute
-from ..numerics import Checked, bracketed_root, check, concrete, count, fields_of, number, real, whole
+from ..numerics import Checked, Given, Numbers, bracketed_root, check, concrete, count, fields_of, number, real, whole
 
 Scalar = Float[Array, ""]
 
@@ -65,7 +65,7 @@ def _span(gear: Gear, teeth) -> Scalar:
     return jnp.cos(alpha) * (gear.module * nominal + 1e-3 * gear.mean_tooth_thickness_allowance) + shifted
 
 
-def over_balls(gear: Gear, ball) -> Scalar:
+def over_balls(gear: Gear, ball: Given) -> Scalar:
     """Dimension over two balls M_dK [mm], or over pins, which is the same for spur gears.
 
     inv(alpha_K) = inv(alpha) + D_M / (z m cos(alpha)) - pi / (2 z) + 2 x tan(alpha) / z + E_sns / (m z); the centres of
@@ -110,7 +110,7 @@ class Measures(NamedTuple):
     over_balls: Scalar
 
 
-def measures(gear: Gear, teeth=None, ball=None) -> Measures:
+def measures(gear: Gear, teeth: Given | None = None, ball: Given | None = None) -> Measures:
     """`span` and `over_balls` of a gear, which may be traced.
 
     Args:
@@ -131,7 +131,7 @@ def measures(gear: Gear, teeth=None, ball=None) -> Measures:
     return Measures(teeth, missing(0.5 * first, first), ball, missing(touched, over))
 
 
-def allowance_of_span(gear: Gear, teeth: int, measured) -> Float[Array, "..."]:
+def allowance_of_span(gear: Gear, teeth: int, measured: Numbers) -> Float[Array, "..."]:
     """Tooth thickness allowance E_sns [um] of a base tangent length W_k [mm] over k teeth; the inverse of `span`.
 
     Args:
@@ -149,7 +149,7 @@ def allowance_of_span(gear: Gear, teeth: int, measured) -> Float[Array, "..."]:
     return 1e3 * (measured - nominal) / jnp.cos(alpha)
 
 
-def allowance_of_balls(gear: Gear, ball, measured) -> Float[Array, "..."]:
+def allowance_of_balls(gear: Gear, ball: Given, measured: Numbers) -> Float[Array, "..."]:
     """Tooth thickness allowance E_sns [um] of a dimension over balls M_dK [mm]; the inverse of `over_balls`.
 
     Args:
@@ -280,6 +280,7 @@ class ToothThickness(Checked):
             return _named("span", lambda: _rounded(measured, *of), teeth_spanned=teeth)
         if (over := self.over_balls) is not None:
             ball = self.ball_diameter
+            assert ball is not None  # likewise
             of = partial(allowance_of_balls, gear, ball), partial(over_balls, _without_allowance(gear), ball)
             return _named("over_balls", lambda: _rounded(over, *of), ball_diameter=ball)
         assert self.tooth_thickness_allowance is not None

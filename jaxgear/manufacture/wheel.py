@@ -20,7 +20,7 @@ from ..geometry import outline
 from ..geometry.involute import load_angle
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, check, concrete, minimum, number, program, result, whole
+from ..numerics import Checked, Given, check, concrete, minimum, number, program, result, whole
 
 Profile = Float[Array, " points"]
 
@@ -168,7 +168,7 @@ def grinding_margins(side: Side, modification: AbstractModification) -> Grinding
     return GrindingMargins(clearance, 2 * flank.x[0], jnp.rad2deg(minimum(angle)))
 
 
-def smallest_wheel_radius(side: Side, flange_radius) -> Scalar:
+def smallest_wheel_radius(side: Side, flange_radius: Given) -> Scalar:
     """Least outer radius [mm] that keeps flanges of a radius [mm] off the tip circle at full depth.
 
     Raises:
@@ -178,7 +178,7 @@ def smallest_wheel_radius(side: Side, flange_radius) -> Scalar:
     return _depth(side) + flange_radius
 
 
-def run_out(side: Side, radius) -> Scalar:
+def run_out(side: Side, radius: Given) -> Scalar:
     """How far the axis of a wheel of a radius [mm] travels beyond the face until it has left the tooth space [mm].
 
     A chord of the wheel at full depth t: sqrt(t (2 R - t)). A shoulder beside the gear must be farther away.
@@ -192,7 +192,7 @@ def run_out(side: Side, radius) -> Scalar:
     return jnp.sqrt(depth * (2 * radius - depth))
 
 
-def largest_wheel_radius(side: Side, gap) -> Scalar:
+def largest_wheel_radius(side: Side, gap: Given) -> Scalar:
     """Largest outer radius [mm] whose `run_out` stays within a gap to a shoulder [mm] that is as high as the teeth.
 
     Raises:
@@ -201,7 +201,7 @@ def largest_wheel_radius(side: Side, gap) -> Scalar:
     depth = _depth(side)
     known = concrete(depth)
     check("largest_wheel_radius", "gap", gap, "mm", low=None if known is None else float(known), open_low=True)
-    return (gap**2 + depth**2) / (2 * depth)
+    return (depth**2 + gap**2) / (2 * depth)
 
 
 def grinding_faults(wheel: GrindingWheel, side: Side, modification: AbstractModification) -> tuple[str, ...]:

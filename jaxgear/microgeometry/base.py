@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, Usual, concrete, number, real, result
+from ..numerics import Checked, Given, Usual, concrete, number, real, result
 
 AMOUNTS = Usual(0.1, np.inf, "less than flanks can be measured to: is it in mm?")  # um, of every modification
 # mm, of reliefs along profile and face: ISO 1328-1 ends at modules of 70 mm, whose active profile is some 350 mm long,
@@ -59,12 +59,12 @@ class AbstractModification(Checked):
             raise TypeError(f"{given}: only another modification can be added to a modification")
         return Sum((*terms(self), *terms(other)))
 
-    def __radd__(self, other) -> "AbstractModification":
+    def __radd__(self, other: object) -> "AbstractModification":
         if isinstance(other, int) and other == 0:  # where `sum` starts
             return self
         raise TypeError(f"{other!r} + {self!r}: only another modification can be added to a modification")
 
-    def __mul__(self, factor) -> "Scaled":
+    def __mul__(self, factor: Given) -> "Scaled":
         if not isinstance(factor, int | float | np.ndarray | np.generic | jax.Array):
             raise TypeError(f"{factor!r} * {self!r}: only a number can scale a modification")
         return Scaled(real(factor), self)

@@ -14,26 +14,28 @@ from jaxtyping import Array, Float
 from ..numerics import Checked, number, safe_power, safe_sqrt
 from ..numerics.spline import interpolate
 
+Real = Float[Array, "..."]
+
 
 class AbstractCurve(Checked):
     """Shape function of a relief."""
 
     @abstractmethod
-    def __call__(self, d: Float[Array, "..."]) -> Float[Array, "..."]:
+    def __call__(self, d: Real) -> Real:
         """Relief divided by its amount at the relative depth d in [0, 1] into the relief; any shape."""
 
 
 class Linear(AbstractCurve):
     """d"""
 
-    def __call__(self, d):
+    def __call__(self, d: Real) -> Real:
         return d
 
 
 class Parabolic(AbstractCurve):
     """0.44 d + 0.56 d^2"""
 
-    def __call__(self, d):
+    def __call__(self, d: Real) -> Real:
         return d * (0.44 + 0.56 * d)
 
 
@@ -46,7 +48,7 @@ class Power(AbstractCurve):
 
     exponent: Float[Array, ""] = number("", low=0.0, open_low=True)
 
-    def __call__(self, d):
+    def __call__(self, d: Real) -> Real:
         return safe_power(d, self.exponent)
 
 
@@ -61,7 +63,7 @@ class Quadratic(AbstractCurve):
     b1: Float[Array, ""] = number("")
     b2: Float[Array, ""] = number("")
 
-    def __call__(self, d):
+    def __call__(self, d: Real) -> Real:
         return self.b0 + d * (self.b1 + d * self.b2)
 
 
@@ -74,7 +76,7 @@ class Polynomial(AbstractCurve):
 
     coefficients: Float[Array, " terms"] = number("", shape=("terms",))
 
-    def __call__(self, d):
+    def __call__(self, d: Real) -> Real:
         value = jnp.zeros_like(d)
         for power in reversed(range(self.coefficients.shape[0])):
             value = value * d + self.coefficients[power]
@@ -93,7 +95,7 @@ class ParabolicLinear(AbstractCurve):
 
     node: Float[Array, ""] = number("", low=0.0, open_low=True, high=1.0)
 
-    def __call__(self, d):
+    def __call__(self, d: Real) -> Real:
         inside = d < self.node
         # two divisions by the root: the derivative of one by the node has its square, which underflows for tiny nodes
         root = safe_sqrt(jnp.where(inside, self.node, 1.0))
@@ -112,7 +114,7 @@ class Sinusoidal(AbstractCurve):
     b1: Float[Array, ""] = number("rad")
     b2: Float[Array, ""] = number("rad")
 
-    def __call__(self, d):
+    def __call__(self, d: Real) -> Real:
         return jnp.sin(self.b0 * d + self.b1) + jnp.cos(self.b0 * d + self.b2)
 
 
@@ -125,7 +127,7 @@ class Spline(AbstractCurve):
 
     values: Float[Array, " knots"] = number("", shape=("knots",), fewest=3)
 
-    def __call__(self, d):
+    def __call__(self, d: Real) -> Real:
         d = jnp.asarray(d)
         depths = jnp.linspace(0.0, 1.0, self.values.shape[0], dtype=d.dtype)
         return interpolate(d, depths, self.values, "natural_cubic")

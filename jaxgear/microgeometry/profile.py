@@ -11,12 +11,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import number, safe_divide
+from ..numerics import Given, number, safe_divide
 from .base import AMOUNTS, LONGEST, AbstractModification, Flank, acts
 from .curves import AbstractCurve, Linear, Parabolic
 
+Real = Float[Array, "..."]
 
-def relief(distance, amount, length, curve: AbstractCurve) -> Float[Array, "..."]:
+
+def relief(distance: Given, amount: Given, length: Given, curve: AbstractCurve) -> Real:
     """Relief [um] at a distance from its end [mm]; zero beyond its start, and everywhere for a length of zero."""
     inside = jnp.asarray(1 - distance * safe_divide(1.0, length))
     # no nested maxima: the derivative of a tie is a division
@@ -41,7 +43,7 @@ class TipRelief(AbstractModification):
 
     varies_along_face = False
 
-    def __call__(self, flank: Flank):
+    def __call__(self, flank: Flank) -> Real:
         return relief(flank.tip_roll_length - flank.roll_length, self.amount, self.length, self.curve)
 
 
@@ -60,7 +62,7 @@ class RootRelief(AbstractModification):
 
     varies_along_face = False
 
-    def __call__(self, flank: Flank):
+    def __call__(self, flank: Flank) -> Real:
         return relief(flank.roll_length - flank.start_roll_length, self.amount, self.length, self.curve)
 
 
@@ -75,7 +77,7 @@ class ProfileCrowning(AbstractModification):
 
     varies_along_face = False
 
-    def __call__(self, flank: Flank):
+    def __call__(self, flank: Flank) -> Real:
         return self.amount * _from_middle(flank) ** 2
 
 
@@ -91,7 +93,7 @@ class ProfileSlope(AbstractModification):
 
     varies_along_face = False
 
-    def __call__(self, flank: Flank):
+    def __call__(self, flank: Flank) -> Real:
         return 0.5 * self.amount * _from_middle(flank)
 
 
@@ -115,7 +117,7 @@ class LeadCrowning(AbstractModification):
     def varies_along_face(self) -> bool:
         return acts(self.amount)
 
-    def __call__(self, flank: Flank):
+    def __call__(self, flank: Flank) -> Real:
         return self.amount * (2.0 * flank.face_coordinate / flank.face_width) ** 2
 
 
@@ -133,7 +135,7 @@ class LeadSlope(AbstractModification):
     def varies_along_face(self) -> bool:
         return acts(self.amount)
 
-    def __call__(self, flank: Flank):
+    def __call__(self, flank: Flank) -> Real:
         return self.amount * flank.face_coordinate / flank.face_width
 
 
@@ -156,7 +158,7 @@ class EndRelief(AbstractModification):
     def varies_along_face(self) -> bool:
         return acts(self.amount)
 
-    def __call__(self, flank: Flank):
+    def __call__(self, flank: Flank) -> Real:
         end = 0.5 * flank.face_width
         total = jnp.zeros_like(flank.face_coordinate)
         if self.side != "negative":

@@ -28,7 +28,7 @@ class TabulatedProfile(AbstractModification):
 
     varies_along_face = False
 
-    def check_together(self):
+    def check_together(self) -> None:
         if self.position.shape != self.amount.shape or self.position.shape[0] < 2:
             raise ValueError(
                 f"TabulatedProfile: position {self.position.shape} and amount {self.amount.shape} must be two lists of "
@@ -36,7 +36,7 @@ class TabulatedProfile(AbstractModification):
             )
         _check_increasing("TabulatedProfile", "position", self.position)
 
-    def __call__(self, flank: Flank):
+    def __call__(self, flank: Flank) -> Float[Array, "..."]:
         x = flank.roll_length
         if self.coordinate == "roll_angle":
             x = jnp.rad2deg(x / flank.base_radius)
@@ -60,7 +60,7 @@ class TabulatedFlank(AbstractModification):
     amount: Float[Array, "points faces"] = number("um", shape=("points", "faces"))
     method: Literal["linear", "natural_cubic", "monotonic"] = eqx.field(default="linear", static=True)
 
-    def check_together(self):
+    def check_together(self) -> None:
         wanted = self.roll_length.shape + self.face_coordinate.shape
         if self.amount.shape != wanted:
             raise ValueError(
@@ -75,7 +75,7 @@ class TabulatedFlank(AbstractModification):
         amount = concrete(self.amount)
         return amount is None or bool((amount != amount[:, :1]).any())
 
-    def __call__(self, flank: Flank):
+    def __call__(self, flank: Flank) -> Float[Array, "..."]:
         face = self.face_coordinate.astype(flank.face_coordinate.dtype)
         y = jnp.clip(flank.face_coordinate, face[0], face[-1])
         left = cell(y, face)

@@ -8,6 +8,8 @@ from .contact_problem import AbstractSpring as AbstractSpring
 from .contact_problem import ContactProblem as ContactProblem
 from .contact_problem import ContactSolution as ContactSolution
 from .conversion import Frozen as Frozen
+from .conversion import Given as Given
+from .conversion import Numbers as Numbers
 from .conversion import concrete as concrete
 from .conversion import optional_real as optional_real
 from .conversion import real as real

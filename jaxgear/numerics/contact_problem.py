@@ -71,7 +71,7 @@ class ContactProblem(eqx.Module):
     start_law: AbstractSpring | None = None
     coupling: SliceCoupling | None = None
 
-    def __check_init__(self):
+    def __check_init__(self) -> None:
         if (self.load is None) == (self.approach is None):
             raise ValueError("ContactProblem: one of load and approach must be given")
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 from .contact_problem import ContactProblem
 from .coupling import CoupledFactors, Response, couple, respond, stiffness, with_inverses
-from .elimination import Curve, Factors, Rows, Slopes, at_approach, balance, factorize, product
+from .elimination import Active, Curve, Factors, Load, Rows, Slopes, at_approach, balance, factorize, product
 
 
 def eliminable(problem: ContactProblem) -> ContactProblem:
@@ -15,7 +15,7 @@ def eliminable(problem: ContactProblem) -> ContactProblem:
     return eqx.tree_at(lambda p: p.coupling, problem, with_inverses(problem.coupling, problem.compliance))
 
 
-def eliminate(problem: ContactProblem, active: list, slope: Slopes) -> Factors | CoupledFactors:
+def eliminate(problem: ContactProblem, active: Active, slope: Slopes) -> Factors | CoupledFactors:
     """Eliminates the active springs of an `eliminable` problem.
 
     Args:
@@ -29,7 +29,9 @@ def eliminate(problem: ContactProblem, active: list, slope: Slopes) -> Factors |
     return couple(problem.coupling, problem.lever, factorize(problem.coupling.held.local, problem.lever, active, slope))
 
 
-def given_load(problem: ContactProblem, factors: Factors | CoupledFactors, known: Rows, load) -> tuple[Rows, Curve]:
+def given_load(
+    problem: ContactProblem, factors: Factors | CoupledFactors, known: Rows, load: Load
+) -> tuple[Rows, Curve]:
     """Line loads of the active springs and approach: deflection + slope x load = known + lever x approach."""
     if isinstance(factors, CoupledFactors):
         return respond(problem.weight, factors, known, load=load)[:2]
@@ -49,6 +51,7 @@ def step(problem: ContactProblem, factors: Factors | CoupledFactors, known: Rows
         if problem.approach is not None:
             load, approach = at_approach(factors, known, problem.approach), problem.approach
         else:
+            assert problem.load is not None  # one of both is given
             load, approach = balance(problem.weight, factors, known, problem.load)
         return load, approach, opening(problem, load, approach)
     found = respond(problem.weight, factors, known, load=problem.load, approach=problem.approach)

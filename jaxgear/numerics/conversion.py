@@ -1,6 +1,7 @@
 """Numbers as JAX takes them, and as text; arrays that no optimizer takes for parameters."""
 
-from typing import Any, Generic, TypeVar
+from collections.abc import Sequence
+from typing import Any, Generic, TypeVar, cast
 
 import equinox as eqx
 import jax
@@ -8,10 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+# one number or an array of them, as whoever calls has them; and whatever `real` makes an array of
+Given = float | np.floating | np.integer | np.ndarray | jax.Array
+Numbers = Given | Sequence[Given] | Sequence[Sequence[Given]]
+
 _SHOWN = 6  # numbers of an array that are printed; of a longer one its range is
 
 
-def real(value, what: str = "") -> Float[Array, "..."]:
+def real(value: Numbers, what: str = "") -> Float[Array, "..."]:
     """Converts to an inexact array: arrays of floats keep their dtype, everything else takes JAX's default float.
 
     Numbers stay concrete inside traced functions, so that they are checked there too.
@@ -45,31 +50,31 @@ def _inexact(value) -> Float[Array, "..."]:
     return jax.lax.convert_element_type(array, dtype)
 
 
-def real_or_given(value):
+def real_or_given(value: object) -> object:
     """A number field's value: anything else stays as it is for the check, which knows its name."""
     try:
-        return optional_real(value)
+        return optional_real(cast(Numbers | None, value))
     except ValueError:
         return value
 
 
-def no_number(what: str, value) -> str:
+def no_number(what: str, value: object) -> str:
     """The message that a value is not a number."""
     wanted = "a real number" if getattr(value, "dtype", np.dtype(type(value))).kind == "c" else "a number"
     return f"{what}{' = ' if what else ''}{shown(value)} must be {wanted}"
 
 
-def optional_real(value) -> Float[Array, "..."] | None:
+def optional_real(value: Numbers | None) -> Float[Array, "..."] | None:
     """`real`, with None kept as None."""
     return None if value is None else real(value)
 
 
-def concrete(value) -> np.ndarray | None:
+def concrete(value: Numbers) -> np.ndarray | None:
     """The value as a NumPy array, or None while it is being traced."""
     return None if isinstance(value, jax.core.Tracer) else np.asarray(value)
 
 
-def shown(value, unit: str = "") -> str:
+def shown(value: object, unit: str = "") -> str:
     """A value as text: numbers with their unit, of many numbers the range, of a tracer its type."""
     if isinstance(value, jax.core.Tracer):
         return eqx.tree_pformat(value)
@@ -108,7 +113,7 @@ class Frozen(eqx.Module, Generic[T]):
     _bits: Any
     _dtypes: tuple[str, ...] = eqx.field(static=True)
 
-    def __init__(self, tree: T):
+    def __init__(self, tree: T) -> None:
         leaves, structure = jax.tree.flatten(tree)
         self._dtypes = tuple(_float_dtype(leaf) for leaf in leaves)
         self._bits = jax.tree.unflatten(structure, [_to_bits(*pair) for pair in zip(leaves, self._dtypes)])

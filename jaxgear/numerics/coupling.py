@@ -33,7 +33,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .dense import solve_dense
-from .elimination import Curve, Factors, Rows, Slopes, inverse_of, small_inverse
+from .elimination import Curve, Factors, Load, Rows, Slopes, inverse_of, small_inverse
 from .safe import stored, unit
 
 Springs = Float[Array, "pairs pairs positions"]
@@ -329,7 +329,12 @@ def _back(
 
 
 def respond(
-    weight: Float[Array, " slices"], factors: CoupledFactors, known: Rows, *, load=None, approach=None
+    weight: Float[Array, " slices"],
+    factors: CoupledFactors,
+    known: Rows,
+    *,
+    load: Load | None = None,
+    approach: Curve | None = None,
 ) -> Response:
     """Solves for a load or for an approach; see the top."""
     coupling, count = factors.coupling, len(weight)

@@ -5,13 +5,15 @@ import os
 import stat
 import sys
 import uuid
+from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 TEMPORARY = ".tmp"  # end of the names of files that are being written
 _sum = hashlib.sha256
 
 
-def write_durably(path: Path, write) -> None:
+def write_durably(path: Path, write: Callable[[BinaryIO], object]) -> None:
     """Lets `write(file)` fill a temporary file that takes the place of `path` once it is on the disk."""
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}{TEMPORARY}")
     try:
@@ -51,7 +53,7 @@ class KeptFiles:
         executed: whether they may be executed, so that only files are read that nobody else can have written.
     """
 
-    def __init__(self, folder: Path, surroundings: bytes = b"", *, executed: bool = False):
+    def __init__(self, folder: Path, surroundings: bytes = b"", *, executed: bool = False) -> None:
         self._folder, self._here, self._executed = folder, surroundings, executed and os.name == "posix"
 
     def read(self, made_of: bytes) -> bytes | None:

@@ -1,15 +1,18 @@
 """Elimination of a few unknowns at many positions at once, unrolled so that a compiler fuses it into few loops."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from .safe import unit
 
 Rows = list[Float[Array, "slices positions"]]
 Slopes = list[Float[Array, "#slices positions"]]  # one row where a slope is the same in every slice
 Curve = Float[Array, " positions"]
+Active = Sequence[Bool[Array, "slices positions"]]
+Load = Float[Array, ""] | Curve  # a scalar where it is the same everywhere
 
 
 class Factors(NamedTuple):
@@ -37,7 +40,7 @@ class Factors(NamedTuple):
 def factorize(
     compliance: Float[Array, "pairs pairs positions"],
     lever: Float[Array, "pairs positions"],
-    active: list,
+    active: Active,
     slope: Slopes,
 ) -> Factors:
     """Eliminates the active springs from C + slope.
@@ -112,7 +115,7 @@ def product(weight: Float[Array, " slices"], factors: Factors, first: Rows, seco
     return jnp.sum(weight[:, None] * terms, axis=0)
 
 
-def balance(weight: Float[Array, " slices"], factors: Factors, known: Rows, load) -> tuple[Rows, Curve]:
+def balance(weight: Float[Array, " slices"], factors: Factors, known: Rows, load: Load) -> tuple[Rows, Curve]:
     """Solves (C + slope) q = known + lever d on the active rows, q = 0 on the others, with sum lever w q = load."""
     part = _of_known(factors, known)
     stiffness = product(weight, factors, factors.lever, factors.lever)

@@ -8,15 +8,15 @@ import dataclasses
 import logging
 from collections.abc import Iterator
 from dataclasses import MISSING
-from typing import Any, Literal, NamedTuple, TypeVar, dataclass_transform, get_args, get_origin
+from typing import Any, Literal, NamedTuple, TypedDict, TypeVar, Unpack, dataclass_transform, get_args, get_origin
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool
+from jaxtyping import Array, Bool, PyTree
 
-from .conversion import concrete, no_number, real_or_given, shown
+from .conversion import Given, Numbers, concrete, no_number, real_or_given, shown
 
 _Module = TypeVar("_Module", bound=eqx.Module)
 
@@ -72,7 +72,23 @@ class Number:
     usual: Usual | None = None
 
 
-def number(unit: str, *, default: Any = MISSING, kw_only: bool = False, **limits) -> Any:
+class Limits(TypedDict, total=False):
+    """What of a `Number` its field may say."""
+
+    low: float | None
+    high: float | None
+    open_low: bool
+    open_high: bool
+    whole: bool
+    optional: bool
+    shape: tuple[str, ...]
+    fewest: int
+    limits: bool
+    static: bool
+    usual: Usual | None
+
+
+def number(unit: str, *, default: object = MISSING, kw_only: bool = False, **limits: Unpack[Limits]) -> Any:
     """A field that holds a number or an array of numbers, a leaf that JAX can trace and differentiate.
 
     Args:
@@ -88,11 +104,11 @@ def number(unit: str, *, default: Any = MISSING, kw_only: bool = False, **limits
 
 
 def count(
-    *, low: int = 1, high: int | None = None, optional: bool = False, default: Any = MISSING, kw_only: bool = False
+    *, low: int = 1, high: int | None = None, optional: bool = False, default: object = MISSING, kw_only: bool = False
 ) -> Any:
     """A static field that holds a whole number: a size, or how often something is done."""
-    limits = {"low": low, "high": _MOST if high is None else high, "optional": optional}
-    return number("", default=default, kw_only=kw_only, whole=True, static=True, **limits)
+    most = _MOST if high is None else high
+    return number("", default=default, kw_only=kw_only, low=low, high=most, optional=optional, whole=True, static=True)
 
 
 def result(unit: str = "") -> Any:
@@ -117,7 +133,7 @@ class Checked(eqx.Module):
         TypeError: for something else than the Module that a field wants.
     """
 
-    def __check_init__(self):
+    def __check_init__(self) -> None:
         for field in dataclasses.fields(self):
             _check_field(type(self).__name__, field, getattr(self, field.name))
         self.check_together()
@@ -131,7 +147,7 @@ class Checked(eqx.Module):
         return f"{type(self).__name__}({', '.join(parts)})"
 
 
-def changed(module: _Module, **fields) -> _Module:
+def changed(module: _Module, **fields: object) -> _Module:
     """The Module with other fields, as JAX puts it together: nothing is converted or checked, and it takes no time."""
     made = object.__new__(type(module))
     for field in dataclasses.fields(module):
@@ -140,7 +156,15 @@ def changed(module: _Module, **fields) -> _Module:
 
 
 def check(
-    owner: str, name: str, value, unit: str, *, low=None, high=None, open_low: bool = False, open_high: bool = False
+    owner: str,
+    name: str,
+    value: Numbers | None,
+    unit: str,
+    *,
+    low: Given | None = None,
+    high: Given | None = None,
+    open_low: bool = False,
+    open_high: bool = False,
 ) -> None:
     """Raises a one-line `ValueError` when a concrete value is not finite or outside its allowed range.
 
@@ -169,7 +193,7 @@ def check(
     )
 
 
-def whole(owner: str, name: str, value, low: float = 1, high: float = _MOST) -> int:
+def whole(owner: str, name: str, value: object, low: float = 1, high: float = _MOST) -> int:
     """The value as an int; raises a one-line `ValueError` unless it is a whole number from `low` to `high`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
         raise ValueError(f"{owner}: {name} = {value!r} must be a whole number of at least {low}")
@@ -185,7 +209,7 @@ def _plain(value):
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _check_field(owner: str, field: dataclasses.Field, value) -> None:
+def _check_field(owner: str, field: dataclasses.Field[Any], value: object) -> None:
     kind = field.metadata.get(_KEY)
     if kind is not None:
         if kind.checked:
@@ -276,7 +300,7 @@ def _range(low, high, open_low, open_high, unit_text) -> str:
     return "must be " + " and ".join(parts)
 
 
-def within_limits(module: Any) -> Bool[Array, ""]:
+def within_limits(module: PyTree[eqx.Module]) -> Bool[Array, ""]:
     """Whether all numbers of a `Checked` Module and of those within it are finite and in the range of their fields.
 
     Concrete numbers that are not are refused when the Module is made; traced ones, and numbers put into it later, pass

@@ -2,19 +2,29 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar, overload
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PyTree
 
 from .dense import pseudo_inverse
 from .safe import stored
 
+Real = Float[Array, "..."]
+Vector = Float[Array, " unknowns"]
+Matrix = Float[Array, "unknowns unknowns"]
+Function = Callable[[Vector], Vector]
+Result = TypeVar("Result")
+_Given = ParamSpec("_Given")
+_Tree = TypeVar("_Tree")
 
-def jvp_of_given(function, primal, tangent):
+
+def jvp_of_given(
+    function: Callable[[_Tree], Result], primal: _Tree, tangent: PyTree[Array | SymbolicZero]
+) -> tuple[Result, Result]:
     """`jax.jvp` along those leaves of the tangent that are not symbolically zero: the others cost nothing."""
     tangents, structure = jax.tree.flatten(tangent, is_leaf=lambda leaf: isinstance(leaf, SymbolicZero))
     primals = jax.tree.leaves(primal)
@@ -29,13 +39,14 @@ def jvp_of_given(function, primal, tangent):
     return jax.jvp(of_given, ([primals[i] for i in given],), ([tangents[i] for i in given],))
 
 
-def by_numbers(function):
+def by_numbers(function: Callable[_Given, Result]) -> Callable[_Given, Result]:
     """The function, with its derivative by every single number of its arguments formed in forward mode.
 
     Reverse mode then keeps one array per number and result, the derivative by it, and none of what led there. That pays
     where an elementwise chain follows from a few numbers. Arrays of several numbers are differentiated as always.
     """
     wrapped = eqx.filter_custom_jvp(function)
+    of_any: Callable[..., Result] = function
 
     def rule(primals, tangents):
         leaves, structure = jax.tree.flatten(tangents, is_leaf=_nothing)
@@ -49,7 +60,7 @@ def by_numbers(function):
                 everything = list(values)
                 for i, leaf in zip(places, moved):
                     everything[i] = leaf
-                return function(*jax.tree.unflatten(structure, everything))
+                return of_any(*jax.tree.unflatten(structure, everything))
 
             return jax.jvp(of_moving, ([values[i] for i in places],), (directions,))[1]
 
@@ -75,7 +86,7 @@ _NEWTON_STEPS = 2
 
 
 @partial(jax.jit, static_argnames="function", inline=True)
-def bracketed_root(function, low, high, args):
+def bracketed_root(function: Callable[[Real, _Tree], Real], low: Real, high: Real, args: _Tree) -> Real:
     """Root of an increasing or decreasing `function(x, args)` in [low, high], elementwise.
 
     Bisection finds the root, Newton steps polish it. Derivatives of any order with respect to `args` come from the
@@ -134,10 +145,6 @@ def _quotient(value, slope):
     ok = slope != 0
     return jnp.where(ok, value / jnp.where(ok, slope, jnp.ones_like(slope)), jnp.zeros_like(value))
 
-
-Vector = Float[Array, " unknowns"]
-Matrix = Float[Array, "unknowns unknowns"]
-Function = Callable[[Vector], Vector]
 
 # Newton's method has converged where its next step is this power of the rounding error of the unknowns: what is left
 # after that step is far below.
@@ -218,7 +225,17 @@ def implicit_root(function: Function, start: Vector, *, most: int = 30) -> Vecto
     )
 
 
-def with_jacobian(function: Callable, x: Vector, *, has_aux: bool = False) -> Any:
+@overload
+def with_jacobian(function: Function, x: Vector) -> tuple[Vector, Matrix]: ...
+
+
+@overload
+def with_jacobian(
+    function: Callable[[Vector], tuple[Vector, Result]], x: Vector, *, has_aux: Literal[True]
+) -> tuple[Vector, Matrix, Result]: ...
+
+
+def with_jacobian(function: Callable[[Vector], Any], x: Vector, *, has_aux: bool = False) -> tuple[Any, ...]:
     """(value, Jacobian), (value, Jacobian, auxiliary result) with `has_aux`, from one evaluation in forward mode."""
 
     def along(direction):

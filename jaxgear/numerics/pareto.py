@@ -1,17 +1,17 @@
 """Pareto fronts, and a genetic algorithm of bit strings."""
 
 from bisect import bisect_left, bisect_right
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
+from .conversion import Given, Numbers
 from .programs import kernel
 
 
-def pareto_front(values) -> np.ndarray:
+def pareto_front(values: Numbers) -> np.ndarray:
     """Rows that no other row dominates, where smaller is better in every objective (negate what is to be large).
 
     A row dominates another one if it is nowhere worse and somewhere better; equal rows do not dominate each other. Rows
@@ -105,7 +105,7 @@ _SWEEPS = {1: _sweep_one, 2: _sweep_two, 3: _sweep_three}
 Strings = Bool[Array, "population length"]
 
 
-def random_strings(key: Any, population: int, numbers: int, bits: int) -> Strings:
+def random_strings(key: PRNGKeyArray, population: int, numbers: int, bits: int) -> Strings:
     """A first population; each string holds so many numbers of so many bits, one after the other."""
     return jax.random.bernoulli(key, shape=(population, numbers * bits))
 
@@ -117,7 +117,9 @@ def decoded(strings: Strings, bits: int) -> Float[Array, "population numbers"]:
 
 
 @kernel
-def next_generation(key: Any, strings: Strings, fitness: Float[Array, " population"], crossover, mutation) -> Strings:
+def next_generation(
+    key: PRNGKeyArray, strings: Strings, fitness: Float[Array, " population"], crossover: Given, mutation: Given
+) -> Strings:
     """A population that replaces the given one.
 
     Args:

@@ -20,6 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.experimental.serialize_executable import deserialize_and_load, serialize
 from jax.extend.core import get_opaque_trace_state
+from jaxtyping import PyTree
 
 _Given = ParamSpec("_Given")
 _Found = TypeVar("_Found")
@@ -162,7 +163,7 @@ class _Program(NamedTuple):
     run: Future[_Run]
     result: Any
 
-    def __call__(self, arrays: Sequence) -> Any:
+    def __call__(self, arrays: Sequence[jax.Array]) -> Any:
         return _filled(self.result, self.run.result()(*arrays))
 
 
@@ -174,11 +175,13 @@ class ProgramStore:
         threads: that compile.
     """
 
-    def __init__(self, shelf: Shelf, threads: int = 2):
+    def __init__(self, shelf: Shelf, threads: int = 2) -> None:
         self._shelf, self._pool = shelf, ThreadPoolExecutor(threads, "compiler")
         self._programs: dict[Any, _Program] = {}
 
-    def program(self, function: Callable, arguments: Any, *, quick: bool) -> tuple[_Program, list] | None:
+    def program(
+        self, function: Callable[..., Any], arguments: PyTree, *, quick: bool
+    ) -> tuple[_Program, list[Any]] | None:
         """The program of a function for some arguments, and the arrays among them; None where JAX traces them."""
         leaves, tree = jax.tree.flatten(arguments)
         if any(map(_is_left_to_jax, leaves)) or not is_eager() or jax.process_count() > 1:
@@ -196,7 +199,9 @@ class ProgramStore:
             )
         return known, [leaf for leaf, shape in zip(leaves, fixed) if isinstance(shape, _Shape)]
 
-    def _made(self, function: Callable, arguments: Any, precision: str, options: dict | None) -> _Program:
+    def _made(
+        self, function: Callable[..., Any], arguments: Any, precision: str, options: dict[str, Any] | None
+    ) -> _Program:
         made_of = _recipe((function, arguments, precision, options))
         kept = None if made_of is None else self._shelf.read(made_of)
         if kept is not None:
@@ -256,7 +261,7 @@ def _compiled(function: Callable[_Given, _Found], *, quick: bool) -> Callable[_G
     return run
 
 
-def begin(function: Callable, *args, **options) -> Any:
+def begin(function: Callable[..., Any], *args: PyTree, **options: PyTree) -> PyTree | None:
     """Starts to compile a `program` or `kernel` for arguments of these shapes, where a store is in use.
 
     Returns:
@@ -290,13 +295,13 @@ def _is_shape(leaf) -> bool:
     return isinstance(leaf, _Shape)
 
 
-def _filled(tree: Any, arrays: Iterable) -> Any:
+def _filled(tree: Any, arrays: Iterable[Any]) -> Any:
     """A tree with arrays in the places of their shapes."""
     left = iter(arrays)
     return jax.tree.map(lambda leaf: next(left) if _is_shape(leaf) else leaf, tree, is_leaf=_is_shape)
 
 
-def _lowered(function: Callable, arguments: Any) -> tuple[jax.stages.Lowered, Any]:
+def _lowered(function: Callable[..., Any], arguments: Any) -> tuple[jax.stages.Lowered, Any]:
     """A function of arrays alone, ready to be compiled, and what it returns."""
     shapes = [leaf.struct for leaf in jax.tree.leaves(arguments, is_leaf=_is_shape) if _is_shape(leaf)]
     results = []
@@ -344,11 +349,11 @@ class Recipe(pickle.Pickler):
     Equal objects are written alike, whether they are one object or two, which differs from process to process.
     """
 
-    def __init__(self, file: io.BytesIO):
+    def __init__(self, file: io.BytesIO) -> None:
         super().__init__(file)
         self.fast = True  # no references to what was written before
 
-    def persistent_id(self, obj):
+    def persistent_id(self, obj: object) -> tuple[object, ...] | None:
         if isinstance(obj, jax.sharding.Sharding | jax.sharding.Mesh):
             return "devices", repr(obj)
         if not isinstance(obj, type | types.FunctionType):

@@ -20,6 +20,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .conversion import Given
 from .fields import whole
 
 _MOST_PLACES = 1 << 16  # leaves 36 bits of the mantissa, ten digits
@@ -94,7 +95,7 @@ def _place(axis: int, x):
 
 
 Values = Float[Array, "... values"]
-Numbers = Float[Array, "..."]
+Real = Float[Array, "..."]
 
 
 @dataclass(frozen=True)
@@ -102,10 +103,10 @@ class AbstractReduction(ABC):
     """A number that stands for the values along the last axis."""
 
     @abstractmethod
-    def __call__(self, values: Values) -> Numbers:
+    def __call__(self, values: Values) -> Real:
         """The exact number."""
 
-    def soft(self, values: Values, width) -> Numbers:
+    def soft(self, values: Values, width: Given) -> Real:
         """The number with soft extremes of a width in the unit of the values; towards zero it becomes the exact one."""
         return self(values)
 
@@ -118,7 +119,7 @@ class AbstractReduction(ABC):
 class Value(AbstractReduction):
     """A single number, which is that number."""
 
-    def __call__(self, values):
+    def __call__(self, values: Values) -> Real:
         if values.shape[-1] != 1:
             raise ValueError(
                 f"Value: {values.shape[-1]} values are not a single number; give a reduction such as Max()"
@@ -130,13 +131,13 @@ class Value(AbstractReduction):
 class Max(AbstractReduction):
     """The largest value."""
 
-    def __call__(self, values):
+    def __call__(self, values: Values) -> Real:
         return maximum(values, -1)
 
-    def soft(self, values, width):
+    def soft(self, values: Values, width: Given) -> Real:
         return _soft_maximum(values, width)
 
-    def factors(self, sign):
+    def factors(self, sign: int) -> tuple[float, float] | None:
         return (1.0, 0.0) if sign > 0 else None
 
 
@@ -144,13 +145,13 @@ class Max(AbstractReduction):
 class Min(AbstractReduction):
     """The smallest value."""
 
-    def __call__(self, values):
+    def __call__(self, values: Values) -> Real:
         return minimum(values, -1)
 
-    def soft(self, values, width):
+    def soft(self, values: Values, width: Given) -> Real:
         return -_soft_maximum(-values, width)
 
-    def factors(self, sign):
+    def factors(self, sign: int) -> tuple[float, float] | None:
         return (-1.0, 0.0) if sign < 0 else None
 
 
@@ -158,13 +159,13 @@ class Min(AbstractReduction):
 class Range(AbstractReduction):
     """The largest minus the smallest value: peak to peak."""
 
-    def __call__(self, values):
+    def __call__(self, values: Values) -> Real:
         return spread(values, -1)
 
-    def soft(self, values, width):
+    def soft(self, values: Values, width: Given) -> Real:
         return _soft_maximum(values, width) + _soft_maximum(-values, width)
 
-    def factors(self, sign):
+    def factors(self, sign: int) -> tuple[float, float] | None:
         return (1.0, 1.0) if sign > 0 else None
 
 
@@ -172,7 +173,7 @@ class Range(AbstractReduction):
 class Average(AbstractReduction):
     """The mean."""
 
-    def __call__(self, values):
+    def __call__(self, values: Values) -> Real:
         return jnp.mean(values, axis=-1)
 
 
@@ -180,7 +181,7 @@ class Average(AbstractReduction):
 class Rms(AbstractReduction):
     """Root mean square about the mean; its derivative is zero where all values are equal."""
 
-    def __call__(self, values):
+    def __call__(self, values: Values) -> Real:
         return _root(jnp.mean((values - jnp.mean(values, axis=-1, keepdims=True)) ** 2, axis=-1))
 
 
@@ -194,10 +195,10 @@ class Harmonic(AbstractReduction):
 
     order: int
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         whole("Harmonic", "order", self.order, 1)
 
-    def __call__(self, values):
+    def __call__(self, values: Values) -> Real:
         count = values.shape[-1]
         if not self.order < count / 2:
             raise ValueError(f"Harmonic: order = {self.order} must be less than half of {count} values")

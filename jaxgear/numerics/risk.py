@@ -15,13 +15,14 @@ from .programs import quick_jit
 
 Scalar = Float[Array, ""]
 Values = Float[Array, " values"]
+Edges = Float[Array, " edges"]
 
 
 class AbstractMeasure(Checked):
     """A number that stands for many."""
 
     @abstractmethod
-    def spread(self, share: Float[Array, " edges"], count: Scalar) -> Float[Array, " edges"]:
+    def spread(self, share: Edges, count: Scalar) -> Edges:
         """How much of the result the lowest values up to a `share` of all weights carry, from 0 to 1.
 
         Args:
@@ -52,14 +53,14 @@ class AbstractMeasure(Checked):
 class Mean(AbstractMeasure):
     """Weighted mean."""
 
-    def spread(self, share, count):
+    def spread(self, share: Edges, count: Scalar) -> Edges:
         return share
 
 
 class Worst(AbstractMeasure):
     """Largest value."""
 
-    def spread(self, share, count):
+    def spread(self, share: Edges, count: Scalar) -> Edges:
         return jnp.where(share >= 1, 1.0, 0.0).astype(share.dtype)
 
 
@@ -68,7 +69,7 @@ class CVaR(AbstractMeasure):
 
     level: Scalar = number("", low=0.0, high=1.0, open_high=True, default=0.95)
 
-    def spread(self, share, count):
+    def spread(self, share: Edges, count: Scalar) -> Edges:
         level = self.level.astype(share.dtype)
         return jnp.maximum(share - level, 0.0) / (1 - level)
 
@@ -82,6 +83,6 @@ class Quantile(AbstractMeasure):
 
     level: Scalar = number("", low=0.0, high=1.0, open_low=True, open_high=True, default=0.95)
 
-    def spread(self, share, count):
+    def spread(self, share: Edges, count: Scalar) -> Edges:
         level = self.level.astype(share.dtype)
         return betainc((count + 1) * level, (count + 1) * (1 - level), share)

@@ -18,27 +18,32 @@ from functools import lru_cache
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
+
+from .conversion import Given
+
+Real = Float[Array, "..."]
 
 
-def safe_divide(numerator, denominator, default=0.0):
+def safe_divide(numerator: Given, denominator: Given, default: Given = 0.0) -> Real:
     """numerator / denominator, and `default` with zero gradient where the denominator is zero."""
     ok = denominator != 0
     return jnp.where(ok, numerator / jnp.where(ok, denominator, jnp.ones_like(denominator)), default)
 
 
-def safe_sqrt(x):
+def safe_sqrt(x: Given) -> Real:
     """sqrt(x) for x > 0, else 0 with zero gradient."""
     ok = x > 0
     return jnp.where(ok, jnp.sqrt(jnp.where(ok, x, jnp.ones_like(x))), jnp.zeros_like(x))
 
 
-def safe_log(x, default=0.0):
+def safe_log(x: Given, default: Given = 0.0) -> Real:
     """log(x) for x > 0, else `default` with zero gradient."""
     ok = x > 0
     return jnp.where(ok, jnp.log(jnp.where(ok, x, jnp.ones_like(x))), default)
 
 
-def safe_power(x, exponent):
+def safe_power(x: Given, exponent: Given) -> Real:
     """x**exponent for x > 0, else 0 with zero gradient (also with respect to the exponent)."""
     ok = x > 0
     return jnp.where(ok, jnp.where(ok, x, jnp.ones_like(x)) ** exponent, jnp.zeros_like(x))
@@ -58,7 +63,7 @@ _SQRT_HALF_BITS = 0x3FE6A09E667F3BCD  # of the float64 nearest to sqrt(1/2)
 
 
 @jax.custom_jvp
-def log(x):
+def log(x: Real) -> Real:
     """ln x, elementwise, of positive normal numbers; NaN for anything else, infinity included."""
     value = _log_float64(x) if x.dtype == jnp.float64 else jnp.log(x)
     return jnp.where((x > 0) & (x < jnp.inf), value, jnp.nan)
@@ -84,7 +89,7 @@ def _log_float64(x):
 
 
 @jax.custom_jvp
-def stored(x):
+def stored(x: Real) -> Real:
     """x, evaluated once; so are its tangents and cotangents."""
     return x / unit(x)
 
@@ -95,7 +100,7 @@ def _stored_jvp(primals, tangents):
     return stored(x), x_dot / unit(x)
 
 
-def unit(x):
+def unit(x: Given) -> Real:
     """Ones of which a compiler does not know it; x where that is NaN."""
     return jnp.where(x == x, 1.0, x)
 

@@ -4,6 +4,7 @@ Every curve is a cubic Hermite polynomial between neighbouring points; the metho
 Differentiable by values and positions.
 """
 
+from collections.abc import Callable
 from typing import Literal
 
 import jax
@@ -27,7 +28,9 @@ def interpolate(x: Float[Array, "..."], positions: Points, values: Points, metho
     return interpolate_columns(x, positions, values[:, None], method)(jnp.zeros_like(x, int))
 
 
-def interpolate_columns(x: Float[Array, "..."], positions: Points, values: Table, method: Method):
+def interpolate_columns(
+    x: Float[Array, "..."], positions: Points, values: Table, method: Method
+) -> Callable[[Int[Array, "..."]], Float[Array, "..."]]:
     """`interpolate` in every column of a table: a function from columns, which broadcast against x, to values there."""
     positions, values = positions.astype(x.dtype), values.astype(x.dtype)
     x = jnp.clip(x, positions[0], positions[-1])

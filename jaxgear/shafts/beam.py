@@ -9,7 +9,8 @@ Displacements are in um, rotations in mrad, forces in N, moments in N mm: force 
 rotation are the same unit of work, so compliance matrices are symmetric.
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -25,8 +26,10 @@ _ASYMMETRY = 1e-4
 # Smallest eigenvalue over the largest one that may be a rounding error of a semidefinite matrix.
 ROUNDING = 1e-9
 
+_Matrix = TypeVar("_Matrix", jax.Array, np.ndarray)
 
-def symmetric(matrix):
+
+def symmetric(matrix: _Matrix) -> _Matrix:
     """Its symmetric part: derivatives see both entries of a pair."""
     return 0.5 * (matrix + matrix.T)
 
@@ -40,7 +43,7 @@ def semidefinite(matrix: Float[Array, "n n"]) -> Bool[Array, ""]:
     return positive_definite(lifted)
 
 
-def check_symmetric(owner: str, name: str, matrix: np.ndarray, labels=None) -> None:
+def check_symmetric(owner: str, name: str, matrix: np.ndarray, labels: Sequence[str] | None = None) -> None:
     """Raises a one-line `ValueError` that names the entry that differs most from its mirror image."""
     scale = np.sqrt(np.abs(np.diag(matrix)))
     size = np.maximum(np.outer(scale, scale), np.finfo(float).tiny)
@@ -48,7 +51,7 @@ def check_symmetric(owner: str, name: str, matrix: np.ndarray, labels=None) -> N
     row, column = np.unravel_index(np.argmax(apart), apart.shape)
     if apart[row, column] <= _ASYMMETRY:
         return
-    first, second = (row, column) if labels is None else (labels[row], labels[column])
+    first, second = (row, column) if labels is None else (labels[int(row)], labels[int(column)])
     raise ValueError(
         f"{owner}: {name} must be symmetric, but ({first}, {second}) = {matrix[row, column]:.6g} and "
         f"({second}, {first}) = {matrix[column, row]:.6g}"

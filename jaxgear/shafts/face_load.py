@@ -16,7 +16,7 @@ from ..compliance.iso_6336 import iso_stiffness
 from ..contact.support import AbstractSupport
 from ..geometry import Gear, GearPair, path_of_contact
 from ..microgeometry import AbstractModification, Flank, NoModification
-from ..numerics import Checked, check, maximum, press, program, real, result, whole
+from ..numerics import Checked, Given, check, maximum, press, program, real, result, whole
 from .mesh_support import ShaftSupport, even_coordinates
 
 Scalar = Float[Array, ""]
@@ -78,7 +78,7 @@ def _largest_over_mean(load, width):
     return jnp.where(idle, 1.0, maximum(load, axis=-1) / jnp.where(idle, 1.0, mean))
 
 
-def root_face_load_factor(factor, face_width, tooth_height) -> Float[Array, "..."]:
+def root_face_load_factor(factor: Given, face_width: Given, tooth_height: Given) -> Float[Array, "..."]:
     """K_Fbeta = K_Hbeta^N_F, N_F = 1 / (1 + h/b + (h/b)^2) (ISO 6336-1 clause 7, Method B).
 
     Args:
@@ -107,7 +107,7 @@ def tooth_height(pair: GearPair) -> Scalar:
     return jnp.maximum(of(pair.pinion), of(pair.wheel))
 
 
-def mesh_stiffness(pair: GearPair, line_load) -> Scalar:
+def mesh_stiffness(pair: GearPair, line_load: Given) -> Scalar:
     """c_gamma_beta = 0.85 c_gamma_alpha [N/(mm um)] of ISO 6336-1 Method B.
 
     Args:
@@ -119,11 +119,11 @@ def mesh_stiffness(pair: GearPair, line_load) -> Scalar:
 
 def annex_e(
     support: AbstractSupport,
+    torque: Given | None = None,
     *,
-    torque=None,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
-    stiffness=None,
+    stiffness: Given | None = None,
     stations: int = _STATIONS,
 ) -> FaceLoad:
     """Load over the face with a constant mesh stiffness, the shafts and the gap, as one complementarity problem.

@@ -43,7 +43,7 @@ import scipy.sparse.linalg
 from jaxtyping import Array, Bool, Float
 from threadpoolctl import threadpool_limits
 
-from ..numerics import Checked, concrete, number, positive_definite, solve_dense
+from ..numerics import Checked, Numbers, concrete, number, positive_definite, solve_dense
 from .beam import DIRECTIONS, check_symmetric, semidefinite, symmetric
 
 Matrix = Float[Array, "rows columns"]
@@ -270,7 +270,7 @@ _MISSED = 1e-6  # of unit loads, where the solution is one
 
 
 def spread_forces(
-    nodes: np.ndarray, center, degrees_of_freedom: np.ndarray, size: int, *, tilting: bool = False
+    nodes: np.ndarray, center: Numbers, degrees_of_freedom: np.ndarray, size: int, *, tilting: bool = False
 ) -> np.ndarray:
     """Nodal forces of unit forces (and moments) on a seat in the directions x, y, z (, rx, ry).
 
@@ -319,7 +319,9 @@ def spread_forces(
     return forces
 
 
-def condense(stiffness, seats: Mapping[str, np.ndarray]) -> Housing:
+def condense(
+    stiffness: scipy.sparse.sparray | scipy.sparse.spmatrix | np.ndarray, seats: Mapping[str, np.ndarray]
+) -> Housing:
     """The housing of a finite-element model in mm, N and rad, as its compliance between the seats.
 
     Args:

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import check, real
+from ..numerics import Given, check, real
 
 Scalar = Float[Array, ""]
 Arrangement = Literal["a", "b", "c", "d", "e"]
@@ -40,7 +40,15 @@ _RUN_IN_SOFT = 320.0  # over sigma_Hlim [MPa]
 
 
 def iso_shaft_deflection(
-    line_load, face_width, pitch_diameter, shaft_diameter, *, arrangement: Arrangement, span, offset, power_share=100.0
+    line_load: Given,
+    face_width: Given,
+    pitch_diameter: Given,
+    shaft_diameter: Given,
+    *,
+    arrangement: Arrangement,
+    span: Given,
+    offset: Given,
+    power_share: Given = 100.0,
 ) -> Scalar:
     """f_sh, misalignment by bending and torsion of the pinion and its shaft [um over the face width].
 
@@ -75,15 +83,15 @@ def iso_shaft_deflection(
 
 
 def method_c(
-    line_load,
-    stiffness,
-    shaft_deflection,
-    misalignment,
+    line_load: Given,
+    stiffness: Given,
+    shaft_deflection: Given,
+    misalignment: Given,
     *,
     flank_line: FlankLine = "none",
-    helix_tolerance=0.0,
+    helix_tolerance: Given = 0.0,
     hardening: Hardening = "surface_hardened",
-    endurance_limit=None,
+    endurance_limit: Given | None = None,
 ) -> Scalar:
     """K_Hbeta by Method C.
 
@@ -121,7 +129,7 @@ def method_c(
     return jnp.where(share <= 2, 1 + share / 2, jnp.sqrt(2 * jnp.maximum(share, 2.0)))
 
 
-def _running_in(initial: Scalar, hardening: Hardening, endurance_limit) -> Scalar:
+def _running_in(initial: Scalar, hardening: Hardening, endurance_limit: Given | None) -> Scalar:
     """y_beta [um]."""
     _check_choice("method_c", "hardening", hardening, get_args(Hardening))
     if endurance_limit is not None and hardening != "through_hardened":

@@ -197,8 +197,8 @@ def mesh_patterns(gearbox: Gearbox, mesh: int, y: Slices) -> list[Patterns]:
 def load_pattern(gearbox: Gearbox, without: int | None = None) -> list[Patterns]:
     """All loads as one pattern for every shaft: meshes, even over their faces, but for one; and loads from outside."""
     points, weights = gauss_legendre(_POINTS)
-    at: list[list] = [[] for _ in gearbox.shafts]
-    vectors: list[list] = [[] for _ in gearbox.shafts]
+    at: list[list[Array]] = [[] for _ in gearbox.shafts]
+    vectors: list[list[Array]] = [[] for _ in gearbox.shafts]
     torques = gearbox.pinion_torques()
     for mesh in range(len(gearbox.meshes)):
         if mesh == without:
@@ -225,14 +225,16 @@ def side_by_side(first: list[Patterns], second: list[Patterns]) -> list[Patterns
     return found
 
 
-def torques_on(gearbox: Gearbox, shaft: int, without: int | None = None):
+def torques_on(
+    gearbox: Gearbox, shaft: int, without: int | None = None
+) -> tuple[Float[Array, " points"], Float[Array, " points"]]:
     """Positions and torques on a shaft, positive where they drive it [N mm], those of all but one mesh.
 
     Meshes act evenly over their faces; the coupling without a torque of its own takes what is left.
     """
     points, weights = gauss_legendre(_POINTS)
-    at: list = []
-    found: list = []
+    at: list[Array] = []
+    found: list[Array] = []
     left = jnp.zeros(())
     for mesh, torque in enumerate(gearbox.pinion_torques()):
         where = acting(gearbox, mesh)

@@ -7,7 +7,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..contact.support import AbstractSupport
 from ..geometry import GearPair, margins
-from ..numerics import concrete, number, program, real, whole, within_limits
+from ..numerics import Given, concrete, number, program, real, whole, within_limits
 from .beam import ROUNDING, check_symmetric, semidefinite, symmetric, twist
 from .gearbox import Gearbox
 from .loads import acting, load_pattern, mesh_patterns, side_by_side, solve, torques_on
@@ -217,6 +217,6 @@ def _twist_between(gearbox: Gearbox, mesh: int, side: int, y: Slices, at: Float[
     return jnp.where(beyond[1] > beyond[0], from_right, from_left)
 
 
-def even_coordinates(width, slices: int) -> Slices:
+def even_coordinates(width: Given, slices: int) -> Slices:
     """Middles of slices of equal width over a face [mm]."""
     return real(width) * ((np.arange(slices) + 0.5) / slices - 0.5)

@@ -5,7 +5,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import GearPair
 from ..microgeometry.base import acts
-from ..numerics import Checked, check, concrete, number, real
+from ..numerics import Checked, Given, check, concrete, number, real
 
 Scalar = Float[Array, ""]
 
@@ -57,7 +57,7 @@ class Misalignment(Checked):
         return self.direct + over_span * pair.face_width / self.bearing_span
 
 
-def axis_tolerance(helix_deviation, face_width, bearing_span) -> Misalignment:
+def axis_tolerance(helix_deviation: Given, face_width: Given, bearing_span: Given) -> Misalignment:
     """Largest deviations of the axes by ISO/TR 10064-3, both in the worse direction.
 
     f_Sigma_beta = 0.5 (L / b) F_beta and f_Sigma_delta = 2 f_Sigma_beta, quoted from secondary sources.
@@ -69,5 +69,6 @@ def axis_tolerance(helix_deviation, face_width, bearing_span) -> Misalignment:
     """
     check("axis_tolerance", "helix_deviation", helix_deviation, "um", low=0.0)
     check("axis_tolerance", "face_width", face_width, "mm", low=0.0, open_low=True)
-    skew = _SKEW * real(bearing_span) / real(face_width) * real(helix_deviation)
-    return Misalignment(skew, _INCLINATION * skew, bearing_span)
+    bearings = real(bearing_span, "Misalignment: bearing_span")
+    skew = _SKEW * bearings / real(face_width) * real(helix_deviation)
+    return Misalignment(skew, _INCLINATION * skew, bearings)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, check, concrete, program, real, result
+from ..numerics import Checked, Numbers, check, concrete, program, real, result
 from .beam import DIRECTIONS, twist
 from .gearbox import Gearbox
 from .loads import Patterns, load_pattern, side_by_side, solve, torques_on
@@ -73,7 +73,7 @@ def with_and_without_housing(gearbox: Gearbox) -> tuple[BearingReactions, Bearin
     return _reactions(gearbox), _reactions(replace(gearbox, housing=None))
 
 
-def elastic_line(gearbox: Gearbox, shaft: str, position) -> ElasticLine:
+def elastic_line(gearbox: Gearbox, shaft: str, position: Numbers) -> ElasticLine:
     """Displacements and twist of a shaft under all loads, the force of every mesh even over its face.
 
     Args:

@@ -200,7 +200,7 @@ class ShaftError(ValueError):
         part: what of the shaft is wrong, as `bearings[1].position`; "" where it is no single part.
     """
 
-    def __init__(self, part: str, problem: str):
+    def __init__(self, part: str, problem: str) -> None:
         self.part = part
         super().__init__(problem)
 

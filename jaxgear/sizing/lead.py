@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import GearPair
 from ..microgeometry import EndRelief, LeadCrowning
-from ..numerics import check, real
+from ..numerics import Given, check, real
 
 Scalar = Float[Array, ""]
 Kind = Literal["through_hardened", "surface_hardened", "stiff"]
@@ -23,7 +23,7 @@ _CROWNING = (10.0, 40.0)
 _STIFF_CROWNING = (10.0, 25.0)
 
 
-def equivalent_misalignment(helix_tolerance, shaft_deflection) -> Scalar:
+def equivalent_misalignment(helix_tolerance: Given, shaft_deflection: Given) -> Scalar:
     """F_betax_cv = f_sh + 1.5 f_Hbeta [um over the face width], the misalignment that crowning and end relief are for.
 
     Args:
@@ -35,7 +35,7 @@ def equivalent_misalignment(helix_tolerance, shaft_deflection) -> Scalar:
     return real(shaft_deflection) + 1.5 * real(helix_tolerance)
 
 
-def crowning_for_misalignment(misalignment, *, limited: bool = False) -> Scalar:
+def crowning_for_misalignment(misalignment: Given, *, limited: bool = False) -> Scalar:
     """C_beta = 0.5 F_betax [um] (ISO 6336-1 Annex B; the genetic-algorithm study of the 19/48 pair calls it C_c).
 
     Args:
@@ -47,7 +47,7 @@ def crowning_for_misalignment(misalignment, *, limited: bool = False) -> Scalar:
     return jnp.clip(amount, *_CROWNING) if limited else amount
 
 
-def crowning_for_tolerance(helix_tolerance, *, limited: bool = False) -> Scalar:
+def crowning_for_tolerance(helix_tolerance: Given, *, limited: bool = False) -> Scalar:
     """C_beta = f_Hbeta [um], where shafts are stiff or a helix modification compensates their deflection.
 
     ISO 6336-1 Annex B; also equation 1 of the study of a three-step sizing of modifications, which applies it to both
@@ -62,7 +62,9 @@ def crowning_for_tolerance(helix_tolerance, *, limited: bool = False) -> Scalar:
     return jnp.clip(amount, *_STIFF_CROWNING) if limited else amount
 
 
-def iso_crowning(helix_tolerance, shaft_deflection=None, *, limited: bool = True) -> LeadCrowning:
+def iso_crowning(
+    helix_tolerance: Given, shaft_deflection: Given | None = None, *, limited: bool = True
+) -> LeadCrowning:
     """Crowning of ISO 6336-1 Annex B, ready to use.
 
     It counts over the gear's own face: on a gear that is wider than its mate the common face has (common / own)^2 of
@@ -79,7 +81,9 @@ def iso_crowning(helix_tolerance, shaft_deflection=None, *, limited: bool = True
     return LeadCrowning(crowning_for_misalignment(misalignment, limited=limited))
 
 
-def end_relief_amount(helix_tolerance, shaft_deflection=0.0, *, kind: Kind = "surface_hardened") -> Scalar:
+def end_relief_amount(
+    helix_tolerance: Given, shaft_deflection: Given = 0.0, *, kind: Kind = "surface_hardened"
+) -> Scalar:
     """C_beta I and II [um] of ISO 6336-1 Annex B, for each end of the face.
 
     f_sh + 1.5 f_Hbeta for through-hardened teeth, half of it for surface-hardened ones, f_Hbeta for "stiff" gears.
@@ -108,7 +112,7 @@ def end_relief_length(pair: GearPair) -> Scalar:
 
 
 def iso_end_relief(
-    pair: GearPair, helix_tolerance, shaft_deflection=0.0, *, kind: Kind = "surface_hardened"
+    pair: GearPair, helix_tolerance: Given, shaft_deflection: Given = 0.0, *, kind: Kind = "surface_hardened"
 ) -> EndRelief:
     """Linear end relief on both ends: `end_relief_amount` over `end_relief_length`.
 

@@ -13,7 +13,7 @@ from ..contact import MeshCycle
 from ..geometry import GearPair, path_of_contact
 from ..metrics import secant_stiffness
 from ..microgeometry import AbstractCurve, TipRelief
-from ..numerics import check, minimum, real, safe_divide
+from ..numerics import Given, check, minimum, real, safe_divide
 
 Scalar = Float[Array, ""]
 
@@ -29,7 +29,7 @@ def short_relief_length(pair: GearPair) -> Scalar:
     return 0.5 * long_relief_length(pair)
 
 
-def relief_amount(pair: GearPair, torque, application_factor=1.0) -> Scalar:
+def relief_amount(pair: GearPair, torque: Given, application_factor: Given = 1.0) -> Scalar:
     """Tip relief C_a = F_t K_A / (b c') [um], the amount that zeroes the profile term B_k of ISO 6336-1's K_v.
 
     It is the deflection of one pair under the whole load. A study of industrial gearboxes starts from a simple rule of
@@ -44,7 +44,9 @@ def relief_amount(pair: GearPair, torque, application_factor=1.0) -> Scalar:
     return _over(line_load, iso_stiffness(pair, line_load).single)
 
 
-def effective_relief(pair: GearPair, torque, application_factor=1.0, mesh_load_factor=1.0) -> Scalar:
+def effective_relief(
+    pair: GearPair, torque: Given, application_factor: Given = 1.0, mesh_load_factor: Given = 1.0
+) -> Scalar:
     """Effective tip relief C_eff = K_A K_mp F_t / (b cos(alpha_t) c_gamma) [um], the mean deflection of the mesh.
 
     Equation B.1 of ISO/TR 13989-1 (scuffing), also in ISO/TS 6336-20, as quoted in secondary sources. c_gamma is the
@@ -62,7 +64,7 @@ def effective_relief(pair: GearPair, torque, application_factor=1.0, mesh_load_f
     return _over(normal, iso_stiffness(pair, line_load).mesh)
 
 
-def mesh_stiffness_relief(pair: GearPair, torque, application_factor=1.0) -> Scalar:
+def mesh_stiffness_relief(pair: GearPair, torque: Given, application_factor: Given = 1.0) -> Scalar:
     """Delta_max = (K_A F_t / b) / (epsilon_alpha c_gamma) [um], as printed in the genetic-algorithm study of the 19/48
     pair; for comparison with it only.
 
@@ -79,7 +81,7 @@ def mesh_stiffness_relief(pair: GearPair, torque, application_factor=1.0) -> Sca
     return _over(line_load, path_of_contact(pair).contact_ratio * iso_stiffness(pair, line_load).mesh)
 
 
-def run_in_relief(hertz_limit) -> Scalar:
+def run_in_relief(hertz_limit: Given) -> Scalar:
     """Tip relief that running in wears off, C_ay = (sigma_Hlim / 97 - 18.45)^2 / 18 + 1.5 [um] (ISO 6336-1).
 
     It stands in for the relief in K_v where none was ground; of two materials take the mean. As quoted in secondary
@@ -92,7 +94,7 @@ def run_in_relief(hertz_limit) -> Scalar:
     return (real(hertz_limit) / 97.0 - 18.45) ** 2 / 18.0 + 1.5
 
 
-def dynamic_relief(cycle: MeshCycle, internal_force=0.0, external_force=0.0) -> Scalar:
+def dynamic_relief(cycle: MeshCycle, internal_force: Given = 0.0, external_force: Given = 0.0) -> Scalar:
     """Tip relief for loads that vibrate, C_max = W_dmax / K_vmin = (F_m + F_ah + F_aT) / K_vmin [um].
 
     The rule of the study of dynamic modification. F_m is the static force of the cycle and K_vmin its smallest secant
@@ -110,13 +112,15 @@ def dynamic_relief(cycle: MeshCycle, internal_force=0.0, external_force=0.0) -> 
     return safe_divide(cycle.force + real(internal_force) + real(external_force), minimum(stiffness))
 
 
-def iso_relief(pair: GearPair, torque, *, curve: AbstractCurve | None = None, application_factor=1.0) -> TipRelief:
+def iso_relief(
+    pair: GearPair, torque: Given, *, curve: AbstractCurve | None = None, application_factor: Given = 1.0
+) -> TipRelief:
     """Rule-based long tip relief: `relief_amount` over `long_relief_length`, for the tip of either gear."""
     shape = {} if curve is None else {"curve": curve}
     return TipRelief(relief_amount(pair, torque, application_factor), long_relief_length(pair), **shape)
 
 
-def _line_load(owner: str, pair: GearPair, torque, application_factor) -> Scalar:
+def _line_load(owner: str, pair: GearPair, torque: Given, application_factor: Given) -> Scalar:
     """F_t K_A / b [N/mm], tangential at the reference circle."""
     check(owner, "torque", torque, "N m", low=0.0)
     check(owner, "application_factor", application_factor, "", low=0.0)

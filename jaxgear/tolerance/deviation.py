@@ -5,10 +5,10 @@ from functools import cache
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from ..contact import Mesh, RemovedMaterial, removed_material
-from ..contact.operating_point import operating_point_of
+from ..contact.operating_point import Torque, operating_point_of
 from ..contact.slide import nominal_material
 from ..microgeometry import AbstractModification, Flank, LeadSlope, NoModification, ProfileSlope
 from ..numerics import Checked, number, program, real, result, spread, whole
@@ -66,14 +66,14 @@ class Waviness(AbstractModification):
 
     varies_along_face = False
 
-    def __call__(self, flank: Flank):
+    def __call__(self, flank: Flank) -> Float[Array, "..."]:
         x = (flank.roll_length - flank.start_roll_length) / (flank.tip_roll_length - flank.start_roll_length)
         x = jnp.clip(x, 0.0, 1.0)
         waves = _waves(x[..., None], self.coefficients.shape[0] // 2, jnp)
         return jnp.sum(waves * self.coefficients.astype(waves.dtype).reshape((1,) * x.ndim + (-1,)), axis=-1)
 
 
-def sample_deviations(tolerance: Tolerance, mesh: Mesh, samples: int, seed) -> Deviation:
+def sample_deviations(tolerance: Tolerance, mesh: Mesh, samples: int, seed: int) -> Deviation:
     """Random deviations of manufactured gears within a tolerance.
 
     Sample i depends on the seed and on i alone, not on the number of samples, and is a smooth function of the limits:
@@ -101,7 +101,7 @@ def _sample(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, samples: int) -
     return jax.vmap(lambda number: deviation_of(tolerance, mesh, key, number))(jnp.arange(samples))
 
 
-def deviation_of(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, number) -> Deviation:
+def deviation_of(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, number: int | Int[Array, ""]) -> Deviation:
     """One sample, of the given number."""
     pinion, wheel, shafts = jax.random.split(jax.random.fold_in(key, number), 3)
     draw, dtype = tolerance.distribution, mesh.slice_width.dtype
@@ -115,7 +115,7 @@ def deviation_of(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, number) ->
 @program
 def deviated_material(
     mesh: Mesh,
-    torque,
+    torque: Torque,
     deviation: Deviation,
     *,
     pinion: AbstractModification | None = None,
@@ -145,7 +145,7 @@ def deviation_field(deviation: Deviation, basis: Float[Array, "terms pairs slice
     return jnp.tensordot(_coefficients(deviation), basis, 1) + pitch[:, None, None]
 
 
-def flank_basis(mesh: Mesh, torque) -> Float[Array, "terms pairs slices positions"]:
+def flank_basis(mesh: Mesh, torque: Torque) -> Float[Array, "terms pairs slices positions"]:
     """Material that every flank deviation of unit size removes [um per um].
 
     Around its nominal place, where the contact meets a deviation, that is linear, so that samples differ by their

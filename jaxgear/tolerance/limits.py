@@ -1,23 +1,27 @@
 """Tolerance limits of a gear pair, by ISO 1328-1:2013 for one, and how deviations are distributed between them."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import replace
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from ..contact import Mesh
 from ..geometry import Gear, GearPair
-from ..numerics import Checked, check, concrete, number, real
+from ..numerics import Checked, Given, check, concrete, number, real
+
+Draws = Float[Array, "..."]
 
 
 class AbstractDistribution(Checked):
     """A symmetric distribution between -1 and 1; a deviation is its tolerance limit times a draw."""
 
     @abstractmethod
-    def __call__(self, key: PRNGKeyArray, shape: tuple[int, ...], dtype) -> Float[Array, "..."]:
+    def __call__(self, key: PRNGKeyArray, shape: tuple[int, ...], dtype: np.dtype) -> Draws:
         """Independent draws between -1 and 1."""
 
 
@@ -29,7 +33,7 @@ class TruncatedNormal(AbstractDistribution):
 
     sigmas: Float[Array, ""] = number("", low=0.0, open_low=True, default=3.0)
 
-    def __call__(self, key, shape, dtype):
+    def __call__(self, key: PRNGKeyArray, shape: tuple[int, ...], dtype: np.dtype) -> Draws:
         sigmas = self.sigmas.astype(dtype)
         return jax.random.truncated_normal(key, -sigmas, sigmas, shape, dtype) / sigmas
 
@@ -37,7 +41,7 @@ class TruncatedNormal(AbstractDistribution):
 class Uniform(AbstractDistribution):
     """Every value between the limits is as likely: nothing is known but the tolerance."""
 
-    def __call__(self, key, shape, dtype):
+    def __call__(self, key: PRNGKeyArray, shape: tuple[int, ...], dtype: np.dtype) -> Draws:
         return jax.random.uniform(key, shape, dtype, -1.0, 1.0)
 
 
@@ -66,10 +70,12 @@ class ToleranceClass(Checked):
     quality_class: Scalar = number("", low=1.0, high=11.0, whole=True)
 
     @classmethod
-    def of(cls, gear: Gear, quality_class) -> "ToleranceClass":
+    def of(cls, gear: Gear, quality_class: Given) -> "ToleranceClass":
         """Tolerances of a gear of 5 to 1000 teeth."""
         check("ToleranceClass", "teeth", gear.teeth, "", low=5.0, high=1000.0)
-        return cls(2 * gear.pitch_radius, gear.module, gear.face_width, quality_class)
+        return cls(
+            2 * gear.pitch_radius, gear.module, gear.face_width, real(quality_class, "ToleranceClass: quality_class")
+        )
 
     @property
     def single_pitch(self) -> Scalar:
@@ -117,7 +123,7 @@ class ToleranceClass(Checked):
         return 2 ** (0.5 * (self.quality_class - 5))
 
 
-def iso_rounded(tolerance) -> Float[Array, "..."]:
+def iso_rounded(tolerance: Given) -> Float[Array, "..."]:
     """A tolerance [um] as the standard states it: above 10 to 1, from 5 to 10 to 0.5, below 5 to 0.1.
 
     Totals are formed before rounding. The steps have no gradient.
@@ -147,7 +153,7 @@ class GearTolerance(Checked):
     helix_slope: Scalar | None = number("um", low=0.0, optional=True, default=None)
 
     @classmethod
-    def from_class(cls, gear: Gear, quality_class, *, rounded: bool = True) -> "GearTolerance":
+    def from_class(cls, gear: Gear, quality_class: Given, *, rounded: bool = True) -> "GearTolerance":
         """Limits of a gear in a flank tolerance class of ISO 1328-1:2013, 1 to 11.
 
         Args:
@@ -191,9 +197,9 @@ class Tolerance(Checked):
     def from_class(
         cls,
         pair: GearPair,
-        quality_class=5,
+        quality_class: Given | Sequence[Given] = 5,
         *,
-        misalignment=None,
+        misalignment: Given | None = None,
         distribution: AbstractDistribution | None = None,
         rounded: bool = True,
     ) -> "Tolerance":
@@ -209,12 +215,12 @@ class Tolerance(Checked):
         Raises:
             ValueError: for a class or a gear outside the range of the standard.
         """
-        both = isinstance(quality_class, (tuple, list))
-        pinion_class, wheel_class = quality_class if both else (quality_class, quality_class)
+        classes = quality_class if isinstance(quality_class, Sequence) else (quality_class, quality_class)
+        pinion_class, wheel_class = classes
         return cls(
             pinion=GearTolerance.from_class(pair.pinion, pinion_class, rounded=rounded),
             wheel=GearTolerance.from_class(pair.wheel, wheel_class, rounded=rounded),
-            misalignment=misalignment,
+            misalignment=None if misalignment is None else real(misalignment, "Tolerance: misalignment"),
             distribution=TruncatedNormal() if distribution is None else distribution,
         )
 

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from ...geometry import Gear, GearPair
 from ...numerics import AbstractSpring, Checked, concrete, program
-from ..assembly import AbstractCompliance, Structures, between_planes, with_edge
+from ..assembly import AbstractCompliance, Outside, Structures, between_planes, with_edge
 from ..hertz import ContactGeometry, DepthReferenced
 from ..plane import (
     Plane,
@@ -71,7 +71,7 @@ class TabulatedCompliance(AbstractCompliance, Checked):
         ]
         return jnp.stack(hubs)
 
-    def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside) -> AbstractSpring:
+    def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside: Outside) -> AbstractSpring:
         plane = contact_plane(self.plane)
         missing = _local(self.pinion[0], pinion, plane) + _local(self.wheel[0], wheel, plane)
         law = DepthReferenced().prepare(geometry)

@@ -44,7 +44,7 @@ def write_table(path: str | Path, table: GearTable) -> None:
         table: of one gear and plane: `finite_element_compliance(pair, plane).pinion[0]`.
     """
     rho = [float(value) for value in np.asarray(table.roll_length)]
-    rows: list[tuple] = [(kind, "", "", "", repr(float(getattr(table, kind)))) for kind in _SINGLE]
+    rows: list[tuple[str | int, ...]] = [(kind, "", "", "", repr(float(getattr(table, kind)))) for kind in _SINGLE]
     for kind in _CURVES:
         rows += [(kind, "", repr(x), "", repr(float(y))) for x, y in zip(rho, np.asarray(getattr(table, kind)))]
     for k, matrix in enumerate(np.asarray(table.neighbours), 1):

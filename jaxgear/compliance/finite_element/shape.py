@@ -4,7 +4,7 @@ The curves are those of `geometry.outline`, in NumPy: a table is made once, from
 also where JAX computes in single precision or is tracing.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import scipy  # its packages load when they are used
@@ -39,6 +39,9 @@ class Shape(NamedTuple):
         return Shape(*(float(f"{value:.{_DIGITS}g}") for value in self))
 
 
+OneOrMany = TypeVar("OneOrMany", float, np.ndarray)
+
+
 class Tooth:
     """Outline of the right flank; tooth frame and trochoid as in `geometry.outline`, lengths in modules.
 
@@ -50,7 +53,7 @@ class Tooth:
         root_half_angle: half angle of the tooth at the root circle [rad].
     """
 
-    def __init__(self, shape: Shape):
+    def __init__(self, shape: Shape) -> None:
         self.shape = shape
         self._alpha = alpha = np.deg2rad(shape.pressure_angle)
         self.pitch = 0.5 * shape.teeth
@@ -72,35 +75,35 @@ class Tooth:
         """Half the angle of a pitch [rad]."""
         return np.pi / self.shape.teeth
 
-    def trochoid(self, g) -> np.ndarray:
+    def trochoid(self, g: float | np.ndarray) -> np.ndarray:
         """Points of the fillet, shape (2, ...), from parameters [rad]."""
         r = self.pitch
         phi = (self._depth / np.tan(g) + self._offset) / r
         distance = self._depth / np.sin(g) + self.shape.root_radius
         return np.stack([r * np.sin(phi) - distance * np.cos(g - phi), r * np.cos(phi) - distance * np.sin(g - phi)])
 
-    def half_angle(self, rho):
+    def half_angle(self, rho: OneOrMany) -> OneOrMany:
         """Between centreline and involute [rad]."""
         return self._base_half_angle - (rho / self.base - np.arctan(rho / self.base))
 
-    def involute(self, rho) -> np.ndarray:
+    def involute(self, rho: float | np.ndarray) -> np.ndarray:
         """Points of the involute, shape (2, ...), from roll lengths."""
-        r, angle = np.sqrt(self.base**2 + np.square(rho)), self.half_angle(rho)
+        r, angle = np.sqrt(self.base**2 + np.square(rho)), self.half_angle(np.asarray(rho))
         return np.stack([r * np.sin(angle), r * np.cos(angle)])
 
-    def load_angle(self, rho):
+    def load_angle(self, rho: OneOrMany) -> OneOrMany:
         """Between the load line and the normal to the centreline [rad]."""
         return np.arctan(rho / self.base) - self.half_angle(rho)
 
-    def depth(self, rho):
+    def depth(self, rho: OneOrMany) -> OneOrMany:
         """From a point of the flank to the centreline along the load line."""
         return self.involute(rho)[0] / np.cos(self.load_angle(rho))
 
-    def crossing(self, rho):
+    def crossing(self, rho: OneOrMany) -> OneOrMany:
         """Height at which the load line crosses the centreline."""
         return self.base / np.cos(self.load_angle(rho))
 
-    def arc(self, rho):
+    def arc(self, rho: OneOrMany) -> OneOrMany:
         """Length of the involute from the base circle."""
         return np.square(rho) / (2 * self.base)
 

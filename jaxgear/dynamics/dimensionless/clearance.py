@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...numerics import check, concrete, number, quick_jit, real
+from ...numerics import Given, check, concrete, number, quick_jit, real
 from ..force import AbstractMeshForce
 
 Scalar = Float[Array, ""]
@@ -44,7 +44,7 @@ class PolynomialClearance(AbstractMeshForce):
     range: Scalar = number("", low=1.0, open_low=True)
 
     @classmethod
-    def fit(cls, order: int = 7, range=3.0) -> "PolynomialClearance":
+    def fit(cls, order: int = 7, range: Given = 3.0) -> "PolynomialClearance":
         """Least squares of the dead zone over |x| <= range.
 
         Args:
@@ -63,10 +63,10 @@ class PolynomialClearance(AbstractMeshForce):
             raise ValueError(f"PolynomialClearance.published: order = {order!r} must be 3, 5 or 7")
         return cls(real(PUBLISHED[order]), real(3.0))
 
-    def at(self, phase: Scalar) -> tuple:
+    def at(self, phase: Scalar) -> tuple[()]:
         return ()
 
-    def force(self, place, dte: Scalar) -> Scalar:
+    def force(self, place: tuple[()], dte: Scalar) -> Scalar:
         known, most = concrete(dte), concrete(self.range)
         if known is not None and most is not None:
             check("PolynomialClearance", "dte", known, "", low=-most, high=most)
@@ -85,7 +85,7 @@ class PolynomialClearance(AbstractMeshForce):
         """f'(x) without regard to the range."""
         return jax.jvp(self.polynomial, (x,), (jnp.ones_like(x),))[1]
 
-    def loaded(self, load) -> Scalar:
+    def loaded(self, load: Given) -> Scalar:
         """Largest x in range with f(x) = load: the mean of a loaded mesh; the range itself where the load is beyond."""
         return _loaded(self, real(load))
 
@@ -112,7 +112,7 @@ def _loaded(clearance: PolynomialClearance, load: Scalar) -> Scalar:
     return x - (clearance.polynomial(x) - load) / clearance.slope(x)  # its derivative is that of the root
 
 
-def warn_of_false_well(clearance: PolynomialClearance, load) -> bool:
+def warn_of_false_well(clearance: PolynomialClearance, load: Given) -> bool:
     """Warns where a load is too small for a fit with a_1 < 0, which makes a double well of the clearance.
 
     A dead zone carries every load with slope 1; such a fit is softer than three quarters of that where the load stands

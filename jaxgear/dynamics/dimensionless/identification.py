@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from ...contact import MeshCycle
 from ...metrics import harmonics, secant_stiffness
-from ...numerics import Checked, check, real, result, safe_sqrt
+from ...numerics import Checked, Given, check, real, result, safe_sqrt
 from ..force import AbstractMeshForce, DeadZone
 from .model import DimensionlessModel
 
@@ -37,12 +37,12 @@ class Identified(Checked):
 def from_mesh(
     cycle: MeshCycle,
     *,
-    mass,
-    damping_ratio=None,
-    damping=None,
-    half_clearance=None,
-    torque_fluctuation=0.0,
-    torque_order=1.0,
+    mass: Given,
+    damping_ratio: Given | None = None,
+    damping: Given | None = None,
+    half_clearance: Given | None = None,
+    torque_fluctuation: Given = 0.0,
+    torque_order: Given = 1.0,
     orders: int = 5,
     stiffness: Literal["secant", "tangent"] = "secant",
     clearance: AbstractMeshForce | None = None,
@@ -80,7 +80,11 @@ def from_mesh(
     mass, mean = real(mass), jnp.mean(curve)
     parametric = harmonics(curve / mean, orders)
     unloaded = harmonics(cycle.unloaded_transmission_error / half, orders)
-    ratio = real(damping_ratio if damping is None else 0.5 * real(damping) / safe_sqrt(mass * _MICRO * mean))
+    if damping is None:
+        assert damping_ratio is not None  # one of both is given
+        ratio = real(damping_ratio)
+    else:
+        ratio = 0.5 * real(damping) / safe_sqrt(mass * _MICRO * mean)
     load = cycle.force / (half * mean)
     order = jnp.arange(1, orders + 1, dtype=mean.dtype)
     # F_aT and F_ah share the list of orders; the fluctuation comes first

@@ -1,14 +1,14 @@
 """The dimensionless torsional model of a gear pair, as studies of profile modification state it."""
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
-from ...numerics import Checked, check, number, real
+from ...numerics import Checked, Given, Numbers, check, number, real
 from ..force import AbstractMeshForce, DeadZone, te_under
 from ..oscillator import Excitation, Oscillator
 from .clearance import PolynomialClearance, warn_of_false_well
@@ -86,14 +86,14 @@ class DimensionlessForce(AbstractMeshForce):
         size = loaded_te(self.clearance, jnp.abs(force) / stiffness)
         return taken + jnp.where(force < 0, -size, size)
 
-    def at(self, phase: Scalar) -> Any:
+    def at(self, phase: Scalar) -> PyTree[Array]:
         order = jnp.arange(1, len(self.stiffness_harmonics) + 1, dtype=self.stiffness_harmonics.dtype)
         angle = 2 * jnp.pi * order * phase + self.stiffness_angles
         stiffness = 1 + jnp.sum(self.stiffness_harmonics * jnp.cos(angle))
         taken = jnp.zeros_like(stiffness) if self.relief is None else self.relief(phase)
         return self.clearance.at(phase), stiffness, taken
 
-    def force(self, place: Any, dte: Scalar) -> Scalar:
+    def force(self, place: PyTree[Array], dte: Scalar) -> Scalar:
         inner, stiffness, taken = place
         if self.relief_form == "exact":
             return stiffness * self.clearance.force(inner, dte - taken)
@@ -181,16 +181,16 @@ class DimensionlessModel(Checked):
 
 def dimensionless_model(
     *,
-    load,
-    damping_ratio,
-    stiffness_harmonics=(0.0,),
-    stiffness_angles=None,
-    torque=0.0,
-    torque_angle=0.0,
-    torque_order=1.0,
-    displacement=0.0,
-    displacement_angle=0.0,
-    displacement_order=1.0,
+    load: Given,
+    damping_ratio: Given,
+    stiffness_harmonics: Numbers = (0.0,),
+    stiffness_angles: Numbers | None = None,
+    torque: Given = 0.0,
+    torque_angle: Given = 0.0,
+    torque_order: Given = 1.0,
+    displacement: Given = 0.0,
+    displacement_angle: Given = 0.0,
+    displacement_order: Given = 1.0,
     clearance: AbstractMeshForce | None = None,
     relief: CycleRelief | None = None,
     relief_form: ReliefForm = "exact",
@@ -208,10 +208,10 @@ def dimensionless_model(
     harmonics = real(stiffness_harmonics)
     none = real(np.zeros(1))
     return DimensionlessModel(
-        load,
-        damping_ratio,
+        real(load, "DimensionlessModel: load"),
+        real(damping_ratio, "DimensionlessModel: damping_ratio"),
         harmonics,
-        jnp.zeros_like(harmonics) if stiffness_angles is None else stiffness_angles,
+        jnp.zeros_like(harmonics) if stiffness_angles is None else real(stiffness_angles),
         jnp.stack([real(torque_order), real(displacement_order)]),
         jnp.concatenate([real(torque)[None], none]),
         jnp.concatenate([real(torque_angle)[None], none]),
@@ -223,7 +223,7 @@ def dimensionless_model(
     )
 
 
-def rectangular_harmonics(ratio, share, count: int = 5) -> Float[Array, " harmonics"]:
+def rectangular_harmonics(ratio: Given, share: Given, count: int = 5) -> Float[Array, " harmonics"]:
     """B_j = 2 (k_D - k_S) sin(pi j share) / (pi j k_mean) of a stiffness k_D = ratio k_S over a share of the cycle
     about mesh position 0, and k_S over the rest; all angles are zero.
 

@@ -12,7 +12,7 @@ import scipy
 from jaxtyping import Array, Bool, Float
 
 from ...microgeometry import Linear, Polynomial, Power, Quadratic
-from ...numerics import Checked, check, concrete, kernel, real, result, spread, whole
+from ...numerics import Checked, Given, Numbers, check, concrete, kernel, real, result, spread, whole
 from ...numerics.pareto import decoded, next_generation, random_strings
 from .model import DimensionlessModel, with_relief
 from .relief import CycleRelief
@@ -29,6 +29,10 @@ def vector(relief: CycleRelief, free: Sequence[str]) -> Float[Array, " numbers"]
     return jnp.concatenate(parts)
 
 
+Vector = Float[Array, " numbers"]
+Bounds = Mapping[str, tuple[Numbers, Numbers]]  # lowest and highest values of what is free
+
+
 def made(relief: CycleRelief, free: Sequence[str], vector: Float[Array, " numbers"]) -> CycleRelief:
     """The relief with other free numbers."""
     for name in free:
@@ -41,11 +45,13 @@ def made(relief: CycleRelief, free: Sequence[str], vector: Float[Array, " number
     return relief
 
 
-def bounds_of(model: DimensionlessModel, relief: CycleRelief, free: Sequence[str], given: Mapping):
+def bounds_of(
+    model: DimensionlessModel, relief: CycleRelief, free: Sequence[str], given: Bounds
+) -> tuple[Vector, Vector]:
     if set(given) - set(free):
         raise ValueError(f"dynamic_profile_modification: bounds = {sorted(given)} must be of what is free, {free!r}")
     ratio = relief.contact_ratio
-    usual = {
+    usual: dict[str, tuple[Numbers, Numbers]] = {
         "amount": (jnp.zeros_like(model.load), 4 * model.load),
         "length": (0.2 * (ratio - 1), 0.5 * ratio),
         "curve": (0.5, 4.0) if isinstance(relief.curve, Power) else (-4.0, 4.0),
@@ -100,7 +106,7 @@ class OperatingCondition(NamedTuple):
     goal: str
 
 
-def operating_conditions(frequency=1.0) -> tuple[OperatingCondition, ...]:
+def operating_conditions(frequency: Given = 1.0) -> tuple[OperatingCondition, ...]:
     """The study's four rows, super-harmonics of order 2 and 3 apart.
 
     Args:
@@ -140,11 +146,11 @@ class DynamicModification(Checked):
 
 def dynamic_profile_modification(
     model: DimensionlessModel,
-    frequency,
+    frequency: Given,
     relief: CycleRelief,
     *,
     free: Sequence[Free] = ("amount", "curve"),
-    bounds: Mapping[str, tuple[Any, Any]] | None = None,
+    bounds: Bounds | None = None,
     iterations: int = 60,
     method: Literal["adam", "genetic"] = "adam",
     seed: int = 0,

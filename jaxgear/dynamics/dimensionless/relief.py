@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from ...geometry import GearPair, path_of_contact
 from ...microgeometry import AbstractCurve, Linear, TipRelief
-from ...numerics import Checked, check, concrete, number, real
+from ...numerics import Checked, Given, check, concrete, number, real
 
 Scalar = Float[Array, ""]
 
@@ -66,7 +66,7 @@ class CycleRelief(Checked):
         return ends - jnp.floor(ends)
 
 
-def cycle_relief(relief: TipRelief, pair: GearPair, half_clearance) -> CycleRelief:
+def cycle_relief(relief: TipRelief, pair: GearPair, half_clearance: Given) -> CycleRelief:
     """What one tip relief on both gears takes off the DTE of their mesh.
 
     Args:
@@ -91,7 +91,7 @@ def cycle_relief(relief: TipRelief, pair: GearPair, half_clearance) -> CycleReli
     )
 
 
-def tip_relief(relief: CycleRelief, pair: GearPair, half_clearance) -> TipRelief:
+def tip_relief(relief: CycleRelief, pair: GearPair, half_clearance: Given) -> TipRelief:
     """The tip relief of either gear that takes a modification of the mesh cycle off its flanks.
 
     The last step of a dynamic profile modification: the distance on the line of action is one of roll length, which
@@ -113,7 +113,7 @@ def tip_relief(relief: CycleRelief, pair: GearPair, half_clearance) -> TipRelief
     return TipRelief(relief.amount * real(half_clearance), relief.length * path.base_pitch, relief.curve)
 
 
-def largest_relief(load, torque_fluctuation, displacement, least_stiffness) -> Scalar:
+def largest_relief(load: Given, torque_fluctuation: Given, displacement: Given, least_stiffness: Given) -> Scalar:
     """C_max = (F_m + F_ah + F_aT) / K_min [half clearances], as the study of dynamic modification prints it.
 
     It adds amplitudes of different kinds: F_m and F_aT are forces over b k_mean, but F_ah is a displacement over b,

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Complex, Float
 
-from ...numerics import Checked, check, program, real, real_roots, result, safe_divide, safe_sqrt, whole
+from ...numerics import Checked, Given, Numbers, check, program, real, real_roots, result, safe_divide, safe_sqrt, whole
 from .model import DimensionlessModel
 from .multiple_scales import LoadedMean, as_complex, effective_forcing, frequency_shift, turned
 
@@ -49,7 +49,7 @@ class Backbone(Checked):
     upper_stable: Bool[Array, " frequencies"] = result()
 
 
-def primary_resonance(state: LoadedMean, frequency) -> Resonance:
+def primary_resonance(state: LoadedMean, frequency: Numbers) -> Resonance:
     """Omega ~ omega_0: (i zeta - s) A + h A* / (2 omega_0) = P_1 / (2 omega_0), with a complex amplitude A.
 
     s = Omega - omega_0 - shift - kappa |A|^2, and h = 2 a_2 Lambda_2 + Q_2 / 2: the stiffness harmonic of twice the
@@ -64,7 +64,7 @@ def primary_resonance(state: LoadedMean, frequency) -> Resonance:
     return _resonance(state, real(frequency), 1)
 
 
-def super_harmonic_resonance(state: LoadedMean, frequency, order: int = 2) -> Resonance:
+def super_harmonic_resonance(state: LoadedMean, frequency: Numbers, order: int = 2) -> Resonance:
     """order Omega ~ omega_0: the same curve under `effective_forcing`, at the detuning order Omega - omega_0.
 
     A is the amplitude of the vibration at order Omega, beside the forced response at the other orders.
@@ -77,7 +77,7 @@ def super_harmonic_resonance(state: LoadedMean, frequency, order: int = 2) -> Re
     return _resonance(state, real(frequency), whole("super_harmonic_resonance", "order", order, 2, 3))
 
 
-def response_curve(state: LoadedMean, amplitude, *, order: int = 1) -> Backbone:
+def response_curve(state: LoadedMean, amplitude: Numbers, *, order: int = 1) -> Backbone:
     """The curve of `primary_resonance` (order 1) or `super_harmonic_resonance` (2, 3) in closed form over A.
 
     Omega = (omega_0 + kappa A^2 + shift + s) / order with the smallest and the largest s of this amplitude, which are
@@ -94,7 +94,7 @@ def response_curve(state: LoadedMean, amplitude, *, order: int = 1) -> Backbone:
     return _curve(state, jnp.atleast_1d(real(amplitude)), order)
 
 
-def sub_harmonic_resonance(state: LoadedMean, frequency, *, order: int = 1) -> Resonance:
+def sub_harmonic_resonance(state: LoadedMean, frequency: Numbers, *, order: int = 1) -> Resonance:
     """order Omega ~ 2 omega_0: A cos(order Omega t / 2 - gamma), which needs no forcing at its own frequency.
 
     kappa A^2 = order Omega / 2 - omega_0 - shift -+ sqrt((|h| / (2 omega_0))^2 - zeta^2), h = 2 a_2 Lambda + Q / 2 of
@@ -127,7 +127,7 @@ def damping_threshold(state: LoadedMean, *, order: int = 1) -> Scalar:
 
 
 def combination_forcing(
-    state: LoadedMean, model: DimensionlessModel, frequency, first: int, second: int, sign: int = 1
+    state: LoadedMean, model: DimensionlessModel, frequency: Given, first: int, second: int, sign: int = 1
 ) -> Complex[Array, ""]:
     """What two excitations of a model make at the frequency (n_1 + sign n_2) Omega.
 
@@ -150,7 +150,7 @@ def combination_forcing(
     return -(4 * as_complex(state.quadratic) * line[0] * line[1] + stiff[0] * line[1] + stiff[1] * line[0])
 
 
-def forced_amplitude(state: LoadedMean, forcing, detuning) -> Float[Array, " solutions"]:
+def forced_amplitude(state: LoadedMean, forcing: Given | complex, detuning: Given) -> Float[Array, " solutions"]:
     """Amplitudes A, smallest first and NaN where there are fewer than three, under a resonant forcing.
 
     A^2 [(detuning - kappa A^2)^2 + zeta^2] = (|forcing| / (2 omega_0))^2.

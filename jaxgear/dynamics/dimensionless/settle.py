@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
-from ...numerics import Checked, check, kernel, program, real, result, safe_divide, whole
+from ...numerics import Checked, Given, Numbers, check, kernel, program, real, result, safe_divide, whole
 from ..orbit import settled_orbit
 from .model import DimensionlessModel, loaded_te
 
@@ -43,13 +43,19 @@ class Settled(Checked):
         """Of x."""
         return jnp.sum(self.weight * self.dte)
 
-    def harmonic(self, order) -> Complex[Array, ""]:
+    def harmonic(self, order: Given) -> Complex[Array, ""]:
         """Complex amplitude c of x ~ Re(c e^(2 pi i order phase))."""
         return _harmonic(self.phase, self.weight * self.dte, real(order))
 
 
 def settled_vibration(
-    model: DimensionlessModel, frequency, *, start=None, settling: int = 100, periods: int = 2, steps: int = 96
+    model: DimensionlessModel,
+    frequency: Given,
+    *,
+    start: Numbers | None = None,
+    settling: int = 100,
+    periods: int = 2,
+    steps: int = 96,
 ) -> Settled:
     """The vibration that a model settles to from a state; differentiable in the model and the frequency.
 
