@@ -7,14 +7,16 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.extend.core import ClosedJaxpr
 from jax.interpreters.partial_eval import dce_jaxpr
 from jaxtyping import Array, Bool, Float
 
 from ..contact import Mesh, MeshCycle, removed_material, solve_removed
-from ..contact.operating_point import operating_point_of
+from ..contact.operating_point import Torque, operating_point_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Checked, fields_of, real
-from .cases import Cases, Conditions, LoadSpectrum, conditions
+from ..tolerance import Tolerance
+from .cases import Cases, Conditions, Loads, LoadSpectrum, conditions
 
 Scalar = Float[Array, ""]
 Parameters = Mapping[str, Scalar]
@@ -94,7 +96,7 @@ class Variants(Checked):
             return self.mesh
         return eqx.filter_eval_shape(self.mesh, dict(zip(self.names, map(real, values))))
 
-    def traced(self, values: Iterable):
+    def traced(self, values: Iterable) -> tuple[ClosedJaxpr, list[str]]:
         """Jaxpr of all that the variables make, as an identity of the functions, and the variables that it uses."""
 
         def made(values, mesh):
@@ -118,8 +120,8 @@ def variants(
     *,
     design: Design,
     mesh: Mesh | Callable[[Parameters], Mesh],
-    torque,
-    tolerance=None,
+    torque: Loads | Callable[[Parameters], Torque],
+    tolerance: Tolerance | None = None,
     samples: int | None = None,
     seed: int = 0,
 ) -> Variants:
@@ -163,7 +165,7 @@ def check_used(owner: str, names: Sequence[str], used: Sequence[str]) -> None:
         raise ValueError(f"{owner}: nothing depends on {', '.join(unused)}: use it in {_USES[owner]}, or leave it out")
 
 
-def two_modifications(made) -> tuple[AbstractModification, AbstractModification]:
+def two_modifications(made: object) -> tuple[AbstractModification, AbstractModification]:
     """What a design has made, with nominal involutes for None.
 
     Raises:
@@ -211,10 +213,10 @@ def _modules(node) -> Iterator[Checked]:
 
 def solve_case(
     mesh: Mesh,
-    torque,
+    torque: Torque,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
-    deviation: Any = None,
+    deviation: Array | float | None = None,
 ) -> MeshCycle:
     """The cycle of a design by the compiled program that serves every kind of modification.
 

@@ -17,6 +17,7 @@ from .settings import Dynamics
 from .steady import SteadyNumbers
 
 Numbers = Float[Array, "runs speeds"]
+Scalar = Float[Array, ""]
 
 _FIELDS = (
     ("dynamic_factor", "", "largest mesh force over the static one"),
@@ -48,7 +49,7 @@ def _swept(name: str, at_speed: bool, analysis: Analysis, dynamics: Dynamics) ->
     return dynamics.numbers(oscillator), oscillator.converged
 
 
-def mesh_frequency(teeth, speed):
+def mesh_frequency(teeth: Scalar, speed: Scalar) -> Scalar:
     """Mesh frequency [Hz] of a gear by its speed [rpm]."""
     return teeth * speed / 60
 

@@ -12,7 +12,7 @@ from ..contact import Mesh
 from ..geometry import GearPair
 from ..metrics import AbstractSettings
 from ..microgeometry import AbstractModification
-from ..numerics import concrete, count, number
+from ..numerics import Given, concrete, count, number
 from .force import AbstractMeshForce
 from .from_contact import Model, force_and_mesh
 from .oscillator import Oscillator
@@ -110,7 +110,7 @@ class Dynamics(AbstractSettings):
     def oscillator(
         self,
         mesh: Mesh,
-        torque: Any,
+        torque: Given,
         *,
         pinion: AbstractModification | None = None,
         wheel: AbstractModification | None = None,
@@ -131,13 +131,13 @@ class Dynamics(AbstractSettings):
     def _oscillator(self, mesh: Mesh, torque: Any, **flanks: Any) -> Oscillator:
         return self.oscillator_and_mesh(mesh, torque, **flanks)[0]
 
-    def oscillator_and_mesh(self, mesh: Mesh, torque: Any, **flanks: Any) -> tuple[Oscillator, Mesh]:
+    def oscillator_and_mesh(self, mesh: Mesh, torque: Given, **flanks: Any) -> tuple[Oscillator, Mesh]:
         """`oscillator`, of coast flanks and manufacturing deviations too, and the mesh of its mesh force."""
         options: dict[str, Any] = {"model": self.model, "compliance": self.compliance, "positions": self.positions}
         force, mesh = force_and_mesh(mesh, torque=torque, **options, **flanks)
         return self.masses(force, mesh.pair, torque), mesh
 
-    def masses(self, force: AbstractMeshForce, pair: GearPair, torque: Any) -> Oscillator:
+    def masses(self, force: AbstractMeshForce, pair: GearPair, torque: Given) -> Oscillator:
         """The oscillator of any mesh force between the gears of a pair under a torque on the pinion [N m]."""
         given = (pair.pinion, self.pinion_inertia), (pair.wheel, self.wheel_inertia)
         inertias = tuple(inertia_of(gear) if inertia is None else inertia for gear, inertia in given)

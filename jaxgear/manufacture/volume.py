@@ -15,7 +15,7 @@ from ..contact import MeshCycle, Side
 from ..geometry import outline
 from ..metrics import Quantity, Vocabulary, gear_volume, removed_at
 from ..microgeometry import AbstractCurve, AbstractModification, Linear, NoModification, Quadratic, TipRelief
-from ..numerics import check, concrete, program, real, safe_divide
+from ..numerics import Given, check, concrete, program, real, safe_divide
 from ..numerics.reductions import Max
 from .spline import wheel_spline
 
@@ -37,7 +37,7 @@ class ReferenceVolumes(NamedTuple):
     parabolic_from_fewest_pairs: Scalar
 
 
-def reference_volumes(side: Side, amount) -> ReferenceVolumes:
+def reference_volumes(side: Side, amount: Given) -> ReferenceVolumes:
     """Volumes of the reference reliefs of a gear.
 
     At a contact ratio of n and a fraction, n pairs are the fewest, and the next pair joins them over the fraction of a
@@ -68,7 +68,7 @@ def _contact_ratio(side: Side) -> Scalar:
     return (side.tip_roll_length - side.start_roll_length) / side.gear.base_pitch
 
 
-def ground_volume(side: Side, modification: AbstractModification, *, stock=0.0) -> Scalar:
+def ground_volume(side: Side, modification: AbstractModification, *, stock: Given = 0.0) -> Scalar:
     """Volume that finishing takes off one gear [mm^3]: the modification and the stock that roughing has left.
 
     Args:

@@ -1,6 +1,6 @@
 """One design under one load: what quantities are worked out from."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any, TypeVar
 
 import equinox as eqx
@@ -12,6 +12,7 @@ from ..contact import Mesh, MeshCycle, OperatingPoint, removed_material
 from ..numerics import Checked
 
 _Found = TypeVar("_Found")
+Settings = TypeVar("Settings", bound=Checked)
 
 
 class Analysis:
@@ -82,7 +83,7 @@ class Analysis:
             return deviation
         return jax.lax.stop_gradient(deviation)  # of the design it does not depend but by rounding
 
-    def once(self, settings: Checked, what: Any, work: Callable[[], _Found]) -> _Found:
+    def once(self, settings: Checked, what: Hashable, work: Callable[[], _Found]) -> _Found:
         """work(), or what it gave before for the same settings: compilers do not find out that two loops do the same.
 
         What was found while one function was being traced is not for another one.
@@ -100,7 +101,7 @@ class Analysis:
         self._found.append((now, settings, what, found))
         return found
 
-    def in_precision(self, settings: Checked) -> Any:
+    def in_precision(self, settings: Settings) -> Settings:
         """Settings with their numbers in the precision of the cycle."""
         dtype = self.cycle.transmission_error.dtype
 

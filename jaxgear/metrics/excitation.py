@@ -1,14 +1,18 @@
 """What excites vibration: variation of the transmission error, mesh stiffness, and the force that goes with both."""
 
 from functools import partial
+from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..numerics import Checked, over_batch, program, result, safe_divide, spread
+from ..numerics import Checked, Given, over_batch, program, result, safe_divide, spread
 from ..numerics.reductions import Range
+
+Curves = TypeVar("Curves", Array, np.ndarray)
 
 Curve = Float[Array, "... positions"]
 
@@ -35,7 +39,7 @@ def peak_to_peak(curve: Curve) -> Float[Array, "..."]:
     return spread(curve, axis=-1)
 
 
-def smooth_peak_to_peak(curve: Curve, smoothing) -> Float[Array, "..."]:
+def smooth_peak_to_peak(curve: Curve, smoothing: Given) -> Float[Array, "..."]:
     """Soft maximum minus soft minimum, smoothing log-mean-exp over the positions.
 
     Args:
@@ -91,7 +95,7 @@ def force_excitation(cycle: MeshCycle) -> Curve:
     return excited_by(cycle.transmission_error, cycle.tangent_stiffness)
 
 
-def excited_by(error, stiffness):
+def excited_by(error: Curves, stiffness: Curves) -> Curves:
     """The same of a transmission error [um] and mesh stiffness [N/um] at the same positions, in NumPy or JAX."""
     return stiffness * (error - error.mean())
 

@@ -144,7 +144,10 @@ def gear_volume(side: Side, modification: AbstractModification) -> Scalar:
 
 @program
 def removed_at(
-    side: Side, modification: AbstractModification, roll_length: Profile, face_coordinate=None
+    side: Side,
+    modification: AbstractModification,
+    roll_length: Profile,
+    face_coordinate: Float[Array, "..."] | None = None,
 ) -> Float[Array, "*lines points"]:
     """Material that the modification of one gear removes at given places [um].
 

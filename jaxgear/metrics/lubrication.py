@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle
 from ..geometry import GearPair, path_of_contact, reduced_radius
-from ..numerics import check, over_batch, real, safe_divide, safe_power, safe_sqrt
+from ..numerics import Given, check, over_batch, real, safe_divide, safe_power, safe_sqrt
 from .lubricant import Lubricant
 
 Load = Float[Array, "pairs slices positions"]
@@ -18,7 +18,9 @@ Load = Float[Array, "pairs slices positions"]
 _BLOK_FACTOR = 1.13  # 2 / sqrt(pi), semi-elliptic heat flux (ISO/TS 6336-20, where Blok's own 1.11 is rounded)
 
 
-def flash_temperature(cycle: MeshCycle, speed, *, friction=0.06) -> Float[Array, "*cycles pairs slices positions"]:
+def flash_temperature(
+    cycle: MeshCycle, speed: Given, *, friction: Given = 0.06
+) -> Float[Array, "*cycles pairs slices positions"]:
     """Rise of the flank temperature in the contact [K], at the line loads of this cycle.
 
         T_fl = 1.13 mu w |v1 - v2| / [(B1 sqrt(v1) + B2 sqrt(v2)) sqrt(2 b_H)]

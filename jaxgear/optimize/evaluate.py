@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy
+from jaxtyping import Array, Float
 
 from ..conditions.join import padded, side_by_side
 from ..numerics import kernel
@@ -27,7 +28,7 @@ def points_nearby(point: np.ndarray, count: int, *, reach: float, seed: int) -> 
     return corner + 2 * reach * scipy.stats.qmc.Halton(len(point), scramble=True, seed=seed).random(count)
 
 
-def real_points(problem: Problem, points) -> jax.Array:
+def real_points(problem: Problem, points: np.ndarray | Array) -> jax.Array:
     """Points of the unit box in the type of the problem."""
     return jnp.asarray(points, problem.low.dtype)
 
@@ -35,7 +36,7 @@ def real_points(problem: Problem, points) -> jax.Array:
 _INFEASIBLE = 1e6  # rank of a design that passes a limit, above any objective
 
 
-def scores(problem: Problem, points) -> Score:
+def scores(problem: Problem, points: np.ndarray | Array) -> Score:
     """Scores of points of the unit box, leading axis (points,), in batches that fit the cache."""
     count = len(points)
     batch = min(side_by_side(problem.mesh, problem.cases.count), count)
@@ -47,7 +48,7 @@ def _scores(problem: Problem, points, batch: int) -> Score:
     return jax.lax.map(problem.score, points, batch_size=batch)
 
 
-def fitness(score: Score):
+def fitness(score: Score) -> Float[Array, " designs"] | Float[Array, ""]:
     """One number to rank by: the objective, and far above any of them the violation."""
     value, excess = score.value[..., 0], counted(score.violation)
     rank = jnp.where(excess > 0, _INFEASIBLE * (1 + excess), value)

@@ -13,6 +13,7 @@ import scipy
 from jaxtyping import Array, Float
 
 from ..conditions import Parameters, conditions, solve_case
+from ..conditions.cases import Loads
 from ..contact import Mesh, MeshCycle, Side
 from ..metrics import peak_to_peak, removed_at
 from ..microgeometry import (
@@ -59,7 +60,7 @@ class _Tables(eqx.Module):
 
 def free_form(
     mesh: Mesh,
-    torque,
+    torque: Loads,
     *,
     points: int = 40,
     max_relief: float = 20.0,

@@ -7,14 +7,16 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.typing import DTypeLike
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
 from ..metrics import Quantity
-from ..numerics import Checked, check, optional_real
+from ..numerics import Checked, Numbers, check, optional_real
 from ..vocabulary import quantity_of
 
 Scalar = Float[Array, ""]
+Violation = jax.Array | np.ndarray | float
 Objective = str | Quantity | Callable[[MeshCycle], Any]
 
 # Searches aim at this part of a limit (of 1 where the limit is zero) inside it, and count an excess from there: what is
@@ -23,7 +25,7 @@ FEASIBLE = 5e-4
 _KEPT = 0.5 * FEASIBLE  # up to this excess a design of a search counts as one that keeps its limits
 
 
-def counted(violation):
+def counted(violation: Violation) -> Violation:
     """A violation as designs are compared by it: one within the tolerance is none."""
     where = jnp.where if isinstance(violation, jax.Array) else np.where
     return where(violation <= _KEPT, 0.0, violation)
@@ -44,12 +46,14 @@ class Constraint(Checked):
     low: Scalar | None = eqx.field(converter=optional_real)
     high: Scalar | None = eqx.field(converter=optional_real)
 
-    def __init__(self, of: Objective | Mapping[str, float], *, low=None, high=None):
+    def __init__(
+        self, of: Objective | Mapping[str, float], *, low: Numbers | None = None, high: Numbers | None = None
+    ) -> None:
         self.quantity = None if isinstance(of, Mapping) else quantity_of(of, "Constraint")
         self.terms = tuple(of.items()) if isinstance(of, Mapping) else ()
-        self.low, self.high = low, high
+        self.low, self.high = optional_real(low), optional_real(high)
 
-    def __check_init__(self):
+    def __check_init__(self) -> None:
         if self.quantity is None and not self.terms:
             raise ValueError("Constraint: a linear constraint must name at least one free parameter")
         if self.low is None and self.high is None:
@@ -57,7 +61,7 @@ class Constraint(Checked):
         check("Constraint", "low", self.low, "")
         check("Constraint", "high", self.high, "", low=self.low)
 
-    def of_parameters(self, parameters: Mapping[str, Any]):
+    def of_parameters(self, parameters: Mapping[str, Any]) -> Scalar:
         """What a linear constraint limits."""
         return sum(factor * parameters[name] for name, factor in self.terms)
 
@@ -78,7 +82,7 @@ class Constraint(Checked):
         """Its limits, each with 1 for an upper and -1 for a lower one."""
         return [(sign, limit) for sign, limit in ((1, self.high), (-1, self.low)) if limit is not None]
 
-    def margin(self, limit: Scalar, dtype) -> Scalar | float:
+    def margin(self, limit: Scalar, dtype: DTypeLike) -> Scalar | float:
         """How far inside a limit a search aims, relative to it: not at all where a free parameter is limited."""
         if self.quantity is None:
             return 0.0
@@ -86,7 +90,7 @@ class Constraint(Checked):
             return FEASIBLE
         return jnp.minimum(FEASIBLE, 0.25 * (self.high - self.low) / scale_of(limit, dtype)).astype(dtype)
 
-    def excess(self, value) -> list[Scalar]:
+    def excess(self, value: Scalar) -> list[Scalar]:
         """By how much what is aimed at is missed at each limit, relative to the limit; negative inside."""
         return [
             sign * (value - limit.astype(value.dtype)) / scale_of(limit, value.dtype) + self.margin(limit, value.dtype)
@@ -94,7 +98,7 @@ class Constraint(Checked):
         ]
 
 
-def scale_of(limit: Scalar, dtype) -> Scalar:
+def scale_of(limit: Scalar, dtype: DTypeLike) -> Scalar:
     """What an excess over a limit is relative to."""
     limit = limit.astype(dtype)
     return jnp.where(limit == 0, 1.0, jnp.abs(limit)).astype(dtype)

@@ -9,6 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from ..numerics import Checked, count, kernel
 from .evaluate import real_points, start_points
@@ -19,17 +20,20 @@ from .search import AbstractMethod, Record
 # Widths of the soft extremes in the stages of a search, relative to the best objective among the start points: from
 # wide, where most positions pull, to narrow, where the soft objective is within about a percent of the true one.
 STAGE_WIDTHS = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
+Designs = tuple[Array, Array, Array]  # of every start: point, value and violation
 _FIRST_RATE, _LAST_RATE = 0.05, 0.002  # step sizes in the unit box, first and last stage
 _LEAST_SCALE = 1e-3  # [um] of the objective, where the start is best already
 _STIFFNESS = 10.0  # of the penalty: objective per squared relative violation, relative to the scale
 
 
-def followed(multipliers, excess, scale):
+def followed(multipliers: Array, excess: Array, scale: Array) -> Array:
     """First-order update of the multipliers of the augmented Lagrangian (Hestenes 1969, Powell 1969)."""
     return jnp.maximum(multipliers + _STIFFNESS * scale * excess, 0.0)
 
 
-def lagrangian(problem: Problem, x, multipliers, width, scale):
+def lagrangian(
+    problem: Problem, x: Array, multipliers: Array, width: Array, scale: Array
+) -> tuple[Array, tuple[Array, Array, Array]]:
     """Augmented Lagrangian of the soft problem at one point, with its true value, violation and excess.
 
     The multipliers are those of every limit, shape (limits,).
@@ -42,7 +46,7 @@ def lagrangian(problem: Problem, x, multipliers, width, scale):
     return values[0] + penalty, (jnp.where(good, true[0], jnp.inf), violation, excess)
 
 
-def merged(best, new):
+def merged(best: Designs, new: Designs) -> Designs:
     """The better of two designs of every start: (points, values, violations) each."""
     (points, values, violations), (other, value, violation) = best, new
     excess, others = counted(violations), counted(violation)
@@ -80,7 +84,7 @@ def stages(steps: int, most: float) -> Iterator[Stage]:
         yield Stage(after - before, after, STAGE_WIDTHS[index * len(STAGE_WIDTHS) // number], float(rate))
 
 
-def yardstick(values) -> float:
+def yardstick(values: np.ndarray | Array) -> float:
     """Scale of the stage widths [um], from the true objective of the start points."""
     known = np.abs(np.asarray(values)[np.isfinite(values)])
     return max(float(known.min()), _LEAST_SCALE) if len(known) else 1.0
@@ -104,12 +108,14 @@ class AbstractStaged(Checked, AbstractMethod):
     further_analyses: ClassVar[int] = 0  # of a stage, beside one for each of its steps
 
     @abstractmethod
-    def begin(self, problem: Problem):
+    def begin(self, problem: Problem) -> Array:
         """Start points, as the method holds them."""
 
     @staticmethod
     @abstractmethod
-    def advance(problem: Problem, points, multipliers, analyses, width, rate, scale):
+    def advance(
+        problem: Problem, points: Array, multipliers: Array, analyses: Array, width: Array, rate: Array, scale: Array
+    ) -> tuple[Array, Array, Designs]:
         """A stage of so many analyses: the new points and multipliers, and the best true design of every start."""
 
     def search(self, problem: Problem, record: Record) -> None:
@@ -142,12 +148,14 @@ class Adam(AbstractStaged):
     name: ClassVar[str] = "adam"
     longest_stage: ClassVar[float] = 20
 
-    def begin(self, problem: Problem):
+    def begin(self, problem: Problem) -> Array:
         return real_points(problem, start_points(problem, self.starts))
 
     @staticmethod
     @kernel
-    def advance(problem: Problem, points, multipliers, analyses, width, rate, scale):
+    def advance(
+        problem: Problem, points: Array, multipliers: Array, analyses: Array, width: Array, rate: Array, scale: Array
+    ) -> tuple[Array, Array, Designs]:
         import optax
 
         gradient = jax.vmap(jax.grad(lagrangian, argnums=1, has_aux=True), (None, 0, 0, None, None))
@@ -189,13 +197,15 @@ class LBFGS(AbstractStaged):
     steps: int = count(low=len(STAGE_WIDTHS), default=150)
     further_analyses: ClassVar[int] = 1  # the first trial is the point itself
 
-    def begin(self, problem: Problem):
+    def begin(self, problem: Problem) -> Array:
         points = np.clip(start_points(problem, self.starts), _INSIDE, 1 - _INSIDE)
         return real_points(problem, np.arcsin(2 * points - 1))
 
     @staticmethod
     @kernel
-    def advance(problem: Problem, angles, multipliers, analyses, width, rate, scale):
+    def advance(
+        problem: Problem, angles: Array, multipliers: Array, analyses: Array, width: Array, rate: Array, scale: Array
+    ) -> tuple[Array, Array, Designs]:
         import optax
 
         method = optax.scale_by_lbfgs()

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -26,7 +26,7 @@ from .slp import SLP
 class IteratedFlanks:
     """Both flanks: the modifications of the start, and what is taken off beside them in the contact points."""
 
-    def __init__(self, mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, most: float):
+    def __init__(self, mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, most: float) -> None:
         contact = mesh.path_of_contact
         pitch, self._most = float(contact.base_pitch), most
         start, end = float(contact.start), float(contact.end)
@@ -240,7 +240,7 @@ def _iterate(mesh: Mesh, cycle: MeshCycle, alone: np.ndarray, pinion, wheel) -> 
 
 def iterate_transmission_error(
     mesh: Mesh,
-    torque,
+    torque: float,
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
@@ -350,12 +350,12 @@ def iterate_from_low_pressure(
     design: Design,
     bounds: Mapping[str, tuple[float, float]],
     mesh: Mesh,
-    torque,
+    torque: float,
     *,
     max_relief: float = 7.0,
     method: AbstractMethod = SLP(),
     callback: Callback | None = None,
-    **options,
+    **options: Any,
 ) -> Optimum:
     """The iteration from the relief of a design that has the least contact pressure (the study's type 3).
 

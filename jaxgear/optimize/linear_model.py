@@ -37,7 +37,7 @@ class Linearizer:
         positions: for which it is compiled; None for those of the mesh.
     """
 
-    def __init__(self, problem: Problem, batch: int, positions: int | None = None):
+    def __init__(self, problem: Problem, batch: int, positions: int | None = None) -> None:
         self.problem = problem
         self._batch, self._positions = batch, positions or problem.mesh.resolution.positions
         meshes = parts(problem.mesh, self._positions) if problem.is_made_of_extremes else []
@@ -149,7 +149,7 @@ class NoObjective(AbstractScalarization):
 
     part = 0.0
 
-    def __init__(self, objectives: int):
+    def __init__(self, objectives: int) -> None:
         self._none = np.zeros(objectives)
 
     def scales(self) -> tuple[np.ndarray, np.ndarray]:
@@ -178,7 +178,7 @@ class LinearModel:
         linearization: Linearization,
         scalarization: AbstractScalarization | None = None,
         penalty: float | None = None,
-    ):
+    ) -> None:
         self._lin: Linearization = jax.tree.map(lambda part: np.asarray(part, float), linearization)
         self._measure, self._weights = problem.measure, np.asarray(problem.cases.weights, float)
         self._shares, self.values = self._measured_cases()

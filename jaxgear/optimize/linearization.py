@@ -35,7 +35,7 @@ class Pieces(NamedTuple):
         top = self.upper.max(axis=1)
         return top if self.lower is None else top - self.lower.min(axis=1)
 
-    def scaled(self, scale, offset) -> "Pieces":
+    def scaled(self, scale: Either | float, offset: Either | float) -> "Pieces":
         """The number divided by a positive scale, after an offset has been taken off."""
         return Pieces(
             (self.upper - offset) / scale,

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 
 from ..conditions import Design
+from ..conditions.cases import Loads
 from ..contact import Mesh
 from ..numerics import AbstractMeasure, Callback
 from ..tolerance import Tolerance
@@ -59,7 +60,7 @@ def minimize(
     design: Design,
     bounds: Mapping[str, tuple[float, float]],
     mesh: Mesh,
-    torque,
+    torque: Loads,
     *,
     objective: Objective = "ppte",
     measure: AbstractMeasure | None = None,

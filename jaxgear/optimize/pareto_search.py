@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from ..conditions import Design
+from ..conditions.cases import Loads
 from ..contact import Mesh
 from ..numerics import AbstractMeasure, Callback
 from ..numerics.fields import Checked, count
@@ -34,7 +35,7 @@ class Chebyshev(AbstractScalarization):
 
     part = _SUM
 
-    def __init__(self, weight: np.ndarray, frame: Callable[[], tuple[np.ndarray, np.ndarray]]):
+    def __init__(self, weight: np.ndarray, frame: Callable[[], tuple[np.ndarray, np.ndarray]]) -> None:
         self._weight, self._frame = weight, frame
 
     def scales(self) -> tuple[np.ndarray, np.ndarray]:
@@ -47,7 +48,7 @@ class Chebyshev(AbstractScalarization):
 class Met:
     """Designs met so far that keep the constraints and that no other one beats."""
 
-    def __init__(self, record: Record, frame: tuple[np.ndarray, np.ndarray] | None = None):
+    def __init__(self, record: Record, frame: tuple[np.ndarray, np.ndarray] | None = None) -> None:
         objectives = len(record.problem.objectives)
         self.record = record
         self._points = np.empty((0, len(record.problem.names)))
@@ -148,7 +149,7 @@ class Descent(AbstractScalarization):
 
     part = 0.0
 
-    def __init__(self, values: np.ndarray, span: np.ndarray):
+    def __init__(self, values: np.ndarray, span: np.ndarray) -> None:
         self._values, self._span = values, span
 
     def scales(self) -> tuple[np.ndarray, np.ndarray]:
@@ -221,7 +222,7 @@ def pareto(
     design: Design,
     bounds: Mapping[str, tuple[float, float]],
     mesh: Mesh,
-    torque,
+    torque: Loads,
     *,
     objectives: Sequence[Objective] = ("ppte", "max_contact_pressure"),
     measure: AbstractMeasure | None = None,

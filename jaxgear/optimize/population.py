@@ -202,11 +202,11 @@ class Factorial(AbstractMethod):
     name: ClassVar[str] = "factorial"
     levels: int | tuple[tuple[str, int], ...] = eqx.field(static=True, default=_LEVELS)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if isinstance(self.levels, Mapping):
             self.levels = tuple(self.levels.items())
 
-    def __check_init__(self):
+    def __check_init__(self) -> None:
         for value in [self.levels] if isinstance(self.levels, int) else dict(self.levels).values():
             whole("Factorial", "levels", value, 2)
 

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..conditions import (
     Cases,
@@ -22,6 +22,7 @@ from ..conditions import (
     solved,
     two_modifications,
 )
+from ..conditions.cases import Loads
 from ..contact import Mesh, removed_material, solve_removed
 from ..metrics import AbstractSettings, Analysis, Quantity, share_settings
 from ..microgeometry import AbstractModification
@@ -34,6 +35,7 @@ from .linearization import Linearization, Pieces, Sloped, any_slopes, local_slop
 
 Scalar = Float[Array, ""]
 Vector = Float[Array, " parameters"]
+Result = TypeVar("Result")  # a tree of arrays
 
 # Contact analyses that a value with its gradient counts for, and the gradient of every further number of the contact.
 GRADIENT_COST = 3
@@ -158,7 +160,9 @@ class Problem(eqx.Module):
         good = jnp.all(fine) & jnp.isfinite(jnp.sum(values)) & jnp.isfinite(jnp.sum(excess))
         return Score(jnp.where(good, values, jnp.inf), _worst(excess))
 
-    def soft_and_true(self, x: Vector, width):
+    def soft_and_true(
+        self, x: Vector, width: Scalar
+    ) -> tuple[Float[Array, " objectives"], Float[Array, " objectives"], Float[Array, " limits"], Bool[Array, ""]]:
         """What gradient methods need of one analysis.
 
         Args:
@@ -224,7 +228,7 @@ class Problem(eqx.Module):
         value = factors @ (self.low + x * (self.high - self.low))
         return Pieces(sign * value[None, None], sign * (factors * (self.high - self.low))[None, None])
 
-    def over_cases(self, x: Vector, of_case: Callable):
+    def over_cases(self, x: Vector, of_case: Callable[[Analysis], Result]) -> Result:
         """A function of the analysis of every case, cases leading."""
         both = self.modifications(x)
         return self.cases.each(lambda *case: of_case(self._analysis(both, *case)))
@@ -268,7 +272,7 @@ def make_problem(
     design: Design,
     bounds: Mapping[str, tuple[float, float]],
     mesh: Mesh,
-    torque,
+    torque: Loads,
     *,
     objective: Objective | Sequence[Objective] = "ppte",
     measure: AbstractMeasure | None = None,

@@ -82,7 +82,13 @@ def on_finer_meshes(owner: str, mesh: Mesh, positions: int, end_on: Callable[[Me
             return found
 
 
-def fine_enough(values, violations, finer_values, finer_violations, span: float | np.ndarray = 0.0) -> bool:
+def fine_enough(
+    values: np.ndarray,
+    violations: np.ndarray,
+    finer_values: np.ndarray,
+    finer_violations: np.ndarray,
+    span: float | np.ndarray = 0.0,
+) -> bool:
     """Whether no design changes much on a finer mesh, and none passes a limit there that it keeps.
 
     Args:

@@ -5,9 +5,10 @@ from abc import abstractmethod
 import equinox as eqx
 import jax
 import numpy as np
+from jaxtyping import Array
 
 from ..conditions.join import padded
-from ..numerics import Callback
+from ..numerics import Callback, Given
 from .evaluate import scores
 from .goal import counted
 from .linear_model import Linearizer, LinearModel
@@ -20,7 +21,7 @@ class Record:
     A design that keeps the constraints beats one that does not; among those that do not, the least violation wins.
     """
 
-    def __init__(self, problem: Problem, callback: Callback | None):
+    def __init__(self, problem: Problem, callback: Callback | None) -> None:
         self.problem = problem
         self.evaluations = 0
         self.point = np.full(len(problem.names), 0.5)
@@ -46,19 +47,21 @@ class Record:
         """Counts contact analyses: of so many designs in every case, each worth so many."""
         self.evaluations += designs * analyses * self.problem.cases.count
 
-    def offer(self, points, values, violations, model: LinearModel | None = None) -> None:
+    def offer(
+        self, points: np.ndarray | Array, values: Given, violations: Given, model: LinearModel | None = None
+    ) -> None:
         """Designs with their true objective and violation; anything that is not finite is no candidate."""
-        points, values, violations = np.atleast_2d(points), np.ravel(values), np.ravel(violations)
-        good = np.isfinite(values) & np.isfinite(violations)
+        many, value, violation = np.atleast_2d(points), np.ravel(values), np.ravel(violations)
+        good = np.isfinite(value) & np.isfinite(violation)
         if not good.any():
             return
-        points, values, violations = points[good], values[good], violations[good]
-        best = np.lexsort((values, counted(violations)))[0]
-        if (counted(violations[best]), values[best]) < (counted(self.violation), self.value):
-            self.point, self.value, self.violation = points[best].copy(), float(values[best]), float(violations[best])
+        many, value, violation = many[good], value[good], violation[good]
+        best = np.lexsort((value, np.asarray(counted(violation))))[0]
+        if (counted(violation[best]), value[best]) < (counted(self.violation), self.value):
+            self.point, self.value, self.violation = many[best].copy(), float(value[best]), float(violation[best])
             self.model = model
 
-    def judge(self, points, chunk: int = 1) -> Score:
+    def judge(self, points: np.ndarray | Array, chunk: int = 1) -> Score:
         """True scores of points of the unit box, which are counted and offered.
 
         Args:
@@ -71,7 +74,7 @@ class Record:
         self.offer(points, score.value[:, 0], score.violation)
         return score
 
-    def take(self, point, model: LinearModel) -> None:
+    def take(self, point: np.ndarray | Array, model: LinearModel) -> None:
         """A design with its linearization."""
         self.offer(point, model.value, model.violation, model)
 

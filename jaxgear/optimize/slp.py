@@ -90,7 +90,7 @@ class Search:
         scalarization: of several objectives.
     """
 
-    def __init__(self, point: np.ndarray, scalarization: AbstractScalarization | None = None):
+    def __init__(self, point: np.ndarray, scalarization: AbstractScalarization | None = None) -> None:
         self.trial, self.scalarization = point, scalarization
         self._point = point
         self._model: LinearModel | None = None

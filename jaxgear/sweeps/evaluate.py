@@ -49,7 +49,7 @@ class Evaluator:
         measures: Sequence[AbstractMeasure],
         rows: int,
         few: bool = False,
-    ):
+    ) -> None:
         """Prepares the evaluation on all local devices.
 
         Args:

@@ -13,7 +13,7 @@ from ..conditions.join import local_devices, over_devices, side_by_side
 from ..contact import Mesh, removed_material, solve_removed
 from ..metrics import AbstractSettings, Analysis, Quantity, share_settings
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import AbstractMeasure, Checked, Quantile, Worst, check, kernel, real, result, whole
+from ..numerics import AbstractMeasure, Checked, Given, Quantile, Worst, check, kernel, real, result, whole
 from ..tolerance import Tolerance
 from ..tolerance.deviation import deviation_field, deviation_of, flank_basis
 from ..tolerance.limits import check_slices
@@ -95,7 +95,7 @@ class Scatter(Checked):
 
 def monte_carlo(
     mesh: Mesh,
-    torque,
+    torque: Given,
     *,
     tolerance: Tolerance,
     pinion: AbstractModification | None = None,

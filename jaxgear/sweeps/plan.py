@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import scipy  # its packages load when they are used: scipy.stats takes a second
 
-from ..numerics import check, whole
+from ..numerics import Numbers, check, whole
 
 Bounds = Mapping[str, tuple[float, float]]
 
@@ -25,7 +25,7 @@ class AbstractPlan(ABC):
         size: number of variants.
     """
 
-    def __init__(self, names: tuple[str, ...], low: Iterable[float], high: Iterable[float], size: int):
+    def __init__(self, names: tuple[str, ...], low: Iterable[float], high: Iterable[float], size: int) -> None:
         self.names, self.low, self.high, self.size = names, tuple(map(float, low)), tuple(map(float, high)), size
 
     @abstractmethod
@@ -59,7 +59,7 @@ class FullFactorial(AbstractPlan):
         levels: values of every parameter.
     """
 
-    def __init__(self, bounds: Bounds, levels: int | Mapping[str, int | Sequence[float]]):
+    def __init__(self, bounds: Bounds, levels: int | Mapping[str, int | Sequence[float]]) -> None:
         """Makes the plan.
 
         Args:
@@ -89,7 +89,7 @@ class FullFactorial(AbstractPlan):
             table[:, column] = values[digit]
         return table
 
-    def describe(self):
+    def describe(self) -> dict[str, Any]:
         levels = {name: values.tolist() for name, values in zip(self.names, self.levels)}
         return {"sampling": "full_factorial", "levels": levels}
 
@@ -101,7 +101,7 @@ class VariantList(AbstractPlan):
         values: float64, shape (size, names).
     """
 
-    def __init__(self, names: Sequence[str], values):
+    def __init__(self, names: Sequence[str], values: Numbers) -> None:
         """Makes the plan.
 
         Args:
@@ -126,7 +126,7 @@ class VariantList(AbstractPlan):
     def _rows(self, start, stop):
         return self.values[start:stop]
 
-    def describe(self):
+    def describe(self) -> dict[str, Any]:
         digest = hashlib.sha256()
         for start in range(0, self.size, _PIECE):
             digest.update(self.values[start : start + _PIECE].tobytes())
@@ -214,7 +214,7 @@ class LatinHypercube(_Sampling):
 
     _kind = "latin_hypercube"
 
-    def __init__(self, bounds: Bounds, samples: int, *, seed: int):
+    def __init__(self, bounds: Bounds, samples: int, *, seed: int) -> None:
         super().__init__(bounds, samples, seed=seed)
         streams = np.random.SeedSequence(self.seed).spawn(len(self.names) + 1)
         self._permutations = [Permutation(self.size, stream) for stream in streams[1:]]
@@ -237,7 +237,7 @@ class LatinHypercube(_Sampling):
 class Permutation:
     """A random permutation of 0 ... size - 1 that is computed, not stored; see `LatinHypercube`."""
 
-    def __init__(self, size: int, seed: np.random.SeedSequence):
+    def __init__(self, size: int, seed: np.random.SeedSequence) -> None:
         self._size = size
         self._right = math.isqrt(size - 1) + 1
         self._left = -(-size // self._right)
@@ -276,7 +276,7 @@ class Sobol(_Sampling):
 
     _kind = "sobol"
 
-    def __init__(self, bounds: Bounds, samples: int, *, seed: int):
+    def __init__(self, bounds: Bounds, samples: int, *, seed: int) -> None:
         super().__init__(bounds, samples, seed=seed)
         if self.size > 2**_SOBOL_BITS:
             raise ValueError(f"Sobol: samples = {samples} must be at most 2^{_SOBOL_BITS} = {2**_SOBOL_BITS}")

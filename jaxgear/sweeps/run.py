@@ -16,8 +16,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..conditions import Conditions, Design, Parameters, Variants, check_used, label, variants
+from ..conditions.cases import Loads
 from ..conditions.join import side_by_side
 from ..contact import Mesh, solve
+from ..contact.operating_point import Torque
 from ..metrics import Analysis, Quantity, share_settings
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
 from ..tolerance import Tolerance
@@ -39,7 +41,7 @@ def sweep(
     design: Design,
     plan: AbstractPlan,
     mesh: Mesh | Callable[[Parameters], Mesh],
-    torque,
+    torque: Loads | Callable[[Parameters], Torque],
     *,
     results: Sequence[str | Quantity] = ("ppte",),
     measures: Sequence[AbstractMeasure] | None = None,
