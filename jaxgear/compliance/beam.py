@@ -1,6 +1,7 @@
 """Bending, shear and axial compression of the tooth as a cantilever of its true outline (potential energy method)."""
 
 from abc import abstractmethod
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -59,7 +60,7 @@ class Beam(AbstractTooth):
         bending, area = self._integrals(load)
         cosine, sine = jnp.cos(load.angle), jnp.sin(load.angle)
 
-        def total(modulus):
+        def total(modulus: Array) -> Array:
             return (
                 bending * cosine**2 / modulus
                 + _SHEAR_FACTOR * area * cosine**2 / shear_modulus(material)
@@ -81,7 +82,9 @@ class Beam(AbstractTooth):
         flank = self._segment(load, Curves.involute, form, jnp.where(in_fillet, form, involute_end))
         return fillet[0] + flank[0], fillet[1] + flank[1]
 
-    def _segment(self, load: ToothLoad, curve, start, end) -> tuple[Array, Array]:
+    def _segment(
+        self, load: ToothLoad, curve: Callable[[Curves, Array], tuple[Array, Array]], start: Array, end: Array
+    ) -> tuple[Array, Array]:
         """The two integrals over a part of the outline, with the quadrature nodes on a leading axis."""
         nodes, weights = (
             jnp.asarray(table, start.dtype).reshape((-1,) + (1,) * start.ndim) for table in gauss_legendre(self.nodes)

@@ -102,7 +102,7 @@ class ElasticRing(AbstractBody):
         if known is None:
             known = self.of_gears(pinion.outline, wheel.outline, pinion.angle.shape[0], planes)
 
-        def of_one(given):
+        def of_one(given: tuple[ToothLoad, int | Array, Array]) -> Array:
             load, step, arcs = given
             modulus = jnp.stack([plane_modulus(load.outline.gear.material, plane) for plane in planes])
             return jax.vmap(partial(self._between_teeth, load, step))(modulus, arcs)
@@ -123,7 +123,7 @@ class ElasticRing(AbstractBody):
         return jax.vmap(lambda of: ring.arc_compliance(angle, ratio, of, spacing, self.harmonics))(poisson)
 
     def _between_teeth(
-        self, load: ToothLoad, step: int, modulus, blocks: Float[Array, "pairs 3 3"]
+        self, load: ToothLoad, step: int | Array, modulus: Array, blocks: Float[Array, "pairs 3 3"]
     ) -> Float[Array, "pairs pairs positions"]:
         """`compliance` by what lies between the root arcs."""
         outline, count = load.outline, load.angle.shape[0]

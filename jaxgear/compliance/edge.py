@@ -258,7 +258,7 @@ def cut_off(distance: Real, squared: Real) -> Patch:
     )
 
 
-def _full_mean(relative):
+def _full_mean(relative: np.ndarray) -> np.ndarray:
     """Mean distance over t of a full contact, at sqrt(t^2 - a^2) / t: g / 2 exp(a^2 / (2 g^2)), g = t + sqrt(...)."""
     return 0.5 * (1 + relative) * np.exp(0.5 * (1 - relative) / (1 + relative))
 

@@ -75,7 +75,9 @@ def face_kernel(
     return mirrored + 2 * _END_SOFTNESS * step / decay * ends @ ends.T
 
 
-def _near_ends(waves, step: Scalar, decay: Scalar, overhang=(0.0, 0.0)) -> Float[Array, "slices 2"]:
+def _near_ends(
+    waves: Float[Array, " slices"], step: Scalar, decay: Scalar, overhang: tuple[Given, Given] = (0.0, 0.0)
+) -> Float[Array, "slices 2"]:
     """exp(-distance / decay) from the positive and the negative end of a gear, its mean over every slice."""
     share = -jnp.expm1(-step / decay) * decay / step
     ends = waves[::-1] * step + overhang[1], waves * step + overhang[0]

@@ -10,6 +10,7 @@ nu' = nu/(1 - nu), which gives the usual forms; plane stress has E and nu in the
 """
 
 from abc import abstractmethod
+from collections.abc import Callable, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -75,10 +76,10 @@ def contact_geometry(pinion: ToothLoad, wheel: ToothLoad, plane: Plane, face_wid
     """Collects the local geometry of both flanks, arrays (pairs, positions), on a common shape."""
     shape = pinion.roll_length.shape
 
-    def field(value):
+    def field(value: Given) -> Array:
         return jnp.broadcast_to(value, shape)[:, None]
 
-    def side(load):
+    def side(load: ToothLoad) -> ContactSide:
         material = load.outline.gear.material
         return ContactSide(
             radius=field(load.roll_length),
@@ -126,7 +127,7 @@ class DepthReferenced(AbstractContact):
     """
 
     def prepare(self, geometry: ContactGeometry) -> LogarithmicLaw:
-        def brackets(squared):
+        def brackets(squared: Array) -> list[Array]:
             reaches = [jnp.sqrt(side.depth**2 + squared) + side.depth for side in geometry.sides]
             # asinh(h / a) = ln((h + sqrt(h^2 + a^2)) / a)
             return [jnp.log(reach) - side.poisson * side.depth / reach for side, reach in zip(geometry.sides, reaches)]
@@ -194,7 +195,12 @@ class NonlinearPower(AbstractContact):
         return PowerLaw(factor, jnp.full_like(factor, 0.9))
 
 
-def _logarithmic(geometry: ContactGeometry, brackets, span: Real | float = 1.0, terms: int = 1) -> LogarithmicLaw:
+def _logarithmic(
+    geometry: ContactGeometry,
+    brackets: Callable[[Array], Sequence[Array]],
+    span: Real | float = 1.0,
+    terms: int = 1,
+) -> LogarithmicLaw:
     """sum_k 2 q / (pi E'_k) [ bracket_k(a^2) - ln a ] with a = sqrt(width_factor q).
 
     The brackets become a polynomial through Chebyshev nodes in 0 <= a^2 <= span: the contact solution evaluates the

@@ -94,13 +94,13 @@ def arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
     frequency, zero = jnp.asarray(order, t.dtype), order == 0
     integrals = jnp.where(zero, 2 * t, 2 * jnp.sin(frequency * t) / jnp.where(zero, 1.0, frequency))
 
-    def cosine(shift):  # int cos((n + shift) theta) over the arc, for each n
+    def cosine(shift: int) -> Array:  # int cos((n + shift) theta) over the arc, for each n
         return integrals[_HIGHEST_SHIFT + shift :][: harmonics + 1]
 
-    def even(*terms):  # cosine series of sum of amplitude * cos(shift theta)
+    def even(*terms: tuple[float, int]) -> Array | int:  # cosine series of sum of amplitude * cos(shift theta)
         return sum(a * 0.5 * (cosine(s) + cosine(-s)) for a, s in terms)
 
-    def odd(*terms):  # sine series of sum of amplitude * sin(shift theta)
+    def odd(*terms: tuple[float, int]) -> Array | int:  # sine series of sum of amplitude * sin(shift theta)
         return sum(a * 0.5 * (cosine(-s) - cosine(s)) for a, s in terms)
 
     sine = jnp.sin(t)
@@ -130,7 +130,7 @@ def ring_compliance(thickness_ratio: Scalar, poisson: Scalar, harmonics: int) ->
     return jnp.concatenate([first, _higher_harmonics(thickness_ratio, poisson, harmonics)])
 
 
-def _condense(bore, outer_displacement, outer_stress, poisson):
+def _condense(bore: Array, outer_displacement: Array, outer_stress: Array, poisson: Array) -> Array:
     """Eliminates the four term amplitudes: u = 0 at the bore, unit stresses outside; axes (harmonics, 2, 4)."""
     system = jnp.concatenate([bore, outer_stress], axis=-2)
     unit = jnp.zeros((*system.shape[:-1], 2), system.dtype).at[..., 2, 0].set(1.0).at[..., 3, 1].set(1.0)
@@ -138,7 +138,7 @@ def _condense(bore, outer_displacement, outer_stress, poisson):
     return (1 + poisson) * (outer_displacement @ amplitude)  # 1 / (2 mu) = (1 + nu) / E
 
 
-def _higher_harmonics(thickness_ratio, poisson, harmonics):
+def _higher_harmonics(thickness_ratio: Array, poisson: Array, harmonics: int) -> Array:
     n = jnp.arange(2, harmonics + 1, dtype=thickness_ratio.dtype)
     kappa = (3 - poisson) / (1 + poisson)
     inner = 1 / thickness_ratio
@@ -163,10 +163,10 @@ def _higher_harmonics(thickness_ratio, poisson, harmonics):
     return _condense(displacement * bore, displacement * outer, stress * outer, poisson)
 
 
-def _first_harmonic(thickness_ratio, poisson):
+def _first_harmonic(thickness_ratio: Array, poisson: Array) -> Array:
     kappa = (3 - poisson) / (1 + poisson)
 
-    def columns(r):
+    def columns(r: Array) -> tuple[Array, Array]:
         one, log = jnp.ones_like(r), jnp.log(r)
         displacement = jnp.stack(
             [

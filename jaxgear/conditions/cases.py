@@ -70,7 +70,7 @@ class LoadSpectrum(Checked):
         check("LoadSpectrum", "sum of the weights", total, "", low=0.0, open_low=True)
         self.weights = shares / total if known is None else real(known / total)
 
-    def _as_many(self, name: str, values):
+    def _as_many(self, name: str, values: Array) -> Array:
         if values.ndim == 0:
             values = jnp.full_like(self.torques, values)
         if values.shape != self.torques.shape:
@@ -117,7 +117,7 @@ class LoadSpectrum(Checked):
         return LoadSpectrum(_alone(torque), None, None if speed is None else _alone(speed), operating_point.friction)
 
 
-def _alone(number):
+def _alone(number: Array) -> Array | np.ndarray:
     known = concrete(number)
     return number[None] if known is None else known[None]
 
@@ -206,7 +206,7 @@ class Cases(Checked):
         A single case is not mapped, so that it costs no more than a plain call.
         """
 
-        def at(load, removed):
+        def at(load: tuple[Array, Array | None], removed: Array) -> Result:
             torque, speed = load
             return function(OperatingPoint(torque, speed, self.friction), removed)
 
@@ -256,13 +256,15 @@ def conditions(
 
 
 @program
-def _repeated(weight, samples: int):
+def _repeated(weight: Float[Array, " torques"], samples: int) -> Float[Array, " cases"]:
     return jnp.repeat(weight / samples, samples)
 
 
 @program
-def _removed(mesh: Mesh, torques, deviations: Deviation):
-    def at(torque):
+def _removed(
+    mesh: Mesh, torques: Float[Array, " torques"], deviations: Deviation
+) -> Float[Array, "torques samples pairs slices positions"]:
+    def at(torque: Array) -> Array:
         basis = flank_basis(mesh, torque)
         return jax.vmap(lambda one: deviation_field(one, basis))(deviations)
 

@@ -133,7 +133,7 @@ def over_devices(
     """
     split, same = PartitionSpec(_AXIS), PartitionSpec()
 
-    def on_device(rows, shared):
+    def on_device(rows: Tree, shared: Shared) -> Result:
         return jax.lax.map(lambda row: function(shared, row), rows, batch_size=batch)
 
     # without the check of replication, which the loops of the contact solution do not pass

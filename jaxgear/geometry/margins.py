@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ..numerics import Checked, result, safe_sqrt
+from ..numerics import Checked, Given, result, safe_sqrt
 from .gear import CHAMFER_ACCURACY, Gear, shape_faults
 from .involute import diameter, involute
 from .outline import Outline, outline
@@ -208,7 +208,8 @@ def faults_between(
     return tuple(faults)
 
 
-def _backlash_fault(pinion: Gear, wheel: Gear, center_distance) -> str:
+def _backlash_fault(pinion: Gear, wheel: Gear, center_distance: Given | None) -> str:
+    assert center_distance is not None  # that of None leaves no backlash to miss
     both = pinion.base_radius + wheel.base_radius
     angle = pressure_angle_of(backlash_free_involute(pinion, wheel) + 0.5e-3 * thickening(pinion, wheel) / both)
     free = float(both / jnp.cos(angle)) * (1 - _DISTANCE_ACCURACY)
@@ -216,7 +217,7 @@ def _backlash_fault(pinion: Gear, wheel: Gear, center_distance) -> str:
     return f"GearPair: center_distance = {float(center_distance):g} {unit} must be at least {free:g} {unit}"
 
 
-def _contact_ratio_fault(pinion: Gear, wheel: Gear, center_distance, contact_ratio: float) -> str:
+def _contact_ratio_fault(pinion: Gear, wheel: Gear, center_distance: Given | None, contact_ratio: float) -> str:
     remedy = "raise a tip_diameter or addendum"
     if center_distance is None:
         return f"GearPair: contact ratio = {contact_ratio:.4g} must be at least 1: {remedy}"

@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PyTree
 
 from ..numerics import Checked, changed, concrete, number, on_both, program
 from .gear import Gear, with_diameters
@@ -185,7 +185,7 @@ def is_even(pair: GearPair) -> bool:
     return bool(np.all(pinion == wheel) and np.all(offset == 0))
 
 
-def _traced(tree) -> bool:
+def _traced(tree: PyTree) -> bool:
     return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(tree))
 
 

@@ -20,6 +20,7 @@ from .spline import relief_start
 
 Scalar = Float[Array, ""]
 Points = Float[Array, " points"]
+Marks = Bool[Array, " points"]
 
 _POINTS = 101
 _ROUNDING = 16  # of the last place
@@ -175,7 +176,9 @@ def helix_trace(
 
 
 @program
-def _profile(side: Side, modification, tolerance: ToleranceClass | None, face: Scalar, roll: Points) -> Trace:
+def _profile(
+    side: Side, modification: AbstractModification, tolerance: ToleranceClass | None, face: Scalar, roll: Points
+) -> Trace:
     inside = _between(roll, *profile_range(side))
     removed = removed_at(side, modification, roll, face[None])[0]
     total = None if tolerance is None else tolerance.profile_total
@@ -183,7 +186,9 @@ def _profile(side: Side, modification, tolerance: ToleranceClass | None, face: S
 
 
 @program
-def _helix(side: Side, modification, tolerance: ToleranceClass | None, roll: Scalar, face: Points) -> Trace:
+def _helix(
+    side: Side, modification: AbstractModification, tolerance: ToleranceClass | None, roll: Scalar, face: Points
+) -> Trace:
     inside = _between(face, *helix_range(side))
     removed = removed_at(side, modification, roll[None], face)[:, 0]
     total = None if tolerance is None else tolerance.helix_total
@@ -252,13 +257,21 @@ def _between(place: Points, low: Scalar, high: Scalar) -> Bool[Array, " points"]
     return (place >= low - slack) & (place <= high + slack)
 
 
-def _band(values: Points, inside, counted) -> Scalar:
+def _band(values: Points, inside: Marks, counted: Marks) -> Scalar:
     """From the least of the values inside to the largest of those counted, which holds the ones inside."""
     first = values[jnp.argmax(inside)]
     return maximum(jnp.where(counted, values, first)) - minimum(jnp.where(inside, values, first))
 
 
-def _trace(kind, side: Side, roll: Points, face: Points, removed: Points, inside, total: Scalar | None) -> Trace:
+def _trace(
+    kind: Literal["profile", "helix"],
+    side: Side,
+    roll: Points,
+    face: Points,
+    removed: Points,
+    inside: Marks,
+    total: Scalar | None,
+) -> Trace:
     design = -removed
     half = jnp.nan if total is None else 0.5 * iso_rounded(total)
     band = jnp.where(inside, jnp.full_like(design, half), jnp.nan)

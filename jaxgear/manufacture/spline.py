@@ -170,7 +170,7 @@ def best_wheel_spline(
     length = (1 - _SHORTEST) * (side.tip_roll_length - first)
     share = jnp.linspace(0.0, 1.0, _NODES, dtype=length.dtype)
 
-    def deviations(nodes):
+    def deviations(nodes: Array) -> Array:
         return _largest_at(side, modification, nodes, degree, criterion, tangent)
 
     start = relief_start(side, modification)[None]
@@ -182,12 +182,14 @@ def best_wheel_spline(
 
 
 @program
-def _largest_at(side: Side, modification, nodes: Profile, degree: int, criterion: Criterion, tangent: bool) -> Profile:
+def _largest_at(
+    side: Side, modification: AbstractModification, nodes: Profile, degree: int, criterion: Criterion, tangent: bool
+) -> Profile:
     """Largest deviation with each of several nodes."""
     return jax.vmap(lambda node: _fitted(side, modification, node, degree, criterion, tangent).largest)(nodes)
 
 
-def _check(degree, criterion) -> None:
+def _check(degree: int, criterion: str) -> None:
     if degree not in (2, 3):
         raise ValueError(f"wheel_spline: degree = {degree!r} must be 2 or 3")
     if criterion not in ("least_squares", "minimax"):
@@ -202,7 +204,14 @@ def _relief_length(modification: AbstractModification) -> Scalar | None:
 
 
 @program
-def _fitted(side: Side, modification, node, degree: int, criterion: Criterion, tangent: bool) -> WheelSpline:
+def _fitted(
+    side: Side,
+    modification: AbstractModification,
+    node: Scalar | None,
+    degree: int,
+    criterion: Criterion,
+    tangent: bool,
+) -> WheelSpline:
     start, tip = side.start_roll_length, side.tip_roll_length
     node = relief_start(side, modification) if node is None else node
     node = jnp.clip(node, start, tip - _SHORTEST * (tip - start))

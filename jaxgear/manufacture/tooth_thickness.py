@@ -58,7 +58,7 @@ def span(gear: Gear, teeth: int) -> Scalar:
     return found
 
 
-def _span(gear: Gear, teeth) -> Scalar:
+def _span(gear: Gear, teeth: Given) -> Scalar:
     alpha = jnp.deg2rad(gear.pressure_angle)
     nominal = jnp.pi * (teeth - 0.5) + gear.teeth * involute(jnp.tan(alpha))
     shifted = 2 * gear.profile_shift * gear.module * jnp.sin(alpha)
@@ -86,7 +86,7 @@ def over_balls(gear: Gear, ball: Given) -> Scalar:
     return 2 * radius * _offset(gear) + ball
 
 
-def _ball(gear: Gear, ball) -> tuple[Scalar, Scalar, Scalar]:
+def _ball(gear: Gear, ball: Given) -> tuple[Scalar, Scalar, Scalar]:
     """inv(alpha_K), radius of the ball's centre and roll length where it touches [mm]."""
     wanted = _thick(gear, ball, 1e-3 * gear.mean_tooth_thickness_allowance)
     tangent = bracketed_root(_missing, jnp.full_like(wanted, 1e-6), jnp.full_like(wanted, _WIDEST), wanted)
@@ -123,7 +123,7 @@ def measures(gear: Gear, teeth: Given | None = None, ball: Given | None = None) 
     first, (wanted, centre, touched) = _span(gear, teeth), _ball(gear, ball)
     form = outline(gear).form_roll_length
 
-    def missing(length, found):
+    def missing(length: Array, found: Array) -> Array:
         return jnp.where((form <= length) & (length <= gear.tip_roll_length), found, jnp.nan)
 
     outside = (wanted > 0) & (centre - 0.5 * ball >= gear.root_circle_radius) & (centre + 0.5 * ball >= gear.tip_radius)
@@ -177,7 +177,7 @@ def allowance_of_balls(gear: Gear, ball: Given, measured: Numbers) -> Float[Arra
     return 1e3 * thicker
 
 
-def _thick(gear: Gear, ball, allowance) -> Scalar:
+def _thick(gear: Gear, ball: Given, allowance: Given) -> Scalar:
     """inv(alpha_K) of a ball between the flanks of a gear with an allowance [mm]."""
     tangent = jnp.tan(jnp.deg2rad(gear.pressure_angle))
     space = (jnp.pi / 2 - 2 * gear.profile_shift * tangent - allowance / gear.module) / gear.teeth
@@ -194,7 +194,7 @@ def _offset(gear: Gear) -> Scalar:
     return jnp.where(odd, jnp.cos(jnp.pi / (2 * gear.teeth)), 1.0)
 
 
-def _check_ball(gear: Gear, ball, wanted: Scalar, radius: Scalar) -> None:
+def _check_ball(gear: Gear, ball: Given, wanted: Scalar, radius: Scalar) -> None:
     known = [concrete(value) for value in (ball, wanted, radius, gear.root_circle_radius, gear.tip_radius)]
     if any(value is None for value in known):
         return
@@ -205,7 +205,7 @@ def _check_ball(gear: Gear, ball, wanted: Scalar, radius: Scalar) -> None:
         raise ValueError(f"over_balls: ball = {size:g} mm does not stand out of the tip circle, must be larger")
 
 
-def _check_touched(owner: str, name: str, value, unit: str, touched: Scalar, gear: Gear) -> None:
+def _check_touched(owner: str, name: str, value: Given, unit: str, touched: Scalar, gear: Gear) -> None:
     """Refuses anvils or balls that would touch at a roll length [mm] where there is no involute."""
     known = [concrete(each) for each in (touched, outline(gear).form_roll_length, gear.tip_roll_length)]
     if any(each is None for each in known):
@@ -216,7 +216,7 @@ def _check_touched(owner: str, name: str, value, unit: str, touched: Scalar, gea
         raise ValueError(f"{owner}: {name} = {value:g}{unit} {place}, must be within {form:.4g} and {tip:.4g} mm")
 
 
-def _check_near(owner: str, name: str, value, nominal: Scalar, gear: Gear) -> None:
+def _check_near(owner: str, name: str, value: Array, nominal: Scalar, gear: Gear) -> None:
     middle, pitch = concrete(nominal), concrete(gear.base_pitch)
     if middle is not None and pitch is not None:
         check(owner, name, value, "mm", low=float(middle - pitch), high=float(middle + pitch))

@@ -63,7 +63,9 @@ def space_flank(
 
 
 @program
-def _space_flank(side: Side, modification, roll_length: Profile | None, points: int) -> SpaceFlank:
+def _space_flank(
+    side: Side, modification: AbstractModification, roll_length: Profile | None, points: int
+) -> SpaceFlank:
     if roll_length is None:
         roll_length = jnp.linspace(outline(side.gear).form_roll_length, side.tip_roll_length, points)
     removed = removed_at(side, modification, roll_length)

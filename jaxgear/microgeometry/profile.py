@@ -97,7 +97,7 @@ class ProfileSlope(AbstractModification):
         return 0.5 * self.amount * _from_middle(flank)
 
 
-def _from_middle(flank: Flank):
+def _from_middle(flank: Flank) -> Real:
     """-1 at the start of the active profile, +1 at the tip."""
     middle = 0.5 * (flank.tip_roll_length + flank.start_roll_length)
     half = 0.5 * (flank.tip_roll_length - flank.start_roll_length)

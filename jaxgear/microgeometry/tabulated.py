@@ -84,7 +84,7 @@ class TabulatedFlank(AbstractModification):
         return (1 - share) * at(left) + share * at(left + 1)
 
 
-def _check_increasing(owner: str, name: str, positions) -> None:
+def _check_increasing(owner: str, name: str, positions: Array) -> None:
     known = concrete(positions)
     if known is not None and not (known[1:] > known[:-1]).all():
         raise ValueError(f"{owner}: {name} must increase strictly")

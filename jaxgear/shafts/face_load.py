@@ -71,7 +71,7 @@ def face_load_factor(line_load: Float[Array, "... slices"], slice_width: Slices 
 
 
 @partial(jax.jit, inline=True)
-def _largest_over_mean(load, width):
+def _largest_over_mean(load: Array, width: Array) -> Array:
     width = jnp.broadcast_to(width, load.shape)
     mean = jnp.sum(load * width, axis=-1) / jnp.sum(width, axis=-1)
     idle = mean <= 0  # loads that have not been found are not idle: they stay NaN
@@ -158,9 +158,17 @@ def annex_e(
 
 
 @program
-def _annex_e(support, pinion, wheel, torque, stiffness, stations: int) -> FaceLoad:
+def _annex_e(
+    support: AbstractSupport,
+    pinion: AbstractModification,
+    wheel: AbstractModification,
+    torque: Scalar | None,
+    stiffness: Scalar | None,
+    stations: int,
+) -> FaceLoad:
     pair = support.pair
     moment = support.torque if torque is None else torque
+    assert moment is not None  # one of both is given
     width = pair.face_width
     y, step = even_coordinates(width, stations), width / stations
     if stiffness is None:
@@ -173,7 +181,7 @@ def _annex_e(support, pinion, wheel, torque, stiffness, stations: int) -> FaceLo
     found = press(influence + jnp.eye(stations) / (stiffness * step), gap, 1e3 * moment / pair.pinion.base_radius)
     converged = found.solved & support.valid & (stiffness > 0)
 
-    def where_found(value):
+    def where_found(value: Array) -> Array:
         return jnp.where(converged, value, jnp.nan)
 
     # a load that has not been found must not pass for an even one, nor for none

@@ -5,6 +5,7 @@ References:
     from secondary sources.
 """
 
+from collections.abc import Collection
 from typing import Literal, get_args
 
 import jax.numpy as jnp
@@ -144,6 +145,6 @@ def _running_in(initial: Scalar, hardening: Hardening, endurance_limit: Given | 
     return _RUN_IN_SOFT / real(endurance_limit) * initial
 
 
-def _check_choice(owner: str, name: str, value, choices) -> None:
+def _check_choice(owner: str, name: str, value: str, choices: Collection[str]) -> None:
     if value not in choices:
         raise ValueError(f"{owner}: {name} = {value!r} must be one of {', '.join(choices)}")

@@ -204,7 +204,9 @@ def _gap(given: ShaftSupport, y: Slices) -> Slices:
     return total + gearbox.meshes[mesh].misalignment.over_face(pair) * y / pair.face_width
 
 
-def _twist_between(gearbox: Gearbox, mesh: int, side: int, y: Slices, at: Float[Array, " points"]):
+def _twist_between(
+    gearbox: Gearbox, mesh: int, side: int, y: Slices, at: Float[Array, " points"]
+) -> Float[Array, "slices points"]:
     """Twist at face coordinates under unit torques at positions, from the end of the face [mrad per N mm]."""
     where = acting(gearbox, mesh)
     held, middle = gearbox.shafts[where.shafts[side]].beam, where.positions[side]

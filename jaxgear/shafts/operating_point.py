@@ -40,7 +40,9 @@ def system_under_load(gearbox: Gearbox, patterns: list[Patterns]) -> System:
     return found._replace(bearings=tangent, play=tangent @ moved - law(moved))
 
 
-def _force(stiffness: Float[Array, "b b"], clearance: Float[Array, " bearings"], moved: Float[Array, " b"]):
+def _force(
+    stiffness: Float[Array, "b b"], clearance: Float[Array, " bearings"], moved: Float[Array, " b"]
+) -> Float[Array, " b"]:
     """Resistance of the bearings to displacements of their shafts against their seats [N, N mm]."""
     each = moved.reshape(-1, _WAYS)
     square = each[:, 0] ** 2 + each[:, 1] ** 2
@@ -70,11 +72,11 @@ def _state(of: System, clearance: Float[Array, " bearings"]) -> Float[Array, " b
     load = jnp.maximum(jnp.max(jnp.abs(linear.force)), jnp.finfo(first.dtype).tiny)
     length = jnp.maximum(jnp.max(jnp.abs(played)), jnp.max(jnp.abs(bent)))
 
-    def displaced(x):
+    def displaced(x: Array) -> Array:
         force, moves = load * x[:count], length / arm * x[count:]
         return inner @ force + across + here @ moves
 
-    def conditions(x):
+    def conditions(x: Array) -> Array:
         force = load * x[:count]
         resisted = _force(of.bearings, clearance, displaced(x))
         stiff = 1 + jnp.abs(of.bearings) @ jnp.max(jnp.abs(inner), axis=1)

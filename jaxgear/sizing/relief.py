@@ -128,6 +128,6 @@ def _line_load(owner: str, pair: GearPair, torque: Given, application_factor: Gi
     return tangential / pair.face_width
 
 
-def _over(load, stiffness) -> Scalar:
+def _over(load: Scalar, stiffness: Scalar) -> Scalar:
     """Deflection [um]; the stiffness of the standard vanishes with the load, but more slowly."""
     return load / jnp.maximum(stiffness, jnp.finfo(load.dtype).tiny)

@@ -1,6 +1,9 @@
 """Random deviations between tolerance limits, and the material they remove at the contacts of a mesh."""
 
+from collections.abc import Iterator
 from functools import cache
+from types import ModuleType
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -160,7 +163,7 @@ def flank_basis(mesh: Mesh, torque: Torque) -> Float[Array, "terms pairs slices 
             mesh, operating_point_of("flank_basis", torque, mesh.slice_width.dtype).torque, **flanks
         )
 
-    def terms(side: str):
+    def terms(side: str) -> Iterator[Array]:
         yield removed(side, ProfileSlope(unit))[None]
         yield jax.vmap(lambda row: removed(side, Waviness(row)))(waves)
 
@@ -182,7 +185,7 @@ def _coefficients(deviation: Deviation) -> Float[Array, " terms"]:
     return jnp.concatenate([*profiles, leads])
 
 
-def _gear_deviation(limits: GearTolerance, draw: AbstractDistribution, mesh: Mesh, key) -> GearDeviation:
+def _gear_deviation(limits: GearTolerance, draw: AbstractDistribution, mesh: Mesh, key: PRNGKeyArray) -> GearDeviation:
     slope, height, shape, pitch, helix = jax.random.split(key, 5)
     dtype = mesh.slice_width.dtype
     return GearDeviation(
@@ -193,11 +196,11 @@ def _gear_deviation(limits: GearTolerance, draw: AbstractDistribution, mesh: Mes
     )
 
 
-def _within(limit, draws):
+def _within(limit: Array | None, draws: Array) -> Array:
     return jnp.zeros_like(draws) if limit is None else limit.astype(draws.dtype) * draws
 
 
-def _random_shape(key: PRNGKeyArray, dtype) -> Float[Array, " waves"]:
+def _random_shape(key: PRNGKeyArray, dtype: np.dtype) -> Float[Array, " waves"]:
     """Coefficients of a waviness of unit height from peak to valley: random phases, amplitudes falling as 1 / k."""
     angle = jax.random.uniform(key, (HARMONICS,), dtype, 0.0, 2 * np.pi)
     order = jnp.arange(1, HARMONICS + 1, dtype=dtype)
@@ -211,7 +214,7 @@ def _grid() -> np.ndarray:
     return _waves(np.linspace(0.0, 1.0, _SHAPE_POINTS)[:, None], HARMONICS, np)
 
 
-def _waves(x, count: int, xp):
+def _waves(x: Any, count: int, xp: ModuleType) -> Any:
     """Cosine and sine waves of `Waviness` at x of shape (..., 1), with jnp or np as xp; shape (..., 2 * count)."""
     order = xp.arange(1, count + 1, dtype=x.dtype).reshape((1,) * (x.ndim - 1) + (-1,))
     angle = 2 * np.pi * order * x

@@ -80,7 +80,7 @@ def sector(tooth: Tooth, fineness: float = 1.0) -> Sector:
     return _joined(tooth_block, foot_block, ring_block, arcs, tooth)
 
 
-def _surface(tooth: Tooth, fineness: float):
+def _surface(tooth: Tooth, fineness: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The right half of the surface from the tip to the cut: arcs of the involute, then points of three curves."""
     top, bottom = tooth.arc(tooth.tip_roll_length), tooth.arc(tooth.form_roll_length)
     arcs = np.linspace(top, bottom, 2 * _edges(top - bottom, _FLANK_EDGE / fineness) + 1)
@@ -155,7 +155,9 @@ def _coons(top: np.ndarray, bottom: np.ndarray, start: np.ndarray, end: np.ndarr
     return ruled - (1 - u) * first - u * last
 
 
-def _joined(tooth_block, foot_block, ring_block, arcs: np.ndarray, tooth: Tooth) -> Sector:
+def _joined(
+    tooth_block: np.ndarray, foot_block: np.ndarray, ring_block: np.ndarray, arcs: np.ndarray, tooth: Tooth
+) -> Sector:
     """The right half from its three blocks, (2, v, u) each, and its mirror image."""
     blocks = tooth_block, foot_block, ring_block
     starts = np.cumsum([0, *(block[0].size for block in blocks)])

@@ -106,7 +106,7 @@ def _ring(flexibility: np.ndarray, cut: int, teeth: int, neighbours: int) -> np.
     return total
 
 
-def _stiffness(sector: Sector, poisson: float):
+def _stiffness(sector: Sector, poisson: float) -> "scipy.sparse.csr_matrix":
     """Stiffness matrix for unit modulus, x and y displacements of the nodes in turn."""
     nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
     local = shape_gradients(nodes, nodes)

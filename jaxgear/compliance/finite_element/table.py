@@ -1,5 +1,7 @@
 """The compliance of one gear as a table over the roll length, interpolated in JAX."""
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -180,19 +182,19 @@ def _unknown_slope(x: Scalar) -> Scalar:
 
 
 @_unknown_slope.defjvp
-def _unknown_slope_jvp(primals, tangents):
+def _unknown_slope_jvp(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
     (x,), (x_dot,) = primals, tangents
     return _unknown_slope(x), jnp.where(x == 0, 0.0, jnp.nan) * x_dot
 
 
-def _held(name: str, value):
+def _held(name: str, value: Array) -> Array:
     """The value; a derivative by it raises a `ValueError`."""
 
     @jax.custom_jvp
-    def identity(x):
+    def identity(x: Array) -> Array:
         return x
 
-    def rule(primals, tangents):
+    def rule(primals: tuple[Array], tangents: tuple[Any]) -> tuple[Array, Array]:
         if not isinstance(tangents[0], jax.custom_derivatives.SymbolicZero):
             raise ValueError(_refusal(name))
         return primals[0], jnp.zeros_like(primals[0])
