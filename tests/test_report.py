@@ -19,7 +19,8 @@ from rich.table import Table as Printed
 from jaxgear import plot, report
 from jaxgear.cli import document
 from jaxgear.io.folder import RESULT_FILES
-from jaxgear.sweeps.columns import Column
+from jaxgear.metrics import quantities
+from jaxgear.sweeps.columns import FLAG, NUMBER, Column, described
 from jaxgear.sweeps.table import in_memory
 
 pytestmark = pytest.mark.usefixtures("no_cache")
@@ -174,10 +175,10 @@ def test_what_nobody_looked_at_is_not_called_usual(tmp_path):
 def test_the_workbook_holds_the_table(tmp_path):
     pyarrow = pytest.importorskip("pyarrow")
     columns = [
-        Column("variant", "", "number"),
-        Column("=1+1", "um", "parameter"),
-        Column("ppte_um", "um", "result", "smaller"),
-        Column("converged", "", "flag"),
+        NUMBER,
+        Column(described("=1+1", "um"), "parameter"),
+        Column(quantities["ppte"]),
+        FLAG,
     ]
     values = {"variant": [0, 1, 2], "=1+1": [1.5, 2.5, 3.5], "ppte_um": [0.3, np.nan, 0.2]}
     table = in_memory("t", columns, [pyarrow.table({**values, "converged": [True, False, True]})])

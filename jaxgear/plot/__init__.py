@@ -43,7 +43,6 @@ from .mesh_cycle import transmission_error as transmission_error
 from .variants import face_load_over_torque as face_load_over_torque
 from .variants import fan as fan
 from .variants import harris_map as harris_map
-from .variants import label as label
 from .variants import ppte_distribution as ppte_distribution
 from .variants import ppte_histogram as ppte_histogram
 from .variants import ppte_over_torque as ppte_over_torque

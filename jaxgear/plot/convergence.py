@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from numpy.typing import ArrayLike
 
 from ..contact import Mesh
 from ..metrics import profile_relief
@@ -15,6 +16,7 @@ from ..optimize import Iterate, Optimum
 from .figure import (
     ABOVE_MARKS,
     FONT,
+    Panels,
     grow,
     legend_above,
     legend_over_panels,
@@ -23,8 +25,9 @@ from .figure import (
     marker_style,
     point_style,
     report_axes,
+    styled,
 )
-from .front import ANALYSES_LABEL, logarithmic, objective_label, wrapped
+from .front import ANALYSES_LABEL, best_label, logarithmic, wrapped
 from .mesh_cycle import PATH_LABEL, PHASE_LABEL, two_pitches
 
 
@@ -41,7 +44,7 @@ def convergence(optima: Mapping[str, Optimum], ax: Axes | None = None) -> Axes:
     """
     own, drawn = ax is None, []
     with report_axes(ax) as ax:
-        for index, (name, optimum) in enumerate(optima.items()):
+        for index, name, optimum in styled(optima):
             spent, best, positions = _curve(optimum)
             style = {**line_style(index), "marker": marker_style(index)["marker"], "markersize": 5.0}
             style |= {"drawstyle": "steps-post", "markevery": [-1]}
@@ -57,7 +60,7 @@ def convergence(optima: Mapping[str, Optimum], ax: Axes | None = None) -> Axes:
             logarithmic(ax, "x", spent)
             if best.min() > 0:
                 logarithmic(ax, "y", best)
-        names = {objective_label(optimum.objective_name) for optimum in optima.values()}
+        names = {best_label(optimum) for optimum in optima.values()}
         ax.set(xlabel=ANALYSES_LABEL, ylabel=wrapped(names.pop()) if len(names) == 1 else "best objective")
         lines = legend_above(ax)
         if own:
@@ -112,7 +115,7 @@ def iterations_relief(
     return ax
 
 
-def iterations_transmission_error(optimum: Optimum, phase, ax: Axes | None = None) -> Axes:
+def iterations_transmission_error(optimum: Optimum, phase: ArrayLike, ax: Axes | None = None) -> Axes:
     """Transmission error [um] of every state of an iteration over two base pitches, with its PPTE in the legend.
 
     Args:
@@ -146,7 +149,7 @@ def _path(mesh: Mesh, gear: str) -> np.ndarray:
     return np.linspace(float(start), float(tip), _POINTS)
 
 
-def _style(index: int, count: int) -> dict:
+def _style(index: int, count: int) -> dict[str, Any]:
     """Later states darker, the first one dashed and the last one wide."""
     part = index / max(count - 1, 1)
     colour = ScalarMappable(Normalize(0, 1), "viridis").to_rgba(_FIRST + (_LAST - _FIRST) * part)
@@ -180,7 +183,9 @@ _WIDEST = 180.0
 _WIDE = 20.0  # largest over smallest value from which the ordinate is logarithmic
 
 
-def optimizer_comparison(rows: Sequence[Mapping[str, Any]], quantity: str = "ppte_um", ax=None) -> np.ndarray:
+def optimizer_comparison(
+    rows: Sequence[Mapping[str, str | float]], quantity: str = "ppte_um", ax: Panels | None = None
+) -> np.ndarray:
     """What every method reached over the contact analyses it spent, one panel per gear pair.
 
     Args:
