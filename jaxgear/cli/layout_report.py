@@ -15,6 +15,7 @@ from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, Tolerance
 from ..metrics import Finding
 from ..microgeometry import AbstractModification
 from ..shafts import bearing_reactions, root_face_load_factor, tooth_height
+from ..sweeps.columns import described
 from . import report
 from .geometry import gears
 from .study import grid_lines
@@ -443,9 +444,10 @@ def write_figures(folder: Path, study: LayoutStudy) -> list[Path]:
         axes["lead_chart"] = plot.lead_chart(mesh, designs(study))
     if study.profile is not None:
         rows, names = study.profile.radar_variants()
-        results = ["ppte_um", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure_MPa"]
-        values = {one: study.profile.table.column(one) for one in results}
-        of_gears = lives(study, study.profile)
-        values |= {one: hours for one, hours in of_gears.items() if np.isfinite(hours[rows]).all()}
-        axes["radar"] = plot.radar(values, list(values), rows, names, maximize=set(of_gears) & set(values))
+        results = "ppte", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure"
+        values: dict[Any, np.ndarray] = {**study.profile.table.values(*results)}
+        for gear, hours in zip(("pinion", "wheel"), lives(study, study.profile).values()):
+            if np.isfinite(hours[rows]).all():
+                values[described(f"{gear}_life", "h", better="larger")] = hours
+        axes["radar"] = plot.radar(values, rows, names)
     return report.save_figures(folder, axes)
