@@ -2,6 +2,7 @@
 
 import builtins
 import datetime
+import io
 import shutil
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import openpyxl
 import pytest
 from commands import FIXED, SWEEP, assert_refused, call
 from report_page import Page, assert_well_formed
-from rich.table import Table as Printed
+from rich.console import Console
 
 from jaxgear import plot, report
 from jaxgear.cli import document
@@ -78,14 +79,15 @@ def test_a_file_that_cannot_be_written_is_one_line(tmp_path):
 
 
 def test_a_table_is_the_one_that_is_printed():
-    printed = Printed(title="title", caption="note")
-    printed.add_column("")
-    printed.add_column("a")
-    printed.add_row("x", "1")
-    printed.add_section()
-    printed.add_row("y", "2")
-    table = report.read_table(printed)
-    assert table == report.Table(("", "a"), (("x", "1"), ("y", "2")), "title", "note", (0,))
+    table = report.Table(("", "a"), title="title", note="note")
+    table.add_row("x [um]", "1")
+    table.add_section()
+    table.add_row("y", "22")
+    assert table == report.Table(("", "a"), (("x [um]", "1"), ("y", "22")), "title", "note", (0,))
+    out = Console(file=io.StringIO(), width=40, markup=False)
+    out.print(table)
+    printed = [line.strip() for line in out.file.getvalue().splitlines() if line.strip()]
+    assert printed == ["title", "a", printed[2], "x [um]    1", "y        22", "note"]
 
 
 def test_figures_are_numbered_through_all_sections(tmp_path):

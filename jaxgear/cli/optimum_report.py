@@ -9,7 +9,6 @@ from typing import Any
 
 import jax
 import numpy as np
-from rich import table as terminal_table
 
 from ..contact import Mesh, Side
 from ..io import DesignFile, describe
@@ -116,17 +115,12 @@ def others_of(front: Front, evaluations: report.Evaluations) -> dict[str, np.nda
     }
 
 
-def front_table(front: Front, evaluations: report.Evaluations, of_variables: Mapping[str, str]) -> terminal_table.Table:
+def front_table(front: Front, evaluations: report.Evaluations, of_variables: Mapping[str, str]) -> Table:
     """All designs of a front, with the others below; variables with their units."""
     title = f"Pareto front, {len(front.values)} designs, all in front.csv"
-    result = terminal_table.Table(title=title, title_justify="left")
-    result.add_column("")
     names = list(front.parameters) if len(front.parameters) <= _SHOWN_PARAMETERS else []
-    for name, unit in zip(front.objectives, front.units):
-        result.add_column(f"{words(name)}\n[{unit}]" if unit else words(name), justify="right")
-    for name in names:
-        unit = of_variables.get(name, "")
-        result.add_column(f"{name}\n[{unit}]" if unit else name, justify="right")
+    columns = [*zip(map(words, front.objectives), front.units), *((name, of_variables.get(name, "")) for name in names)]
+    result = Table(("", *(f"{name}\n[{unit}]" if unit else name for name, unit in columns)), title=title)
     for row, values in enumerate(front.values):
         cells = [*values, *(front.parameters[name][row] for name in names)]
         label = f"{row + 1}, {COMPROMISE}" if row == front.chosen else f"{row + 1}"

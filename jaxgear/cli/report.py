@@ -7,7 +7,6 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from rich.table import Table
 
 from ..contact import Mesh
 from ..geometry import Gear
@@ -17,6 +16,7 @@ from ..io.results import unit_of
 from ..metrics import Finding, findings_of, quantities
 from ..numerics import program
 from ..optimize import Verified
+from ..report import Table
 from .study import Evaluation, grid_lines
 from .terminal import console as console
 from .terminal import say as say
@@ -63,10 +63,7 @@ _TITLE = 9.0  # [pt]
 
 def table(file: DesignFile, evaluations: Evaluations) -> Table:
     """The designs side by side at the design torque."""
-    result = Table(title=f"{file.title}, {file.torque:g} N m on the pinion", title_justify="left")
-    result.add_column("")
-    for name in evaluations:
-        result.add_column(name, justify="right", no_wrap=True)
+    result = Table(("", *evaluations), title=f"{file.title}, {file.torque:g} N m on the pinion")
     first = next(iter(evaluations.values()))
     second = verified(evaluations)
     rows = [quantities[name] for name in _TABLE]

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import jax
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
 from ..io import sweep_request, writing
+from ..report import Table
 from ..sweeps import SweepTable, sweep
 from . import interrupt, report, sweep_report
 from .document import document
@@ -103,11 +102,9 @@ def _show(
 
 def _side_by_side(table: SweepTable, count: int) -> Table:
     """The first rows as columns."""
-    result = Table(title=f"{table.title}, best first by {table.results[0]}", title_justify="left", box=SIMPLE_HEAD)
-    result.add_column("variant")
-    columns = {name: table.column(name)[: max(count, 1)] for name in table.names}
-    for number in columns["variant"]:
-        result.add_column(str(number), justify="right", no_wrap=True)
-    for column in map(table.find, (*table.parameters, *table.results)):
-        result.add_row(column.named, *(format(value, column.form) for value in columns[column.name]))
+    shown = table.take(range(min(max(count, 1), len(table))))
+    header = "variant", *map(str, shown.column("variant"))
+    result = Table(header, title=f"{table.title}, best first by {table.results[0]}")
+    for column, values in shown.values(*shown.parameters, *shown.results).items():
+        result.add_row(column.named, *(format(value, column.form) for value in values))
     return result

@@ -7,7 +7,6 @@ from typing import Any
 
 import jax
 import numpy as np
-import rich.table
 
 from ..contact import Mesh, Resolution
 from ..io import DesignFile
@@ -88,7 +87,7 @@ class Chosen:
         lines: why they are not evaluated.
     """
 
-    tables: Sequence[rich.table.Table] = ()
+    tables: Sequence[Table] = ()
     figures: Sequence[Path] = ()
     pages: Mapping[str, Sequence[Path]] = field(default_factory=dict)
     findings: Sequence[str] | None = None

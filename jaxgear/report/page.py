@@ -12,6 +12,7 @@ from unicodedata import category
 
 import numpy as np
 import rich.table
+from rich.box import SIMPLE_HEAD
 
 from ..metrics import quantities
 from ..numerics.durable import write_durably
@@ -53,9 +54,9 @@ class Source:
         return cls(path.name, content.decode("utf-8-sig", "replace"), hashlib.sha256(content).hexdigest())
 
 
-@dataclass(frozen=True)
+@dataclass
 class Table:
-    """A table of texts.
+    """A table of texts, which a terminal prints and a report holds.
 
     Attributes:
         header: one text per column.
@@ -66,10 +67,27 @@ class Table:
     """
 
     header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    rows: tuple[tuple[str, ...], ...] = ()
     title: str = ""
     note: str = ""
     ends: tuple[int, ...] = ()
+
+    def add_row(self, *cells: str) -> None:
+        """Adds a row at the end."""
+        self.rows += (cells,)
+
+    def add_section(self) -> None:
+        """Ends a group of rows."""
+        self.ends += (len(self.rows) - 1,)
+
+    def __rich__(self) -> rich.table.Table:
+        shown = rich.table.Table(box=SIMPLE_HEAD, title_justify="left", caption_justify="left")
+        shown.title, shown.caption = self.title or None, self.note or None
+        for place, heading in enumerate(self.header):
+            shown.add_column(heading, justify="right" if place else "left", no_wrap=place > 0)
+        for number, row in enumerate(self.rows):
+            shown.add_row(*row, end_section=number in self.ends)
+        return shown
 
 
 @dataclass(frozen=True)
@@ -128,19 +146,6 @@ class Report:
     subtitle: str
     facts: Sequence[tuple[str, str]]
     sections: Sequence[Chapter]
-
-
-def read_table(printed: rich.table.Table) -> Table:
-    """The table that a command prints."""
-    columns = [[str(cell) for cell in column.cells] for column in printed.columns]
-    ends = tuple(number for number, row in enumerate(printed.rows) if row.end_section)
-    return Table(
-        header=tuple(str(column.header) for column in printed.columns),
-        rows=tuple(zip(*columns)),
-        title=str(printed.title or ""),
-        note=str(printed.caption or ""),
-        ends=ends,
-    )
 
 
 _TEMPLATES = Path(__file__).parent / "templates"
