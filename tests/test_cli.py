@@ -32,7 +32,7 @@ from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
 from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
 from jaxgear.manufacture import over_balls
-from jaxgear.metrics import Finding
+from jaxgear.metrics import Finding, quantities
 from jaxgear.metrics.findings import Range
 from jaxgear.microgeometry import NoModification
 from jaxgear.optimize import result as optimum_result
@@ -398,27 +398,39 @@ def judged(objective, *values, ppte, verified=None):
 
 def test_gains_lead_with_the_objective_and_say_what_became_worse():
     """Less loss, bought with PPTE; a safety is to be large; a temperature has no percentages."""
-    problem = SimpleNamespace(objectives=[SimpleNamespace(sign=1)])
-    found = list(gains(judged("loss_power [W]", 290.0, 210.0, 199.7, ppte=(2.0, 0.5, 3.0)), problem))
+
+    def problem(name):
+        return SimpleNamespace(objectives=[quantities[name]], cases=SimpleNamespace(count=1))
+
+    found = list(gains(judged("loss_power [W]", 290.0, 210.0, 199.7, ppte=(2.0, 0.5, 3.0)), problem("loss_power")))
     assert found == [
-        ("loss power", "290 -> 199.7 W: 31.1 % less than unmodified, 4.9 % less than rule-based (210)"),
+        (
+            quantities["loss_power"].words,
+            "290 -> 199.7 W: 31.1 % less than unmodified, 4.9 % less than rule-based (210)",
+        ),
         (
             "PPTE",
             "2.000 -> 3.000 um: 50.0 % more (worse) than unmodified, 500.0 % more (worse) than rule-based (0.500)",
         ),
     ]
-    large = SimpleNamespace(objectives=[SimpleNamespace(sign=-1)])
-    (safety, _) = gains(judged("root_safety", 2.0, 2.2, 2.1, ppte=(2.0, 0.5, 3.0)), large)
-    assert safety[1] == "2 -> 2.1: 5.0 % more than unmodified, 4.5 % less (worse) than rule-based (2.2)"
-    (hot, _) = gains(judged("bulk_temperature [degC]", 80.0, 75.0, 70.0, ppte=(2.0, 0.5, 3.0)), problem)
-    assert hot[1] == "80 -> 70 degC: -10 degC against unmodified, -5 degC against rule-based (75)"
+    numbers = judged("pinion_root_safety", 2.0, 2.2, 2.1, ppte=(2.0, 0.5, 3.0))
+    (safety, _) = gains(numbers, problem("pinion_root_safety"))
+    assert safety[1] == "2.00 -> 2.10: 5.0 % more than unmodified, 4.5 % less (worse) than rule-based (2.20)"
+    numbers = judged("bulk_temperature [degC]", 80.0, 75.0, 70.0, ppte=(2.0, 0.5, 3.0))
+    (hot, _) = gains(numbers, problem("bulk_temperature"))
+    assert hot[1] == "80.0 -> 70.0 degC: -10 degC against unmodified, -5 degC against rule-based (75.0)"
 
 
 def test_a_front_is_tabulated_drawn_and_compared(monkeypatch):
     values = np.array([[0.5, 400.0], [1.0, 380.0], [3.0, 350.0]])
     parameters = {"height": np.array([1.0, 2.0, 3.0])}
+    objectives = quantities["ppte"], quantities["loss_power"]
     front = SimpleNamespace(
-        objectives=("ppte", "loss_power"), units=("um", "W"), values=values, parameters=parameters, chosen=1
+        objectives=[of.name for of in objectives],
+        compromise=SimpleNamespace(problem=SimpleNamespace(objectives=objectives)),
+        values=values,
+        parameters=parameters,
+        chosen=1,
     )
     both = {"unmodified": [4.0, 500.0], "rule-based": [1.2, 390.0], "compromise": [1.0, 380.0]}
     designs = {name: SimpleNamespace(objectives=dict(zip("ab", of))) for name, of in both.items()}
@@ -436,7 +448,9 @@ def test_a_front_is_tabulated_drawn_and_compared(monkeypatch):
     assert drawn["chosen"] == 1 and {name: [*point] for name, point in drawn["others"].items()} == {
         name: both[name] for name in ("unmodified", "rule-based")
     }
-    rows = front_table(front, designs, {"height": "mm"}).rows
+    table = front_table(front, designs, {"height": "mm"})
+    assert table.header == ("", "PPTE\n[um]", f"{quantities['loss_power'].words}\n[W]", "height\n[mm]")
+    rows = table.rows
     assert rows[1] == ("2, compromise", "1", "380", "2") and rows[-1] == ("rule-based", "1.2", "390", "-")
     told = dict(reversed([*front_rows(front, [1, 1], designs)]))
     assert "worst distance" in told["compromise"]
