@@ -15,7 +15,7 @@ from ..contact import MeshCycle
 from ..dynamics import Branch, RunUp, SpeedResponse
 from ..metrics import harmonics
 from ..numerics import program
-from .figure import GREY, legend_above, line_style, marker_style, report_axes, styled
+from .figure import GREY, colour_bar, legend_above, line_style, marker_style, report_axes, styled
 
 FREQUENCY_LABEL = "mesh frequency [Hz]"
 _APPROACH_LABEL = "dynamic transmission error [µm]"
@@ -124,9 +124,8 @@ def waterfall(
         ax.set_xlim(float(frequency.min()), float(frequency.max()))
         ax.set_ylim(0, float(orders.max() * frequency.max()))
         _name_orders(ax, orders, float(frequency.max()))
-        bar = ax.figure.colorbar(lines, ax=ax, pad=0.09)
-        bar.set_label(f"amplitude of the {'mesh force' if of == 'force' else 'velocity of the DTE'} [{unit}]")
-        bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
+        what = "mesh force" if of == "force" else "velocity of the DTE"
+        colour_bar(lines, ax, f"amplitude of the {what} [{unit}]", pad=0.09)
         ax.set(xlabel=FREQUENCY_LABEL, ylabel="frequency [Hz]")
         _entitle(ax, title, 0)
     return ax

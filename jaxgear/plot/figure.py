@@ -12,11 +12,13 @@ import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
 from ..geometry import PathOfContact
+from ..io import writing
 from ..numerics.durable import write_durably
 
 _INCH = 25.4  # mm
@@ -250,6 +252,21 @@ def _root(ax: Axes) -> Any:
     return canvas.figure
 
 
+def colour_bar(image: ScalarMappable, ax: Axes | Panels, label: str, **options: float | str) -> None:
+    """A scale of the colours beside Axes, with the letters of its own like theirs.
+
+    Args:
+        image: what is coloured.
+        ax: Axes, or panels side by side.
+        label: of the scale.
+        options: of matplotlib's colour bar, such as its distance `pad`.
+    """
+    panels = np.atleast_1d(ax)
+    bar = panels[0].figure.colorbar(image, ax=list(panels), **options)
+    bar.set_label(label)
+    bar.ax.tick_params(labelsize=panels[0].xaxis.label.get_fontsize())
+
+
 def mark_path(ax: Axes, contact: PathOfContact, *, zorder: float = 0.5) -> None:
     """Thin lines at the points A to E of the path of contact, with their letters above the Axes."""
     outer = {"A": contact.start, "B": contact.inner_single, "D": contact.outer_single, "E": contact.end}
@@ -302,9 +319,7 @@ def save(fig: Figure, path: str | Path) -> Path:
     contents = fig.get_tightbbox().padded(_MARGIN)
     fig.savefig(picture, format="png", dpi=_DPI, bbox_inches=contents, facecolor="white")
     plt.close(fig)
-    try:
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         write_durably(path, lambda file: file.write(picture.getvalue()))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
     return path

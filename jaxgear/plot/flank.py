@@ -22,6 +22,7 @@ from .figure import (
     HEIGHT,
     PALE,
     Panels,
+    colour_bar,
     legend_above,
     legend_over_panels,
     line_style,
@@ -134,9 +135,7 @@ def topography(mesh: Mesh, design: Design, ax: Panels | None = None) -> np.ndarr
             panel.contour(*places, levels=levels[1:], colors="black", linewidths=0.3)
             panel.set_xlabel(f"roll angle of the {title} [deg]")
         panels[0].set_ylabel("face coordinate [mm]")
-        bar = panels[0].figure.colorbar(filled, ax=list(panels), pad=0.02, format="%.3g")
-        bar.set_label("material removed [µm]")
-        bar.ax.tick_params(labelsize=panels[0].xaxis.label.get_fontsize())
+        colour_bar(filled, panels, "material removed [µm]", pad=0.02, format="%.3g")
     return np.asarray(panels)
 
 
@@ -259,7 +258,7 @@ def _over_roll_angle(panel: Axes, side: Side, title: str) -> None:
     upper.tick_params(labelsize=panel.xaxis.label.get_fontsize(), width=0.6, length=3)
 
 
-_FACE_LABEL = "face coordinate [mm]"
+_FACE_LABEL, _PRESSURE_LABEL = "face coordinate [mm]", "flank pressure [MPa]"
 
 
 def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
@@ -272,7 +271,7 @@ def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
     path, face, flank = _pressed(cycle)
     contact = cycle.kinematics.path_of_contact
     with report_axes(ax) as ax:
-        _bar(ax, _draw(ax, path, face, flank, None))
+        colour_bar(_draw(ax, path, face, flank, None), ax, _PRESSURE_LABEL, pad=0.02)
         mark_path(ax, contact, zorder=3)
         air = 0.05 * float(contact.base_pitch)
         ax.set_xlim(float(contact.start) - air, float(contact.end) + air)
@@ -302,7 +301,7 @@ def contact_pattern(cycle: MeshCycle, ax: Panels | None = None) -> np.ndarray:
             panel.set_xlim(*np.rad2deg(np.array([*ends]) / base))
             panel.set(ylim=(face[0], face[-1]), xlabel=f"roll angle of the {title} [deg]")
         panels[0].set_ylabel(_FACE_LABEL)
-        _bar(panels[1], image)
+        colour_bar(image, panels[1], _PRESSURE_LABEL, pad=0.02)
     return np.asarray(panels)
 
 
@@ -318,12 +317,6 @@ def _draw(ax: Axes, along: np.ndarray, face: np.ndarray, flank: np.ndarray, most
     ax.grid(False)
     # cividis: even in lightness, so that it reads the same in grey and for every kind of colour vision
     return ax.pcolormesh(along, face, flank, cmap="cividis_r", vmin=0, vmax=most)
-
-
-def _bar(ax: Axes, image: ScalarMappable) -> None:
-    bar = ax.figure.colorbar(image, ax=ax, pad=0.02)
-    bar.set_label("flank pressure [MPa]")
-    bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
 
 
 def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None = None) -> Axes:

@@ -19,12 +19,23 @@ from ..optimize import Front, Optimum, Problem
 from ..optimize.result import PENALIZED
 from ..optimize.verdict import over_cases
 from ..sweeps.columns import axis_label, printed_unit
-from .figure import APART, FONT, GREY, HEIGHT, legend_above, line_style, point_style, report_axes, style_number
+from .figure import (
+    APART,
+    FONT,
+    GREY,
+    HEIGHT,
+    colour_bar,
+    legend_above,
+    line_style,
+    point_style,
+    report_axes,
+    style_number,
+)
 from .variants import Of, Table, columns_of, costs, share_text, subsample
 
 ANALYSES_LABEL = "contact analyses spent [-]"
 _NARROW = 5.0  # largest over smallest value below which a logarithmic axis has too few round numbers of its own
-_LINE = 34  # letters along an axis of report height
+_LINE = 34  # letters along an axis of report height, about which a long label is broken
 
 
 def objective_labels(problem: Problem | None) -> list[str]:
@@ -50,10 +61,10 @@ def meaning_label(of: Quantity, before: str = "", after: str = "") -> str:
     return f"{before}{of.meaning or of.words}{after} [{printed_unit(of.unit) or '-'}]"
 
 
-def wrapped(text: str) -> str:
-    """A long label on several lines of at most about the height of a figure, its unit with the last word."""
+def wrapped(text: str, room: int = _LINE) -> str:
+    """A label in lines of at most `room` letters where its words allow it, its unit with the last word."""
     bound = text.replace(" [", "\N{NO-BREAK SPACE}[")
-    return textwrap.fill(bound, _LINE, break_long_words=False, break_on_hyphens=False)
+    return textwrap.fill(bound, max(room, 1), break_long_words=False, break_on_hyphens=False)
 
 
 def logarithmic(ax: Axes, which: Literal["x", "y"], values: ArrayLike) -> None:
@@ -152,9 +163,7 @@ def front_dots(ax: Axes, best: np.ndarray, text: str, bar_text: str, *, turned: 
         zorder=4,
         label=text,
     )
-    bar = ax.figure.colorbar(image, ax=ax, pad=0.03)
-    bar.set_label(bar_text)
-    bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
+    colour_bar(image, ax, bar_text, pad=0.03)
 
 
 def front_star(ax: Axes, values: np.ndarray, text: str, index: int = 0) -> None:
@@ -260,9 +269,7 @@ def parallel_coordinates(
         seen = share_text(len(cloud), rows.size, len(values) - rows.size)
         ax.plot([], [], color=colours.to_rgba(np.median(colour[rows])), linewidth=0.8, label=seen)
         _axes(ax, low, high, list(table))
-        bar = ax.figure.colorbar(colours, ax=ax, pad=0.03, aspect=30)
-        bar.set_label(axis_label(colour_by))
-        bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
+        colour_bar(colours, ax, axis_label(colour_by), pad=0.03, aspect=30)
         legend_above(ax)
     return ax
 
@@ -279,7 +286,7 @@ def _axes(ax: Axes, low: np.ndarray, high: np.ndarray, columns: Sequence[Of]) ->
     ax.set(xlim=(-0.15, len(columns) - 0.6), ylim=(-0.03, 1.03), yticks=[])
     ax.grid(False)
     ax.spines[["left", "bottom"]].set_visible(False)
-    names = (_wrapped(of.words, _LABEL_ROOM // len(columns)) for of in columns)
+    names = (wrapped(of.words, _LABEL_ROOM // len(columns)) for of in columns)
     units = (f"[{printed_unit(of.unit) or '-'}]" for of in columns)
     ax.set_xticks(range(len(columns)), list(map("\n".join, zip(names, units))))
     ax.tick_params(axis="x", length=0)
@@ -306,8 +313,3 @@ def _tick(ax: Axes, place: int, height: float, text: str) -> None:
         bbox=box,
         zorder=5,
     )
-
-
-def _wrapped(text: str, room: int) -> str:
-    """A text in lines of at most `room` characters where its words allow it."""
-    return "\n".join(textwrap.wrap(text, max(room, 1), break_long_words=False))

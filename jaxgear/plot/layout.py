@@ -1,6 +1,5 @@
 """Layouts: shafts under load, cases of deviations, and radar charts of variants in parallel."""
 
-import textwrap
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -24,6 +23,7 @@ from .figure import (
     report_figure,
     style_number,
 )
+from .front import wrapped
 from .variants import Of, Table, columns_of, costs
 
 _PANEL = (58.0, 60.0)  # width and height of one chart [mm]
@@ -106,16 +106,11 @@ def _texts(values: np.ndarray, named: Sequence[tuple[str, str]]) -> list[list[st
     decimals = np.clip(2 - np.floor(np.log10(np.where(largest > 0, largest, 1.0))), 0, 4).astype(int)
     return [
         [
-            f"{_wrapped(what)}\n{value:.{digits}f} {unit}".rstrip()
+            f"{wrapped(what, _LINE)}\n{value:.{digits}f} {unit}".rstrip()
             for value, digits, (what, unit) in zip(row, decimals, named)
         ]
         for row in values
     ]
-
-
-def _wrapped(what: str) -> str:
-    """Long names on several lines."""
-    return "\n".join(textwrap.wrap(what, _LINE, break_long_words=False))
 
 
 def _draw(panels: np.ndarray, radii: np.ndarray, texts: Sequence[Sequence[str]], names: Sequence[str]) -> None:

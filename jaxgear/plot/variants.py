@@ -20,6 +20,7 @@ from .figure import (
     ABOVE_MARKS,
     FONT,
     GREY,
+    colour_bar,
     laid_out_size,
     legend_above,
     line_style,
@@ -102,9 +103,7 @@ def response_surface(
         ax.grid(False)
         # cividis: even in lightness, so that it reads the same in grey and for every kind of colour vision
         image = ax.contourf(x, rows, surface, levels, cmap="cividis")
-        bar = ax.figure.colorbar(image, ax=ax, pad=0.02)
-        bar.set_label("transmission error [µm]")
-        bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
+        colour_bar(image, ax, "transmission error [µm]", pad=0.02)
         ax.set(xlim=(0, 2), ylim=(0, rows[-1]), xlabel=PHASE_LABEL, ylabel="pinion torque [N m]")
         if design_torque is not None:
             text = f"design torque {float(design_torque):g} N m"

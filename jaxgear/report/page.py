@@ -14,6 +14,7 @@ import numpy as np
 import rich.table
 from rich.box import SIMPLE_HEAD
 
+from ..io import writing
 from ..metrics import quantities
 from ..numerics.durable import write_durably
 
@@ -164,11 +165,17 @@ def write_report(path: Path, report: Report) -> None:
     """
     needed("jinja2")
     page = template("report.html").render(report=report, upright=_UPRIGHT)
-    held = printable(page).encode("utf-8", "replace")
-    try:
-        write_durably(path, lambda file: file.write(held))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
+    write_text(path, printable(page))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes a text whole or not at all.
+
+    Raises:
+        ValueError: when the file cannot be written.
+    """
+    with writing(path):
+        write_durably(path, lambda file: file.write(text.encode("utf-8", "replace")))
 
 
 def template(name: str) -> Any:
@@ -270,32 +277,13 @@ def figure(path: Path) -> Figure:
     return Figure(path.stem, caption, data, pixels / density * _MM)
 
 
-# ending of a name -> unit; the first that fits counts
-_UNITS = {
-    "N_per_(ms^0.5K)": "N/(m s^0.5 K)",
-    "kg_per_m^3": "kg/m^3",
-    "N_per_mm": "N/mm",
-    "N_per_um": "N/um",
-    "mm2_per_s": "mm2/s",
-    "m2_per_N": "m2/N",
-    "percent": "%",
-    "mm3": "mm3",
-    "mm2": "mm2",
-    "mm": "mm",
-    "um": "um",
-    "degC": "degC",
-    "deg": "deg",
-    "sqrt_MPa": "MPa^0.5",
-    "MPa": "MPa",
-    "Nm": "N m",
-    "rpm": "rpm",
-    "Hz": "Hz",
-    "kg": "kg",
-    "N": "N",
-    "W": "W",
-    "K": "K",
-    "h": "h",
-    "s": "s",
+# units that names end with, those first that end with another one
+_UNITS = (
+    *("N/(m s^0.5 K)", "kg/m^3", "N/mm", "N/um", "mm2/s", "m2/N", "mm3", "mm2", "mm", "um", "degC", "deg", "MPa"),
+    *("N m", "rpm", "Hz", "kg", "N", "W", "K", "h", "s"),
+)
+_ENDINGS = {"percent": "%", "sqrt_MPa": "MPa^0.5"} | {
+    unit.replace(" ", "").replace("/", "_per_"): unit for unit in _UNITS
 }
 _DIGITS = 6  # of a number
 _MOST = 12  # numbers of a list that are written out
@@ -306,7 +294,7 @@ def heading(name: str) -> str:
     """A name of `summary.json` in words: "max_flank_pressure_MPa" becomes "max flank pressure [MPa]"."""
     if name in quantities:
         return quantities[name].heading
-    for ending, unit in _UNITS.items():
+    for ending, unit in _ENDINGS.items():
         if name.endswith(f"_{ending}"):
             return f"{name.removesuffix(f'_{ending}').replace('_', ' ')} [{unit}]"
     return name.replace("_", " ")

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ..io import writing
 from ..numerics.durable import write_durably
 from ..sweeps import SweepTable
 from ..sweeps.columns import axis_label
-from .page import needed, printable, template
+from .page import needed, printable, template, write_text
 
 # a sheet of this many rows and some tens of columns opens in seconds; Excel itself ends at 1 048 576
 MOST_ROWS = 20_000
@@ -50,10 +51,8 @@ def write_workbook(path: Path, facts: Sequence[tuple[str, str]], best: SweepTabl
         about.set_column(1, 1, 3 * _WIDEST)
         _sheet(book.add_worksheet("best"), best, bold)
         _sheet(book.add_worksheet("variants" if every else "best variants"), shown, bold)
-    try:
+    with writing(path):
         write_durably(path, lambda file: file.write(held.getvalue()))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
 def _sheet(sheet, table: SweepTable, bold) -> None:
@@ -115,10 +114,7 @@ def write_variants(
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         library=get_plotlyjs(),
     )
-    try:
-        write_durably(path, lambda file: file.write(page.encode("utf-8", "replace")))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
+    write_text(path, page)
 
 
 def _shown(table: SweepTable) -> SweepTable:
