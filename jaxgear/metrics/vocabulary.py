@@ -108,6 +108,7 @@ quantities.add(
         "peak-to-peak transmission error, unloaded",
         Range(),
         local=True,
+        label="unloaded PPTE",
     ),
     *(
         Quantity(
@@ -179,7 +180,13 @@ quantities.add(
         local=True,
         form=".1f",
     ),
-    *_stresses("contact_stress", nominal_contact_stress, "nominal contact stress after ISO 6336-2"),
+    *_stresses(
+        "contact_stress",
+        nominal_contact_stress,
+        "nominal contact stress after ISO 6336-2",
+        "contact stress, ISO 6336-2",
+        form=".1f",
+    ),
     *(
         Quantity(f"{gear}_{name}", _margin(f"{gear}_{name}"), "mm", f"{meaning}, {gear}", better="larger")
         for gear in ("pinion", "wheel")

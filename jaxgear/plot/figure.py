@@ -246,7 +246,7 @@ def _in_points(ax: Axes, pixels: float) -> float:
     return pixels * _POINTS_PER_INCH / _root(ax).dpi
 
 
-def _root(ax: Axes) -> Any:
+def _root(ax: Axes) -> Figure:
     """The figure of the Axes, also if they stand in a subfigure."""
     canvas: Any = ax.figure.canvas
     return canvas.figure

@@ -246,10 +246,10 @@ def _over_roll_angle(panel: Axes, side: Side, title: str) -> None:
     surface = jax.tree.map(np.asarray, flank_surface(side, NoModification()))
     base = float(surface.diameter[-1] / np.hypot(1, np.deg2rad(surface.roll_angle[-1])))
 
-    def to_diameter(angle):
+    def to_diameter(angle: np.ndarray) -> np.ndarray:
         return base * np.hypot(1, np.deg2rad(angle))
 
-    def to_angle(diameter):
+    def to_angle(diameter: np.ndarray) -> np.ndarray:
         return np.rad2deg(np.sqrt(np.maximum((np.asarray(diameter) / base) ** 2 - 1, 0)))
 
     upper: Any = panel.secondary_xaxis("top", functions=(to_diameter, to_angle))

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
 import numpy as np
+import scipy  # its packages load when they are used
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -330,11 +331,6 @@ def _spread(heights: np.ndarray, gap: float) -> np.ndarray:
     order = np.argsort(heights, kind="stable")
     # least squares under y[i+1] - y[i] >= gap is isotonic regression of the heights minus their stacked offsets
     offsets = gap * np.arange(heights.size)
-    blocks: list[list[float]] = []
-    for value in heights[order] - offsets:
-        blocks.append([value])
-        while len(blocks) > 1 and np.mean(blocks[-2]) > np.mean(blocks[-1]):
-            blocks[-2:] = [blocks[-2] + blocks[-1]]
     spread = np.empty_like(heights)
-    spread[order] = np.array([np.mean(block) for block in blocks for _ in block]) + offsets
+    spread[order] = scipy.optimize.isotonic_regression(heights[order] - offsets).x + offsets
     return spread

@@ -7,7 +7,6 @@ import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from unicodedata import category
 
 import numpy as np
@@ -164,8 +163,7 @@ def write_report(path: Path, report: Report) -> None:
         ValueError: without the library jinja2, or when the file cannot be written.
     """
     needed("jinja2")
-    page = template("report.html").render(report=report, upright=_UPRIGHT)
-    write_text(path, printable(page))
+    write_text(path, printable(rendered("report.html", report=report, upright=_UPRIGHT)))
 
 
 def write_text(path: Path, text: str) -> None:
@@ -178,8 +176,8 @@ def write_text(path: Path, text: str) -> None:
         write_durably(path, lambda file: file.write(text.encode("utf-8", "replace")))
 
 
-def template(name: str) -> Any:
-    """A template of the pages."""
+def rendered(template: str, **parts: object) -> str:
+    """A page of a template, with the parts that it asks for."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -189,7 +187,8 @@ def template(name: str) -> Any:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(name)
+    page: str = environment.get_template(template).render(**parts)
+    return page
 
 
 def printable(text: str) -> str:
@@ -300,13 +299,13 @@ def heading(name: str) -> str:
     return name.replace("_", " ")
 
 
-def text(value: Any) -> str:
+def text(value: object) -> str:
     """A value in six digits, as the whole report writes it; "-" where there is none."""
     if isinstance(value, Mapping):
         return ", ".join(f"{heading(str(key))} {text(item)}" for key, item in value.items()) or "-"
-    if isinstance(value, list | tuple) or np.ndim(value):
-        items = list(value)
-        shown = ", ".join(text(item) for item in items[:_MOST])
+    items = value if isinstance(value, list | tuple) else np.asarray(value)
+    if not isinstance(items, np.ndarray) or items.ndim:
+        shown = ", ".join(map(text, items[:_MOST]))
         return f"{shown}, ... ({len(items)} values)" if len(items) > _MOST else shown or "-"
     if isinstance(value, str) or value is None:
         return value or "-"
@@ -318,7 +317,7 @@ def text(value: Any) -> str:
     return f"{number:.{_DIGITS}g}" if isinstance(number, float | np.floating) else str(number)
 
 
-def numbers(data: Mapping[str, Any], within: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
+def numbers(data: Mapping[str, object], within: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
     """Name and text of everything that nested data hold, in their order."""
     for name, value in data.items():
         names = (*within, heading(str(name)))

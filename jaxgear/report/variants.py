@@ -12,7 +12,7 @@ from ..io import writing
 from ..numerics.durable import write_durably
 from ..sweeps import SweepTable
 from ..sweeps.columns import axis_label
-from .page import needed, printable, template, write_text
+from .page import needed, printable, rendered, write_text
 
 # a sheet of this many rows and some tens of columns opens in seconds; Excel itself ends at 1 048 576
 MOST_ROWS = 20_000
@@ -106,7 +106,8 @@ def write_variants(
     words = (
         f"{count} of {len(table)} variants, {failed} failed" if failed or count < len(table) else f"{count} variants"
     )
-    page = template("variants.html").render(
+    page = rendered(
+        "variants.html",
         title=printable(title),
         facts=[(name, printable(text)) for name, text in facts],
         shown=f"{words}. ",
