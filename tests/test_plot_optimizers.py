@@ -13,6 +13,7 @@ import matplotlib.pyplot as plt
 from catalogue import LINE, gear_pair, prepare
 
 import jaxgear as jg
+from benchmarks.optimization.figure import optimizer_comparison
 from jaxgear import plot
 from jaxgear.metrics import quantity_of
 from jaxgear.optimize import Front, Iterate, Optimum
@@ -131,7 +132,7 @@ def draw(mesh, iterated, optima, front, rows):
         "transmission error": lambda ax=None: plot.iterations_transmission_error(iterated, PHASE, ax),
         "surface": lambda ax=None: plot.response_surface(PHASE, TORQUES, surface(), wave(1.0) - 20, ax),
         "front": lambda ax=None: plot.optimum_front(front, 3, ax),
-        "comparison": lambda ax=None: plot.optimizer_comparison(one, ax=ax),
+        "comparison": lambda ax=None: optimizer_comparison(one, ax=ax),
     }
 
 
@@ -345,7 +346,7 @@ def test_front_of_three_shows_the_third_as_colour(front):
 
 
 def test_comparison_has_a_panel_per_pair_on_common_scales(rows):
-    panels = plot.optimizer_comparison(rows)
+    panels = optimizer_comparison(rows)
     assert [panel.get_title() for panel in panels] == ["19/48", "30/30", "50/50"]
     assert len({(panel.get_xlim(), panel.get_ylim(), panel.get_xscale()) for panel in panels}) == 1
     for panel in panels:
@@ -362,20 +363,20 @@ def test_comparison_of_several_runs_failures_and_methods_on_one_pair_only():
         return {"method": method, "pair": pair, "evaluations": evaluations, "ppte_um": ppte}
 
     rows = [row("a", "P", 0, 1.0), row("a", "P", 9, 0.01), row("a", "Q", 9, np.nan), row("b", "Q", 9, 2.0)]
-    first, second = plot.optimizer_comparison(rows)
+    first, second = optimizer_comparison(rows)
     np.testing.assert_array_equal(first.lines[0].get_xdata(), [1.0, 9.0])
     assert [line.get_xdata().size for line in (*first.lines, *second.lines)] == [2, 0, 0, 1]
     assert first.get_yscale() == second.get_yscale() == "log"
-    plot.optimizer_comparison([row("a", "P", 1, np.inf)])[0].figure.draw_without_rendering()
+    optimizer_comparison([row("a", "P", 1, np.inf)])[0].figure.draw_without_rendering()
 
 
 def test_comparison_shows_other_quantities_and_refuses_unknown_ones(rows):
-    panels = plot.optimizer_comparison(rows, "worst_over_torque_um")
+    panels = optimizer_comparison(rows, "worst_over_torque_um")
     assert plain(panels[0].get_ylabel()) == "worst peak-to-peak transmission error over torque [µm]"
     assert panels[0].lines[0].get_ydata()[0] == 2.0
     with pytest.raises(ValueError, match='^optimizer_comparison: "cost" is not known'):
-        plot.optimizer_comparison(rows, "cost")
+        optimizer_comparison(rows, "cost")
     with pytest.raises(ValueError, match="^optimizer_comparison: ax has 2 Axes, must have one for each of 3 pairs"):
-        plot.optimizer_comparison(rows, ax=plt.subplots(1, 2)[1])
+        optimizer_comparison(rows, ax=plt.subplots(1, 2)[1])
     with pytest.raises(ValueError, match="^optimizer_comparison: rows is empty"):
-        plot.optimizer_comparison([])
+        optimizer_comparison([])

@@ -7,7 +7,6 @@ None shows a window or changes matplotlib's settings; `save` writes the file.
 from .convergence import convergence as convergence
 from .convergence import iterations_relief as iterations_relief
 from .convergence import iterations_transmission_error as iterations_transmission_error
-from .convergence import optimizer_comparison as optimizer_comparison
 from .dynamics import bifurcation as bifurcation
 from .dynamics import branches as branches
 from .dynamics import order_tracks as order_tracks
