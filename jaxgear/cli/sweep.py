@@ -106,5 +106,5 @@ def _side_by_side(table: SweepTable, count: int) -> Table:
     header = "variant", *map(str, shown.column("variant"))
     result = Table(header, title=f"{table.title}, best first by {table.results[0]}")
     for column, values in shown.values(*shown.parameters, *shown.results).items():
-        result.add_row(column.named, *(format(value, column.form) for value in values))
+        result.add_row(column.named, *(format(value, column.quantity.form) for value in values))
     return result

@@ -167,7 +167,7 @@ def write_figures(folder: Path, scatters: Mapping[str, Samples]) -> list[Path]:
     from .. import plot
 
     samples = {name: of[_PPTE] for name, of in scatters.items()}
-    axes = plot.ppte_distribution(samples, of="mean PPTE over the life")
+    axes = plot.ppte_distribution(samples, of=_PPTE)
     return report.save_figures(folder, {"life_ppte_distribution": axes})
 
 

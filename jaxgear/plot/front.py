@@ -13,7 +13,7 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import ArrayLike
 
-from ..metrics import Quantity, quantities
+from ..metrics import quantities
 from ..numerics.pareto import pareto_front
 from ..optimize import Front, Optimum, Problem
 from ..optimize.result import PENALIZED
@@ -31,7 +31,7 @@ from .figure import (
     report_axes,
     style_number,
 )
-from .variants import Of, Table, columns_of, costs, share_text, subsample
+from .variants import Of, Table, columns_of, costs, meaning_label, share_text, subsample
 
 ANALYSES_LABEL = "contact analyses spent [-]"
 _NARROW = 5.0  # largest over smallest value below which a logarithmic axis has too few round numbers of its own
@@ -54,11 +54,6 @@ def best_label(optimum: Optimum) -> str:
     """Label of what a search has made small; of several objectives it is the distance from the ideal."""
     labels = objective_labels(optimum.problem)
     return labels[0] if len(labels) == 1 else "distance from the ideal [-]"
-
-
-def meaning_label(of: Quantity, before: str = "", after: str = "") -> str:
-    """What a quantity means, with its unit in print, between further words."""
-    return f"{before}{of.meaning or of.words}{after} [{printed_unit(of.unit) or '-'}]"
 
 
 def wrapped(text: str, room: int = _LINE) -> str:

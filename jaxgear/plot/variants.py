@@ -12,10 +12,10 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from ..conditions import ranked
-from ..metrics import Quantity
+from ..metrics import Quantity, quantity_of
 from ..numerics import Quantile, real
 from ..sweeps import Scatter
-from ..sweeps.columns import Column
+from ..sweeps.columns import Column, printed_unit
 from .figure import (
     ABOVE,
     ABOVE_MARKS,
@@ -54,6 +54,11 @@ def columns_of(owner: str, table: Table[Of], *, least: int = 1) -> np.ndarray:
 def costs(values: np.ndarray, columns: Iterable[Of]) -> np.ndarray:
     """The columns with their signs turned so that smaller is better in each."""
     return values * np.array([float(of.sign) for of in columns])
+
+
+def meaning_label(of: Quantity, before: str = "", after: str = "") -> str:
+    """What a quantity means, with its unit in print, between further words."""
+    return f"{before}{of.meaning or of.words}{after} [{printed_unit(of.unit) or '-'}]"
 
 
 def subsample(rows: np.ndarray, count: int) -> np.ndarray:
@@ -208,28 +213,33 @@ def ppte_distribution(
     ax: Axes | None = None,
     level: float = 0.95,
     *,
-    of: str = "peak-to-peak transmission error",
+    of: str | Quantity = "ppte",
 ) -> Axes:
-    """Share of the manufactured gears whose PPTE stays below a value, of several designs.
+    """Share of the manufactured gears whose PPTE, or another quantity, stays below a value, of several designs.
 
     Args:
-        samples: PPTE of every sample [um] by the name of the design; those that failed, NaN, stay below no value.
+        samples: the quantity of every sample by the name of the design; those that failed, NaN, stay below no value.
         ax: Axes to draw into; None for a new figure.
         level: share that a line marks; the legend has each design's quantile, as `Quantile` takes it.
-        of: what the samples are, in words.
+        of: the quantity, or its name.
+
+    Raises:
+        ValueError: for an unknown name.
     """
+    quantity = quantity_of(of, "ppte_distribution")
+    unit = printed_unit(quantity.unit)
     with report_axes(ax) as ax:
         for index, name, given in styled(samples):
             values = np.asarray(given)
             ordered = np.sort(values[np.isfinite(values)])
             share = 100 * np.arange(1, ordered.size + 1) / values.size
             reached = float(ranked(Quantile(real(level)), values))
-            below = f", {100 * level:g} % below {reached:.2f} µm" if np.isfinite(reached) else ""
+            below = f", {100 * level:g} % below {reached:.2f} {unit}".rstrip() if np.isfinite(reached) else ""
             ax.plot(ordered, share, label=f"{name}{below}", **line_style(index))
         ax.axhline(100 * level, color=GREY, linewidth=0.8, zorder=0.5)
         ax.set_xlim(left=0)
         ax.set_ylim(0, 100)
-        ax.set(xlabel=f"{of} [µm]", ylabel="share of the gears below [%]")
+        ax.set(xlabel=meaning_label(quantity), ylabel="share of the gears below [%]")
         legend_above(ax)
     return ax
 

@@ -11,7 +11,7 @@ from ..geometry import roll_angle
 from ..metrics import Quantity, quantity_of
 from ..wear import WearLife, over_life, wear_depth
 from .figure import legend_above, line_style, marker_style, report_axes, styled
-from .front import meaning_label
+from .variants import meaning_label
 
 _GEARS = "pinion", "wheel"
 _SHOWN = 4  # lives

@@ -114,11 +114,6 @@ class Column:
         return self.quantity.unit
 
     @property
-    def form(self) -> str:
-        """How tables format the number."""
-        return self.quantity.form
-
-    @property
     def better(self) -> Better | Literal[""]:
         """Whether small or large values of a result are the better ones, "" where neither is."""
         return self.quantity.better if self.kind == "result" else ""

@@ -112,11 +112,9 @@ class SweepTable:
     @property
     def heads(self) -> tuple[Column, ...]:
         """The first column of every result, which of a load spectrum or a tolerance is the mean."""
-        results = (column for column in self.columns if column.kind == "result")
-        firsts: dict[str, Column] = {}
-        for column in results:
-            firsts.setdefault(column.quantity.name, column)
-        return tuple(firsts.values())
+        results = [column for column in self.columns if column.kind == "result"]
+        firsts = {column.quantity.name: column for column in reversed(results)}
+        return tuple(column for column in results if firsts[column.quantity.name] is column)
 
     def find(self, name: str) -> Column:
         """The column of a name: with or without its unit, a result's own name standing for its (weighted) mean.
