@@ -100,7 +100,9 @@ def _figure(rows: Sequence[Row], path: Path) -> None:
     matplotlib.use("Agg")
     from jaxgear import plot
 
-    panels = plot.optimizer_comparison([asdict(row) for row in rows])
+    from .optimization.figure import optimizer_comparison
+
+    panels = optimizer_comparison([asdict(row) for row in rows])
     print(f"wrote {plot.save(panels[0].figure, path)}")
 
 

@@ -165,8 +165,8 @@ def draw(found):
         plot.save(np.ravel(axes)[0].figure, folder / f"reproduce_gearbox_layout_step_{step}.png")
     made = found["profiles"]["low speed", "bad foundation"]
     rows, names = made.radar_variants()
-    results = ["ppte_um", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure_MPa"]
-    axes = plot.radar({name: made.table.column(name) for name in results}, results, rows, names)
+    results = "ppte", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure"
+    axes = plot.radar(made.table.values(*results), rows, names)
     plot.save(np.ravel(axes)[0].figure, folder / "reproduce_gearbox_layout_profiles.png")
 
 

@@ -10,15 +10,9 @@ import pytest
 from catalogue import FACE, LINE, gear_pair, prepare
 
 import jaxgear as jg
-from jaxgear.metrics import (
-    edge_load_factor,
-    face_load_factor,
-    face_load_factors,
-    quantities,
-    root_face_load_factor,
-    summary,
-)
+from jaxgear.metrics import edge_load_factor, face_load_factor, face_load_factors, root_face_load_factor, summary
 from jaxgear.shafts import tooth_height
+from jaxgear.vocabulary import quantities
 
 NAMES = ("face_load_factor", "root_face_load_factor", "edge_load_factor")
 

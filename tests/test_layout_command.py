@@ -17,6 +17,7 @@ from jaxgear.io import layout_request, load_design
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.layout import at_stations, layout_flank_lines
 from jaxgear.metrics import face_load_factor
+from jaxgear.vocabulary import quantities
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -203,10 +204,13 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
     others = "face_load_factors", "face_load_over_torque", "shaft_deflection"
     for name in others:
         monkeypatch.setattr(plot, name, lambda *given, **options: None)
-    monkeypatch.setattr(plot, "radar", lambda *given, **options: drawn.append((*given, options["maximize"])))
+    monkeypatch.setattr(plot, "radar", lambda table, *_: drawn.append(table))
     monkeypatch.setattr(layout_report.report, "save_figures", lambda folder, axes: list(axes))
     profile = SimpleNamespace(
-        table=SimpleNamespace(column=lambda name: np.asarray([1.2, 1.0, np.nan])),
+        table=SimpleNamespace(
+            column=lambda name: np.asarray([1.2, 1.0, np.nan]),
+            values=lambda *names: {quantities[name]: np.ones(3) for name in names},
+        ),
         radar_variants=lambda: ([0, 1], ["no profile modification", "best"]),
     )
     layout = SimpleNamespace(after={"maximum": None}, cases=[])
@@ -214,14 +218,15 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
         design=design, request=request, main=layout, over_torque={}, cycles={}, profile=profile, profiles={}
     )
     assert layout_report.write_figures(None, study)[-1] == "radar"
-    ((values, columns, *_, maximized),) = drawn
-    assert columns[-2:] == ["pinion_life_h", "wheel_life_h"] and maximized == set(columns[-2:])
-    for name in columns[-2:]:
-        uneven, even, none = values[name]
+    (values,) = drawn
+    lives = list(values)[-2:]
+    assert [(of.key, of.better) for of in lives] == [("pinion_life_h", "larger"), ("wheel_life_h", "larger")]
+    for of in lives:
+        uneven, even, none = values[of]
         assert uneven / even == pytest.approx(1.2**-6.6, rel=1e-9) and np.isnan(none)
     study.request = SimpleNamespace(**{**vars(request), "options": {}})
     layout_report.write_figures(None, study)
-    assert drawn[1][1] == columns[:-2] and not drawn[1][-1]
+    assert list(drawn[1]) == list(values)[:-2]
 
 
 @pytest.mark.slow

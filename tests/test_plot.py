@@ -306,6 +306,8 @@ def test_ppte_over_torque_marks_the_design_torque(curves):
         np.testing.assert_array_equal(line.get_ydata(), curve)
     assert [text.get_text() for text in ax.texts] == ["design torque 50 N m"]
     assert ax.texts[0].xy[0] == TORQUE
+    low, high = ax.get_xlim()  # that of the data with some air, not from zero
+    assert 0.1 > (min(TORQUES) - low) / np.ptp(TORQUES) > 0 and 0.1 > (high - max(TORQUES)) / np.ptp(TORQUES) > 0
 
 
 def test_the_design_that_a_figure_is_about_is_the_boldest(curves):

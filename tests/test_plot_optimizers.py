@@ -1,6 +1,7 @@
 """Pictures of optimizations show what the results hold, name their units and draw nothing that is not finite."""
 
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import matplotlib
 import numpy as np
@@ -12,10 +13,13 @@ import matplotlib.pyplot as plt
 from catalogue import LINE, gear_pair, prepare
 
 import jaxgear as jg
+from benchmarks.optimization.figure import optimizer_comparison
 from jaxgear import plot
 from jaxgear.optimize import Front, Iterate, Optimum
 from jaxgear.plot.figure import point_style
-from jaxgear.plot.front import objective_label
+from jaxgear.plot.front import best_label
+from jaxgear.sweeps.columns import described
+from jaxgear.vocabulary import quantity_of
 
 pytestmark = pytest.mark.usefixtures("clean_figures")
 
@@ -52,6 +56,13 @@ def optimum(method="slp", history=(np.inf, 3.0, 1.0), spent=(0, 10, 100), **othe
     return Optimum(**{**given, **others})
 
 
+def problem(*objectives, measure=None, penalty=None):
+    """What a problem says of its objectives, of a single case without a measure."""
+    cases = SimpleNamespace(count=1 if measure is None else 2)
+    of = tuple(quantity_of(one) for one in objectives)
+    return SimpleNamespace(objectives=of, measure=measure, cases=cases, roughness=penalty)
+
+
 def wave(amplitude):
     return 20.0 + amplitude * np.sin(2 * np.pi * PHASE)
 
@@ -86,7 +97,9 @@ def front():
     ppte = np.linspace(0.6, 3.0, 12)
     values = np.stack([ppte, 900 - 80 * ppte], axis=1)
     parameters = {"amount": np.linspace(9, 1, 12)}
-    return Front(("ppte", "max_flank_pressure"), ("um", "MPa"), values, parameters, np.zeros(12), optimum(), 5)
+    names = "ppte", "max_flank_pressure"
+    compromise = optimum(problem=problem(*names))
+    return Front(names, ("um", "MPa"), values, parameters, np.zeros(12), compromise, 5)
 
 
 @pytest.fixture
@@ -119,7 +132,7 @@ def draw(mesh, iterated, optima, front, rows):
         "transmission error": lambda ax=None: plot.iterations_transmission_error(iterated, PHASE, ax),
         "surface": lambda ax=None: plot.response_surface(PHASE, TORQUES, surface(), wave(1.0) - 20, ax),
         "front": lambda ax=None: plot.optimum_front(front, 3, ax),
-        "comparison": lambda ax=None: plot.optimizer_comparison(one, ax=ax),
+        "comparison": lambda ax=None: optimizer_comparison(one, ax=ax),
     }
 
 
@@ -162,21 +175,21 @@ def test_legends_cover_no_data(draw, name):
 
 
 @pytest.mark.parametrize(
-    ("name", "unit", "expected"),
+    ("names", "measure", "penalty", "expected"),
     [
-        ("ppte", "um", "peak-to-peak transmission error [µm]"),
-        ("95 % CVaR of ppte", None, "95 % CVaR of peak-to-peak transmission error [µm]"),
-        ("ppte with curvature penalty", None, "peak-to-peak transmission error with curvature penalty [µm]"),
-        ("worst max_flank_pressure", None, "worst largest Hertzian flank pressure [MPa]"),
-        ("mesh_loss_factor", "", "loss power per input power and coefficient of friction [-]"),
-        ("removed_volume", None, "material ground off all flanks [mm³]"),
-        ("distance from the ideal of ppte and removed_volume", None, "distance from the ideal [-]"),
-        ("my_cost", "", "my cost"),
-        ("my_cost", "um", "my cost [µm]"),
+        (["ppte"], None, None, "peak-to-peak transmission error [µm]"),
+        (["ppte"], jg.CVaR(0.95), None, "95 % CVaR of peak-to-peak transmission error [µm]"),
+        (["ppte"], None, 1.0, "peak-to-peak transmission error with curvature penalty [µm]"),
+        (["max_flank_pressure"], jg.Worst(), None, "worst largest Hertzian flank pressure [MPa]"),
+        (["mesh_loss_factor"], None, None, "loss power per input power and coefficient of friction [-]"),
+        (["removed_volume"], None, None, "material ground off all flanks [mm³]"),
+        (["ppte", "removed_volume"], None, None, "distance from the ideal [-]"),
+        ([described("my_cost")], None, None, "my cost [-]"),
+        ([described("my_cost", "um")], None, None, "my cost [µm]"),
     ],
 )
-def test_objectives_in_words(name, unit, expected):
-    assert objective_label(name, unit) == expected
+def test_objectives_in_words(names, measure, penalty, expected):
+    assert best_label(optimum(problem=problem(*names, measure=measure, penalty=penalty))) == expected
 
 
 def test_sixteen_points_differ():
@@ -222,7 +235,7 @@ def test_convergence_from_zero_analyses_and_without_any_valid_design():
 
 
 def test_convergence_of_negative_and_of_different_objectives():
-    negative = optimum(history=(2.0, -1.0), spent=(1, 8), objective_name="cost")
+    negative = optimum(history=(2.0, -1.0), spent=(1, 8), problem=problem(described("cost")))
     ax = plot.convergence({"negative": negative, "other": optimum()})
     assert (ax.get_yscale(), ax.get_ylabel()) == ("linear", "best objective")
 
@@ -325,14 +338,15 @@ def test_front_is_drawn_as_it_is_and_the_chosen_design_marked(front):
 def test_front_of_three_shows_the_third_as_colour(front):
     third = np.linspace(40.0, 2.0, 12)
     names, units = (*front.objectives, "removed_volume"), (*front.units, "mm3")
-    three = replace(front, objectives=names, units=units, values=np.c_[front.values, third])
+    compromise = optimum(problem=problem(*names))
+    three = replace(front, objectives=names, units=units, values=np.c_[front.values, third], compromise=compromise)
     ax = plot.optimum_front(three)
     np.testing.assert_array_equal(ax.collections[0].get_array(), third)
     assert plain(ax.figure.axes[1].get_ylabel()) == "material ground off all flanks [mm³]"
 
 
 def test_comparison_has_a_panel_per_pair_on_common_scales(rows):
-    panels = plot.optimizer_comparison(rows)
+    panels = optimizer_comparison(rows)
     assert [panel.get_title() for panel in panels] == ["19/48", "30/30", "50/50"]
     assert len({(panel.get_xlim(), panel.get_ylim(), panel.get_xscale()) for panel in panels}) == 1
     for panel in panels:
@@ -349,20 +363,20 @@ def test_comparison_of_several_runs_failures_and_methods_on_one_pair_only():
         return {"method": method, "pair": pair, "evaluations": evaluations, "ppte_um": ppte}
 
     rows = [row("a", "P", 0, 1.0), row("a", "P", 9, 0.01), row("a", "Q", 9, np.nan), row("b", "Q", 9, 2.0)]
-    first, second = plot.optimizer_comparison(rows)
+    first, second = optimizer_comparison(rows)
     np.testing.assert_array_equal(first.lines[0].get_xdata(), [1.0, 9.0])
     assert [line.get_xdata().size for line in (*first.lines, *second.lines)] == [2, 0, 0, 1]
     assert first.get_yscale() == second.get_yscale() == "log"
-    plot.optimizer_comparison([row("a", "P", 1, np.inf)])[0].figure.draw_without_rendering()
+    optimizer_comparison([row("a", "P", 1, np.inf)])[0].figure.draw_without_rendering()
 
 
 def test_comparison_shows_other_quantities_and_refuses_unknown_ones(rows):
-    panels = plot.optimizer_comparison(rows, "worst_over_torque_um")
+    panels = optimizer_comparison(rows, "worst_over_torque_um")
     assert plain(panels[0].get_ylabel()) == "worst peak-to-peak transmission error over torque [µm]"
     assert panels[0].lines[0].get_ydata()[0] == 2.0
     with pytest.raises(ValueError, match='^optimizer_comparison: "cost" is not known'):
-        plot.optimizer_comparison(rows, "cost")
+        optimizer_comparison(rows, "cost")
     with pytest.raises(ValueError, match="^optimizer_comparison: ax has 2 Axes, must have one for each of 3 pairs"):
-        plot.optimizer_comparison(rows, ax=plt.subplots(1, 2)[1])
+        optimizer_comparison(rows, ax=plt.subplots(1, 2)[1])
     with pytest.raises(ValueError, match="^optimizer_comparison: rows is empty"):
-        plot.optimizer_comparison([])
+        optimizer_comparison([])

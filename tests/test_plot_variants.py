@@ -14,12 +14,16 @@ import matplotlib.pyplot as plt
 import jaxgear as jg
 from jaxgear import plot
 from jaxgear.numerics.pareto import pareto_front
-from jaxgear.plot.variants import label
+from jaxgear.sweeps.columns import Column, axis_label, described
+from jaxgear.vocabulary import quantities
 
 pytestmark = pytest.mark.usefixtures("clean_figures")
 
 ROWS = 60
-COLUMNS = ("ppte_um", "mesh_loss_factor", "max_flank_pressure_MPa", "effective_contact_ratio")
+RELIEF = described("relief", "um")
+PPTE, LOSS, PRESSURE, RATIO = RESULTS = tuple(
+    quantities[name] for name in ("ppte", "mesh_loss_factor", "max_flank_pressure", "effective_contact_ratio")
+)
 NAMES = ("unmodified", "rule", "optimum")
 
 
@@ -28,14 +32,18 @@ def table():
     """Sixty variants over one relief, the last one failed."""
     relief = np.linspace(0.0, 12.0, ROWS)
     table = {
-        "relief_um": relief,
-        "ppte_um": 0.5 + 0.08 * (relief - 6.0) ** 2,
-        "mesh_loss_factor": 0.16 - 0.003 * relief,
-        "max_flank_pressure_MPa": 730 + 0.9 * relief**2,
-        "effective_contact_ratio": 1.75 - 0.03 * relief,
+        RELIEF: relief,
+        PPTE: 0.5 + 0.08 * (relief - 6.0) ** 2,
+        LOSS: 0.16 - 0.003 * relief,
+        PRESSURE: 730 + 0.9 * relief**2,
+        RATIO: 1.75 - 0.03 * relief,
     }
-    table["ppte_um"][-1] = np.nan
+    table[PPTE][-1] = np.nan
     return table
+
+
+def some(table, *columns):
+    return {of: table[of] for of in columns}
 
 
 @pytest.fixture(scope="module")
@@ -81,11 +89,10 @@ def failing(scatter, count):
 @pytest.fixture
 def draw(table, scatter):
     """Every picture of one Axes by name, as a function of the Axes to draw into."""
-    three = ("ppte_um", "mesh_loss_factor", "max_flank_pressure_MPa")
     return {
-        "pareto": lambda ax=None: plot.pareto(table, "ppte_um", "max_flank_pressure_MPa", ax=ax),
-        "pareto of three": lambda ax=None: plot.pareto(table, *three, ax),
-        "parallel": lambda ax=None: plot.parallel_coordinates(table, ("relief_um", *COLUMNS), "ppte_um", ax),
+        "pareto": lambda ax=None: plot.pareto(some(table, PPTE, PRESSURE), ax),
+        "pareto of three": lambda ax=None: plot.pareto(some(table, PPTE, LOSS, PRESSURE), ax),
+        "parallel": lambda ax=None: plot.parallel_coordinates(table, PPTE, ax),
         "fan": lambda ax=None: plot.fan(scatter, ax),
         "histogram": lambda ax=None: plot.ppte_histogram(scatter, ax),
     }
@@ -117,33 +124,37 @@ def test_a_given_ax_is_used_and_legends_cover_no_data(draw, name):
 
 
 @pytest.mark.parametrize(
-    ("name", "expected"),
-    {
-        "ppte_um": "PPTE [µm]",
-        "max_line_load_N_per_mm": "max line load [N/mm]",
-        "min_tangent_stiffness_N_per_um": "min tangent stiffness [N/µm]",
-        "mesh_loss_factor": "mesh loss factor H_V [-]",
-        "ppte_um_50Nm_q95": "PPTE at 50 N m, q95 over gears [µm]",
-        "ppte_um_12.5Nm": "PPTE at 12.5 N m [µm]",
-        "corner_force_N_worst": "corner force worst [N]",
-        "number": "number [-]",
-    }.items(),
+    ("of", "expected"),
+    [
+        (PPTE, "PPTE [µm]"),
+        (quantities["max_line_load"], "max line load [N/mm]"),
+        (quantities["min_tangent_stiffness"], "min tangent stiffness [N/µm]"),
+        (quantities["bulk_temperature"], "bulk temperature [°C]"),
+        (quantities["removed_volume"], "removed volume [mm³]"),
+        (LOSS, "mesh loss factor H_V [-]"),
+        (Column(PPTE, torque=50.0, statistic="q95"), "PPTE at 50 N m, q95 over gears [µm]"),
+        (Column(PPTE, torque=50.0, speed=1000.0), "PPTE at 50 N m and 1000 rpm [µm]"),
+        (Column(PPTE, torque=12.5), "PPTE at 12.5 N m [µm]"),
+        (Column(PPTE), "PPTE [µm]"),
+        (Column(quantities["corner_force"], statistic="worst"), "corner force worst [N]"),
+        (Column(described("relief_length", "mm"), "parameter"), "relief length [mm]"),
+        (described("number"), "number [-]"),
+        (described("noise", "kN", label="own"), "own [kN]"),
+    ],
 )
-def test_labels_follow_from_the_names_of_columns(name, expected):
-    assert label(name) == expected
-    assert label(name, {name: "own [kN]"}) == "own [kN]"
+def test_labels_are_those_of_the_quantity_and_its_cases(of, expected):
+    assert axis_label(of) == expected
 
 
 def test_radar_runs_from_the_worst_to_the_best_of_the_variants_shown(table):
     rows = [0, 20, 30]
-    panels = plot.radar(table, COLUMNS, rows, NAMES, maximize=("effective_contact_ratio",))
+    panels = plot.radar(some(table, *RESULTS), rows, NAMES)
     assert [panel.get_title() for panel in panels] == list(NAMES)
     shape = {name: np.asarray(panel.lines[-1].get_ydata()) for name, panel in zip(NAMES, panels)}
     radius = np.stack([shape[name][:-1] for name in NAMES])
     np.testing.assert_allclose(radius.max(axis=0), 1.0)
-    values = np.stack([table[name][rows] for name in COLUMNS], axis=1)
-    span = np.ptp(values, axis=0) / np.where([name == "effective_contact_ratio" for name in COLUMNS],
-                                             values.max(axis=0), values.min(axis=0))  # fmt: skip
+    values = np.stack([table[of][rows] for of in RESULTS], axis=1)
+    span = np.ptp(values, axis=0) / np.where([of is RATIO for of in RESULTS], values.max(axis=0), values.min(axis=0))
     # a difference of a few percent is not stretched over the whole chart: the inner ring is a fifth from the best
     np.testing.assert_allclose(radius.min(axis=0), 1 - 0.75 * np.minimum(span / 0.2, 1.0))
     # the unmodified variant has the highest PPTE and loss, the lowest pressure and the largest contact ratio
@@ -154,7 +165,8 @@ def test_radar_runs_from_the_worst_to_the_best_of_the_variants_shown(table):
 
 
 def test_radar_writes_values_and_units_and_marks_the_best(table):
-    panels = plot.radar(table, COLUMNS, [0, 30], ["a", "b"], labels={"ppte_um": "noise [dB]"})
+    noise = {described("noise", "dB"): table[PPTE], **some(table, LOSS, PRESSURE, RATIO)}
+    panels = plot.radar(noise, [0, 30], ["a", "b"])
     first, second = ([text for text in panel.texts] for panel in panels)
     assert [text.get_text().replace("\n", " ") for text in first] == [
         "noise 3.38 dB",
@@ -162,13 +174,13 @@ def test_radar_writes_values_and_units_and_marks_the_best(table):
         "max flank pressure 730 MPa",
         "effective contact ratio 1.75",
     ]
-    assert [text.get_fontweight() for text in first] == ["normal", "normal", "bold", "normal"]
-    assert [text.get_fontweight() for text in second] == ["bold", "bold", "normal", "bold"]
+    assert [text.get_fontweight() for text in first] == ["normal", "normal", "bold", "bold"]
+    assert [text.get_fontweight() for text in second] == ["bold", "bold", "normal", "normal"]
 
 
 def test_radar_labels_stay_apart_and_in_the_figure(table):
-    many = {**table, **{f"result_{i}_N": np.linspace(i, 9.0, ROWS) for i in range(2)}}
-    panels = plot.radar(many, [*COLUMNS, "result_0_N", "result_1_N"], range(4), list("abcd"))
+    further = {described(f"result_{i}", "N"): np.linspace(i, 9.0, ROWS) for i in range(2)}
+    panels = plot.radar({**some(table, *RESULTS), **further}, range(4), list("abcd"))
     figure = panels[0].figure
     figure.draw_without_rendering()
     boxes = [text.get_window_extent() for panel in panels for text in (*panel.texts, panel.title)]
@@ -179,26 +191,25 @@ def test_radar_labels_stay_apart_and_in_the_figure(table):
 
 def test_radar_takes_given_axes(table):
     figure, axes = plt.subplots(1, 2, subplot_kw={"projection": "polar"})
-    assert plot.radar(table, COLUMNS, [0, 30], ["a", "b"], axes) is axes
+    assert plot.radar(some(table, *RESULTS), [0, 30], ["a", "b"], axes) is axes
     assert plt.get_fignums() == [figure.number]
 
 
 @pytest.mark.parametrize(
     ("columns", "rows", "names", "message"),
     [
-        (COLUMNS[:2], [0], None, "columns has 2 names, must have at least 3"),
-        ((*COLUMNS, "mass"), [0], None, '"mass" is not a column of the table, must be one of relief_um'),
-        (COLUMNS, [0, 59], None, "ppte_um of variant 59 is nan, must be finite"),
-        (COLUMNS, [0, 1], ["a"], "names has 1 entries, must have one for each of 2 variants"),
+        (RESULTS[:2], [0], None, "table has 2 columns, must have at least 3"),
+        (RESULTS, [0, 59], None, "PPTE of variant 59 is nan, must be finite"),
+        (RESULTS, [0, 1], ["a"], "names has 1 entries, must have one for each of 2 variants"),
     ],
 )
 def test_radar_refuses_what_it_cannot_show(table, columns, rows, names, message):
     with pytest.raises(ValueError, match=f"^radar: {message}"):
-        plot.radar(table, columns, rows, names)
+        plot.radar(some(table, *columns), rows, names)
 
 
 def test_parallel_coordinates_show_the_best_over_a_stated_share(table):
-    ax = plot.parallel_coordinates(table, ("relief_um", *COLUMNS), "ppte_um", shown=25, best=2)
+    ax = plot.parallel_coordinates(table, PPTE, shown=25, best=2)
     texts = [text.get_text() for text in ax.get_legend().get_texts()]
     # the smallest PPTE lies between variants 29 and 30, of relief 5.90 and 6.10 um
     assert {text.split(":")[0] for text in texts[:2]} == {"variant 29", "variant 30"}
@@ -211,17 +222,17 @@ def test_parallel_coordinates_show_the_best_over_a_stated_share(table):
 
 
 def test_parallel_coordinates_follow_the_better_way(table):
-    ax = plot.parallel_coordinates(table, COLUMNS, "effective_contact_ratio", maximize=("effective_contact_ratio",))
+    ax = plot.parallel_coordinates(some(table, *RESULTS), RATIO)
     assert ax.get_legend().get_texts()[0].get_text() == "variant 0: effective contact ratio 1.75"
 
 
 def test_pareto_draws_every_variant_once(table):
-    ax = plot.pareto(table, "ppte_um", "max_flank_pressure_MPa", marked={"rule": 3})
+    ax = plot.pareto(some(table, PPTE, PRESSURE), marked={"rule": 3})
     cloud, steps, front, rule = ax.lines
     # pressure rises with the relief and PPTE falls up to 6 um: variants 0 to 29 are the front, 30 is beaten by 29
     assert len(front.get_xdata()) == 30 and len(cloud.get_xdata()) == ROWS - 1 - 30
     assert (np.diff(front.get_xdata()) > 0).all() and (np.diff(front.get_ydata()) < 0).all()
-    assert rule.get_xdata()[0] == table["ppte_um"][3] and rule.get_label() == "rule"
+    assert rule.get_xdata()[0] == table[PPTE][3] and rule.get_label() == "rule"
     texts = [text.get_text() for text in ax.get_legend().get_texts()]
     assert texts[:2] == ["59 variants, 1 failed", "Pareto front, 30 variants"]
     assert steps.get_drawstyle() == "steps-post"
@@ -229,11 +240,36 @@ def test_pareto_draws_every_variant_once(table):
 
 def test_pareto_counts_many_variants_in_hexagons():
     random = np.random.default_rng(0)
-    table = {"ppte_um": random.random(20_000), "corner_force_N": random.random(20_000)}
-    ax = plot.pareto(table, "ppte_um", "corner_force_N")
+    table = {PPTE: random.random(20_000), quantities["corner_force"]: random.random(20_000)}
+    ax = plot.pareto(table)
     front = pareto_front(np.stack(list(table.values()), axis=1)).sum()
     assert np.sum(ax.collections[0].get_array()) == pytest.approx(20_000 - front)
     assert len(ax.lines[0].get_xdata()) == 0  # no dot per variant
+
+
+def test_pareto_and_parallel_coordinates_refuse_what_they_cannot_show(table):
+    with pytest.raises(ValueError, match="^pareto: table has 4 columns, must have two or three"):
+        plot.pareto(some(table, *RESULTS))
+    with pytest.raises(ValueError, match="colour_by PPTE is not a column of the table"):
+        plot.parallel_coordinates(some(table, RELIEF, LOSS), PPTE)
+    with pytest.raises(ValueError, match=r"columns must be lists of the same length and not empty, not PPTE \(60,\), "):
+        plot.pareto({PPTE: table[PPTE], LOSS: table[LOSS][:3]})
+
+
+def test_a_variant_has_one_style_in_all_figures(table):
+    """Also where the others of a figure are others."""
+    numbers = {"unmodified": 0, "variant 29": 1, "variant 30": 3}
+    with plot.figure.same_styles(numbers):
+        lines = plot.parallel_coordinates(table, PPTE, best=2).lines
+        alone = plot.ppte_over_torque([1.0, 2.0], {"unmodified": [1.0, 2.0], "variant 30": [1.0, 2.0]}).lines
+        radar = plot.radar(some(table, *RESULTS), [29, 30], ["variant 29", "variant 30"])
+    best = {line.get_label().split(":")[0]: line for line in lines if line.get_label().startswith("variant")}
+    for name, line in (("variant 30", alone[1]), ("unmodified", alone[0]), *best.items()):
+        style = plot.figure.line_style(numbers[name])
+        assert line.get_color() == style["color"]
+        assert line._unscaled_dash_pattern == plt.Line2D([0], [0], **style)._unscaled_dash_pattern
+    assert [panel.title.get_color() for panel in radar] == [plot.figure.line_style(n)["color"] for n in (1, 3)]
+    assert plot.figure.style_number("variant 30", 5) == 5  # outside of the block it goes by its place
 
 
 def test_the_distribution_tells_the_quantile_of_the_scatter(scatter):

@@ -2,6 +2,7 @@
 
 import builtins
 import datetime
+import io
 import shutil
 import subprocess
 import sys
@@ -14,13 +15,14 @@ import openpyxl
 import pytest
 from commands import FIXED, SWEEP, assert_refused, call
 from report_page import Page, assert_well_formed
-from rich.table import Table as Printed
+from rich.console import Console
 
 from jaxgear import plot, report
 from jaxgear.cli import document
 from jaxgear.io.folder import RESULT_FILES
-from jaxgear.sweeps.columns import Column
+from jaxgear.sweeps.columns import FLAG, NUMBER, Column, described
 from jaxgear.sweeps.table import in_memory
+from jaxgear.vocabulary import quantities
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -77,14 +79,15 @@ def test_a_file_that_cannot_be_written_is_one_line(tmp_path):
 
 
 def test_a_table_is_the_one_that_is_printed():
-    printed = Printed(title="title", caption="note")
-    printed.add_column("")
-    printed.add_column("a")
-    printed.add_row("x", "1")
-    printed.add_section()
-    printed.add_row("y", "2")
-    table = report.read_table(printed)
-    assert table == report.Table(("", "a"), (("x", "1"), ("y", "2")), "title", "note", (0,))
+    table = report.Table(("", "a"), title="title", note="note")
+    table.add_row("x [um]", "1")
+    table.add_section()
+    table.add_row("y", "22")
+    assert table == report.Table(("", "a"), (("x [um]", "1"), ("y", "22")), "title", "note", (0,))
+    out = Console(file=io.StringIO(), width=40, markup=False)
+    out.print(table)
+    printed = [line.strip() for line in out.file.getvalue().splitlines() if line.strip()]
+    assert printed == ["title", "a", printed[2], "x [um]    1", "y        22", "note"]
 
 
 def test_figures_are_numbered_through_all_sections(tmp_path):
@@ -174,10 +177,10 @@ def test_what_nobody_looked_at_is_not_called_usual(tmp_path):
 def test_the_workbook_holds_the_table(tmp_path):
     pyarrow = pytest.importorskip("pyarrow")
     columns = [
-        Column("variant", "", "number"),
-        Column("=1+1", "um", "parameter"),
-        Column("ppte_um", "um", "result", "smaller"),
-        Column("converged", "", "flag"),
+        NUMBER,
+        Column(described("=1+1", "um"), "parameter"),
+        Column(quantities["ppte"]),
+        FLAG,
     ]
     values = {"variant": [0, 1, 2], "=1+1": [1.5, 2.5, 3.5], "ppte_um": [0.3, np.nan, 0.2]}
     table = in_memory("t", columns, [pyarrow.table({**values, "converged": [True, False, True]})])

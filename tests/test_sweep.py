@@ -16,7 +16,8 @@ from scipy.stats.mstats import hdquantiles
 import jaxgear as jg
 from jaxgear.dynamics import DYNAMIC_QUANTITIES
 from jaxgear.metrics import LUBRICANT_QUANTITIES, STRENGTH_QUANTITIES
-from jaxgear.sweeps.store import Store, load_manifest
+from jaxgear.sweeps.columns import FLAG, NUMBER, Column, described
+from jaxgear.sweeps.store import Manifest, Store, load_manifest
 from jaxgear.sweeps.table import front, smallest
 from jaxgear.vocabulary import quantities
 from jaxgear.wear import WEAR_QUANTITIES
@@ -244,6 +245,7 @@ def test_a_column_is_found_with_and_without_its_unit(table, spectrum_table):
     with pytest.raises(ValueError, match="two or three different columns"):
         table.pareto(["ppte", "ppte_um"])
     assert [spectrum_table.find(name).name for name in ("ppte", "ppte_worst")] == ["ppte_um_mean", "ppte_um_worst"]
+    assert [head.name for head in spectrum_table.heads] == ["ppte_um_mean", "effective_contact_ratio_mean"]
 
 
 def test_the_table_is_arrow_pandas_and_xarray_with_units(table, folder):
@@ -302,17 +304,52 @@ def test_selections_of_a_stream_are_those_of_the_whole():
 def test_units_ranges_and_settings_are_in_the_files(folder):
     schema = parquet.read_schema(parts_of(folder)[2])
     field = schema.field("max_flank_pressure_MPa")
-    assert field.metadata == {b"unit": b"MPa", b"kind": b"result", b"better": b"smaller"}
+    assert {b"unit": b"MPa", b"kind": b"result", b"better": b"smaller"}.items() <= field.metadata.items()
     field = schema.field("length")
     assert (field.metadata[b"unit"], field.metadata[b"low"], field.metadata[b"high"]) == (b"mm", b"1.0", b"5.5")
     assert schema.metadata[b"title"] == b"a title" and schema.metadata[b"torques_Nm"] == b"[50.0]"
     assert {b"jaxgear", b"plan", b"weights", b"fingerprint"} <= set(schema.metadata)
     table = jg.open_sweep(folder)
+    for column in table.columns[4:-1]:  # what tables and figures say of a result
+        of = quantities[column.quantity.name]
+        said = "words", "unit", "meaning", "form", "better", "key"
+        assert [getattr(column.quantity, name) for name in said] == [getattr(of, name) for name in said]
+        assert (column.name, column.torque, column.statistic) == (of.key, None, "")
+    with pytest.raises(ValueError, match="known by its description only"):
+        table.find("ppte").quantity.values(None)
     assert table.units["ppte_um"] == "um" and table.units["effective_contact_ratio"] == ""
     table.to_csv(folder.parent / "table.csv")
     header, first, *_ = (folder.parent / "table.csv").read_text().splitlines()
     assert header.split(",")[3:5] == ['"length [mm]"', '"ppte_um"']
     assert float(first.split(",")[4]) == table.column("ppte_um")[0]
+
+
+def test_a_column_knows_its_cases_also_when_it_is_read(tmp_path):
+    own = described("ripple", "N/um", label="own ripple", meaning="a meaning", form=".1f", better="larger")
+    columns = (
+        NUMBER,
+        Column(described("length", "mm"), "parameter", low=1.0, high=5.5),
+        Column(own, statistic="mean"),
+        Column(own, torque=25.0, speed=1e3),
+        Column(own, torque=62.5, speed=1e3, statistic="q95"),
+        FLAG,
+    )
+    settings = {"variants": 4, "part_rows": 2}
+    Store(tmp_path, Manifest("t", columns, settings)).claim(leader=True)
+    read = load_manifest(tmp_path).columns
+    assert read == columns
+    assert [column.name for column in read[2:5]] == [
+        "ripple_N_per_um_mean",
+        "ripple_N_per_um_25Nm_1000rpm",
+        "ripple_N_per_um_62.5Nm_1000rpm_q95",
+    ]
+    assert [column.heading for column in read[1:5]] == [
+        "length [mm]",
+        "own ripple mean [N/um]",
+        "own ripple at 25 N m and 1000 rpm [N/um]",
+        "own ripple at 62.5 N m and 1000 rpm, q95 over gears [N/um]",
+    ]
+    assert [column.better for column in read] == ["", "", "larger", "larger", "larger", ""]
 
 
 def test_a_resumed_sweep_computes_what_is_missing_and_only_that(mesh, table, folder, caplog):

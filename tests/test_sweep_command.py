@@ -26,7 +26,7 @@ from jaxgear.cli.sweep_report import said_of_best
 from jaxgear.io import load_design, read_variants, sweep_request
 from jaxgear.metrics.findings import LIMITS
 from jaxgear.sweeps import SweepTable, evaluate
-from jaxgear.sweeps.columns import Column
+from jaxgear.sweeps.columns import Column, described
 
 
 def sweep(file, *arguments):
@@ -74,7 +74,7 @@ def test_the_report_shows_the_best_variants(folder):
     best = jg.open_sweep(folder / "out" / "table").best(5)
     names = [f"variant {number}" for number in best.column("variant")]
     assert ["", *names] in page.rows
-    for name, heading in (("height", "height [um]"), ("ppte_um", "ppte_um")):
+    for name, heading in (("height", "height [um]"), ("ppte_um", "PPTE [um]")):
         assert_row(page, heading, list(best.column(name)))
     # evaluated on a mesh of their own, to the same result
     assert ["", "unmodified", *names[:3]] in page.rows
@@ -108,8 +108,8 @@ def test_the_best_are_printed_and_written(folder):
     folder, result = folder
     best = jg.open_sweep(folder / "out" / "table").best(5)
     assert "a [small] pair, best first by ppte_um" in result.out and "height [um]" in result.out
-    for name in ("ppte_um", "height"):
-        assert f"{best.column(name)[0]:.4g}" in result.out
+    for name, form in (("ppte_um", ".3f"), ("height", ".4g")):
+        assert f"{best.column(name)[0]:{form}}" in result.out
     assert f"table in {folder / 'out' / 'table'}{os.sep}" in result.out and "60 variants, " in result.out
     read = read_variants(folder / "out" / "best.csv", {"height": (0.0, 20.0)}, {"height": "um"})
     np.testing.assert_array_equal(read.rows(0, 5)[:, 0], best.column("height"))
@@ -127,11 +127,11 @@ def test_pictures_show_every_variant_or_an_even_share(folder, tmp_path, monkeypa
     } < names  # of the best, for the report
     monkeypatch.setattr(sweep_report, "_DRAWN", 20)
     drawn = {}
-    monkeypatch.setattr("jaxgear.plot.pareto", lambda table, *names, **_: drawn.update(table) or plt.subplots()[1])
+    monkeypatch.setattr("jaxgear.plot.pareto", lambda table: drawn.update(table) or plt.subplots()[1])
     table = jg.open_sweep(folder / "out" / "table")
-    sweep_report.write_figures(tmp_path, table, ("ppte", "effective_contact_ratio"))
+    sweep_report.write_figures(tmp_path, table)
     front = table.pareto(["ppte_um", "effective_contact_ratio"]).column("ppte_um")
-    assert set(drawn["ppte_um"]) == {*table.column("ppte_um")[::3], *front}
+    assert set(drawn[table.find("ppte")]) == {*table.column("ppte_um")[::3], *front}
 
 
 def test_repeated_it_finds_everything_there(folder):
@@ -373,7 +373,7 @@ def test_headings_are_no_formulas_and_read_back(tmp_path):
     """Names are the user's: quotes within them, and what a spreadsheet would calculate or run."""
     names = ['a"b', "=cmd|' /C calc'!A0", "+1", "@x", "plain", "'quoted"]
     path = tmp_path / "list.csv"
-    SweepTable("", [Column(name, "um", "parameter") for name in names], (), None).to_csv(path)
+    SweepTable("", [Column(described(name, "um"), "parameter") for name in names], (), None).to_csv(path)
     (headings,) = csv.reader(path.read_text().splitlines())
     assert [heading[0] for heading in headings] == ["a", "'", "'", "'", "p", "'"]
     with path.open("a") as file:

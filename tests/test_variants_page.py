@@ -12,22 +12,22 @@ from report_page import Page, assert_well_formed
 
 from jaxgear import report
 from jaxgear.numerics.pareto import pareto_front
-from jaxgear.sweeps.columns import Column
+from jaxgear.sweeps.columns import FLAG, NUMBER, Column, described
 from jaxgear.sweeps.table import in_memory
+from jaxgear.vocabulary import quantities
 
 pyarrow, offline = pytest.importorskip("pyarrow"), pytest.importorskip("plotly.offline")
 
 HOSTILE = '</script><script>alert("1")</script> & <!-- '
 COLUMNS = [
-    Column("variant", "", "number"),
-    Column("height", "um", "parameter"),
-    Column("ppte_um", "um", "result", "smaller"),
-    Column("effective_contact_ratio", "", "result", "larger"),
-    Column("mean_te_um", "um", "result", "smaller"),
-    Column("mean_te_um_50Nm", "um", "result", "smaller"),
-    Column("converged", "", "flag"),
+    NUMBER,
+    Column(described("height", "um"), "parameter"),
+    Column(quantities["ppte"]),
+    Column(described("effective_contact_ratio", label=HOSTILE, better="larger")),
+    Column(quantities["mean_te"]),
+    Column(quantities["mean_te"], torque=50.0),
+    FLAG,
 ]
-LABELS = {"height": "height [µm]", "ppte_um": "PPTE [µm]", "effective_contact_ratio": HOSTILE}
 MAIN = ["ppte_um", "effective_contact_ratio", "mean_te_um"]
 
 
@@ -51,7 +51,7 @@ def page(tmp_path):
         table = in_memory("t", COLUMNS, [pyarrow.table(values(count))])
         path = tmp_path / "variants.html"
         facts = [("design file", HOSTILE)]
-        report.write_variants(path, f"a pair {HOSTILE}", facts, table, labels=LABELS, main=MAIN)
+        report.write_variants(path, f"a pair {HOSTILE}", facts, table)
         return path
 
     return write
@@ -83,7 +83,11 @@ def test_the_page_knows_the_variants_that_did_not_fail(page):
     fine = np.isfinite(given["ppte_um"])
     assert data["variants"] == given["variant"][fine].tolist()
     assert [column["label"] for column in data["columns"]] == [
-        *("height [µm]", "PPTE [µm]", HOSTILE, "mean_te_um", "mean_te_um_50Nm")
+        "height [µm]",
+        "PPTE [µm]",
+        f"{HOSTILE} [-]",
+        "mean transmission error [µm]",
+        "mean transmission error at 50 N m [µm]",
     ]
     assert [column["main"] for column in data["columns"]] == [True] * 4 + [False]
     assert [column["better"] for column in data["columns"]] == ["", "smaller", "larger", "smaller", "smaller"]

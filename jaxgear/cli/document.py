@@ -7,12 +7,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import rich.table
-
 from ..io import DesignFile
 from ..io.errors import naming
 from ..io.toml import content
-from ..report import Chapter, Report, Source, Table, figure, heading, needed, numbers, read_table, text, write_report
+from ..report import Chapter, Report, Source, Table, figure, heading, needed, numbers, text, write_report
 from .geometry import drawing_table, rating_page
 
 REPORT = "report.html"
@@ -82,7 +80,7 @@ class CommandResult:
     lines: Sequence[str]
     warnings: Sequence[str] = ()
     findings: Sequence[str] | None = None
-    tables: Sequence[rich.table.Table] = ()
+    tables: Sequence[Table] = ()
     figures: Sequence[Path] = ()
     pages: Sequence[Chapter] = ()
     assumptions: Sequence[str] = ()
@@ -126,7 +124,7 @@ class Document:
         """
         versions = ("made by", ", ".join(f"{name} {version}" for name, version in data["versions"].items()))
         sections = [
-            Chapter("Results", found.lines, found.warnings, tables=[*found.first, *map(read_table, found.tables)]),
+            Chapter("Results", found.lines, found.warnings, tables=[*found.first, *found.tables]),
             *found.pages,
             *_figures(found.figures),
             _validity(found, data),

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
 from ..contact import Mesh
 from ..dynamics import Branch, Oscillator, RunUp, SpeedResponse, inertia_of
 from ..dynamics.response import FORCE_REFERENCE
 from ..io import DesignFile, DynamicsRequest, describe
 from ..microgeometry import AbstractModification
+from ..report import Table
 from .geometry import gears
 from .study import grid_lines
 from .summary_file import identity, model, versions
@@ -97,13 +96,9 @@ def peak(response: SpeedResponse | RunUp, field: str) -> tuple[float, float]:
 
 def table(study: DynamicsStudy) -> Table:
     """The peaks of every run."""
-    result = Table(title=f"{study.design.title}: largest values over the speed", title_justify="left", box=SIMPLE_HEAD)
-    result.add_column("design", no_wrap=True)
-    result.add_column("torque [N m]", justify="right")
-    result.add_column("f_n [Hz]", justify="right", no_wrap=True)
-    result.add_column("speed", no_wrap=True)
-    for heading in ("K_v", "at [Hz]", "DTE rms [um]", "at [Hz]", "contact loss [%]"):
-        result.add_column(heading, justify="right", no_wrap=True)
+    peaks = "K_v", "at [Hz]", "DTE rms [um]", "at [Hz]", "contact loss [%]"
+    header = "design", "torque [N m]", "f_n [Hz]", "speed", *peaks
+    result = Table(header, title=f"{study.design.title}: largest values over the speed")
     before = None
     for name, torque, run, response in study.rows():
         if before not in (None, name):

@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
 from ..contact import Mesh, MeshCycle
 from ..io import DesignFile, LayoutRequest, describe
 from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, ToleranceCases, gear_lives
 from ..metrics import Finding
 from ..microgeometry import AbstractModification
+from ..report import Table
 from ..shafts import bearing_reactions, root_face_load_factor, tooth_height
+from ..sweeps.columns import described
 from . import report
 from .geometry import gears
 from .study import grid_lines
@@ -301,10 +301,7 @@ def tables(study: LayoutStudy) -> Iterator[Table]:
 
 
 def _steps(study: LayoutStudy) -> Table:
-    result = Table(title=f"{study.design.title}: flank lines", title_justify="left", box=SIMPLE_HEAD)
-    result.add_column("", no_wrap=True)
-    for name in study.layouts:
-        result.add_column(name, justify="right", no_wrap=True)
+    result = Table(("", *study.layouts), title=f"{study.design.title}: flank lines")
 
     def row(text: str, values: Iterator[str]) -> None:
         result.add_row(text, *values)
@@ -341,7 +338,7 @@ def _steps(study: LayoutStudy) -> Table:
         result.add_section()
         for number, text in enumerate(("without modification", "after step 1", "after step 2")):
             row(f"life {text} [h]", (f"{float(one.damage[number].life):.4g}" for one in each))
-    result.caption = "* largest load at an edge" + ("; last rows: no deviation" if study.main.damage else "")
+    result.note = "* largest load at an edge" + ("; last rows: no deviation" if study.main.damage else "")
     return result
 
 
@@ -361,9 +358,7 @@ def _worst_life(layout: FlankLineLayout, name: str) -> str:
 def _contacts(study: LayoutStudy) -> Table:
     """The contact analysis of every step, beside the one-dimensional one at the same torque."""
     title = f"contact analysis at {study.request.profile_torque:g} N m, without deviations"
-    result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
-    for name in ("", "K_Hbeta", "K_Fbeta", "edge load factor", "K_Hbeta of Annex E"):
-        result.add_column(name, justify="right" if name else "left", no_wrap=True)
+    result = Table(("", "K_Hbeta", "K_Fbeta", "edge load factor", "K_Hbeta of Annex E"), title=title)
     for support, steps in study.contacts.items():
         for step, found in steps.items():
             cells = [_number(found[name]) for name in FACTORS]
@@ -375,9 +370,7 @@ def _contacts(study: LayoutStudy) -> Table:
 def _contact_cases(study: LayoutStudy) -> Table:
     """K_Hbeta of the contact analysis in the five cases."""
     title = f"K_Hbeta of the contact analysis at {study.request.profile_torque:g} N m in the cases of deviations"
-    result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
-    for number, name in enumerate(("", *CASES)):
-        result.add_column(name, justify="right" if number else "left", no_wrap=True)
+    result = Table(("", *CASES), title=title)
     for support, tolerances in study.contact_cases.items():
         for tolerance, steps in tolerances.items():
             for step, factors in steps.items():
@@ -394,13 +387,9 @@ def _number(value: float) -> str:
 
 def _bearings(study: LayoutStudy) -> Table:
     """Displacements of the shafts at the bearings."""
-    result = Table(title="bearings: displacement of the shaft [um]", title_justify="left", box=SIMPLE_HEAD)
-    result.add_column("bearing", no_wrap=True)
-    result.add_column("force [N]", justify="right")
     found = {name: bearing_reactions(support.gearbox) for name, support in study.request.supports.items()}
-    for name in found:
-        for way in "xy":
-            result.add_column(f"{way}, {name}", justify="right", no_wrap=True)
+    header = "bearing", "force [N]", *(f"{way}, {name}" for name in found for way in "xy")
+    result = Table(header, title="bearings: displacement of the shaft [um]")
     first = next(iter(found.values()))
     for number, name in enumerate(first.names):
         force = float(np.hypot(*np.asarray(first.force)[number, :2]))
@@ -443,9 +432,10 @@ def write_figures(folder: Path, study: LayoutStudy) -> list[Path]:
         axes["lead_chart"] = plot.lead_chart(mesh, designs(study))
     if study.profile is not None:
         rows, names = study.profile.radar_variants()
-        results = ["ppte_um", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure_MPa"]
-        values = {one: study.profile.table.column(one) for one in results}
-        of_gears = lives(study, study.profile)
-        values |= {one: hours for one, hours in of_gears.items() if np.isfinite(hours[rows]).all()}
-        axes["radar"] = plot.radar(values, list(values), rows, names, maximize=set(of_gears) & set(values))
+        results = "ppte", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure"
+        values: dict[Any, np.ndarray] = {**study.profile.table.values(*results)}
+        for gear, hours in zip(("pinion", "wheel"), lives(study, study.profile).values()):
+            if np.isfinite(hours[rows]).all():
+                values[described(f"{gear}_life", "h", better="larger")] = hours
+        axes["radar"] = plot.radar(values, rows, names)
     return report.save_figures(folder, axes)

@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rich.table
 
 from ..contact import Mesh
 from ..io import DesignFile
-from ..report import Chapter, read_table
+from ..report import Chapter, Table
 from ..sweeps import Scatter, monte_carlo
 from ..tolerance import Tolerance
 from . import report
@@ -71,10 +70,7 @@ def pages(design: DesignFile, evaluations: Evaluations) -> list[Chapter]:
     scatters = _scatters(evaluations)
     if not scatters:
         return []
-    table = rich.table.Table(title=f"PPTE over manufactured pairs, {design.torque:g} N m on the pinion")
-    table.add_column("")
-    for name in scatters:
-        table.add_column(name)
+    table = Table(("", *scatters), title=f"PPTE over manufactured pairs, {design.torque:g} N m on the pinion")
     for label, of in (
         ("without deviations [um]", lambda scatter: scatter.nominal_ppte),
         ("mean [um]", lambda scatter: scatter.mean),
@@ -88,9 +84,7 @@ def pages(design: DesignFile, evaluations: Evaluations) -> list[Chapter]:
         f"{_pairs(design, scatter)}, drawn at random within the limits of ISO 1328-1:2013, the same for every design."
     )
     even = " Deviations along the face are left out, as one slice cannot show them."
-    return [
-        Chapter("Robustness", [text + (even if design.resolution().slices == 1 else "")], tables=[read_table(table)])
-    ]
+    return [Chapter("Robustness", [text + (even if design.resolution().slices == 1 else "")], tables=[table])]
 
 
 def summary(evaluation: Evaluation) -> dict[str, Any]:

@@ -9,20 +9,20 @@ from typing import Any
 
 import jax
 import numpy as np
-from rich import table as terminal_table
 
 from ..contact import Mesh, Side
 from ..io import DesignFile, describe
 from ..io.results import unit_of
-from ..metrics import flank_surface
+from ..metrics import Quantity, flank_surface
 from ..microgeometry import AbstractModification
 from ..optimize import Front, Optimum, Problem, Projection
 from ..optimize.result import PENALIZED
+from ..optimize.verdict import over_cases
 from ..report import Table
+from ..vocabulary import quantities
 from . import report
 from .study import response_surface
 
-_PPTE = "ppte [um]"
 _SAME = 0.05  # [%]; a smaller change rounds to nothing
 _NO_RATIO = ("degC",)  # units whose zero is a convention
 
@@ -32,16 +32,14 @@ class Judged:
     """A number by which designs are compared.
 
     Attributes:
-        label: name in words.
-        unit: "" for a pure number.
-        sign: 1 where small values are the better ones, else -1.
+        of: the quantity.
+        label: in words, with the measure over several cases.
         values: by the name of the design.
         verified: the same with the finite-element structure; empty where that was not asked for.
     """
 
+    of: Quantity
     label: str
-    unit: str
-    sign: int
     values: Mapping[str, float]
     verified: Mapping[str, float]
 
@@ -49,9 +47,9 @@ class Judged:
         """What becomes of a number: "31.1 % less than unmodified"; "" where nobody can say."""
         if not (math.isfinite(before) and math.isfinite(after)):
             return ""
-        worse = " (worse)" if self.sign * (after - before) > 0 else ""
-        if self.unit in _NO_RATIO or before <= 0:
-            return f"{after - before:+.3g} {self.unit}".rstrip() + f"{worse} against {than}"
+        worse = " (worse)" if self.of.sign * (after - before) > 0 else ""
+        if self.of.unit in _NO_RATIO or before <= 0:
+            return f"{after - before:+.3g} {self.of.unit}".rstrip() + f"{worse} against {than}"
         percent = 100 * (after / before - 1)
         if abs(percent) < _SAME:
             return f"as {than}"
@@ -59,12 +57,12 @@ class Judged:
 
     def row(self, values: Mapping[str, float]) -> str:
         """The main design, which is the last, against the first and against those between."""
-        form = ".3f" if self.unit == "um" else ".4g"
+        form = self.of.form
         (first, before), *others, (_, after) = values.items()
         changes = [self.change(before, after, first)]
         changes += [self.change(value, after, f"{other} ({value:{form}})") for other, value in others]
         said = ", ".join(change for change in changes if change)
-        return f"{before:{form}} -> {after:{form}} {self.unit}".rstrip() + f": {said}" * bool(said)
+        return f"{before:{form}} -> {after:{form}} {self.of.unit}".rstrip() + f": {said}" * bool(said)
 
 
 def gains(evaluations: report.Evaluations, problem: Problem | None) -> Iterator[tuple[str, str]]:
@@ -84,23 +82,18 @@ def gains(evaluations: report.Evaluations, problem: Problem | None) -> Iterator[
 
 
 def _numbers(evaluations: report.Evaluations, problem: Problem | None) -> Iterator[Judged]:
-    signs = [of.sign for of in problem.objectives] if problem is not None else []
     labels = list(next(iter(evaluations.values())).objectives)
+    asked = [] if problem is None else [(of, f"{over_cases(problem)}{of.words}") for of in problem.objectives]
     several = all(found.verified is not None for found in evaluations.values())
-    for label, sign in zip(labels, signs):
-        name, _, unit = label.partition(" [")
-        verified = {of: found.verified.objectives[label] for of, found in evaluations.items() if found.verified}
-        values = {of: found.objectives[label] for of, found in evaluations.items()}
-        yield Judged(words(name), unit.rstrip("]"), sign, values, verified if several else {})
-    if _PPTE not in labels:
-        verified = {of: found.verified.ppte for of, found in evaluations.items() if found.verified}
-        values = {of: float(found.metrics["ppte_um"]) for of, found in evaluations.items()}
-        yield Judged(words("ppte"), "um", 1, values, verified if several else {})
-
-
-def words(name: str) -> str:
-    """Name of a quantity as a table says it."""
-    return name.replace("ppte", "PPTE").replace("_", " ")
+    for label, (of, said) in zip(labels, asked):
+        verified = {name: found.verified.objectives[label] for name, found in evaluations.items() if found.verified}
+        values = {name: found.objectives[label] for name, found in evaluations.items()}
+        yield Judged(of, said, values, verified if several else {})
+    ppte = quantities["ppte"]
+    if ppte.named not in labels:
+        verified = {name: found.verified.ppte for name, found in evaluations.items() if found.verified}
+        values = {name: float(found.metrics[ppte.key]) for name, found in evaluations.items()}
+        yield Judged(ppte, ppte.words, values, verified if several else {})
 
 
 COMPROMISE = "compromise"  # what the design of a front is called that the run shows
@@ -116,17 +109,13 @@ def others_of(front: Front, evaluations: report.Evaluations) -> dict[str, np.nda
     }
 
 
-def front_table(front: Front, evaluations: report.Evaluations, of_variables: Mapping[str, str]) -> terminal_table.Table:
+def front_table(front: Front, evaluations: report.Evaluations, of_variables: Mapping[str, str]) -> Table:
     """All designs of a front, with the others below; variables with their units."""
     title = f"Pareto front, {len(front.values)} designs, all in front.csv"
-    result = terminal_table.Table(title=title, title_justify="left")
-    result.add_column("")
     names = list(front.parameters) if len(front.parameters) <= _SHOWN_PARAMETERS else []
-    for name, unit in zip(front.objectives, front.units):
-        result.add_column(f"{words(name)}\n[{unit}]" if unit else words(name), justify="right")
-    for name in names:
-        unit = of_variables.get(name, "")
-        result.add_column(f"{name}\n[{unit}]" if unit else name, justify="right")
+    objectives = () if front.compromise.problem is None else front.compromise.problem.objectives
+    columns = [*((of.words, of.unit) for of in objectives), *((name, of_variables.get(name, "")) for name in names)]
+    result = Table(("", *(f"{name}\n[{unit}]" if unit else name for name, unit in columns)), title=title)
     for row, values in enumerate(front.values):
         cells = [*values, *(front.parameters[name][row] for name in names)]
         label = f"{row + 1}, {COMPROMISE}" if row == front.chosen else f"{row + 1}"

@@ -7,16 +7,16 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from rich.table import Table
 
 from ..contact import Mesh
 from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.requests import quality_classes
 from ..io.results import unit_of
-from ..metrics import Finding, findings_of
+from ..metrics import Finding, Quantity, findings_of
 from ..numerics import program
 from ..optimize import Verified
+from ..report import Table
 from ..vocabulary import quantities
 from .study import Evaluation, grid_lines
 from .terminal import console as console
@@ -27,34 +27,6 @@ from .terminal import warn as warn
 Evaluations = Mapping[str, Evaluation]
 
 
-# quantities of the table, in its order; those that a design does not have are left out
-_TABLE = (
-    "ppte",
-    "relative_ppte",
-    "mean_te",
-    "force_excitation",
-    "max_flank_pressure",
-    "max_corner_pressure",
-    "contact_ratio",
-    "effective_contact_ratio",
-    "pinion_root_stress",
-    "wheel_root_stress",
-    "pinion_local_root_stress",
-    "wheel_local_root_stress",
-    "face_load_factor",
-    "mesh_loss_factor",
-    *("friction_coefficient", "loss_power", "mesh_efficiency"),
-    *("max_flash_temperature", "bulk_temperature", "max_contact_temperature"),
-    *("min_film_thickness", "min_specific_film_thickness"),
-    *(
-        f"{gear}_{kind}"
-        for kind in ("pitting_safety", "root_safety", "local_root_safety")
-        for gear in ("pinion", "wheel")
-    ),
-    "pressure_safety",
-    *(f"{gear}_{kind}" for kind in ("pitting_damage", "root_damage") for gear in ("pinion", "wheel")),
-    *("micropitting_safety", "scuffing_safety"),
-)
 _BY_FINITE_ELEMENTS = "  by finite elements"
 WARNING = "warning: "
 _HARRIS_CURVES = 7
@@ -64,22 +36,18 @@ _TITLE = 9.0  # [pt]
 
 def table(file: DesignFile, evaluations: Evaluations) -> Table:
     """The designs side by side at the design torque."""
-    result = Table(title=f"{file.title}, {file.torque:g} N m on the pinion", title_justify="left")
-    result.add_column("")
-    for name in evaluations:
-        result.add_column(name, justify="right", no_wrap=True)
+    result = Table(("", *evaluations), title=f"{file.title}, {file.torque:g} N m on the pinion")
     first = next(iter(evaluations.values()))
     second = verified(evaluations)
-    rows = [quantities[name] for name in _TABLE]
+    rows = told(evaluations)
     asked = [quantity for quantity in rows if quantity.named in first.objectives]
     for label in objectives(evaluations):
         result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
         if second:
             result.add_row(_BY_FINITE_ELEMENTS, *(format(each.objectives[label], ".4g") for each in second))
     for quantity in dict.fromkeys([*asked, *rows]):  # what was asked for stands first
-        cells = [evaluation.metrics.get(quantity.key) for evaluation in evaluations.values()]
-        if None not in cells:
-            result.add_row(quantity.heading, *(format(cell, quantity.form) for cell in cells))
+        cells = (evaluation.metrics[quantity.key] for evaluation in evaluations.values())
+        result.add_row(quantity.heading, *(format(cell, quantity.form) for cell in cells))
         if second and (quantity.name == "ppte" or quantity in asked):
             found = [each.ppte if quantity.name == "ppte" else each.objectives[quantity.named] for each in second]
             result.add_row(_BY_FINITE_ELEMENTS, *(format(each, quantity.form) for each in found))
@@ -155,9 +123,15 @@ def diameters(gear: Gear):
     return 2 * gear.tip_radius, 2 * gear.tip_form_radius, 2 * gear.bore_radius
 
 
+def told(evaluations: Evaluations) -> list[Quantity]:
+    """The quantities that are known of every design, in the order of the vocabulary."""
+    known = [evaluation.metrics for evaluation in evaluations.values()]
+    return [quantity for quantity in quantities.values() if all(quantity.key in metrics for metrics in known)]
+
+
 def objectives(evaluations: Evaluations) -> list[str]:
     """What an optimization made small, without what is a row of the table anyhow."""
-    known = {quantities[name].named for name in _TABLE}
+    known = {quantity.named for quantity in told(evaluations)}
     return [label for label in next(iter(evaluations.values())).objectives if label not in known]
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import jax
 import numpy as np
-from rich.table import Table
 
 from ..compliance import Compliance, TabulatedCompliance
 from ..contact import Mesh, Resolution
@@ -37,7 +36,7 @@ from ..optimize import (
     structure_for,
     verification,
 )
-from ..report import Table as Block
+from ..report import Table
 from . import interrupt, manufactured, optimum_report, report, summary_file
 from .cache import enable_cache
 from .document import CommandResult, Document
@@ -200,7 +199,7 @@ class CommandRun:
         if self._front is not None:
             yield front_table(self._front, self._evaluations, self.design.units)
 
-    def _first(self) -> Iterator[Block]:
+    def _first(self) -> Iterator[Table]:
         """What an optimization says before its tables."""
         if self._optimum is not None:
             found = self._optimum, self._front, self._projection, self._evaluations

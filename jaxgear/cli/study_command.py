@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-import rich.table
-
 from ..io import DesignFile, result_folder, write_summary
 from ..numerics import compile_quickly
+from ..report import Table
 from . import interrupt, report
 from .commands import import_ahead
 from .document import CommandResult, document
@@ -49,7 +48,7 @@ class StudyCommand(Generic[S]):
     summary: Callable[[S], dict[str, Any]]
     write: Callable[[Path, S], None]
     draw: Callable[[Path, S], list[Path]]
-    tables: Callable[[S], Iterable[rich.table.Table]]
+    tables: Callable[[S], Iterable[Table]]
     verdict: Callable[[S], Iterable[str]]
     failures: Callable[[S], Iterable[str]]
     assumptions: tuple[str, ...] = ()

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import jax
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
 from ..io import sweep_request, writing
+from ..report import Table
 from ..sweeps import SweepTable, sweep
 from . import interrupt, report, sweep_report
 from .document import document
@@ -65,12 +64,10 @@ def run_sweep(
         chosen.to_csv(target / _BEST_FILE)
     interrupt.note(f"the table and {_BEST_FILE} are complete in {target}{os.sep}, not all figures are drawn")
     grid, findings = said_of_best(design, chosen, size) if len(chosen) else ([], [])
-    files = write_figures(target, table, request.results) if figures and len(chosen) else []
+    files = write_figures(target, table) if figures and len(chosen) else []
     if asked is not None:
         closer = evaluate_best(target, design, chosen, size, quick=quick, figures=figures)
-        sweep_report.write(
-            target, asked, design, table, chosen, closer, files, request.results, size=size, quick=quick, grid=grid
-        )
+        sweep_report.write(target, asked, design, table, chosen, closer, files, size=size, quick=quick, grid=grid)
     interrupt.note(f"all results are in {target}{os.sep}")
     fine = _show(table, chosen, target, meter, quick=quick, lines=[*grid, *findings])
     if design.left_out:
@@ -105,13 +102,9 @@ def _show(
 
 def _side_by_side(table: SweepTable, count: int) -> Table:
     """The first rows as columns."""
-    result = Table(title=f"{table.title}, best first by {table.results[0]}", title_justify="left", box=SIMPLE_HEAD)
-    result.add_column("variant")
-    columns = {name: table.column(name)[: max(count, 1)] for name in table.names}
-    for number in columns["variant"]:
-        result.add_column(str(number), justify="right", no_wrap=True)
-    units = table.units
-    for name in (*table.parameters, *table.results):
-        label = f"{name} [{units[name]}]" if units[name] and name in table.parameters else name
-        result.add_row(label, *(f"{value:.4g}" for value in columns[name]))
+    shown = table.take(range(min(max(count, 1), len(table))))
+    header = "variant", *map(str, shown.column("variant"))
+    result = Table(header, title=f"{table.title}, best first by {table.results[0]}")
+    for column, values in shown.values(*shown.parameters, *shown.results).items():
+        result.add_row(column.named, *(format(value, column.quantity.form) for value in values))
     return result

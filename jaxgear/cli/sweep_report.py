@@ -7,15 +7,13 @@ from typing import Any
 
 import jax
 import numpy as np
-import rich.table
 
 from ..contact import Mesh, Resolution
 from ..io import DesignFile
-from ..metrics import Quantity, findings_of
+from ..metrics import findings_of
 from ..microgeometry import NoModification
 from ..report import Chapter, Table, figure, text, write_variants, write_workbook
 from ..sweeps import SweepTable, over_torques
-from ..vocabulary import quantity_of
 from . import report
 from .document import CommandResult, Document, project_facts
 from .geometry import gears
@@ -26,39 +24,34 @@ from .summary_file import sizes, versions
 
 _DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory does not grow with the table
 _CHARTS = 6  # radar charts
+_UNMODIFIED = "unmodified"
 
 
-def write_figures(folder: Path, table: SweepTable, results: Sequence[str | Quantity]) -> list[Path]:
+def write_figures(folder: Path, table: SweepTable) -> list[Path]:
     """Writes all figures that the results allow, of a table with a variant that did not fail; gives the files."""
     import matplotlib
 
     matplotlib.use("Agg")  # the command line never shows a window
     from .. import plot
 
-    heads = head_columns(table, results)
-    maximize = [column.name for column in table.columns if column.better == "larger"]
-    labels = parameter_labels(table)
-    options: dict[str, Any] = {"labels": labels, "maximize": maximize}
+    heads = table.heads
     size = len(table)
     step = -(-size // _DRAWN)
-    axes: dict[str, Any] = {}
-    if len(heads) > 1:
-        rows = np.arange(0, size, step)
-        if step > 1:  # the front is that of all variants, whichever of the others are drawn
-            rows = np.union1d(rows, table.pareto(heads[:3]).column("variant"))
-        axes["pareto"] = plot.pareto(_columns(table.take(rows), heads[:3]), *heads[:3], **options)
     best = table.best(_CHARTS)
-    numbers = np.union1d(np.arange(0, size, step), best.column("variant"))  # the best of all, too
-    lines = _columns(table.take(numbers), [*table.parameters, *heads])
-    axes["parallel_coordinates"] = plot.parallel_coordinates(lines, list(lines), heads[0], numbers=numbers, **options)
-    if len(heads) > 2:
-        names = [f"variant {number}" for number in best.column("variant")]
-        # what is said of all results alike stands once, under the charts
-        short = {head: plot.label(name) for head, name in zip(heads, (quantity_of(result).key for result in results))}
-        common = plot.label(heads[0]).rpartition(" [")[0].removeprefix(short[heads[0]].rpartition(" [")[0]).strip()
-        axes["radar"] = plot.radar(
-            _columns(best, heads), heads, names=names, note=common, labels=short, maximize=maximize
-        )
+    axes: dict[str, Any] = {}
+    with plot.figure.same_styles(_styles(best)):
+        if len(heads) > 1:
+            rows = np.arange(0, size, step)
+            if step > 1:  # the front is that of all variants, whichever of the others are drawn
+                rows = np.union1d(rows, table.pareto([head.name for head in heads[:3]]).column("variant"))
+            axes["pareto"] = plot.pareto(table.take(rows).values(*heads[:3]))
+        numbers = np.union1d(np.arange(0, size, step), best.column("variant"))  # the best of all, too
+        lines = table.take(numbers).values(*table.parameters, *heads)
+        axes["parallel_coordinates"] = plot.parallel_coordinates(lines, heads[0], numbers=numbers)
+        if len(heads) > 2:
+            # what is said of all results alike stands once, under the charts
+            spokes = {head.quantity: values for head, values in best.values(*heads).items()}
+            axes["radar"] = plot.radar(spokes, names=_names(best), note=heads[0].statistic)
     if step > 1:
         note = f"1 in {step} of {size:,} variants".replace(",", "\u2009")
         for name in axes.keys() - {"radar"}:
@@ -67,26 +60,15 @@ def write_figures(folder: Path, table: SweepTable, results: Sequence[str | Quant
     return report.save_figures(folder, axes)
 
 
-def head_columns(table: SweepTable, results: Sequence[str | Quantity]) -> list[str]:
-    """One column of every result: the first, which of a load spectrum or a tolerance is its mean."""
-    return [next(name for name in table.results if name.startswith(quantity_of(result).key)) for result in results]
+def _names(best: SweepTable) -> list[str]:
+    return [f"variant {number}" for number in best.column("variant")]
 
 
-def parameter_labels(table: SweepTable) -> dict[str, str]:
-    """Labels of the parameters with their units."""
-    units = {**table.units, **{name: "µm" for name, unit in table.units.items() if unit == "um"}}
-    return {name: f"{name.replace('_', ' ')} [{units[name] or '-'}]" for name in table.parameters}
-
-
-def labels_of(table: SweepTable) -> dict[str, str]:
-    """Labels of parameters and results with their units."""
+def _styles(best: SweepTable) -> dict[str, int]:
+    """Numbers of the styles of the best variants, best first, in all figures."""
     from .. import plot
 
-    return {**{name: plot.label(name) for name in table.results}, **parameter_labels(table)}
-
-
-def _columns(table: SweepTable, names: Sequence[str]) -> dict[str, np.ndarray]:
-    return {name: table.column(name) for name in names}
+    return {_UNMODIFIED: 0, **dict(zip(_names(best), plot.figure.APART))}
 
 
 CHOSEN = 3  # variants
@@ -105,7 +87,7 @@ class Chosen:
         lines: why they are not evaluated.
     """
 
-    tables: Sequence[rich.table.Table] = ()
+    tables: Sequence[Table] = ()
     figures: Sequence[Path] = ()
     pages: Mapping[str, Sequence[Path]] = field(default_factory=dict)
     findings: Sequence[str] | None = None
@@ -135,15 +117,14 @@ def evaluate_best(
         stages.begin("evaluating the best variants")
         mesh, torques = jax.block_until_ready(design.mesh(size)), torques_of(design, quick=quick)
         involute = NoModification()
-        modifications: dict[str, Modifications] = {"unmodified": (involute, involute)}
+        modifications: dict[str, Modifications] = {_UNMODIFIED: (involute, involute)}
         first = best.take(range(min(CHOSEN, len(best))))
         for number, parameters in reversed([*zip(first.column("variant"), first.designs())]):
             modifications[f"variant {number}"] = design.design(parameters)
         found = {name: evaluate(design, mesh, torques, *flanks) for name, flanks in modifications.items()}
-        drawn = report.write_figures(folder, design, mesh, found, torques) if figures else []
-        pages = _alone(folder, mesh, found) if figures else {}
+        drawn, pages = _draw(folder, design, mesh, found, torques, best) if figures else ([], {})
     findings = report.finding_lines(report.findings(design, mesh, found))
-    best_first = {name: found[name] for name in ("unmodified", *reversed(list(found)))}
+    best_first = {name: found[name] for name in (_UNMODIFIED, *reversed(list(found)))}
     return Chosen([report.table(design, best_first)], drawn, pages, list(findings), list(report.failures(found)))
 
 
@@ -159,6 +140,16 @@ def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tupl
     findings = findings_of(cycle, pinion=pinion, wheel=wheel, compliance=mesh.compliance)
     grid = grid_lines(f"{size.positions} positions", {name: grid_change(mesh, cycle, pinion, wheel)})
     return [*grid], [f"{report.WARNING}{name}: {finding}" for finding in findings]
+
+
+def _draw(
+    folder: Path, design: DesignFile, mesh: Mesh, found: report.Evaluations, torques: np.ndarray, best: SweepTable
+) -> tuple[list[Path], dict[str, list[Path]]]:
+    """Pictures of all variants together, and those of each alone by its name; a variant has one style in all."""
+    from .. import plot
+
+    with plot.figure.same_styles(_styles(best)):
+        return report.write_figures(folder, design, mesh, found, torques), _alone(folder, mesh, found)
 
 
 def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, list[Path]]:
@@ -190,7 +181,6 @@ def write(
     best: SweepTable,
     chosen: Chosen,
     figures: Sequence[Path],
-    results: Sequence[str | Quantity],
     *,
     size: Resolution,
     quick: bool,
@@ -206,7 +196,6 @@ def write(
         best: the best of them, best first.
         chosen: what was found of the first of them.
         figures: files of the pictures of the sweep.
-        results: that the sweep was asked for.
         size: array sizes of a mesh.
         quick: whether the run was a quick one.
         grid: what a finer mesh would change.
@@ -216,8 +205,7 @@ def write(
     write_workbook(folder / WORKBOOK, facts, best, table)
     failed = table.failures()
     if failed < len(table):
-        main = head_columns(table, results)
-        write_variants(folder / PAGE, design.title, facts, table, labels=labels_of(table), main=main)
+        write_variants(folder / PAGE, design.title, facts, table)
     lines = [
         f"{len(table)} variants, ranked by {table.results[0]}; the best {len(best)} and the table are in {WORKBOOK}, "
         f"with units and filters; {PAGE} is an interactive page of them.",
@@ -250,25 +238,21 @@ def _with_unit(design: DesignFile, name: str) -> str:
 
 def _side_by_side(best: SweepTable) -> Chapter:
     shown = best.take(range(min(_TABLE, len(best))))
-    columns = [_values(shown, name) for name in shown.names if name != "variant"]
-    names = (shown.headings[name] for name in shown.names if name != "variant")
-    header = ("", *(f"variant {number}" for number in _values(shown, "variant")))
-    rows = tuple((name, *column) for name, column in zip(names, columns))
-    return Chapter("Best variants", tables=[Table(header, rows, "best first")], new_page=True)
+    _, *columns = shown.columns
+    rows = tuple((column.heading, *_values(shown, column.name)) for column in columns)
+    return Chapter("Best variants", tables=[Table(("", *_names(shown)), rows, "best first")], new_page=True)
 
 
 def _page(table: SweepTable, best: SweepTable, place: int, chosen: Chosen) -> Chapter:
     """One variant, and what it is among the others."""
-    number = _values(best, "variant")[place]
+    name = _names(best)[place]
     rows = []
-    for name in (*best.parameters, *best.results):
-        ranked = table.find(name)
-        low, high = (text(one) for one in _range(table, name))
-        better = {"larger": "larger", "smaller": "smaller"}.get(str(ranked.better), "") if name in best.results else ""
-        rows.append((best.headings[name], text(best.column(name)[place]), low, high, better))
-    header = ("", f"variant {number}", "least of all", "largest of all", "better is")
-    pictures = [figure(path) for path in chosen.pages.get(f"variant {number}", ())]
-    return Chapter(f"Variant {number}", tables=[Table(header, tuple(rows))], figures=pictures, new_page=True)
+    for column in map(best.find, (*best.parameters, *best.results)):
+        low, high = map(text, _range(table, column.name))
+        rows.append((column.heading, text(best.column(column.name)[place]), low, high, column.better))
+    header = ("", name, "least of all", "largest of all", "better is")
+    pictures = [figure(path) for path in chosen.pages.get(name, ())]
+    return Chapter(name.capitalize(), tables=[Table(header, tuple(rows))], figures=pictures, new_page=True)
 
 
 def _values(table: SweepTable, name: str) -> list[str]:

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
 from ..io import DesignFile, WearRequest, describe
 from ..microgeometry import AbstractModification
+from ..report import Table
 from ..vocabulary import quantity_of
 from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth, worn_volume
 from ..wear.quantities import blocks_are_short, number_of
@@ -107,8 +106,6 @@ def _table(study: WearStudy) -> Table:
     """One row per design."""
     settings = study.request.settings
     title = f"{study.design.title}: {float(settings.revolutions):.3g} revolutions at {_loads(study)}"
-    result = Table(title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD)
-    result.add_column("design", no_wrap=True)
     columns = {
         "pinion_wear_depth_um": "depth\npinion\n[um]",
         "wheel_wear_depth_um": "depth\nwheel\n[um]",
@@ -125,14 +122,13 @@ def _table(study: WearStudy) -> Table:
         "life_to_ppte_revolutions": (settings.ppte_limit, "revolutions\nto PPTE of\n{:g} um"),
     }
     columns |= {key: text.format(float(limit)) for key, (limit, text) in limits.items() if limit is not None}
-    for heading in columns.values():
-        result.add_column(heading, justify="right", no_wrap=True)
+    result = Table(("design", *columns.values()), title=title)
     ended = float(settings.revolutions)
     for name, life in study.lives.items():
         numbers = _numbers(study, life)
         result.add_row(name, *(_cell(key, numbers[key], ended) for key in columns))
         if ended < numbers.get("life_to_depth_revolutions", 0.0) < np.inf:
-            result.caption = f"{_BEYOND} beyond the revolutions that were worn, at the rate of the last block"
+            result.note = f"{_BEYOND} beyond the revolutions that were worn, at the rate of the last block"
     return result
 
 

@@ -6,14 +6,13 @@ from typing import Any
 
 import jax
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
 from ..conditions import conditions, ranked
 from ..contact import Mesh
 from ..io import DesignFile
 from ..microgeometry import AbstractModification
 from ..numerics import Quantile, program, real
+from ..report import Table
 from ..tolerance import Tolerance
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import LIVES_AHEAD, number_of
@@ -111,14 +110,11 @@ def tables(design: DesignFile, settings: Wear, scatters: Mapping[str, Samples]) 
     if not scatters:
         return
     title = f"{_pairs(design, scatters)}, the same for every design"
-    result = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
-    result.add_column("design", no_wrap=True)
-    headings = ["mean PPTE [um]", "95 % below", "depth [um]", "95 % below"]
+    headings = ["mean PPTE\n[um]", "95 %\nbelow", "depth\n[um]", "95 %\nbelow"]
     lives = asked(settings)[2:]
-    limits = {"life_to_depth": "95 % last, {:g} um deep", "life_to_ppte": "95 % last, PPTE {:g} um"}
+    limits = {"life_to_depth": "95 % last,\n{:g} um deep", "life_to_ppte": "95 % last,\nPPTE {:g} um"}
     headings += [limits[name].format(float(getattr(settings, _LIVES[name][0]))) for name in lives]
-    for heading in (*headings, "failed"):
-        result.add_column(heading, justify="right")
+    result = Table(("design", *headings, "failed"), title=title)
     for name, samples in scatters.items():
         cells = [f"{of(samples, key):.3f}" for key in (_PPTE, _DEPTH) for of in (_mean, _bound)]
         cells += [_life_text(settings, key, _lasts(samples, key, _LEVEL)) for key in lives]
@@ -171,7 +167,7 @@ def write_figures(folder: Path, scatters: Mapping[str, Samples]) -> list[Path]:
     from .. import plot
 
     samples = {name: of[_PPTE] for name, of in scatters.items()}
-    axes = plot.ppte_distribution(samples, of="mean PPTE over the life")
+    axes = plot.ppte_distribution(samples, of=_PPTE)
     return report.save_figures(folder, {"life_ppte_distribution": axes})
 
 

@@ -109,6 +109,7 @@ MESH_QUANTITIES = Vocabulary(
             "peak-to-peak transmission error, unloaded",
             Range(),
             local=True,
+            label="unloaded PPTE",
         ),
         *(
             Quantity(
@@ -185,7 +186,13 @@ MESH_QUANTITIES = Vocabulary(
             local=True,
             form=".1f",
         ),
-        *_stresses("contact_stress", nominal_contact_stress, "nominal contact stress after ISO 6336-2"),
+        *_stresses(
+            "contact_stress",
+            nominal_contact_stress,
+            "nominal contact stress after ISO 6336-2",
+            "contact stress, ISO 6336-2",
+            form=".1f",
+        ),
         *(
             Quantity(f"{gear}_{name}", _margin(f"{gear}_{name}"), "mm", f"{meaning}, {gear}", better="larger")
             for gear in ("pinion", "wheel")

@@ -88,7 +88,7 @@ def objective_name(problem: Problem) -> str:
     names = [of.name for of in problem.objectives]
     if len(names) > 1:
         return f"distance from the ideal of {' and '.join(names)}"
-    return _over_cases(problem) + names[0] + (PENALIZED if problem.roughness is not None else "")
+    return over_cases(problem) + names[0] + (PENALIZED if problem.roughness is not None else "")
 
 
 def judged(
@@ -110,11 +110,12 @@ def judged(
         values = np.asarray(_of_one(problem.objectives, cycle, mesh, problem.settings))
     else:
         values = np.asarray(_score_of(problem, pinion, wheel).value)
-    names = (f"{_over_cases(problem)}{of.named}" for of in problem.objectives)
+    names = (f"{over_cases(problem)}{of.named}" for of in problem.objectives)
     return {name: of.sign * float(value) for name, of, value in zip(names, problem.objectives, values)}
 
 
-def _over_cases(problem: Problem) -> str:
+def over_cases(problem: Problem) -> str:
+    """The measure of a problem before the name of what it measures, "95 % CVaR of "; "" where it has a single case."""
     return f"{in_words(problem.measure)} " if problem.cases.count > 1 else ""
 
 

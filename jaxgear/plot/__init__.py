@@ -7,7 +7,6 @@ None shows a window or changes matplotlib's settings; `save` writes the file.
 from .convergence import convergence as convergence
 from .convergence import iterations_relief as iterations_relief
 from .convergence import iterations_transmission_error as iterations_transmission_error
-from .convergence import optimizer_comparison as optimizer_comparison
 from .dynamics import bifurcation as bifurcation
 from .dynamics import branches as branches
 from .dynamics import order_tracks as order_tracks
@@ -43,7 +42,6 @@ from .mesh_cycle import transmission_error as transmission_error
 from .variants import face_load_over_torque as face_load_over_torque
 from .variants import fan as fan
 from .variants import harris_map as harris_map
-from .variants import label as label
 from .variants import ppte_distribution as ppte_distribution
 from .variants import ppte_histogram as ppte_histogram
 from .variants import ppte_over_torque as ppte_over_torque

@@ -1,30 +1,28 @@
 """Convergence of optimizations and of the transmission-error iteration."""
 
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from numpy.typing import ArrayLike
 
 from ..contact import Mesh
 from ..metrics import profile_relief
 from ..optimize import Iterate, Optimum
 from .figure import (
     ABOVE_MARKS,
-    FONT,
     grow,
     legend_above,
-    legend_over_panels,
     line_style,
     mark_path,
     marker_style,
-    point_style,
     report_axes,
+    styled,
 )
-from .front import ANALYSES_LABEL, logarithmic, objective_label, wrapped
+from .front import ANALYSES_LABEL, best_label, logarithmic, wrapped
 from .mesh_cycle import PATH_LABEL, PHASE_LABEL, two_pitches
 
 
@@ -41,7 +39,7 @@ def convergence(optima: Mapping[str, Optimum], ax: Axes | None = None) -> Axes:
     """
     own, drawn = ax is None, []
     with report_axes(ax) as ax:
-        for index, (name, optimum) in enumerate(optima.items()):
+        for index, name, optimum in styled(optima):
             spent, best, positions = _curve(optimum)
             style = {**line_style(index), "marker": marker_style(index)["marker"], "markersize": 5.0}
             style |= {"drawstyle": "steps-post", "markevery": [-1]}
@@ -57,7 +55,7 @@ def convergence(optima: Mapping[str, Optimum], ax: Axes | None = None) -> Axes:
             logarithmic(ax, "x", spent)
             if best.min() > 0:
                 logarithmic(ax, "y", best)
-        names = {objective_label(optimum.objective_name) for optimum in optima.values()}
+        names = {best_label(optimum) for optimum in optima.values()}
         ax.set(xlabel=ANALYSES_LABEL, ylabel=wrapped(names.pop()) if len(names) == 1 else "best objective")
         lines = legend_above(ax)
         if own:
@@ -112,7 +110,7 @@ def iterations_relief(
     return ax
 
 
-def iterations_transmission_error(optimum: Optimum, phase, ax: Axes | None = None) -> Axes:
+def iterations_transmission_error(optimum: Optimum, phase: ArrayLike, ax: Axes | None = None) -> Axes:
     """Transmission error [um] of every state of an iteration over two base pitches, with its PPTE in the legend.
 
     Args:
@@ -146,7 +144,7 @@ def _path(mesh: Mesh, gear: str) -> np.ndarray:
     return np.linspace(float(start), float(tip), _POINTS)
 
 
-def _style(index: int, count: int) -> dict:
+def _style(index: int, count: int) -> dict[str, Any]:
     """Later states darker, the first one dashed and the last one wide."""
     part = index / max(count - 1, 1)
     colour = ScalarMappable(Normalize(0, 1), "viridis").to_rgba(_FIRST + (_LAST - _FIRST) * part)
@@ -166,79 +164,3 @@ def _label(index: int, count: int, text: str = "") -> str:
         return f"_{index}"  # matplotlib leaves labels with an underscore out of the legend
     role = "start" if index == 0 else "end" if index == count - 1 else ""
     return ": ".join(part for part in (" ".join((str(index), role)).strip(), text) if part)
-
-
-_QUANTITIES: Mapping[str, str] = MappingProxyType(
-    {
-        "ppte_um": "peak-to-peak\ntransmission error [µm]",
-        "worst_over_torque_um": "worst peak-to-peak\ntransmission error over torque [µm]",
-        "quantile95_um": "peak-to-peak transmission\nerror, 95 % of the gears [µm]",
-    }
-)
-_WIDTHS = {1: 120.0, 2: 150.0}  # of all panels together [mm]
-_WIDEST = 180.0
-_WIDE = 20.0  # largest over smallest value from which the ordinate is logarithmic
-
-
-def optimizer_comparison(rows: Sequence[Mapping[str, Any]], quantity: str = "ppte_um", ax=None) -> np.ndarray:
-    """What every method reached over the contact analyses it spent, one panel per gear pair.
-
-    Args:
-        rows: results, each with "method", "pair", "evaluations" and the quantity; several rows of a method and a pair
-            are several runs.
-        quantity: "ppte_um", "worst_over_torque_um" or "quantile95_um".
-        ax: one Axes per pair; None for a new figure.
-
-    Returns:
-        the Axes, one per pair.
-
-    Raises:
-        ValueError: for no rows, an unknown quantity or another number of Axes than of pairs.
-    """
-    if not rows:
-        raise ValueError("optimizer_comparison: rows is empty, must have at least one result")
-    if quantity not in _QUANTITIES:
-        raise ValueError(f'optimizer_comparison: "{quantity}" is not known, must be one of {", ".join(_QUANTITIES)}')
-    pairs, methods = (list(dict.fromkeys(row[key] for row in rows)) for key in ("pair", "method"))
-    own = ax is None
-    with report_axes(ax, columns=len(pairs), width=_WIDTHS.get(len(pairs), _WIDEST)) as axes:
-        panels = np.atleast_1d(axes)
-        if panels.size != len(pairs):
-            raise ValueError(
-                f"optimizer_comparison: ax has {panels.size} Axes, must have one for each of {len(pairs)} pairs"
-            )
-        for panel, pair in zip(panels, pairs):
-            for index, method in enumerate(methods):
-                runs = [row for row in rows if (row["pair"], row["method"]) == (pair, method)]
-                panel.plot(*_points(runs, quantity), label=method, zorder=3, **point_style(index))
-            panel.set_title(pair, fontsize=FONT)
-            panel.set_xlabel(ANALYSES_LABEL)
-        panels[0].set_ylabel(_QUANTITIES[quantity])
-        _scales(panels, *_points(rows, quantity))
-        if own:
-            grow(panels[0], legend_over_panels(panels[0].figure, panels[0]))
-        else:
-            legend_above(panels[0], distance=ABOVE_MARKS)
-    return panels
-
-
-def _points(rows: Sequence[Mapping[str, Any]], quantity: str) -> tuple[np.ndarray, np.ndarray]:
-    """Contact analyses, at least one, and what was reached with them; failed runs are left out."""
-    spent = np.array([max(row["evaluations"], 1) for row in rows], float)
-    reached = np.array([row[quantity] for row in rows], float)
-    valid = np.isfinite(reached)
-    return spent[valid], reached[valid]
-
-
-def _scales(panels: np.ndarray, spent: np.ndarray, reached: np.ndarray) -> None:
-    """The same scales in all panels."""
-    if not spent.size:
-        return
-    wide = reached.min() > 0 and reached.max() > _WIDE * reached.min()
-    limits = (reached.min() / 1.5, 1.5 * reached.max()) if wide else (0.0, 1.08 * max(reached.max(), 1e-9))
-    for panel in panels:
-        logarithmic(panel, "x", spent)
-        panel.set_xlim(spent.min() / 1.6, 1.6 * spent.max())
-        if wide:
-            logarithmic(panel, "y", reached)
-        panel.set_ylim(limits)

@@ -4,16 +4,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
+from jaxtyping import Array, Float
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
 
 from ..contact import MeshCycle
 from ..dynamics import Branch, RunUp, SpeedResponse
 from ..metrics import harmonics
 from ..numerics import program
-from .figure import GREY, legend_above, line_style, marker_style, report_axes
+from .figure import GREY, colour_bar, legend_above, line_style, marker_style, report_axes, styled
 
 FREQUENCY_LABEL = "mesh frequency [Hz]"
 _APPROACH_LABEL = "dynamic transmission error [µm]"
@@ -51,7 +53,7 @@ def speed_response(
     """
     seen: dict[str, Any] = {}
     with report_axes(ax) as ax:
-        for index, (name, several) in enumerate(responses.items()):
+        for index, name, several in styled(responses):
             style = marker_style(index)
             for number, (run, response) in enumerate(_named(several)):
                 frequency = np.asarray(response.mesh_frequency)
@@ -122,15 +124,14 @@ def waterfall(
         ax.set_xlim(float(frequency.min()), float(frequency.max()))
         ax.set_ylim(0, float(orders.max() * frequency.max()))
         _name_orders(ax, orders, float(frequency.max()))
-        bar = ax.figure.colorbar(lines, ax=ax, pad=0.09)
-        bar.set_label(f"amplitude of the {'mesh force' if of == 'force' else 'velocity of the DTE'} [{unit}]")
-        bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
+        what = "mesh force" if of == "force" else "velocity of the DTE"
+        colour_bar(lines, ax, f"amplitude of the {what} [{unit}]", pad=0.09)
         ax.set(xlabel=FREQUENCY_LABEL, ylabel="frequency [Hz]")
         _entitle(ax, title, 0)
     return ax
 
 
-def _name_orders(ax: Axes, orders, highest: float) -> None:
+def _name_orders(ax: Axes, orders: np.ndarray, highest: float) -> None:
     for order in orders:
         place = {"xytext": (3, 0), "textcoords": "offset points", "va": "center", "color": GREY}
         if order == round(order):
@@ -254,7 +255,7 @@ def branches(
     return ax
 
 
-def _curve(branch: Branch, of: str):
+def _curve(branch: Branch, of: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mesh frequencies, values and stability along a branch, with its bifurcations, which belong to both sides."""
     places = np.asarray(branch.before, int)
     between = [float(one.parameter) for one in branch.bifurcations]
@@ -264,7 +265,15 @@ def _curve(branch: Branch, of: str):
     return at, values, np.insert(np.asarray(branch.stable), places, np.ones(len(places), bool))
 
 
-def phase_portrait(dte, velocity, force, ax: Axes | None = None, *, once: Any = None, title: str = "") -> Axes:
+def phase_portrait(
+    dte: ArrayLike,
+    velocity: ArrayLike,
+    force: ArrayLike,
+    ax: Axes | None = None,
+    *,
+    once: tuple[ArrayLike, ArrayLike] | None = None,
+    title: str = "",
+) -> Axes:
     """An orbit in the plane of DTE and velocity, coloured by what is in contact.
 
     Args:
@@ -321,7 +330,7 @@ def transmission_error_orders(cycles: Mapping[str, MeshCycle], ax: Axes | None =
     width = _GROUP / max(len(cycles), 1)
     orders = np.arange(1, count + 1)
     with report_axes(ax) as ax:
-        for index, (name, cycle) in enumerate(cycles.items()):
+        for index, name, cycle in styled(cycles):
             amplitude = np.asarray(_amplitudes(cycle.transmission_error, count))
             place = orders + (index - (len(cycles) - 1) / 2) * width
             ax.bar(
@@ -335,5 +344,5 @@ def transmission_error_orders(cycles: Mapping[str, MeshCycle], ax: Axes | None =
 
 
 @program
-def _amplitudes(error, count: int):
+def _amplitudes(error: Float[Array, " positions"], count: int) -> Float[Array, " orders"]:
     return harmonics(error, count).amplitude

@@ -1,19 +1,24 @@
 """What all pictures share: report size, line styles, marks and files."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, TypeVar
 
 import matplotlib
 import matplotlib.pyplot as plt
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
 from ..geometry import PathOfContact
+from ..io import writing
 from ..numerics.durable import write_durably
 
 _INCH = 25.4  # mm
@@ -56,17 +61,49 @@ _STYLE = {
 }
 
 
-def line_style(index: int) -> dict:
+Panels = Sequence[Axes] | np.ndarray
+_Drawn = TypeVar("_Drawn")
+_NUMBERS: ContextVar[Mapping[str, int]] = ContextVar("numbers of designs", default=MappingProxyType({}))
+# style numbers of designs, best first, that stand apart from the black of the first design and from a blue cloud
+APART = (1, 3, 4, 5, 2, 6, 7)
+
+
+@contextmanager
+def same_styles(numbers: Mapping[str, int]) -> Iterator[None]:
+    """In the `with` block a design has the same colour and line style in every figure.
+
+    Args:
+        numbers: of the styles, as `line_style` takes them, by the name of the design. Others go by their place.
+    """
+    before = _NUMBERS.set(MappingProxyType(dict(numbers)))
+    try:
+        yield
+    finally:
+        _NUMBERS.reset(before)
+
+
+def style_number(name: str, place: int) -> int:
+    """Number of the style of a design: that of `same_styles`, or else its place."""
+    return _NUMBERS.get().get(name, place)
+
+
+def styled(designs: Mapping[str, _Drawn]) -> Iterator[tuple[int, str, _Drawn]]:
+    """Number of its style, name and what is drawn, of every design."""
+    for place, (name, drawn) in enumerate(designs.items()):
+        yield style_number(name, place), name, drawn
+
+
+def line_style(index: int) -> dict[str, Any]:
     """Colour, dashes and width of the curve with this number."""
     return {"color": _COLOURS[index % len(_COLOURS)], "linestyle": _DASHES[index % len(_DASHES)], "linewidth": 1.4}
 
 
-def marker_style(index: int) -> dict:
+def marker_style(index: int) -> dict[str, Any]:
     """`line_style` with a marker on every point."""
     return {**line_style(index), "marker": _MARKERS[index % len(_MARKERS)], "markersize": 3.5}
 
 
-def point_style(index: int) -> dict:
+def point_style(index: int) -> dict[str, Any]:
     """Colour and marker of the points with this number, without a line; sixteen differ, the second eight hollow."""
     colour = _COLOURS[index % len(_COLOURS)]
     hollow = index // len(_COLOURS) % 2 == 1
@@ -83,8 +120,8 @@ def point_style(index: int) -> dict:
 
 @contextmanager
 def report_axes(
-    ax: Axes | None, *, columns: int = 1, rows: int = 1, width: float = WIDTH, height: float = HEIGHT
-) -> Iterator:
+    ax: Axes | Panels | None, *, columns: int = 1, rows: int = 1, width: float = WIDTH, height: float = HEIGHT
+) -> Iterator[Axes]:
     """The given Axes as they are, or new ones in report style; the style is off again after the `with` block.
 
     Args:
@@ -113,7 +150,7 @@ def report_figure(width: float, height: float) -> Iterator[Figure]:
 
 
 def emphasize(figure: Figure, name: str) -> None:
-    """Makes the lines of one design the boldest of a figure: solid and wide, before all others.
+    """Makes the lines of one design the boldest of a figure: wide, before all others.
 
     Args:
         figure: with one line per design.
@@ -124,7 +161,7 @@ def emphasize(figure: Figure, name: str) -> None:
     lines = [line for ax in figure.axes for line in ax.lines if _is_of(str(line.get_label()), name)]
     lines += [mark for text, mark in marks if _is_of(text.get_text(), name) and isinstance(mark, Line2D)]
     for line in lines:
-        line.set(linestyle="-", linewidth=_BOLD, zorder=_BEFORE_LINES)
+        line.set(linewidth=_BOLD, zorder=_BEFORE_LINES)
 
 
 def _is_of(label: str, name: str) -> bool:
@@ -209,10 +246,25 @@ def _in_points(ax: Axes, pixels: float) -> float:
     return pixels * _POINTS_PER_INCH / _root(ax).dpi
 
 
-def _root(ax: Axes) -> Any:
+def _root(ax: Axes) -> Figure:
     """The figure of the Axes, also if they stand in a subfigure."""
     canvas: Any = ax.figure.canvas
     return canvas.figure
+
+
+def colour_bar(image: ScalarMappable, ax: Axes | Panels, label: str, **options: float | str) -> None:
+    """A scale of the colours beside Axes, with the letters of its own like theirs.
+
+    Args:
+        image: what is coloured.
+        ax: Axes, or panels side by side.
+        label: of the scale.
+        options: of matplotlib's colour bar, such as its distance `pad`.
+    """
+    panels = np.atleast_1d(ax)
+    bar = panels[0].figure.colorbar(image, ax=list(panels), **options)
+    bar.set_label(label)
+    bar.ax.tick_params(labelsize=panels[0].xaxis.label.get_fontsize())
 
 
 def mark_path(ax: Axes, contact: PathOfContact, *, zorder: float = 0.5) -> None:
@@ -267,9 +319,7 @@ def save(fig: Figure, path: str | Path) -> Path:
     contents = fig.get_tightbbox().padded(_MARGIN)
     fig.savefig(picture, format="png", dpi=_DPI, bbox_inches=contents, facecolor="white")
     plt.close(fig)
-    try:
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         write_durably(path, lambda file: file.write(picture.getvalue()))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
     return path

@@ -6,6 +6,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.ticker import MaxNLocator
@@ -20,12 +21,15 @@ from .figure import (
     GREY,
     HEIGHT,
     PALE,
+    Panels,
+    colour_bar,
     legend_above,
     legend_over_panels,
     line_style,
     mark_path,
     marker_style,
     report_axes,
+    styled,
 )
 from .mesh_cycle import PATH_LABEL, pair_history
 
@@ -38,8 +42,9 @@ Tolerances = tuple[ToleranceClass | None, ToleranceClass | None]
 
 # abscissa and material removed [um] of a flank, of one shape
 Trace = Callable[[Side, AbstractModification], tuple[np.ndarray, np.ndarray]]
-# the band of the tolerance about a flank of a class: abscissa, lower and upper limit of the material removed [um]
-Band = Callable[[Side, AbstractModification, ToleranceClass], tuple[np.ndarray, np.ndarray, np.ndarray]]
+# of a band of the tolerance about a flank: abscissa, lower and upper limit of the material removed [um]
+Edges = tuple[np.ndarray, np.ndarray, np.ndarray]
+Band = Callable[[Side, AbstractModification, ToleranceClass], Edges]  # about a flank of a class
 # labels the abscissa of the panel of one gear, "pinion" or "wheel"
 Frame = Callable[[Axes, Side, str], None]
 
@@ -47,7 +52,7 @@ Frame = Callable[[Axes, Side, str], None]
 def flank_panels(
     mesh: Mesh,
     designs: Mapping[str, Design],
-    ax,
+    ax: Panels | None,
     trace: Trace,
     frame: Frame,
     *,
@@ -72,7 +77,7 @@ def flank_panels(
     own = ax is None
     with report_axes(ax, columns=2, width=WIDTH, height=HEIGHT) as panels:
         for index, (panel, title, side) in enumerate(zip(panels, ("pinion", "wheel"), mesh.sides)):
-            for style, (name, design) in enumerate(designs.items()):
+            for style, name, design in styled(designs):
                 abscissa, removed = trace(side, design[index] or NoModification())
                 panel.plot(abscissa, removed, label=name, **line_style(style))
                 panel.set_xlim(abscissa[0], abscissa[-1])
@@ -92,7 +97,7 @@ def flank_panels(
     return np.asarray(panels)
 
 
-def _downwards(panels) -> None:
+def _downwards(panels: np.ndarray) -> None:
     """One common ordinate that points down and has the nominal involute in sight."""
     lines = [line.get_ydata() for panel in panels for line in panel.lines]
     bands = [path.vertices[:, 1] for panel in panels for band in panel.collections for path in band.get_paths()]
@@ -106,7 +111,7 @@ def _downwards(panels) -> None:
 _LEVELS = 9
 
 
-def topography(mesh: Mesh, design: Design, ax=None) -> np.ndarray:
+def topography(mesh: Mesh, design: Design, ax: Panels | None = None) -> np.ndarray:
     """Material removed [um] from pinion and wheel over roll angle [deg] and face coordinate [mm], as contours.
 
     Args:
@@ -130,9 +135,7 @@ def topography(mesh: Mesh, design: Design, ax=None) -> np.ndarray:
             panel.contour(*places, levels=levels[1:], colors="black", linewidths=0.3)
             panel.set_xlabel(f"roll angle of the {title} [deg]")
         panels[0].set_ylabel("face coordinate [mm]")
-        bar = panels[0].figure.colorbar(filled, ax=list(panels), pad=0.02, format="%.3g")
-        bar.set_label("material removed [µm]")
-        bar.ax.tick_params(labelsize=panels[0].xaxis.label.get_fontsize())
+        colour_bar(filled, panels, "material removed [µm]", pad=0.02, format="%.3g")
     return np.asarray(panels)
 
 
@@ -142,7 +145,7 @@ _POINTS = 201  # across the face
 def lead_chart(
     mesh: Mesh,
     designs: Mapping[str, Design],
-    ax=None,
+    ax: Panels | None = None,
     *,
     tolerance: Tolerances | None = None,
     about: str | None = None,
@@ -165,10 +168,15 @@ def lead_chart(
     return flank_panels(mesh, designs, ax, _line, _over_face, tolerance=tolerance, about=about, band=_lead_band)
 
 
-def _lead_band(side: Side, design: AbstractModification, quality: ToleranceClass):
+def _lead_band(side: Side, design: AbstractModification, quality: ToleranceClass) -> Edges:
     trace = helix_trace(side, design, quality)
-    inside = np.isfinite(trace.upper)
-    return tuple(np.asarray(values)[inside] for values in (trace.face_coordinate, -trace.upper, -trace.lower))
+    return _edges(trace.face_coordinate, trace.lower, trace.upper)
+
+
+def _edges(abscissa: Array, lower: Array, upper: Array) -> Edges:
+    """A band as it is drawn, of material removed, over the evaluation range."""
+    inside = np.isfinite(upper)
+    return np.asarray(abscissa)[inside], -np.asarray(upper)[inside], -np.asarray(lower)[inside]
 
 
 def _line(side: Side, modification: AbstractModification) -> tuple[np.ndarray, np.ndarray]:
@@ -188,7 +196,7 @@ _ABOVE_DIAMETERS = 34.0  # [pt]; clears numbers and label of the upper axis
 def k_chart(
     mesh: Mesh,
     designs: Mapping[str, Design],
-    ax=None,
+    ax: Panels | None = None,
     *,
     tolerance: Tolerances | None = None,
     about: str | None = None,
@@ -222,10 +230,9 @@ def k_chart(
     )
 
 
-def _profile_band(side: Side, design: AbstractModification, quality: ToleranceClass):
+def _profile_band(side: Side, design: AbstractModification, quality: ToleranceClass) -> Edges:
     trace = profile_trace(side, design, quality)
-    inside = np.isfinite(trace.upper)
-    return tuple(np.asarray(values)[inside] for values in (trace.roll_angle, -trace.upper, -trace.lower))
+    return _edges(trace.roll_angle, trace.lower, trace.upper)
 
 
 def _profile(side: Side, modification: AbstractModification) -> tuple[np.ndarray, np.ndarray]:
@@ -239,10 +246,10 @@ def _over_roll_angle(panel: Axes, side: Side, title: str) -> None:
     surface = jax.tree.map(np.asarray, flank_surface(side, NoModification()))
     base = float(surface.diameter[-1] / np.hypot(1, np.deg2rad(surface.roll_angle[-1])))
 
-    def to_diameter(angle):
+    def to_diameter(angle: np.ndarray) -> np.ndarray:
         return base * np.hypot(1, np.deg2rad(angle))
 
-    def to_angle(diameter):
+    def to_angle(diameter: np.ndarray) -> np.ndarray:
         return np.rad2deg(np.sqrt(np.maximum((np.asarray(diameter) / base) ** 2 - 1, 0)))
 
     upper: Any = panel.secondary_xaxis("top", functions=(to_diameter, to_angle))
@@ -251,7 +258,7 @@ def _over_roll_angle(panel: Axes, side: Side, title: str) -> None:
     upper.tick_params(labelsize=panel.xaxis.label.get_fontsize(), width=0.6, length=3)
 
 
-_FACE_LABEL = "face coordinate [mm]"
+_FACE_LABEL, _PRESSURE_LABEL = "face coordinate [mm]", "flank pressure [MPa]"
 
 
 def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
@@ -264,7 +271,7 @@ def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
     path, face, flank = _pressed(cycle)
     contact = cycle.kinematics.path_of_contact
     with report_axes(ax) as ax:
-        _bar(ax, _draw(ax, path, face, flank, None))
+        colour_bar(_draw(ax, path, face, flank, None), ax, _PRESSURE_LABEL, pad=0.02)
         mark_path(ax, contact, zorder=3)
         air = 0.05 * float(contact.base_pitch)
         ax.set_xlim(float(contact.start) - air, float(contact.end) + air)
@@ -272,7 +279,7 @@ def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def contact_pattern(cycle: MeshCycle, ax=None) -> np.ndarray:
+def contact_pattern(cycle: MeshCycle, ax: Panels | None = None) -> np.ndarray:
     """Contact pattern: Hertzian pressure [MPa] over the roll angle and the face width of pinion and wheel.
 
     Each over the active profile, from its start on the left to the tip on the right; white where the flanks part.
@@ -294,7 +301,7 @@ def contact_pattern(cycle: MeshCycle, ax=None) -> np.ndarray:
             panel.set_xlim(*np.rad2deg(np.array([*ends]) / base))
             panel.set(ylim=(face[0], face[-1]), xlabel=f"roll angle of the {title} [deg]")
         panels[0].set_ylabel(_FACE_LABEL)
-        _bar(panels[1], image)
+        colour_bar(image, panels[1], _PRESSURE_LABEL, pad=0.02)
     return np.asarray(panels)
 
 
@@ -306,16 +313,10 @@ def _pressed(cycle: MeshCycle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.append(path, path[-1] + step) - 0.5 * step, face, np.where(flank > 0, flank, np.nan)
 
 
-def _draw(ax: Axes, along, face, flank, most: float | None) -> ScalarMappable:
+def _draw(ax: Axes, along: np.ndarray, face: np.ndarray, flank: np.ndarray, most: float | None) -> ScalarMappable:
     ax.grid(False)
     # cividis: even in lightness, so that it reads the same in grey and for every kind of colour vision
     return ax.pcolormesh(along, face, flank, cmap="cividis_r", vmin=0, vmax=most)
-
-
-def _bar(ax: Axes, image: ScalarMappable) -> None:
-    bar = ax.figure.colorbar(image, ax=ax, pad=0.02)
-    bar.set_label("flank pressure [MPa]")
-    bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
 
 
 def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None = None) -> Axes:

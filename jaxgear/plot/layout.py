@@ -1,7 +1,6 @@
 """Layouts: shafts under load, cases of deviations, and radar charts of variants in parallel."""
 
-import textwrap
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,8 +9,22 @@ from matplotlib.patches import Rectangle
 
 from ..layout import CASES, ToleranceCases
 from ..shafts import Gearbox, Shaft, elastic_line
-from .figure import FONT, GREY, PALE, WIDTH, legend_above, line_style, marker_style, report_axes, report_figure
-from .variants import Labels, Table, columns_of, costs, label, parts
+from ..sweeps.columns import printed_unit
+from .figure import (
+    FONT,
+    GREY,
+    PALE,
+    WIDTH,
+    Panels,
+    legend_above,
+    line_style,
+    marker_style,
+    report_axes,
+    report_figure,
+    style_number,
+)
+from .front import wrapped
+from .variants import Of, Table, columns_of, costs
 
 _PANEL = (58.0, 60.0)  # width and height of one chart [mm]
 _ACROSS = 3  # charts in a row
@@ -23,15 +36,12 @@ _LINES, _TITLE_PAD = 2, 9.0  # lines on the upper spoke, and the distance of the
 
 
 def radar(
-    table: Table,
-    columns: Sequence[str],
+    table: Table[Of],
     variants: Sequence[int] | None = None,
     names: Sequence[str] | None = None,
-    ax: np.ndarray | None = None,
+    ax: Panels | None = None,
     *,
     note: str = "",
-    labels: Labels | None = None,
-    maximize: Collection[str] = (),
 ) -> np.ndarray:
     """One radar chart per variant, each spoke from the worst value of the variants shown, inside, to the best one.
 
@@ -41,28 +51,29 @@ def radar(
     the first variant is drawn into every chart for comparison.
 
     Args:
-        table: values by the name of their column.
-        columns: results on the spokes, at least three.
+        table: values of every variant by what they are, a `Quantity` or a column of a sweep: the results on the spokes,
+            at least three.
         variants: row numbers of the variants; None for all rows, of which a page holds about nine.
         names: of the variants; None for their row numbers.
         ax: one polar Axes per variant; None for a new figure.
         note: what all values have in common, such as "mean over torques"; it stands under the charts.
-        labels: labels with units by column; others are derived from the column's name.
-        maximize: columns in which large values are the better ones.
 
     Returns:
         the Axes, one per variant.
 
     Raises:
-        ValueError: for unknown columns, less than three of them, or a value that is not finite.
+        ValueError: for less than three results, or a value that is not finite.
     """
-    values = columns_of("radar", table, columns, least=3)
+    values = columns_of("radar", table, least=3)
     rows = np.arange(len(values)) if variants is None else np.asarray(variants, int)
     names = [f"variant {row}" for row in rows] if names is None else names
     values = values[rows]
-    _check(values, rows, names, columns)
-    radii = _radii(costs(values, columns, maximize))
-    texts = _texts(values, [parts(label(name, labels)) for name in columns])
+    if len(names) != len(rows) or len(rows) == 0:
+        raise ValueError(f"radar: names has {len(names)} entries, must have one for each of {len(rows)} variants")
+    for row, column in np.argwhere(~np.isfinite(values))[:1]:
+        raise ValueError(f"radar: {list(table)[column].words} of {names[row]} is {values[row, column]}, must be finite")
+    radii = _radii(costs(values, table))
+    texts = _texts(values, [(of.words, printed_unit(of.unit)) for of in table])
     if ax is not None:
         panels = np.atleast_1d(ax)
         _draw(panels, radii, texts, names)
@@ -80,15 +91,6 @@ def radar(
     return grid[: len(rows)]
 
 
-def _check(values, rows, names, columns) -> None:
-    if len(names) != len(rows) or len(rows) == 0:
-        raise ValueError(f"radar: names has {len(names)} entries, must have one for each of {len(rows)} variants")
-    bad = np.argwhere(~np.isfinite(values))
-    if bad.size:
-        row, column = bad[0]
-        raise ValueError(f"radar: {columns[column]} of {names[row]} is {values[row, column]}, must be finite")
-
-
 def _radii(cost: np.ndarray) -> np.ndarray:
     """Distance from the centre: 1 for the best of every column, also where all are equal."""
     best, worst = cost.min(axis=0), cost.max(axis=0)
@@ -98,41 +100,36 @@ def _radii(cost: np.ndarray) -> np.ndarray:
     return 1 - (1 - _INNER) * badness
 
 
-def _texts(values: np.ndarray, named) -> list[list[str]]:
+def _texts(values: np.ndarray, named: Sequence[tuple[str, str]]) -> list[list[str]]:
     """What stands at the spokes of every variant: name, value and unit."""
     largest = np.abs(values).max(axis=0)
     decimals = np.clip(2 - np.floor(np.log10(np.where(largest > 0, largest, 1.0))), 0, 4).astype(int)
     return [
         [
-            f"{_wrapped(what)}\n{value:.{digits}f} {unit}".rstrip()
+            f"{wrapped(what, _LINE)}\n{value:.{digits}f} {unit}".rstrip()
             for value, digits, (what, unit) in zip(row, decimals, named)
         ]
         for row in values
     ]
 
 
-def _wrapped(what: str) -> str:
-    """Long names on several lines."""
-    return "\n".join(textwrap.wrap(what, _LINE, break_long_words=False))
-
-
-def _draw(panels, radii: np.ndarray, texts, names) -> None:
+def _draw(panels: np.ndarray, radii: np.ndarray, texts: Sequence[Sequence[str]], names: Sequence[str]) -> None:
     angles = 2 * np.pi * np.arange(radii.shape[1]) / radii.shape[1]
     above = max(text[0].count("\n") + 1 for text in texts)  # lines on the upper spoke
     pad = _TITLE_PAD + max(above - _LINES, 0) * 1.15 * (FONT - 2)
-    for index, (panel, radius) in enumerate(zip(panels, radii)):
+    for index, (panel, radius, name) in enumerate(zip(panels, radii, names)):
         _frame(panel, angles)
-        style = line_style(index)
+        style = line_style(style_number(name, index))
         if index:
             panel.plot(*_closed(angles, radii[0]), color=GREY, linewidth=1.0, linestyle=(0, (3, 2)), zorder=3)
         panel.plot(*_closed(angles, radius), color=style["color"], linewidth=1.6, zorder=4)
         panel.fill(angles, radius, color=style["color"], alpha=0.15, linewidth=0, zorder=2)
         for angle, far, text in zip(angles, radius, texts[index]):
             _spoke_text(panel, angle, text, bold=far == 1.0)
-        panel.set_title(names[index], fontsize=FONT, fontweight="bold", color=style["color"], pad=pad)
+        panel.set_title(name, fontsize=FONT, fontweight="bold", color=style["color"], pad=pad)
 
 
-def _frame(panel, angles) -> None:
+def _frame(panel: Axes, angles: np.ndarray) -> None:
     """Spokes, rim and inner ring as straight lines between the spokes."""
     panel.set_theta_zero_location("N")
     panel.set_theta_direction(-1)
@@ -144,11 +141,11 @@ def _frame(panel, angles) -> None:
     panel.vlines(angles, 0, 1, color=PALE, linewidth=0.7, zorder=1)
 
 
-def _closed(angles, radius):
+def _closed(angles: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.append(angles, angles[0]), np.append(radius, radius[0])
 
 
-def _spoke_text(panel, angle: float, text: str, *, bold: bool) -> None:
+def _spoke_text(panel: Axes, angle: float, text: str, *, bold: bool) -> None:
     side, up = np.sin(angle), np.cos(angle)
     panel.text(
         angle,
@@ -229,7 +226,7 @@ _ROOM = 1.35  # of a panel, over the largest radius drawn
 _GEAR = "#EEF3F7"
 
 
-def shaft_deflection(gearbox: Gearbox, ax=None) -> np.ndarray:
+def shaft_deflection(gearbox: Gearbox, ax: Panels | None = None) -> np.ndarray:
     """Shafts of a gearbox side-on with their elastic lines, one panel each, in the direction of the largest deflection.
 
     The line is exaggerated by the factor in its legend, which names largest deflection and direction too; the shafts

@@ -1,21 +1,22 @@
 """Curves over the mesh cycle: transmission error, load sharing, stiffness, pressure, and the path of contact."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
 
 from ..contact import MeshCycle
 from ..metrics import load_sharing as share
 from ..metrics import secant_stiffness
-from .figure import ABOVE_MARKS, GREY, legend_above, line_style, mark_path, report_axes
+from .figure import ABOVE_MARKS, GREY, legend_above, line_style, mark_path, report_axes, styled
 
 PATH_LABEL = "path of contact from the pitch point [mm]"
 PHASE_LABEL = "mesh phase [base pitches]"
 
 
-def pair_history(cycle: MeshCycle, values) -> tuple[np.ndarray, np.ndarray]:
+def pair_history(cycle: MeshCycle, values: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """What one pair goes through from first to last contact.
 
     All pairs are alike and follow each other at one base pitch, so the pairs of a cycle, put in the order of their path
@@ -35,7 +36,7 @@ def pair_history(cycle: MeshCycle, values) -> tuple[np.ndarray, np.ndarray]:
     return path[order], stages[..., order]
 
 
-def path_limits(cycles) -> tuple[float, float]:
+def path_limits(cycles: Iterable[MeshCycle]) -> tuple[float, float]:
     """Path range that holds the path of contact and all loaded corner contact of these cycles, with some air [mm]."""
     low, high = [], []
     for cycle in cycles:
@@ -47,7 +48,7 @@ def path_limits(cycles) -> tuple[float, float]:
     return min(low), max(high)
 
 
-def two_pitches(phase, curve) -> tuple[np.ndarray, np.ndarray]:
+def two_pitches(phase: ArrayLike, curve: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Phase and curve over two base pitches, closed at the end.
 
     Args:
@@ -67,7 +68,7 @@ def transmission_error(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) 
         ax: Axes to draw into; None for a new figure.
     """
     with report_axes(ax) as ax:
-        for index, (name, cycle) in enumerate(cycles.items()):
+        for index, name, cycle in styled(cycles):
             ppte = np.ptp(np.asarray(cycle.transmission_error))
             curve = two_pitches(cycle.phase, cycle.transmission_error)
             ax.plot(*curve, label=f"{name} (PPTE {ppte:.2f} µm)", **line_style(index))
@@ -84,7 +85,7 @@ def load_sharing(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axe
         ax: Axes to draw into; None for a new figure.
     """
     with report_axes(ax) as ax:
-        for index, (name, cycle) in enumerate(cycles.items()):
+        for index, name, cycle in styled(cycles):
             ax.plot(*pair_history(cycle, share(cycle)), label=name, **line_style(index))
         if cycles:
             mark_path(ax, next(iter(cycles.values())).kinematics.path_of_contact)
@@ -132,7 +133,7 @@ def pressure(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
     corners: dict[int, tuple[np.ndarray, np.ndarray]] = {}
     highest = 0.0
     with report_axes(ax) as ax:
-        for index, (name, cycle) in enumerate(cycles.items()):
+        for index, name, cycle in styled(cycles):
             path, flank = pair_history(cycle, np.asarray(cycle.contact_pressure).max(axis=1))
             _, corner = pair_history(cycle, np.asarray(cycle.corner_pressure).max(axis=1))
             contact = cycle.kinematics.path_of_contact
@@ -223,7 +224,9 @@ def meshing_diagram(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _place(position: float, along, centres, base, start: float, end: float) -> np.ndarray:
+def _place(
+    position: float, along: np.ndarray, centres: Sequence[np.ndarray], base: np.ndarray, start: float, end: float
+) -> np.ndarray:
     """Point of contact [mm] of a pair at a path position: on the line of action, or with a tip corner beyond it."""
     if start <= position <= end:
         return position * along

@@ -1,110 +1,65 @@
 """Many variants and torques: tables read as pictures, response surfaces, scatter over manufactured gears."""
 
-import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from typing import TypeVar
 
 import numpy as np
+import scipy  # its packages load when they are used
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
 
 from ..conditions import ranked
+from ..metrics import Quantity
 from ..numerics import Quantile, real
 from ..sweeps import Scatter
-from ..vocabulary import quantities
+from ..sweeps.columns import Column, printed_unit
+from ..vocabulary import quantity_of
 from .figure import (
+    ABOVE,
     ABOVE_MARKS,
     FONT,
     GREY,
+    colour_bar,
     laid_out_size,
     legend_above,
     line_style,
     marker_style,
     report_axes,
+    styled,
     text_above,
 )
 from .mesh_cycle import PHASE_LABEL, two_pitches
 
-Table = Mapping[str, np.ndarray]
-Labels = Mapping[str, str]
-
-# unit as it stands in a column name, and in print
-_UNITS = {
-    "N_per_mm": "N/mm",
-    "N_per_um": "N/µm",
-    "um": "µm",
-    "mm": "mm",
-    "MPa": "MPa",
-    "Nm": "N m",
-    "N": "N",
-    "W": "W",
-    "deg": "deg",
-    "degC": "°C",
-    "rpm": "rpm",
-    "Hz": "Hz",
-    "percent": "%",
-    "h": "h",
-}
-# what may follow the unit: the torque, or a statistic over torques and samples
-_STATISTIC = r"_[-+.\de]+(?:Nm|rpm)|_mean|_worst|_q[.\d]+|_cvar[.\d]+"
-_NAME = re.compile(rf"(?P<what>.+?)(_(?P<unit>{'|'.join(_UNITS)}))?(?P<of>({_STATISTIC})*)")
+Of = TypeVar("Of", bound=Quantity | Column)
+Table = Mapping[Of, ArrayLike]  # of every variant, by what the number is; `SweepTable.values` gives one
 
 
-def label(name: str, labels: Labels | None = None) -> str:
-    """Label of a column with its unit, "max flank pressure [MPa]" for `max_flank_pressure_MPa`.
-
-    Args:
-        name: of the column.
-        labels: whole labels by the name of the column, which go before the ones derived from the names.
-    """
-    if labels and name in labels:
-        return labels[name]
-    match = _NAME.fullmatch(name)
-    what, unit, of = (match["what"], _UNITS.get(match["unit"], "-"), match["of"]) if match else (name, "-", "")
-    words = quantities[what].words if what in quantities else what.replace("_", " ")
-    return f"{words}{_in_words(re.findall(_STATISTIC, of))} [{unit}]"
-
-
-def _in_words(statistics: Sequence[str]) -> str:
-    """Cases and statistics of a column: the last of several is over manufactured gears, one before it over torques."""
-    texts = [re.sub(r"^([-+.\de]+)(Nm|rpm)$", lambda match: f"at {match[1]} {_UNITS[match[2]]}", one[1:])
-             for one in statistics]  # fmt: skip
-    over = [index for index, text in enumerate(texts) if not text.startswith("at ")]
-    if over and len(texts) > 1:
-        texts[over[-1]] += " over gears"
-        texts[over[0]] += " over torques" if len(over) > 1 else ""
-    return f" {', '.join(texts)}".rstrip()
-
-
-def parts(text: str) -> tuple[str, str]:
-    """A label in two: what it is, and its unit ("" for a pure number or none)."""
-    match = re.fullmatch(r"(.*?)\s*\[(.*)\]", text)
-    what, unit = (match[1], match[2]) if match else (text, "")
-    return what, "" if unit == "-" else unit
-
-
-def columns_of(owner: str, table: Table, names: Sequence[str], *, least: int = 1) -> np.ndarray:
+def columns_of(owner: str, table: Table[Of], *, least: int = 1) -> np.ndarray:
     """Columns of a table side by side as floats, shape (variants, columns).
 
     Raises:
-        ValueError: for a name that the table does not have, columns of different lengths or too few of them.
+        ValueError: for columns of different lengths or too few of them.
     """
-    if len(names) < least:
-        raise ValueError(f"{owner}: columns has {len(names)} names, must have at least {least}")
-    for name in names:
-        if name not in table:
-            raise ValueError(f'{owner}: "{name}" is not a column of the table, must be one of {", ".join(table)}')
-    columns = [np.asarray(table[name], float) for name in names]
+    if len(table) < least:
+        raise ValueError(f"{owner}: table has {len(table)} columns, must have at least {least}")
+    columns = [np.asarray(values, float) for values in table.values()]
     if len({column.shape for column in columns}) > 1 or columns[0].ndim != 1 or columns[0].size == 0:
-        shapes = ", ".join(f"{name} {column.shape}" for name, column in zip(names, columns))
+        shapes = ", ".join(f"{of.words} {column.shape}" for of, column in zip(table, columns))
         raise ValueError(f"{owner}: columns must be lists of the same length and not empty, not {shapes}")
     return np.stack(columns, axis=1)
 
 
-def costs(values: np.ndarray, names: Sequence[str], maximize: Collection[str]) -> np.ndarray:
+def costs(values: np.ndarray, columns: Iterable[Of]) -> np.ndarray:
     """The columns with their signs turned so that smaller is better in each."""
-    return values * np.array([-1.0 if name in maximize else 1.0 for name in names])
+    return values * np.array([float(of.sign) for of in columns])
+
+
+def meaning_label(of: Quantity, before: str = "", after: str = "") -> str:
+    """What a quantity means, with its unit in print, between further words."""
+    return f"{before}{of.meaning or of.words}{after} [{printed_unit(of.unit) or '-'}]"
 
 
 def subsample(rows: np.ndarray, count: int) -> np.ndarray:
@@ -125,10 +80,10 @@ _EDGE = 0.04  # part of the Axes along its edges that is too close for a label
 
 
 def response_surface(
-    phase,
-    torques,
-    te,
-    unloaded,
+    phase: ArrayLike,
+    torques: ArrayLike,
+    te: ArrayLike,
+    unloaded: ArrayLike,
     ax: Axes | None = None,
     *,
     design_torque: float | None = None,
@@ -155,9 +110,7 @@ def response_surface(
         ax.grid(False)
         # cividis: even in lightness, so that it reads the same in grey and for every kind of colour vision
         image = ax.contourf(x, rows, surface, levels, cmap="cividis")
-        bar = ax.figure.colorbar(image, ax=ax, pad=0.02)
-        bar.set_label("transmission error [µm]")
-        bar.ax.tick_params(labelsize=ax.xaxis.label.get_fontsize())
+        colour_bar(image, ax, "transmission error [µm]", pad=0.02)
         ax.set(xlim=(0, 2), ylim=(0, rows[-1]), xlabel=PHASE_LABEL, ylabel="pinion torque [N m]")
         if design_torque is not None:
             text = f"design torque {float(design_torque):g} N m"
@@ -170,7 +123,7 @@ def response_surface(
     return ax
 
 
-def _labelled_lines(ax: Axes, x, rows, surface, levels) -> None:
+def _labelled_lines(ax: Axes, x: np.ndarray, rows: np.ndarray, surface: np.ndarray, levels: np.ndarray) -> None:
     middle = 0.5 * (levels[0] + levels[-1])
     colours = ["white" if level < middle else "black" for level in levels]
     lines = ax.contour(x, rows, surface, levels, colors=colours, linewidths=0.6)
@@ -180,7 +133,7 @@ def _labelled_lines(ax: Axes, x, rows, surface, levels) -> None:
         ax.clabel(lines, fmt=lambda level: f"{level:g}", fontsize=FONT - 1, manual=places)
 
 
-def _label_place(points, highest: float) -> list:
+def _label_place(points: np.ndarray, highest: float) -> list[tuple[float, ...]]:
     """The point of a contour nearest to the middle of the two pitches; none for contours along the edges."""
     x, y = points.T / np.array([[2.0], [highest]])
     inside = points[(np.minimum(x, 1 - x) > _EDGE) & (np.minimum(y, 1 - y) > _EDGE)]
@@ -257,32 +210,37 @@ def ppte_histogram(scatter: Scatter, ax: Axes | None = None) -> Axes:
 
 
 def ppte_distribution(
-    samples: Mapping[str, np.ndarray],
+    samples: Mapping[str, ArrayLike],
     ax: Axes | None = None,
     level: float = 0.95,
     *,
-    of: str = "peak-to-peak transmission error",
+    of: str | Quantity = "ppte",
 ) -> Axes:
-    """Share of the manufactured gears whose PPTE stays below a value, of several designs.
+    """Share of the manufactured gears whose PPTE, or another quantity, stays below a value, of several designs.
 
     Args:
-        samples: PPTE of every sample [um] by the name of the design; those that failed, NaN, stay below no value.
+        samples: the quantity of every sample by the name of the design; those that failed, NaN, stay below no value.
         ax: Axes to draw into; None for a new figure.
         level: share that a line marks; the legend has each design's quantile, as `Quantile` takes it.
-        of: what the samples are, in words.
+        of: the quantity, or its name.
+
+    Raises:
+        ValueError: for an unknown name.
     """
+    quantity = quantity_of(of, "ppte_distribution")
+    unit = printed_unit(quantity.unit)
     with report_axes(ax) as ax:
-        for index, (name, values) in enumerate(samples.items()):
-            values = np.asarray(values)
+        for index, name, given in styled(samples):
+            values = np.asarray(given)
             ordered = np.sort(values[np.isfinite(values)])
             share = 100 * np.arange(1, ordered.size + 1) / values.size
             reached = float(ranked(Quantile(real(level)), values))
-            below = f", {100 * level:g} % below {reached:.2f} µm" if np.isfinite(reached) else ""
+            below = f", {100 * level:g} % below {reached:.2f} {unit}".rstrip() if np.isfinite(reached) else ""
             ax.plot(ordered, share, label=f"{name}{below}", **line_style(index))
         ax.axhline(100 * level, color=GREY, linewidth=0.8, zorder=0.5)
         ax.set_xlim(left=0)
         ax.set_ylim(0, 100)
-        ax.set(xlabel=f"{of} [µm]", ylabel="share of the gears below [%]")
+        ax.set(xlabel=meaning_label(quantity), ylabel="share of the gears below [%]")
         legend_above(ax)
     return ax
 
@@ -291,7 +249,7 @@ _DARK, _LIGHT = 0.0, 0.72  # part of the colour map that shows on white
 
 
 def ppte_over_torque(
-    torques, curves: Mapping[str, np.ndarray], ax: Axes | None = None, design_torque: float | None = None
+    torques: ArrayLike, curves: Mapping[str, ArrayLike], ax: Axes | None = None, design_torque: float | None = None
 ) -> Axes:
     """PPTE [um] of several designs over the torque, with the torque they were designed for.
 
@@ -308,7 +266,7 @@ def ppte_over_torque(
 
 
 def face_load_over_torque(
-    torques, curves: Mapping[str, np.ndarray], ax: Axes | None = None, design_torque: float | None = None
+    torques: ArrayLike, curves: Mapping[str, ArrayLike], ax: Axes | None = None, design_torque: float | None = None
 ) -> Axes:
     """Face load factor K_Hbeta of several designs over the torque; 1 is a load that is even over the face.
 
@@ -326,18 +284,27 @@ def face_load_over_torque(
     return ax
 
 
-def _over_torque(ax: Axes, torques, curves: Mapping[str, np.ndarray], design_torque: float | None) -> None:
-    for index, (name, curve) in enumerate(curves.items()):
-        ax.plot(np.asarray(torques), np.asarray(curve), label=name, clip_on=False, **marker_style(index))
-    if design_torque is not None:
-        ax.axvline(float(design_torque), color=GREY, linewidth=0.8, zorder=0.5)
-        text_above(ax, float(design_torque), f"design torque {float(design_torque):g} N m")
-    ax.set_xlim(left=0)
+_MARGIN = 0.03  # of the range of torques, on either side
+
+
+def _over_torque(ax: Axes, torques: ArrayLike, curves: Mapping[str, ArrayLike], design_torque: float | None) -> None:
+    along = np.asarray(torques, float)
+    for index, name, curve in styled(curves):
+        ax.plot(along, np.asarray(curve), label=name, clip_on=False, **marker_style(index))
+    marks = [] if design_torque is None else [float(design_torque)]
+    for mark in marks:
+        ax.axvline(mark, color=GREY, linewidth=0.8, zorder=0.5)
+        text_above(ax, mark, f"design torque {mark:g} N m")
+    low, high = np.min([*along, *marks]), np.max([*along, *marks])
+    air = _MARGIN * (high - low)
+    ax.set_xlim(low - air, high + air)
     ax.set_xlabel("pinion torque [N m]")
-    legend_above(ax, distance=4.0 if design_torque is None else ABOVE_MARKS)
+    legend_above(ax, distance=ABOVE if design_torque is None else ABOVE_MARKS)
 
 
-def harris_map(phase, torques, te, ax: Axes | None = None, *, design: str | None = None) -> Axes:
+def harris_map(
+    phase: ArrayLike, torques: ArrayLike, te: ArrayLike, ax: Axes | None = None, *, design: str | None = None
+) -> Axes:
     """Transmission error over two base pitches at several torques (Harris 1958), each curve with its torque at the end.
 
     Args:
@@ -348,7 +315,7 @@ def harris_map(phase, torques, te, ax: Axes | None = None, *, design: str | None
         design: name of the design, for a title; None for none.
     """
     order = np.argsort(torques)
-    torques = np.asarray(torques)[order]
+    torques = np.asarray(torques, float)[order]
     x, curves = two_pitches(phase, np.asarray(te)[order])
     colours = ScalarMappable(Normalize(0, 1), "viridis").to_rgba(np.linspace(_DARK, _LIGHT, len(torques)))
     with report_axes(ax) as ax:
@@ -370,17 +337,11 @@ def _line_height(ax: Axes) -> float:
     return 1.15 * ax.yaxis.label.get_fontsize() / laid_out_size(ax)[1] * (high - low)
 
 
-def _spread(heights, gap: float) -> np.ndarray:
+def _spread(heights: np.ndarray, gap: float) -> np.ndarray:
     """Heights moved apart as little as possible so that neighbours keep a gap; their order stays."""
-    heights = np.asarray(heights, float)
     order = np.argsort(heights, kind="stable")
     # least squares under y[i+1] - y[i] >= gap is isotonic regression of the heights minus their stacked offsets
     offsets = gap * np.arange(heights.size)
-    blocks: list[list[float]] = []
-    for value in heights[order] - offsets:
-        blocks.append([value])
-        while len(blocks) > 1 and np.mean(blocks[-2]) > np.mean(blocks[-1]):
-            blocks[-2:] = [blocks[-2] + blocks[-1]]
     spread = np.empty_like(heights)
-    spread[order] = np.array([np.mean(block) for block in blocks for _ in block]) + offsets
+    spread[order] = scipy.optimize.isotonic_regression(heights[order] - offsets).x + offsets
     return spread

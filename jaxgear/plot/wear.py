@@ -1,20 +1,24 @@
 """Worn flanks, and what they make of the mesh over the life."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..contact import MeshCycle
 from ..geometry import roll_angle
+from ..metrics import Quantity
 from ..vocabulary import quantity_of
 from ..wear import WearLife, over_life, wear_depth
-from .figure import legend_above, line_style, marker_style, report_axes
+from .figure import legend_above, line_style, marker_style, report_axes, styled
+from .variants import meaning_label
 
 _GEARS = "pinion", "wheel"
 _SHOWN = 4  # lives
 
 
-def worn_flank(life: WearLife, gear: str, ax: Axes | None = None, *, title: str = "") -> Axes:
+def worn_flank(life: WearLife, gear: Literal["pinion", "wheel"], ax: Axes | None = None, *, title: str = "") -> Axes:
     """Wear depth [um] of one gear over its roll angle [deg] at several lives, in the line that is worn deepest.
 
     Material removed goes down, as in the K-chart.
@@ -46,7 +50,9 @@ def worn_flank(life: WearLife, gear: str, ax: Axes | None = None, *, title: str 
     return ax
 
 
-def lives(of: Mapping[str, WearLife], quantity="ppte", ax: Axes | None = None) -> Axes:
+def lives(
+    of: Mapping[str, WearLife], quantity: str | Quantity | Callable[[MeshCycle], Any] = "ppte", ax: Axes | None = None
+) -> Axes:
     """A quantity of several designs over the revolutions of the pinion.
 
     Args:
@@ -56,20 +62,12 @@ def lives(of: Mapping[str, WearLife], quantity="ppte", ax: Axes | None = None) -
         ax: Axes to draw into; None for a new figure.
     """
     with report_axes(ax) as ax:
-        for index, (name, life) in enumerate(of.items()):
+        for index, name, life in styled(of):
             values = wear_depth(life) if quantity == "wear_depth" else over_life(life, quantity)
             done = np.asarray(life.revolutions)
             every = max(1, len(done) // 10)
             ax.plot(done, np.asarray(values), label=name, markevery=every, **marker_style(index))
-        ax.set(xlabel="revolutions of the pinion", ylabel=_label(quantity))
+        ax.set(xlabel="revolutions of the pinion", ylabel=meaning_label(quantity_of(quantity, "lives")))
         ax.set_xlim(left=0)
         legend_above(ax)
     return ax
-
-
-def _label(quantity) -> str:
-    if quantity == "wear_depth":
-        return "largest wear depth [µm]"
-    known = quantity_of(quantity, "lives")
-    unit = known.unit.replace("um", "µm")
-    return f"{known.meaning or known.name}" + (f" [{unit}]" if unit else "")

@@ -13,7 +13,6 @@ from .page import figure as figure
 from .page import heading as heading
 from .page import needed as needed
 from .page import numbers as numbers
-from .page import read_table as read_table
 from .page import text as text
 from .page import write_report as write_report
 from .variants import MOST_ROWS as MOST_ROWS

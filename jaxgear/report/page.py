@@ -7,12 +7,13 @@ import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from unicodedata import category
 
 import numpy as np
 import rich.table
+from rich.box import SIMPLE_HEAD
 
+from ..io import writing
 from ..numerics.durable import write_durably
 from ..vocabulary import quantities
 
@@ -53,9 +54,9 @@ class Source:
         return cls(path.name, content.decode("utf-8-sig", "replace"), hashlib.sha256(content).hexdigest())
 
 
-@dataclass(frozen=True)
+@dataclass
 class Table:
-    """A table of texts.
+    """A table of texts, which a terminal prints and a report holds.
 
     Attributes:
         header: one text per column.
@@ -66,10 +67,27 @@ class Table:
     """
 
     header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    rows: tuple[tuple[str, ...], ...] = ()
     title: str = ""
     note: str = ""
     ends: tuple[int, ...] = ()
+
+    def add_row(self, *cells: str) -> None:
+        """Adds a row at the end."""
+        self.rows += (cells,)
+
+    def add_section(self) -> None:
+        """Ends a group of rows."""
+        self.ends += (len(self.rows) - 1,)
+
+    def __rich__(self) -> rich.table.Table:
+        shown = rich.table.Table(box=SIMPLE_HEAD, title_justify="left", caption_justify="left")
+        shown.title, shown.caption = self.title or None, self.note or None
+        for place, heading in enumerate(self.header):
+            shown.add_column(heading, justify="right" if place else "left", no_wrap=place > 0)
+        for number, row in enumerate(self.rows):
+            shown.add_row(*row, end_section=number in self.ends)
+        return shown
 
 
 @dataclass(frozen=True)
@@ -130,19 +148,6 @@ class Report:
     sections: Sequence[Chapter]
 
 
-def read_table(printed: rich.table.Table) -> Table:
-    """The table that a command prints."""
-    columns = [[str(cell) for cell in column.cells] for column in printed.columns]
-    ends = tuple(number for number, row in enumerate(printed.rows) if row.end_section)
-    return Table(
-        header=tuple(str(column.header) for column in printed.columns),
-        rows=tuple(zip(*columns)),
-        title=str(printed.title or ""),
-        note=str(printed.caption or ""),
-        ends=ends,
-    )
-
-
 _TEMPLATES = Path(__file__).parent / "templates"
 # Between the margins of A4 are 180 mm: letters of a picture of this width [mm] shrink from 9 to 7.7 points, and
 # wider ones lie on their side.
@@ -158,16 +163,21 @@ def write_report(path: Path, report: Report) -> None:
         ValueError: without the library jinja2, or when the file cannot be written.
     """
     needed("jinja2")
-    page = template("report.html").render(report=report, upright=_UPRIGHT)
-    held = printable(page).encode("utf-8", "replace")
-    try:
-        write_durably(path, lambda file: file.write(held))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
+    write_text(path, printable(rendered("report.html", report=report, upright=_UPRIGHT)))
 
 
-def template(name: str) -> Any:
-    """A template of the pages."""
+def write_text(path: Path, text: str) -> None:
+    """Writes a text whole or not at all.
+
+    Raises:
+        ValueError: when the file cannot be written.
+    """
+    with writing(path):
+        write_durably(path, lambda file: file.write(text.encode("utf-8", "replace")))
+
+
+def rendered(template: str, **parts: object) -> str:
+    """A page of a template, with the parts that it asks for."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -177,7 +187,8 @@ def template(name: str) -> Any:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(name)
+    page: str = environment.get_template(template).render(**parts)
+    return page
 
 
 def printable(text: str) -> str:
@@ -265,32 +276,13 @@ def figure(path: Path) -> Figure:
     return Figure(path.stem, caption, data, pixels / density * _MM)
 
 
-# ending of a name -> unit; the first that fits counts
-_UNITS = {
-    "N_per_(ms^0.5K)": "N/(m s^0.5 K)",
-    "kg_per_m^3": "kg/m^3",
-    "N_per_mm": "N/mm",
-    "N_per_um": "N/um",
-    "mm2_per_s": "mm2/s",
-    "m2_per_N": "m2/N",
-    "percent": "%",
-    "mm3": "mm3",
-    "mm2": "mm2",
-    "mm": "mm",
-    "um": "um",
-    "degC": "degC",
-    "deg": "deg",
-    "sqrt_MPa": "MPa^0.5",
-    "MPa": "MPa",
-    "Nm": "N m",
-    "rpm": "rpm",
-    "Hz": "Hz",
-    "kg": "kg",
-    "N": "N",
-    "W": "W",
-    "K": "K",
-    "h": "h",
-    "s": "s",
+# units that names end with, those first that end with another one
+_UNITS = (
+    *("N/(m s^0.5 K)", "kg/m^3", "N/mm", "N/um", "mm2/s", "m2/N", "mm3", "mm2", "mm", "um", "degC", "deg", "MPa"),
+    *("N m", "rpm", "Hz", "kg", "N", "W", "K", "h", "s"),
+)
+_ENDINGS = {"percent": "%", "sqrt_MPa": "MPa^0.5"} | {
+    unit.replace(" ", "").replace("/", "_per_"): unit for unit in _UNITS
 }
 _DIGITS = 6  # of a number
 _MOST = 12  # numbers of a list that are written out
@@ -301,19 +293,19 @@ def heading(name: str) -> str:
     """A name of `summary.json` in words: "max_flank_pressure_MPa" becomes "max flank pressure [MPa]"."""
     if name in quantities:
         return quantities[name].heading
-    for ending, unit in _UNITS.items():
+    for ending, unit in _ENDINGS.items():
         if name.endswith(f"_{ending}"):
             return f"{name.removesuffix(f'_{ending}').replace('_', ' ')} [{unit}]"
     return name.replace("_", " ")
 
 
-def text(value: Any) -> str:
+def text(value: object) -> str:
     """A value in six digits, as the whole report writes it; "-" where there is none."""
     if isinstance(value, Mapping):
         return ", ".join(f"{heading(str(key))} {text(item)}" for key, item in value.items()) or "-"
-    if isinstance(value, list | tuple) or np.ndim(value):
-        items = list(value)
-        shown = ", ".join(text(item) for item in items[:_MOST])
+    items = value if isinstance(value, list | tuple) else np.asarray(value)
+    if not isinstance(items, np.ndarray) or items.ndim:
+        shown = ", ".join(map(text, items[:_MOST]))
         return f"{shown}, ... ({len(items)} values)" if len(items) > _MOST else shown or "-"
     if isinstance(value, str) or value is None:
         return value or "-"
@@ -325,7 +317,7 @@ def text(value: Any) -> str:
     return f"{number:.{_DIGITS}g}" if isinstance(number, float | np.floating) else str(number)
 
 
-def numbers(data: Mapping[str, Any], within: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
+def numbers(data: Mapping[str, object], within: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
     """Name and text of everything that nested data hold, in their order."""
     for name, value in data.items():
         names = (*within, heading(str(name)))

@@ -1,16 +1,18 @@
 """Variants of a sweep as an interactive page and as an Excel workbook."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..io import writing
 from ..numerics.durable import write_durably
 from ..sweeps import SweepTable
-from .page import needed, printable, template
+from ..sweeps.columns import axis_label
+from .page import needed, printable, rendered, write_text
 
 # a sheet of this many rows and some tens of columns opens in seconds; Excel itself ends at 1 048 576
 MOST_ROWS = 20_000
@@ -49,10 +51,8 @@ def write_workbook(path: Path, facts: Sequence[tuple[str, str]], best: SweepTabl
         about.set_column(1, 1, 3 * _WIDEST)
         _sheet(book.add_worksheet("best"), best, bold)
         _sheet(book.add_worksheet("variants" if every else "best variants"), shown, bold)
-    try:
+    with writing(path):
         write_durably(path, lambda file: file.write(held.getvalue()))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
 def _sheet(sheet, table: SweepTable, bold) -> None:
@@ -82,22 +82,18 @@ def write_variants(
     title: str,
     facts: Sequence[tuple[str, str]],
     table: SweepTable,
-    *,
-    labels: Mapping[str, str],
-    main: Sequence[str],
 ) -> None:
     """Writes a page that holds everything in itself, the library that draws it included, and refers to nothing.
 
-    Of more than `MOST_ROWS` variants the best by the first result, the Pareto front of the first two and an even share
-    of the others are in it. Failed variants are not.
+    The first column of every result has an axis of its own, the others can be chosen for the Pareto front. Of more than
+    `MOST_ROWS` variants the best by the first result, the Pareto front of the first two and an even share of the others
+    are in it. Failed variants are not.
 
     Args:
         path: file to write.
         title: of the sweep.
         facts: name and text of what identifies it.
         table: all variants.
-        labels: of its columns, with units.
-        main: results that have an axis of their own; the others can be chosen for the Pareto front.
 
     Raises:
         ValueError: without the libraries jinja2 and plotly, or when the file cannot be written.
@@ -105,13 +101,13 @@ def write_variants(
     needed("jinja2", "plotly")
     from plotly.offline import get_plotlyjs
 
-    shown = _shown(table, main)
-    data, count = _data(shown, labels, main)
+    data, count = _data(_shown(table))
     failed = table.failures()
     words = (
         f"{count} of {len(table)} variants, {failed} failed" if failed or count < len(table) else f"{count} variants"
     )
-    page = template("variants.html").render(
+    page = rendered(
+        "variants.html",
         title=printable(title),
         facts=[(name, printable(text)) for name, text in facts],
         shown=f"{words}. ",
@@ -119,41 +115,37 @@ def write_variants(
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         library=get_plotlyjs(),
     )
-    try:
-        write_durably(path, lambda file: file.write(page.encode("utf-8", "replace")))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
+    write_text(path, page)
 
 
-def _shown(table: SweepTable, main: Sequence[str]) -> SweepTable:
+def _shown(table: SweepTable) -> SweepTable:
     size = len(table)
     if size <= MOST_ROWS:
         return table
     # every so many-th, with the best of all for a third of the rows, and the front, whatever it takes
     share = np.arange(0, size, -(-3 * size // (2 * MOST_ROWS)))
     kept = [share, table.best(MOST_ROWS // 3).column("variant")]
-    if len(main) > 1:
-        kept.append(table.pareto(main[:2]).column("variant"))
+    if len(table.heads) > 1:
+        kept.append(table.pareto([head.name for head in table.heads[:2]]).column("variant"))
     return table.take(np.unique(np.concatenate(kept)))
 
 
-def _data(table: SweepTable, labels: Mapping[str, str], main: Sequence[str]) -> tuple[dict[str, Any], int]:
+def _data(table: SweepTable) -> tuple[dict[str, Any], int]:
     """What the page knows, of variants that did not fail, and how many these are."""
-    names = [*table.parameters, *main, *(name for name in table.results if name not in main)]
-    values = np.stack([np.asarray(table.column(name), float) for name in names])
-    fine = np.isfinite(values).all(axis=0)
-    values, numbers = values[:, fine], table.column("variant")[fine]
-    better = [table.find(name).better for name in names]
-    first = values[names.index(main[0])] * (-1 if table.find(main[0]).better == "larger" else 1)
+    parameters, heads = [column for column in table.columns if column.kind == "parameter"], table.heads
+    others = [column for column in table.columns if column.kind == "result" and column not in heads]
+    found = table.values(*parameters, *heads, *others)
+    fine = np.isfinite([*found.values()]).all(axis=0)
+    numbers = table.column("variant")[fine]
     columns = [
         {
-            "label": printable(labels.get(name, name)),
-            "kind": "parameter" if name in table.parameters else "result",
-            "main": name in table.parameters or name in main,
-            "better": better[place],
-            "values": [float(f"{value:.{_DIGITS}g}") for value in values[place].tolist()],
+            "label": printable(axis_label(column)),
+            "kind": column.kind,
+            "main": column not in others,
+            "better": column.better,
+            "values": [float(f"{value:.{_DIGITS}g}") for value in values[fine].tolist()],
         }
-        for place, name in enumerate(names)
+        for column, values in found.items()
     ]
-    chosen = np.argsort(first, kind="stable")[:_CHOSEN].tolist()
+    chosen = np.argsort(heads[0].sign * found[heads[0]][fine], kind="stable")[:_CHOSEN].tolist()
     return {"columns": columns, "variants": numbers.tolist(), "chosen": chosen}, len(numbers)

@@ -1,4 +1,4 @@
-"""Columns of the table: their names, their units, and which way is better.
+"""Columns of the table: the quantity that each holds, and the cases of a variant that it is of.
 
 A text that begins like a formula gets an apostrophe in front, which spreadsheets take for "this is text"; who reads the
 file again leaves it out.
@@ -6,9 +6,9 @@ file again leaves it out.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NoReturn
 
-from ..conditions import Conditions, LoadSpectrum, label, solve_case
+from ..conditions import Better, Conditions, label, solve_case
 from ..contact import Mesh, MeshCycle
 from ..metrics import Quantity
 from ..microgeometry import AbstractModification
@@ -33,24 +33,114 @@ def from_text(heading: str) -> str:
 VARIANT, CONVERGED = "variant", "converged"
 
 
+Kind = Literal["number", "parameter", "result", "flag"]
+
+
+def described(
+    name: str,
+    unit: str = "",
+    *,
+    label: str = "",
+    meaning: str = "",
+    better: Better = "smaller",
+    form: str = ".4g",
+) -> Quantity:
+    """A quantity of which only the description is known, as of a parameter or of a column that is read from a file.
+
+    Args:
+        name, unit, label, meaning, better, form: as of a `Quantity`; called with a cycle it raises a `ValueError`.
+    """
+    return Quantity(name, _not_computed, unit, meaning, better=better, label=label, form=form)
+
+
+def _not_computed(cycle: MeshCycle) -> NoReturn:
+    raise ValueError("Quantity: is known by its description only, it cannot be computed")
+
+
 @dataclass(frozen=True)
 class Column:
-    """One column of the table.
+    """One column of the table: a quantity of every variant, and the cases of the variant that it is of.
 
     Attributes:
-        name: with the unit for results, as written by the user for parameters.
-        unit: "" for a pure number.
-        kind: what it holds.
-        better: whether small or large values are the better ones, "" where neither is.
+        quantity: the number that it holds.
+        kind: what this number is.
+        torque: of the pinion to which a result belongs [N m]; None for all torques.
+        speed: of the pinion at this torque [rpm]; None where the loads have none.
+        statistic: by which several cases are joined, such as "mean" or "q95"; "" for a single case. The cases are those
+            of all torques and manufactured gears, or the manufactured gears of one torque.
         low, high: range of a parameter.
     """
 
-    name: str
-    unit: str
-    kind: Literal["number", "parameter", "result", "flag"]
-    better: Literal["smaller", "larger", ""] = ""
+    quantity: Quantity
+    kind: Kind = "result"
+    torque: float | None = None
+    speed: float | None = None
+    statistic: str = ""
     low: float | None = None
     high: float | None = None
+
+    @property
+    def name(self) -> str:
+        """As files carry it: with the unit for results, `ppte_um_25Nm_q95`, as written by the user for parameters."""
+        return f"{self.quantity.key if self.kind == 'result' else self.quantity.name}{self._case}"
+
+    @property
+    def name_without_unit(self) -> str:
+        """The name without the unit of a result, `ppte_25Nm_q95`."""
+        return f"{self.quantity.name}{self._case}"
+
+    @property
+    def named(self) -> str:
+        """Name with the unit, once: `height [um]` of a parameter, `ppte_um` of a result."""
+        return self.name if self.kind == "result" else self.quantity.named
+
+    @property
+    def words(self) -> str:
+        """In words without the unit: "PPTE at 25 N m, q95 over gears"."""
+        if self.torque is None:
+            return f"{self.quantity.words} {self.statistic}" if self.statistic else self.quantity.words
+        speed = "" if self.speed is None else f" and {self.speed:.12g} rpm"
+        over = f", {self.statistic} over gears" if self.statistic else ""
+        return f"{self.quantity.words} at {self.torque:.12g} N m{speed}{over}"
+
+    @property
+    def heading(self) -> str:
+        """In words with the unit: `PPTE mean [um]`."""
+        return f"{self.words} [{self.unit}]" if self.unit else self.words
+
+    @property
+    def unit(self) -> str:
+        """Unit of the quantity, "" for a pure number."""
+        return self.quantity.unit
+
+    @property
+    def better(self) -> Better | Literal[""]:
+        """Whether small or large values of a result are the better ones, "" where neither is."""
+        return self.quantity.better if self.kind == "result" else ""
+
+    @property
+    def sign(self) -> int:
+        """-1 where large values are the better ones, else 1."""
+        return self.quantity.sign
+
+    @property
+    def _case(self) -> str:
+        torque = "" if self.torque is None else f"_{self.torque:.12g}Nm"
+        speed = "" if self.speed is None else f"_{self.speed:.12g}rpm"
+        return f"{torque}{speed}" + (f"_{self.statistic}" if self.statistic else "")
+
+
+NUMBER, FLAG = Column(described(VARIANT), "number"), Column(described(CONVERGED), "flag")  # first and last of a table
+
+
+def axis_label(of: Quantity | Column) -> str:
+    """A number in words with its unit in print, as axes carry it: "PPTE [µm]", "contact ratio [-]"."""
+    return f"{of.words} [{printed_unit(of.unit) or '-'}]"
+
+
+def printed_unit(unit: str) -> str:
+    """A unit in print."""
+    return unit.replace("um", "µm").replace("mm3", "mm³").replace("degC", "°C")
 
 
 def parameter_columns(plan: AbstractPlan, units: Mapping[str, str], taken: Sequence[str]) -> list[Column]:
@@ -63,7 +153,7 @@ def parameter_columns(plan: AbstractPlan, units: Mapping[str, str], taken: Seque
         if name in taken or name in (VARIANT, CONVERGED):
             raise ValueError(f'sweep: parameter "{name}" has the name of another column of the table')
     limits = zip(plan.names, plan.low, plan.high)
-    return [Column(name, units.get(name, ""), "parameter", low=low, high=high) for name, low, high in limits]
+    return [Column(described(name, units.get(name, "")), "parameter", low=low, high=high) for name, low, high in limits]
 
 
 def result_columns(
@@ -84,21 +174,20 @@ def result_columns(
     """
     if not results or len({of.key for of in results}) != len(results):
         raise ValueError("sweep: results must be different and at least one")
-    loads = _labels(conditions.load) if len(conditions.load.torques) > 1 else []
-    joins = [f"_{label(measure)}" for measure in measures]
+    joins = [label(measure) for measure in measures] or [""]
     gears = joins if conditions.samples > 1 else [""]
-    endings = [*(joins or [""]), *(f"{load}{join}" for load in loads for join in gears)]
+    load = conditions.load
+    torques = load.torques.tolist() if len(load.torques) > 1 else []
+    speeds = [None] * len(torques) if load.speeds is None else load.speeds.tolist()
     columns = []
     for result in results:
-        columns += [Column(f"{result.key}{ending}", result.unit, "result", result.better) for ending in endings]
+        columns += [Column(result, statistic=join) for join in joins]
+        columns += [
+            Column(result, torque=torque, speed=speed, statistic=join)
+            for torque, speed in zip(torques, speeds)
+            for join in gears
+        ]
     return columns
-
-
-def _labels(load: LoadSpectrum) -> list[str]:
-    torques = [f"_{torque:.12g}Nm" for torque in load.torques.tolist()]
-    if load.speeds is None:
-        return torques
-    return [f"{torque}_{speed:.12g}rpm" for torque, speed in zip(torques, load.speeds.tolist())]
 
 
 def over_torques(

@@ -24,7 +24,7 @@ from ..metrics import Analysis, Quantity, share_settings
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
 from ..tolerance import Tolerance
 from ..vocabulary import quantities, quantity_of
-from .columns import CONVERGED, VARIANT, Column, parameter_columns
+from .columns import FLAG, NUMBER, Column, parameter_columns
 from .evaluate import FEW, LEAST_STEPS, Evaluator
 from .plan import AbstractPlan
 from .store import MANIFEST, Manifest, Store, load_manifest
@@ -211,10 +211,10 @@ def _wait(there: Callable[[], bool]) -> None:
 def _columns(plan: AbstractPlan, units: Mapping[str, str], evaluator: Evaluator) -> list[Column]:
     names = [column.name for column in evaluator.columns]
     return [
-        Column(VARIANT, "", "number"),
+        NUMBER,
         *parameter_columns(plan, units, names),
         *evaluator.columns,
-        Column(CONVERGED, "", "flag"),
+        FLAG,
     ]
 
 

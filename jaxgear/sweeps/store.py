@@ -19,11 +19,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..numerics.durable import write_durably
-from .columns import CONVERGED, VARIANT, Column
+from .columns import CONVERGED, VARIANT, Column, described
 
 MANIFEST = "_sweep.parquet"  # Arrow and Spark pass over such names, others find no row in it
 _PART = re.compile(r"part-(\d+)-[0-9a-f]+\.parquet")
 _LEFTOVER = re.compile(r"\.part-(\d+)-.*\.tmp")
+
+# numbers of a column by what its notes call them
+_NUMBERS = {"torque_Nm": "torque", "speed_rpm": "speed", "low": "low", "high": "high"}
 
 _log = logging.getLogger("jaxgear")
 
@@ -172,15 +175,17 @@ def load_manifest(folder: Path) -> Manifest:
 
 
 def _schema(manifest: Manifest):
-    """Arrow schema with units and ranges at the columns, and the sweep itself at the table."""
+    """Arrow schema with the quantities and ranges at the columns, and the sweep itself at the table."""
     import pyarrow
 
     types = {"number": pyarrow.int64(), "flag": pyarrow.bool_()}
     fields = []
     for column in manifest.columns:
-        notes = {"unit": column.unit, "kind": column.kind, "better": column.better}
-        if column.low is not None and column.high is not None:
-            notes |= {"low": repr(column.low), "high": repr(column.high)}
+        of = column.quantity
+        notes = {"unit": of.unit, "kind": column.kind, "better": column.better, "statistic": column.statistic}
+        notes |= {"quantity": of.name, "label": of.label, "meaning": of.meaning, "form": of.form}
+        numbers = {note: getattr(column, name) for note, name in _NUMBERS.items()}
+        notes |= {note: repr(number) for note, number in numbers.items() if number is not None}
         kept = {key: value for key, value in notes.items() if value or key == "unit"}
         fields.append(pyarrow.field(column.name, types.get(column.kind, pyarrow.float64()), metadata=kept))
     settings = manifest.settings
@@ -196,8 +201,10 @@ def _schema(manifest: Manifest):
 def _column(field) -> Column:
     """A column of the table from the field that `_schema` makes of it."""
     notes = {key.decode(): value.decode() for key, value in field.metadata.items()}
-    limits = {key: float(notes[key]) for key in ("low", "high") if key in notes}
-    return Column(field.name, notes["unit"], notes["kind"], notes.get("better", ""), **limits)
+    texts = {name: notes.get(name, "") for name in ("label", "meaning", "form")}
+    quantity = described(notes["quantity"], notes["unit"], better=notes.get("better", "smaller"), **texts)
+    numbers = {name: float(notes[note]) for note, name in _NUMBERS.items() if note in notes}
+    return Column(quantity, notes["kind"], statistic=notes.get("statistic", ""), **numbers)
 
 
 def _parquet(table) -> memoryview:

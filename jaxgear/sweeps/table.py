@@ -107,7 +107,14 @@ class SweepTable:
     @property
     def headings(self) -> dict[str, str]:
         """Name of every column with its unit, once."""
-        return {column.name: _heading(column) for column in self.columns}
+        return {column.name: column.named for column in self.columns}
+
+    @property
+    def heads(self) -> tuple[Column, ...]:
+        """The first column of every result, which of a load spectrum or a tolerance is the mean."""
+        results = [column for column in self.columns if column.kind == "result"]
+        firsts = {column.quantity.name: column for column in reversed(results)}
+        return tuple(column for column in results if firsts[column.quantity.name] is column)
 
     def find(self, name: str) -> Column:
         """The column of a name: with or without its unit, a result's own name standing for its (weighted) mean.
@@ -115,9 +122,9 @@ class SweepTable:
         Raises:
             ValueError: for an unknown column.
         """
-        for ending in ("", "_mean", "_mean_mean"):
+        for wanted in (name, f"{name}_mean"):
             for column in self.columns:
-                if f"{name}{ending}" in (column.name, _without_unit(column)):
+                if wanted in (column.name, column.name_without_unit):
                     return column
         raise ValueError(f'SweepTable: "{name}" is not a column, must be one of {", ".join(self.names)}')
 
@@ -142,6 +149,15 @@ class SweepTable:
             ValueError: for an unknown column.
         """
         return np.concatenate([batch[name] for batch in self.batches([name])])
+
+    def values(self, *columns: str | Column) -> dict[Column, np.ndarray]:
+        """Whole columns by what they hold, as figures take them, each of shape (variants,).
+
+        Raises:
+            ValueError: for an unknown column.
+        """
+        wanted = [of if isinstance(of, Column) else self.find(of) for of in columns]
+        return {column: self.column(column.name) for column in wanted}
 
     def failures(self) -> int:
         """Number of variants that failed."""
@@ -242,7 +258,7 @@ class SweepTable:
         count = len(self)
         lines = [f"SweepTable {self.title}: {count} variants, {self.failures()} failed"]
         head = next(self.batches(), {}) if count else {}
-        cells = [[_heading(c), *(_text(value) for value in head[c.name][:_SHOWN])] for c in self.columns if head]
+        cells = [[c.named, *(_text(value) for value in head[c.name][:_SHOWN])] for c in self.columns if head]
         widths = [max(map(len, column)) for column in cells]
         lines += ["  ".join(cell.rjust(width) for cell, width in zip(row, widths)) for row in zip(*cells)]
         return "\n".join([*lines, "..."] if count > _SHOWN else lines)
@@ -258,7 +274,7 @@ class SweepTable:
 
     def _ranked(self, columns: Sequence[Column]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Row numbers and values of the columns, turned so that small is better, NaN where the variant failed."""
-        signs = np.array([-1.0 if column.better == "larger" else 1.0 for column in columns])
+        signs = np.array([column.sign for column in columns], float)
         first = 0
         for batch in self.batches([*dict.fromkeys([*(column.name for column in columns), CONVERGED])]):
             values = np.stack([batch[column.name].astype(float) for column in columns], axis=1) * signs
@@ -307,17 +323,6 @@ def _stored(path: Path, names: Sequence[str] | None):
             return file.read(names)
     except (OSError, pyarrow.ArrowException):
         raise ValueError(f"{path}: is damaged or gone: repeat the sweep, which mends it") from None
-
-
-def _heading(column: Column) -> str:
-    """Name with the unit, once: the names of results end with theirs."""
-    return f"{column.name} [{column.unit}]" if column.unit and column.kind == "parameter" else column.name
-
-
-def _without_unit(column: Column) -> str:
-    """Name of a result without the unit in it."""
-    unit = column.unit.replace(" ", "").replace("/", "_per_")
-    return column.name.replace(f"_{unit}", "", 1) if unit and column.kind == "result" else column.name
 
 
 def _text(value) -> str:
