@@ -316,7 +316,7 @@ def test_units_ranges_and_settings_are_in_the_files(folder):
         assert [getattr(column.quantity, name) for name in said] == [getattr(of, name) for name in said]
         assert (column.name, column.torque, column.statistic) == (of.key, None, "")
     with pytest.raises(ValueError, match="known by its description only"):
-        table.find("ppte").quantity.values(None)
+        table.find("ppte").quantity.of(None)
     assert table.units["ppte_um"] == "um" and table.units["effective_contact_ratio"] == ""
     table.to_csv(folder.parent / "table.csv")
     header, first, *_ = (folder.parent / "table.csv").read_text().splitlines()
