@@ -176,30 +176,50 @@ OF_ANY_TYPE = {
 }
 
 
-def untyped(body, owner=""):
-    """Public functions and methods, with constructors and operators, that leave a type out or say `Any`."""
+def public(body, owner=""):
+    """Public functions and methods, with constructors and operators: names and nodes."""
     for node in body:
         name = getattr(node, "name", "_")
         if name.startswith("_") and not name.endswith("__"):
             continue
         if isinstance(node, ast.ClassDef):
-            yield from untyped(node.body, f"{owner}{name}.")
+            yield from public(node.body, f"{owner}{name}.")
         elif isinstance(node, ast.FunctionDef):
-            given = node.args
-            every = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
-            hints = [part.annotation for part in every if part and not (owner and part.arg in ("self", "cls"))]
-            if any(hint is None or ast.unparse(hint) == "Any" for hint in [*hints, node.returns]):
-                yield owner + name
+            yield owner + name, node
+
+
+def untyped(body):
+    """Names of those that leave a type out or say `Any`."""
+    for name, node in public(body):
+        given = node.args
+        every = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
+        hints = [part.annotation for part in every if part and not ("." in name and part.arg in ("self", "cls"))]
+        if any(hint is None or ast.unparse(hint) == "Any" for hint in [*hints, node.returns]):
+            yield name
+
+
+def typed_files():
+    """Places in the package of the files that `TYPED` names, and what is at their module level."""
+    for path in FILES:
+        place = path.relative_to(PACKAGE).as_posix()
+        if layer(path) in TYPED and place not in TO_BE_TYPED:
+            yield place, ast.parse(path.read_text(encoding="utf-8")).body
 
 
 def test_public_signatures_are_typed():
-    found = {
-        f"{path.relative_to(PACKAGE).as_posix()} {name}"
-        for path in FILES
-        if layer(path) in TYPED and path.relative_to(PACKAGE).as_posix() not in TO_BE_TYPED
-        for name in untyped(ast.parse(path.read_text(encoding="utf-8")).body)
+    assert {f"{place} {name}" for place, body in typed_files() for name in untyped(body)} == set(OF_ANY_TYPE)
+
+
+def test_the_load_comes_by_place():
+    """After what is analysed and before the options, which come by keyword."""
+    amplitude = "dynamics/dimensionless/model.py dimensionless_model"  # that of an excitation
+    by_keyword = {
+        f"{place} {name}"
+        for place, body in typed_files()
+        for name, node in public(body)
+        if "torque" in [part.arg for part in node.args.kwonlyargs]
     }
-    assert found == set(OF_ANY_TYPE)
+    assert by_keyword == {amplitude}
 
 
 def test_the_check_sees_what_is_not_typed():

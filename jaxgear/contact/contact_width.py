@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from functools import reduce
 from operator import add
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -84,7 +84,7 @@ def place_of(mesh: Mesh, torque: Scalar, line_load: Real | None = None) -> Place
 
 
 def _side(mesh: Mesh, side: Side, direction: float) -> PlaceSide:
-    def number(value):
+    def number(value: Array) -> Array:
         return jnp.reshape(value, (1, 1, 1))
 
     return PlaceSide(
@@ -104,7 +104,7 @@ def terms_of(mesh: Mesh, dtype: np.dtype, pinion: AbstractModification, wheel: A
     On their own, since most vary along the profile or along the face only.
     """
 
-    def cast(leaf):
+    def cast(leaf: Any) -> Any:
         return leaf.astype(dtype) if eqx.is_inexact_array(leaf) else leaf
 
     return [
@@ -178,8 +178,10 @@ def probe(sided_terms: Sequence[Sided], place: Place, moved: Real, nodes: tuple[
 
 
 @by_numbers
-def _moments(term, points, shares):
-    sums = [0.0] * len(shares[0])
+def _moments(
+    term: AbstractModification, points: Sequence[Flank], shares: Sequence[Sequence[float]]
+) -> tuple[Array, ...]:
+    sums: list[Any] = [0.0] * len(shares[0])
     for point, weights in zip(points, shares):
         removed = term(point)
         sums = [total + weight * removed for total, weight in zip(sums, weights)]

@@ -1,5 +1,7 @@
 """How many tooth pairs a mesh has to carry along."""
 
+from collections.abc import Sequence
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -50,7 +52,7 @@ def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
 
 
 @program
-def _gaps_at(pair: GearPair, reaches):
+def _gaps_at(pair: GearPair, reaches: Sequence[tuple[int, int]]) -> Array:
     contact = path_of_contact(pair)
     return closing(_next_pairs(pair, contact, jnp.asarray(reaches, jnp.result_type(contact.start))))
 

@@ -17,6 +17,7 @@ References:
     is derived from the involute's generation.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -194,11 +195,11 @@ class Kinematics(Checked):
             return jnp.full((slices,), 1.0 / slices, self._dtype) * self.pair.face_width
         return jnp.asarray(np.diff(self.resolution.slice_edges), self._dtype) * self.pair.face_width
 
-    def _count(self, number: int):
+    def _count(self, number: int) -> Array:
         return jnp.arange(number, dtype=self._dtype)
 
     @property
-    def _dtype(self):
+    def _dtype(self) -> np.dtype:
         return self.path_of_contact.start.dtype
 
 
@@ -208,7 +209,7 @@ def _sides(moving: Kinematics) -> tuple[Side, Side]:
     return sides(pair, contact, contacts(pair, contact, moving.path))
 
 
-def _phases(first, count: int):
+def _phases(first: Array, count: int) -> Array:
     known = concrete(first)
     if known is None:
         return first[(0,) * first.ndim] + jnp.arange(count, dtype=first.dtype) / count
@@ -265,7 +266,7 @@ class _Corner(NamedTuple):
     mate_roll_length: Float[Array, "..."]
 
 
-def _corner(x, lengths, reach) -> _Corner:
+def _corner(x: Array, lengths: Sequence[Array], reach: Array) -> _Corner:
     """The corner at a distance outside the path [mm], zero on it; `lengths` as `corner_gap` takes them.
 
     Beyond `reach` the gap goes on along its tangent, so that far pairs stay finite and apart.

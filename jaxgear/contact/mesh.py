@@ -1,6 +1,7 @@
 """A prepared mesh: everything that depends neither on the modification nor on the torque."""
 
 from dataclasses import replace
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -176,7 +177,7 @@ class Mesh(eqx.Module):
         pinion, wheel = self.sides
         return self._flank(pinion, offset), self._flank(wheel, -offset)
 
-    def _flank(self, side: Side, offset) -> Flank:
+    def _flank(self, side: Side, offset: Given) -> Flank:
         rho = side.contact_roll_length
         # arc length of an involute: ds = rho / r_b d rho
         moved = jnp.maximum(rho + offset * side.base_radius / rho, 0.0)
@@ -262,7 +263,7 @@ def _labelled(mesh: Mesh, pair: GearPair, compliance: AbstractCompliance, resolu
 
 @program
 def _arrays_of(
-    first_phase,
+    first_phase: Any,
     pair: GearPair,
     gears: Gears,
     resolution: Resolution,
@@ -345,10 +346,10 @@ def parts(mesh: Mesh, positions: int) -> list[Mesh]:
 
 
 @program
-def _part(first, count: int, mesh: Mesh) -> Mesh:
+def _part(first: Array | np.ndarray, count: int, mesh: Mesh) -> Mesh:
     """Every so many positions from the first one on."""
 
-    def take(leaf):
+    def take(leaf: Array) -> Array:
         rows = leaf.reshape(*leaf.shape[:-1], -1, count)
         return jax.lax.dynamic_index_in_dim(rows, first, axis=-1, keepdims=False)
 

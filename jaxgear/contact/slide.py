@@ -21,7 +21,7 @@ carries. Where the structure is as accurate as that, it shows: on steep reliefs 
 to 9 % too small, and the loaded width leaves 2.5 % at worst.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax
@@ -35,6 +35,7 @@ from ..numerics import Checked, Numbers, changed, program, real, result, stored
 from .contact_width import (
     Node,
     Place,
+    Sided,
     flank_at,
     patch_nodes,
     place_of,
@@ -122,7 +123,7 @@ def slid_material(
     return RemovedMaterial(amount + found[0], found[1], found[2])
 
 
-def _slide(sided_terms, place: Place, nodes: tuple[Node, ...], steps: int) -> tuple[Real, Real, Real]:
+def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], steps: int) -> tuple[Real, Real, Real]:
     """Amount [um], shift [mm] and bend of `RemovedMaterial`, of the shape that the terms have."""
     bulge = 1e3 / place.radius
     moved = shift = jnp.zeros_like(place.radius)
@@ -180,7 +181,7 @@ def _gain(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], 
 
 
 @_gain.defjvp
-def _gain_jvp(primals, tangents):
+def _gain_jvp(primals: tuple[Array, ...], tangents: tuple[Array, ...]) -> tuple[Array, Array]:
     slope, curvature, *at = primals
     return _gain(*primals), jax.jvp(_gain_of, (stored(slope), stored(curvature), *at), tangents)[1]
 
