@@ -576,10 +576,10 @@ def test_a_search_without_numbers_to_keep_gives_its_flanks(tmp_path, file):
 
 
 def test_blocks_on_the_disk_are_the_blocks(tmp_path):
-    march = March(jnp.arange(3.0), jnp.ones(2), jnp.array([True, False]), {"converged": jnp.array([True, False])})
+    march = March(jnp.arange(3.0), jnp.ones(2), jnp.array([0, 3], jnp.int8), {"status": jnp.array([0, 1], jnp.int8)})
     found = Marches().result(dict(Marches().arrays(march)))
-    assert (found.known == march.known).all()
-    assert found.seen["converged"].dtype == bool and (found.depth == march.depth).all()
+    assert (found.status == march.status).all()
+    assert found.seen["status"].dtype == np.int8 and (found.depth == march.depth).all()
 
 
 @pytest.fixture(scope="module")

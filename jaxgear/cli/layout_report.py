@@ -10,6 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..contact import Mesh, MeshCycle
+from ..contact.status import Status
 from ..io import DesignFile, LayoutRequest, describe
 from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, ToleranceCases, gear_lives
 from ..metrics import Finding
@@ -154,9 +155,10 @@ def failures(study: LayoutStudy) -> Iterator[str]:
     """What is not to be trusted or not reached."""
     for name, layout in study.layouts.items():
         cases = [one for of in layout.cases for one in of.values()]
-        found = [*(one.load.converged for one in cases), *(one.converged for one in layout.damage)]
-        if not all(bool(np.all(one)) for one in found):
-            yield f"LOAD OVER THE FACE NOT FOUND: {name}; its numbers are not to be trusted"
+        statuses = [*(one.load.status for one in cases), *(one.status for one in layout.damage)]
+        status = Status(max(int(np.max(one)) for one in statuses))
+        if status != Status.CONVERGED:
+            yield f"LOAD OVER THE FACE NOT FOUND: {name}, {status.text}; its numbers are not to be trusted"
         if layout.touches_edges:
             yield f"the largest load is at an edge: {name}"
     known = np.isfinite(list(study.over_torque.values())).all(axis=0)

@@ -11,6 +11,7 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from ..contact.status import reason
 from ..io import DesignFile, WearRequest, describe
 from ..metrics import quantity_of
 from ..microgeometry import AbstractModification
@@ -206,8 +207,8 @@ def failures(study: WearStudy) -> Iterator[str]:
         if lost.any():
             first = float(life.revolutions[int(lost.argmax())])
             yield (
-                f"NOT CONVERGED: {name} from {first:.3g} revolutions on; its numbers are not to be trusted. "
-                "Take more blocks, or raise resolution.newton_steps or resolution.pairs. Or teeth are worn through."
+                f"NOT CONVERGED: {name} from {first:.3g} revolutions on, {reason(life.cycles.status)}; its numbers are "
+                "not to be trusted. Take more blocks, or raise resolution.newton_steps or resolution.pairs."
                 + _OF_MOTION
                 * (life.dynamic_factor is not None)
             )

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, ContactProblem, check, program, real, result, solve_contact, tangent_stiffness
@@ -12,7 +12,8 @@ from .face_coupling import check_torque
 from .mesh import Mesh
 from .operating_point import operating_point_of
 from .slide import RemovedMaterial, for_contact, loaded_material
-from .solve import check_mesh, flanks_of, outermost
+from .solve import check_mesh, contact_status, flanks_of
+from .status import Status, Statuses, WithStatus, status_of, worst
 
 # Newton steps of a mesh of several slices from the approach of all springs in series to that of the teeth: the force of
 # contacts that stiffen bends one way, so that the steps come from one side and double their digits.
@@ -25,7 +26,7 @@ Curve = Float[Array, " positions"]
 Load = Float[Array, "pairs slices positions"]
 
 
-class PrescribedContact(Checked):
+class PrescribedContact(WithStatus, Checked):
     """Result of `solve_at`.
 
     Attributes:
@@ -36,8 +37,7 @@ class PrescribedContact(Checked):
         tangent_stiffness: d force / d transmission error [N/um] on the material that is met; it counts only where there
             is contact.
         residual: largest relative violation of the contact conditions, shape (positions,).
-        converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
-            touch, and the gears can run, shape (positions,).
+        status: of every position, as of a `MeshCycle`, shape (positions,).
     """
 
     transmission_error: Curve = result("um")
@@ -46,7 +46,7 @@ class PrescribedContact(Checked):
     line_load: Load = result("N/mm")
     tangent_stiffness: Curve = result("N/um")
     residual: Curve = result()
-    converged: Bool[Array, " positions"] = result()
+    status: Statuses = result()
 
 
 def solve_at(
@@ -119,7 +119,6 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
     pair_force = mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1)
     force = jnp.sum(pair_force, axis=0)
     error = approach if shared is None else approach - shared * force
-    teeth = error - mesh.support_deflection(solution.line_load)
     return PrescribedContact(
         transmission_error=error,
         force=force,
@@ -127,7 +126,7 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
         line_load=solution.line_load,
         tangent_stiffness=tangent_stiffness(problem, solution),
         residual=solution.residual,
-        converged=solution.solved & mesh.valid & (teeth < outermost(mesh, removed)),
+        status=contact_status(mesh, solution, error, removed),
     )
 
 
@@ -136,11 +135,11 @@ class ForcedContact(NamedTuple):
 
     Attributes:
         line_load: [N/mm], shape (pairs, slices, positions).
-        converged: where the contact has been found, shape (positions,).
+        status: of every position, shape (positions,).
     """
 
     line_load: Load
-    converged: Bool[Array, " positions"]
+    status: Statuses
 
 
 @program
@@ -151,8 +150,7 @@ def solve_forces(mesh: Mesh, force: Curve, removed: RemovedMaterial) -> ForcedCo
         mesh.structure, law, gap, mesh.lever, mesh.slice_width, force, start_law=mesh.law, coupling=mesh.coupling
     )
     solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
-    teeth = solution.approach - mesh.support_deflection(solution.line_load)
-    return ForcedContact(solution.line_load, solution.solved & mesh.margins.valid & (teeth < outermost(mesh, removed)))
+    return ForcedContact(solution.line_load, contact_status(mesh, solution, solution.approach, removed))
 
 
 class SeriesContact(NamedTuple):
@@ -162,13 +160,13 @@ class SeriesContact(NamedTuple):
         force: [N].
         stiffness: its slope over the approach [N/um].
         transmission_error: of the teeth alone, as `solve_at` takes it [um].
-        converged: where the contact has been found.
+        status: of the contact.
     """
 
     force: Curve
     stiffness: Curve
     transmission_error: Curve
-    converged: Bool[Array, " positions"]
+    status: Statuses
 
 
 def solve_series(mesh: Mesh, approach: Curve, removed: RemovedMaterial, compliance: Scalar) -> SeriesContact:
@@ -183,7 +181,7 @@ def solve_series(mesh: Mesh, approach: Curve, removed: RemovedMaterial, complian
     shared = mesh.hub / mesh.pair.face_width + compliance
     if mesh.resolution.slices == 1:  # a compliance that couples all pairs: one solution is enough
         found = _solve_at(mesh, approach, removed, shared)
-        return SeriesContact(found.force, found.tangent_stiffness, found.transmission_error, found.converged)
+        return SeriesContact(found.force, found.tangent_stiffness, found.transmission_error, found.status)
 
     def step(error, _):
         found = _solve_at(mesh, error, removed)
@@ -191,7 +189,7 @@ def solve_series(mesh: Mesh, approach: Curve, removed: RemovedMaterial, complian
         missed = approach - error - shared * found.force
         stiffness = found.tangent_stiffness / softened
         met = jnp.abs(missed) <= _MET * (1 + jnp.abs(approach))
-        met &= found.converged
-        return error + missed / softened, SeriesContact(found.force + stiffness * missed, stiffness, error, met)
+        status = worst(found.status, status_of({Status.NOT_CONVERGED: ~met}))
+        return error + missed / softened, SeriesContact(found.force + stiffness * missed, stiffness, error, status)
 
     return jax.tree.map(lambda part: part[-1], jax.lax.scan(step, approach, length=_SERIES_STEPS)[1])

@@ -7,12 +7,21 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from ..compliance import AbstractCompliance
 from ..geometry import GearPair, reduced_radius
 from ..microgeometry import AbstractModification, NoModification, terms
-from ..numerics import ContactProblem, concrete, minimum, program, solve_contact, stored, tangent_stiffness
+from ..numerics import (
+    ContactProblem,
+    ContactSolution,
+    concrete,
+    minimum,
+    program,
+    solve_contact,
+    stored,
+    tangent_stiffness,
+)
 from ..numerics.programs import begin
 from .cycle import MeshCycle
 from .face_coupling import check_torque, ends_together, holds_at
@@ -20,6 +29,7 @@ from .mesh import Mesh, begin_mesh, prepare
 from .operating_point import OperatingPoint, operating_point_of
 from .resolution import Resolution
 from .slide import RemovedMaterial, as_removed, for_contact, loaded_material, nothing_removed
+from .status import Status, Statuses, status_of, worst
 from .support import AbstractSupport
 
 _MOST_PAIRS = 12
@@ -213,21 +223,36 @@ def _cycle(mesh: Mesh, operating_point: OperatingPoint, contact: dict[str, Any],
 
 def _wider(mesh: Mesh, cycle: MeshCycle) -> Mesh | None:
     """The mesh with more pairs, where their number was left open, is too small and can be known."""
-    failed = concrete(cycle.converged) if mesh.automatic else None
-    if failed is None or failed.all() or mesh.resolution.chosen_pairs >= _MOST_PAIRS:
-        return None
-    beyond = concrete(_beyond(mesh, cycle))
-    if beyond is None or not beyond.any():
+    if not more_pairs_help(mesh, cycle.status):
         return None
     sizes = replace(mesh.resolution, pairs=mesh.resolution.chosen_pairs + 1)
     wider = prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes, support=mesh.support)
     return replace(wider, automatic=True)
 
 
-def _beyond(mesh: Mesh, cycle: MeshCycle) -> Bool[Array, " positions"]:
-    removed = RemovedMaterial(cycle.gap - mesh.corner_gap[:, None], cycle.shift, cycle.bend)
-    windup = mesh.hub * cycle.force / mesh.pair.face_width
-    return cycle.transmission_error - windup - mesh.support_deflection(cycle.line_load) >= outermost(mesh, removed)
+def more_pairs_help(mesh: Mesh, status: Statuses) -> bool:
+    """Whether a result on a mesh whose number of pairs was left open needs more of them; False while it is traced."""
+    known = concrete(status) if mesh.automatic and mesh.resolution.chosen_pairs < _MOST_PAIRS else None
+    return known is not None and bool((known == Status.MORE_PAIRS_NEEDED).any())
+
+
+def contact_status(mesh: Mesh, solution: ContactSolution, error: Curve, removed: RemovedMaterial) -> Statuses:
+    """Status of the contact at every position, shape (positions,).
+
+    Args:
+        mesh: prepared mesh.
+        solution: of the contact problem.
+        error: transmission error without the wind-up of the bodies [um].
+        removed: material removed from the flanks.
+    """
+    # the deflection of the support closes no gap of pairs that are not carried along
+    teeth, last = error - mesh.support_deflection(solution.line_load), outermost(mesh, removed)
+    # what is not a number has not converged
+    causes = {
+        Status.NOT_CONVERGED: ~(solution.converged & (teeth < last)),
+        Status.MORE_PAIRS_NEEDED: teeth >= last,
+    }
+    return worst(status_of(causes), mesh.status)
 
 
 def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
@@ -272,10 +297,9 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
     windup = mesh.hub * force / mesh.pair.face_width
     contact_stiffness = tangent_stiffness(problem, solution)
     unloaded = minimum(held / mesh.lever[:, None], axis=(0, 1))
-    valid = mesh.valid & holds_at(mesh.support_torque, torque)
-    teeth = solution.approach - mesh.support_deflection(
-        solution.line_load
-    )  # what closes the gaps of pairs that are not there
+    status = contact_status(mesh, solution, solution.approach, removed)
+    if mesh.support_torque is not None:
+        status = worst(status, status_of({Status.OUT_OF_VALIDITY: ~holds_at(mesh.support_torque, torque)}))
     return {
         "transmission_error": solution.approach + windup,
         "unloaded_transmission_error": unloaded,
@@ -287,7 +311,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
         "bend": removed.bend,
         "tangent_stiffness": 1 / (1 / contact_stiffness + mesh.hub / mesh.pair.face_width),
         "residual": solution.residual,
-        "converged": solution.solved & (teeth < outermost(mesh, removed)) & valid,
+        "status": status,
     }
 
 

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..contact.prescribed import solve_series
+from ..contact.status import Statuses, WithStatus
 from ..numerics import program, result
 from .flanks import Flanks
 from .force import AbstractMeshForce
@@ -37,7 +38,7 @@ class Rows(NamedTuple):
     rise: Float[Array, " nodes"]
 
 
-class ForceMap(AbstractMeshForce):
+class ForceMap(WithStatus, AbstractMeshForce):
     """Force of a mesh by cubic pieces over the DTE, linear between mesh positions; made by `mesh_force`.
 
     The force is exactly zero in the clearance, rises everywhere else with a continuous slope, and goes on linearly
@@ -55,7 +56,7 @@ class ForceMap(AbstractMeshForce):
         reach: DTE of the last level beyond `start` [um]; the levels lie closer where the flanks begin to touch.
         node_force: force of drive and coast flanks [N], shape (2, positions, levels), from `start` on.
         node_stiffness: its slope over the DTE [N/um], same shape.
-        converged: whether all contacts of the grid have been found.
+        status: of all contacts of the grid.
     """
 
     first_phase: Scalar = result("base pitches")
@@ -63,7 +64,7 @@ class ForceMap(AbstractMeshForce):
     reach: Scalar = result("um")
     node_force: Table = result("N")
     node_stiffness: Table = result("N/um")
-    converged: Bool[Array, ""] = result()
+    status: Statuses = result()
 
     def at(self, phase: Scalar) -> Rows:
         lower, upper, share = between(phase, self.first_phase, self.start.shape[-1])
@@ -125,8 +126,7 @@ def closing(start: Sides, dte: Scalar) -> tuple[Bool[Array, ""], Scalar]:
 
 @program
 def tabulate(flanks: Flanks, unloaded, compliance: Scalar, reach: Scalar, levels: int):
-    """Force [N] and slope [N/um] of one side at levels of the DTE, shape (positions, levels) each, and whether
-    all of it has converged.
+    """Force [N] and slope [N/um] of one side at levels of the DTE, shape (positions, levels) each, and their status.
 
     Called as it is, it runs for a hundredth of the time that it compiles, and a gear pair needs it twice.
 
@@ -152,7 +152,7 @@ def tabulate(flanks: Flanks, unloaded, compliance: Scalar, reach: Scalar, levels
     least = jnp.minimum(jnp.concatenate([step[:, :1], step], axis=1), jnp.concatenate([step, step[:, -1:]], axis=1))
     # the last slope is the one beyond the table as well
     slope = jnp.clip(slope, 0.0, _STEEPEST * least / apart[None])
-    return force[flanks.order], slope[flanks.order], jnp.all(found.converged)
+    return force[flanks.order], slope[flanks.order], jnp.max(found.status)
 
 
 Curves = Float[Array, "sides positions"]
@@ -175,7 +175,7 @@ def _mixed(curves: Curves, phase: Scalar, first: Scalar) -> Sides:
     return (1 - share) * curves[:, lower] + share * curves[:, upper]
 
 
-class VaryingStiffness(AbstractMeshForce):
+class VaryingStiffness(WithStatus, AbstractMeshForce):
     """Stiffness that varies with the mesh position, beyond the unloaded transmission error: k(phase) (q - e_u(phase)).
 
     The stiffness is that of the whole deflection under the torque it was made for: the force is right for this load
@@ -186,13 +186,13 @@ class VaryingStiffness(AbstractMeshForce):
         start: DTE at which the drive flanks touch, and the negative of that at which the coast flanks do [um],
             shape (2, positions).
         secant_stiffness: of drive and coast flanks [N/um], same shape.
-        converged: whether the contacts have been found.
+        status: of all contacts.
     """
 
     first_phase: Scalar = result("base pitches")
     start: Curves = result("um")
     secant_stiffness: Curves = result("N/um")
-    converged: Bool[Array, ""] = result()
+    status: Statuses = result()
 
     def at(self, phase: Scalar) -> Springs:
         return Springs(*(_mixed(part, phase, self.first_phase) for part in (self.start, self.secant_stiffness)))
@@ -201,7 +201,7 @@ class VaryingStiffness(AbstractMeshForce):
         return place.force(dte)
 
 
-class LoadedError(AbstractMeshForce):
+class LoadedError(WithStatus, AbstractMeshForce):
     """Mean stiffness, excited by the loaded transmission error: k (q - q_0(phase) + F_0 / k), without parametric
     excitation, as A. Kahraman and R. Singh have it.
 
@@ -210,13 +210,13 @@ class LoadedError(AbstractMeshForce):
         start: static transmission error under the load less F_0 / k, of the drive flanks, and its negative for the
             coast flanks [um], shape (2, positions).
         constant_stiffness: F_0 over the mean deflection of drive and coast flanks [N/um], shape (2,).
-        converged: whether the contacts have been found.
+        status: of all contacts.
     """
 
     first_phase: Scalar = result("base pitches")
     start: Curves = result("um")
     constant_stiffness: Sides = result("N/um")
-    converged: Bool[Array, ""] = result()
+    status: Statuses = result()
 
     def at(self, phase: Scalar) -> Springs:
         return Springs(_mixed(self.start, phase, self.first_phase), self.constant_stiffness)
@@ -225,7 +225,7 @@ class LoadedError(AbstractMeshForce):
         return place.force(dte)
 
 
-class Tangent(AbstractMeshForce):
+class Tangent(WithStatus, AbstractMeshForce):
     """The force to first order about its static value: F_0 + k(phase) (q - q_0(phase)); no clearance, small vibration.
 
     Attributes:
@@ -233,14 +233,14 @@ class Tangent(AbstractMeshForce):
         static_force: F_0 [N].
         dte: q_0, static transmission error [um], shape (positions,).
         tangent_stiffness: slope of the force there [N/um], shape (positions,).
-        converged: whether the contacts have been found.
+        status: of all contacts.
     """
 
     first_phase: Scalar = result("base pitches")
     static_force: Scalar = result("N")
     dte: Float[Array, " positions"] = result("um")
     tangent_stiffness: Float[Array, " positions"] = result("N/um")
-    converged: Bool[Array, ""] = result()
+    status: Statuses = result()
 
     def at(self, phase: Scalar) -> Sides:
         return _mixed(jnp.stack([self.dte, self.tangent_stiffness]), phase, self.first_phase)

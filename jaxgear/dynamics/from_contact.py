@@ -12,7 +12,8 @@ from jaxtyping import Array, Float
 from ..contact import Mesh
 from ..contact.mesh import prepare_from
 from ..contact.operating_point import operating_point_of
-from ..contact.solve import check_mesh
+from ..contact.solve import check_mesh, more_pairs_help
+from ..contact.status import Status, status_of, worst
 from ..microgeometry import AbstractModification
 from ..numerics import check, concrete, real, whole
 from ..numerics.programs import is_eager
@@ -25,7 +26,6 @@ Model = Literal["map", "varying stiffness", "loaded error", "tangent"]
 
 # Flanks that press on both sides without a load by more than this jam [um]; rounding of single precision is less.
 _JAMMED = 1e-2
-_MOST_PAIRS = 12
 _LEVELS, _REACH = 48, 5.0
 
 
@@ -153,8 +153,7 @@ def _coast_of(coast: Any, drive: Both) -> Both:
 
 
 def _is_too_narrow(mesh: Mesh, made) -> bool:
-    converged = concrete(made.converged)
-    return converged is not None and not converged and mesh.automatic and mesh.resolution.chosen_pairs < _MOST_PAIRS
+    return more_pairs_help(mesh, made.status)
 
 
 def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> AbstractMeshForce:
@@ -162,17 +161,17 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
     sides = drive._replace(removed=drive.removed + deviation), coast_flanks(mesh, torque, both[1])
     found = _of_both(lambda side: static(side, torque, compliance), sides)
     force, first = 1e3 * torque / mesh.pair.pinion.base_radius, mesh.kinematics.first_phase
-    converged = jnp.all(found[0].converged) & jnp.all(found[1].converged)
+    each = [jnp.max(side.status) for side in found]
     if model == "tangent":
-        return Tangent(first, force, found[0].loaded, found[0].stiffness, jnp.all(found[0].converged))
+        return Tangent(first, force, found[0].loaded, found[0].stiffness, each[0])
     start = jnp.stack([each.unloaded + side.clearance for each, side in zip(found, sides)])
-    converged &= ~_jammed(start)
+    status = worst(*each, status_of({Status.GEARS_CANNOT_RUN: _jammed(start)}))
     deflection = jnp.stack([each.loaded - each.unloaded for each in found])
     if model == "varying stiffness":
-        return VaryingStiffness(first, start, force / deflection, converged)
+        return VaryingStiffness(first, start, force / deflection, status)
     if model == "loaded error":
         mean = jnp.mean(deflection, axis=1)
-        return LoadedError(first, start + deflection - mean[:, None], force / mean, converged)
+        return LoadedError(first, start + deflection - mean[:, None], force / mean, status)
     farthest = reach * jnp.max(deflection[0])
     both = tuple((side, _in_own_order(side, each)) for side, each in zip(sides, found))
     drive, coast = _of_both(lambda of: tabulate(of[0], of[1], compliance, farthest, levels), both)
@@ -182,7 +181,7 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
         reach=farthest,
         node_force=jnp.stack([drive[0], coast[0]]),
         node_stiffness=jnp.stack([drive[1], coast[1]]),
-        converged=converged & drive[2] & coast[2],
+        status=worst(status, drive[2], coast[2]),
     )
 
 

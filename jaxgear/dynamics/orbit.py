@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
+from ..contact.status import Status, Statuses, WithStatus, status_of, worst
 from ..numerics import Checked, check, count, implicit_root, kernel, real, result, whole, with_jacobian
 from .integrate import cycles, history, largest, mean, rms, share, smallest
 from .oscillator import Coordinates, Oscillator, State, static_force
@@ -24,7 +25,7 @@ _REFINEMENTS = 8  # evaluations of Newton's method from a settled state, which i
 _SAME = 0.05  # largest distance of an orbit from the settled state that it refines, as part of its size
 
 
-class Orbit(Checked):
+class Orbit(WithStatus, Checked):
     """A periodic orbit: the state repeats after some mesh cycles. Leading axes of a batch come from `jax.vmap`.
 
     Attributes:
@@ -44,7 +45,7 @@ class Orbit(Checked):
         monodromy: derivative of the state after the orbit by the state before, of displacements and of velocities
             divided by 2 pi times the mesh frequency, shape (2 coordinates, 2 coordinates).
         residual: largest change of those unknowns over the orbit [um].
-        converged: whether the residual is down to what rounding and the size of the multipliers leave.
+        status: `converged` where the residual is down to what rounding and the size of the multipliers leave.
     """
 
     displacement: Coordinates = result("um")
@@ -63,7 +64,7 @@ class Orbit(Checked):
     back_side_contact: Scalar = result()
     monodromy: Float[Array, "unknowns unknowns"] = result()
     residual: Scalar = result("um")
-    converged: Bool[Array, ""] = result()
+    status: Statuses = result()
     periods: int = count()
 
     @property
@@ -224,7 +225,8 @@ def settled_orbit(oscillator: Oscillator, frequency: Scalar, start: State, nodes
     # not where a state is not a number either
     same = jax.lax.stop_gradient(jnp.linalg.norm(z - begin) <= _SAME * jnp.linalg.norm(z))
     orbit = orbit_at(oscillator, jnp.where(same, z, begin), steps, frequency, periods)
-    return dataclasses.replace(orbit, converged=orbit.converged & orbit.stable & same)
+    status = status_of({Status.NO_STEADY_MOTION: ~(orbit.stable & same)})
+    return dataclasses.replace(orbit, status=worst(orbit.status, status))
 
 
 def orbit_at(oscillator: Oscillator, z, steps, frequency: Scalar, periods: int) -> Orbit:
@@ -255,7 +257,7 @@ def orbit_at(oscillator: Oscillator, z, steps, frequency: Scalar, periods: int) 
         back_side_contact=share(of, of.force < 0),
         monodromy=monodromy,
         residual=residual,
-        converged=residual <= _tolerance(z, monodromy),
+        status=status_of({Status.NOT_CONVERGED: ~(residual <= _tolerance(z, monodromy))}),
         periods=periods,
     )
 

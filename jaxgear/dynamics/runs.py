@@ -134,7 +134,7 @@ def design_runs(
 
     Returns:
         what is kept, with the axis of the designs in front. Of a design whose contacts were not found floating-point
-        numbers are nan, and no speed is settled.
+        numbers are nan, and every speed has its status.
 
     Raises:
         ValueError: as `speed_sweep`, without `steps`, and for designs without a common leading axis.
@@ -189,7 +189,7 @@ def _of_designs(rows, shared, make, keep, ways: _Ways, sizes, devices):
             most_cycles=jnp.where(converged, limits.most_cycles, jnp.zeros_like(limits.most_cycles))
         )
         found = _of_one(oscillator, (frequencies, limits), sizes)
-        found = jax.tree.map(partial(_or_nothing, converged), found)
+        found = replace(jax.tree.map(partial(_or_nothing, converged), found), status=found.status)
         return keep(_named(found, ways)) if keep else found
 
     def of_batch(shared, batch):

@@ -15,14 +15,14 @@ smallest damage sum.
 import math
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.optimize
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float, Int8
 
 from ..conditions import LoadSpectrum
+from ..contact.status import Status, WithStatus, reason, status_of
 from ..geometry import GearPair
 from ..metrics.stress import nominal_stress_squares, single_contact_root_stress
 from ..numerics import Checked, concrete, kernel, maximum, number, program, real, result, whole
@@ -62,15 +62,15 @@ class Endurance(Checked):
     bending: SNCurve
 
 
-class Damage(Checked):
+class Damage(WithStatus, Checked):
     """Damage under a duty cycle, 1 for a life that is used up; axes (gears, torques), pinion first.
 
     Attributes:
         pitting, bending: damage that every load does.
         contact_stress, root_stress: of both gears at every torque.
         face_load_factor: K_Hbeta at every torque.
-        converged: whether the load over the face has been found at every torque; where it has not, its numbers are
-            NaN, and with them every sum. Without torque there is nothing to find.
+        status: of the load over the face at every torque; where it has not converged, its numbers are NaN, and with
+            them every sum. Without torque there is nothing to find.
         duration: of the duty cycle; None where it has none: the damage is that of one revolution of the pinion.
     """
 
@@ -79,7 +79,7 @@ class Damage(Checked):
     contact_stress: OfGears = result("MPa")
     root_stress: OfGears = result("MPa")
     face_load_factor: Torques = result()
-    converged: Bool[Array, " torques"] = eqx.field()
+    status: Int8[Array, " torques"] = result()
     duration: Scalar | None = result("h")
 
     @property
@@ -170,7 +170,7 @@ def damage_of(
     """`damage` of supports that are worked out."""
     found = face_loads(faces, pinion, wheel)
     pair = jax.tree.map(lambda leaf: leaf[0], faces.pair)
-    loaded = Loaded(maximum(found.line_load, axis=-1), face_load_factor(found.line_load), found.converged)
+    loaded = Loaded(maximum(found.line_load, axis=-1), face_load_factor(found.line_load), found.status)
     return summed(pair, loaded, load, endurance)
 
 
@@ -194,7 +194,9 @@ def _gear_lives(pair: GearPair, load: LoadSpectrum, endurance: tuple[Endurance, 
 
     def lives(factor):
         every = jnp.full_like(mean, factor)
-        return summed(pair, Loaded(factor * mean, every, jnp.isfinite(every)), load, endurance).gear_lives
+        return summed(
+            pair, Loaded(factor * mean, every, status_of({Status.NOT_CONVERGED: ~jnp.isfinite(every)})), load, endurance
+        ).gear_lives
 
     return jax.vmap(lives)(factors)
 
@@ -205,12 +207,12 @@ class Loaded(NamedTuple):
     Attributes:
         largest: line load [N/mm].
         factor: K_Hbeta.
-        converged: whether it has been found.
+        status: of each.
     """
 
     largest: Torques
     factor: Torques
-    converged: Bool[Array, " torques"]
+    status: Int8[Array, " torques"]
 
 
 def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, endurance: tuple[Endurance, Endurance]) -> Damage:
@@ -243,7 +245,7 @@ def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, endurance: tuple[E
         jnp.stack(stress),
         jnp.stack([bent * share for share in root]),
         found.factor,
-        found.converged | ~carries,
+        jnp.where(carries, found.status, jnp.int8(Status.CONVERGED)),
         load.duration,
     )
 
@@ -293,8 +295,8 @@ def longest_life(
     missed = np.asarray(load.torques)[~np.asarray(unmodified.converged)]
     if len(missed):
         raise ValueError(
-            f"longest_life: the load over the face at {float(missed[0]):g} N m is not found: do loads leave a shaft "
-            "afloat in its clearances?"
+            f"longest_life: the load over the face at {float(missed[0]):g} N m is not found, "
+            f"{reason(unmodified.status)}: do loads leave a shaft afloat in its clearances?"
         )
     worst = int(np.argmax(np.sum(unmodified.pitting, axis=0)))
     start = level_load(support, load.torques[worst], negative_crowning=negative_crowning, stations=stations)
@@ -334,7 +336,7 @@ def _soft_damage(faces: Stations, load: LoadSpectrum, endurance, at: Float[Array
         top = jax.lax.stop_gradient(jnp.max(share, axis=-1))
         factor = top * jnp.mean((share / jnp.where(loaded, top, 1.0)[:, None]) ** sharpness, axis=-1) ** (1 / sharpness)
         factor = jnp.where(loaded, factor, 1.0)
-        made: Damage = summed(pair, Loaded(factor * mean, factor, found.converged), load, endurance)
+        made: Damage = summed(pair, Loaded(factor * mean, factor, found.status), load, endurance)
         return jnp.log(jnp.maximum(maximum(made.total), _NONE))
 
     return jax.value_and_grad(of)(at)

@@ -91,7 +91,8 @@ class FlankLineLayout(Checked):
         Raises:
             ValueError: for a layout without a duty cycle.
         """
-        return jnp.stack([each.life for each in self.damage]) / self._level_life("relative_life")
+        level = self._level_life("relative_life")
+        return jnp.stack([each.life / level for each in self.damage])
 
     def worst_relative_life(self, tolerance: str) -> Float[Array, " steps"]:
         """Life of the worst case of deviations without modification, after step 1 and after step 2, relative to that

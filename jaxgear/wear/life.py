@@ -6,9 +6,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float, Int8
 
 from ..contact import Mesh, MeshCycle
+from ..contact.status import WithStatus
 from ..dynamics import Dynamics
 from ..geometry import Gear
 from ..microgeometry import AbstractModification
@@ -25,7 +26,7 @@ Depths = Float[Array, "lives slices points"]
 BLOCKS = 20
 
 
-class WearLife(Checked):
+class WearLife(WithStatus, Checked):
     """A pair of flanks over its life; at the start of every block and after the last one.
 
     Attributes:
@@ -42,8 +43,8 @@ class WearLife(Checked):
         pressure_error: estimate of the error of the largest flank pressure by the grid and by the width over which
             contacts average the worn flanks [MPa], shape (lives,), (lives, torques) under a load spectrum; zero on new
             flanks, NaN on flanks that are not known. It is not part of `error`, which is that of the blocks alone.
-        known: whether all contacts that have worn these flanks were found, also within blocks, and something is left of
-            the teeth, shape (lives,).
+        status: the worst so far, shape (lives,): of the contacts that have worn these flanks, also within blocks; of
+            the motion, the coefficient of wear, and what is left of the teeth.
         cycles: the mesh on these flanks, leading axis (lives,); (lives, torques) under a load spectrum. None has
             converged on flanks that are not known.
         weights: of the torques of a load spectrum in the revolutions, shape (torques,); None under one torque.
@@ -60,7 +61,7 @@ class WearLife(Checked):
     depth: Float[Array, "lives gears parts slices points"] = result("um")
     error: Lives = result("um")
     pressure_error: Float[Array, "lives *torques"] = result("MPa")
-    known: Bool[Array, " lives"] = result()
+    status: Int8[Array, " lives"] = result()
     cycles: MeshCycle
     weights: Float[Array, " torques"] | None = result()
     dynamic_factor: Float[Array, "lives *torques"] | None = result()
@@ -202,7 +203,7 @@ def life_of(case: Case, found: March, revolutions: Lives) -> WearLife:
         depth=found.depth,
         error=_total_error(found.error),
         pressure_error=case.pressure_errors(roll_length, found, cycles),
-        known=found.known,
+        status=found.status,
         cycles=cycles,
         weights=case.weights,
         dynamic_factor=case.dynamic_factor(found),
@@ -285,7 +286,7 @@ def wear_in_steps(
             length = now * min(limit / most, _GROWTH) if most > 0 else _GROWTH * now
             if most > _SLACK * limit and not lost:
                 continue
-            lost = lost or not np.asarray(pair.known).all()
+            lost = lost or bool(np.asarray(pair.status).any())
             # the rest is gone through in pairs of one length, not in a last short one
             rest = total - done - BLOCKS_OF_A_PAIR * now
             length = rest / (BLOCKS_OF_A_PAIR * max(1, np.ceil(rest / (BLOCKS_OF_A_PAIR * length) - 1e-9)))
@@ -322,7 +323,7 @@ def _together(pairs: list[March]) -> March:
         return jnp.concatenate([*(leaf[:-1] for leaf in leaves), leaves[-1][-1:]])
 
     depth, seen = jax.tree.map(joined, *[(pair.depth, pair.seen) for pair in pairs])
-    # the flank with which a march begins is as well known as that with which the one before has ended
-    known = jnp.concatenate([pairs[0].known[:1], *(pair.known[1:] for pair in pairs)])
+    # the flank with which a march begins has the status of that with which the one before has ended
+    status = jnp.concatenate([pairs[0].status[:1], *(pair.status[1:] for pair in pairs)])
     error = jnp.concatenate([pair.error for pair in pairs])
-    return March(depth, error, jnp.cumsum(~known) == 0, seen)
+    return March(depth, error, jax.lax.cummax(status), seen)

@@ -81,7 +81,7 @@ def wear_depth(life: WearLife, gear: Worn = "both") -> Lives:
     }
     if gear not in depths:
         raise ValueError(f'wear_depth: gear = {gear!r} must be "pinion", "wheel" or "both"')
-    return jnp.where(life.known, maximum(jnp.stack(depths[gear]), axis=(0, 2, 3)), jnp.nan)
+    return jnp.where(life.converged, maximum(jnp.stack(depths[gear]), axis=(0, 2, 3)), jnp.nan)
 
 
 def worn_volume(life: WearLife) -> Float[Array, "lives gears parts"]:
@@ -92,7 +92,7 @@ def worn_volume(life: WearLife) -> Float[Array, "lives gears parts"]:
     """
     _single("worn_volume", life)
     volume = 1e-3 * jnp.einsum("lgpsk,gk,s->lgp", life.depth, life.arc, life.slice_width)
-    return jnp.where(life.known[:, None, None], volume, jnp.nan)
+    return jnp.where(life.converged[:, None, None], volume, jnp.nan)
 
 
 def life_to_depth(life: WearLife, limit: Any, gear: Worn = "both") -> Scalar:
