@@ -14,7 +14,7 @@ import jaxgear as jg
 from jaxgear.contact import removed_material
 from jaxgear.contact.prescribed import solve_forces
 from jaxgear.dynamics import Dynamics, natural_frequencies
-from jaxgear.wear import WEAR_QUANTITIES, Wear, mean_over_life, over_life, wear, wear_depth, wear_in_steps, worn_volume
+from jaxgear.wear import WEAR_QUANTITIES, Wear, mean_over_life, over_life, wear, wear_depth, worn_volume
 from jaxgear.wear.worn_volume import deposit
 
 SIZES = LINE
@@ -234,7 +234,7 @@ def test_steps_on_the_host_are_the_blocks(mesh, natural, resonant):
         return make()
 
     options = {"coefficient": COEFFICIENT, "blocks": BLOCKS, "dynamics": SETTINGS, **FLANKS}
-    steps = wear_in_steps(mesh, at(natural), REVOLUTIONS, keep=keep, **options)
+    steps = wear(mesh, at(natural), REVOLUTIONS, keep=keep, **options)
     np.testing.assert_array_equal(steps.depth, resonant.depth)
     np.testing.assert_array_equal(steps.dynamic_factor, resonant.dynamic_factor)
     kept = [str(leaf) for leaf in jax.tree.leaves(made_of[0])]

@@ -19,12 +19,11 @@ from jaxgear.wear import (
     passage_depth,
     specific_sliding,
     wear_depth,
-    wear_in_steps,
     worn_volume,
 )
 from jaxgear.wear import wear as worn_flanks
 from jaxgear.wear.case import case_of, marched, worn_through
-from jaxgear.wear.life import life_of as life_from
+from jaxgear.wear.history import history_of
 from jaxgear.wear.march import Analysis, march
 from jaxgear.wear.worn_volume import deposit, grid, worn
 
@@ -50,7 +49,8 @@ def steps_of(mesh, **options):
     """The same life pair by pair of its blocks, for which one program serves any number of them."""
     given = {"coefficient": COEFFICIENT, "pinion": NONE, "wheel": NONE}
     given |= {} if "largest_increment" in options else {"blocks": BLOCKS}
-    return wear_in_steps(mesh, TORQUE, REVOLUTIONS, **{**given, **options})
+    given |= {"callback": lambda *_: None}
+    return worn_flanks(mesh, TORQUE, REVOLUTIONS, **{**given, **options})
 
 
 @pytest.fixture(scope="module")
@@ -497,8 +497,9 @@ def test_flanks_that_a_lost_contact_has_worn_are_not_known(mesh):
     options = {"pinion": NONE, "wheel": NONE, "deviation": None, "points": None}
     case = case_of("wear", mesh, TORQUE, coefficient=COEFFICIENT, **options)
     found = marched(case, case.start(), jnp.asarray([REVOLUTIONS / 2]))
-    np.testing.assert_array_equal(life_from(case, found, life.revolutions).depth, life.depth)
-    lost = life_from(case, found._replace(status=jnp.asarray([0, 0, Status.NOT_CONVERGED], jnp.int8)), life.revolutions)
+    np.testing.assert_array_equal(history_of(case, found, life.revolutions).depth, life.depth)
+    unfound = found._replace(status=jnp.asarray([0, 0, Status.NOT_CONVERGED], jnp.int8))
+    lost = history_of(case, unfound, life.revolutions)
     after = [False, False, True]
     errors, *numbers = told(lost, 1e3)
     for values in (errors, wear_depth(lost), np.asarray(worn_volume(lost))[:, 0, 0]):
@@ -584,7 +585,9 @@ def test_refuses_results_that_are_not_there(life):
         wear_depth(life, "rack")
     with pytest.raises(ValueError, match="life_to_depth: limit = 0 um must be greater than 0 um"):
         life_to_depth(life, 0.0)
-    with pytest.raises(IndexError, match=f"life = 100 must be less than {BLOCKS + 1}, of so many it is one"):
+    with pytest.raises(
+        IndexError, match=f"step = 100 must be from -{BLOCKS + 1} to {BLOCKS}, of {BLOCKS + 1} time steps"
+    ):
         life.flanks(100)
     with pytest.raises(ValueError, match="passage_depth: coefficient = -1 m2/N"):
         passage_depth(life.cycles, -1.0)
@@ -669,5 +672,5 @@ def test_what_is_worn_through_is_not_worn_on(mesh):
 
 
 def test_steps_refuse_in_one_line(mesh):
-    with pytest.raises(ValueError, match="wear_in_steps: largest_increment = 0 um must be greater than 0 um"):
+    with pytest.raises(ValueError, match="wear: largest_increment = 0 um must be greater than 0 um"):
         steps_of(mesh, largest_increment=0.0)

@@ -15,7 +15,16 @@ from ..contact.status import reason
 from ..io import DesignFile, WearRequest, describe
 from ..metrics import quantity_of
 from ..microgeometry import AbstractModification
-from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth, worn_volume
+from ..wear import (
+    WearHistory,
+    life_to,
+    life_to_depth,
+    mean_over_life,
+    over_life,
+    pressure_error,
+    wear_depth,
+    worn_volume,
+)
 from ..wear.quantities import blocks_are_short, number_of
 from . import manufactured, report, wear_scatter
 from .geometry import gears
@@ -62,11 +71,11 @@ class WearStudy:
     design: DesignFile
     request: WearRequest
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]]
-    lives: Mapping[str, WearLife]
+    lives: Mapping[str, WearHistory]
     scatters: Mapping[str, wear_scatter.Samples]
 
 
-def _numbers(study: WearStudy, life: WearLife) -> dict[str, float]:
+def _numbers(study: WearStudy, life: WearHistory) -> dict[str, float]:
     """What a life comes to."""
     ppte, settings = np.asarray(over_life(life, "ppte")), study.request.settings
     volume = np.asarray(worn_volume(life))[-1]

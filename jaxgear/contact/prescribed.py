@@ -1,7 +1,8 @@
 """Contact of the mesh at a prescribed transmission error, or under a force of every position: for dynamics and wear."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -130,7 +131,7 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
     )
 
 
-class ForcedContact(NamedTuple):
+class ForcedContact(WithStatus, eqx.Module):
     """Contact under forces that differ from position to position.
 
     Attributes:
@@ -153,7 +154,7 @@ def solve_forces(mesh: Mesh, force: Curve, removed: RemovedMaterial) -> ForcedCo
     return ForcedContact(solution.line_load, contact_status(mesh, solution, solution.approach, removed))
 
 
-class SeriesContact(NamedTuple):
+class SeriesContact(WithStatus, eqx.Module):
     """Contact at a prescribed approach of teeth and what they share in series, shape (positions,) each.
 
     Attributes:

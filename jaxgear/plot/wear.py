@@ -7,14 +7,14 @@ from matplotlib.axes import Axes
 
 from ..geometry import roll_angle
 from ..metrics import quantity_of
-from ..wear import WearLife, over_life, wear_depth
+from ..wear import WearHistory, over_life, wear_depth
 from .figure import legend_above, line_style, marker_style, report_axes
 
 _GEARS = "pinion", "wheel"
 _SHOWN = 4  # lives
 
 
-def worn_flank(life: WearLife, gear: str, ax: Axes | None = None, *, title: str = "") -> Axes:
+def worn_flank(life: WearHistory, gear: str, ax: Axes | None = None, *, title: str = "") -> Axes:
     """Wear depth [um] of one gear over its roll angle [deg] at several lives, in the line that is worn deepest.
 
     Material removed goes down, as in the K-chart.
@@ -46,7 +46,7 @@ def worn_flank(life: WearLife, gear: str, ax: Axes | None = None, *, title: str 
     return ax
 
 
-def lives(of: Mapping[str, WearLife], quantity="ppte", ax: Axes | None = None) -> Axes:
+def lives(of: Mapping[str, WearHistory], quantity="ppte", ax: Axes | None = None) -> Axes:
     """A quantity of several designs over the revolutions of the pinion.
 
     Args:

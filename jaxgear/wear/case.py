@@ -230,7 +230,7 @@ class Case(eqx.Module):
         return Analysis(rate, found, worst(status, cycle_status(cycle)))
 
     def _worn(self, roll_length, depth: Depth) -> Flanks:
-        """Both flanks with what is worn off them, as the contact analyses of a life look it up."""
+        """Both flanks with what is worn off them, as the contact analyses look it up."""
         total = jnp.sum(depth, axis=1)
         pinion, wheel = (WornFlank(lengths, amount) for lengths, amount in zip(roll_length, total))
         return {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
@@ -262,7 +262,7 @@ class Case(eqx.Module):
         return {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
 
     def cycles(self, roll_length, marched: March) -> MeshCycle:
-        """The mesh on all flanks of a march, leading axis (lives,); (lives, torques) under a load spectrum."""
+        """The mesh on all flanks of a march, leading axis (steps,); (steps, torques) under a load spectrum."""
 
         def under(flanks, load: OperatingPoint, found) -> MeshCycle:
             return MeshCycle(
@@ -279,8 +279,8 @@ class Case(eqx.Module):
         cycles = jax.vmap(on)(marched.depth, marched.seen, marched.status)
         return jax.tree.map(lambda leaf: leaf[:, 0], cycles) if self.weights is None else cycles
 
-    def pressure_errors(self, roll_length, marched: March, cycles: MeshCycle) -> Float[Array, "lives *torques"]:
-        """Estimated error of the largest flank pressure at all lives of a march, as its `cycles` [MPa].
+    def pressure_errors(self, roll_length, marched: March, cycles: MeshCycle) -> Float[Array, "steps *torques"]:
+        """Estimated error of the largest flank pressure at all time steps of a march, as its `cycles` [MPa].
 
         By how much it changes where the worn flanks are known on every other point only, and where the contacts are as
         wide as their own loads and curvatures make them instead of as one pair that carries the full load.
@@ -306,8 +306,8 @@ class Case(eqx.Module):
 
         return jnp.where(solved(cycles), jax.lax.map(on, (marched.depth, cycles)), jnp.nan)
 
-    def dynamic_factor(self, marched: March) -> Float[Array, "lives *torques"] | None:
-        """At all lives of a march, as its `cycles`; None where nobody asks for it."""
+    def dynamic_factor(self, marched: March) -> Float[Array, "steps *torques"] | None:
+        """At all time steps of a march, as its `cycles`; None where nobody asks for it."""
         if self.vibration is None:
             return None
         found = jnp.where(marched.status[:, None] == Status.CONVERGED, marched.seen[_DYNAMIC_FACTOR], jnp.nan)
@@ -355,7 +355,7 @@ def _march(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> Mar
     return found._replace(status=worst(found.status, gone))
 
 
-# of a motion it is twice as many programs in one, which compile for a hundred times as long as a life of theirs takes
+# of a motion it is twice as many programs in one, which compile for a hundred times as long as they run
 _marched, _marched_quickly = kernel(_march), program(_march)
 
 

@@ -15,7 +15,7 @@ from ..contact import MeshCycle
 from ..metrics import Quantity, quantities
 from ..metrics.settings import WithoutSettings, WithSettings
 from ..numerics import maximum, once
-from .life import WearLife
+from .history import WearHistory
 from .over_life import life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth
 
 
@@ -30,7 +30,7 @@ class _Kind(NamedTuple):
         needs: field of the settings that must be given.
     """
 
-    of: Callable[[WearLife, Any], Any]
+    of: Callable[[WearHistory, Any], Any]
     unit: str
     meaning: str
     better: Literal["smaller", "larger"] = "smaller"
@@ -52,7 +52,7 @@ def _at_most(longest, life):
     return jnp.where(life > longest, longest, life)
 
 
-def _pressure_error(life: WearLife):
+def _pressure_error(life: WearHistory):
     """By how much the largest pressure of a life may be larger [MPa]; that at tip corners depends on no grid."""
     largest = over_life(life, "max_contact_pressure")
     may_be = jnp.maximum(largest, over_life(life, "max_flank_pressure") + pressure_error(life))
@@ -117,13 +117,13 @@ def _number(given: WithSettings, cycle: MeshCycle):
     return number_of(given.name, life, settings)
 
 
-def number_of(name: str, life: WearLife, settings: Any) -> Float[Array, ""]:
+def number_of(name: str, life: WearHistory, settings: Any) -> Float[Array, ""]:
     """A quantity of a life that was worn by `Wear` settings; NaN as `Wear.quantity` says."""
     usable = jnp.all(solved(life.cycles)) & (name == _ERROR or blocks_are_short(life))
     return jnp.where(usable, WEAR_QUANTITIES[name].of(life, settings), jnp.nan)
 
 
-def blocks_are_short(life: WearLife) -> Bool[Array, ""]:
+def blocks_are_short(life: WearHistory) -> Bool[Array, ""]:
     """Whether the blocks are short enough for the depth to mean something."""
     worn = jnp.sum(life.depth, axis=2)
     deflection = life.cycles.transmission_error[0] - life.cycles.unloaded_transmission_error[0]
@@ -131,7 +131,7 @@ def blocks_are_short(life: WearLife) -> Bool[Array, ""]:
     return ~overshoots & (life.error[-1] <= _LARGEST_ERROR * wear_depth(life)[-1])
 
 
-def _life(name: str, settings: Any, cycle: MeshCycle) -> WearLife:
+def _life(name: str, settings: Any, cycle: MeshCycle) -> WearHistory:
     mesh = cycle.mesh_for(name)
     flanks = {"pinion": cycle.pinion, "wheel": cycle.wheel}
     load = cycle.operating_point if settings.loads is None else None

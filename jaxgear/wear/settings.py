@@ -13,7 +13,7 @@ from ..metrics.settings import with_settings
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, count, number
 from .case import LARGEST_COEFFICIENT
-from .life import BLOCKS, WearLife, check_blocks, wear
+from .history import BLOCKS, WearHistory, check_blocks, wear
 from .vibration import LineLoad, check_line_load
 
 Scalar = Float[Array, ""]
@@ -68,7 +68,7 @@ class Wear(Checked):
         pinion: AbstractModification | None = None,
         wheel: AbstractModification | None = None,
         deviation: Any = None,
-    ) -> WearLife:
+    ) -> WearHistory:
         """The life of a design; arguments and errors as `wear`.
 
         Args:
