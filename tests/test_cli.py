@@ -35,8 +35,8 @@ from jaxgear.io.folder import RESULT_FILES, result_folder
 from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
 from jaxgear.manufacture import over_balls
 from jaxgear.metrics import Finding
-from jaxgear.metrics.findings import Range
 from jaxgear.microgeometry import NoModification
+from jaxgear.numerics import Usual
 from jaxgear.optimize import result as optimum_result
 from jaxgear.report import read_table
 from jaxgear.tolerance import ToleranceClass, iso_rounded
@@ -229,7 +229,7 @@ def test_shafts_that_an_analysis_leaves_out_are_told(folder, analyzed):
 
 
 def test_what_is_not_usual_is_said_once_of_all_designs_it_concerns():
-    usual, range_ = Range(0.0, 1650.0, "MPa", "case-hardened"), Range(0.0, 0.5, "", "steel")
+    usual, range_ = Usual(0.0, 1650.0, "MPa", "case-hardened"), Usual(0.0, 0.5, "", "steel")
     found = {
         "unmodified": (Finding("friction", "", 3.7, range_), Finding("corner pressure", "", 4689.0, usual)),
         "optimum": (

@@ -130,10 +130,10 @@ def finding_lines(found: Mapping[str, tuple[Finding, ...]]) -> Iterator[str]:
     grouped: dict[tuple[str, str], dict[str, Finding]] = {}
     for design, several in found.items():
         for finding in several:
-            grouped.setdefault((finding.name, finding.where), {})[design] = finding
+            grouped.setdefault((finding.key, finding.where), {})[design] = finding
     for same in grouped.values():
         finding = list(same.values())[-1]  # the last is the one that the run is about
-        numbers = {design: f"{each.value:.4g} {each.limit.unit}".rstrip() for design, each in same.items()}
+        numbers = {design: each.number for design, each in same.items()}
         if len(set(numbers.values())) > 1:
             said = f"{', '.join(f'{design} {number}' for design, number in numbers.items())}: "
         else:
