@@ -11,7 +11,8 @@ from gearboxes import PAIR, PINION, TILTED, WHEEL, gearbox, stage, two_stages
 
 import jaxgear as jg
 from jaxgear.contact.status import Status
-from jaxgear.layout import Endurance, SNCurve, damage, level_load
+from jaxgear.layout import damage, level_load
+from jaxgear.metrics import Strength
 from jaxgear.numerics import positive_definite, within_limits
 from jaxgear.shafts import (
     Bearing,
@@ -132,7 +133,9 @@ GOOD, BAD_SHAFTS, BAD_GEARS = slice(0, 2), slice(2, 5), slice(5, 7)
 def batch():
     """What shafts do to the load, in one batch of those that can be and those that cannot."""
     load = jg.LoadSpectrum.from_hours([0.0, 50.0], [5.0, 10.0], 500.0)
-    endurance = Endurance(SNCurve(1500.0, 13.2, 5e7), SNCurve(900.0, 8.7, 3e6))
+    strength = Strength(
+        1500.0, bending=900.0, pitting_exponent=13.2, pitting_cycles=5e7, bending_exponent=8.7, bending_cycles=3e6
+    )
 
     def of(radial, shift):
         box = eqx.tree_at(
@@ -144,7 +147,7 @@ def batch():
         table = TabulatedSupport(pair, jnp.zeros((STATIONS, STATIONS)))
         faces = [annex_e(held, stations=STATIONS)]
         faces += [annex_e(each, torque=50.0, stations=STATIONS) for each in (RigidSupport(pair), table)]
-        spent = damage(held, load, endurance, stations=STATIONS)
+        spent = damage(held, load, strength, stations=STATIONS)
         return {
             "valid": jg.margins(pair).valid,
             "loads": jnp.stack([jnp.append(face.line_load, face.approach) for face in faces]),

@@ -85,10 +85,10 @@ def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine
 def lives(study: LayoutStudy, profile: ProfileLayout) -> dict[str, np.ndarray]:
     """Life [h] of pinion and wheel with every profile modification, by K_Hbeta of its contact; empty without a duty
     cycle. That factor is of the torque of step 3 and stands for every load."""
-    load, endurance = (study.request.options.get(name) for name in ("duty_cycle", "endurance"))
-    if load is None or endurance is None:
+    load, strength = (study.request.options.get(name) for name in ("duty_cycle", "strength"))
+    if load is None or strength is None:
         return {}
-    found = gear_lives(study.design.pair(), load, endurance, profile.table.column("face_load_factor"))
+    found = gear_lives(study.design.pair(), load, strength, profile.table.column("face_load_factor"))
     return dict(zip(LIVES, np.asarray(found).T))
 
 

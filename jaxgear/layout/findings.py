@@ -64,7 +64,7 @@ LIMITS = {
     ),
     "misalignment over the face": Usual(0.1, np.inf, "um", "less than axes can be measured to: is it in mm?"),
     "damage by the duty cycle": Usual(
-        1e-12, 1.0, "", "1 is the end of life: are torques in N m, endurance in MPa and cycles single ones?"
+        1e-12, 1.0, "", "1 is the end of life: are torques in N m, strengths in MPa and cycles single ones?"
     ),
     **{name: LIMITS_OF_MESH[name] for name in ("depth of the modification", "depth of the modification in modules")},
     "pitch line velocity": LIMITS_OF_MESH["pitch line velocity"],

@@ -100,7 +100,7 @@ class Finding(NamedTuple):
     @property
     def number(self) -> str:
         """The value with its unit."""
-        return f"{self.value:.4g} {self.usual.unit}".rstrip()
+        return self.usual.text(self.value)
 
     def __str__(self) -> str:
         return (
