@@ -493,14 +493,14 @@ def test_life_is_differentiable_beside_idle_loads():
 
         return jax.jvp(of, (slope,), (jnp.ones_like(slope),))
 
-    faces, at, step = under_loads(SUPPORT, load, stations=STATIONS), 3.0, 1e-4
+    faces, at, step = under_loads(SUPPORT, load.torques, STATIONS), 3.0, 1e-4
     slope = (life(at + step, faces)[0] - life(at - step, faces)[0]) / (2 * step)
     np.testing.assert_allclose(life(at, faces)[1], slope, rtol=1e-6)
 
 
 def test_longest_life_beats_its_neighbours_and_every_single_layout(bent):
     line = longest_life(bent, DUTY, STRENGTH, stations=STATIONS)
-    faces = under_loads(bent, DUTY, stations=STATIONS)
+    faces = under_loads(bent, DUTY.torques, STATIONS)
 
     def worst(other):
         found = damage_of(faces, DUTY, STRENGTH, FlankLine(), other)

@@ -8,12 +8,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, ContactProblem, check, program, real, result, solve_contact, tangent_stiffness
+from ..numerics import Checked, check, program, real, result, tangent_stiffness
 from .face_coupling import check_torque
 from .mesh import Mesh
 from .operating_point import operating_point_of
 from .slide import RemovedMaterial, for_contact, loaded_material
-from .solve import check_mesh, contact_status, flanks_of
+from .solve import check_mesh, contact_of, contact_status, flanks_of, pair_forces
 from .status import Status, Statuses, WithStatus, status_of, worst
 
 # Newton steps of a mesh of several slices from the approach of all springs in series to that of the teeth: the force of
@@ -106,18 +106,12 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
 
     Its deflection is then part of the approach and of the tangent stiffness, not of the transmission error.
     """
-    gap, law, structure = (
-        mesh.held(mesh.corner_gap[:, None] + removed.amount),
-        mesh.law.moved(removed.shift),
-        mesh.structure,
-    )
+    structure = mesh.structure
     if shared is not None:
         structure = structure + shared * mesh.slice_width[0] * mesh.lever[:, None] * mesh.lever[None]
-    problem = ContactProblem(
-        structure, law, gap, mesh.lever, mesh.slice_width, approach=approach, coupling=mesh.coupling
-    )
-    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
-    pair_force = mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1)
+    gap = mesh.corner_gap[:, None] + removed.amount
+    problem, solution = contact_of(mesh, gap, removed.shift, approach=approach, compliance=structure)
+    pair_force = pair_forces(mesh, solution.line_load)
     force = jnp.sum(pair_force, axis=0)
     error = approach if shared is None else approach - shared * force
     return PrescribedContact(
@@ -146,11 +140,7 @@ class ForcedContact(WithStatus, eqx.Module):
 @program
 def solve_forces(mesh: Mesh, force: Curve, removed: RemovedMaterial) -> ForcedContact:
     """Contact under a force on the line of action at every mesh position [N], at least zero, shape (positions,)."""
-    law, gap = mesh.law.moved(removed.shift), mesh.held(mesh.corner_gap[:, None] + removed.amount)
-    problem = ContactProblem(
-        mesh.structure, law, gap, mesh.lever, mesh.slice_width, force, start_law=mesh.law, coupling=mesh.coupling
-    )
-    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
+    _, solution = contact_of(mesh, mesh.corner_gap[:, None] + removed.amount, removed.shift, load=force)
     return ForcedContact(solution.line_load, contact_status(mesh, solution, solution.approach, removed))
 
 

@@ -36,6 +36,7 @@ _MOST_PAIRS = 12
 
 Scalar = Float[Array, ""]
 Curve = Float[Array, " positions"]
+Load = Float[Array, "pairs slices positions"]
 
 
 def solve(
@@ -236,6 +237,35 @@ def more_pairs_help(mesh: Mesh, status: Statuses) -> bool:
     return known is not None and bool((known == Status.MORE_PAIRS_NEEDED).any())
 
 
+def contact_of(
+    mesh: Mesh, gap: Load, shift: Float[Array, "pairs #slices positions"], **given: Any
+) -> tuple[ContactProblem, ContactSolution]:
+    """The contact problem of a mesh, and its solution.
+
+    Args:
+        mesh: prepared mesh.
+        gap: of the undeformed flanks on rigid, parallel shafts [um].
+        shift: of the centre of contact [mm].
+        given: `load` [N], scalar or shape (positions,), or `approach` [um]; `compliance` in place of that of the mesh.
+    """
+    if "load" in given:
+        given["start_law"] = mesh.law
+    problem = ContactProblem(
+        **{"compliance": mesh.structure, **given},
+        law=mesh.law.moved(shift),
+        gap=mesh.held(gap),
+        lever=mesh.lever,
+        weight=mesh.slice_width,
+        coupling=mesh.coupling,
+    )
+    return problem, solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
+
+
+def pair_forces(mesh: Mesh, line_load: Load) -> Float[Array, "pairs positions"]:
+    """Force on the line of action that every pair contributes under line loads [N/mm], in N."""
+    return mesh.lever * jnp.sum(line_load * mesh.slice_width[None, :, None], axis=1)
+
+
 def contact_status(mesh: Mesh, solution: ContactSolution, error: Curve, removed: RemovedMaterial) -> Statuses:
     """Status of the contact at every position, shape (positions,).
 
@@ -288,15 +318,11 @@ def _sliding_gain(mesh: Mesh, shift) -> Float[Array, "2 slices"]:
 def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict[str, Array]:
     force = _force(mesh, torque)
     removed = jax.tree.map(lambda field: field.astype(force.dtype), removed)
-    gap, law = stored(mesh.corner_gap[:, None] + removed.amount), mesh.law.moved(stored(removed.shift))
-    held = mesh.held(gap)
-    problem = ContactProblem(
-        mesh.structure, law, held, mesh.lever, mesh.slice_width, force, start_law=mesh.law, coupling=mesh.coupling
-    )
-    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
+    gap = stored(mesh.corner_gap[:, None] + removed.amount)
+    problem, solution = contact_of(mesh, gap, stored(removed.shift), load=force)
     windup = mesh.hub * force / mesh.pair.face_width
     contact_stiffness = tangent_stiffness(problem, solution)
-    unloaded = minimum(held / mesh.lever[:, None], axis=(0, 1))
+    unloaded = minimum(problem.gap / mesh.lever[:, None], axis=(0, 1))
     status = contact_status(mesh, solution, solution.approach, removed)
     if mesh.support_torque is not None:
         status = worst(status, status_of({Status.OUT_OF_VALIDITY: ~holds_at(mesh.support_torque, torque)}))
@@ -304,7 +330,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
         "transmission_error": solution.approach + windup,
         "unloaded_transmission_error": unloaded,
         "line_load": solution.line_load,
-        "pair_force": mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1),
+        "pair_force": pair_forces(mesh, solution.line_load),
         "opening": solution.opening,
         "gap": gap,
         "shift": removed.shift,

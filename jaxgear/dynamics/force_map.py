@@ -164,65 +164,42 @@ class Springs(NamedTuple):
     start: Sides
     stiffness: Sides
 
-    def force(self, dte: Scalar) -> Scalar:
-        drive, closed = closing(self.start, dte)
-        found = jnp.where(drive, self.stiffness[0], self.stiffness[1]) * jnp.maximum(closed, 0.0)
-        return jnp.where(drive, found, -found)
-
 
 def _mixed(curves: Curves, phase: Scalar, first: Scalar) -> Sides:
     lower, upper, share = between(phase, first, curves.shape[-1])
     return (1 - share) * curves[:, lower] + share * curves[:, upper]
 
 
-class VaryingStiffness(WithStatus, AbstractMeshForce):
-    """Stiffness that varies with the mesh position, beyond the unloaded transmission error: k(phase) (q - e_u(phase)).
+class FlankSprings(WithStatus, AbstractMeshForce):
+    """Drive and coast flanks as one spring each beyond where they touch: k (q - start(phase)), no contact between.
 
-    The stiffness is that of the whole deflection under the torque it was made for: the force is right for this load
-    and every mesh position, and no other. How much of the teeth is in contact does not change with the DTE.
+    With a stiffness that varies, k(phase) (q - e_u(phase)), it is that of the whole deflection under the torque that
+    the force was made for: right for this load and every mesh position, and no other. How much of the teeth is in
+    contact does not change with the DTE. With a constant one the loaded transmission error excites a mean stiffness
+    without parametric excitation, k (q - q_0(phase) + F_0 / k), as A. Kahraman and R. Singh have it.
 
     Attributes:
         first_phase: mesh position with which the curves begin [base pitches].
         start: DTE at which the drive flanks touch, and the negative of that at which the coast flanks do [um],
-            shape (2, positions).
-        secant_stiffness: of drive and coast flanks [N/um], same shape.
+            shape (2, positions); of a constant stiffness the static transmission error under the load less F_0 / k.
+        spring_stiffness: of drive and coast flanks [N/um], F_0 over the deflection, shape (2, positions), or over its
+            mean, shape (2,).
         status: of all contacts.
     """
 
     first_phase: Scalar = result("base pitches")
     start: Curves = result("um")
-    secant_stiffness: Curves = result("N/um")
+    spring_stiffness: Float[Array, "sides *positions"] = result("N/um")
     status: Statuses = result()
 
     def at(self, phase: Scalar) -> Springs:
-        return Springs(*(_mixed(part, phase, self.first_phase) for part in (self.start, self.secant_stiffness)))
+        start, stiffness = _mixed(self.start, phase, self.first_phase), self.spring_stiffness
+        return Springs(start, stiffness if stiffness.ndim == 1 else _mixed(stiffness, phase, self.first_phase))
 
     def force(self, place: Springs, dte: Scalar) -> Scalar:
-        return place.force(dte)
-
-
-class LoadedError(WithStatus, AbstractMeshForce):
-    """Mean stiffness, excited by the loaded transmission error: k (q - q_0(phase) + F_0 / k), without parametric
-    excitation, as A. Kahraman and R. Singh have it.
-
-    Attributes:
-        first_phase: mesh position with which the curves begin [base pitches].
-        start: static transmission error under the load less F_0 / k, of the drive flanks, and its negative for the
-            coast flanks [um], shape (2, positions).
-        constant_stiffness: F_0 over the mean deflection of drive and coast flanks [N/um], shape (2,).
-        status: of all contacts.
-    """
-
-    first_phase: Scalar = result("base pitches")
-    start: Curves = result("um")
-    constant_stiffness: Sides = result("N/um")
-    status: Statuses = result()
-
-    def at(self, phase: Scalar) -> Springs:
-        return Springs(_mixed(self.start, phase, self.first_phase), self.constant_stiffness)
-
-    def force(self, place: Springs, dte: Scalar) -> Scalar:
-        return place.force(dte)
+        drive, closed = closing(place.start, dte)
+        found = jnp.where(drive, place.stiffness[0], place.stiffness[1]) * jnp.maximum(closed, 0.0)
+        return jnp.where(drive, found, -found)
 
 
 class Tangent(WithStatus, AbstractMeshForce):

@@ -19,7 +19,7 @@ from ..numerics import check, concrete, real, whole
 from ..numerics.programs import is_eager
 from .flanks import Both, Flanks, Static, coast_flanks, drive_flanks, static
 from .force import AbstractMeshForce
-from .force_map import ForceMap, LoadedError, Tangent, VaryingStiffness, tabulate
+from .force_map import FlankSprings, ForceMap, Tangent, tabulate
 
 Scalar = Float[Array, ""]
 Model = Literal["map", "varying stiffness", "loaded error", "tangent"]
@@ -55,8 +55,8 @@ def mesh_force(
         wheel: likewise of the wheel.
         coast: modifications of the coast flanks of (pinion, wheel), None of either for the nominal involute; None for
             those of the drive flanks.
-        model: "map" for `ForceMap`, the contact at every DTE; "varying stiffness" for `VaryingStiffness`, "loaded
-            error" for `LoadedError`, "tangent" for `Tangent`: all give the static transmission error of the torque.
+        model: "map" for `ForceMap`, the contact at every DTE; "varying stiffness" and "loaded error" for
+            `FlankSprings`, "tangent" for `Tangent`: all give the static transmission error of the torque.
         positions: mesh positions of the force, which is linear between them: the DTE at which a pair comes into
             contact changes by several um from one of 64 positions to the next, so that they limit how near the map is
             to the contact analysis (half a percent needs 512). An integrator whose steps meet these positions alone
@@ -103,7 +103,7 @@ def force_and_mesh(
     both = (pinion, wheel), _coast_of(coast, (pinion, wheel))
     off = interpolated(deviation, given, mesh)
     made = _made(mesh, torque, both, off, model, levels, farthest, series)
-    while _is_too_narrow(mesh, made):
+    while more_pairs_help(mesh, made.status):
         mesh = resized(mesh, pairs=mesh.resolution.chosen_pairs + 1)
         made = _made(mesh, torque, both, interpolated(deviation, given, mesh), model, levels, farthest, series)
     return made, mesh
@@ -152,26 +152,22 @@ def _coast_of(coast: Any, drive: Both) -> Both:
     return coast
 
 
-def _is_too_narrow(mesh: Mesh, made) -> bool:
-    return more_pairs_help(mesh, made.status)
-
-
-def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> AbstractMeshForce:
+def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> ForceMap | FlankSprings | Tangent:
     drive = drive_flanks(mesh, torque, both[0])
     sides = drive._replace(removed=drive.removed + deviation), coast_flanks(mesh, torque, both[1])
     found = _of_both(lambda side: static(side, torque, compliance), sides)
     force, first = 1e3 * torque / mesh.pair.pinion.base_radius, mesh.kinematics.first_phase
-    each = [jnp.max(side.status) for side in found]
+    statuses = [jnp.max(side.status) for side in found]
     if model == "tangent":
-        return Tangent(first, force, found[0].loaded, found[0].stiffness, each[0])
+        return Tangent(first, force, found[0].loaded, found[0].stiffness, statuses[0])
     start = jnp.stack([each.unloaded + side.clearance for each, side in zip(found, sides)])
-    status = worst(*each, status_of({Status.GEARS_CANNOT_RUN: _jammed(start)}))
+    status = worst(*statuses, status_of({Status.GEARS_CANNOT_RUN: _jammed(start)}))
     deflection = jnp.stack([each.loaded - each.unloaded for each in found])
     if model == "varying stiffness":
-        return VaryingStiffness(first, start, force / deflection, status)
+        return FlankSprings(first, start, force / deflection, status)
     if model == "loaded error":
         mean = jnp.mean(deflection, axis=1)
-        return LoadedError(first, start + deflection - mean[:, None], force / mean, status)
+        return FlankSprings(first, start + deflection - mean[:, None], force / mean, status)
     farthest = reach * jnp.max(deflection[0])
     both = tuple((side, _in_own_order(side, each)) for side, each in zip(sides, found))
     drive, coast = _of_both(lambda of: tabulate(of[0], of[1], compliance, farthest, levels), both)

@@ -34,8 +34,6 @@ Scalar = Float[Array, ""]
 Torques = Float[Array, " torques"]
 OfGears = Float[Array, "gears torques"]
 
-_MINUTES = 60.0  # in an hour
-
 
 class Damage(WithStatus, Checked):
     """Damage under a duty cycle, 1 for a life that is used up; axes (gears, torques), pinion first.
@@ -110,19 +108,13 @@ def damage(
         ValueError: for a duration without speeds, and a strength without an S-N curve.
     """
     whole("damage", "stations", stations, 3, 1001)
-    found = under_loads(support, load, stations=stations)
+    found = under_loads(support, load.torques, stations)
     return damage_of(found, load, strength, pinion or FlankLine(), wheel or FlankLine())
 
 
-def under_loads(support: AbstractSupport, load: LoadSpectrum, *, stations: int = STATIONS) -> Stations:
-    """A support under every torque of a spectrum, with a leading axis (torques,)."""
-    if load.duration is not None and load.speeds is None:
-        raise ValueError("damage: a load spectrum with a duration needs speeds, for the number of cycles")
-    return _under_loads(support, load.torques, stations)
-
-
 @program
-def _under_loads(support: AbstractSupport, torques: Torques, stations: int) -> Stations:
+def under_loads(support: AbstractSupport, torques: Torques, stations: int) -> Stations:
+    """A support under several torques, with a leading axis (torques,)."""
     return jax.vmap(lambda torque: at_stations(support, torque, stations=stations))(torques)
 
 
@@ -193,8 +185,7 @@ def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, strength: Strength
     mean = largest / factor
     # K_Fbeta of an even load; below 1 is rounding
     bent = mean * root_face_load_factor(jnp.maximum(factor, 1.0), pair.face_width, tooth_height(pair))
-    hours, speeds = load.hours, load.speeds
-    turns = load.weights if hours is None or speeds is None else _MINUTES * hours * speeds
+    turns = load.turns("damage")
     cycles = turns, turns / pair.gear_ratio
     loaded = largest != 0
     # the root has no derivative at zero load
@@ -256,7 +247,7 @@ def longest_life(
         raise ValueError("longest_life: searches with numbers, not inside of a traced function; `damage` can be traced")
     if not float(jnp.max(jnp.where(load.weights > 0, load.torques, 0.0))) > 0:
         raise ValueError("longest_life: torques are all zero; every flank line has an infinite life")
-    faces = under_loads(support, load, stations=stations)
+    faces = under_loads(support, load.torques, stations)
     unmodified = damage(support, load, strength, stations=stations)
     missed = np.asarray(load.torques)[~np.asarray(unmodified.converged)]
     if len(missed):
@@ -328,7 +319,7 @@ def face_load_over_torques(
         ValueError: for torques that are negative or repeated, and other numbers out of range.
     """
     whole("face_load_over_torques", "stations", stations, 2, 1001)
-    faces = under_loads(support, LoadSpectrum(torques), stations=stations)
+    faces = under_loads(support, LoadSpectrum(torques).torques, stations)
     return _factors(faces, pinion or FlankLine(), wheel or FlankLine())
 
 

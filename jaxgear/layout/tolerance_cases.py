@@ -278,7 +278,7 @@ def lives_in_cases(
         ValueError: as `damage` does.
     """
     whole("lives_in_cases", "stations", stations, 3, 1001)
-    faces = under_loads(support, load, stations=stations)
+    faces = under_loads(support, load.torques, stations)
     return _lives(faces, load, strength, tolerance, pinion or FlankLine(), wheel or FlankLine())
 
 

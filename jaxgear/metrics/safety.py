@@ -31,7 +31,7 @@ LARGEST_SAFETY = 1000.0
 
 
 class Strength(Checked):
-    """Permissible stresses of both gears; factors of life, surface and size are included.
+    """Permissible stresses and S-N curves of both gears; factors of life, surface and size are included.
 
     Attributes:
         pitting: nominal contact stress that the pinion bears, and the wheel where it has none of its own: sigma_HG
@@ -93,20 +93,21 @@ def safety_factor(borne: Real, reached: Real) -> Real:
     return borne / jnp.maximum(reached, borne / LARGEST_SAFETY)
 
 
+def _safety(owner: str, strength: Strength, name: Mode, stress: Any) -> tuple[Real, Real]:
+    pinion, wheel = strengths_of(owner, strength, name)
+    return safety_factor(pinion, stress.pinion), safety_factor(wheel, stress.wheel)
+
+
 @over_batch
 def pitting_safety(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
     """S_H of pinion and wheel: pitting strength over the nominal contact stress."""
-    stress = nominal_contact_stress(cycle)
-    limits = strengths_of("pitting_safety", strength, "pitting")
-    return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
+    return _safety("pitting_safety", strength, "pitting", nominal_contact_stress(cycle))
 
 
 @over_batch
 def root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
     """S_F of pinion and wheel after ISO 6336-3: bending strength over the nominal root stress."""
-    stress = nominal_root_stress(cycle)
-    limits = strengths_of("root_safety", strength, "bending")
-    return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
+    return _safety("root_safety", strength, "bending", nominal_root_stress(cycle))
 
 
 @over_batch
@@ -115,9 +116,7 @@ def local_root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Load, Load]
 
     Larger than the standard's S_F where a pair that touches early or late shares the load.
     """
-    stress = root_stress(cycle)
-    limits = strengths_of("local_root_safety", strength, "bending")
-    return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
+    return _safety("local_root_safety", strength, "bending", root_stress(cycle))
 
 
 @over_batch

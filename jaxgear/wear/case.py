@@ -404,18 +404,14 @@ def _loads(owner: str, torque: Any, dtype) -> tuple[OperatingPoint, Float[Array,
     if not isinstance(torque, LoadSpectrum):
         single = operating_point_of(owner, torque, dtype)
         return jax.tree.map(lambda number: number[None], single), None
-    if torque.duration is not None and torque.speeds is None:
-        raise ValueError(f"{owner}: a load spectrum with a duration needs speeds, for the shares of the revolutions")
     load = jax.tree.map(lambda number: number.astype(dtype), torque)
     friction = None if load.friction is None else jnp.broadcast_to(load.friction, load.torques.shape)
 
     def each(torque, speed, friction):
         return OperatingPoint(torque, speed, friction)
 
-    weights = load.weights
-    if load.duration is not None and load.speeds is not None:
-        # shares of the hours: a load turns the pinion by hours times speed
-        turns = weights * load.speeds
+    turns = load.turns(owner)
+    if load.duration is not None:
         check(owner, "sum of hours times speeds", jnp.sum(turns), "", low=0.0, open_low=True)
-        weights = turns / jnp.sum(turns)
-    return jax.vmap(each)(load.torques, load.speeds, friction), weights
+        turns = turns / jnp.sum(turns)
+    return jax.vmap(each)(load.torques, load.speeds, friction), turns
