@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..contact.operating_point import operating_point_of
-from ..contact.status import Status, Statuses, status_of, worst
+from ..contact.status import Status, Statuses, status_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Checked, fields_of, real
 from .cases import Cases, Conditions, LoadSpectrum, conditions
@@ -238,7 +238,7 @@ def cycle_status(cycle: MeshCycle) -> Statuses:
     The transmission error has to be finite too: reductions of the backend can drop NaN.
     """
     infinite = ~jnp.isfinite(jnp.sum(cycle.transmission_error, axis=-1))
-    return worst(jnp.max(cycle.status, axis=-1), status_of({Status.NOT_CONVERGED: infinite}))
+    return status_of({Status.NOT_CONVERGED: infinite}, jnp.max(cycle.status, axis=-1))
 
 
 def solved(cycle: MeshCycle) -> Bool[Array, "*cycles"]:

@@ -20,7 +20,7 @@ from .covering import check_cover, closing, pairs_for
 from .face_coupling import check_modes, check_support, coupling_of, ends_together, spreading_of
 from .kinematics import Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution
-from .status import Status, Statuses, status_of, worst
+from .status import Status, Statuses, status_of
 from .support import AbstractSupport
 
 
@@ -124,8 +124,8 @@ class Mesh(eqx.Module):
     @property
     def status(self) -> Statuses:
         """Whether such gears can run and such a support is possible, shape (); only traced ones may fail to."""
-        gears = status_of({Status.GEARS_CANNOT_RUN: ~self.margins.valid})
-        return gears if self.support_status is None else worst(gears, self.support_status)
+        parts = () if self.support_status is None else (self.support_status,)
+        return status_of({Status.GEARS_CANNOT_RUN: ~self.margins.valid}, *parts)
 
     @property
     def path_of_contact(self) -> PathOfContact:

@@ -14,7 +14,7 @@ from .mesh import Mesh
 from .operating_point import operating_point_of
 from .slide import RemovedMaterial, for_contact, loaded_material
 from .solve import check_mesh, contact_of, contact_status, flanks_of, pair_forces
-from .status import Status, Statuses, WithStatus, status_of, worst
+from .status import Status, Statuses, WithStatus, status_of
 
 # Newton steps of a mesh of several slices from the approach of all springs in series to that of the teeth: the force of
 # contacts that stiffen bends one way, so that the steps come from one side and double their digits.
@@ -180,7 +180,7 @@ def solve_series(mesh: Mesh, approach: Curve, removed: RemovedMaterial, complian
         missed = approach - error - shared * found.force
         stiffness = found.tangent_stiffness / softened
         met = jnp.abs(missed) <= _MET * (1 + jnp.abs(approach))
-        status = worst(found.status, status_of({Status.NOT_CONVERGED: ~met}))
+        status = status_of({Status.NOT_CONVERGED: ~met}, found.status)
         return error + missed / softened, SeriesContact(found.force + stiffness * missed, stiffness, error, status)
 
     return jax.tree.map(lambda part: part[-1], jax.lax.scan(step, approach, length=_SERIES_STEPS)[1])

@@ -29,7 +29,7 @@ from .mesh import Mesh, begin_mesh, prepare
 from .operating_point import OperatingPoint, operating_point_of
 from .resolution import Resolution
 from .slide import RemovedMaterial, as_removed, for_contact, loaded_material, nothing_removed
-from .status import Status, Statuses, status_of, worst
+from .status import Status, Statuses, status_of
 from .support import AbstractSupport
 
 _MOST_PAIRS = 12
@@ -282,7 +282,7 @@ def contact_status(mesh: Mesh, solution: ContactSolution, error: Curve, removed:
         Status.NOT_CONVERGED: ~(solution.converged & (teeth < last)),
         Status.MORE_PAIRS_NEEDED: teeth >= last,
     }
-    return worst(status_of(causes), mesh.status)
+    return status_of(causes, mesh.status)
 
 
 def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
@@ -325,7 +325,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
     unloaded = minimum(problem.gap / mesh.lever[:, None], axis=(0, 1))
     status = contact_status(mesh, solution, solution.approach, removed)
     if mesh.support_torque is not None:
-        status = worst(status, status_of({Status.OUT_OF_VALIDITY: ~holds_at(mesh.support_torque, torque)}))
+        status = status_of({Status.OUT_OF_VALIDITY: ~holds_at(mesh.support_torque, torque)}, status)
     return {
         "transmission_error": solution.approach + windup,
         "unloaded_transmission_error": unloaded,

@@ -54,18 +54,15 @@ class WithStatus:
         return self.status == Status.CONVERGED.value
 
 
-def status_of(causes: Mapping[Status, Any]) -> Statuses:
+def status_of(causes: Mapping[Status, Any], *parts: Any) -> Statuses:
     """The status of a result; `CONVERGED` where there is none of the causes.
 
     Args:
         causes: for every cause where it is met, arrays of bools that broadcast against each other.
+        parts: statuses of what the result is made of, to be broadcast likewise.
     """
-    return worst(*(jnp.asarray(met).astype(jnp.int8) * jnp.int8(cause.value) for cause, met in causes.items()))
-
-
-def worst(*statuses: Any) -> Statuses:
-    """The most basic cause of several arrays, elementwise."""
-    return reduce(jnp.maximum, statuses)
+    met = (jnp.asarray(where).astype(jnp.int8) * jnp.int8(cause.value) for cause, where in causes.items())
+    return reduce(jnp.maximum, (*met, *parts))
 
 
 def reason(status: Any) -> str:

@@ -13,7 +13,7 @@ from ..contact import Mesh
 from ..contact.mesh import prepare_from
 from ..contact.operating_point import operating_point_of
 from ..contact.solve import check_mesh, more_pairs_help
-from ..contact.status import Status, status_of, worst
+from ..contact.status import Status, status_of
 from ..microgeometry import AbstractModification
 from ..numerics import check, concrete, real, whole
 from ..numerics.programs import is_eager
@@ -161,7 +161,7 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Fo
     if model == "tangent":
         return Tangent(first, force, found[0].loaded, found[0].stiffness, statuses[0])
     start = jnp.stack([each.unloaded + side.clearance for each, side in zip(found, sides)])
-    status = worst(*statuses, status_of({Status.GEARS_CANNOT_RUN: _jammed(start)}))
+    status = status_of({Status.GEARS_CANNOT_RUN: _jammed(start)}, *statuses)
     deflection = jnp.stack([each.loaded - each.unloaded for each in found])
     if model == "varying stiffness":
         return FlankSprings(first, start, force / deflection, status)
@@ -177,7 +177,7 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Fo
         reach=farthest,
         node_force=jnp.stack([drive[0], coast[0]]),
         node_stiffness=jnp.stack([drive[1], coast[1]]),
-        status=worst(status, drive[2], coast[2]),
+        status=status_of({}, status, drive[2], coast[2]),
     )
 
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
-from ..contact.status import Status, Statuses, WithStatus, status_of, worst
+from ..contact.status import Status, Statuses, WithStatus, status_of
 from ..numerics import Checked, check, count, implicit_root, kernel, real, result, whole, with_jacobian
 from .integrate import cycles, history, largest, mean, rms, share, smallest
 from .oscillator import Coordinates, Oscillator, State, static_force
@@ -225,8 +225,8 @@ def settled_orbit(oscillator: Oscillator, frequency: Scalar, start: State, nodes
     # not where a state is not a number either
     same = jax.lax.stop_gradient(jnp.linalg.norm(z - begin) <= _SAME * jnp.linalg.norm(z))
     orbit = orbit_at(oscillator, jnp.where(same, z, begin), steps, frequency, periods)
-    status = status_of({Status.NO_STEADY_MOTION: ~(orbit.stable & same)})
-    return dataclasses.replace(orbit, status=worst(orbit.status, status))
+    status = status_of({Status.NO_STEADY_MOTION: ~(orbit.stable & same)}, orbit.status)
+    return dataclasses.replace(orbit, status=status)
 
 
 def orbit_at(oscillator: Oscillator, z, steps, frequency: Scalar, periods: int) -> Orbit:

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ..contact.status import Status, Statuses, status_of, worst
+from ..contact.status import Status, Statuses, status_of
 from .orbit import Orbit, find_orbit
 from .oscillator import Oscillator, static_force
 from .response import SpeedResponse
@@ -129,14 +129,14 @@ def steady_force(
         def on_orbit() -> SteadyForce:
             orbit, same = _orbit_of(oscillator, frequency, start, periods, steps, recorded)
             force = jnp.tile(_at_positions(oscillator, orbit, phase), (most // periods, 1))
-            status = worst(status_of({Status.NO_STEADY_MOTION: ~same}), oscillator.status)
+            status = status_of({Status.NO_STEADY_MOTION: ~same}, oscillator.status)
             force = jnp.where(status == Status.CONVERGED, force, even)
             return SteadyForce(force, orbit.dynamic_factor, orbit.back_side_contact > 0, status)
 
         return on_orbit
 
     def none() -> SteadyForce:
-        status = worst(jnp.int8(Status.NO_STEADY_MOTION), oscillator.status)
+        status = status_of({Status.NO_STEADY_MOTION: True}, oscillator.status)
         return SteadyForce(
             jnp.full((most, len(phase)), even), jnp.full_like(even, jnp.nan), jnp.zeros((), bool), status
         )

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..compliance.iso_6336 import iso_stiffness
-from ..contact.status import Status, Statuses, WithStatus, status_of, worst
+from ..contact.status import Status, Statuses, WithStatus, status_of
 from ..contact.support import AbstractSupport
 from ..geometry import Gear, GearPair, path_of_contact
 from ..microgeometry import AbstractModification, Flank, NoModification
@@ -173,7 +173,7 @@ def _annex_e(support, pinion, wheel, torque, stiffness, stations: int) -> FaceLo
     gap = jnp.broadcast_to(gap, y.shape)
     found = press(influence + jnp.eye(stations) / (stiffness * step), gap, 1e3 * moment / pair.pinion.base_radius)
     causes = {Status.NOT_CONVERGED: ~found.converged, Status.OUT_OF_VALIDITY: ~(stiffness > 0)}
-    status = worst(status_of(causes), support.status)
+    status = status_of(causes, support.status)
 
     def where_found(value):
         return jnp.where(status == Status.CONVERGED, value, jnp.nan)

@@ -19,7 +19,7 @@ from ..contact.operating_point import operating_point_of
 from ..contact.prescribed import solve_forces
 from ..contact.slide import slid_material
 from ..contact.solve import check_mesh, flanks_of
-from ..contact.status import Status, Statuses, status_of, worst
+from ..contact.status import Status, Statuses, status_of
 from ..dynamics import Dynamics
 from ..dynamics.steady import SteadyForce
 from ..geometry import GearPair
@@ -227,7 +227,7 @@ class Case(eqx.Module):
             found[_DYNAMIC_FACTOR] = jnp.where(motion.status == Status.CONVERGED, motion.dynamic_factor, jnp.nan)
             if self.vibration.wears:
                 rate, status = self._dynamic_rate(cycle, motion, removed, place)
-        return Analysis(rate, found, worst(status, cycle_status(cycle)))
+        return Analysis(rate, found, jnp.maximum(status, cycle_status(cycle)))
 
     def _worn(self, roll_length, depth: Depth) -> Flanks:
         """Both flanks with what is worn off them, as the contact analyses look it up."""
@@ -250,11 +250,11 @@ class Case(eqx.Module):
         def of_cycle(force):
             contact = solve_forces(self.mesh, jnp.maximum(force, 0.0), removed)
             rate, status = self._rate(replace(cycle, line_load=contact.line_load), place)
-            return rate, worst(status, jnp.max(contact.status))
+            return rate, jnp.maximum(status, jnp.max(contact.status))
 
         rates, statuses = jax.lax.map(of_cycle, motion.force)
-        on_the_back = status_of({Status.OUT_OF_VALIDITY: motion.back_side_contact})
-        return jnp.mean(rates, axis=0), worst(jnp.max(statuses), motion.status, on_the_back)
+        status = status_of({Status.OUT_OF_VALIDITY: motion.back_side_contact}, jnp.max(statuses), motion.status)
+        return jnp.mean(rates, axis=0), status
 
     def flanks(self, roll_length, depth: Depth) -> dict[str, AbstractModification]:
         """Both flanks with what is worn off them."""
@@ -272,7 +272,7 @@ class Case(eqx.Module):
         def on(depth, found, status) -> MeshCycle:
             found = {name: found[name] for name in _FOUND}
             # flanks that a contact has worn which was not found are not those of the history
-            found = found | {"status": worst(found["status"], status)}
+            found = found | {"status": jnp.maximum(found["status"], status)}
             flanks = self.flanks(roll_length, depth)
             return jax.vmap(lambda load, of: under(flanks, load, of))(self.loads, found)
 
@@ -342,7 +342,7 @@ def _march(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> Mar
     def analyze(depth) -> Analysis:
         rates, seen, statuses = over_loads(lambda load, place: case.under(load, place, depth))
         rate = jnp.tensordot(shares, rates, 1) * passages[:, None, None, None]
-        return Analysis(rate, seen, worst(jnp.max(statuses), through(depth)))
+        return Analysis(rate, seen, jnp.maximum(jnp.max(statuses), through(depth)))
 
     def over_loads(under):
         if case.vibration is None:
@@ -352,7 +352,7 @@ def _march(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> Mar
 
     found = march(analyze, start, revolutions)
     gone = jax.lax.cummax(jax.vmap(through)(found.depth))
-    return found._replace(status=worst(found.status, gone))
+    return found._replace(status=jnp.maximum(found.status, gone))
 
 
 # of a motion it is twice as many programs in one, which compile for a hundred times as long as they run
