@@ -147,7 +147,7 @@ def main(fast=False) -> dict:
             key = f"{torque:g} {name}"
             curves[key] = {run: (np.asarray(r.dynamic_factor), np.asarray(r.dte_rms)) for run, r in runs.items()}
             found |= _numbers(key, np.asarray(settings.mesh_frequencies), curves[key])
-            found[f"{key} settled"] = all(bool(np.all(r.settled)) for r in runs.values())
+            found[f"{key} settled"] = all(bool(np.all(r.converged)) for r in runs.values())
         found |= _lower(torque, found, [name for name in designs if name != "unmodified"])
     return found | {"frequency": np.asarray(settings.mesh_frequencies), "curves": curves}
 

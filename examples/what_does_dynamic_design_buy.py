@@ -108,7 +108,7 @@ def numbers(results):
             found[f"{name}_loudest_frequency_at_{torque:g}_Nm_Hz"] = float(runs[0].mesh_frequency[factor.argmax()])
         worst[name] = max(found[f"{name}_worst_factor_at_{torque:g}_Nm"] for torque in responses)
         found[f"{name}_worst_factor"] = worst[name]
-        found[f"{name}_settled_share"] = float(np.mean([run.settled for runs in responses.values() for run in runs]))
+        found[f"{name}_settled_share"] = float(np.mean([run.converged for runs in responses.values() for run in runs]))
     found["dynamic_searched_factor"] = results["dynamic"][0].objective
     return found | {"worst_factor_lower_percent": 100 * (1 - worst["dynamic"] / worst["static"])}
 

@@ -162,7 +162,7 @@ def numbers(results) -> dict:
                 f"{name}_{key}_exponent": float(relief.curve.exponent),
             }
         answer[f"{name}_settled_share"] = float(
-            np.mean([response.settled[at] for said in speed["judged"].values() for response in said["responses"]])
+            np.mean([response.converged[at] for said in speed["judged"].values() for response in said["responses"]])
         )
     return answer
 

@@ -18,6 +18,7 @@ from types import SimpleNamespace
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from commands import FIXED, FREE, LINE, assert_refused, call
@@ -28,13 +29,14 @@ from jaxgear import plot
 from jaxgear.cli import app, cache, geometry, main, manufactured, optimum_report, report, run, study
 from jaxgear.cli.geometry import gears
 from jaxgear.cli.optimum_report import front_rows, front_table, gains
+from jaxgear.contact.status import Status
 from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
 from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
 from jaxgear.manufacture import over_balls
 from jaxgear.metrics import Finding
-from jaxgear.metrics.findings import Range
 from jaxgear.microgeometry import NoModification
+from jaxgear.numerics import Usual
 from jaxgear.optimize import result as optimum_result
 from jaxgear.tolerance import ToleranceClass, iso_rounded
 from jaxgear.vocabulary import quantities
@@ -227,7 +229,7 @@ def test_shafts_that_an_analysis_leaves_out_are_told(folder, analyzed):
 
 
 def test_what_is_not_usual_is_said_once_of_all_designs_it_concerns():
-    usual, range_ = Range(0.0, 1650.0, "MPa", "case-hardened"), Range(0.0, 0.5, "", "steel")
+    usual, range_ = Usual(0.0, 1650.0, "MPa", "case-hardened"), Usual(0.0, 0.5, "", "steel")
     found = {
         "unmodified": (Finding("friction", "", 3.7, range_), Finding("corner pressure", "", 4689.0, usual)),
         "optimum": (
@@ -708,7 +710,7 @@ def files_of_at_most(size):
 def test_a_failed_contact_solution_is_loud(folder, tmp_path, monkeypatch, analyzed):
     def failed(*arguments, **flanks):
         cycles = jg.sweeps.over_torques(*arguments, **flanks)
-        return [replace(cycle, converged=np.zeros_like(cycle.converged)) for cycle in cycles]
+        return [replace(cycle, status=jnp.full_like(cycle.status, Status.MORE_PAIRS_NEEDED)) for cycle in cycles]
 
     monkeypatch.setattr(study, "over_torques", failed)
     path = tmp_path / "fails.toml"
@@ -716,6 +718,7 @@ def test_a_failed_contact_solution_is_loud(folder, tmp_path, monkeypatch, analyz
     result = call("analyze", path, "--no-figures", "-o", tmp_path / "out")
     assert result.code == 1
     assert "CONTACT SOLUTION NOT CONVERGED: unmodified at 30" in result.err
+    assert "more are needed; its numbers" in " ".join(result.err.split())
     designs = json.loads((tmp_path / "out" / "summary.json").read_text())["designs"]
     assert designs["unmodified"]["converged"] is False
     assert 50.0 in designs["unmodified"]["failed_torques_Nm"]

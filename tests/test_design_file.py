@@ -564,7 +564,6 @@ LAYOUTS = {
     "[layout.misalignment]\nskew = nan\nbearing_span = 80.0": "layout.misalignment.skew: nan must be finite",
     "[layout.misalignment]\nskw = 9.0\nbearing_span = 80.0": "layout.misalignment.skw: unknown key, did you mean",
     "[layout.profile]\npinion_amounts = [1.0, 1.0]": "layout.profile.pinion_amounts: must all be different",
-    "[layout.pitting]\nendurance = 900.0": "layout.pitting: has no effect without layout.torques",
 }
 
 

@@ -14,7 +14,7 @@ import jaxgear as jg
 from jaxgear.contact import removed_material
 from jaxgear.contact.prescribed import solve_forces
 from jaxgear.dynamics import Dynamics, natural_frequencies
-from jaxgear.wear import Wear, mean_over_life, over_life, wear, wear_depth, wear_in_steps, worn_volume
+from jaxgear.wear import Wear, mean_over_life, over_life, wear, wear_depth, worn_volume
 from jaxgear.wear.quantities import OF_LIFE
 from jaxgear.wear.worn_volume import deposit
 
@@ -83,7 +83,7 @@ def resonant(mesh, natural):
 def test_slow_gears_have_the_static_force(mesh, natural):
     """But for the vibration after every step of the stiffness."""
     _, motion = motion_at(mesh, natural / 40)
-    assert motion.found and not motion.back_side_contact
+    assert motion.status == 0 and not motion.back_side_contact
     np.testing.assert_allclose(motion.force[:, OF_MESH], static_force(mesh), rtol=0.02)
     assert motion.force.std() < 0.01 * static_force(mesh)
 
@@ -91,7 +91,7 @@ def test_slow_gears_have_the_static_force(mesh, natural):
 @pytest.mark.slow
 def test_slow_gears_wear_as_under_the_static_load(mesh, natural):
     slow, static = life_of(mesh, natural / 40), life_of(mesh, natural, dynamics=None)
-    assert slow.known.all() and static.dynamic_factor is None
+    assert slow.converged.all() and static.dynamic_factor is None
     np.testing.assert_allclose(wear_depth(slow)[1:], wear_depth(static)[1:], rtol=0.01)
     np.testing.assert_allclose(worn_volume(slow)[-1].sum(), worn_volume(static)[-1].sum(), rtol=0.01)
     assert 1.0 < float(slow.dynamic_factor[0]) < 1.1
@@ -115,7 +115,7 @@ def test_the_worn_volume_is_that_of_the_forces_of_the_motion(mesh, natural):
     (_, motion), place = motion_at(mesh, natural), deposit(mesh, jnp.asarray(TORQUE), 9)
     short = life_of(mesh, natural, 1e-3)
     force = motion.force[0, OF_MESH]
-    assert motion.found and motion.force.shape == (12, 64) and (force >= 0).all()
+    assert motion.status == 0 and motion.force.shape == (12, 64) and (force >= 0).all()
     contact = solve_forces(mesh, jnp.asarray(force), removed_material(mesh, TORQUE, **FLANKS))
     carried = np.asarray(contact.line_load)[:, 0] * float(mesh.slice_width[0])
     np.testing.assert_allclose((carried * np.asarray(mesh.lever)).sum(axis=0), force, rtol=1e-10)
@@ -171,7 +171,7 @@ def test_wear_is_deeper_where_the_force_of_the_motion_peaks(mesh, natural):
 
 def test_the_dynamic_factor_is_that_of_the_worn_flanks(mesh, natural, resonant):
     factors = np.asarray(resonant.dynamic_factor)
-    assert np.asarray(resonant.known).all() and factors.shape == (BLOCKS + 1,)
+    assert np.asarray(resonant.converged).all() and factors.shape == (BLOCKS + 1,)
     worn = dict(zip(FLANKS, resonant.flanks(-1)))
     for factor, flanks in ((factors[0], FLANKS), (factors[-1], {gear: RELIEF + worn[gear] for gear in FLANKS})):
         motion = motion_at(mesh, natural, **flanks)[1]
@@ -211,7 +211,7 @@ def test_the_static_load_alone_gives_the_factors_of_flanks_that_it_has_worn(mesh
     static = life_of(mesh, natural, dynamics=None)
     seen = life_of(mesh, natural, line_load="static")
     np.testing.assert_allclose(seen.depth, static.depth, rtol=1e-9, atol=1e-12)
-    assert seen.known.all() and (np.asarray(seen.dynamic_factor) > 1.1).all()
+    assert seen.converged.all() and (np.asarray(seen.dynamic_factor) > 1.1).all()
 
 
 def test_flanks_whose_coast_side_touches_are_not_known(natural):
@@ -219,7 +219,7 @@ def test_flanks_whose_coast_side_touches_are_not_known(natural):
     tight = prepared(0.0)
     light = replace(SETTINGS, damping_ratio=0.01)
     life = life_of(tight, 0.9 * natural, dynamics=light)
-    assert life.known.tolist() == [True] + [False] * BLOCKS
+    assert life.converged.tolist() == [True] + [False] * BLOCKS
     assert np.isfinite(life.dynamic_factor[0]) and np.isnan(life.dynamic_factor[1:]).all()
     assert np.isnan(wear_depth(life)[-1]) and np.isnan(over_life(life, "ppte")[-1])
 
@@ -233,7 +233,7 @@ def test_steps_on_the_host_are_the_blocks(mesh, natural, resonant):
         return make()
 
     options = {"coefficient": COEFFICIENT, "blocks": BLOCKS, "dynamics": SETTINGS, **FLANKS}
-    steps = wear_in_steps(mesh, at(natural), REVOLUTIONS, keep=keep, **options)
+    steps = wear(mesh, at(natural), REVOLUTIONS, keep=keep, **options)
     np.testing.assert_array_equal(steps.depth, resonant.depth)
     np.testing.assert_array_equal(steps.dynamic_factor, resonant.dynamic_factor)
     kept = [str(leaf) for leaf in jax.tree.leaves(made_of[0])]
@@ -309,5 +309,5 @@ def test_slow_gears_wear_alike_by_the_map_of_forces(mesh, natural):
     mapped = replace(SETTINGS, model="map", positions=128, steps=512)
     slow = life_of(mesh, natural / 40, dynamics=mapped)
     static = life_of(mesh, natural, dynamics=None)
-    assert slow.known.all()
+    assert slow.converged.all()
     np.testing.assert_allclose(wear_depth(slow)[1:], wear_depth(static)[1:], rtol=0.01)

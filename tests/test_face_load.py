@@ -95,7 +95,7 @@ def test_points_that_all_feel_each_other_meet_every_condition():
         matrix, gap = part @ part.T / 21 + softness * np.eye(21), 3 * random.normal(size=21)
         load = 10.0 ** random.uniform(-1.0, 2.0)
         found = pressed(jnp.asarray(matrix), jnp.asarray(gap), jnp.asarray(load))
-        assert found.solved
+        assert found.converged
         force = np.asarray(found.force)
         opening = matrix @ force + gap - float(found.approach)
         assert force.min() >= -1e-10 and opening.min() >= -1e-10

@@ -13,7 +13,7 @@ from jaxgear.metrics import Lubricant, findings_of
 
 
 def names(cycle, **options):
-    return {(finding.name, finding.where) for finding in findings_of(cycle, **options)}
+    return {(finding.key, finding.where) for finding in findings_of(cycle, **options)}
 
 
 def oil(**values):

@@ -71,14 +71,13 @@ LIFE = """
 torques = [60.0, 150.0]
 hours = [1000.0, 50.0]
 speeds = [900.0, 600.0]
-[layout.pitting]
-endurance = 1500.0
-exponent = 13.2
-cycles = 5e7
-[layout.bending]
-endurance = 900.0
-exponent = 8.7
-cycles = 3e6
+[strength]
+pitting = 1500.0
+pitting_exponent = 13.2
+pitting_cycles = 5e7
+bending = 900.0
+bending_exponent = 8.7
+bending_cycles = 3e6
 """
 HOUSING = """compliance um/N, A.x, B.x, C.x, D.x
 A.x, 1e-3, 0, 0, 0
@@ -479,11 +478,11 @@ WRONG = [
     (replaced("torque = 150.0 }]", "torque = -150.0 }]"), "the pinion of a mesh drives its wheel"),
     (FILE + LIFE.replace("[1000.0, 50.0]", "[1000.0, -50.0]"), "layout.hours[1]: -50 h must be at least 0 h"),
     (FILE + LIFE.replace("[900.0, 600.0]", "[900.0, 0.0]"), "layout.speeds[1]: 0 rpm must be greater than 0 rpm"),
-    (FILE + LIFE.replace("exponent = 13.2\n", ""), "layout.pitting.exponent: missing, this key is required"),
+    (FILE + LIFE.partition("[strength]")[0], "strength.pitting_cycles: missing, layout.torques needs it"),
     (FILE + "torques = [10.0]\n", "layout.hours: missing, layout.torques needs it"),
     (FILE + "hours = [10.0]\n", "layout.hours: has no effect without layout.torques"),
     (FILE + LIFE.replace("[900.0, 600.0]", "[900.0]"), "layout.speeds: 1 numbers must be as many as the 2 torques"),
-    (FILE + LIFE.replace("exponent = 8.7", "exponent = 0.5"), "layout.bending.exponent: 0.5 must be at least 1"),
+    (FILE + LIFE.replace("exponent = 8.7", "exponent = 0.5"), "strength.bending_exponent: 0.5 must be at least 1"),
     (
         FILE + "[layout.profile]\npinion_amounts = [-1.0]\n",
         "layout.profile.pinion_amounts[0]: -1 um must be at least 0 um",

@@ -340,6 +340,14 @@ def test_safety_is_what_is_borne_over_what_is_there(cycle):
         expected[f"{gear}_pitting_damage"] = 1e6 * turned / 5e7 * expected[f"{gear}_pitting_safety"] ** -13
         expected[f"{gear}_root_damage"] = 1e6 * turned / 3e6 * expected[f"{gear}_root_safety"] ** -9
     assert safety == pytest.approx(expected, rel=1e-12)
+    # S-N curves of the wheel alone
+    own = {f"wheel_{name}": value + 1.0 for name, value in LINES.items()}
+    other = metrics.Strength(1500.0, wheel_pitting=1400.0, bending=900.0, wheel_bending=800.0, **LINES, **own)
+    for name, power, cycles in (("pitting", -14, 5e7 + 1), ("root", -10, 3e6 + 1)):
+        damage = 1e6 * turns[1] / cycles * expected[f"wheel_{name}_safety"] ** power
+        assert float(other.quantity(f"wheel_{name}_damage")(cycle)) == pytest.approx(damage, rel=1e-12)
+        pinion = float(other.quantity(f"pinion_{name}_damage")(cycle))
+        assert pinion == pytest.approx(expected[f"pinion_{name}_damage"], rel=1e-12)
     alike = metrics.Strength(1500.0, bending=900.0)
     assert float(alike.quantity("wheel_root_safety")(cycle)) == pytest.approx(900.0 / number("wheel_root_stress"))
     oiled = {name: float(OIL.quantity(name)(cycle)) for name in LUBRICANT_QUANTITIES}

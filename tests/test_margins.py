@@ -10,6 +10,7 @@ from catalogue import gear_pair
 from scipy.optimize import minimize
 
 import jaxgear as jg
+from jaxgear.contact.status import Status, reason
 from jaxgear.geometry import outline
 from jaxgear.numerics import fields_of
 
@@ -222,12 +223,13 @@ def test_traced_gears_that_cannot_run_do_not_converge():
         pinion = jg.Gear(12, 3.0, profile_shift=shift, face_width=20.0, bore_diameter=12.0)
         pair = jg.GearPair(pinion, jg.Gear(48, 3.0, face_width=18.0, bore_diameter=70.0))
         cycle = jg.solve(jg.prepare(pair, resolution=jg.Resolution(positions=4, pairs=2)), 20.0)
-        return cycle.valid, cycle.converged, cycle.margins.pinion_tip_land
+        return cycle.margins.valid, cycle.status, cycle.margins.pinion_tip_land
 
-    valid, converged, _ = solved(0.5)
-    assert bool(valid) and bool(converged.all())
-    valid, converged, land = solved(0.9)
-    assert not bool(valid) and not bool(converged.any()) and float(land) < 0
+    valid, status, _ = solved(0.5)
+    assert bool(valid) and bool((status == Status.CONVERGED).all())
+    valid, status, land = solved(0.9)
+    assert not bool(valid) and bool((status == Status.GEARS_CANNOT_RUN).all()) and float(land) < 0
+    assert reason(status).startswith("the gears cannot run")
 
 
 def test_a_slip_of_the_unit_is_named_where_no_number_of_pairs_suffices():

@@ -81,7 +81,7 @@ def test_primary_resonance_and_its_numerical_counterpart(torque, frequency, scal
     assert np.isclose(found.amplitude[0, 0], scales, atol=1.5e-6) and found.stable[0, 0]
     assert np.isnan(found.amplitude[1:]).all() and not found.stable[1:].any()
     settled = settled_vibration(given, frequency, settling=SETTLING, steps=64)
-    assert settled.settled
+    assert settled.converged
     assert np.isclose(abs(settled.harmonic(1)), integrated, atol=3e-6)
 
 
@@ -147,7 +147,7 @@ def helped(size, angle, detuning):
     frequency = NATURAL + detuning * size
     found = primary_resonance(loaded_mean(given), [frequency])
     settled = settled_vibration(given, frequency, settling=SETTLING, steps=64)
-    assert settled.settled and found.stable[0, 0]
+    assert settled.converged and found.stable[0, 0]
     return float(found.amplitude[0, 0]) / float(abs(settled.harmonic(1))), float(found.amplitude[0, 0])
 
 
@@ -168,7 +168,7 @@ def super_harmonic(order, size, detuning):
     frequency = (NATURAL + detuning * size) / order
     closed = super_harmonic_resonance(loaded_mean(given), [frequency], order).amplitude[0, 0]
     settled = settled_vibration(given, frequency, settling=SETTLING, steps=64)
-    assert settled.settled
+    assert settled.converged
     return float(closed), float(abs(settled.harmonic(order)))
 
 
@@ -202,7 +202,7 @@ def sub_harmonic(size, share):
     frequency = float(low + share * (high - low))
     found = sub_harmonic_resonance(state, [frequency])
     settled = settled_vibration(given, frequency, start=[1.6, 0.1], settling=SETTLING, steps=64)
-    assert settled.settled
+    assert settled.converged
     return found, float(abs(settled.harmonic(0.5)))
 
 

@@ -27,7 +27,7 @@ def pressed(loaded):
 
 
 def test_the_approach_under_a_load_brings_the_load_back(loaded, pressed):
-    assert bool(jnp.all(loaded.solved)) and bool(jnp.all(pressed.solved))
+    assert bool(jnp.all(loaded.converged)) and bool(jnp.all(pressed.converged))
     np.testing.assert_allclose(pressed.load, 400.0, rtol=1e-9)
     np.testing.assert_allclose(pressed.line_load, loaded.line_load, rtol=1e-9, atol=1e-9 * 400)
     np.testing.assert_allclose(pressed.opening, loaded.opening, rtol=1e-9, atol=1e-10)
@@ -89,7 +89,7 @@ def test_without_contact_loads_and_derivatives_are_exactly_zero():
     value, slope = jax.jit(lambda d: jax.jvp(load, (d,), (jnp.ones_like(d),)))(touching + shift)
     assert not np.any(value) and not np.any(slope)
     apart = solve(at_approach(DATA, touching + shift))
-    assert bool(jnp.all(apart.solved)) and not np.any(apart.line_load) and not np.any(apart.in_contact)
+    assert bool(jnp.all(apart.converged)) and not np.any(apart.line_load) and not np.any(apart.in_contact)
     assert bool(jnp.all(apart.opening > 0))
 
 
@@ -100,7 +100,7 @@ def test_random_approaches_satisfy_all_conditions(law):
     touching = jnp.min(data.gap / data.lever[:, None], axis=(0, 1))
     approach = touching + 10 ** jnp.asarray(np.random.default_rng(1).uniform(-6.0, 2.0, POSITIONS))
     solution = solve(at_approach(data, approach))
-    assert bool(jnp.all(solution.solved))
+    assert bool(jnp.all(solution.converged))
     q = np.asarray(solution.line_load)
     deflection = np.asarray(jax.vmap(lambda law, row: law.deflection(row))(data.law, solution.line_load))
     distance = np.einsum("ijn,jsn->isn", data.compliance, q) + deflection + np.asarray(data.gap)
@@ -113,7 +113,7 @@ def test_random_approaches_satisfy_all_conditions(law):
 
 def test_nan_is_not_solved_and_one_condition_is_given():
     solution = solve(at_approach(DATA, jnp.full(POSITIONS, jnp.nan)))
-    assert not bool(jnp.any(solution.solved))
+    assert not bool(jnp.any(solution.converged))
     springs = DATA.compliance, DATA.law, DATA.gap, DATA.lever, DATA.weight
     for given in ({}, {"load": DATA.load, "approach": jnp.zeros(POSITIONS)}):
         with pytest.raises(ValueError, match="one of load and approach"):

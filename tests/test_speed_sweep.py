@@ -46,7 +46,7 @@ def the_one(knowns, omega, direction):
 def test_orbits_are_the_exact_ones(direction):
     """To the printed digits."""
     found = swept(direction, steps=SHARPER)
-    assert found.settled.all() and found.direction == direction
+    assert found.converged.all() and found.direction == direction
     for i, omega in enumerate(OMEGA):
         known = the_one(RECTANGULAR, omega, direction)
         assert int(found.period[i]) == known.periods
@@ -101,7 +101,7 @@ def test_the_orbit_is_foreseen_before_the_motion_has_settled():
     assert (18 * OMEGA / (2 * np.pi * zeta) > 2 * cycles)[unique].all()
     options = {"carry": False, "steps": STEPS}
     few = jax.tree.map(np.asarray, speed_sweep(rectangular(zeta), SPEEDS, most_cycles=cycles, **options))
-    assert few.settled[unique].all()
+    assert few.converged[unique].all()
     many = speed_sweep(rectangular(zeta), SPEEDS, most_cycles=5000, tolerance=1e-11, **options)
     for name in ("dynamic_factor", "dte_rms", "period"):
         np.testing.assert_allclose(getattr(few, name)[unique], np.asarray(getattr(many, name))[unique], rtol=1e-6)
@@ -148,7 +148,7 @@ def test_dead_zone_orbits_are_the_exact_ones(steps, within):
     omega = np.array(sorted({known.omega for known in DEAD_ZONE}))
     for direction in ("up", "down"):
         found = speed_sweep(dead_zone_on_a_moving_base(), omega / (2 * np.pi), direction=direction, steps=steps)
-        assert found.settled.all()
+        assert found.converged.all()
         for i, at in enumerate(omega):
             known = the_one(DEAD_ZONE, at, direction)
             if (at, direction) == (0.75, "up"):
@@ -177,13 +177,13 @@ def test_shares_of_contact():
 
 def test_an_undamped_start_never_settles():
     found = speed_sweep(rectangular(0.0), SPEEDS[:1], kick=2.0, steps=STEPS, most_cycles=10)
-    assert not found.settled.any() and int(found.period[0]) == 0 and np.isfinite(found.dynamic_factor).all()
+    assert not found.converged.any() and int(found.period[0]) == 0 and np.isfinite(found.dynamic_factor).all()
 
 
 def test_flanks_that_a_cycle_hardly_moves_are_not_settled():
     """Far above any resonance flanks thrown apart do not come back within the cycles: the state repeats, falling."""
     found = speed_sweep(rectangular(), 1e9 * SPEEDS, kick=3.0, steps=STEPS, most_cycles=10)
-    assert (np.asarray(found.dynamic_factor) < 0.5).all() and not np.any(found.settled)
+    assert (np.asarray(found.dynamic_factor) < 0.5).all() and not np.any(found.converged)
 
 
 def test_slow_run_up_follows_the_steady_states():

@@ -11,6 +11,7 @@ from catalogue import FACE
 from gearboxes import PAIR, gearbox
 
 import jaxgear as jg
+from jaxgear.contact.status import Status
 from jaxgear.metrics import face_load_factor
 from jaxgear.shafts import Housing, RigidSupport, annex_e, support
 
@@ -43,7 +44,7 @@ def carried(mesh):
 @pytest.fixture(scope="module")
 def rigid(mesh):
     """The same mesh on nothing that gives way; `test_face_coupling` prepares it so."""
-    nothing = dict.fromkeys(("support", "support_gap", "support_torque", "support_valid"))
+    nothing = dict.fromkeys(("support", "support_gap", "support_torque", "support_status"))
     alone = replace(mesh.coupling, support_modes=None, support=None)
     cycle = jg.solve(replace(mesh, coupling=alone, **nothing), TORQUE, pinion=FLANK)
     assert np.all(cycle.converged)
@@ -107,14 +108,16 @@ def test_teeth_that_pass_their_load_on_raise_the_factor_of_the_one_dimensional_a
 
 
 def test_a_contact_on_shafts_that_cannot_be_does_not_converge(mesh):
-    assert bool(mesh.valid)
-    refused = eqx.tree_at(lambda of: of.support_valid, mesh, jnp.zeros((), bool))
-    assert not bool(refused.valid) and not np.any(jg.solve(refused, TORQUE, pinion=FLANK).converged)
+    assert mesh.status == Status.CONVERGED
+    refused = eqx.tree_at(lambda of: of.support_status, mesh, jnp.int8(Status.SUPPORT_NOT_POSSIBLE))
+    cycle = jg.solve(refused, TORQUE, pinion=FLANK)
+    assert not np.any(cycle.converged) and np.all(cycle.status == Status.SUPPORT_NOT_POSSIBLE)
+    assert "NOT CONVERGED (shafts, bearings or housing are not possible)" in str(cycle)
 
     def valid(position):
         """As a traced position, which nothing checks."""
         box = eqx.tree_at(lambda of: of.shafts[0].gears[0].position, gearbox(), jnp.asarray(position, float))
-        return bool(jg.prepare(PAIR, resolution=FACE, support=support(box, 0)).valid)
+        return bool(jg.prepare(PAIR, resolution=FACE, support=support(box, 0)).status == Status.CONVERGED)
 
     assert valid(45.0) and not valid(300.0)
 

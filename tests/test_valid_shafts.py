@@ -10,7 +10,9 @@ import pytest
 from gearboxes import PAIR, PINION, TILTED, WHEEL, gearbox, stage, two_stages
 
 import jaxgear as jg
-from jaxgear.layout import Endurance, SNCurve, damage, level_load
+from jaxgear.contact.status import Status
+from jaxgear.layout import damage, level_load
+from jaxgear.metrics import Strength
 from jaxgear.numerics import positive_definite, within_limits
 from jaxgear.shafts import (
     Bearing,
@@ -97,14 +99,15 @@ def judged():
     batch = {
         name: jnp.stack([jnp.broadcast_to(row[name], jnp.shape(places(BOX)[name])) for row in rows]) for name in names
     }
-    return np.asarray(jax.jit(jax.vmap(lambda values: spoiled(values).valid))(batch)).reshape(2, -1)
+    return np.asarray(jax.jit(jax.vmap(lambda values: spoiled(values).status))(batch)).reshape(2, -1)
 
 
 @pytest.mark.parametrize(
     "index", range(len(CASES)), ids=[f"{name} {number}" for number, (name, *_) in enumerate(CASES)]
 )
 def test_numbers_that_cannot_be_are_not_valid(judged, index):
-    assert list(judged[:, index]) == [False, True]
+    bad, good = judged[:, index]
+    assert bad in (Status.SUPPORT_NOT_POSSIBLE, Status.GEARS_CANNOT_RUN) and good == Status.CONVERGED
 
 
 def test_what_is_refused_is_not_valid_and_what_is_taken_is():
@@ -130,7 +133,9 @@ GOOD, BAD_SHAFTS, BAD_GEARS = slice(0, 2), slice(2, 5), slice(5, 7)
 def batch():
     """What shafts do to the load, in one batch of those that can be and those that cannot."""
     load = jg.LoadSpectrum.from_hours([0.0, 50.0], [5.0, 10.0], 500.0)
-    endurance = Endurance(SNCurve(1500.0, 13.2, 5e7), SNCurve(900.0, 8.7, 3e6))
+    strength = Strength(
+        1500.0, bending=900.0, pitting_exponent=13.2, pitting_cycles=5e7, bending_exponent=8.7, bending_cycles=3e6
+    )
 
     def of(radial, shift):
         box = eqx.tree_at(
@@ -142,12 +147,12 @@ def batch():
         table = TabulatedSupport(pair, jnp.zeros((STATIONS, STATIONS)))
         faces = [annex_e(held, stations=STATIONS)]
         faces += [annex_e(each, torque=50.0, stations=STATIONS) for each in (RigidSupport(pair), table)]
-        spent = damage(held, load, endurance, stations=STATIONS)
+        spent = damage(held, load, strength, stations=STATIONS)
         return {
             "valid": jg.margins(pair).valid,
             "loads": jnp.stack([jnp.append(face.line_load, face.approach) for face in faces]),
             "factors": jnp.stack([face.face_load_factor for face in faces]),
-            "converged": jnp.stack([face.converged for face in faces]),
+            "status": jnp.stack([face.status for face in faces]),
             "slope": level_load(RigidSupport(pair), torque=50.0, stations=STATIONS).slope,
             "spent": jnp.stack([spent.life, spent.largest, spent.face_load_factor[1]]),
             "found": spent.converged,
@@ -168,7 +173,7 @@ def test_a_batch_keeps_its_good_members(batch):
     np.testing.assert_allclose(batch["spent"][GOOD, 2], batch["factors"][GOOD, 0], rtol=1e-9)
     assert np.isnan(batch["loads"][BAD_SHAFTS, 0]).all() and np.isnan(batch["factors"][BAD_SHAFTS, 0]).all()
     assert np.isnan(batch["spent"][BAD_SHAFTS]).all() and np.isnan(batch["force"][BAD_SHAFTS]).all()
-    assert batch["converged"][GOOD, 0].all() and not batch["converged"][BAD_SHAFTS, 0].any()
+    assert not batch["status"][GOOD, 0].any() and (batch["status"][BAD_SHAFTS, 0] == Status.SUPPORT_NOT_POSSIBLE).all()
     # idle loads do no damage whatever holds the gears
     np.testing.assert_array_equal(batch["found"][:5], [[True, good] for good in (True, True, False, False, False)])
     np.testing.assert_array_equal(batch["pitting"][:5, :, 0], 0.0)
@@ -179,7 +184,7 @@ def test_a_batch_keeps_its_good_members(batch):
 def test_gears_that_cannot_run_carry_no_load_whatever_holds_them(batch):
     """Not converged, as in the contact, and NaN: rigid, by a table, and on shafts."""
     np.testing.assert_array_equal(batch["valid"], np.arange(7) < 5)
-    assert batch["converged"][GOOD].all() and not batch["converged"][BAD_GEARS].any()
+    assert not batch["status"][GOOD].any() and (batch["status"][BAD_GEARS] == Status.GEARS_CANNOT_RUN).all()
     assert np.isnan(batch["loads"][BAD_GEARS]).all()
     assert np.isfinite(batch["slope"][GOOD]).all() and np.isnan(batch["slope"][BAD_GEARS]).all()
 
@@ -188,14 +193,16 @@ def test_gears_that_cannot_run_carry_no_load_whatever_holds_them(batch):
 def test_a_shaft_afloat_carries_no_even_load():
     """A belt holds the one shaft in place; nothing does the other, whose clearance no torque takes up."""
     afloat = annex_e(support(stage(20.0, moment=0.0)), stations=STATIONS)
-    assert np.isnan(float(afloat.face_load_factor)) and not bool(afloat.converged)
+    assert np.isnan(float(afloat.face_load_factor)) and afloat.status == Status.NOT_CONVERGED
 
 
 def test_other_supports_tell_too():
     matrix = np.eye(4) + 0.5
-    valid = jax.jit(lambda given: TabulatedSupport(PAIR, given).valid)
+    valid = jax.jit(lambda given: TabulatedSupport(PAIR, given).status == Status.CONVERGED)
     assert bool(valid(matrix)) and bool(valid(0 * matrix)) and not bool(valid(matrix - 1.1 * np.eye(4)))
-    span = jax.jit(lambda given: RigidSupport(PAIR, Misalignment(skew=5.0, bearing_span=given)).valid)
+    span = jax.jit(
+        lambda given: RigidSupport(PAIR, Misalignment(skew=5.0, bearing_span=given)).status == Status.CONVERGED
+    )
     assert bool(span(100.0)) and not bool(span(-100.0))
 
 

@@ -124,4 +124,4 @@ def test_an_unmodified_pair_claims_nothing(flat):
     light = jg.solve(flat, 0.5)
     assert float(jg.peak_to_peak(light.transmission_error)) < 0.1 and findings_of(light) == ()
     relief = jg.TipRelief(0.2, 3.0)
-    assert [finding.name for finding in findings_of(jg.solve(flat, 0.5, pinion=relief, wheel=relief))] == ["PPTE"]
+    assert [finding.key for finding in findings_of(jg.solve(flat, 0.5, pinion=relief, wheel=relief))] == ["PPTE"]

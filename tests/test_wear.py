@@ -9,6 +9,7 @@ from catalogue import FACE, LINE, SLIDING, TWO_PAIRS, gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear.conditions import solved
+from jaxgear.contact.status import Status, status_of
 from jaxgear.geometry import tooth_thickness
 from jaxgear.wear import (
     life_to,
@@ -18,12 +19,11 @@ from jaxgear.wear import (
     passage_depth,
     specific_sliding,
     wear_depth,
-    wear_in_steps,
     worn_volume,
 )
 from jaxgear.wear import wear as worn_flanks
 from jaxgear.wear.case import case_of, marched, worn_through
-from jaxgear.wear.life import life_of as life_from
+from jaxgear.wear.history import history_of
 from jaxgear.wear.march import Analysis, march
 from jaxgear.wear.worn_volume import deposit, grid, worn
 
@@ -49,7 +49,8 @@ def steps_of(mesh, **options):
     """The same life pair by pair of its blocks, for which one program serves any number of them."""
     given = {"coefficient": COEFFICIENT, "pinion": NONE, "wheel": NONE}
     given |= {} if "largest_increment" in options else {"blocks": BLOCKS}
-    return wear_in_steps(mesh, TORQUE, REVOLUTIONS, **{**given, **options})
+    given |= {"callback": lambda *_: None}
+    return worn_flanks(mesh, TORQUE, REVOLUTIONS, **{**given, **options})
 
 
 @pytest.fixture(scope="module")
@@ -214,7 +215,7 @@ def test_any_pair_loses_what_its_forces_slide(teeth, module, shift, widths, torq
     mesh = prepare(jg.GearPair(wide.pinion, narrow.wheel), resolution=SIZES)
     coefficients, passages = np.array([1.3e-18, 0.4e-18]), 1e-3 * np.array([1.0, teeth[0] / teeth[1]])
     life = life_of(mesh, torque, revolutions=1e-3, coefficient=coefficients)
-    assert life.known.all() and float(mesh.slice_width[0]) == min(widths)
+    assert life.converged.all() and float(mesh.slice_width[0]) == min(widths)
     expected = 1e6 * coefficients * passages * slid_force(mesh, life)
     np.testing.assert_allclose(np.asarray(worn_volume(life))[-1, :, 0], expected, rtol=1e-10)
 
@@ -317,9 +318,9 @@ def test_revolutions_of_a_spectrum_without_load_wear_nothing(mesh):
     assert means.shape == (blocks + 1,)
     np.testing.assert_allclose(means, np.asarray(part.cycles.transmission_error).mean(-1) @ [0.25, 0.75])
     # where the contact under one of the loads was not found, nothing is known of the flanks under both
-    converged = np.array(part.cycles.converged)
-    converged[1, 1] = False
-    lost = eqx.tree_at(lambda life: life.cycles.converged, part, jnp.asarray(converged))
+    status = np.array(part.cycles.status)
+    status[1, 1] = Status.NOT_CONVERGED
+    lost = eqx.tree_at(lambda life: life.cycles.status, part, jnp.asarray(status))
     values, *numbers = told(lost, 1e3)
     assert np.isnan(values).tolist() == [life == 1 for life in range(blocks + 1)] and np.isnan(numbers).all()
 
@@ -377,7 +378,7 @@ def test_slices_of_an_even_load_wear_alike_and_crowning_wears_in_the_middle():
 
 def levelling(depth):
     """d y / d n = 1 - y: wear levels the load."""
-    return Analysis(1 - depth, depth, jnp.array(True))
+    return Analysis(1 - depth, depth, jnp.int8(Status.CONVERGED))
 
 
 NEW = np.zeros((1, 1, 1, 1))
@@ -387,13 +388,17 @@ PAIRS = 20  # with blocks of no length after the last one: one program
 @jax.jit
 def levelled(lengths, limit=np.inf):
     """Over pairs of blocks of these lengths; no contact is found beyond a depth."""
-    return march(lambda depth: levelling(depth)._replace(found=jnp.all(depth < limit)), jnp.asarray(NEW), lengths)
+
+    def lost(depth):
+        return levelling(depth)._replace(status=status_of({Status.MORE_PAIRS_NEEDED: jnp.any(depth >= limit)}))
+
+    return march(lost, jnp.asarray(NEW), lengths)
 
 
 def test_blocks_are_of_second_order_and_tell_their_error():
     def end(pairs):
         found = jax.tree.map(np.asarray, levelled(np.append(np.full(pairs, 0.5 / pairs), np.zeros(PAIRS - pairs))))
-        assert found.depth.shape[0] == 2 * PAIRS + 1 and (found.depth == found.seen).all() and found.known.all()
+        assert found.depth.shape[0] == 2 * PAIRS + 1 and (found.depth == found.seen).all() and not found.status.any()
         depth = found.depth.ravel()
         assert (depth[2 * pairs :] == depth[-1]).all() and (np.diff(depth[: 2 * pairs + 1]) > 0).all()
         return found.depth[-1].sum(), found.error.sum()
@@ -429,7 +434,8 @@ def test_an_overlong_block_overshoots():
 )
 def test_a_contact_that_is_lost_within_a_block_is_told(limit, known, said):
     found = levelled(np.full(2, 0.25), limit)
-    assert found.known.tolist() == known
+    wanted = [Status.CONVERGED if each else Status.MORE_PAIRS_NEEDED for each in known]
+    assert found.status.tolist() == wanted
     # where the double block alone is lost, the depth is known and its error is not
     assert np.isfinite(np.asarray(found.error)).ravel().tolist() == said
 
@@ -478,9 +484,9 @@ def test_the_life_to_a_limit_of_a_quantity(life):
 
 def test_a_contact_that_was_not_found_is_no_number(life):
     """One at the start of a block."""
-    converged = np.array(life.cycles.converged)
-    converged[2, 0] = False
-    lost = eqx.tree_at(lambda life: life.cycles.converged, life, jnp.asarray(converged))
+    status = np.array(life.cycles.status)
+    status[2, 0] = Status.NOT_CONVERGED
+    lost = eqx.tree_at(lambda life: life.cycles.status, life, jnp.asarray(status))
     values, until, _ = told(lost, 1e3)
     assert np.isnan(values).tolist() == [life == 2 for life in range(BLOCKS + 1)] and np.isnan(until)
 
@@ -491,8 +497,9 @@ def test_flanks_that_a_lost_contact_has_worn_are_not_known(mesh):
     options = {"pinion": NONE, "wheel": NONE, "deviation": None, "points": None}
     case = case_of("wear", mesh, TORQUE, coefficient=COEFFICIENT, **options)
     found = marched(case, case.start(), jnp.asarray([REVOLUTIONS / 2]))
-    np.testing.assert_array_equal(life_from(case, found, life.revolutions).depth, life.depth)
-    lost = life_from(case, found._replace(known=jnp.asarray(np.arange(3) < 2)), life.revolutions)
+    np.testing.assert_array_equal(history_of(case, found, life.revolutions).depth, life.depth)
+    unfound = found._replace(status=jnp.asarray([0, 0, Status.NOT_CONVERGED], jnp.int8))
+    lost = history_of(case, unfound, life.revolutions)
     after = [False, False, True]
     errors, *numbers = told(lost, 1e3)
     for values in (errors, wear_depth(lost), np.asarray(worn_volume(lost))[:, 0, 0]):
@@ -524,7 +531,7 @@ def test_a_function_that_gives_no_coefficient_leaves_no_flank_known(mesh):
     """At the contact of the largest pressure alone, which is enough."""
     for value in (jnp.nan, -1e-17):
         life = lubricated(mesh, 0.0, 0.5, value)
-        assert life.known.tolist() == [True, False, False]
+        assert life.converged.tolist() == [True, False, False]
         values, *_ = told(life)
         assert np.isfinite(values).tolist() == [True, False, False]
 
@@ -578,7 +585,9 @@ def test_refuses_results_that_are_not_there(life):
         wear_depth(life, "rack")
     with pytest.raises(ValueError, match="life_to_depth: limit = 0 um must be greater than 0 um"):
         life_to_depth(life, 0.0)
-    with pytest.raises(IndexError, match=f"life = 100 must be less than {BLOCKS + 1}, of so many it is one"):
+    with pytest.raises(
+        IndexError, match=f"step = 100 must be from -{BLOCKS + 1} to {BLOCKS}, of {BLOCKS + 1} time steps"
+    ):
         life.flanks(100)
     with pytest.raises(ValueError, match="passage_depth: coefficient = -1 m2/N"):
         passage_depth(life.cycles, -1.0)
@@ -650,7 +659,7 @@ def test_what_is_worn_through_is_not_worn_on(mesh):
     blocks = []
     options = {"coefficient": 1e4 * COEFFICIENT, "largest_increment": 60.0}
     life = steps_of(mesh, callback=lambda *given: blocks.append(given), **options)
-    known = np.asarray(life.known)
+    known = np.asarray(life.converged)
     tip = [float(thickness(gear, gear.tip_diameter)) for gear in life.gears]
     assert known[0] and not known[-1] and life.revolutions[-1] == REVOLUTIONS == blocks[-1][0]
     assert 100 < float(np.nanmax(wear_depth(life))) < 4e3 * max(tip)
@@ -663,5 +672,5 @@ def test_what_is_worn_through_is_not_worn_on(mesh):
 
 
 def test_steps_refuse_in_one_line(mesh):
-    with pytest.raises(ValueError, match="wear_in_steps: largest_increment = 0 um must be greater than 0 um"):
+    with pytest.raises(ValueError, match="wear: largest_increment = 0 um must be greater than 0 um"):
         steps_of(mesh, largest_increment=0.0)

@@ -116,7 +116,7 @@ def by_sweep(knowns: Sequence[Known], oscillator, steps: int) -> Iterator[Compar
             of_sweep(run, i, cycle)
             for run in runs
             for cycle in range(known.periods)
-            if bool(run.settled[i]) and int(run.period[i]) == known.periods
+            if bool(run.converged[i]) and int(run.period[i]) == known.periods
         ]
         why = _UNSTABLE if not known.stable else _ONLY_MODULI if known.rms is None else _NOT_MET
         yield Compared(known, "sweep", _nearest(known, found), why, needed=why == _NOT_MET)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..contact import Mesh
+from ..contact.status import reason
 from ..dynamics import Branch, Oscillator, RunUp, SpeedResponse, inertia_of
 from ..dynamics.response import FORCE_REFERENCE
 from ..io import DesignFile, DynamicsRequest, describe
@@ -28,7 +29,7 @@ _COLUMNS = {
     "contact_loss_share": "no_contact_share",
     "back_side_contact": "coast_contact_share",
     "period": "period_mesh_cycles",
-    "settled": "settled",
+    "converged": "settled",
 }
 
 
@@ -185,8 +186,9 @@ def failures(study: DynamicsStudy) -> Iterator[str]:
     for name, of_torques in study.oscillators.items():
         bad = [f"{torque:g}" for torque, of in of_torques.items() if not bool(of.converged)]
         if bad:
+            why = reason([of.status for of in of_torques.values()])
             yield (
-                f"MESH FORCE NOT CONVERGED: {name} at {', '.join(bad)} N m; its numbers are not to be trusted. "
+                f"MESH FORCE NOT CONVERGED: {name} at {', '.join(bad)} N m, {why}; its numbers are not to be trusted. "
                 "Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
             )
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..contact import Mesh, MeshCycle
+from ..contact.status import Status
 from ..io import DesignFile, LayoutRequest, describe
 from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, ToleranceCases, gear_lives
 from ..metrics import Finding
@@ -84,10 +85,10 @@ def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine
 def lives(study: LayoutStudy, profile: ProfileLayout) -> dict[str, np.ndarray]:
     """Life [h] of pinion and wheel with every profile modification, by K_Hbeta of its contact; empty without a duty
     cycle. That factor is of the torque of step 3 and stands for every load."""
-    load, endurance = (study.request.options.get(name) for name in ("duty_cycle", "endurance"))
-    if load is None or endurance is None:
+    load, strength = (study.request.options.get(name) for name in ("duty_cycle", "strength"))
+    if load is None or strength is None:
         return {}
-    found = gear_lives(study.design.pair(), load, endurance, profile.table.column("face_load_factor"))
+    found = gear_lives(study.design.pair(), load, strength, profile.table.column("face_load_factor"))
     return dict(zip(LIVES, np.asarray(found).T))
 
 
@@ -154,9 +155,10 @@ def failures(study: LayoutStudy) -> Iterator[str]:
     """What is not to be trusted or not reached."""
     for name, layout in study.layouts.items():
         cases = [one for of in layout.cases for one in of.values()]
-        found = [*(one.load.converged for one in cases), *(one.converged for one in layout.damage)]
-        if not all(bool(np.all(one)) for one in found):
-            yield f"LOAD OVER THE FACE NOT FOUND: {name}; its numbers are not to be trusted"
+        statuses = [*(one.load.status for one in cases), *(one.status for one in layout.damage)]
+        status = Status(max(int(np.max(one)) for one in statuses))
+        if status != Status.CONVERGED:
+            yield f"LOAD OVER THE FACE NOT FOUND: {name}, {status.text}; its numbers are not to be trusted"
         if layout.touches_edges:
             yield f"the largest load is at an edge: {name}"
     known = np.isfinite(list(study.over_torque.values())).all(axis=0)

@@ -67,8 +67,8 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
         if evaluation.failed_torques:
             torques = ", ".join(f"{torque:g}" for torque in evaluation.failed_torques)
             yield (
-                f"CONTACT SOLUTION NOT CONVERGED: {name} at {torques} N m; its numbers are not to be trusted. "
-                "Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
+                f"CONTACT SOLUTION NOT CONVERGED: {name} at {torques} N m, {evaluation.cause}; its numbers are not "
+                "to be trusted. Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
             )
 
 
@@ -99,10 +99,10 @@ def finding_lines(found: Mapping[str, tuple[Finding, ...]]) -> Iterator[str]:
     grouped: dict[tuple[str, str], dict[str, Finding]] = {}
     for design, several in found.items():
         for finding in several:
-            grouped.setdefault((finding.name, finding.where), {})[design] = finding
+            grouped.setdefault((finding.key, finding.where), {})[design] = finding
     for same in grouped.values():
         finding = list(same.values())[-1]  # the last is the one that the run is about
-        numbers = {design: f"{each.value:.4g} {each.limit.unit}".rstrip() for design, each in same.items()}
+        numbers = {design: each.number for design, each in same.items()}
         if len(set(numbers.values())) > 1:
             said = f"{', '.join(f'{design} {number}' for design, number in numbers.items())}: "
         else:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..contact import Mesh, MeshCycle, OperatingPoint
 from ..contact.mesh import half_way
+from ..contact.status import Status, reason
 from ..dynamics import SpeedResponse
 from ..io import DesignFile, quantities_of_tables, writing
 from ..metrics import (
@@ -57,6 +58,7 @@ class Evaluation:
         objectives: what an optimization made small, by name and unit, of this design; empty without one.
         grid_change: by how much numbers at the design torque change at twice the positions, by name and unit.
         failed_torques: torques without a converged contact solution [N m], the design torque included.
+        cause: why, in words: the most basic cause at all of them.
         seconds: what finding and evaluating it took, without compilation of the latter [s].
         factors: of the rating by ISO 6336 at the design torque, by name and unit.
         verified: what it is worth with the finite-element structure; None where nobody asked.
@@ -72,6 +74,7 @@ class Evaluation:
     ppte: np.ndarray
     grid_change: Mapping[str, float]
     failed_torques: list[float]
+    cause: str
     seconds: float
     objectives: dict[str, float] = field(default_factory=dict)
     factors: dict[str, float] = field(default_factory=dict)
@@ -90,7 +93,8 @@ def evaluate(
     cycles = over_torques(mesh, every, pinion=pinion, wheel=wheel)
     seconds = time.perf_counter() - began
     curves = np.asarray([cycle.transmission_error for cycle in cycles])
-    converged = np.asarray([cycle.converged for cycle in cycles]) & np.isfinite(curves)
+    infinite = Status.NOT_CONVERGED * ~np.isfinite(curves).all(axis=1)
+    status = np.maximum([np.max(cycle.status) for cycle in cycles], infinite)
     # without the flanks: one program serves every kind of them
     running = OperatingPoint(real(file.torque), optional_real(file.speed), optional_real(file.friction))
     bare = replace(cycles[0], pinion=None, wheel=None, operating_point=running)
@@ -104,7 +108,8 @@ def evaluate(
         transmission_error=curves[1:],
         ppte=np.ptp(curves[1:], axis=1),
         grid_change=grid_change(mesh, cycles[0], pinion, wheel),
-        failed_torques=sorted({float(torque) for torque in every[~converged.all(axis=1)]}),
+        failed_torques=sorted({float(torque) for torque in every[status != Status.CONVERGED]}),
+        cause=reason(status),
         seconds=seconds,
         factors=factors,
         face_load=_face_load(cycles[1:]),
@@ -300,9 +305,9 @@ class Marches:
 
     def arrays(self, found: March) -> dict[str, Any]:
         """All that they hold."""
-        return {"depth": found.depth, "error": found.error, "known": found.known, **found.seen}
+        return {"depth": found.depth, "error": found.error, "march_status": found.status, **found.seen}
 
     def result(self, arrays: dict[str, Any]) -> March:
         """The blocks."""
         known = {name: jnp.asarray(value) for name, value in arrays.items()}
-        return March(known.pop("depth"), known.pop("error"), known.pop("known"), known)
+        return March(known.pop("depth"), known.pop("error"), known.pop("march_status"), known)

@@ -162,4 +162,4 @@ def _options(part: eqx.Module) -> dict[str, Any]:
 
 def finding_data(finding: Finding) -> dict[str, Any]:
     """A finding by name, place, value and what is usual."""
-    return {"name": finding.name, "where": finding.where, "value": finding.value, **finding.limit._asdict()}
+    return {"name": finding.key, "where": finding.where, "value": finding.value, **finding.usual._asdict()}

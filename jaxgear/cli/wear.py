@@ -9,7 +9,7 @@ from ..io import DesignFile, WearRequest, wear_request, write_worn
 from ..io.errors import naming
 from ..io.requests import tolerance_of
 from ..numerics import optional_real, real
-from ..wear import WearLife, wear_in_steps
+from ..wear import WearHistory, wear
 from . import wear_report, wear_scatter
 from .comparison import compared, first_mesh, search_of, sought
 from .progress import Stages
@@ -58,7 +58,7 @@ def _write(folder: Path, study: WearStudy) -> None:
         write_worn(folder / name, study.lives)
 
 
-def _life(design: DesignFile, request: WearRequest, mesh, name: str, flanks, kept: Kept, stages: Stages) -> WearLife:
+def _life(design: DesignFile, request: WearRequest, mesh, name: str, flanks, kept: Kept, stages: Stages) -> WearHistory:
     """The life of one design, at the torque of the file."""
     stages.begin(f"wearing the {name} design")
     settings, (pinion, wheel) = request.settings, flanks
@@ -66,7 +66,7 @@ def _life(design: DesignFile, request: WearRequest, mesh, name: str, flanks, kep
     def progress(done: float, total: float) -> None:
         stages.count(int(done), int(total), f"{done:.3g} of {total:.3g} revolutions")
 
-    return wear_in_steps(
+    return wear(
         mesh,
         settings.loads
         or OperatingPoint(real(design.torque), optional_real(design.speed), optional_real(design.friction)),

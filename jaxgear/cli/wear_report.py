@@ -9,11 +9,21 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.status import reason
 from ..io import DesignFile, WearRequest, describe
 from ..microgeometry import AbstractModification
 from ..report import Table
 from ..vocabulary import quantity_of
-from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth, worn_volume
+from ..wear import (
+    WearHistory,
+    life_to,
+    life_to_depth,
+    mean_over_life,
+    over_life,
+    pressure_error,
+    wear_depth,
+    worn_volume,
+)
 from ..wear.quantities import blocks_are_short, number_of
 from . import manufactured, report, wear_scatter
 from .geometry import gears
@@ -60,11 +70,11 @@ class WearStudy:
     design: DesignFile
     request: WearRequest
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]]
-    lives: Mapping[str, WearLife]
+    lives: Mapping[str, WearHistory]
     scatters: Mapping[str, wear_scatter.Samples]
 
 
-def _numbers(study: WearStudy, life: WearLife) -> dict[str, float]:
+def _numbers(study: WearStudy, life: WearHistory) -> dict[str, float]:
     """What a life comes to."""
     ppte, settings = np.asarray(over_life(life, "ppte")), study.request.settings
     volume = np.asarray(worn_volume(life))[-1]
@@ -202,8 +212,8 @@ def failures(study: WearStudy) -> Iterator[str]:
         if lost.any():
             first = float(life.revolutions[int(lost.argmax())])
             yield (
-                f"NOT CONVERGED: {name} from {first:.3g} revolutions on; its numbers are not to be trusted. "
-                "Take more blocks, or raise resolution.newton_steps or resolution.pairs. Or teeth are worn through."
+                f"NOT CONVERGED: {name} from {first:.3g} revolutions on, {reason(life.cycles.status)}; its numbers are "
+                "not to be trusted. Take more blocks, or raise resolution.newton_steps or resolution.pairs."
                 + _OF_MOTION
                 * (life.dynamic_factor is not None)
             )

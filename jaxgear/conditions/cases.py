@@ -110,6 +110,21 @@ class LoadSpectrum(Checked):
         """At every torque [h]; None without a duration."""
         return None if self.duration is None else self.weights * self.duration
 
+    def turns(self, owner: str) -> Float[Array, " torques"]:
+        """Revolutions of the pinion at every torque; their shares, the weights, without a duration.
+
+        Args:
+            owner: who asks, for messages.
+
+        Raises:
+            ValueError: for a duration without speeds.
+        """
+        if self.duration is None:
+            return self.weights
+        if self.speeds is None:
+            raise ValueError(f"{owner}: a load spectrum with a duration needs speeds, for the number of revolutions")
+        return _MINUTES * self.weights * self.duration * self.speeds
+
     @staticmethod
     def of(operating_point: OperatingPoint) -> "LoadSpectrum":
         """A spectrum of a single load."""
@@ -122,6 +137,7 @@ def _alone(number: Array) -> Array | np.ndarray:
     return number[None] if known is None else known[None]
 
 
+_MINUTES = 60.0  # in an hour
 SAMPLES = 64  # manufactured pairs, where nothing is said
 
 Loads = Torque | LoadSpectrum  # one load or several

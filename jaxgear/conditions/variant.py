@@ -13,6 +13,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..contact.operating_point import Torque, operating_point_of
+from ..contact.status import Status, Statuses, status_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Checked, fields_of, real
 from ..tolerance import Tolerance
@@ -37,14 +38,14 @@ class Variant(NamedTuple):
         mesh: prepared mesh.
         cases: loads and manufactured gears on it.
         pinion, wheel: modifications.
-        possible: whether all numbers that the variables made are within the ranges of their fields.
+        status: `Status.OUT_OF_VALIDITY` where a number that the variables made is out of the range of its field.
     """
 
     mesh: Mesh
     cases: Cases
     pinion: AbstractModification
     wheel: AbstractModification
-    possible: Bool[Array, ""]
+    status: Statuses
 
 
 class Variants(Checked):
@@ -88,7 +89,7 @@ class Variants(Checked):
                 conditions = Conditions(LoadSpectrum.of(operating_point), conditions.deviations)
             cases = conditions.on(mesh)
         possible = jnp.all(jnp.stack([jnp.asarray(True), *_in_range(made)]))
-        return Variant(mesh, cases, pinion, wheel, possible)
+        return Variant(mesh, cases, pinion, wheel, status_of({Status.OUT_OF_VALIDITY: ~possible}))
 
     def mesh_shape(self, values: Iterable) -> Mesh:
         """The mesh, or one of shapes where every variant has its own."""
@@ -233,9 +234,15 @@ def solve_case(
     return solve_removed(mesh, torque, removed, pinion=pinion, wheel=wheel)
 
 
-def solved(cycle: MeshCycle) -> Bool[Array, "*cycles"]:
-    """Whether a cycle was found at all its positions and is finite; with the leading axes of the cycle.
+def cycle_status(cycle: MeshCycle) -> Statuses:
+    """Status of a cycle over all its positions, shape (*cycles,) of its leading axes.
 
-    The transmission error is asked too: reductions of the backend can drop NaN.
+    The transmission error has to be finite too: reductions of the backend can drop NaN.
     """
-    return jnp.all(cycle.converged, axis=-1) & jnp.isfinite(jnp.sum(cycle.transmission_error, axis=-1))
+    infinite = ~jnp.isfinite(jnp.sum(cycle.transmission_error, axis=-1))
+    return status_of({Status.NOT_CONVERGED: infinite}, jnp.max(cycle.status, axis=-1))
+
+
+def solved(cycle: MeshCycle) -> Bool[Array, "*cycles"]:
+    """Whether `cycle_status` is `Status.CONVERGED`."""
+    return cycle_status(cycle) == Status.CONVERGED

@@ -17,5 +17,6 @@ from .solve import begin_contact as begin_contact
 from .solve import removed_material as removed_material
 from .solve import solve as solve
 from .solve import solve_removed as solve_removed
+from .status import Status as Status
 from .support import AbstractSupport as AbstractSupport
 from .table import flank_table as flank_table

@@ -3,7 +3,7 @@
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int8
 
 from ..compliance.plane import combined_modulus
 from ..geometry import Margins, reduced_radius
@@ -11,6 +11,7 @@ from ..microgeometry import AbstractModification
 from ..numerics import over_batch, program, safe_sqrt
 from .kinematics import Kinematics, Side
 from .operating_point import OperatingPoint
+from .status import WithStatus, reason
 
 Load = Float[Array, "pairs slices positions"]
 Bend = Float[Array, "pairs #slices positions"]
@@ -64,7 +65,7 @@ def _hertz(kinematics: Kinematics, line_load: Load, reduced) -> Load:
 Curve = Float[Array, " positions"]
 
 
-class MeshCycle(eqx.Module):
+class MeshCycle(WithStatus, eqx.Module):
     """Result of `solve`: one design under one torque, over one base pitch.
 
     It holds what it was solved for, but not the prepared mesh (see `metrics.Analysis`), so that many can be kept and
@@ -91,8 +92,8 @@ class MeshCycle(eqx.Module):
             the same shape.
         tangent_stiffness: d force / d transmission error at fixed position [N/um].
         residual: largest relative violation of the contact conditions, shape (positions,).
-        converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
-            touch, and gears and support are valid, shape (positions,).
+        status: of every position, see `Status`, shape (positions,): `converged` where the residual is below the
+            resolution's rtol, no pair beyond those carried along could touch, and gears and support are possible.
     """
 
     kinematics: Kinematics
@@ -110,7 +111,7 @@ class MeshCycle(eqx.Module):
     bend: Float[Array, "pairs #slices positions"]
     tangent_stiffness: Curve
     residual: Curve
-    converged: Array
+    status: Int8[Array, " positions"]
 
     @property
     def batch_ndim(self) -> int:
@@ -121,11 +122,6 @@ class MeshCycle(eqx.Module):
     def phase(self) -> Curve:
         """Mesh position in base pitches, shape (positions,) without batch axes."""
         return self.kinematics.phase
-
-    @property
-    def valid(self) -> Array:
-        """Whether such gears can run, which only traced ones may fail to; `margins` and `explain` tell why."""
-        return self.margins.valid
 
     @property
     def torque(self) -> Float[Array, "*cycles"]:
@@ -162,7 +158,8 @@ class MeshCycle(eqx.Module):
         if self.batch_ndim:
             return f"{self.transmission_error.shape[:-1]} of MeshCycle, {self.phase.shape[0]} positions"
         error, pressure = np.asarray(self.transmission_error), np.asarray(self.contact_pressure)
-        corner, state = np.asarray(self.corner_pressure), "converged" if np.all(self.converged) else "NOT CONVERGED"
+        corner = np.asarray(self.corner_pressure)
+        state = "converged" if np.all(self.converged) else f"NOT CONVERGED ({reason(self.status)})"
         return "\n".join(
             [
                 f"MeshCycle at {float(self.torque):g} N m, {len(error)} positions, {state}",

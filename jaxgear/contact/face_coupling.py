@@ -176,10 +176,8 @@ def check_modes(support: AbstractSupport | None, resolution: Resolution) -> None
         )
 
 
-def holds_at(wanted: Float[Array, ""] | None, torque: Float[Array, ""]) -> Bool[Array, ""]:
+def holds_at(wanted: Float[Array, ""], torque: Float[Array, ""]) -> Bool[Array, ""]:
     """Whether a support that belongs to one torque holds at another; `check_torque` refuses it where both are known."""
-    if wanted is None:
-        return jnp.ones((), bool)
     return jnp.abs(torque - wanted) <= _SAME_TORQUE * jnp.abs(wanted)
 
 

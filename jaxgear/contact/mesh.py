@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from ..compliance import AbstractCompliance, default_compliance
 from ..compliance.hertz import contact_geometry
@@ -21,6 +21,7 @@ from .covering import check_cover, closing, pairs_for
 from .face_coupling import check_modes, check_support, coupling_of, ends_together, spreading_of
 from .kinematics import Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution
+from .status import Status, Statuses, status_of
 from .support import AbstractSupport
 
 
@@ -85,7 +86,7 @@ class Mesh(eqx.Module):
         support: shafts, bearings and housing; None for rigid, parallel shafts.
         support_gap: by which it opens the flanks without the force of this mesh [um], shape (slices,); None without.
         support_torque: at which the support holds [N m]; None where it does at every torque.
-        support_valid: whether such a support can be; None without.
+        support_status: whether such a support is possible; None without.
         automatic: whether the number of pairs was left to `prepare`: `solve` takes more where they are too few.
         even: whether neither gear is known to help beyond the common face: both end together, or the model is one of
             two dimensions.
@@ -109,7 +110,7 @@ class Mesh(eqx.Module):
     support: AbstractSupport | None = None
     support_gap: Float[Array, " slices"] | None = None
     support_torque: Scalar | None = None
-    support_valid: Bool[Array, ""] | None = None
+    support_status: Statuses | None = None
     automatic: bool = eqx.field(static=True, default=False)
     even: bool = eqx.field(static=True, default=False)
 
@@ -122,9 +123,10 @@ class Mesh(eqx.Module):
         return self.kinematics.pair
 
     @property
-    def valid(self) -> Bool[Array, ""]:
-        """Whether such gears can run and such a support can be, which only traced ones may fail to."""
-        return self.margins.valid if self.support_valid is None else self.margins.valid & self.support_valid
+    def status(self) -> Statuses:
+        """Whether such gears can run and such a support is possible, shape (); only traced ones may fail to."""
+        parts = () if self.support_status is None else (self.support_status,)
+        return status_of({Status.GEARS_CANNOT_RUN: ~self.margins.valid}, *parts)
 
     @property
     def path_of_contact(self) -> PathOfContact:
@@ -311,7 +313,7 @@ def _arrays_of(
         support=support,
         support_gap=None if support is None else support.gap(moving.face_coordinate).astype(moving.slice_width.dtype),
         support_torque=None if support is None else support.torque,
-        support_valid=None if support is None else support.valid,
+        support_status=None if support is None else support.status,
         even=even,
     )
 

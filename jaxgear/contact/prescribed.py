@@ -1,18 +1,20 @@
 """Contact of the mesh at a prescribed transmission error, or under a force of every position: for dynamics and wear."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, ContactProblem, check, program, real, result, solve_contact, tangent_stiffness
+from ..numerics import Checked, check, program, real, result, tangent_stiffness
 from .face_coupling import check_torque
 from .mesh import Mesh
 from .operating_point import operating_point_of
 from .slide import RemovedMaterial, for_contact, loaded_material
-from .solve import check_mesh, flanks_of, outermost
+from .solve import check_mesh, contact_of, contact_status, flanks_of, pair_forces
+from .status import Status, Statuses, WithStatus, status_of
 
 # Newton steps of a mesh of several slices from the approach of all springs in series to that of the teeth: the force of
 # contacts that stiffen bends one way, so that the steps come from one side and double their digits.
@@ -25,7 +27,7 @@ Curve = Float[Array, " positions"]
 Load = Float[Array, "pairs slices positions"]
 
 
-class PrescribedContact(Checked):
+class PrescribedContact(WithStatus, Checked):
     """Result of `solve_at`.
 
     Attributes:
@@ -36,8 +38,7 @@ class PrescribedContact(Checked):
         tangent_stiffness: d force / d transmission error [N/um] on the material that is met; it counts only where there
             is contact.
         residual: largest relative violation of the contact conditions, shape (positions,).
-        converged: where the residual is below the resolution's rtol, no pair beyond those carried along could
-            touch, and the gears can run, shape (positions,).
+        status: of every position, as of a `MeshCycle`, shape (positions,).
     """
 
     transmission_error: Curve = result("um")
@@ -46,7 +47,7 @@ class PrescribedContact(Checked):
     line_load: Load = result("N/mm")
     tangent_stiffness: Curve = result("N/um")
     residual: Curve = result()
-    converged: Bool[Array, " positions"] = result()
+    status: Statuses = result()
 
 
 def solve_at(
@@ -105,21 +106,14 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
 
     Its deflection is then part of the approach and of the tangent stiffness, not of the transmission error.
     """
-    gap, law, structure = (
-        mesh.held(mesh.corner_gap[:, None] + removed.amount),
-        mesh.law.moved(removed.shift),
-        mesh.structure,
-    )
+    structure = mesh.structure
     if shared is not None:
         structure = structure + shared * mesh.slice_width[0] * mesh.lever[:, None] * mesh.lever[None]
-    problem = ContactProblem(
-        structure, law, gap, mesh.lever, mesh.slice_width, approach=approach, coupling=mesh.coupling
-    )
-    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
-    pair_force = mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1)
+    gap = mesh.corner_gap[:, None] + removed.amount
+    problem, solution = contact_of(mesh, gap, removed.shift, approach=approach, compliance=structure)
+    pair_force = pair_forces(mesh, solution.line_load)
     force = jnp.sum(pair_force, axis=0)
     error = approach if shared is None else approach - shared * force
-    teeth = error - mesh.support_deflection(solution.line_load)
     return PrescribedContact(
         transmission_error=error,
         force=force,
@@ -127,48 +121,43 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
         line_load=solution.line_load,
         tangent_stiffness=tangent_stiffness(problem, solution),
         residual=solution.residual,
-        converged=solution.solved & mesh.valid & (teeth < outermost(mesh, removed)),
+        status=contact_status(mesh, solution, error, removed),
     )
 
 
-class ForcedContact(NamedTuple):
+class ForcedContact(WithStatus, eqx.Module):
     """Contact under forces that differ from position to position.
 
     Attributes:
         line_load: [N/mm], shape (pairs, slices, positions).
-        converged: where the contact has been found, shape (positions,).
+        status: of every position, shape (positions,).
     """
 
     line_load: Load
-    converged: Bool[Array, " positions"]
+    status: Statuses
 
 
 @program
 def solve_forces(mesh: Mesh, force: Curve, removed: RemovedMaterial) -> ForcedContact:
     """Contact under a force on the line of action at every mesh position [N], at least zero, shape (positions,)."""
-    law, gap = mesh.law.moved(removed.shift), mesh.held(mesh.corner_gap[:, None] + removed.amount)
-    problem = ContactProblem(
-        mesh.structure, law, gap, mesh.lever, mesh.slice_width, force, start_law=mesh.law, coupling=mesh.coupling
-    )
-    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
-    teeth = solution.approach - mesh.support_deflection(solution.line_load)
-    return ForcedContact(solution.line_load, solution.solved & mesh.margins.valid & (teeth < outermost(mesh, removed)))
+    _, solution = contact_of(mesh, mesh.corner_gap[:, None] + removed.amount, removed.shift, load=force)
+    return ForcedContact(solution.line_load, contact_status(mesh, solution, solution.approach, removed))
 
 
-class SeriesContact(NamedTuple):
+class SeriesContact(WithStatus, eqx.Module):
     """Contact at a prescribed approach of teeth and what they share in series, shape (positions,) each.
 
     Attributes:
         force: [N].
         stiffness: its slope over the approach [N/um].
         transmission_error: of the teeth alone, as `solve_at` takes it [um].
-        converged: where the contact has been found.
+        status: of the contact.
     """
 
     force: Curve
     stiffness: Curve
     transmission_error: Curve
-    converged: Bool[Array, " positions"]
+    status: Statuses
 
 
 def solve_series(mesh: Mesh, approach: Curve, removed: RemovedMaterial, compliance: Scalar) -> SeriesContact:
@@ -183,7 +172,7 @@ def solve_series(mesh: Mesh, approach: Curve, removed: RemovedMaterial, complian
     shared = mesh.hub / mesh.pair.face_width + compliance
     if mesh.resolution.slices == 1:  # a compliance that couples all pairs: one solution is enough
         found = _solve_at(mesh, approach, removed, shared)
-        return SeriesContact(found.force, found.tangent_stiffness, found.transmission_error, found.converged)
+        return SeriesContact(found.force, found.tangent_stiffness, found.transmission_error, found.status)
 
     def step(error, _):
         found = _solve_at(mesh, error, removed)
@@ -191,7 +180,7 @@ def solve_series(mesh: Mesh, approach: Curve, removed: RemovedMaterial, complian
         missed = approach - error - shared * found.force
         stiffness = found.tangent_stiffness / softened
         met = jnp.abs(missed) <= _MET * (1 + jnp.abs(approach))
-        met &= found.converged
-        return error + missed / softened, SeriesContact(found.force + stiffness * missed, stiffness, error, met)
+        status = status_of({Status.NOT_CONVERGED: ~met}, found.status)
+        return error + missed / softened, SeriesContact(found.force + stiffness * missed, stiffness, error, status)
 
     return jax.tree.map(lambda part: part[-1], jax.lax.scan(step, approach, length=_SERIES_STEPS)[1])

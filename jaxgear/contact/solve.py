@@ -7,12 +7,21 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from ..compliance import AbstractCompliance
 from ..geometry import GearPair, reduced_radius
 from ..microgeometry import AbstractModification, NoModification, terms
-from ..numerics import ContactProblem, concrete, minimum, program, solve_contact, stored, tangent_stiffness
+from ..numerics import (
+    ContactProblem,
+    ContactSolution,
+    concrete,
+    minimum,
+    program,
+    solve_contact,
+    stored,
+    tangent_stiffness,
+)
 from ..numerics.programs import begin
 from .cycle import MeshCycle
 from .face_coupling import check_torque, ends_together, holds_at
@@ -20,12 +29,14 @@ from .mesh import Mesh, begin_mesh, prepare
 from .operating_point import OperatingPoint, operating_point_of
 from .resolution import Resolution
 from .slide import RemovedMaterial, as_removed, for_contact, loaded_material, nothing_removed
+from .status import Status, Statuses, status_of
 from .support import AbstractSupport
 
 _MOST_PAIRS = 12
 
 Scalar = Float[Array, ""]
 Curve = Float[Array, " positions"]
+Load = Float[Array, "pairs slices positions"]
 
 
 def solve(
@@ -213,21 +224,65 @@ def _cycle(mesh: Mesh, operating_point: OperatingPoint, contact: dict[str, Any],
 
 def _wider(mesh: Mesh, cycle: MeshCycle) -> Mesh | None:
     """The mesh with more pairs, where their number was left open, is too small and can be known."""
-    failed = concrete(cycle.converged) if mesh.automatic else None
-    if failed is None or failed.all() or mesh.resolution.chosen_pairs >= _MOST_PAIRS:
-        return None
-    beyond = concrete(_beyond(mesh, cycle))
-    if beyond is None or not beyond.any():
+    if not more_pairs_help(mesh, cycle.status):
         return None
     sizes = replace(mesh.resolution, pairs=mesh.resolution.chosen_pairs + 1)
     wider = prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes, support=mesh.support)
     return replace(wider, automatic=True)
 
 
-def _beyond(mesh: Mesh, cycle: MeshCycle) -> Bool[Array, " positions"]:
-    removed = RemovedMaterial(cycle.gap - mesh.corner_gap[:, None], cycle.shift, cycle.bend)
-    windup = mesh.hub * cycle.force / mesh.pair.face_width
-    return cycle.transmission_error - windup - mesh.support_deflection(cycle.line_load) >= outermost(mesh, removed)
+def more_pairs_help(mesh: Mesh, status: Statuses) -> bool:
+    """Whether a result on a mesh whose number of pairs was left open needs more of them; False while it is traced."""
+    known = concrete(status) if mesh.automatic and mesh.resolution.chosen_pairs < _MOST_PAIRS else None
+    return known is not None and bool((known == Status.MORE_PAIRS_NEEDED).any())
+
+
+def contact_of(
+    mesh: Mesh, gap: Load, shift: Float[Array, "pairs #slices positions"], **given: Any
+) -> tuple[ContactProblem, ContactSolution]:
+    """The contact problem of a mesh, and its solution.
+
+    Args:
+        mesh: prepared mesh.
+        gap: of the undeformed flanks on rigid, parallel shafts [um].
+        shift: of the centre of contact [mm].
+        given: `load` [N], scalar or shape (positions,), or `approach` [um]; `compliance` in place of that of the mesh.
+    """
+    if "load" in given:
+        given["start_law"] = mesh.law
+    problem = ContactProblem(
+        **{"compliance": mesh.structure, **given},
+        law=mesh.law.moved(shift),
+        gap=mesh.held(gap),
+        lever=mesh.lever,
+        weight=mesh.slice_width,
+        coupling=mesh.coupling,
+    )
+    return problem, solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
+
+
+def pair_forces(mesh: Mesh, line_load: Load) -> Float[Array, "pairs positions"]:
+    """Force on the line of action that every pair contributes under line loads [N/mm], in N."""
+    return mesh.lever * jnp.sum(line_load * mesh.slice_width[None, :, None], axis=1)
+
+
+def contact_status(mesh: Mesh, solution: ContactSolution, error: Curve, removed: RemovedMaterial) -> Statuses:
+    """Status of the contact at every position, shape (positions,).
+
+    Args:
+        mesh: prepared mesh.
+        solution: of the contact problem.
+        error: transmission error without the wind-up of the bodies [um].
+        removed: material removed from the flanks.
+    """
+    # the deflection of the support closes no gap of pairs that are not carried along
+    teeth, last = error - mesh.support_deflection(solution.line_load), outermost(mesh, removed)
+    # what is not a number has not converged
+    causes = {
+        Status.NOT_CONVERGED: ~(solution.converged & (teeth < last)),
+        Status.MORE_PAIRS_NEEDED: teeth >= last,
+    }
+    return status_of(causes, mesh.status)
 
 
 def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
@@ -263,31 +318,26 @@ def _sliding_gain(mesh: Mesh, shift) -> Float[Array, "2 slices"]:
 def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict[str, Array]:
     force = _force(mesh, torque)
     removed = jax.tree.map(lambda field: field.astype(force.dtype), removed)
-    gap, law = stored(mesh.corner_gap[:, None] + removed.amount), mesh.law.moved(stored(removed.shift))
-    held = mesh.held(gap)
-    problem = ContactProblem(
-        mesh.structure, law, held, mesh.lever, mesh.slice_width, force, start_law=mesh.law, coupling=mesh.coupling
-    )
-    solution = solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
+    gap = stored(mesh.corner_gap[:, None] + removed.amount)
+    problem, solution = contact_of(mesh, gap, stored(removed.shift), load=force)
     windup = mesh.hub * force / mesh.pair.face_width
     contact_stiffness = tangent_stiffness(problem, solution)
-    unloaded = minimum(held / mesh.lever[:, None], axis=(0, 1))
-    valid = mesh.valid & holds_at(mesh.support_torque, torque)
-    teeth = solution.approach - mesh.support_deflection(
-        solution.line_load
-    )  # what closes the gaps of pairs that are not there
+    unloaded = minimum(problem.gap / mesh.lever[:, None], axis=(0, 1))
+    status = contact_status(mesh, solution, solution.approach, removed)
+    if mesh.support_torque is not None:
+        status = status_of({Status.OUT_OF_VALIDITY: ~holds_at(mesh.support_torque, torque)}, status)
     return {
         "transmission_error": solution.approach + windup,
         "unloaded_transmission_error": unloaded,
         "line_load": solution.line_load,
-        "pair_force": mesh.lever * jnp.sum(solution.line_load * mesh.slice_width[None, :, None], axis=1),
+        "pair_force": pair_forces(mesh, solution.line_load),
         "opening": solution.opening,
         "gap": gap,
         "shift": removed.shift,
         "bend": removed.bend,
         "tangent_stiffness": 1 / (1 / contact_stiffness + mesh.hub / mesh.pair.face_width),
         "residual": solution.residual,
-        "converged": solution.solved & (teeth < outermost(mesh, removed)) & valid,
+        "status": status,
     }
 
 

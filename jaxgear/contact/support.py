@@ -2,10 +2,11 @@
 
 from abc import abstractmethod
 
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from ..geometry import GearPair
 from ..numerics import Checked
+from .status import Statuses
 
 Slices = Float[Array, " slices"]
 Scalar = Float[Array, ""]
@@ -36,8 +37,8 @@ class AbstractSupport(Checked):
 
     @property
     @abstractmethod
-    def valid(self) -> Bool[Array, ""]:
-        """Whether such a support can be and its gears run: concrete ones are refused else, traced ones flagged."""
+    def status(self) -> Statuses:
+        """Whether such a support is possible and its gears can run, shape (): a concrete one that is not is refused."""
 
     @abstractmethod
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:

@@ -8,10 +8,9 @@ from .continuation import follow_orbits as follow_orbits
 from .force import AbstractMeshForce as AbstractMeshForce
 from .force import DeadZone as DeadZone
 from .force import RectangularStiffness as RectangularStiffness
+from .force_map import FlankSprings as FlankSprings
 from .force_map import ForceMap as ForceMap
-from .force_map import LoadedError as LoadedError
 from .force_map import Tangent as Tangent
-from .force_map import VaryingStiffness as VaryingStiffness
 from .from_contact import mesh_force as mesh_force
 from .motion import Motion as Motion
 from .motion import RunUp as RunUp

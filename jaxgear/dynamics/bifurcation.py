@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..contact.status import Status, Statuses, WithStatus, status_of
 from ..numerics import Checked, Numbers, kernel, real, result
 from .orbit import Orbit, outside
 from .oscillator import Oscillator
@@ -127,7 +128,7 @@ _FURTHER, _FARTHEST = 1.5, 0.1  # factor on a secant that has not enclosed the b
 _ASIDE = 3e-3
 
 
-class BifurcationPoint(Checked):
+class BifurcationPoint(WithStatus, Checked):
     """Result of `bifurcation_of`.
 
     Attributes:
@@ -136,14 +137,14 @@ class BifurcationPoint(Checked):
         test: the number that is zero there. For a fold the slope of the parameter over the branch, both scaled: not
             zero where the branch has a corner. For a flip the product of 1 + multiplier, for a Neimark-Sacker point
             the modulus of the pair less one.
-        converged: whether a bifurcation was found.
+        status: `converged` where a bifurcation was found.
     """
 
     parameter: Scalar = result()
     displacement: Float[Array, " coordinates"] = result("um")
     velocity: Float[Array, " coordinates"] = result("um/s")
     test: Scalar = result()
-    converged: Bool[Array, ""] = result()
+    status: Statuses = result()
 
 
 def bifurcation_of(oscillator: Oscillator | Family, near: Bifurcation, *, steps: Numbers = STEPS) -> BifurcationPoint:
@@ -213,7 +214,7 @@ def _moved(family: Family, given, nodes, kind: Kind, periods: int) -> Bifurcatio
         displacement=x,
         velocity=v * 2 * jnp.pi * frequency,
         test=search.tests[1],
-        converged=search.point.converged & search.found,
+        status=status_of({Status.NOT_CONVERGED: ~(search.point.converged & search.enclosed)}),
     )
 
 
@@ -261,7 +262,7 @@ class _Search(NamedTuple):
     trials: Array
 
     @property
-    def found(self) -> Bool[Array, ""]:
+    def enclosed(self) -> Bool[Array, ""]:
         """Whether a test of zero has been met or enclosed; at the corner of a branch it can only be enclosed."""
         apart = jnp.abs(self.distances[1] - self.distances[0])
         return (self.trials > 1) & ((jnp.abs(self.tests[1]) < _FLAT) | (self.bracketed & (apart < _NARROW)))
@@ -282,7 +283,7 @@ def _searched(family: Family, kind: Kind, begin: Place, normal: Place, multiplie
         return point, jnp.abs(_critical(kind, point.monodromy, multiplier)) - 1
 
     def go_on(search):
-        return ~search.found & search.point.converged & (search.trials < _TRIALS)
+        return ~search.enclosed & search.point.converged & (search.trials < _TRIALS)
 
     def advance(search):
         point, test = at(search.trial)

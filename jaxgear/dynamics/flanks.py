@@ -40,13 +40,13 @@ class Static(NamedTuple):
         unloaded: DTE at which the flanks touch [um].
         loaded: DTE under the torque, series compliance included [um].
         stiffness: slope of the force there [N/um].
-        converged: where the contact has been found.
+        status: of the contact.
     """
 
     unloaded: Curve
     loaded: Curve
     stiffness: Curve
-    converged: Any
+    status: Any
 
 
 def drive_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
@@ -107,6 +107,6 @@ def static(flanks: Flanks, torque: Scalar, compliance: Scalar) -> Static:
         cycle.unloaded_transmission_error,
         cycle.transmission_error + compliance * force,
         1 / (1 / cycle.tangent_stiffness + compliance),
-        cycle.converged,
+        cycle.status,
     )
     return Static(*(part[flanks.order] for part in found))

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from ..contact.prescribed import solve_series
+from ..contact.status import Statuses, WithStatus
 from ..numerics import program, result
 from .flanks import Flanks
 from .force import AbstractMeshForce
@@ -37,7 +38,7 @@ class Rows(NamedTuple):
     rise: Float[Array, " nodes"]
 
 
-class ForceMap(AbstractMeshForce):
+class ForceMap(WithStatus, AbstractMeshForce):
     """Force of a mesh by cubic pieces over the DTE, linear between mesh positions; made by `mesh_force`.
 
     The force is exactly zero in the clearance, rises everywhere else with a continuous slope, and goes on linearly
@@ -55,7 +56,7 @@ class ForceMap(AbstractMeshForce):
         reach: DTE of the last level beyond `start` [um]; the levels lie closer where the flanks begin to touch.
         node_force: force of drive and coast flanks [N], shape (2, positions, levels), from `start` on.
         node_stiffness: its slope over the DTE [N/um], same shape.
-        converged: whether all contacts of the grid have been found.
+        status: of all contacts of the grid.
     """
 
     first_phase: Scalar = result("base pitches")
@@ -63,7 +64,7 @@ class ForceMap(AbstractMeshForce):
     reach: Scalar = result("um")
     node_force: Table = result("N")
     node_stiffness: Table = result("N/um")
-    converged: Bool[Array, ""] = result()
+    status: Statuses = result()
 
     def at(self, phase: Scalar) -> Rows:
         lower, upper, share = between(phase, self.first_phase, self.start.shape[-1])
@@ -126,9 +127,8 @@ def closing(start: Sides, dte: Scalar) -> tuple[Bool[Array, ""], Scalar]:
 @program
 def tabulate(
     flanks: Flanks, unloaded: Float[Array, " positions"], compliance: Scalar, reach: Scalar, levels: int
-) -> tuple[Float[Array, "positions levels"], Float[Array, "positions levels"], Bool[Array, ""]]:
-    """Force [N] and slope [N/um] of one side at levels of the DTE, shape (positions, levels) each, and whether
-    all of it has converged.
+) -> tuple[Float[Array, "positions levels"], Float[Array, "positions levels"], Statuses]:
+    """Force [N] and slope [N/um] of one side at levels of the DTE, shape (positions, levels) each, and their status.
 
     Called as it is, it runs for a hundredth of the time that it compiles, and a gear pair needs it twice.
 
@@ -154,7 +154,7 @@ def tabulate(
     least = jnp.minimum(jnp.concatenate([step[:, :1], step], axis=1), jnp.concatenate([step, step[:, -1:]], axis=1))
     # the last slope is the one beyond the table as well
     slope = jnp.clip(slope, 0.0, _STEEPEST * least / apart[None])
-    return force[flanks.order], slope[flanks.order], jnp.all(found.converged)
+    return force[flanks.order], slope[flanks.order], jnp.max(found.status)
 
 
 Curves = Float[Array, "sides positions"]
@@ -166,68 +166,45 @@ class Springs(NamedTuple):
     start: Sides
     stiffness: Sides
 
-    def force(self, dte: Scalar) -> Scalar:
-        drive, closed = closing(self.start, dte)
-        found = jnp.where(drive, self.stiffness[0], self.stiffness[1]) * jnp.maximum(closed, 0.0)
-        return jnp.where(drive, found, -found)
-
 
 def _mixed(curves: Curves, phase: Scalar, first: Scalar) -> Sides:
     lower, upper, share = between(phase, first, curves.shape[-1])
     return (1 - share) * curves[:, lower] + share * curves[:, upper]
 
 
-class VaryingStiffness(AbstractMeshForce):
-    """Stiffness that varies with the mesh position, beyond the unloaded transmission error: k(phase) (q - e_u(phase)).
+class FlankSprings(WithStatus, AbstractMeshForce):
+    """Drive and coast flanks as one spring each beyond where they touch: k (q - start(phase)), no contact between.
 
-    The stiffness is that of the whole deflection under the torque it was made for: the force is right for this load
-    and every mesh position, and no other. How much of the teeth is in contact does not change with the DTE.
+    With a stiffness that varies, k(phase) (q - e_u(phase)), it is that of the whole deflection under the torque that
+    the force was made for: right for this load and every mesh position, and no other. How much of the teeth is in
+    contact does not change with the DTE. With a constant one the loaded transmission error excites a mean stiffness
+    without parametric excitation, k (q - q_0(phase) + F_0 / k), as A. Kahraman and R. Singh have it.
 
     Attributes:
         first_phase: mesh position with which the curves begin [base pitches].
         start: DTE at which the drive flanks touch, and the negative of that at which the coast flanks do [um],
-            shape (2, positions).
-        secant_stiffness: of drive and coast flanks [N/um], same shape.
-        converged: whether the contacts have been found.
+            shape (2, positions); of a constant stiffness the static transmission error under the load less F_0 / k.
+        spring_stiffness: of drive and coast flanks [N/um], F_0 over the deflection, shape (2, positions), or over its
+            mean, shape (2,).
+        status: of all contacts.
     """
 
     first_phase: Scalar = result("base pitches")
     start: Curves = result("um")
-    secant_stiffness: Curves = result("N/um")
-    converged: Bool[Array, ""] = result()
+    spring_stiffness: Float[Array, "sides *positions"] = result("N/um")
+    status: Statuses = result()
 
     def at(self, phase: Scalar) -> Springs:
-        return Springs(*(_mixed(part, phase, self.first_phase) for part in (self.start, self.secant_stiffness)))
+        start, stiffness = _mixed(self.start, phase, self.first_phase), self.spring_stiffness
+        return Springs(start, stiffness if stiffness.ndim == 1 else _mixed(stiffness, phase, self.first_phase))
 
     def force(self, place: Springs, dte: Scalar) -> Scalar:
-        return place.force(dte)
+        drive, closed = closing(place.start, dte)
+        found = jnp.where(drive, place.stiffness[0], place.stiffness[1]) * jnp.maximum(closed, 0.0)
+        return jnp.where(drive, found, -found)
 
 
-class LoadedError(AbstractMeshForce):
-    """Mean stiffness, excited by the loaded transmission error: k (q - q_0(phase) + F_0 / k), without parametric
-    excitation, as A. Kahraman and R. Singh have it.
-
-    Attributes:
-        first_phase: mesh position with which the curves begin [base pitches].
-        start: static transmission error under the load less F_0 / k, of the drive flanks, and its negative for the
-            coast flanks [um], shape (2, positions).
-        constant_stiffness: F_0 over the mean deflection of drive and coast flanks [N/um], shape (2,).
-        converged: whether the contacts have been found.
-    """
-
-    first_phase: Scalar = result("base pitches")
-    start: Curves = result("um")
-    constant_stiffness: Sides = result("N/um")
-    converged: Bool[Array, ""] = result()
-
-    def at(self, phase: Scalar) -> Springs:
-        return Springs(_mixed(self.start, phase, self.first_phase), self.constant_stiffness)
-
-    def force(self, place: Springs, dte: Scalar) -> Scalar:
-        return place.force(dte)
-
-
-class Tangent(AbstractMeshForce):
+class Tangent(WithStatus, AbstractMeshForce):
     """The force to first order about its static value: F_0 + k(phase) (q - q_0(phase)); no clearance, small vibration.
 
     Attributes:
@@ -235,14 +212,14 @@ class Tangent(AbstractMeshForce):
         static_force: F_0 [N].
         dte: q_0, static transmission error [um], shape (positions,).
         tangent_stiffness: slope of the force there [N/um], shape (positions,).
-        converged: whether the contacts have been found.
+        status: of all contacts.
     """
 
     first_phase: Scalar = result("base pitches")
     static_force: Scalar = result("N")
     dte: Float[Array, " positions"] = result("um")
     tangent_stiffness: Float[Array, " positions"] = result("N/um")
-    converged: Bool[Array, ""] = result()
+    status: Statuses = result()
 
     def at(self, phase: Scalar) -> Sides:
         return _mixed(jnp.stack([self.dte, self.tangent_stiffness]), phase, self.first_phase)

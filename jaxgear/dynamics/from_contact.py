@@ -12,20 +12,20 @@ from jaxtyping import Array, Float
 from ..contact import Mesh
 from ..contact.mesh import prepare_from
 from ..contact.operating_point import Torque, operating_point_of
-from ..contact.solve import check_mesh
+from ..contact.solve import check_mesh, more_pairs_help
+from ..contact.status import Status, status_of
 from ..microgeometry import AbstractModification
 from ..numerics import Given, check, concrete, real, whole
 from ..numerics.programs import is_eager
 from .flanks import Both, Flanks, Static, coast_flanks, drive_flanks, static
 from .force import AbstractMeshForce
-from .force_map import ForceMap, LoadedError, Tangent, VaryingStiffness, tabulate
+from .force_map import FlankSprings, ForceMap, Tangent, tabulate
 
 Scalar = Float[Array, ""]
 Model = Literal["map", "varying stiffness", "loaded error", "tangent"]
 
 # Flanks that press on both sides without a load by more than this jam [um]; rounding of single precision is less.
 _JAMMED = 1e-2
-_MOST_PAIRS = 12
 _LEVELS, _REACH = 48, 5.0
 
 
@@ -55,8 +55,8 @@ def mesh_force(
         wheel: likewise of the wheel.
         coast: modifications of the coast flanks of (pinion, wheel), None of either for the nominal involute; None for
             those of the drive flanks.
-        model: "map" for `ForceMap`, the contact at every DTE; "varying stiffness" for `VaryingStiffness`, "loaded
-            error" for `LoadedError`, "tangent" for `Tangent`: all give the static transmission error of the torque.
+        model: "map" for `ForceMap`, the contact at every DTE; "varying stiffness" and "loaded error" for
+            `FlankSprings`, "tangent" for `Tangent`: all give the static transmission error of the torque.
         positions: mesh positions of the force, which is linear between them: the DTE at which a pair comes into
             contact changes by several um from one of 64 positions to the next, so that they limit how near the map is
             to the contact analysis (half a percent needs 512). An integrator whose steps meet these positions alone
@@ -112,7 +112,7 @@ def force_and_mesh(
     both = (pinion, wheel), _coast_of(coast, (pinion, wheel))
     off = _besides(deviation, given, mesh)
     made = _made(mesh, torque, both, off, model, levels, farthest, series)
-    while _is_too_narrow(mesh, made):
+    while more_pairs_help(mesh, made.status):
         mesh = resized(mesh, pairs=mesh.resolution.chosen_pairs + 1)
         made = _made(mesh, torque, both, _besides(deviation, given, mesh), model, levels, farthest, series)
     return made, mesh
@@ -171,27 +171,22 @@ def _coast_of(coast: Any, drive: Both) -> Both:
     return coast
 
 
-def _is_too_narrow(mesh: Mesh, made) -> bool:
-    converged = concrete(made.converged)
-    return converged is not None and not converged and mesh.automatic and mesh.resolution.chosen_pairs < _MOST_PAIRS
-
-
-def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> AbstractMeshForce:
+def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> ForceMap | FlankSprings | Tangent:
     drive = drive_flanks(mesh, torque, both[0])
     sides = drive._replace(removed=drive.removed + deviation), coast_flanks(mesh, torque, both[1])
     found = _of_both(lambda side: static(side, torque, compliance), sides)
     force, first = 1e3 * torque / mesh.pair.pinion.base_radius, mesh.kinematics.first_phase
-    converged = jnp.all(found[0].converged) & jnp.all(found[1].converged)
+    statuses = [jnp.max(side.status) for side in found]
     if model == "tangent":
-        return Tangent(first, force, found[0].loaded, found[0].stiffness, jnp.all(found[0].converged))
+        return Tangent(first, force, found[0].loaded, found[0].stiffness, statuses[0])
     start = jnp.stack([each.unloaded + side.clearance for each, side in zip(found, sides)])
-    converged &= ~_jammed(start)
+    status = status_of({Status.GEARS_CANNOT_RUN: _jammed(start)}, *statuses)
     deflection = jnp.stack([each.loaded - each.unloaded for each in found])
     if model == "varying stiffness":
-        return VaryingStiffness(first, start, force / deflection, converged)
+        return FlankSprings(first, start, force / deflection, status)
     if model == "loaded error":
         mean = jnp.mean(deflection, axis=1)
-        return LoadedError(first, start + deflection - mean[:, None], force / mean, converged)
+        return FlankSprings(first, start + deflection - mean[:, None], force / mean, status)
     farthest = reach * jnp.max(deflection[0])
     both = tuple((side, _in_own_order(side, each)) for side, each in zip(sides, found))
     drive, coast = _of_both(lambda of: tabulate(of[0], of[1], compliance, farthest, levels), both)
@@ -201,7 +196,7 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Ab
         reach=farthest,
         node_force=jnp.stack([drive[0], coast[0]]),
         node_stiffness=jnp.stack([drive[1], coast[1]]),
-        converged=converged & drive[2] & coast[2],
+        status=status_of({}, status, drive[2], coast[2]),
     )
 
 

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..compliance import IsoStiffness, iso_stiffness
+from ..contact.status import Status, Statuses, status_of
 from ..geometry import Gear, GearPair, path_of_contact
 from ..numerics import Checked, Given, check, optional_real, program, real, result
 from ..tolerance import ToleranceClass
@@ -59,9 +60,9 @@ class IsoDynamicFactor(Checked):
         return "intermediate" if ratio < _INTERMEDIATE else "supercritical"
 
     @property
-    def usable(self) -> Array:
-        """Whether the speed is high enough for method B."""
-        return self.usable_speed >= _LEAST_SPEED
+    def status(self) -> Statuses:
+        """`Status.OUT_OF_VALIDITY` where the speed is not high enough for method B."""
+        return status_of({Status.OUT_OF_VALIDITY: ~(self.usable_speed >= _LEAST_SPEED)})
 
 
 def iso_dynamic_factor(

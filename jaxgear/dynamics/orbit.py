@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
+from ..contact.status import Status, Statuses, WithStatus, status_of
 from ..numerics import Checked, Given, Numbers, check, count, implicit_root, kernel, real, result, whole, with_jacobian
 from .integrate import Steps, cycles, history, largest, mean, rms, share, smallest
 from .oscillator import Coordinates, Oscillator, State, static_force
@@ -23,7 +24,7 @@ _REFINEMENTS = 8  # evaluations of Newton's method from a settled state, which i
 _SAME = 0.05  # largest distance of an orbit from the settled state that it refines, as part of its size
 
 
-class Orbit(Checked):
+class Orbit(WithStatus, Checked):
     """A periodic orbit: the state repeats after some mesh cycles. Leading axes of a batch come from `jax.vmap`.
 
     Attributes:
@@ -43,7 +44,7 @@ class Orbit(Checked):
         monodromy: derivative of the state after the orbit by the state before, of displacements and of velocities
             divided by 2 pi times the mesh frequency, shape (2 coordinates, 2 coordinates).
         residual: largest change of those unknowns over the orbit [um].
-        converged: whether the residual is down to what rounding and the size of the multipliers leave.
+        status: `converged` where the residual is down to what rounding and the size of the multipliers leave.
     """
 
     displacement: Coordinates = result("um")
@@ -62,7 +63,7 @@ class Orbit(Checked):
     back_side_contact: Scalar = result()
     monodromy: Float[Array, "unknowns unknowns"] = result()
     residual: Scalar = result("um")
-    converged: Bool[Array, ""] = result()
+    status: Statuses = result()
     periods: int = count()
 
     @property
@@ -227,7 +228,8 @@ def settled_orbit(
     # not where a state is not a number either
     same = jax.lax.stop_gradient(jnp.linalg.norm(z - begin) <= _SAME * jnp.linalg.norm(z))
     orbit = orbit_at(oscillator, jnp.where(same, z, begin), steps, frequency, periods)
-    return dataclasses.replace(orbit, converged=orbit.converged & orbit.stable & same)
+    status = status_of({Status.NO_STEADY_MOTION: ~(orbit.stable & same)}, orbit.status)
+    return dataclasses.replace(orbit, status=status)
 
 
 def orbit_at(oscillator: Oscillator, z: Unknowns, steps: Steps, frequency: Scalar, periods: int) -> Orbit:
@@ -258,7 +260,7 @@ def orbit_at(oscillator: Oscillator, z: Unknowns, steps: Steps, frequency: Scala
         back_side_contact=share(of, of.force < 0),
         monodromy=monodromy,
         residual=residual,
-        converged=residual <= _tolerance(z, monodromy),
+        status=status_of({Status.NOT_CONVERGED: ~(residual <= _tolerance(z, monodromy))}),
         periods=periods,
     )
 

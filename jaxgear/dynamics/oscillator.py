@@ -6,8 +6,9 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, PyTree
+from jaxtyping import Array, Float, PyTree
 
+from ..contact.status import Status, Statuses, WithStatus
 from ..numerics import Checked, Given, number, program, pseudo_inverse, safe_divide
 from .force import AbstractMeshForce, te_under
 
@@ -38,7 +39,7 @@ class Excitation(Checked):
     orders: Float[Array, " orders"] = number("", shape=("orders",))
 
 
-class Oscillator(Checked):
+class Oscillator(WithStatus, Checked):
     """Coordinates along and across lines of action with one mesh between them, as a vector field `(t, y, args)`.
 
         mass x'' + damping x' + stiffness x + direction (F(phase, q) + mesh_damping q') = load
@@ -96,9 +97,9 @@ class Oscillator(Checked):
         return total
 
     @property
-    def converged(self) -> Bool[Array, ""]:
-        """Whether the contacts that its mesh force was made of have been found; a force in closed form has none."""
-        return jnp.asarray(getattr(self.mesh_force, "converged", True))
+    def status(self) -> Statuses:
+        """Of the contacts that its mesh force was made of; a force in closed form has converged."""
+        return jnp.asarray(getattr(self.mesh_force, "status", Status.CONVERGED.value), jnp.int8)
 
     def dte(self, phase: Scalar, x: Coordinates) -> Scalar:
         """Dynamic transmission error of the flanks (DTE) [um]."""

@@ -5,8 +5,9 @@ from typing import Literal, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int, Int8
 
+from ..contact.status import WithStatus
 from ..numerics import Checked, result
 from .integrate import SIMPSON, Steps, history, largest, mean, one_step, share, smallest
 from .oscillator import Oscillator, State
@@ -18,7 +19,7 @@ FORCE_REFERENCE = 1e-6  # N, of levels (ISO 1683)
 _ROUNDING = 1e-6
 
 
-class SpeedResponse(Checked):
+class SpeedResponse(WithStatus, Checked):
     """Steady vibration over mesh frequency; `jax.vmap` puts batch axes in front of every array.
 
     Attributes:
@@ -35,8 +36,9 @@ class SpeedResponse(Checked):
             (speeds,).
         poincare_dte, poincare_velocity: DTE [um] and its rate [um/s] at mesh position 0 of successive cycles,
             shape (speeds, points); they repeat where the orbit does.
-        settled: whether a steady state was reached, of a mesh force whose contacts were found, shape (speeds,); where
-            it is not, the numbers are of a motion that is aperiodic, or still on its way, or of no such force.
+        status: `converged` where a steady state was reached, of a mesh force whose contacts were found, shape
+            (speeds,); elsewhere the numbers are of a motion that is aperiodic, or still on its way, or of no such
+            force.
         state: coordinates [um] and velocities [um/s] at mesh position 0, each of shape (speeds, coordinates).
         orders: multiples of the mesh frequency of the harmonics.
         direction: in which the speeds were gone through.
@@ -55,7 +57,7 @@ class SpeedResponse(Checked):
     period: Int[Array, "*batch speeds"] = result()
     poincare_dte: Float[Array, "*batch speeds points"] = result("um")
     poincare_velocity: Float[Array, "*batch speeds points"] = result("um/s")
-    settled: Bool[Array, "*batch speeds"] = result()
+    status: Int8[Array, "*batch speeds"] = result()
     state: tuple[Float[Array, "*batch speeds coordinates"], Float[Array, "*batch speeds coordinates"]] = result()
     orders: tuple[float, ...] = eqx.field(static=True)
     direction: Literal["up", "down"] = eqx.field(static=True)

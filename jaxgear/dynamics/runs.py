@@ -1,6 +1,5 @@
 """Several runs through the same speeds in one program, of one oscillator or of many designs, on all devices."""
 
-import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -24,52 +23,6 @@ def side_by_side(owner: str, batch: int | None) -> int:
     """Oscillators that advance side by side on a device; None for as many as suit it."""
     elsewhere = jax.local_devices()[0].platform != "cpu"
     return whole(owner, "batch", (_SIDE_BY_SIDE_ELSEWHERE if elsewhere else _SIDE_BY_SIDE) if batch is None else batch)
-
-
-def speed_sweeps(oscillators: Oscillator, mesh_frequencies, *, batch: int | None = None, **options: Any):
-    """`speed_sweep` of many oscillators: designs, torques, or both.
-
-    What is in memory besides the results does not grow with their number.
-
-    Args:
-        oscillators: with one axis in front of every array, as `jax.vmap` of what makes one gives them.
-        mesh_frequencies: [Hz], increasing, shape (speeds,), the same for all.
-        batch: oscillators that advance side by side on a device; None for as many as suit the device.
-        options: the others of `speed_sweep`, the same for all; but for `start`, each begins at its static equilibrium.
-
-    Returns:
-        a `SpeedResponse` whose arrays have the axis of the oscillators in front.
-
-    Raises:
-        ValueError: in one line for a single oscillator, and as `speed_sweep`.
-        TypeError: for an unknown option.
-    """
-    owner = "speed_sweeps"
-    frequencies = checked_frequencies(owner, mesh_frequencies)
-    if oscillators.mass.ndim != 2:
-        raise ValueError(
-            f"{owner}: oscillators have masses of shape {oscillators.mass.shape}, must be (oscillators, coordinates); "
-            "make them with jax.vmap"
-        )
-    batch = side_by_side(owner, batch)
-    sizes, limits = prepared(owner, oscillators, frequencies, **options)
-    devices, count = local_devices(), len(oscillators.mass)
-    share = -(-count // devices.size)
-    batch = min(batch, share)
-    rows = jax.tree.map(lambda part: padded(part, batch * devices.size), oscillators)
-    found = _all_swept(divided(rows, devices), (frequencies, limits), sizes, batch, devices)
-    found = jax.tree.map(lambda part: part[:count], found)
-    return dataclasses.replace(found, direction=options.get("direction", "up"))
-
-
-@kernel
-def _all_swept(oscillators, shared, sizes, batch: int, devices) -> SpeedResponse:
-    return over_devices(partial(_of_shared, sizes), oscillators, shared, batch=batch, devices=devices)
-
-
-def _of_shared(sizes, shared, oscillator) -> SpeedResponse:
-    frequencies, limits = shared
-    return swept(oscillator, jnp.asarray(frequencies), None, limits, sizes)
 
 
 Responses = dict[str, SpeedResponse]
@@ -134,7 +87,7 @@ def design_runs(
 
     Returns:
         what is kept, with the axis of the designs in front. Of a design whose contacts were not found floating-point
-        numbers are nan, and no speed is settled.
+        numbers are nan, and every speed has its status.
 
     Raises:
         ValueError: as `speed_sweep`, without `steps`, and for designs without a common leading axis.
@@ -143,6 +96,13 @@ def design_runs(
     frequencies = checked_frequencies(owner, mesh_frequencies)
     if options.get("steps") is None:
         raise ValueError(f"{owner}: steps must be given, as steps_for of the stiffest design gives them")
+    return _in_batches(owner, make, designs, frequencies, runs, keep=keep, batch=batch, **options)
+
+
+def _in_batches(
+    owner: str, make, designs: Any, frequencies, runs: Mapping[str, Run], *, keep=None, batch: int | None, **options
+) -> Any:
+    """`design_runs` under checked frequencies."""
     lengths = {jnp.shape(part)[:1] for part in jax.tree.leaves(designs)}
     if len(lengths) != 1 or not all(lengths) or lengths == {(0,)}:
         raise ValueError(f"{owner}: designs must be arrays with one leading axis, the same and not 0 for all")
@@ -150,14 +110,50 @@ def design_runs(
     devices, (count,) = local_devices(), lengths.pop()
     batch = min(side_by_side(owner, batch), -(-count // devices.size))
 
-    def in_batches(part):
+    def batches(part):
         rows = padded(part, batch * devices.size)
         return rows.reshape(-1, batch, *rows.shape[1:])
 
-    rows = divided(jax.tree.map(in_batches, designs), devices)
+    rows = divided(jax.tree.map(batches, designs), devices)
     found = _of_designs(rows, (frequencies, limits), make, keep, _ways(runs), sizes, devices)
     found = jax.tree.map(lambda part: part.reshape(-1, *part.shape[2:])[:count], found)
     return found if keep else _named(found, _ways(runs), axis=1)
+
+
+def speed_sweeps(oscillators: Oscillator, mesh_frequencies, *, batch: int | None = None, **options: Any):
+    """`speed_sweep` of many oscillators: designs, torques, or both.
+
+    What is in memory besides the results does not grow with their number.
+
+    Args:
+        oscillators: with one axis in front of every array, as `jax.vmap` of what makes one gives them.
+        mesh_frequencies: [Hz], increasing, shape (speeds,), the same for all.
+        batch: oscillators that advance side by side on a device; None for as many as suit the device.
+        options: the others of `speed_sweep`, the same for all; but for `start`, each begins at its static equilibrium.
+
+    Returns:
+        a `SpeedResponse` whose arrays have the axis of the oscillators in front; of an oscillator whose contacts were
+        not found as `design_runs`.
+
+    Raises:
+        ValueError: in one line for a single oscillator, and as `speed_sweep`.
+        TypeError: for an unknown option.
+    """
+    owner = "speed_sweeps"
+    frequencies = checked_frequencies(owner, mesh_frequencies)
+    if oscillators.mass.ndim != 2:
+        raise ValueError(
+            f"{owner}: oscillators have masses of shape {oscillators.mass.shape}, must be (oscillators, coordinates); "
+            "make them with jax.vmap"
+        )
+    if options.get("steps") is None:
+        options["steps"] = steps_for(oscillators, frequencies)
+    run = Run(**{name: options.pop(name) for name in Run._fields if name in options})
+    return _in_batches(owner, _itself, oscillators, frequencies, {owner: run}, batch=batch, **options)[owner]
+
+
+def _itself(oscillator: Oscillator) -> Oscillator:
+    return oscillator
 
 
 def _prepared(owner: str, frequencies, runs: Mapping[str, Run], options: dict):
@@ -189,7 +185,7 @@ def _of_designs(rows, shared, make, keep, ways: _Ways, sizes, devices):
             most_cycles=jnp.where(converged, limits.most_cycles, jnp.zeros_like(limits.most_cycles))
         )
         found = _of_one(oscillator, (frequencies, limits), sizes)
-        found = jax.tree.map(partial(_or_nothing, converged), found)
+        found = replace(jax.tree.map(partial(_or_nothing, converged), found), status=found.status)
         return keep(_named(found, ways)) if keep else found
 
     def of_batch(shared, batch):

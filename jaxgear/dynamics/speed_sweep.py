@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from ..contact.status import Status, status_of
 from ..numerics import Numbers, check, concrete, kernel, real, whole
 from .integrate import cycle_of
 from .oscillator import Oscillator, State, at_rest, natural_frequencies, static_force
@@ -290,7 +291,7 @@ def swept(
         poincare_dte=found.dte,
         poincare_velocity=found.velocity,
         # a map of contacts that were not found is no force
-        settled=(found.period > 0) & oscillator.converged,
+        status=status_of({Status.NO_STEADY_MOTION: found.period <= 0}, oscillator.status),
         state=found.state,
         orders=sizes.orders,
         direction="up",

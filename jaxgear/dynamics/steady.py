@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from ..contact.status import Status, Statuses, status_of
 from .orbit import Orbit, find_orbit
 from .oscillator import Oscillator, static_force
 from .response import SpeedResponse
@@ -71,7 +72,7 @@ def _settled_on(of: SpeedResponse):
 
 def _recorded(of: SpeedResponse) -> SteadyNumbers:
     """The numbers of a response, without derivatives."""
-    found = of.dynamic_factor, of.dte_rms, of.contact_loss_share, of.back_side_contact, jnp.zeros_like(of.settled)
+    found = of.dynamic_factor, of.dte_rms, of.contact_loss_share, of.back_side_contact, jnp.zeros_like(of.status, bool)
     return jax.lax.stop_gradient(SteadyNumbers(*found))
 
 
@@ -99,14 +100,13 @@ class SteadyForce(NamedTuple):
             coast flanks; as many cycles as any orbit that is looked for repeats in.
         dynamic_factor: largest force at any time over the static one.
         back_side_contact: whether the coast flanks touch at any time.
-        found: whether the motion has settled on an orbit, of a mesh force whose contacts were found; forces are the
-            static one otherwise.
+        status: of the motion and of its mesh force; forces are the static one where it has not converged.
     """
 
     force: Float[Array, "cycles positions"]
     dynamic_factor: Scalar
     back_side_contact: Bool[Array, ""]
-    found: Bool[Array, ""]
+    status: Statuses
 
 
 def steady_force(
@@ -126,17 +126,20 @@ def steady_force(
     most = max(_PERIODS)
 
     def orbit(periods: int):
-        def found() -> SteadyForce:
+        def on_orbit() -> SteadyForce:
             orbit, same = _orbit_of(oscillator, frequency, start, periods, steps, recorded)
             force = jnp.tile(_at_positions(oscillator, orbit, phase), (most // periods, 1))
-            same &= oscillator.converged
-            return SteadyForce(jnp.where(same, force, even), orbit.dynamic_factor, orbit.back_side_contact > 0, same)
+            status = status_of({Status.NO_STEADY_MOTION: ~same}, oscillator.status)
+            force = jnp.where(status == Status.CONVERGED, force, even)
+            return SteadyForce(force, orbit.dynamic_factor, orbit.back_side_contact > 0, status)
 
-        return found
+        return on_orbit
 
     def none() -> SteadyForce:
-        no = jnp.zeros((), bool)
-        return SteadyForce(jnp.full((most, len(phase)), even), jnp.full_like(even, jnp.nan), no, no)
+        status = status_of({Status.NO_STEADY_MOTION: True}, oscillator.status)
+        return SteadyForce(
+            jnp.full((most, len(phase)), even), jnp.full_like(even, jnp.nan), jnp.zeros((), bool), status
+        )
 
     return jax.lax.switch(jnp.asarray(_CHOICE)[period], [*map(orbit, _PERIODS), none])
 

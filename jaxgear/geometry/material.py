@@ -6,7 +6,7 @@ from ..numerics import Checked, Usual, number
 
 Scalar = Float[Array, ""]
 
-_MODULI = Usual(500.0, 700_000.0, "plastics 1000 to 10000, steel 206000 MPa: is it in GPa or Pa?")
+_MODULI = Usual(500.0, 700_000.0, "MPa", "plastics 1000 to 10000, steel 206000 MPa: is it in GPa or Pa?")
 
 
 class Material(Checked):

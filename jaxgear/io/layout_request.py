@@ -6,18 +6,17 @@ import numpy as np
 
 from ..conditions import LoadSpectrum
 from ..layout import (
-    Endurance,
     FlankLineTolerance,
-    SNCurve,
     flank_line_tolerance,
     helix_slope_limits,
     without_housing,
 )
+from ..metrics import Strength
 from ..shafts import Misalignment, ShaftSupport
 from .design_file import DesignFile
 from .errors import DesignFileError, naming, refuse_given, refused
 from .gears import both_classes
-from .schema_shafts import LayoutSection, MisalignmentSection, ProfileSection, WoehlerSection
+from .schema_shafts import LayoutSection, MisalignmentSection, ProfileSection
 from .template import part_of
 from .toml import decode
 
@@ -75,7 +74,7 @@ def layout_request(design: DesignFile, *, quick: bool = False) -> LayoutRequest:
             "share": section.edge_share,
             "negative_crowning": section.negative_crowning,
             "stations": min(section.stations, _QUICK_STATIONS) if quick else section.stations,
-            **_life(section),
+            **_life(section, design.strength),
         }
         housed = support.gearbox.housing is not None
         supports = {"housing": support, "rigid seats": without_housing(support)} if housed else {"rigid seats": support}
@@ -93,7 +92,7 @@ def check_layout(design: DesignFile, section: LayoutSection) -> None:
         DesignFileError: for anything that is wrong with it, in one line that names the key.
     """
     _axes(section.misalignment, float(design.pair().face_width))
-    _life(section)
+    _life(section, design.strength)
     _profile(section, quick=False)
 
 
@@ -126,27 +125,24 @@ def _axes(given: str | dict | None, width: float):
     return part_of(key, section, Misalignment).build({})
 
 
-def _life(section: LayoutSection) -> dict:
-    """Duty cycle and endurance."""
-    keys = ["hours", "speeds", "pitting", "bending"]
+def _life(section: LayoutSection, strength: Strength | None) -> dict:
+    """Duty cycle and strength."""
+    keys = ["hours", "speeds"]
     if section.torques is None:
         refuse_given("layout", section, keys, " without layout.torques")
         return {}
     for key in keys:
         if getattr(section, key) is None:
             raise DesignFileError(f"layout.{key}", "missing, layout.torques needs it")
-    for key in ("hours", "speeds"):
+    for key in ("pitting_cycles", "bending_cycles"):  # given together with stress and exponent
+        if strength is None or getattr(strength, key) is None:
+            raise DesignFileError(f"strength.{key}", "missing, layout.torques needs it")
+    for key in keys:
         count, wanted = len(getattr(section, key)), len(section.torques)
         if count != wanted:
             raise DesignFileError(f"layout.{key}", f"{count} numbers must be as many as the {wanted} torques")
     load = refused("layout.torques", LoadSpectrum.from_hours, section.torques, section.hours, section.speeds)
-    lines = [_woehler(key, getattr(section, key)) for key in ("pitting", "bending")]
-    return {"duty_cycle": load, "endurance": Endurance(*lines)}
-
-
-def _woehler(name: str, table) -> SNCurve:
-    key = f"layout.{name}"
-    return part_of(key, decode(key, table, WoehlerSection), SNCurve).build({})
+    return {"duty_cycle": load, "strength": strength}
 
 
 def _profile(layout: LayoutSection, quick: bool) -> ProfileSection | None:

@@ -15,7 +15,6 @@ from ..compliance import AbstractBody, AbstractContact, AbstractTooth, Complianc
 from ..contact import OperatingPoint, Resolution
 from ..dynamics import Dynamics
 from ..geometry import Gear, GearPair, Material
-from ..layout import SNCurve
 from ..metrics import Lubricant, Strength
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
@@ -120,7 +119,6 @@ def _gearbox_tables() -> Iterator[tuple[str, type[FileTable], Callable[..., Any]
     yield "[meshes.misalignment]", schema_shafts.MisalignmentSection, shafts.Misalignment
     yield "[housing]", schema_shafts.HousingSection, None
     yield "[layout]", schema_shafts.LayoutSection, None
-    yield "[layout.pitting] and [layout.bending]", schema_shafts.WoehlerSection, SNCurve
     yield "[layout.profile]", schema_shafts.ProfileSection, None
 
 

@@ -2,7 +2,6 @@
 
 from typing import Annotated, Any
 
-from ..layout import SNCurve
 from ..numerics import Number
 from ..shafts import Bearing, Coupling, GearMesh, MatrixBearing, Misalignment, MountedGear, ShaftLoad
 from ..shafts import Section as ShaftPart
@@ -23,7 +22,6 @@ MatrixBearingSection = section_of(MatrixBearing, open=False)
 CouplingSection = section_of(Coupling, open=False)
 LoadOnShaftSection = section_of(ShaftLoad, open=False)
 MisalignmentSection = section_of(Misalignment, open=False)
-WoehlerSection = section_of(SNCurve, open=False)
 
 
 class ShaftSection(FileTable):
@@ -104,11 +102,10 @@ class LayoutSection(FileTable):
         edge_share: of the largest load inside, up to which the end of a face may be loaded.
         negative_crowning: whether the crowning of step 1 may be negative.
         stations: over the face, of the one-dimensional analysis.
-        torques: on the pinion, of a duty cycle; the load is levelled at the design torque without it.
+        torques: on the pinion, of a duty cycle, with the S-N curves of [strength]; the load is levelled at the design
+            torque without it.
         hours: at every torque.
         speeds: of the pinion at every torque.
-        pitting: S-N curve of the flanks, with `endurance`, `exponent` and `cycles`.
-        bending: what the tooth roots bear, likewise.
         profile: profile modifications to be tried in step 3; none without it.
     """
 
@@ -123,8 +120,6 @@ class LayoutSection(FileTable):
     torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
     hours: Annotated[list[float] | None, _HOURS] = None
     speeds: Annotated[list[float] | None, list_of(positive("rpm"))] = None
-    pitting: Annotated[Tables | None, table()] = None
-    bending: Annotated[Tables | None, table()] = None
     profile: Annotated[Tables | None, table()] = None
 
 

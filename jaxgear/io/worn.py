@@ -10,7 +10,7 @@ import numpy as np
 from ..geometry import roll_angle
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
 from ..numerics import real
-from ..wear import WearLife
+from ..wear import WearHistory
 from .errors import DesignFileError
 from .folder import writing
 from .rows import PARQUET, read_rows
@@ -20,7 +20,7 @@ _GEARS = "pinion", "wheel"
 Worn = tuple[AbstractModification, AbstractModification]
 
 
-def write_worn(path: str | Path, lives: Mapping[str, WearLife]) -> None:
+def write_worn(path: str | Path, lives: Mapping[str, WearHistory]) -> None:
     """Writes the worn flanks of all designs at every life, one row per point of a flank, to all digits.
 
     `read_worn` gives the same flanks of all, `read_flank` one of them.
@@ -55,7 +55,7 @@ def _write_parquet(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     parquet.write_table(pyarrow.table({name: pyarrow.array(values.tolist()) for name, values in columns.items()}), path)
 
 
-def _columns(design: str, life: WearLife) -> dict[str, np.ndarray]:
+def _columns(design: str, life: WearHistory) -> dict[str, np.ndarray]:
     """Points of both flanks at every life, of shape (lives, gears, slices, points) before they stand in one row."""
     depth = np.asarray(life.depth, float)
     total, corner = depth.sum(axis=2), depth[:, :, 1]

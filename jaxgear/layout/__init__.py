@@ -24,8 +24,6 @@ from .flank_line import at_stations as at_stations
 from .flank_line import at_torque as at_torque
 from .flank_line import level_load as level_load
 from .life import Damage as Damage
-from .life import Endurance as Endurance
-from .life import SNCurve as SNCurve
 from .life import damage as damage
 from .life import face_load_over_torques as face_load_over_torques
 from .life import gear_lives as gear_lives

@@ -4,6 +4,7 @@ Nothing is refused here: a finding is a warning. The limits are of this project 
 """
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from ..conditions import LoadSpectrum
 from ..geometry import GearPair
 from ..metrics import Finding
 from ..metrics.findings import LIMITS as LIMITS_OF_MESH
-from ..metrics.findings import Range
+from ..metrics.findings import of_limits, unusual
+from ..numerics import Usual
 from ..shafts import AbstractSupport, Gearbox, Shaft, ShaftSupport, bearing_reactions
 from ..shafts.gearbox import tip_clearances
 from ..shafts.shaft import facts_of
@@ -25,44 +27,44 @@ _COST = 1.2
 _FEWEST = 8
 
 LIMITS = {
-    "K_Hbeta": Range(
+    "K_Hbeta": Usual(
         0.0,
         np.inf,
         "",
         f"fewer than {_FEWEST} stations carry the load, so that it depends on their number: more stations? are the "
         "units of bearings, shafts and housing right?",
     ),
-    "K_Hbeta without deviations": Range(
+    "K_Hbeta without deviations": Usual(
         0.0,
         np.inf,
         "",
         f"more than {_COST:g} times that of unmodified flanks; compare the worst cases of deviations, and try "
         'layout.further_crowning = "least"',
     ),
-    "K_Hbeta of the worst case": Range(
+    "K_Hbeta of the worst case": Usual(
         0.0, np.inf, "", 'no better than without the further crowning; try layout.further_crowning = "least"'
     ),
-    "slope and crowning in modules": Range(
+    "slope and crowning in modules": Usual(
         0.0, 0.04, "", "twice the tip relief of ISO 53:1974: are the units of bearings, shafts and housing right?"
     ),
-    "radial displacement in modules": Range(
+    "radial displacement in modules": Usual(
         0.0, 0.05, "", "about the backlash of a gear: center distance and contact ratio are those of shafts in place"
     ),
-    "radial stiffness": Range(1.0, 20_000.0, "N/um", "rolling bearings have ten to some thousands: is it in N/um?"),
-    "clearance": Range(0.1, 500.0, "um", "rolling bearings have 2 to 100 um to either side: is it in um?"),
-    "distance from the face": Range(
+    "radial stiffness": Usual(1.0, 20_000.0, "N/um", "rolling bearings have ten to some thousands: is it in N/um?"),
+    "clearance": Usual(0.1, 500.0, "um", "rolling bearings have 2 to 100 um to either side: is it in um?"),
+    "distance from the face": Usual(
         0.0, np.inf, "mm", "a bearing under the teeth holds a gear in its bore, but not a shaft: is its position right?"
     ),
-    "number of meshes": Range(1.0, np.inf, "", "it turns idle, no force acts on it: is a mesh missing?"),
-    "tip clearance": Range(
+    "number of meshes": Usual(1.0, np.inf, "", "it turns idle, no force acts on it: is a mesh missing?"),
+    "tip clearance": Usual(
         0.0, np.inf, "mm", "they run into each other: are angles of the meshes and positions right?"
     ),
-    "shaft diameter over bore": Range(
+    "shaft diameter over bore": Usual(
         0.0, 1.0, "", "only a gear that is cut into its shaft is on one thicker than its bore: integral?"
     ),
-    "misalignment over the face": Range(0.1, np.inf, "um", "less than axes can be measured to: is it in mm?"),
-    "damage by the duty cycle": Range(
-        1e-12, 1.0, "", "1 is the end of life: are torques in N m, endurance in MPa and cycles single ones?"
+    "misalignment over the face": Usual(0.1, np.inf, "um", "less than axes can be measured to: is it in mm?"),
+    "damage by the duty cycle": Usual(
+        1e-12, 1.0, "", "1 is the end of life: are torques in N m, strengths in MPa and cycles single ones?"
     ),
     **{name: LIMITS_OF_MESH[name] for name in ("depth of the modification", "depth of the modification in modules")},
     "pitch line velocity": LIMITS_OF_MESH["pitch line velocity"],
@@ -103,20 +105,18 @@ def findings_of(
         numbers += _of_duty_cycle(layout, duty_cycle)
     if profiles is not None:
         numbers += _of_profiles(profiles, float(layout.pair.pinion.module))
-    return tuple(each for each in numbers if not each.limit.low <= each.value <= each.limit.high)
+    return unusual(numbers)
 
 
-def _finding(name: str, where: str, value, limit: Range | None = None) -> Finding:
-    return Finding(name, where, float(value), limit or LIMITS[name])
+_finding = partial(of_limits, LIMITS)
 
 
 def _of_load(layout: FlankLineLayout) -> Iterator[Finding]:
     cases = list(layout.after.values())
     stations = cases[0].load.line_load.shape[-1]
-    limit = LIMITS["K_Hbeta"]._replace(high=2 * stations / _FEWEST)
     worst = max(float(np.max(each.face_load_factor)) for each in cases)
     for where, factor in zip(("without modification", "after step 1", "after step 2"), (*layout.factors, worst)):
-        yield _finding("K_Hbeta", where, factor, limit)
+        yield _finding("K_Hbeta", where, factor, high=2 * stations / _FEWEST)
 
 
 def _of_crowning(layout: FlankLineLayout, contact: ContactCases) -> Iterator[Finding]:
@@ -134,10 +134,8 @@ def _of_crowning(layout: FlankLineLayout, contact: ContactCases) -> Iterator[Fin
             *others, worst = (float(np.max(factors)) for factors in cases)
             if where == next(iter(analysis)):
                 place = "after step 2" + (", contact analysis" if number else "")
-                name = "K_Hbeta without deviations"
-                yield _finding(name, place, crowned, LIMITS[name]._replace(high=_COST * unmodified))
-            name = "K_Hbeta of the worst case"
-            yield _finding(name, f"after step 2, {where}", worst, LIMITS[name]._replace(high=min(others)))
+                yield _finding("K_Hbeta without deviations", place, crowned, high=_COST * unmodified)
+            yield _finding("K_Hbeta of the worst case", f"after step 2, {where}", worst, high=min(others))
 
 
 def _of_flank_lines(layout: FlankLineLayout) -> Iterator[Finding]:

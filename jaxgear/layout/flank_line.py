@@ -11,8 +11,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
+from ..contact.status import Statuses
 from ..geometry import GearPair
 from ..microgeometry import AbstractModification, LeadCrowning, LeadSlope
 from ..numerics import Checked, check, concrete, implicit_root, number, optional_real, program, real, result, whole
@@ -36,17 +37,17 @@ class Stations(AbstractSupport):
     Attributes:
         table: what it does over the face.
         load: torque on the pinion under which it does that.
-        held: whether the support that it was worked out from can be.
+        of_support: status of the support that it was worked out from.
     """
 
     table: TabulatedSupport
     load: Scalar = result("N m")
-    held: Bool[Array, ""] = eqx.field()
+    of_support: Statuses = result()
 
     @property
-    def valid(self) -> Bool[Array, ""]:
-        """`held`."""
-        return self.held
+    def status(self) -> Statuses:
+        """`of_support`."""
+        return self.of_support
 
     @property
     def pair(self) -> GearPair:
@@ -161,7 +162,7 @@ def _at_stations(support: AbstractSupport, torque: Scalar | None, stations: int)
         torque = support.torque
     assert torque is not None
     gap = jnp.broadcast_to(support.gap(y), y.shape)
-    return Stations(TabulatedSupport(support.pair, support.influence(y), gap), torque, support.valid)
+    return Stations(TabulatedSupport(support.pair, support.influence(y), gap), torque, support.status)
 
 
 GearName = Literal["pinion", "wheel"]

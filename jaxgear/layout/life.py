@@ -15,17 +15,18 @@ smallest damage sum.
 import math
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.optimize
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float, Int8
 
 from ..conditions import LoadSpectrum
+from ..contact.status import Status, WithStatus, reason, status_of
 from ..geometry import GearPair
+from ..metrics.safety import Mode, Strength, damage_per_cycle
 from ..metrics.stress import nominal_stress_squares, single_contact_root_stress
-from ..numerics import Checked, concrete, kernel, maximum, number, program, real, result, whole
+from ..numerics import Checked, concrete, kernel, maximum, program, real, result, whole
 from ..shafts import AbstractSupport, FaceLoad, annex_e, face_load_factor, root_face_load_factor, tooth_height
 from .flank_line import STATIONS, FlankLine, Stations, at_stations, level_load
 
@@ -33,44 +34,16 @@ Scalar = Float[Array, ""]
 Torques = Float[Array, " torques"]
 OfGears = Float[Array, "gears torques"]
 
-_MINUTES = 60.0  # in an hour
 
-
-class SNCurve(Checked):
-    """Cycles that a stress can be borne, N = cycles (endurance / stress)^exponent, without an end below.
-
-    Attributes:
-        endurance: stress that is borne for `cycles`.
-        exponent: p, slope of the line.
-        cycles: N_0.
-    """
-
-    endurance: Scalar = number("MPa", low=0.0, open_low=True)
-    exponent: Scalar = number("", low=1.0, high=100.0)
-    cycles: Scalar = number("", low=0.0, open_low=True)
-
-
-class Endurance(Checked):
-    """S-N curve of the material of a gear.
-
-    Attributes:
-        pitting: against the nominal contact stress of ISO 6336-2, as `pitting` of `metrics.Strength`.
-        bending: against the nominal stress in the tooth root of ISO 6336-3.
-    """
-
-    pitting: SNCurve
-    bending: SNCurve
-
-
-class Damage(Checked):
+class Damage(WithStatus, Checked):
     """Damage under a duty cycle, 1 for a life that is used up; axes (gears, torques), pinion first.
 
     Attributes:
         pitting, bending: damage that every load does.
         contact_stress, root_stress: of both gears at every torque.
         face_load_factor: K_Hbeta at every torque.
-        converged: whether the load over the face has been found at every torque; where it has not, its numbers are
-            NaN, and with them every sum. Without torque there is nothing to find.
+        status: of the load over the face at every torque; where it has not converged, its numbers are NaN, and with
+            them every sum. Without torque there is nothing to find.
         duration: of the duty cycle; None where it has none: the damage is that of one revolution of the pinion.
     """
 
@@ -79,7 +52,7 @@ class Damage(Checked):
     contact_stress: OfGears = result("MPa")
     root_stress: OfGears = result("MPa")
     face_load_factor: Torques = result()
-    converged: Bool[Array, " torques"] = eqx.field()
+    status: Int8[Array, " torques"] = result()
     duration: Scalar | None = result("h")
 
     @property
@@ -111,7 +84,7 @@ class Damage(Checked):
 def damage(
     support: AbstractSupport,
     load: LoadSpectrum,
-    endurance: Endurance | tuple[Endurance, Endurance],
+    strength: Strength,
     *,
     pinion: FlankLine | None = None,
     wheel: FlankLine | None = None,
@@ -127,28 +100,21 @@ def damage(
         support: shafts at the mesh; couplings are scaled to every torque.
         load: torques on the pinion with speeds and duration, `LoadSpectrum.from_hours`. Without a duration the weights
             are shares of the revolutions and the damage is that of one revolution.
-        endurance: of both gears, or (pinion, wheel).
+        strength: of both gears, with the S-N curves of pitting and bending.
         pinion, wheel: flank lines; None for none.
         stations: over the face.
 
     Raises:
-        ValueError: for a duration without speeds.
+        ValueError: for a duration without speeds, and a strength without an S-N curve.
     """
-    both = endurance if isinstance(endurance, tuple) else (endurance, endurance)
     whole("damage", "stations", stations, 3, 1001)
-    found = under_loads(support, load, stations=stations)
-    return damage_of(found, load, both, pinion or FlankLine(), wheel or FlankLine())
-
-
-def under_loads(support: AbstractSupport, load: LoadSpectrum, *, stations: int = STATIONS) -> Stations:
-    """A support under every torque of a spectrum, with a leading axis (torques,)."""
-    if load.duration is not None and load.speeds is None:
-        raise ValueError("damage: a load spectrum with a duration needs speeds, for the number of cycles")
-    return _under_loads(support, load.torques, stations)
+    found = under_loads(support, load.torques, stations)
+    return damage_of(found, load, strength, pinion or FlankLine(), wheel or FlankLine())
 
 
 @program
-def _under_loads(support: AbstractSupport, torques: Torques, stations: int) -> Stations:
+def under_loads(support: AbstractSupport, torques: Torques, stations: int) -> Stations:
+    """A support under several torques, with a leading axis (torques,)."""
     return jax.vmap(lambda torque: at_stations(support, torque, stations=stations))(torques)
 
 
@@ -164,37 +130,34 @@ def face_loads(faces: Stations, pinion: FlankLine, wheel: FlankLine) -> FaceLoad
 
 
 @program
-def damage_of(
-    faces: Stations, load: LoadSpectrum, endurance: tuple[Endurance, Endurance], pinion: FlankLine, wheel: FlankLine
-) -> Damage:
+def damage_of(faces: Stations, load: LoadSpectrum, strength: Strength, pinion: FlankLine, wheel: FlankLine) -> Damage:
     """`damage` of supports that are worked out."""
     found = face_loads(faces, pinion, wheel)
     pair = jax.tree.map(lambda leaf: leaf[0], faces.pair)
-    loaded = Loaded(maximum(found.line_load, axis=-1), face_load_factor(found.line_load), found.converged)
-    return summed(pair, loaded, load, endurance)
+    loaded = Loaded(maximum(found.line_load, axis=-1), face_load_factor(found.line_load), found.status)
+    return summed(pair, loaded, load, strength)
 
 
-def gear_lives(
-    pair: GearPair, load: LoadSpectrum, endurance: Endurance | tuple[Endurance, Endurance], factors
-) -> Float[Array, "variants gears"]:
+def gear_lives(pair: GearPair, load: LoadSpectrum, strength: Strength, factors) -> Float[Array, "variants gears"]:
     """`Damage.gear_lives` of pinion and wheel where one face load factor stands for every load.
 
     Args:
         pair: the gears.
-        load, endurance: as for `damage`.
+        load, strength: as for `damage`.
         factors: K_Hbeta, such as that of the loaded tooth contact at one torque, shape (variants,).
     """
-    both = endurance if isinstance(endurance, tuple) else (endurance, endurance)
-    return _gear_lives(pair, load, both, real(factors))
+    return _gear_lives(pair, load, strength, real(factors))
 
 
 @program
-def _gear_lives(pair: GearPair, load: LoadSpectrum, endurance: tuple[Endurance, Endurance], factors):
+def _gear_lives(pair: GearPair, load: LoadSpectrum, strength: Strength, factors):
     mean = 1e3 * load.torques / (pair.pinion.base_radius * pair.face_width)
 
     def lives(factor):
         every = jnp.full_like(mean, factor)
-        return summed(pair, Loaded(factor * mean, every, jnp.isfinite(every)), load, endurance).gear_lives
+        return summed(
+            pair, Loaded(factor * mean, every, status_of({Status.NOT_CONVERGED: ~jnp.isfinite(every)})), load, strength
+        ).gear_lives
 
     return jax.vmap(lives)(factors)
 
@@ -205,15 +168,15 @@ class Loaded(NamedTuple):
     Attributes:
         largest: line load [N/mm].
         factor: K_Hbeta.
-        converged: whether it has been found.
+        status: of each.
     """
 
     largest: Torques
     factor: Torques
-    converged: Bool[Array, " torques"]
+    status: Int8[Array, " torques"]
 
 
-def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, endurance: tuple[Endurance, Endurance]) -> Damage:
+def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, strength: Strength) -> Damage:
     """The damage of loads over the face."""
     # without torque teeth carry nothing, whether the place of the shafts has been found or not
     carries = load.torques > 0
@@ -222,28 +185,25 @@ def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, endurance: tuple[E
     mean = largest / factor
     # K_Fbeta of an even load; below 1 is rounding
     bent = mean * root_face_load_factor(jnp.maximum(factor, 1.0), pair.face_width, tooth_height(pair))
-    hours, speeds = load.hours, load.speeds
-    turns = load.weights if hours is None or speeds is None else _MINUTES * hours * speeds
+    turns = load.turns("damage")
+    cycles = turns, turns / pair.gear_ratio
     loaded = largest != 0
-    pitting: list[Torques] = []
-    bending: list[Torques] = []
-    for turned, hertz, share, bears in zip((turns, turns / pair.gear_ratio), contact, root, endurance):
-        lines = bears.pitting, bears.bending
-        # by the square of the stress, whose root has no derivative at zero load
-        square = jnp.where(loaded, largest * hertz / lines[0].endurance ** 2, 1.0)
-        power = jnp.where(loaded, square ** (0.5 * lines[0].exponent), 0.0)
-        shares = power / lines[0].cycles, (bent * share / lines[1].endurance) ** lines[1].exponent / lines[1].cycles
+    # the root has no derivative at zero load
+    stresses = [jnp.where(loaded, jnp.sqrt(jnp.where(loaded, largest * hertz, 1.0)), 0.0) for hertz in contact]
+    bending = [bent * share for share in root]
+
+    def of(name: Mode, stresses) -> OfGears:
+        shares = damage_per_cycle("damage", strength, name, tuple(stresses))
         # a load that is never run does nothing, even where it has not been found
-        for each, damaged in zip((pitting, bending), shares):
-            each.append(jnp.where(turned > 0, turned * damaged, 0.0))
-    stress = [jnp.where(loaded, jnp.sqrt(jnp.where(loaded, largest * hertz, 1.0)), 0.0) for hertz in contact]
+        return jnp.stack([jnp.where(run > 0, run * each, 0.0) for run, each in zip(cycles, shares)])
+
     return Damage(
-        jnp.stack(pitting),
+        of("pitting", stresses),
+        of("bending", bending),
+        jnp.stack(stresses),
         jnp.stack(bending),
-        jnp.stack(stress),
-        jnp.stack([bent * share for share in root]),
         found.factor,
-        found.converged | ~carries,
+        jnp.where(carries, found.status, jnp.int8(Status.CONVERGED)),
         load.duration,
     )
 
@@ -259,7 +219,7 @@ _NONE = 1e-300  # damage whose logarithm still exists
 def longest_life(
     support: AbstractSupport,
     load: LoadSpectrum,
-    endurance: Endurance | tuple[Endurance, Endurance],
+    strength: Strength,
     *,
     negative_crowning: bool = False,
     stations: int = STATIONS,
@@ -273,7 +233,7 @@ def longest_life(
 
     Args:
         support: shafts at the mesh; couplings are scaled to every torque.
-        load, endurance, stations: as for `damage`.
+        load, strength, stations: as for `damage`.
         negative_crowning: whether the crowning may be negative.
 
     Returns:
@@ -283,18 +243,17 @@ def longest_life(
         ValueError: as `damage` does, for torques that are all zero, numbers that are being traced, and a torque whose
             load over the face is not found.
     """
-    if any(concrete(leaf) is None for leaf in jax.tree.leaves((support, load, endurance))):
+    if any(concrete(leaf) is None for leaf in jax.tree.leaves((support, load, strength))):
         raise ValueError("longest_life: searches with numbers, not inside of a traced function; `damage` can be traced")
-    both = endurance if isinstance(endurance, tuple) else (endurance, endurance)
     if not float(jnp.max(jnp.where(load.weights > 0, load.torques, 0.0))) > 0:
         raise ValueError("longest_life: torques are all zero; every flank line has an infinite life")
-    faces = under_loads(support, load, stations=stations)
-    unmodified = damage(support, load, both, stations=stations)
+    faces = under_loads(support, load.torques, stations)
+    unmodified = damage(support, load, strength, stations=stations)
     missed = np.asarray(load.torques)[~np.asarray(unmodified.converged)]
     if len(missed):
         raise ValueError(
-            f"longest_life: the load over the face at {float(missed[0]):g} N m is not found: do loads leave a shaft "
-            "afloat in its clearances?"
+            f"longest_life: the load over the face at {float(missed[0]):g} N m is not found, "
+            f"{reason(unmodified.status)}: do loads leave a shaft afloat in its clearances?"
         )
     worst = int(np.argmax(np.sum(unmodified.pitting, axis=0)))
     start = level_load(support, load.torques[worst], negative_crowning=negative_crowning, stations=stations)
@@ -303,7 +262,7 @@ def longest_life(
     for sharpness in _SHARPNESS:
 
         def soft(at, sharpness=sharpness):
-            value, slope = _soft_damage(faces, load, both, jnp.asarray(at), jnp.asarray(sharpness))
+            value, slope = _soft_damage(faces, load, strength, jnp.asarray(at), jnp.asarray(sharpness))
             return float(value), np.asarray(slope)
 
         point = scipy.optimize.minimize(soft, point, jac=True, method="L-BFGS-B", bounds=bounds).x
@@ -311,7 +270,7 @@ def longest_life(
     pair = support.pair
 
     def true(at):
-        found = damage_of(faces, load, both, FlankLine(), FlankLine(*at).on(pair, "wheel"))
+        found = damage_of(faces, load, strength, FlankLine(), FlankLine(*at).on(pair, "wheel"))
         return math.log(max(float(found.largest), _NONE))
 
     corners = np.stack([point, point + [_FIRST_STEP, 0.0], point + [0.0, _FIRST_STEP]])
@@ -321,7 +280,7 @@ def longest_life(
 
 
 @kernel
-def _soft_damage(faces: Stations, load: LoadSpectrum, endurance, at: Float[Array, "2"], sharpness):
+def _soft_damage(faces: Stations, load: LoadSpectrum, strength, at: Float[Array, "2"], sharpness):
     """Logarithm of the damage by a mean of the line load that is close to the largest, and its gradient."""
     pair = jax.tree.map(lambda leaf: leaf[0], faces.pair)
 
@@ -334,7 +293,7 @@ def _soft_damage(faces: Stations, load: LoadSpectrum, endurance, at: Float[Array
         top = jax.lax.stop_gradient(jnp.max(share, axis=-1))
         factor = top * jnp.mean((share / jnp.where(loaded, top, 1.0)[:, None]) ** sharpness, axis=-1) ** (1 / sharpness)
         factor = jnp.where(loaded, factor, 1.0)
-        made: Damage = summed(pair, Loaded(factor * mean, factor, found.converged), load, endurance)
+        made: Damage = summed(pair, Loaded(factor * mean, factor, found.status), load, strength)
         return jnp.log(jnp.maximum(maximum(made.total), _NONE))
 
     return jax.value_and_grad(of)(at)
@@ -360,7 +319,7 @@ def face_load_over_torques(
         ValueError: for torques that are negative or repeated, and other numbers out of range.
     """
     whole("face_load_over_torques", "stations", stations, 2, 1001)
-    faces = under_loads(support, LoadSpectrum(torques), stations=stations)
+    faces = under_loads(support, LoadSpectrum(torques).torques, stations)
     return _factors(faces, pinion or FlankLine(), wheel or FlankLine())
 
 

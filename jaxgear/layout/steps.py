@@ -10,11 +10,12 @@ from jaxtyping import Array, Float
 
 from ..conditions import LoadSpectrum
 from ..geometry import GearPair
+from ..metrics.safety import Strength
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, check, real, result
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
 from .flank_line import STATIONS, FlankLine, GearName, at_stations, level_load
-from .life import Damage, Endurance, damage, longest_life
+from .life import Damage, damage, longest_life
 from .tolerance_cases import (
     CASES,
     FlankLineTolerance,
@@ -91,7 +92,8 @@ class FlankLineLayout(Checked):
         Raises:
             ValueError: for a layout without a duty cycle.
         """
-        return jnp.stack([each.life for each in self.damage]) / self._level_life("relative_life")
+        level = self._level_life("relative_life")
+        return jnp.stack([each.life / level for each in self.damage])
 
     def worst_relative_life(self, tolerance: str) -> Float[Array, " steps"]:
         """Life of the worst case of deviations without modification, after step 1 and after step 2, relative to that
@@ -137,7 +139,7 @@ def layout_flank_lines(
     *,
     torque=None,
     duty_cycle: LoadSpectrum | None = None,
-    endurance: Endurance | tuple[Endurance, Endurance] | None = None,
+    strength: Strength | None = None,
     gear: GearName = "wheel",
     further=None,
     share: float = 1.0,
@@ -157,7 +159,7 @@ def layout_flank_lines(
         tolerances: by name, for instance {"statistical": ..., "maximum": ...}; the worst of all counts.
         torque: on the pinion [N m]; None for the largest that the duty cycle has hours of, or that of the couplings.
         duty_cycle: torques with their hours, for step 1; None to level the load.
-        endurance: of the gears under it.
+        strength: of the gears under it, as for `damage`.
         gear: whose flank line levels the load.
         further: C_b of pinion and wheel over the common face [um]; None for as little as it takes.
         share: of the largest load inside, up to which an end may be loaded.
@@ -165,13 +167,13 @@ def layout_flank_lines(
         stations: over the face.
 
     Raises:
-        ValueError: for a duty cycle without endurance or the reverse, another gear, amounts or numbers out of range,
+        ValueError: for a duty cycle without strength or the reverse, another gear, amounts or numbers out of range,
             where the load over the face is not found, and where no crowning keeps it off the edges.
     """
     if gear not in ("pinion", "wheel"):
         raise ValueError(f'layout_flank_lines: gear = {gear!r} must be "pinion" or "wheel"')
-    if (duty_cycle is None) != (endurance is None):
-        given, missing = ("duty_cycle", "endurance") if endurance is None else ("endurance", "duty_cycle")
+    if (duty_cycle is None) != (strength is None):
+        given, missing = ("duty_cycle", "strength") if strength is None else ("strength", "duty_cycle")
         raise ValueError(f"layout_flank_lines: {given} has no effect without {missing}")
     check("layout_flank_lines", "further", further, "um", low=0.0)
     if torque is None and duty_cycle is not None:
@@ -180,10 +182,10 @@ def layout_flank_lines(
     if not several:
         raise ValueError("layout_flank_lines: tolerances must not be empty")
     face = at_stations(support, torque, stations=stations)
-    if duty_cycle is None or endurance is None:
+    if duty_cycle is None or strength is None:
         line = level_load(face, negative_crowning=negative_crowning)
     else:
-        line = longest_life(support, duty_cycle, endurance, negative_crowning=negative_crowning, stations=stations)
+        line = longest_life(support, duty_cycle, strength, negative_crowning=negative_crowning, stations=stations)
     each = [crowning_off_the_edges(face, one, line=line, share=share) for one in several.values()]
     needed = jnp.max(jnp.stack(each))
     if not bool(jnp.isfinite(line.slope)):
@@ -215,12 +217,12 @@ def layout_flank_lines(
         before=before,
         after=after,
     )
-    if duty_cycle is None or endurance is None:
+    if duty_cycle is None or strength is None:
         return layout
-    spent = tuple(damage(support, duty_cycle, endurance, wheel=one, stations=stations) for one in steps)
+    spent = tuple(damage(support, duty_cycle, strength, wheel=one, stations=stations) for one in steps)
     lives = {
         name: jnp.stack(
-            [lives_in_cases(support, duty_cycle, endurance, each, wheel=one, stations=stations) for one in steps]
+            [lives_in_cases(support, duty_cycle, strength, each, wheel=one, stations=stations) for one in steps]
         )
         for name, each in several.items()
     }

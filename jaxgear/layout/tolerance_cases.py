@@ -17,11 +17,12 @@ from jaxtyping import Array, Bool, Float
 
 from ..conditions import LoadSpectrum
 from ..geometry import GearPair
+from ..metrics.safety import Strength
 from ..numerics import Checked, bracketed_root, check, concrete, maximum, number, program, real, result, whole
 from ..shafts import AbstractSupport, FaceLoad, Misalignment, annex_e, axis_tolerance, face_load_factor
 from ..tolerance import ToleranceClass
 from .flank_line import STATIONS, FlankLine, Stations, at_stations
-from .life import Endurance, damage_of, under_loads
+from .life import damage_of, under_loads
 
 Scalar = Float[Array, ""]
 Cases = Float[Array, " cases"]
@@ -260,7 +261,7 @@ def _excess(line_load: Float[Array, "... slices"], share) -> Float[Array, "..."]
 def lives_in_cases(
     support: AbstractSupport,
     load: LoadSpectrum,
-    endurance: Endurance | tuple[Endurance, Endurance],
+    strength: Strength,
     tolerance: FlankLineTolerance,
     *,
     pinion: FlankLine | None = None,
@@ -270,23 +271,22 @@ def lives_in_cases(
     """Life [h] without deviations and in the four combinations of the largest ones, see `CASES`.
 
     Args:
-        support, load, endurance, pinion, wheel, stations: as for `damage`.
+        support, load, strength, pinion, wheel, stations: as for `damage`.
         tolerance: the deviations.
 
     Raises:
         ValueError: as `damage` does.
     """
-    both = endurance if isinstance(endurance, tuple) else (endurance, endurance)
     whole("lives_in_cases", "stations", stations, 3, 1001)
-    faces = under_loads(support, load, stations=stations)
-    return _lives(faces, load, both, tolerance, pinion or FlankLine(), wheel or FlankLine())
+    faces = under_loads(support, load.torques, stations)
+    return _lives(faces, load, strength, tolerance, pinion or FlankLine(), wheel or FlankLine())
 
 
 @program
 def _lives(
     faces: Stations,
     load: LoadSpectrum,
-    endurance: tuple[Endurance, Endurance],
+    strength: Strength,
     tolerance: FlankLineTolerance,
     pinion: FlankLine,
     wheel: FlankLine,
@@ -296,6 +296,6 @@ def _lives(
     def life(slope):
         on_wheel = FlankLine(slope).on(pair, "wheel")
         deviated = FlankLine(wheel.slope + on_wheel.slope, wheel.crowning + on_wheel.crowning)
-        return damage_of(faces, load, endurance, pinion, deviated).life
+        return damage_of(faces, load, strength, pinion, deviated).life
 
     return jax.vmap(life)(jnp.asarray(tolerance.slopes))

@@ -3,9 +3,10 @@
 One table of limits serves inputs and results alike. Nothing is refused here: a finding is a warning.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from functools import partial
+from typing import Literal, NamedTuple
 
 import equinox as eqx
 import jax
@@ -16,100 +17,109 @@ from ..compliance import AbstractCompliance, TabulatedCompliance
 from ..contact import MeshCycle, Resolution
 from ..geometry import Material
 from ..microgeometry import AbstractModification, EndRelief, NoModification, RootRelief, TipRelief
-from ..numerics import fields_of, program
+from ..numerics import Usual, fields_of, program
 from .flank import flank_surface
 from .load_distribution import effective_contact_ratio
 from .lubricant import Lubricant
 from .stress import nominal_root_stress
 
 
-class Range(NamedTuple):
-    """What is usual of a number.
-
-    Attributes:
-        low, high: the usual range.
-        unit: of all three.
-        remark: what is likely meant, or what the number means; with its source.
-    """
-
-    low: float
-    high: float
-    unit: str
-    remark: str
-
-
-def _of_field(cls: type[eqx.Module], name: str) -> Range:
+def _of_field(cls: type[eqx.Module], name: str) -> Usual:
     """What a class says is usual of its field."""
-    field = fields_of(cls)[name]
-    assert field.usual is not None
-    low, high, remark = field.usual
-    return Range(low, high, field.unit, remark)
+    usual = fields_of(cls)[name].usual
+    assert usual is not None
+    return usual
 
 
 LIMITS = {
-    "torque": Range(0.0, np.inf, "N m", "the design torque lies outside the range of torques that is looked at"),
-    "module": Range(0.05, 100.0, "mm", "ISO 54 lists 1 to 50 mm, fine mechanics goes down to 0.1 mm"),
+    "torque": Usual(0.0, np.inf, "N m", "the design torque lies outside the range of torques that is looked at"),
+    "module": Usual(0.05, 100.0, "mm", "ISO 54 lists 1 to 50 mm, fine mechanics goes down to 0.1 mm"),
     "elastic modulus": _of_field(Material, "elastic_modulus"),
-    "density": Range(500.0, 25_000.0, "kg/m^3", "steel 7850 kg/m^3: is it in g/cm^3?"),
-    "bore to root diameter": Range(0.1, 0.95, "", "a ring held at its bore, outside of the usual proportions"),
-    "face width in modules, plane stress": Range(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
-    "face width in modules": Range(2.0, 48.0, "", "as compared with finite elements; narrower contacts are softer"),
-    "overhang in modules, one slice": Range(0.0, 1.0, "", "load gathers beside it, which takes Resolution(slices=9)"),
-    "tip edge radius in modules": Range(0.0, 0.2, "", "an edge is broken by 0.01 to 0.1 modules"),
-    "least backlash": Range(-0.1, np.inf, "um", "the thickest teeth that the tolerances allow jam"),
-    "coefficient of friction": Range(0.0, 0.5, "", "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"),
-    "coefficient of friction of the oil": Range(
+    "density": Usual(500.0, 25_000.0, "kg/m^3", "steel 7850 kg/m^3: is it in g/cm^3?"),
+    "bore to root diameter": Usual(0.1, 0.95, "", "a ring held at its bore, outside of the usual proportions"),
+    "face width in modules, plane stress": Usual(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
+    "face width in modules": Usual(2.0, 48.0, "", "as compared with finite elements; narrower contacts are softer"),
+    "overhang in modules, one slice": Usual(0.0, 1.0, "", "load gathers beside it, which takes Resolution(slices=9)"),
+    "tip edge radius in modules": Usual(0.0, 0.2, "", "an edge is broken by 0.01 to 0.1 modules"),
+    "least backlash": Usual(-0.1, np.inf, "um", "the thickest teeth that the tolerances allow jam"),
+    "coefficient of friction": Usual(0.0, 0.5, "", "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"),
+    "coefficient of friction of the oil": Usual(
         0.01, 0.2, "", "lubricated gears 0.03 to 0.12: the law is not made for it"
     ),
-    "bulk temperature": Range(
+    "bulk temperature": Usual(
         -np.inf, 180.0, "degC", "case-hardened steel softens there, and mineral oil ages above 120"
     ),
-    "temperature of the oil": Range(
+    "temperature of the oil": Usual(
         -30.0, np.inf, "degC", "mineral gear oils stop flowing at -10 to -30 degC, synthetic ones at -30 to -60"
     ),
-    "cooling factor": Range(0.2, 1.2, "", "ISO/TS 6336-20: X_S is 0.2 for submerged teeth, 1 for dip, 1.2 for spray"),
-    "contact ratio": Range(1.0, 2.0, "", "stresses and safeties of ISO 6336-2 and -3 are made for 1 to 2"),
-    "pitch line velocity": Range(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
-    "amount of the modification": Range(0.0, np.inf, "um", "negative: material is added; positive removes it"),
+    "cooling factor": Usual(0.2, 1.2, "", "ISO/TS 6336-20: X_S is 0.2 for submerged teeth, 1 for dip, 1.2 for spray"),
+    "contact ratio": Usual(1.0, 2.0, "", "stresses and safeties of ISO 6336-2 and -3 are made for 1 to 2"),
+    "pitch line velocity": Usual(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
+    "amount of the modification": Usual(0.0, np.inf, "um", "negative: material is added; positive removes it"),
     "depth of the modification": _of_field(TipRelief, "amount"),
-    "depth of the modification in modules": Range(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
-    "length of the modification": Range(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
-    "length of the end relief": Range(0.0, np.inf, "mm", "less than the gear is wider than its mate: it has no effect"),
-    "slices over the end relief": Range(2.0, np.inf, "", "the load peaks beside it: jaxgear.contact.end_relief_widths"),
-    "mean transmission error in modules": Range(0.0, 0.02, "", "the teeth bend beyond what the model is made for"),
-    "PPTE": Range(0.1, np.inf, "um", "finer than the model can claim of modified flanks"),
-    "PPTE by finite elements": Range(0.03, np.inf, "um", "finer than a model in two dimensions can claim"),
-    "flank pressure": Range(0.0, 1650.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
-    "corner pressure": Range(
+    "depth of the modification in modules": Usual(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
+    "length of the modification": Usual(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
+    "length of the end relief": Usual(0.0, np.inf, "mm", "less than the gear is wider than its mate: it has no effect"),
+    "slices over the end relief": Usual(2.0, np.inf, "", "the load peaks beside it: jaxgear.contact.end_relief_widths"),
+    "mean transmission error in modules": Usual(0.0, 0.02, "", "the teeth bend beyond what the model is made for"),
+    "PPTE": Usual(0.1, np.inf, "um", "finer than the model can claim of modified flanks"),
+    "PPTE by finite elements": Usual(0.03, np.inf, "um", "finer than a model in two dimensions can claim"),
+    "flank pressure": Usual(0.0, 1650.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
+    "corner pressure": Usual(
         0.0, 1650.0, "MPa", "tip edges dig into the mates, which no flank endures: relieve the tips"
     ),
-    "root stress": Range(0.0, 1050.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
-    "effective contact ratio": Range(1.0, np.inf, "", "the teeth lose contact, and shocks follow"),
+    "root stress": Usual(0.0, 1050.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
+    "effective contact ratio": Usual(1.0, np.inf, "", "the teeth lose contact, and shocks follow"),
 }
 
 _RELIEFS = TipRelief, RootRelief, EndRelief
 
 
 class Finding(NamedTuple):
-    """A number that is not usual.
+    """A number, and what is usual of it.
 
     Attributes:
-        name: key of `LIMITS`.
-        where: "pinion", "wheel", or "" for the pair.
-        value: the number, in the unit of the limit.
-        limit: what is usual.
+        key: what number it is, of `LIMITS` or the like.
+        where: "pinion", "wheel", or another part; "" for the pair.
+        value: the number, in the unit of the usual range.
+        usual: range; a number out of it is a finding to be told.
+        severity: how it is told.
     """
 
-    name: str
+    key: str
     where: str
     value: float
-    limit: Range
+    usual: Usual
+    severity: Literal["warning"] = "warning"
+
+    @property
+    def is_unusual(self) -> bool:
+        """Whether the number is out of its usual range."""
+        return not self.usual.holds(self.value)
+
+    @property
+    def number(self) -> str:
+        """The value with its unit."""
+        return self.usual.text(self.value)
 
     def __str__(self) -> str:
-        low, high, unit, remark = self.limit
-        bound = f"less than {low:.4g} {unit}" if self.value < low else f"more than {high:.4g} {unit}"
-        number = f"{self.name} {self.value:.4g} {unit}"
-        return f"{f'{self.where}, ' if self.where else ''}{number.rstrip()} is {bound.rstrip()} ({remark})"
+        return (
+            f"{f'{self.where}, ' if self.where else ''}{self.key} {self.number} is {self.usual.missed_by(self.value)}"
+        )
+
+
+def of_limits(
+    limits: Mapping[str, Usual], key: str, where: str, value, *, low: float | None = None, high: float | None = None
+) -> Finding:
+    """The finding about a number, whose usual range may be known better than the table has it."""
+    usual = limits[key]
+    usual = usual._replace(low=usual.low if low is None else low, high=usual.high if high is None else high)
+    return Finding(key, where, float(value), usual)
+
+
+def unusual(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Those whose number is out of its usual range."""
+    return tuple(finding for finding in findings if finding.is_unusual)
 
 
 def findings_of(
@@ -176,10 +186,10 @@ def findings_of(
     if torque_range is not None:
         low, high = torque_range
         numbers.append(_finding("torque", "", cycle.torque, low=low, high=high))
-    found = [finding for finding in numbers if not finding.limit.low <= finding.value <= finding.limit.high]
+    found = unusual(numbers)
     if not all(isinstance(flank, NoModification) for flank in flanks):
         found += finding_of_claim(float(np.ptp(np.asarray(cycle.transmission_error))), compliance, verified)
-    return tuple(found)
+    return found
 
 
 def finding_of_claim(
@@ -194,16 +204,12 @@ def finding_of_claim(
     """
     finding = _finding("PPTE by finite elements" if isinstance(compliance, TabulatedCompliance) else "PPTE", "", ppte)
     if verified is not None:
-        remark = f"{finding.limit.remark}; with finite-element structure: {verified:.3g} um"
-        finding = finding._replace(limit=finding.limit._replace(remark=remark))
-    return () if finding.value >= finding.limit.low else (finding,)
+        remark = f"{finding.usual.remark}; with finite-element structure: {verified:.3g} um"
+        finding = finding._replace(usual=finding.usual._replace(remark=remark))
+    return unusual([finding])
 
 
-def _finding(name: str, where: str, value, *, low: float | None = None, high: float | None = None) -> Finding:
-    """A finding if the value is outside the usual range, which may be known better than the table has it."""
-    usual = LIMITS[name]
-    limit = usual._replace(low=usual.low if low is None else low, high=usual.high if high is None else high)
-    return Finding(name, where, float(value), limit)
+_finding = partial(of_limits, LIMITS)
 
 
 @program

@@ -8,6 +8,8 @@ References:
     ISO 6336-6 (load spectra); ISO 6336-2 and -3 for the nominal stresses.
 """
 
+from typing import Any, Literal
+
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -19,6 +21,7 @@ from .quantity import AbstractSettings
 from .stress import nominal_contact_stress, nominal_root_stress, root_stress
 
 Real = Float[Array, "..."]
+Mode = Literal["pitting", "bending"]
 Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
 
@@ -27,7 +30,7 @@ LARGEST_SAFETY = 1000.0
 
 
 class Strength(AbstractSettings):
-    """Permissible stresses of both gears; factors of life, surface and size are included.
+    """Permissible stresses and S-N curves of both gears; factors of life, surface and size are included.
 
     `quantity` gives with them the safety factors and damages, `metrics.STRENGTH_QUANTITIES`, each where its strength is
     given.
@@ -40,10 +43,13 @@ class Strength(AbstractSettings):
             none of its own: sigma_FG of ISO 6336-3.
         wheel_bending: the same of the wheel; None for that of the pinion.
         pressure: permissible pressure of the contact analysis, tip edges included.
-        pitting_exponent: p of the Woehler line N = `pitting_cycles` (pitting / stress)^p of both gears, for damage.
-        pitting_cycles: that `pitting` is borne for.
-        bending_exponent: of the Woehler line of the tooth roots, likewise.
-        bending_cycles: that `bending` is borne for.
+        pitting_exponent: p of the S-N curve N = `pitting_cycles` (pitting / stress)^p of the pinion, and of the wheel
+            where it has none of its own, for damage; without an end below.
+        pitting_cycles: load cycles for which `pitting` is permissible, likewise.
+        bending_exponent: of the S-N curve of the tooth roots, likewise.
+        bending_cycles: load cycles for which `bending` is permissible, likewise.
+        wheel_pitting_exponent, wheel_pitting_cycles: those of the wheel; None for those of the pinion.
+        wheel_bending_exponent, wheel_bending_cycles: those of the wheel; None for those of the pinion.
     """
 
     table = "strength"
@@ -56,11 +62,16 @@ class Strength(AbstractSettings):
     pitting_cycles: Scalar | None = number("", low=0.0, open_low=True, optional=True, default=None)
     bending_exponent: Scalar | None = number("", low=1.0, high=100.0, optional=True, default=None)
     bending_cycles: Scalar | None = number("", low=0.0, open_low=True, optional=True, default=None)
+    wheel_pitting_exponent: Scalar | None = number("", low=1.0, high=100.0, optional=True, default=None)
+    wheel_pitting_cycles: Scalar | None = number("", low=0.0, open_low=True, optional=True, default=None)
+    wheel_bending_exponent: Scalar | None = number("", low=1.0, high=100.0, optional=True, default=None)
+    wheel_bending_cycles: Scalar | None = number("", low=0.0, open_low=True, optional=True, default=None)
 
     def check_together(self) -> None:
         for name in ("pitting", "bending"):
             exponent, cycles = f"{name}_exponent", f"{name}_cycles"
-            pairs = (f"wheel_{name}", name), (exponent, name), (exponent, cycles), (cycles, exponent)
+            pairs = [(exponent, name), (exponent, cycles), (cycles, exponent)]
+            pairs += [(f"wheel_{each}", each) for each in (name, exponent, cycles)]
             for given, needed in pairs:
                 if getattr(self, given) is not None and getattr(self, needed) is None:
                     raise ValueError(f"Strength: {needed} must be given where {given} is")
@@ -71,20 +82,21 @@ def safety_factor(borne: Real, reached: Real) -> Real:
     return borne / jnp.maximum(reached, borne / LARGEST_SAFETY)
 
 
+def _safety(owner: str, strength: Strength, name: Mode, stress: Any) -> tuple[Real, Real]:
+    pinion, wheel = strengths_of(owner, strength, name)
+    return safety_factor(pinion, stress.pinion), safety_factor(wheel, stress.wheel)
+
+
 @over_batch
 def pitting_safety(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
     """S_H of pinion and wheel: pitting strength over the nominal contact stress."""
-    stress = nominal_contact_stress(cycle)
-    limits = strengths_of("pitting_safety", strength, "pitting")
-    return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
+    return _safety("pitting_safety", strength, "pitting", nominal_contact_stress(cycle))
 
 
 @over_batch
 def root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
     """S_F of pinion and wheel after ISO 6336-3: bending strength over the nominal root stress."""
-    stress = nominal_root_stress(cycle)
-    limits = strengths_of("root_safety", strength, "bending")
-    return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
+    return _safety("root_safety", strength, "bending", nominal_root_stress(cycle))
 
 
 @over_batch
@@ -93,9 +105,7 @@ def local_root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Load, Load]
 
     Larger than the standard's S_F where a pair that touches early or late shares the load.
     """
-    stress = root_stress(cycle)
-    limits = strengths_of("local_root_safety", strength, "bending")
-    return safety_factor(limits[0], stress.pinion), safety_factor(limits[1], stress.wheel)
+    return _safety("local_root_safety", strength, "bending", root_stress(cycle))
 
 
 @over_batch
@@ -155,10 +165,9 @@ def pitting_damage(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar
     """Damage of pinion and wheel by the nominal contact stress, per million revolutions of the pinion.
 
     Raises:
-        ValueError: for a strength without `pitting` or without its Woehler line.
+        ValueError: for a strength without `pitting` or without its S-N curve.
     """
-    stress = nominal_contact_stress(cycle)
-    return _damage(cycle, "pitting", strength, stress.pinion, stress.wheel)
+    return _damage(cycle, "pitting", strength, nominal_contact_stress(cycle))
 
 
 @over_batch
@@ -166,18 +175,30 @@ def root_damage(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
     """Damage of the tooth roots of pinion and wheel by the nominal root stress, per million revolutions of the pinion.
 
     Raises:
-        ValueError: for a strength without `bending` or without its Woehler line.
+        ValueError: for a strength without `bending` or without its S-N curve.
     """
-    stress = nominal_root_stress(cycle)
-    return _damage(cycle, "bending", strength, stress.pinion, stress.wheel)
+    return _damage(cycle, "bending", strength, nominal_root_stress(cycle))
 
 
-def _damage(cycle: MeshCycle, name: str, strength: Strength, pinion, wheel):
-    """Of both gears by their stresses."""
-    owner = f"{name} damage"
-    exponent, cycles = (given_strength(owner, strength, f"{name}_{part}") for part in ("exponent", "cycles"))
-    limits = strengths_of(owner, strength, name)
-    of_pinion, of_wheel = (
-        REVOLUTIONS / cycles * (stress / limit) ** exponent for stress, limit in zip((pinion, wheel), limits)
+def _damage(cycle: MeshCycle, name: Mode, strength: Strength, stress: Any) -> tuple[Scalar, Scalar]:
+    pinion, wheel = damage_per_cycle(f"{name} damage", strength, name, (stress.pinion, stress.wheel))
+    return REVOLUTIONS * pinion, REVOLUTIONS * wheel / cycle.kinematics.pair.gear_ratio
+
+
+def damage_per_cycle(owner: str, strength: Strength, name: Mode, stresses: tuple[Real, Real]) -> tuple[Real, Real]:
+    """Damage of pinion and wheel by one load cycle of each, 1 / N of their S-N curves.
+
+    Args:
+        owner: who asks, for messages.
+        strength: with the S-N curve.
+        name: "pitting" or "bending".
+        stresses: nominal stress of pinion and wheel [MPa].
+
+    Raises:
+        ValueError: for a strength without that S-N curve.
+    """
+    curves = zip(*(strengths_of(owner, strength, each) for each in (name, f"{name}_exponent", f"{name}_cycles")))
+    pinion, wheel = (
+        (stress / limit) ** exponent / cycles for stress, (limit, exponent, cycles) in zip(stresses, curves)
     )
-    return of_pinion, of_wheel / cycle.kinematics.pair.gear_ratio
+    return pinion, wheel

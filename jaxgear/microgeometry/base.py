@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ..numerics import Checked, Given, Usual, concrete, number, real, result
 
-AMOUNTS = Usual(0.1, np.inf, "less than flanks can be measured to: is it in mm?")  # um, of every modification
+AMOUNTS = Usual(0.1, np.inf, "um", "less than flanks can be measured to: is it in mm?")  # of every modification
 # mm, of reliefs along profile and face: ISO 1328-1 ends at modules of 70 mm, whose active profile is some 350 mm long,
 # and at face widths of 1200 mm
 LONGEST = 1000.0

@@ -104,7 +104,7 @@ def solve_contact(problem: ContactProblem, *, steps: int, tolerance: float | Non
         opening=jnp.stack(opening(problem, load, approach)),
         in_contact=jnp.stack(active_of(problem, v)),
         residual=residual,
-        solved=residual < tolerance,
+        converged=residual < tolerance,
     )
 
 

@@ -87,7 +87,7 @@ class ContactSolution(eqx.Module):
             remaining gap where it is positive, minus the contact deflection h(q) where the spring is loaded.
         in_contact: which springs carry load, shape (pairs, slices, positions).
         residual: largest violation of any condition, relative to the approach and to the load, shape (positions,).
-        solved: whether the residual is as small as it has to be, shape (positions,).
+        converged: whether the residual is as small as it has to be, shape (positions,).
     """
 
     line_load: Float[Array, "pairs slices positions"]
@@ -96,7 +96,7 @@ class ContactSolution(eqx.Module):
     opening: Float[Array, "pairs slices positions"]
     in_contact: Bool[Array, "pairs slices positions"]
     residual: Float[Array, " positions"]
-    solved: Bool[Array, " positions"]
+    converged: Bool[Array, " positions"]
 
 
 def active_of(problem: ContactProblem, v: Rows) -> list[Bool[Array, "slices positions"]]:

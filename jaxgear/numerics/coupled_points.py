@@ -33,14 +33,14 @@ class Pressed(eqx.Module):
         approach: d.
         opening: y, shape (points,).
         in_contact: shape (points,).
-        solved: whether all conditions hold.
+        converged: whether all conditions hold.
     """
 
     force: Vector
     approach: Float[Array, ""]
     opening: Vector
     in_contact: Bool[Array, " points"]
-    solved: Bool[Array, ""]
+    converged: Bool[Array, ""]
 
 
 def press(compliance: Float[Array, "points points"], gap: Vector, load: Float[Array, ""]) -> Pressed:

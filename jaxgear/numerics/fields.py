@@ -27,16 +27,31 @@ _asked: set[tuple[str, str]] = set()  # classes and fields that were warned of: 
 
 
 class Usual(NamedTuple):
-    """What is usual of the size of a number; zero always is.
+    """The usual range of a number, or of its size where it belongs to a field: then zero is usual too.
 
     Attributes:
-        low, high: of the size, in the unit of the number.
-        remark: what is likely meant by another one.
+        low, high: the range.
+        unit: of both; that of the field where it belongs to one.
+        remark: what is likely meant by another number, or what such a number means; with its source.
     """
 
     low: float
     high: float
+    unit: str
     remark: str
+
+    def holds(self, value: float) -> bool:
+        """Whether a number is in the range; NaN is not."""
+        return self.low <= value <= self.high
+
+    def missed_by(self, value: float) -> str:
+        """In which way a number is out of the range, and what it may mean."""
+        low = value < self.low
+        return f"{'less' if low else 'more'} than {self.text(self.low if low else self.high)} ({self.remark})"
+
+    def text(self, value: float) -> str:
+        """A number to four digits with the unit."""
+        return f"{float(f'{value:.4g}'):g} {self.unit}".rstrip()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -254,14 +269,14 @@ def _check_number(owner: str, name: str, value, kind: Number) -> None:
         limits = f"{float(known[1]):g}{unit} must be at least the lower one, {float(known[0]):g}{unit}"
         raise ValueError(f"{owner}: {name}: upper limit {limits}")
     if kind.usual is not None:
-        _ask(owner, name, value, kind.unit, kind.usual)
+        _ask(owner, name, value, kind.usual)
     known = concrete(value) if kind.whole else None
     if known is not None and (known != known.round()).any():
         shown = float(known[known != known.round()].flat[0])
         raise ValueError(f"{owner}: {name} = {shown:g} must be a whole number")
 
 
-def _ask(owner: str, name: str, value, unit: str, usual: Usual) -> None:
+def _ask(owner: str, name: str, value, usual: Usual) -> None:
     known = concrete(value)
     if known is None or (owner, name) in _asked:
         return
@@ -270,8 +285,7 @@ def _ask(owner: str, name: str, value, unit: str, usual: Usual) -> None:
     if unusual.any():
         _asked.add((owner, name))
         shown = float(known[unusual].flat[0] if known.ndim else known)
-        bound = f"less than {usual.low:g}" if abs(shown) < usual.low else f"more than {usual.high:g}"
-        _LOG.warning("%s: %s = %g %s is %s %s (%s)", owner, name, shown, unit, bound, unit, usual.remark)
+        _LOG.warning("%s: %s = %g %s is %s", owner, name, shown, usual.unit, usual.missed_by(abs(shown)))
 
 
 def _check_shape(owner: str, name: str, shape: tuple[int, ...], kind: Number) -> None:

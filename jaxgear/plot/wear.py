@@ -10,7 +10,7 @@ from ..contact import MeshCycle
 from ..geometry import roll_angle
 from ..metrics import Quantity
 from ..vocabulary import quantity_of
-from ..wear import WearLife, over_life, wear_depth
+from ..wear import WearHistory, over_life, wear_depth
 from .figure import legend_above, line_style, marker_style, report_axes, styled
 from .variants import meaning_label
 
@@ -18,7 +18,7 @@ _GEARS = "pinion", "wheel"
 _SHOWN = 4  # lives
 
 
-def worn_flank(life: WearLife, gear: Literal["pinion", "wheel"], ax: Axes | None = None, *, title: str = "") -> Axes:
+def worn_flank(life: WearHistory, gear: Literal["pinion", "wheel"], ax: Axes | None = None, *, title: str = "") -> Axes:
     """Wear depth [um] of one gear over its roll angle [deg] at several lives, in the line that is worn deepest.
 
     Material removed goes down, as in the K-chart.
@@ -51,7 +51,9 @@ def worn_flank(life: WearLife, gear: Literal["pinion", "wheel"], ax: Axes | None
 
 
 def lives(
-    of: Mapping[str, WearLife], quantity: str | Quantity | Callable[[MeshCycle], Any] = "ppte", ax: Axes | None = None
+    of: Mapping[str, WearHistory],
+    quantity: str | Quantity | Callable[[MeshCycle], Any] = "ppte",
+    ax: Axes | None = None,
 ) -> Axes:
     """A quantity of several designs over the revolutions of the pinion.
 

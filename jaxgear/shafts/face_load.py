@@ -13,6 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..compliance.iso_6336 import iso_stiffness
+from ..contact.status import Status, Statuses, WithStatus, status_of
 from ..contact.support import AbstractSupport
 from ..geometry import Gear, GearPair, path_of_contact
 from ..microgeometry import AbstractModification, Flank, NoModification
@@ -29,7 +30,7 @@ _WIDEST_TOOTH = 1 / 3  # largest h/b of ISO 6336-1 clause 7
 _LEVEL = 1 - 1e-5  # factor of an even load, less rounding
 
 
-class FaceLoad(Checked):
+class FaceLoad(WithStatus, Checked):
     """Load over the face by the one-dimensional analysis; NaN where it has not been found.
 
     Attributes:
@@ -39,7 +40,7 @@ class FaceLoad(Checked):
         deformation: by which shafts, bearings and housing open the gap under the line load.
         approach: of the flanks along the line of action.
         in_contact: stations that carry load.
-        converged: whether all contact conditions hold, such a support can be, and its gears can run.
+        status: `converged` where all contact conditions hold, such a support is possible, and its gears can run.
     """
 
     face_coordinate: Slices = result("mm")
@@ -48,7 +49,7 @@ class FaceLoad(Checked):
     deformation: Slices = result("um")
     approach: Scalar = result("um")
     in_contact: Bool[Array, " slices"] = eqx.field()
-    converged: Bool[Array, ""] = eqx.field()
+    status: Statuses = result()
 
     @property
     def face_load_factor(self) -> Scalar:
@@ -179,10 +180,11 @@ def _annex_e(
     gap = support.gap(y) + sum(item(flank) for item, flank in zip((pinion, wheel), pitch_lines(pair, y)))
     gap = jnp.broadcast_to(gap, y.shape)
     found = press(influence + jnp.eye(stations) / (stiffness * step), gap, 1e3 * moment / pair.pinion.base_radius)
-    converged = found.solved & support.valid & (stiffness > 0)
+    causes = {Status.NOT_CONVERGED: ~found.converged, Status.OUT_OF_VALIDITY: ~(stiffness > 0)}
+    status = status_of(causes, support.status)
 
     def where_found(value: Array) -> Array:
-        return jnp.where(converged, value, jnp.nan)
+        return jnp.where(status == Status.CONVERGED, value, jnp.nan)
 
     # a load that has not been found must not pass for an even one, nor for none
     return FaceLoad(
@@ -192,7 +194,7 @@ def _annex_e(
         deformation=where_found(influence @ found.force),
         approach=where_found(found.approach),
         in_contact=found.in_contact,
-        converged=converged,
+        status=status,
     )
 
 

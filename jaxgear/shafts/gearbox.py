@@ -8,8 +8,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
+from ..contact.status import Status, Statuses, status_of
 from ..geometry import GearPair, margins
 from ..numerics import Checked, concrete, number, program, within_limits
 from .beam import semidefinite
@@ -142,14 +143,13 @@ class Gearbox(Checked):
                 raise ValueError(f'Gearbox: the housing has no seat for bearing "{name}"')
 
     @property
-    def valid(self) -> Bool[Array, ""]:
-        """Whether such a gearbox can be, as far as numbers tell: every one in its range, shafts held, nothing beyond
-        their ends, the housing definite, gears that can run with each other, pinions that drive.
+    def status(self) -> Statuses:
+        """Whether such a gearbox is possible, as far as numbers tell: every one in its range, shafts held, nothing
+        beyond their ends, the housing definite, pinions that drive; and whether all its gears can run.
 
-        Concrete gearboxes that cannot be are refused; traced ones are flagged, and the load over the face of one that
-        cannot be is not found.
+        A concrete gearbox that is not possible is refused; of a traced one the load over the face has this status.
         """
-        return _valid(self)
+        return _status(self)
 
     @property
     def bearing_names(self) -> tuple[str, ...]:
@@ -211,14 +211,16 @@ def _torques(gearbox: Gearbox) -> Float[Array, " meshes"]:
 
 
 @program
-def _valid(gearbox: Gearbox) -> Bool[Array, ""]:
+def _status(gearbox: Gearbox) -> Statuses:
     bearings = jnp.stack([bearing.matrix for shaft in gearbox.shafts for bearing in shaft.bearings])
     each = [within_limits(gearbox), jnp.all(jax.vmap(semidefinite)(bearings))]
     each += [shaft.valid for shaft in gearbox.shafts]
-    each += [margins(gearbox.pair(index)).valid for index in range(len(gearbox.meshes))]
     if gearbox.housing is not None:
         each.append(gearbox.housing.valid)
-    return jnp.all(jnp.stack(each)) & jnp.all(gearbox.pinion_torques() >= 0)
+    possible = jnp.all(jnp.stack(each)) & jnp.all(gearbox.pinion_torques() >= 0)
+    run = [margins(gearbox.pair(index)).valid for index in range(len(gearbox.meshes))]
+    gears = {Status.GEARS_CANNOT_RUN: ~jnp.all(jnp.stack(run))} if run else {}
+    return status_of({Status.SUPPORT_NOT_POSSIBLE: ~possible} | gears)
 
 
 def _check_single(kind: str, names: list[str]) -> None:

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..contact.status import Status, Statuses, status_of
 from ..contact.support import AbstractSupport
 from ..geometry import GearPair, margins
 from ..numerics import Given, concrete, number, program, real, whole, within_limits
@@ -16,6 +17,10 @@ from .operating_point import system_under_load
 
 Slices = Float[Array, " slices"]
 Scalar = Float[Array, ""]
+
+
+def _status(gears: GearPair, possible: Bool[Array, ""]) -> Statuses:
+    return status_of({Status.SUPPORT_NOT_POSSIBLE: ~possible, Status.GEARS_CANNOT_RUN: ~margins(gears).valid})
 
 
 class RigidSupport(AbstractSupport):
@@ -35,9 +40,9 @@ class RigidSupport(AbstractSupport):
         return self.gears
 
     @property
-    def valid(self) -> Bool[Array, ""]:
+    def status(self) -> Statuses:
         """Whether all numbers are in their ranges and the gears can run."""
-        return within_limits(self) & margins(self.gears).valid
+        return _status(self.gears, within_limits(self))
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
         """Zero."""
@@ -97,9 +102,9 @@ class TabulatedSupport(AbstractSupport):
         return self.matrix
 
     @property
-    def valid(self) -> Bool[Array, ""]:
+    def status(self) -> Statuses:
         """Whether all numbers are in their ranges, the gears can run, and no eigenvalue of the matrix is negative."""
-        return within_limits(self) & margins(self.gears).valid & semidefinite(symmetric(self.matrix))
+        return _status(self.gears, within_limits(self) & semidefinite(symmetric(self.matrix)))
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
         """`matrix`, its symmetric part.
@@ -149,9 +154,9 @@ class ShaftSupport(AbstractSupport):
         return self.gearbox.pinion_torques()[self.mesh]
 
     @property
-    def valid(self) -> Bool[Array, ""]:
-        """Whether such a gearbox can be."""
-        return self.gearbox.valid
+    def status(self) -> Statuses:
+        """That of the gearbox."""
+        return self.gearbox.status
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
         """Bending, shear, torsion, bearings and housing of both shafts, and of all others through the housing.

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..contact.status import Status
 from ..numerics import Checked, Numbers, check, concrete, program, real, result
 from .beam import DIRECTIONS, twist
 from .gearbox import Gearbox
@@ -96,10 +97,9 @@ def elastic_line(gearbox: Gearbox, shaft: str, position: Numbers) -> ElasticLine
 @program
 def _reactions(gearbox: Gearbox) -> BearingReactions:
     found = solve(system_under_load(gearbox, load_pattern(gearbox)), jnp.ones((1, 1)), actual=True)
-    valid = gearbox.valid
-    force, shaft, seat = (
-        jnp.where(valid, item[:, 0].reshape(-1, _WAYS), jnp.nan) for item in (-found.force, found.bearing, found.seat)
-    )
+    possible = gearbox.status == Status.CONVERGED
+    each = -found.force, found.bearing, found.seat
+    force, shaft, seat = (jnp.where(possible, item[:, 0].reshape(-1, _WAYS), jnp.nan) for item in each)
     return BearingReactions(gearbox.bearing_names, force, shaft, seat)
 
 
@@ -116,5 +116,6 @@ def _line(gearbox: Gearbox, shaft: int, position: Float[Array, " points"]) -> El
     # of two torques that turn a shaft against each other, the one on the left holds
     turned = twist(gearbox.shafts[shaft].beam, jnp.minimum(position[:, None], at[None, :])) @ torque
     # no answer of a traced shaft that cannot be
-    bent, turned = (jnp.where(gearbox.valid, each, jnp.nan) for each in (found.reshape(count, _WAYS), turned))
+    possible = gearbox.status == Status.CONVERGED
+    bent, turned = (jnp.where(possible, each, jnp.nan) for each in (found.reshape(count, _WAYS), turned))
     return ElasticLine(position, bent, turned)

@@ -124,7 +124,7 @@ def _numbers(task: _Task, data, values):
     flat = []
     for of, of_cases in zip(task.results, numbers.T):
         flat += _joined(of_cases, variant.cases, measures, of.better)
-    return flat, jnp.all(fine) & variant.possible
+    return flat, jnp.all(fine) & (variant.status == 0)
 
 
 def _joined(values, cases, measures, better):

@@ -1,8 +1,7 @@
-"""Wear: the flank as a state over its life."""
+"""Wear: the flank as a state, block by block of revolutions."""
 
-from .life import WearLife as WearLife
-from .life import wear as wear
-from .life import wear_in_steps as wear_in_steps
+from .history import WearHistory as WearHistory
+from .history import wear as wear
 from .march import March as March
 from .over_life import life_to as life_to
 from .over_life import life_to_depth as life_to_depth

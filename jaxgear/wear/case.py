@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..conditions import LoadSpectrum, solved
+from ..conditions.variant import cycle_status
 from ..contact import Mesh, MeshCycle, OperatingPoint, RemovedMaterial, removed_material, solve_removed
 from ..contact.cycle import FLATTEST, flank_pressure
 from ..contact.face_coupling import check_torque
@@ -18,6 +19,7 @@ from ..contact.operating_point import operating_point_of
 from ..contact.prescribed import solve_forces
 from ..contact.slide import slid_material
 from ..contact.solve import check_mesh, flanks_of
+from ..contact.status import Status, Statuses, status_of
 from ..dynamics import Dynamics
 from ..dynamics.steady import SteadyForce
 from ..geometry import GearPair
@@ -156,7 +158,7 @@ _FOUND = (
     "bend",
     "tangent_stiffness",
     "residual",
-    "converged",
+    "status",
 )
 
 
@@ -219,38 +221,40 @@ class Case(eqx.Module):
         removed = removed_material(self.mesh, load, **flanks) + self.deviation
         cycle = solve_removed(self.mesh, load, removed, **flanks)
         found = {name: getattr(cycle, name) for name in _FOUND}
-        rate, usable = self._rate(cycle, place)
+        rate, status = self._rate(cycle, place)
         if self.vibration is not None:
             motion = self.vibration.force(flanks, load, self.mesh.phase)
-            found[_DYNAMIC_FACTOR] = jnp.where(motion.found, motion.dynamic_factor, jnp.nan)
+            found[_DYNAMIC_FACTOR] = jnp.where(motion.status == Status.CONVERGED, motion.dynamic_factor, jnp.nan)
             if self.vibration.wears:
-                rate, usable = self._dynamic_rate(cycle, motion, removed, place)
-        return Analysis(rate, found, usable & solved(cycle))
+                rate, status = self._dynamic_rate(cycle, motion, removed, place)
+        return Analysis(rate, found, jnp.maximum(status, cycle_status(cycle)))
 
     def _worn(self, roll_length, depth: Depth) -> Flanks:
-        """Both flanks with what is worn off them, as the contact analyses of a life look it up."""
+        """Both flanks with what is worn off them, as the contact analyses look it up."""
         total = jnp.sum(depth, axis=1)
         pinion, wheel = (WornFlank(lengths, amount) for lengths, amount in zip(roll_length, total))
         return {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
 
-    def _rate(self, cycle: MeshCycle, place: Deposit) -> tuple[Depth, Bool[Array, ""]]:
-        """What one passage wears off, and whether the coefficient is one."""
+    def _rate(self, cycle: MeshCycle, place: Deposit) -> tuple[Depth, Statuses]:
+        """What one passage wears off, and whether the coefficient is valid."""
         coefficient = self.law(cycle)
         # a function may give anything: no flank is known that NaN or a negative coefficient has worn
-        return worn(cycle.line_load, coefficient, place), jnp.all(coefficient >= 0)
+        valid = jnp.all(coefficient >= 0)
+        return worn(cycle.line_load, coefficient, place), status_of({Status.OUT_OF_VALIDITY: ~valid})
 
     def _dynamic_rate(
         self, cycle: MeshCycle, motion: SteadyForce, removed: RemovedMaterial, place: Deposit
-    ) -> tuple[Depth, Bool[Array, ""]]:
+    ) -> tuple[Depth, Statuses]:
         """`_rate` under the forces of a motion, the mean of its mesh cycles: each tooth takes part in all of them."""
 
         def of_cycle(force):
             contact = solve_forces(self.mesh, jnp.maximum(force, 0.0), removed)
-            rate, usable = self._rate(replace(cycle, line_load=contact.line_load), place)
-            return rate, usable & jnp.all(contact.converged)
+            rate, status = self._rate(replace(cycle, line_load=contact.line_load), place)
+            return rate, jnp.maximum(status, jnp.max(contact.status))
 
-        rates, usable = jax.lax.map(of_cycle, motion.force)
-        return jnp.mean(rates, axis=0), jnp.all(usable) & motion.found & ~motion.back_side_contact
+        rates, statuses = jax.lax.map(of_cycle, motion.force)
+        status = status_of({Status.OUT_OF_VALIDITY: motion.back_side_contact}, jnp.max(statuses), motion.status)
+        return jnp.mean(rates, axis=0), status
 
     def flanks(self, roll_length, depth: Depth) -> dict[str, AbstractModification]:
         """Both flanks with what is worn off them."""
@@ -258,25 +262,25 @@ class Case(eqx.Module):
         return {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
 
     def cycles(self, roll_length, marched: March) -> MeshCycle:
-        """The mesh on all flanks of a march, leading axis (lives,); (lives, torques) under a load spectrum."""
+        """The mesh on all flanks of a march, leading axis (steps,); (steps, torques) under a load spectrum."""
 
         def under(flanks, load: OperatingPoint, found) -> MeshCycle:
             return MeshCycle(
                 kinematics=self.mesh.kinematics, margins=self.mesh.margins, operating_point=load, **flanks, **found
             )
 
-        def on(depth, found, known) -> MeshCycle:
+        def on(depth, found, status) -> MeshCycle:
             found = {name: found[name] for name in _FOUND}
-            # flanks that a contact has worn which was not found are not those of the life
-            found = found | {"converged": found["converged"] & known}
+            # flanks that a contact has worn which was not found are not those of the history
+            found = found | {"status": jnp.maximum(found["status"], status)}
             flanks = self.flanks(roll_length, depth)
             return jax.vmap(lambda load, of: under(flanks, load, of))(self.loads, found)
 
-        cycles = jax.vmap(on)(marched.depth, marched.seen, marched.known)
+        cycles = jax.vmap(on)(marched.depth, marched.seen, marched.status)
         return jax.tree.map(lambda leaf: leaf[:, 0], cycles) if self.weights is None else cycles
 
-    def pressure_errors(self, roll_length, marched: March, cycles: MeshCycle) -> Float[Array, "lives *torques"]:
-        """Estimated error of the largest flank pressure at all lives of a march, as its `cycles` [MPa].
+    def pressure_errors(self, roll_length, marched: March, cycles: MeshCycle) -> Float[Array, "steps *torques"]:
+        """Estimated error of the largest flank pressure at all time steps of a march, as its `cycles` [MPa].
 
         By how much it changes where the worn flanks are known on every other point only, and where the contacts are as
         wide as their own loads and curvatures make them instead of as one pair that carries the full load.
@@ -302,11 +306,11 @@ class Case(eqx.Module):
 
         return jnp.where(solved(cycles), jax.lax.map(on, (marched.depth, cycles)), jnp.nan)
 
-    def dynamic_factor(self, marched: March) -> Float[Array, "lives *torques"] | None:
-        """At all lives of a march, as its `cycles`; None where nobody asks for it."""
+    def dynamic_factor(self, marched: March) -> Float[Array, "steps *torques"] | None:
+        """At all time steps of a march, as its `cycles`; None where nobody asks for it."""
         if self.vibration is None:
             return None
-        found = jnp.where(marched.known[:, None], marched.seen[_DYNAMIC_FACTOR], jnp.nan)
+        found = jnp.where(marched.status[:, None] == Status.CONVERGED, marched.seen[_DYNAMIC_FACTOR], jnp.nan)
         return found[:, 0] if self.weights is None else found
 
 
@@ -332,12 +336,13 @@ def _march(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> Mar
     shares = jnp.ones((1,), start.dtype) if case.weights is None else case.weights
     passages = jnp.stack([jnp.ones((), start.dtype), mesh.pair.pinion.teeth / mesh.pair.wheel.teeth])
 
-    through = partial(worn_through, mesh.pair, grid(mesh, case.points))
+    def through(depth) -> Statuses:
+        return status_of({Status.GEARS_CANNOT_RUN: worn_through(mesh.pair, grid(mesh, case.points), depth)})
 
     def analyze(depth) -> Analysis:
-        rates, seen, found = over_loads(lambda load, place: case.under(load, place, depth))
+        rates, seen, statuses = over_loads(lambda load, place: case.under(load, place, depth))
         rate = jnp.tensordot(shares, rates, 1) * passages[:, None, None, None]
-        return Analysis(rate, seen, jnp.all(found) & ~through(depth))
+        return Analysis(rate, seen, jnp.maximum(jnp.max(statuses), through(depth)))
 
     def over_loads(under):
         if case.vibration is None:
@@ -346,11 +351,11 @@ def _march(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> Mar
         return jax.lax.map(lambda each: under(*each), (case.loads, places))
 
     found = march(analyze, start, revolutions)
-    gone = jnp.cumsum(jax.vmap(through)(found.depth)) > 0
-    return found._replace(known=found.known & ~gone)
+    gone = jax.lax.cummax(jax.vmap(through)(found.depth))
+    return found._replace(status=jnp.maximum(found.status, gone))
 
 
-# of a motion it is twice as many programs in one, which compile for a hundred times as long as a life of theirs takes
+# of a motion it is twice as many programs in one, which compile for a hundred times as long as they run
 _marched, _marched_quickly = kernel(_march), program(_march)
 
 
@@ -399,18 +404,14 @@ def _loads(owner: str, torque: Any, dtype) -> tuple[OperatingPoint, Float[Array,
     if not isinstance(torque, LoadSpectrum):
         single = operating_point_of(owner, torque, dtype)
         return jax.tree.map(lambda number: number[None], single), None
-    if torque.duration is not None and torque.speeds is None:
-        raise ValueError(f"{owner}: a load spectrum with a duration needs speeds, for the shares of the revolutions")
     load = jax.tree.map(lambda number: number.astype(dtype), torque)
     friction = None if load.friction is None else jnp.broadcast_to(load.friction, load.torques.shape)
 
     def each(torque, speed, friction):
         return OperatingPoint(torque, speed, friction)
 
-    weights = load.weights
-    if load.duration is not None and load.speeds is not None:
-        # shares of the hours: a load turns the pinion by hours times speed
-        turns = weights * load.speeds
+    turns = load.turns(owner)
+    if load.duration is not None:
         check(owner, "sum of hours times speeds", jnp.sum(turns), "", low=0.0, open_low=True)
-        weights = turns / jnp.sum(turns)
-    return jax.vmap(each)(load.torques, load.speeds, friction), weights
+        turns = turns / jnp.sum(turns)
+    return jax.vmap(each)(load.torques, load.speeds, friction), turns

@@ -11,7 +11,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float, Int8
+
+from ..contact.status import Status, Statuses
 
 Depth = Float[Array, "gears parts slices points"]
 
@@ -32,17 +34,17 @@ _BOTH = np.array([0.5, 0.5, 0.5, 0.5, 0.0])
 _DOUBLE = np.array([1.0, 0.0, 0.0, 0.0, 1.0])
 _ANALYSES = len(_STAGES)
 _DOUBLED = _ANALYSES - 1  # the analysis that the double block alone needs; before it come two of each block
-_LIVES = 0, 2  # the analyses of flanks that are there at the start of a block
+_STARTS = 0, 2  # the analyses of flanks at the start of a block
 # If a block makes the error e, two make 2 e, and the double one, of third order each, 8 e.
 _SHARE = 2 / (8 - 2)
 
 
 class Analysis(NamedTuple):
-    """The contact on a flank: how fast it wears [um per revolution], what else it gives, and whether it was found."""
+    """The contact on a flank: how fast it wears [um per revolution], what else it gives, and its status."""
 
     rate: Depth
     seen: Any
-    found: Bool[Array, ""]
+    status: Statuses
 
 
 class March(NamedTuple):
@@ -52,13 +54,13 @@ class March(NamedTuple):
         depth: at the start of every block and after the last one [um], leading axis (blocks + 1,).
         error: estimate of what every pair of blocks adds to the error of the depth [um], leading axis (pairs,); NaN
             where the contact of the double block was not found.
-        known: whether all contacts that have worn these flanks were found, shape (blocks + 1,).
+        status: the worst of all contacts that have worn these flanks, shape (blocks + 1,).
         seen: what the contact gave on these flanks, leading axis (blocks + 1,).
     """
 
-    depth: Float[Array, "lives gears parts slices points"]
+    depth: Float[Array, "steps gears parts slices points"]
     error: Float[Array, "pairs gears parts slices points"]
-    known: Bool[Array, " lives"]
+    status: Int8[Array, " steps"]
     seen: Any
 
 
@@ -84,16 +86,15 @@ def march(analyze: Callable[[Depth], Analysis], depth: Depth, revolutions: Float
         rates = rates.at[number].set(contact.rate)
         end, doubled = (length * jnp.tensordot(shares, rates, 1) for shares in (both, double))
         start = jnp.where(number == _ANALYSES - 1, start + end, start)
-        return (start, rates), (flank, contact.seen, contact.found, _SHARE * (doubled - end))
+        return (start, rates), (flank, contact.seen, contact.status, _SHARE * (doubled - end))
 
     nothing = jnp.zeros((_ANALYSES, *depth.shape), dtype)
     # backwards the contacts are found again instead of kept
-    _, (flanks, seen, found, error) = jax.lax.scan(jax.checkpoint(analysis), (depth, nothing), (number, length))
-    lives = np.append((np.arange(pairs)[:, None] * _ANALYSES + np.array(_LIVES)).ravel(), pairs * _ANALYSES)
-    flanks, seen = jax.tree.map(lambda leaf: leaf[lives], (flanks, seen))
-    of_pairs = found[:-1].reshape(pairs, _ANALYSES)
-    worn_by, doubled = of_pairs[:, :_DOUBLED].reshape(2 * pairs, -1), of_pairs[:, _DOUBLED]
-    lost = jnp.cumsum(~jnp.all(worn_by, axis=1))
-    known = jnp.append(jnp.ones((1,), bool), lost == 0)
+    _, (flanks, seen, status, error) = jax.lax.scan(jax.checkpoint(analysis), (depth, nothing), (number, length))
+    steps = np.append((np.arange(pairs)[:, None] * _ANALYSES + np.array(_STARTS)).ravel(), pairs * _ANALYSES)
+    flanks, seen = jax.tree.map(lambda leaf: leaf[steps], (flanks, seen))
+    of_pairs = status[:-1].reshape(pairs, _ANALYSES)
+    worn_by, doubled = of_pairs[:, :_DOUBLED].reshape(2 * pairs, -1), of_pairs[:, _DOUBLED] == Status.CONVERGED
+    status = jnp.append(jnp.zeros((1,), status.dtype), jax.lax.cummax(jnp.max(worn_by, axis=1)))
     error = jnp.where(doubled[:, None, None, None, None], error[_ANALYSES - 1 :: _ANALYSES], jnp.nan)
-    return March(flanks, error, known, seen)
+    return March(flanks, error, status, seen)

@@ -9,7 +9,7 @@ from ..conditions import joined, solved
 from ..dynamics import DYNAMIC_QUANTITIES, Dynamics
 from ..metrics import MESH_QUANTITIES, Quantity, Vocabulary
 from ..numerics import AbstractMeasure, Mean, check, maximum, quick_jit, real
-from .life import WearLife
+from .history import WearHistory
 
 Scalar = Float[Array, ""]
 Lives = Float[Array, " lives"]
@@ -18,7 +18,7 @@ Worn = Literal["pinion", "wheel", "both"]
 _quantity_of = Vocabulary((*MESH_QUANTITIES.values(), *DYNAMIC_QUANTITIES.values())).quantity_of
 
 
-def over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Lives:
+def over_life(life: WearHistory, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Lives:
     """A quantity of the mesh at every life, shape (lives,); NaN where a contact was not found, then or before.
 
     Args:
@@ -43,7 +43,7 @@ def over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure
     return _of_all_loads(life, values, quantity.better, measure)
 
 
-def _of_all_loads(life: WearLife, values, better, measure: AbstractMeasure | None) -> Lives:
+def _of_all_loads(life: WearHistory, values, better, measure: AbstractMeasure | None) -> Lives:
     """Values (lives, torques) joined over the torques of a spectrum."""
     if life.weights is None:
         return values
@@ -52,7 +52,7 @@ def _of_all_loads(life: WearLife, values, better, measure: AbstractMeasure | Non
     return jnp.where(jnp.any(jnp.isnan(values), axis=-1), jnp.nan, many)
 
 
-def pressure_error(life: WearLife, measure: AbstractMeasure | None = None) -> Lives:
+def pressure_error(life: WearHistory, measure: AbstractMeasure | None = None) -> Lives:
     """Estimated error of the largest flank pressure at every life [MPa], shape (lives,).
 
     By how much it changes where the worn flanks are known on every other point only, and where contacts are as wide as
@@ -62,13 +62,13 @@ def pressure_error(life: WearLife, measure: AbstractMeasure | None = None) -> Li
     return _of_all_loads(life, life.pressure_error, "smaller", measure)
 
 
-def mean_over_life(life: WearLife, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Scalar:
+def mean_over_life(life: WearHistory, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Scalar:
     """Mean of a quantity over the revolutions of a life; arguments as for `over_life`."""
     values, done = over_life(life, of, measure), life.revolutions
     return 0.5 * jnp.sum((values[1:] + values[:-1]) * jnp.diff(done)) / (done[-1] - done[0])
 
 
-def wear_depth(life: WearLife, gear: Worn = "both") -> Lives:
+def wear_depth(life: WearHistory, gear: Worn = "both") -> Lives:
     """Largest wear depth of the flank of a gear, or of both, at every life [um], shape (lives,).
 
     NaN after a life whose contact was not found.
@@ -84,10 +84,10 @@ def wear_depth(life: WearLife, gear: Worn = "both") -> Lives:
     }
     if gear not in depths:
         raise ValueError(f'wear_depth: gear = {gear!r} must be "pinion", "wheel" or "both"')
-    return jnp.where(life.known, maximum(jnp.stack(depths[gear]), axis=(0, 2, 3)), jnp.nan)
+    return jnp.where(life.converged, maximum(jnp.stack(depths[gear]), axis=(0, 2, 3)), jnp.nan)
 
 
-def worn_volume(life: WearLife) -> Float[Array, "lives gears parts"]:
+def worn_volume(life: WearHistory) -> Float[Array, "lives gears parts"]:
     """Volume worn off one flank of every tooth of pinion and wheel, on the flank and at tip corners [mm3].
 
     Where a gear wears at tip corners, its tip edge and its flank at the mate's tip corners count alike.
@@ -95,10 +95,10 @@ def worn_volume(life: WearLife) -> Float[Array, "lives gears parts"]:
     """
     _single("worn_volume", life)
     volume = 1e-3 * jnp.einsum("lgpsk,gk,s->lgp", life.depth, life.arc, life.slice_width)
-    return jnp.where(life.known[:, None, None], volume, jnp.nan)
+    return jnp.where(life.converged[:, None, None], volume, jnp.nan)
 
 
-def life_to_depth(life: WearLife, limit: Any, gear: Worn = "both") -> Scalar:
+def life_to_depth(life: WearHistory, limit: Any, gear: Worn = "both") -> Scalar:
     """Revolutions of the pinion until the deepest wear reaches a limit [um].
 
     Between two lives the depth is linear; beyond the last one it goes on as in the last block. Infinite where nothing
@@ -112,7 +112,7 @@ def life_to_depth(life: WearLife, limit: Any, gear: Worn = "both") -> Scalar:
     return _reached(life.revolutions, wear_depth(life, gear), limit, goes_on=True)
 
 
-def life_to(life: WearLife, of: str | Quantity | Any, limit: Any, measure: AbstractMeasure | None = None) -> Scalar:
+def life_to(life: WearHistory, of: str | Quantity | Any, limit: Any, measure: AbstractMeasure | None = None) -> Scalar:
     """Revolutions of the pinion until a quantity first passes a limit on its bad side; infinite where it never does.
 
     Between two lives the quantity is linear. Zero where the new flanks are beyond the limit; NaN where the contact was
@@ -129,7 +129,7 @@ def life_to(life: WearLife, of: str | Quantity | Any, limit: Any, measure: Abstr
     return _reached(life.revolutions, quantity.sign * values, quantity.sign * limit, goes_on=False)
 
 
-def _single(owner: str, life: WearLife) -> None:
+def _single(owner: str, life: WearHistory) -> None:
     """Refuses lives of many designs: their axis would be taken for that of the lives of one."""
     if life.revolutions.ndim != 1:
         raise ValueError(f"{owner}: life is of a batch of designs, must be of one: put jax.vmap around {owner} as well")

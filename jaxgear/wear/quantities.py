@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float
 from ..conditions import solved
 from ..metrics import Analysis, Quantity, Vocabulary
 from ..numerics import maximum
-from .life import WearLife
+from .history import WearHistory
 from .over_life import life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth
 from .settings import Wear
 
@@ -33,7 +33,7 @@ def _at_most(longest, life):
     return jnp.where(life > longest, longest, life)
 
 
-def _pressure_error(life: WearLife):
+def _pressure_error(life: WearHistory):
     """By how much the largest pressure of a life may be larger [MPa]; that at tip corners depends on no grid."""
     largest = over_life(life, "max_contact_pressure")
     may_be = jnp.maximum(largest, over_life(life, "max_flank_pressure") + pressure_error(life))
@@ -41,7 +41,7 @@ def _pressure_error(life: WearLife):
 
 
 # of a life and the settings that it was worn by, by the name of the quantity
-OF_LIFE: Mapping[str, Callable[[WearLife, Wear], Float[Array, ""]]] = {
+OF_LIFE: Mapping[str, Callable[[WearHistory, Wear], Float[Array, ""]]] = {
     "worn_ppte": lambda life, _: over_life(life, "ppte")[-1],
     "mean_ppte_over_life": lambda life, _: mean_over_life(life, "ppte"),
     "max_ppte_over_life": lambda life, _: maximum(over_life(life, "ppte")),
@@ -58,7 +58,7 @@ OF_LIFE: Mapping[str, Callable[[WearLife, Wear], Float[Array, ""]]] = {
 }
 
 
-def number_of(name: str, life: WearLife, settings: Wear) -> Float[Array, ""]:
+def number_of(name: str, life: WearHistory, settings: Wear) -> Float[Array, ""]:
     """A quantity of a life that was worn by `Wear` settings; NaN as `Wear` says."""
     usable = jnp.all(solved(life.cycles)) & (name == _ERROR or blocks_are_short(life))
     return jnp.where(usable, OF_LIFE[name](life, settings), jnp.nan)
@@ -69,12 +69,12 @@ def _number(name: str, analysis: Analysis, wear: Wear) -> Float[Array, ""]:
     return number_of(name, analysis.once(wear, "life", lambda: _life(name, analysis, wear)), wear)
 
 
-def _life(name: str, analysis: Analysis, wear: Wear) -> WearLife:
+def _life(name: str, analysis: Analysis, wear: Wear) -> WearHistory:
     load = analysis.operating_point if wear.loads is None else None
     return wear.life(analysis.mesh_for(name), load, **analysis.flanks, deviation=analysis.deviation(name))
 
 
-def blocks_are_short(life: WearLife) -> Bool[Array, ""]:
+def blocks_are_short(life: WearHistory) -> Bool[Array, ""]:
     """Whether the blocks are short enough for the depth to mean something."""
     worn = jnp.sum(life.depth, axis=2)
     deflection = life.cycles.transmission_error[0] - life.cycles.unloaded_transmission_error[0]

@@ -12,7 +12,7 @@ from ..metrics import AbstractSettings
 from ..microgeometry import AbstractModification
 from ..numerics import count, number
 from .case import LARGEST_COEFFICIENT
-from .life import BLOCKS, WearLife, check_blocks, wear
+from .history import BLOCKS, WearHistory, check_blocks, wear
 from .vibration import LineLoad, check_line_load
 
 Scalar = Float[Array, ""]
@@ -79,7 +79,7 @@ class Wear(AbstractSettings):
         pinion: AbstractModification | None = None,
         wheel: AbstractModification | None = None,
         deviation: Any = None,
-    ) -> WearLife:
+    ) -> WearHistory:
         """The life of a design; arguments and errors as `wear`.
 
         Args:

@@ -9,8 +9,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float, Int8
 
+from ...contact.status import Statuses, WithStatus
 from ...microgeometry import Linear, Polynomial, Power, Quadratic
 from ...numerics import Checked, Given, Numbers, check, concrete, kernel, real, result, spread, whole
 from ...numerics.pareto import decoded, next_generation, random_strings
@@ -124,7 +125,7 @@ def operating_conditions(frequency: Given = 1.0) -> tuple[OperatingCondition, ..
     )
 
 
-class DynamicModification(Checked):
+class DynamicModification(WithStatus, Checked):
     """Optimum for one operating condition beside the static one; amplitudes are half of the range of x.
 
     Attributes:
@@ -133,7 +134,7 @@ class DynamicModification(Checked):
         amplitude: at this frequency without relief, with the static and with the dynamic one, shape (3,); the larger of
             the vibrations that two starts settle to.
         static_amplitude: the same at vanishing speed and steady torque, shape (3,).
-        settled: whether each of the three has settled, shape (3,).
+        status: of each of the three, shape (3,).
     """
 
     frequency: Scalar = result()
@@ -141,7 +142,7 @@ class DynamicModification(Checked):
     dynamic: CycleRelief
     amplitude: Float[Array, " three"] = result()
     static_amplitude: Float[Array, " three"] = result()
-    settled: Bool[Array, " three"] = result()
+    status: Int8[Array, " three"] = result()
 
 
 def dynamic_profile_modification(
@@ -206,11 +207,11 @@ def dynamic_profile_modification(
     none = eqx.tree_at(lambda r: r.amount, relief, jnp.zeros_like(relief.amount))
     candidates = [made(relief, names, low + (high - low) * x) for x in jnp.concatenate([starts, ends])]
     every = jax.tree.map(lambda *parts: jnp.stack(parts), none, *candidates)
-    amplitude, settled = _last_amplitudes(model, every, at, _FINER * steps)
+    amplitude, status = _last_amplitudes(model, every, at, _FINER * steps)
     three = jnp.stack([jnp.array(0), jnp.array(2), 1 + jnp.nanargmin(amplitude[1:])])  # none, static and the best
     of_three = [jax.tree.map(lambda part, i=i: part[i], every) for i in three]
     at_rest_too = jnp.stack([_static_amplitude(model, part) for part in of_three])
-    return DynamicModification(at, of_three[1], of_three[2], amplitude[three], at_rest_too, settled[three])
+    return DynamicModification(at, of_three[1], of_three[2], amplitude[three], at_rest_too, status[three])
 
 
 def modification_table(rows: Sequence[tuple[OperatingCondition, DynamicModification]]) -> str:
@@ -246,8 +247,8 @@ def _static_amplitude(model: DimensionlessModel, relief: CycleRelief) -> Scalar:
 
 def _amplitude(
     model: DimensionlessModel, relief: CycleRelief, frequency: Scalar, steps: int, settling: int = _SETTLING
-) -> tuple[Scalar, Bool[Array, ""]]:
-    """The larger amplitude of two starts, at rest and kicked; and whether it has settled."""
+) -> tuple[Scalar, Statuses]:
+    """The larger amplitude of two starts, at rest and kicked, and its status."""
     moved = with_relief(model, relief)
     rest = at_rest(moved)
     kicked = rest + jnp.stack([jnp.zeros_like(model.load), _KICK * model.load])
@@ -256,7 +257,7 @@ def _amplitude(
     # a kick that leaves the range of a polynomial says nothing about the design
     second = jnp.where(jnp.isfinite(found.amplitude[1]), found.amplitude[1], -1.0)
     which = jnp.where(second > found.amplitude[0], 1, 0)
-    return found.amplitude[which], found.settled[which]
+    return found.amplitude[which], found.status[which]
 
 
 @kernel

@@ -3,8 +3,9 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Complex, Float
+from jaxtyping import Array, Complex, Float
 
+from ...contact.status import Status, Statuses, WithStatus, status_of
 from ...numerics import Checked, Given, Numbers, check, kernel, program, real, result, safe_divide, whole
 from ..orbit import settled_orbit
 from .model import DimensionlessModel, loaded_te
@@ -15,7 +16,7 @@ Scalar = Float[Array, ""]
 _SETTLED = 1e-5
 
 
-class Settled(Checked):
+class Settled(WithStatus, Checked):
     """A settled vibration; every number dimensionless.
 
     Attributes:
@@ -25,7 +26,8 @@ class Settled(Checked):
         weight: share of the recorded time that a sample stands for, shape (samples,).
         amplitude: half of the range of x, S1's alpha_max.
         residual: change of the state over the recorded cycles, relative to the size of the vibration.
-        settled: False where that is too large, the orbit is unstable, or the vibration left the range of a polynomial.
+        status: `Status.NO_STEADY_MOTION` where that is too large, the orbit is unstable, or the vibration left the
+            range of a polynomial.
         start: state at mesh position 0, of the oscillator's coordinate.
     """
 
@@ -35,7 +37,7 @@ class Settled(Checked):
     weight: Float[Array, " samples"] = result()
     amplitude: Scalar = result()
     residual: Scalar = result()
-    settled: Bool[Array, ""] = result()
+    status: Statuses = result()
     start: Float[Array, " two"] = result()
 
     @property
@@ -91,6 +93,7 @@ def _settle(model: DimensionlessModel, frequency: Scalar, begin, settling: int, 
     orbit = settled_orbit(model.oscillator(), frequency / (2 * jnp.pi), start, steps, settling, periods)
     length = jnp.diff(orbit.phase, append=jnp.full(1, periods, orbit.phase.dtype))
     residual = safe_divide(orbit.residual, jnp.max(jnp.abs(orbit.dte)))
+    settled = jnp.isfinite(orbit.dte).all() & orbit.stable & (residual < _SETTLED)
     return Settled(
         phase=orbit.phase,
         dte=orbit.dte,
@@ -98,7 +101,7 @@ def _settle(model: DimensionlessModel, frequency: Scalar, begin, settling: int, 
         weight=0.5 * (length + jnp.roll(length, 1)) / periods,
         amplitude=0.5 * (orbit.dte_max - orbit.dte_min),
         residual=residual,
-        settled=jnp.isfinite(orbit.dte).all() & orbit.stable & (residual < _SETTLED),
+        status=status_of({Status.NO_STEADY_MOTION: ~settled}),
         start=jnp.concatenate(orbit.start),
     )
 

@@ -7,6 +7,7 @@ import jax
 import numpy as np
 
 from ...contact import MeshCycle
+from ...contact.status import reason
 from ...geometry import GearPair
 from ...microgeometry import AbstractModification
 from ...numerics import check
@@ -118,7 +119,9 @@ def _of_cycle(pair, cycle: MeshCycle, pinion, wheel, torque, speed, friction):
         raise ValueError(f"write_rexs: cycle holds cycles of shape {cycle.transmission_error.shape[:-1]}, must be one")
     if not np.all(np.asarray(cycle.converged)):
         count = int(np.sum(~np.asarray(cycle.converged)))
-        raise ValueError(f"write_rexs: cycle did not converge at {count} of {len(cycle.phase)} positions")
+        raise ValueError(
+            f"write_rexs: cycle did not converge at {count} of {len(cycle.phase)} positions: {reason(cycle.status)}"
+        )
     if not eqx.tree_equal(cycle.kinematics.pair, pair):
         raise ValueError("write_rexs: cycle is of another pair")
     if cycle.pinion is None or cycle.wheel is None:

@@ -1,4 +1,4 @@
-"""The flank as a state over its life: wear of both gears, by blocks at once or with progress, and the mesh it makes."""
+"""Wear history: both flanks after every block of revolutions, and the mesh on them."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,9 +6,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float, Int8
 
 from ..contact import Mesh, MeshCycle
+from ..contact.status import WithStatus
 from ..dynamics import Dynamics
 from ..geometry import Gear
 from ..microgeometry import AbstractModification
@@ -19,84 +20,87 @@ from .vibration import LineLoad
 from .worn_volume import arcs, grid
 
 Scalar = Float[Array, ""]
-Lives = Float[Array, " lives"]
-Depths = Float[Array, "lives slices points"]
+Steps = Float[Array, " steps"]
+Depths = Float[Array, "steps slices points"]
 
 BLOCKS = 20
 
+Make = Callable[[], March]
 
-class WearLife(Checked):
-    """A pair of flanks over its life; at the start of every block and after the last one.
+
+class WearHistory(WithStatus, Checked):
+    """A pair of flanks at time steps: at the start of every block and after the last one.
 
     Attributes:
-        revolutions: of the pinion, shape (lives,).
+        revolutions: of the pinion, shape (steps,).
         roll_length: of the grid points of pinion and wheel [mm], shape (gears, points).
         arc: of the flank that belongs to every point [mm], shape (gears, points).
         face_coordinate: of the lines along the profile, from the middle of each gear's own face [mm], shape (gears,
             slices).
         slice_width: of the face that belongs to every line [mm], shape (slices,).
-        depth: worn off pinion and wheel by contact of the flanks and by tip corners [um], shape (lives, gears, parts,
+        depth: worn off pinion and wheel by contact of the flanks and by tip corners [um], shape (steps, gears, parts,
             slices, points).
         error: estimate of the error of that depth by the length of the blocks, largest of all points [um], shape
-            (lives,); NaN where that of two blocks is not known.
+            (steps,); NaN where that of two blocks is not known.
         pressure_error: estimate of the error of the largest flank pressure by the grid and by the width over which
-            contacts average the worn flanks [MPa], shape (lives,), (lives, torques) under a load spectrum; zero on new
+            contacts average the worn flanks [MPa], shape (steps,), (steps, torques) under a load spectrum; zero on new
             flanks, NaN on flanks that are not known. It is not part of `error`, which is that of the blocks alone.
-        known: whether all contacts that have worn these flanks were found, also within blocks, and something is left of
-            the teeth, shape (lives,).
-        cycles: the mesh on these flanks, leading axis (lives,); (lives, torques) under a load spectrum. None has
+        status: the worst so far, shape (steps,): of the contacts that have worn these flanks, also within blocks; of
+            the motion, the coefficient of wear, and what is left of the teeth.
+        cycles: the mesh on these flanks, leading axis (steps,); (steps, torques) under a load spectrum. None has
             converged on flanks that are not known.
         weights: of the torques of a load spectrum in the revolutions, shape (torques,); None under one torque.
         dynamic_factor: largest mesh force of the steady motion over the static one, at the speed of the load (K_v),
-            shape (lives,), (lives, torques) under a load spectrum; NaN where the motion does not settle on an orbit of
+            shape (steps,), (steps, torques) under a load spectrum; NaN where the motion does not settle on an orbit of
             up to four mesh cycles, and on flanks that are not known. None without dynamics.
     """
 
-    revolutions: Lives = result()
+    revolutions: Steps = result()
     roll_length: Float[Array, "gears points"] = result("mm")
     arc: Float[Array, "gears points"] = result("mm")
     face_coordinate: Float[Array, "gears slices"] = result("mm")
     slice_width: Float[Array, " slices"] = result("mm")
-    depth: Float[Array, "lives gears parts slices points"] = result("um")
-    error: Lives = result("um")
-    pressure_error: Float[Array, "lives *torques"] = result("MPa")
-    known: Bool[Array, " lives"] = result()
+    depth: Float[Array, "steps gears parts slices points"] = result("um")
+    error: Steps = result("um")
+    pressure_error: Float[Array, "steps *torques"] = result("MPa")
+    status: Int8[Array, " steps"] = result()
     cycles: MeshCycle
     weights: Float[Array, " torques"] | None = result()
-    dynamic_factor: Float[Array, "lives *torques"] | None = result()
+    dynamic_factor: Float[Array, "steps *torques"] | None = result()
 
     @property
     def pinion_depth(self) -> Depths:
-        """Worn off the pinion in all [um], shape (lives, slices, points)."""
+        """Worn off the pinion in all [um], shape (steps, slices, points)."""
         return jnp.sum(self.depth[..., 0, :, :, :], axis=-3)
 
     @property
     def wheel_depth(self) -> Depths:
-        """Worn off the wheel in all [um], shape (lives, slices, points)."""
+        """Worn off the wheel in all [um], shape (steps, slices, points)."""
         return jnp.sum(self.depth[..., 1, :, :, :], axis=-3)
 
     @property
     def gears(self) -> tuple[Gear, Gear]:
         """Pinion and wheel."""
         pair = self.cycles.kinematics.pair
-        first = (0,) * self.cycles.batch_ndim  # of all lives the same
+        first = (0,) * self.cycles.batch_ndim  # of all time steps the same
         pinion, wheel = jax.tree.map(lambda leaf: leaf[first], (pair.pinion, pair.wheel))
         return pinion, wheel
 
-    def flanks(self, life: int = -1) -> tuple[AbstractModification, AbstractModification]:
+    def flanks(self, step: int = -1) -> tuple[AbstractModification, AbstractModification]:
         """What is worn off pinion and wheel, as modifications: `TabulatedProfile`, or `TabulatedFlank` over slices.
 
         They add to the modifications of the new flanks. Interpolated linearly, they hold the worn volume.
 
         Args:
-            life: which of the lives; the last one by default.
+            step: which of the time steps; the last one by default.
 
         Raises:
-            IndexError: where there are not so many.
+            IndexError: for a time step that does not exist.
         """
-        if not -len(self.depth) <= life < len(self.depth):
-            raise IndexError(f"WearLife: life = {life} must be less than {len(self.depth)}, of so many it is one")
-        return tables(self.roll_length, self.face_coordinate, self.depth[life])
+        count = len(self.depth)
+        if not -count <= step < count:
+            raise IndexError(f"WearHistory: step = {step} must be from {-count} to {count - 1}, of {count} time steps")
+        return tables(self.roll_length, self.face_coordinate, self.depth[step])
 
 
 def wear(
@@ -112,10 +116,15 @@ def wear(
     points: int | None = None,
     dynamics: Dynamics | None = None,
     line_load: LineLoad | None = None,
-) -> WearLife:
-    """Wear of both flanks over their life, in blocks of revolutions of one length: contact, wear, new flank, again.
+    largest_increment: Any = None,
+    keep: Callable[[Any, Make], March] | None = None,
+    callback: Callable[[float, float], None] | None = None,
+) -> WearHistory:
+    """Wear of both flanks, in blocks of revolutions: contact, wear, new flank, again.
 
-    Every tooth of a gear wears alike. Differentiable with respect to every number in it, and for `jax.vmap`.
+    Every tooth of a gear wears alike. Differentiable with respect to every number in it, and for `jax.vmap`: all blocks
+    are one program then. With `largest_increment`, `keep` or `callback`, which take concrete numbers, every two blocks
+    are one call of a program, which serves any number of them.
 
     Wear levels the load, so that a block must not wear off more than the teeth deflect under their load: beyond
     twice that, flanks overshoot from block to block. `error` tells; on smooth loads it falls with the square of the
@@ -148,6 +157,11 @@ def wear(
             of them. Flanks are not `known` where the motion does not settle on an orbit of up to four mesh cycles, or
             where coast flanks touch, which do not wear here. "static" for dynamic factors alone. None for "dynamic"
             with dynamics, "static" without.
+        largest_increment: depth that no block wears off beyond a tenth more [um], in place of `blocks`. It should stay
+            below what the teeth deflect under their load.
+        keep: called for every two blocks with all that they depend on and with what makes them; gives them, made now or
+            before. None to make them all.
+        callback: called with the revolutions so far and all of them after every two blocks.
 
     Returns:
         flanks and mesh at the start of every block and after the last one.
@@ -163,10 +177,17 @@ def wear(
     flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
     vibrating: dict[str, Any] = {"dynamics": dynamics, "line_load": line_load}
     case = case_of("wear", mesh, torque, coefficient=coefficient, points=points, **flanks, **vibrating)
-    revolutions = checked_revolutions("wear", revolutions, mesh)
+    revolutions = real(revolutions).astype(mesh.slice_width.dtype)
+    if revolutions.ndim:
+        raise ValueError(f"wear: revolutions has shape {revolutions.shape}, must be a single number")
+    check("wear", "revolutions", revolutions, "", low=0.0, open_low=True)
+    check("wear", "largest_increment", largest_increment, "um", low=0.0, open_low=True)
+    if largest_increment is not None or keep is not None or callback is not None:
+        limit = None if largest_increment is None else float(largest_increment)
+        return _by_pairs(case, float(revolutions), blocks, limit, keep, callback)
     pairs = blocks // BLOCKS_OF_A_PAIR
     found = marched(case, case.start(), jnp.full((pairs,), 1.0 / blocks, revolutions.dtype) * revolutions)
-    return life_of(case, found, jnp.arange(blocks + 1, dtype=revolutions.dtype) / blocks * revolutions)
+    return history_of(case, found, jnp.arange(blocks + 1, dtype=revolutions.dtype) / blocks * revolutions)
 
 
 def check_blocks(owner: str, blocks: int) -> None:
@@ -175,25 +196,12 @@ def check_blocks(owner: str, blocks: int) -> None:
         raise ValueError(f"{owner}: blocks = {blocks} must be even: two and two are compared with one of double length")
 
 
-def checked_revolutions(owner: str, revolutions: Any, mesh: Mesh) -> Scalar:
-    """A number of revolutions in the precision of a mesh.
-
-    Raises:
-        ValueError: for something else than one number greater than zero.
-    """
-    revolutions = real(revolutions).astype(mesh.slice_width.dtype)
-    if revolutions.ndim:
-        raise ValueError(f"{owner}: revolutions has shape {revolutions.shape}, must be a single number")
-    check(owner, "revolutions", revolutions, "", low=0.0, open_low=True)
-    return revolutions
-
-
 @program
-def life_of(case: Case, found: March, revolutions: Lives) -> WearLife:
-    """The life of a march; `revolutions` at its lives."""
+def history_of(case: Case, found: March, revolutions: Steps) -> WearHistory:
+    """The history of a march; `revolutions` at its time steps."""
     roll_length = grid(case.mesh, case.points)
     cycles = case.cycles(roll_length, found)
-    return WearLife(
+    return WearHistory(
         revolutions=revolutions,
         roll_length=roll_length,
         arc=jnp.stack([arcs(knots, side.base_radius) for knots, side in zip(roll_length, case.mesh.sides)]),
@@ -202,72 +210,31 @@ def life_of(case: Case, found: March, revolutions: Lives) -> WearLife:
         depth=found.depth,
         error=_total_error(found.error),
         pressure_error=case.pressure_errors(roll_length, found, cycles),
-        known=found.known,
+        status=found.status,
         cycles=cycles,
         weights=case.weights,
         dynamic_factor=case.dynamic_factor(found),
     )
 
 
-def _total_error(error: Float[Array, "pairs gears parts slices points"]) -> Lives:
+def _total_error(error: Float[Array, "pairs gears parts slices points"]) -> Steps:
     """Largest error of the depth so far [um]: at the start, and after both blocks of every pair."""
     error = jnp.sum(error, axis=2)
     after = jnp.cumsum(error, axis=0)
     before = jnp.concatenate([jnp.zeros_like(after[:1]), after[:-1]])
-    lives = jnp.stack([before, before + error / 2], axis=1).reshape(-1, *error.shape[1:])
-    lives = jnp.concatenate([lives, after[-1:]])
-    return maximum(jnp.abs(lives), axis=(1, 2, 3))
+    steps = jnp.stack([before, before + error / 2], axis=1).reshape(-1, *error.shape[1:])
+    steps = jnp.concatenate([steps, after[-1:]])
+    return maximum(jnp.abs(steps), axis=(1, 2, 3))
 
 
-Make = Callable[[], March]
-
-# Share of a life in which the first rate of wear is found: short beside any block.
+# Share of the revolutions in which the first rate of wear is found: short beside any block.
 _TRIAL = 1e-9
 # A block that wears more than the increment by this factor is done again; the next one grows by the second at most.
 _SLACK, _GROWTH = 1.1, 2.0
 
 
-def wear_in_steps(
-    mesh: Mesh,
-    torque: Any,
-    revolutions: Any,
-    *,
-    coefficient: Any,
-    pinion: AbstractModification | None = None,
-    wheel: AbstractModification | None = None,
-    deviation: Any = None,
-    points: int | None = None,
-    dynamics: Dynamics | None = None,
-    line_load: LineLoad | None = None,
-    blocks: int = BLOCKS,
-    largest_increment: Any = None,
-    keep: Callable[[Any, Make], March] | None = None,
-    callback: Callable[[float, float], None] | None = None,
-) -> WearLife:
-    """`wear` of concrete numbers, in blocks of equal length, or as long as their wear allows.
-
-    Args:
-        mesh, torque, revolutions, coefficient, pinion, wheel: as for `wear`.
-        deviation, points, dynamics, line_load, blocks: as for `wear`.
-        largest_increment: depth that no block wears off beyond a tenth more [um], in place of `blocks`. It should stay
-            below what the teeth deflect under their load.
-        keep: called for every two blocks with all that they depend on and with what makes them; gives them, made now or
-            before. None to make them all.
-        callback: called with the revolutions so far and all of them after every two blocks.
-
-    Raises:
-        TypeError, ValueError: as `wear`, and for an increment that is not greater than 0.
-    """
-    owner = "wear_in_steps"
-    check_blocks(owner, blocks)
-    flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
-    vibrating: dict[str, Any] = {"dynamics": dynamics, "line_load": line_load}
-    case = case_of(owner, mesh, torque, coefficient=coefficient, points=points, **flanks, **vibrating)
-    total = float(checked_revolutions(owner, revolutions, mesh))
-    limit = None
-    if largest_increment is not None:
-        check(owner, "largest_increment", real(largest_increment), "um", low=0.0, open_low=True)
-        limit = float(largest_increment)
+def _by_pairs(case: Case, total: float, blocks: int, limit: float | None, keep, callback) -> WearHistory:
+    """`wear` pair by pair of blocks: of equal length, or as long as a limit of their wear allows."""
     taken = keep or (lambda _, make: make())
 
     def two(start: Depth, length: float) -> March:
@@ -285,7 +252,7 @@ def wear_in_steps(
             length = now * min(limit / most, _GROWTH) if most > 0 else _GROWTH * now
             if most > _SLACK * limit and not lost:
                 continue
-            lost = lost or not np.asarray(pair.known).all()
+            lost = lost or bool(np.asarray(pair.status).any())
             # the rest is gone through in pairs of one length, not in a last short one
             rest = total - done - BLOCKS_OF_A_PAIR * now
             length = rest / (BLOCKS_OF_A_PAIR * max(1, np.ceil(rest / (BLOCKS_OF_A_PAIR * length) - 1e-9)))
@@ -299,7 +266,7 @@ def wear_in_steps(
         found.append(pair)
         if callback is not None:
             callback(done, total)
-    return life_of(case, _together(found), jnp.asarray(at, depth.dtype))
+    return history_of(case, _together(found), jnp.asarray(at, depth.dtype))
 
 
 def _first(two: Callable[[Depth, float], March], case: Case, total: float, limit: float) -> float:
@@ -322,7 +289,7 @@ def _together(pairs: list[March]) -> March:
         return jnp.concatenate([*(leaf[:-1] for leaf in leaves), leaves[-1][-1:]])
 
     depth, seen = jax.tree.map(joined, *[(pair.depth, pair.seen) for pair in pairs])
-    # the flank with which a march begins is as well known as that with which the one before has ended
-    known = jnp.concatenate([pairs[0].known[:1], *(pair.known[1:] for pair in pairs)])
+    # the flank with which a march begins has the status of that with which the one before has ended
+    status = jnp.concatenate([pairs[0].status[:1], *(pair.status[1:] for pair in pairs)])
     error = jnp.concatenate([pair.error for pair in pairs])
-    return March(depth, error, jnp.cumsum(~known) == 0, seen)
+    return March(depth, error, jax.lax.cummax(status), seen)

@@ -1,0 +1,70 @@
+"""Why a result counts or does not: one status for the results of all analyses."""
+
+from collections.abc import Mapping
+from enum import IntEnum
+from functools import reduce
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Int8
+
+
+class Status(IntEnum):
+    """Outcome of an analysis; of several causes the largest number counts, which is the most basic one.
+
+    Arrays hold the numbers, so that a status can be traced, mapped, and reduced by its maximum.
+    """
+
+    CONVERGED = 0
+    NOT_CONVERGED = 1
+    NO_STEADY_MOTION = 2
+    MORE_PAIRS_NEEDED = 3
+    OUT_OF_VALIDITY = 4
+    SUPPORT_NOT_POSSIBLE = 5
+    GEARS_CANNOT_RUN = 6
+
+    @property
+    def text(self) -> str:
+        """The cause in words."""
+        return _TEXTS[self]
+
+
+_TEXTS = {
+    Status.CONVERGED: "converged",
+    Status.NOT_CONVERGED: "the iteration did not converge",
+    Status.NO_STEADY_MOTION: "the motion settles on no orbit within the largest number of mesh cycles",
+    Status.MORE_PAIRS_NEEDED: "tooth pairs beyond those of the mesh come into contact, more are needed",
+    Status.OUT_OF_VALIDITY: "a number is outside of its range, or of that for which model or support are valid",
+    Status.SUPPORT_NOT_POSSIBLE: "shafts, bearings or housing are not possible",
+    Status.GEARS_CANNOT_RUN: "the gears cannot run: their teeth are not possible, jam, or are worn through",
+}
+
+Statuses = Int8[Array, "..."]
+
+
+class WithStatus:
+    """A result with a status: an array of the numbers of `Status` in its field `status`."""
+
+    status: Any
+
+    @property
+    def converged(self) -> Any:
+        """Where the status is `Status.CONVERGED`, bools of its shape."""
+        return self.status == Status.CONVERGED.value
+
+
+def status_of(causes: Mapping[Status, Any], *parts: Any) -> Statuses:
+    """The status of a result; `CONVERGED` where there is none of the causes.
+
+    Args:
+        causes: for every cause where it is met, arrays of bools that broadcast against each other.
+        parts: statuses of what the result is made of, to be broadcast likewise.
+    """
+    met = (jnp.asarray(where).astype(jnp.int8) * jnp.int8(cause.value) for cause, where in causes.items())
+    return reduce(jnp.maximum, (*met, *parts))
+
+
+def reason(status: Any) -> str:
+    """The text of the most basic cause in a concrete array of statuses."""
+    return Status(int(np.max(np.asarray(status)))).text
