@@ -144,7 +144,7 @@ def test_what_has_no_effect_is_refused(mesh):
 
 def test_a_load_has_a_speed(mesh):
     load = jg.LoadSpectrum([50.0, 50.0], speeds=[1000.0, 2000.0], friction=0.05)
-    made = variants("test", ("amount",), (AMOUNT,), design=design, mesh=mesh, torque=load)
+    made = variants("test", design, mesh, load, names=("amount",), values=(AMOUNT,))
     speeds = made.cases.each(
         lambda operating_point, removed: (operating_point.speed, operating_point.torque * operating_point.friction)
     )

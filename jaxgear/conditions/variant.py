@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.extend.core import ClosedJaxpr
 from jax.interpreters.partial_eval import dce_jaxpr
 from jaxtyping import Array, Bool, Float
@@ -116,12 +117,12 @@ class Variants(Checked):
 
 def variants(
     owner: str,
-    names: Sequence[str],
-    values: Sequence,
-    *,
     design: Design,
     mesh: Mesh | Callable[[Parameters], Mesh],
     torque: Loads | Callable[[Parameters], Torque],
+    *,
+    names: Sequence[str],
+    values: Sequence[Any] | np.ndarray | Array,
     tolerance: Tolerance | None = None,
     samples: int | None = None,
     seed: int = 0,
@@ -130,12 +131,12 @@ def variants(
 
     Args:
         owner: the function that is asked, for messages.
-        names: of the variables.
-        values: of the variables of one variant, by which the functions are tried.
         design: makes (pinion, wheel) modifications from the named variables.
         mesh: prepared mesh, or a function of the named variables that prepares one; traced.
         torque: on the pinion [N m], an `OperatingPoint` or a `LoadSpectrum`; or a function of the named variables that
             gives a torque or an operating point.
+        names: of the variables.
+        values: of the variables of one variant, by which the functions are tried.
         tolerance, samples, seed: of manufactured gears, see `conditions`.
 
     Raises:

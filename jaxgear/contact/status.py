@@ -3,11 +3,10 @@
 from collections.abc import Mapping
 from enum import IntEnum
 from functools import reduce
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Int8
+from jaxtyping import Array, Bool, Int8
 
 
 class Status(IntEnum):
@@ -46,15 +45,15 @@ Statuses = Int8[Array, "..."]
 class WithStatus:
     """A result with a status: an array of the numbers of `Status` in its field `status`."""
 
-    status: Any
+    status: Statuses
 
     @property
-    def converged(self) -> Any:
+    def converged(self) -> Bool[Array, "..."]:
         """Where the status is `Status.CONVERGED`, bools of its shape."""
         return self.status == Status.CONVERGED.value
 
 
-def status_of(causes: Mapping[Status, Any], *parts: Any) -> Statuses:
+def status_of(causes: Mapping[Status, Bool[Array, "..."] | bool], *parts: Statuses) -> Statuses:
     """The status of a result; `CONVERGED` where there is none of the causes.
 
     Args:
@@ -65,6 +64,6 @@ def status_of(causes: Mapping[Status, Any], *parts: Any) -> Statuses:
     return reduce(jnp.maximum, (*met, *parts))
 
 
-def reason(status: Any) -> str:
+def reason(status: Statuses | np.ndarray) -> str:
     """The text of the most basic cause in a concrete array of statuses."""
     return Status(int(np.max(np.asarray(status)))).text

@@ -109,7 +109,13 @@ class Finding(NamedTuple):
 
 
 def of_limits(
-    limits: Mapping[str, Usual], key: str, where: str, value, *, low: float | None = None, high: float | None = None
+    limits: Mapping[str, Usual],
+    key: str,
+    where: str,
+    value: Given,
+    *,
+    low: float | None = None,
+    high: float | None = None,
 ) -> Finding:
     """The finding about a number, whose usual range may be known better than the table has it."""
     usual = limits[key]

@@ -107,11 +107,11 @@ def sweep(
     example = plan.rows(0, 1)[0]
     made = variants(
         "sweep",
-        plan.names,
-        example,
-        design=design,
-        mesh=mesh,
-        torque=torque,
+        design,
+        mesh,
+        torque,
+        names=plan.names,
+        values=example,
         tolerance=tolerance,
         samples=samples,
         seed=seed,
