@@ -105,11 +105,6 @@ class SweepTable:
         return {column.name: column.unit for column in self.columns}
 
     @property
-    def headings(self) -> dict[str, str]:
-        """Name of every column with its unit, once."""
-        return {column.name: column.named for column in self.columns}
-
-    @property
     def heads(self) -> tuple[Column, ...]:
         """The first column of every result, which of a load spectrum or a tolerance is the mean."""
         results = [column for column in self.columns if column.kind == "result"]
@@ -244,7 +239,7 @@ class SweepTable:
         """Writes all rows as CSV with the units in the header; cells of failed results are empty."""
         from pyarrow import csv
 
-        quoted = (as_text(heading).replace('"', '""') for heading in self.headings.values())
+        quoted = (as_text(column.named).replace('"', '""') for column in self.columns)
         header = ",".join(f'"{heading}"' for heading in quoted)
 
         def write(file):
