@@ -65,7 +65,7 @@ class SweepTable:
 
     Attributes:
         title: of the sweep.
-        columns: all columns with their units.
+        columns: all columns, each with the quantity that it holds and its cases.
     """
 
     def __init__(self, title: str, columns: Sequence[Column], sizes: Sequence[int], read: Callable):
