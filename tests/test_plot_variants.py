@@ -259,7 +259,7 @@ def test_pareto_and_parallel_coordinates_refuse_what_they_cannot_show(table):
 def test_a_variant_has_one_style_in_all_figures(table):
     """Also where the others of a figure are others."""
     numbers = {"unmodified": 0, "variant 29": 1, "variant 30": 3}
-    with plot.figure.same_styles(numbers):
+    with plot.same_styles(numbers):
         lines = plot.parallel_coordinates(table, PPTE, best=2).lines
         alone = plot.ppte_over_torque([1.0, 2.0], {"unmodified": [1.0, 2.0], "variant 30": [1.0, 2.0]}).lines
         radar = plot.radar(some(table, *RESULTS), [29, 30], ["variant 29", "variant 30"])

@@ -39,7 +39,7 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
     result = Table(("", *evaluations), title=f"{file.title}, {file.torque:g} N m on the pinion")
     first = next(iter(evaluations.values()))
     second = verified(evaluations)
-    rows = told(evaluations)
+    rows = quantities_of(evaluations)
     asked = [quantity for quantity in rows if quantity.named in first.objectives]
     for label in objectives(evaluations):
         result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
@@ -123,7 +123,7 @@ def diameters(gear: Gear):
     return 2 * gear.tip_radius, 2 * gear.tip_form_radius, 2 * gear.bore_radius
 
 
-def told(evaluations: Evaluations) -> list[Quantity]:
+def quantities_of(evaluations: Evaluations) -> list[Quantity]:
     """The quantities that are known of every design, in the order of the vocabulary."""
     known = [evaluation.metrics for evaluation in evaluations.values()]
     return [quantity for quantity in quantities.values() if all(quantity.key in metrics for metrics in known)]
@@ -131,7 +131,7 @@ def told(evaluations: Evaluations) -> list[Quantity]:
 
 def objectives(evaluations: Evaluations) -> list[str]:
     """What an optimization made small, without what is a row of the table anyhow."""
-    known = {quantity.named for quantity in told(evaluations)}
+    known = {quantity.named for quantity in quantities_of(evaluations)}
     return [label for label in next(iter(evaluations.values())).objectives if label not in known]
 
 

@@ -39,7 +39,7 @@ def write_figures(folder: Path, table: SweepTable) -> list[Path]:
     step = -(-size // _DRAWN)
     best = table.best(_CHARTS)
     axes: dict[str, Any] = {}
-    with plot.figure.same_styles(_styles(best)):
+    with plot.same_styles(_styles(best)):
         if len(heads) > 1:
             rows = np.arange(0, size, step)
             if step > 1:  # the front is that of all variants, whichever of the others are drawn
@@ -148,7 +148,7 @@ def _draw(
     """Pictures of all variants together, and those of each alone by its name; a variant has one style in all."""
     from .. import plot
 
-    with plot.figure.same_styles(_styles(best)):
+    with plot.same_styles(_styles(best)):
         return report.write_figures(folder, design, mesh, found, torques), _alone(folder, mesh, found)
 
 

@@ -296,7 +296,7 @@ def _over_torque(ax: Axes, torques: ArrayLike, curves: Mapping[str, ArrayLike], 
         ax.axvline(mark, color=GREY, linewidth=0.8, zorder=0.5)
         text_above(ax, mark, f"design torque {mark:g} N m")
     low, high = np.min([*along, *marks]), np.max([*along, *marks])
-    air = _MARGIN * (high - low)
+    air = _MARGIN * (high - low) or 1.0  # of a single torque
     ax.set_xlim(low - air, high + air)
     ax.set_xlabel("pinion torque [N m]")
     legend_above(ax, distance=ABOVE if design_torque is None else ABOVE_MARKS)

@@ -56,14 +56,13 @@ def write_workbook(path: Path, facts: Sequence[tuple[str, str]], best: SweepTabl
 
 
 def _sheet(sheet, table: SweepTable, bold) -> None:
-    headings = table.headings
-    for place, name in enumerate(table.names):
-        sheet.write_string(0, place, headings[name], bold)
-        sheet.set_column(place, place, min(_WIDEST, len(headings[name]) + _MARGIN))
-        for row, value in enumerate(table.column(name).tolist(), 1):
+    for place, column in enumerate(table.columns):
+        sheet.write_string(0, place, column.named, bold)
+        sheet.set_column(place, place, min(_WIDEST, len(column.named) + _MARGIN))
+        for row, value in enumerate(table.column(column.name).tolist(), 1):
             _cell(sheet, row, place, value)
     sheet.freeze_panes(1, 1)
-    sheet.autofilter(0, 0, max(len(table), 1), len(table.names) - 1)
+    sheet.autofilter(0, 0, max(len(table), 1), len(table.columns) - 1)
 
 
 def _cell(sheet, row: int, place: int, value: Any) -> None:

@@ -1,5 +1,8 @@
 """Many variants, loads or manufactured gears: tables of plans in a resumable store, and the scatter of one design."""
 
+from .columns import Column as Column
+from .columns import axis_label as axis_label
+from .columns import described as described
 from .columns import over_torques as over_torques
 from .monte_carlo import Scatter as Scatter
 from .monte_carlo import monte_carlo as monte_carlo

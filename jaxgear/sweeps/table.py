@@ -65,7 +65,7 @@ class SweepTable:
 
     Attributes:
         title: of the sweep.
-        columns: all columns with their units.
+        columns: all columns, each with the quantity that it holds and its cases.
     """
 
     def __init__(self, title: str, columns: Sequence[Column], sizes: Sequence[int], read: Callable):
@@ -103,11 +103,6 @@ class SweepTable:
     def units(self) -> dict[str, str]:
         """Unit of every column, "" for a pure number."""
         return {column.name: column.unit for column in self.columns}
-
-    @property
-    def headings(self) -> dict[str, str]:
-        """Name of every column with its unit, once."""
-        return {column.name: column.named for column in self.columns}
 
     @property
     def heads(self) -> tuple[Column, ...]:
@@ -244,7 +239,7 @@ class SweepTable:
         """Writes all rows as CSV with the units in the header; cells of failed results are empty."""
         from pyarrow import csv
 
-        quoted = (as_text(heading).replace('"', '""') for heading in self.headings.values())
+        quoted = (as_text(column.named).replace('"', '""') for column in self.columns)
         header = ",".join(f'"{heading}"' for heading in quoted)
 
         def write(file):
