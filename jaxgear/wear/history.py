@@ -154,8 +154,8 @@ def wear(
         line_load: "dynamic" for the flanks to wear under the elastic force of the steady motion that begins at rest,
             found anew in every contact analysis: the contact at every mesh position is that under the force of the
             motion there, and the wear is the mean of the mesh cycles of its orbit, as if every tooth took part in each
-            of them. Flanks have not `converged` where the motion does not settle on an orbit of up to four mesh cycles, or
-            where coast flanks touch, which do not wear here. "static" for dynamic factors alone. None for "dynamic"
+            of them. Flanks have not converged where the motion does not settle on an orbit of up to four mesh cycles,
+            or where coast flanks touch, which do not wear here. "static" for dynamic factors alone. None for "dynamic"
             with dynamics, "static" without.
         largest_increment: depth that no block wears off beyond a tenth more [um], in place of `blocks`. It should stay
             below what the teeth deflect under their load.
