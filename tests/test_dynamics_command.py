@@ -226,7 +226,7 @@ def test_kept_responses_are_not_made_again(tmp_path):
     made = []
     shapes = {"force_harmonics": (2, 3), "velocity_harmonics": (2, 3)}  # of two speeds, three orders and four points
     shapes |= {"poincare_dte": (2, 4), "poincare_velocity": (2, 4)}
-    kinds = {"period": int, "settled": bool}
+    kinds = {"period": int, "status": np.int8}
 
     def sweep():
         """Stands for a sweep that takes long."""

@@ -87,7 +87,7 @@ def test_primary_resonance_and_its_numerical_counterpart(torque, frequency, scal
 
 def test_mean_falls_at_the_primary_resonance():
     settled = settled_vibration(model(0.03, torque=0.02), 0.97636, settling=SETTLING, steps=64)
-    assert np.isclose(settled.mean, 1.50908, atol=5e-6)
+    assert np.isclose(settled.dte_mean, 1.50908, atol=5e-6)
 
 
 def test_stiffness_harmonics_force_directly_and_in_the_slope():

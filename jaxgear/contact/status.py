@@ -1,8 +1,9 @@
 """Why a result counts or does not: one status for the results of all analyses."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from functools import reduce
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -45,7 +46,7 @@ Statuses = Int8[Array, "..."]
 class WithStatus:
     """A result with a status: an array of the numbers of `Status` in its field `status`."""
 
-    status: Statuses
+    status: Any
 
     @property
     def converged(self) -> Bool[Array, "..."]:
@@ -64,6 +65,6 @@ def status_of(causes: Mapping[Status, Bool[Array, "..."] | bool], *parts: Status
     return reduce(jnp.maximum, (*met, *parts))
 
 
-def reason(status: Statuses | np.ndarray) -> str:
+def reason(status: Statuses | np.ndarray | Sequence[Statuses]) -> str:
     """The text of the most basic cause in a concrete array of statuses."""
     return Status(int(np.max(np.asarray(status)))).text

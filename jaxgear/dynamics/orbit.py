@@ -9,7 +9,20 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..contact.status import Status, Statuses, WithStatus, status_of
-from ..numerics import Checked, Given, Numbers, check, count, implicit_root, kernel, real, result, whole, with_jacobian
+from ..numerics import (
+    Checked,
+    Given,
+    Numbers,
+    check,
+    count,
+    implicit_root,
+    kernel,
+    program,
+    real,
+    result,
+    whole,
+    with_jacobian,
+)
 from .integrate import Steps, cycles, history, largest, mean, rms, share, smallest
 from .oscillator import Coordinates, Oscillator, State, static_force
 from .poincare import STEPS, Nodes, Start, Unknowns, after, checked, moved, scaled, steps_at, unscaled
@@ -72,6 +85,15 @@ class Orbit(WithStatus, Checked):
         return self.displacement, self.velocity
 
     @property
+    def amplitude(self) -> Float[Array, "..."]:
+        """Half of the range of the DTE [um]."""
+        return 0.5 * (self.dte_max - self.dte_min)
+
+    def harmonic(self, order: Given) -> Complex[Array, ""]:
+        """Complex amplitude c [um] of the DTE ~ Re(c e^(2 pi i order phase)), of any order; of a single orbit."""
+        return _harmonic(self.phase, self.dte, real(order), self.periods)
+
+    @property
     def multipliers(self) -> Complex[Array, "... unknowns"]:
         """Floquet multipliers: what becomes of small deviations over one orbit."""
         return jnp.linalg.eigvals(self.monodromy)
@@ -80,6 +102,14 @@ class Orbit(WithStatus, Checked):
     def stable(self) -> Bool[Array, "..."]:
         """Whether no small deviation grows: no multiplier lies outside of the unit circle."""
         return ~jnp.any(outside(jnp.abs(jnp.linalg.eigvals(jax.lax.stop_gradient(self.monodromy)))), axis=-1)
+
+
+@program
+def _harmonic(phase: Samples, dte: Samples, order: Scalar, periods: int) -> Complex[Array, ""]:
+    length = jnp.diff(phase, append=jnp.full(1, periods, phase.dtype))
+    part = 0.5 * (length + jnp.roll(length, 1)) / periods * dte
+    angle = 2 * jnp.pi * order * phase
+    return 2 * jax.lax.complex(jnp.sum(part * jnp.cos(angle)), -jnp.sum(part * jnp.sin(angle)))
 
 
 def outside(moduli: Float[Array | np.ndarray, "..."]) -> Bool[Array | np.ndarray, "..."]:

@@ -17,7 +17,7 @@ from ..compliance import AbstractCompliance, TabulatedCompliance
 from ..contact import MeshCycle, Resolution
 from ..geometry import Material
 from ..microgeometry import AbstractModification, EndRelief, NoModification, RootRelief, TipRelief
-from ..numerics import Usual, fields_of, program
+from ..numerics import Given, Usual, fields_of, program
 from .flank import flank_surface
 from .load_distribution import effective_contact_ratio
 from .lubricant import Lubricant

@@ -142,7 +142,7 @@ def annex_e(
 
     Returns:
         the load, differentiable; NaN and not `converged` where it has not been found, as of shafts afloat in their
-        bearings, and where traced gears, shafts, bearings or housing cannot be.
+        bearings, and where traced gears, shafts, bearings or housing are not possible: its status tells which.
 
     Raises:
         ValueError: for a torque beside that of a gearbox, or without any; for numbers out of their range.

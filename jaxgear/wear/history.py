@@ -41,18 +41,18 @@ class WearHistory(WithStatus, Checked):
         depth: worn off pinion and wheel by contact of the flanks and by tip corners [um], shape (steps, gears, parts,
             slices, points).
         error: estimate of the error of that depth by the length of the blocks, largest of all points [um], shape
-            (steps,); NaN where that of two blocks is not known.
+            (steps,); NaN where that of two blocks has not converged.
         pressure_error: estimate of the error of the largest flank pressure by the grid and by the width over which
             contacts average the worn flanks [MPa], shape (steps,), (steps, torques) under a load spectrum; zero on new
-            flanks, NaN on flanks that are not known. It is not part of `error`, which is that of the blocks alone.
+            flanks, NaN on flanks that have not converged. It is not part of `error`, which is that of the blocks alone.
         status: the worst so far, shape (steps,): of the contacts that have worn these flanks, also within blocks; of
             the motion, the coefficient of wear, and what is left of the teeth.
         cycles: the mesh on these flanks, leading axis (steps,); (steps, torques) under a load spectrum. None has
-            converged on flanks that are not known.
+            converged on flanks that have not.
         weights: of the torques of a load spectrum in the revolutions, shape (torques,); None under one torque.
         dynamic_factor: largest mesh force of the steady motion over the static one, at the speed of the load (K_v),
             shape (steps,), (steps, torques) under a load spectrum; NaN where the motion does not settle on an orbit of
-            up to four mesh cycles, and on flanks that are not known. None without dynamics.
+            up to four mesh cycles, and on flanks that have not converged. None without dynamics.
     """
 
     revolutions: Steps = result()
@@ -140,7 +140,7 @@ def wear(
             5e-16 for mild wear of mixed lubrication. Or a function of the state of lubrication at every contact, of
             pressure [MPa], sliding speed [m/s] and flash temperature [K], arrays of shape (pairs, slices, positions),
             to such an array or a pair of them; traced, and asked where there is load. It needs the speed of an
-            `OperatingPoint`. Flanks that NaN or a negative number have worn are not `known`. Where it depends on
+            `OperatingPoint`. Flanks that NaN or a negative number have worn are out of validity. Where it depends on
             numbers of its own to differentiate by, they may be fields of an `equinox.Module`.
         pinion, wheel: modifications of the new flanks; None for nominal involutes.
         deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions);
@@ -154,8 +154,8 @@ def wear(
         line_load: "dynamic" for the flanks to wear under the elastic force of the steady motion that begins at rest,
             found anew in every contact analysis: the contact at every mesh position is that under the force of the
             motion there, and the wear is the mean of the mesh cycles of its orbit, as if every tooth took part in each
-            of them. Flanks are not `known` where the motion does not settle on an orbit of up to four mesh cycles, or
-            where coast flanks touch, which do not wear here. "static" for dynamic factors alone. None for "dynamic"
+            of them. Flanks have not converged where the motion does not settle on an orbit of up to four mesh cycles,
+            or where coast flanks touch, which do not wear here. "static" for dynamic factors alone. None for "dynamic"
             with dynamics, "static" without.
         largest_increment: depth that no block wears off beyond a tenth more [um], in place of `blocks`. It should stay
             below what the teeth deflect under their load.
@@ -256,7 +256,7 @@ def _by_pairs(case: Case, total: float, blocks: int, limit: float | None, keep, 
             # the rest is gone through in pairs of one length, not in a last short one
             rest = total - done - BLOCKS_OF_A_PAIR * now
             length = rest / (BLOCKS_OF_A_PAIR * max(1, np.ceil(rest / (BLOCKS_OF_A_PAIR * length) - 1e-9)))
-            if lost:  # the flanks of the rest are not known, however short the blocks
+            if lost:  # the flanks of the rest have not converged, however short the blocks
                 length = rest / BLOCKS_OF_A_PAIR
         at += [done + now, done + BLOCKS_OF_A_PAIR * now]
         done, left = at[-1], left - 1

@@ -37,5 +37,4 @@ from .resonances import primary_resonance as primary_resonance
 from .resonances import response_curve as response_curve
 from .resonances import sub_harmonic_resonance as sub_harmonic_resonance
 from .resonances import super_harmonic_resonance as super_harmonic_resonance
-from .settle import Settled as Settled
 from .settle import settled_vibration as settled_vibration
