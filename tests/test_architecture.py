@@ -34,6 +34,7 @@ ORDER = (
     "io",
     "plot",
     "report",
+    "studies",
     "cli",
 )
 FILES = sorted(PACKAGE.rglob("*.py"))

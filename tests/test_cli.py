@@ -25,7 +25,7 @@ from report_page import Page, check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import app, cache, geometry, main, manufactured, optimum_report, report, run, study
+from jaxgear.cli import app, cache, geometry, main, manufactured, optimum_report, report, run
 from jaxgear.cli.geometry import gears
 from jaxgear.cli.optimum_report import front_rows, front_table, gains
 from jaxgear.io import load_design, optimize_request
@@ -37,6 +37,7 @@ from jaxgear.metrics.findings import Range
 from jaxgear.microgeometry import NoModification
 from jaxgear.optimize import result as optimum_result
 from jaxgear.report import read_table
+from jaxgear.studies import evaluation
 from jaxgear.tolerance import ToleranceClass, iso_rounded
 
 pytestmark = pytest.mark.usefixtures("no_cache")
@@ -693,7 +694,7 @@ def test_a_failed_contact_solution_is_loud(folder, tmp_path, monkeypatch, analyz
         cycles = jg.sweeps.over_torques(*arguments, **flanks)
         return [replace(cycle, converged=np.zeros_like(cycle.converged)) for cycle in cycles]
 
-    monkeypatch.setattr(study, "over_torques", failed)
+    monkeypatch.setattr(evaluation, "over_torques", failed)
     path = tmp_path / "fails.toml"
     path.write_text(FIXED)
     result = call("analyze", path, "--no-figures", "-o", tmp_path / "out")

@@ -11,11 +11,11 @@ import rich.table
 from ..contact import Mesh
 from ..io import DesignFile
 from ..report import Chapter, read_table
+from ..studies.evaluation import Evaluation
 from ..sweeps import Scatter, monte_carlo
 from ..tolerance import Tolerance
 from . import report
 from .report import Evaluations
-from .study import Evaluation
 
 _QUICK_PAIRS = 16
 

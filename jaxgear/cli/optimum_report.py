@@ -19,8 +19,8 @@ from ..microgeometry import AbstractModification
 from ..optimize import Front, Optimum, Problem, Projection
 from ..optimize.result import PENALIZED
 from ..report import Table
+from ..studies.evaluation import response_surface
 from . import report
-from .study import response_surface
 
 _PPTE = "ppte [um]"
 _SAME = 0.05  # [%]; a smaller change rounds to nothing

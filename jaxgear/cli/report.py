@@ -17,7 +17,7 @@ from ..io.results import unit_of
 from ..metrics import Finding, findings_of, quantities
 from ..numerics import program
 from ..optimize import Verified
-from .study import Evaluation, grid_lines
+from ..studies.evaluation import Evaluation, grid_lines
 from .terminal import console as console
 from .terminal import say as say
 from .terminal import say_rows as say_rows

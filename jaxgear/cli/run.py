@@ -38,13 +38,13 @@ from ..optimize import (
     verification,
 )
 from ..report import Table as Block
+from ..studies.evaluation import Evaluation, evaluate
 from . import interrupt, manufactured, optimum_report, report, summary_file
 from .cache import enable_cache
 from .document import CommandResult, Document
 from .geometry import mounting
 from .optimum_report import COMPROMISE, front_table
 from .progress import Stages
-from .study import Evaluation, evaluate
 
 _TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
 _QUICK_POSITIONS = 16

@@ -17,10 +17,10 @@ from ..metrics import Finding
 from ..numerics import Number, fields_of
 from ..optimize import Verified
 from ..shafts import RigidSupport
+from ..studies.evaluation import Evaluation
 from . import manufactured
 from .geometry import gears
 from .report import Evaluations, diameters, reduction
-from .study import Evaluation
 from .version import version
 
 

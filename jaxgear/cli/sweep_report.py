@@ -14,13 +14,13 @@ from ..io import DesignFile
 from ..metrics import Quantity, findings_of, quantity_of
 from ..microgeometry import NoModification
 from ..report import Chapter, Table, figure, text, write_variants, write_workbook
+from ..studies.evaluation import evaluate, grid_change, grid_lines
 from ..sweeps import SweepTable, over_torques
 from . import report
 from .document import CommandResult, Document, project_facts
 from .geometry import gears
 from .progress import Stages
 from .run import Modifications, torques_of
-from .study import evaluate, grid_change, grid_lines
 from .summary_file import sizes, versions
 
 _DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory does not grow with the table
