@@ -93,7 +93,7 @@ HEAVY = {
     "jaxgear.plot",
 }
 # so do the commands, and their help without any of the library
-_NAMES = "commands", "convert", "devices", "dynamics", "layout", "new", "sweep", "wear"
+_NAMES = "commands", "convert", "devices", "new", "study_command", "sweep"
 COMMANDS = {f"jaxgear.cli.{name}" for name in _NAMES}
 
 

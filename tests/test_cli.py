@@ -25,8 +25,7 @@ from report_page import Page, check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import app, cache, geometry, main, manufactured, optimum_report, report, run
-from jaxgear.cli.geometry import gears
+from jaxgear.cli import app, cache, main, manufactured, optimum_report, report, run
 from jaxgear.cli.optimum_report import front_rows, front_table, gains
 from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
@@ -38,6 +37,7 @@ from jaxgear.microgeometry import NoModification
 from jaxgear.optimize import result as optimum_result
 from jaxgear.report import read_table
 from jaxgear.studies import evaluation
+from jaxgear.studies.gear_data import gears
 from jaxgear.tolerance import ToleranceClass, iso_rounded
 
 pytestmark = pytest.mark.usefixtures("no_cache")
@@ -72,8 +72,8 @@ couplings = [{ position = 190.0 }]
 @pytest.fixture(scope="module", autouse=True)
 def few_torques():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run, "_TORQUES", 5)
-        patch.setattr(run, "_QUICK_TORQUES", 5)
+        patch.setattr(evaluation, "_TORQUES", 5)
+        patch.setattr(evaluation, "_QUICK_TORQUES", 5)
         yield
 
 
@@ -298,7 +298,7 @@ def test_the_reports_hold_what_was_found(folder, analyzed, optimized):
         assert width == pytest.approx(30e-3 * times, rel=1e-9 if key == "span" else 0.05)
     chosen = "span = [22.85, 22.88]\nteeth_spanned = 3"
     (folder / "thin.toml").write_text(file.read_text().replace("[pinion]", "[pinion]\n" + chosen, 1))
-    (teeth, ball, quality), (free, *_) = geometry.chosen(load_design(folder / "thin.toml"))
+    (teeth, ball, quality), (free, *_) = gear_data.chosen(load_design(folder / "thin.toml"))
     assert (float(teeth), ball, float(quality.quality_class), free) == (3.0, None, 5.0, None)
     factors = [one["pinion_form_factor"] for one in analyzed.summary["iso_6336"].values()]
     assert rows["pinion form factor, Y_F"] == [f"{factor:.6g}" for factor in factors] and factors[0] > 1

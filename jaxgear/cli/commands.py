@@ -5,13 +5,10 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
-from ..geometry import GearPair
-from ..io import DesignFile, DesignFileError, optimize_request
-from ..microgeometry import AbstractModification, NoModification
-from ..numerics import compile_quickly, program
-from ..sizing import iso_relief
+from ..io import DesignFileError, optimize_request
+from ..microgeometry import NoModification
+from ..numerics import compile_quickly
+from ..studies.comparison import rule_based
 from .document import document
 from .progress import Stages
 from .run import default_folder, opened, run
@@ -79,13 +76,3 @@ def optimize(
 def import_ahead(*modules: str) -> None:
     """Imports what is needed later in another thread: this one will wait for the compiler."""
     threading.Thread(target=lambda: [importlib.import_module(module) for module in modules]).start()
-
-
-def rule_based(design: DesignFile) -> AbstractModification:
-    """The relief of ISO 6336-1 for both tips."""
-    return _iso_relief(design.pair(), np.asarray(design.torque), np.asarray(design.optimize.application_factor))
-
-
-@program
-def _iso_relief(pair: GearPair, torque, application_factor):
-    return iso_relief(pair, torque, application_factor=application_factor)

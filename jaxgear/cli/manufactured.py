@@ -12,12 +12,11 @@ from ..contact import Mesh
 from ..io import DesignFile
 from ..report import Chapter, read_table
 from ..studies.evaluation import Evaluation
+from ..studies.manufactured import pairs_in_words, pairs_of
 from ..sweeps import Scatter, monte_carlo
 from ..tolerance import Tolerance
 from . import report
 from .report import Evaluations
-
-_QUICK_PAIRS = 16
 
 
 def scattered(
@@ -33,19 +32,6 @@ def scattered(
         )
         for name, found in evaluations.items()
     }
-
-
-def pairs_of(design: DesignFile, *, quick: bool) -> int:
-    """How many manufactured pairs a design is judged by."""
-    assert design.tolerance is not None
-    return min(design.tolerance.samples, _QUICK_PAIRS) if quick else design.tolerance.samples
-
-
-def left_out(design: DesignFile, why: str = "") -> str:
-    """That an analysis is of nominal gears though the file has tolerances; "" where it has none."""
-    if design.tolerance is None:
-        return ""
-    return "[tolerance] is not part of this analysis, the gears are nominal" + f" ({why})" * bool(why)
 
 
 def lines(design: DesignFile, evaluations: Evaluations) -> Iterator[str]:
@@ -110,11 +96,6 @@ def summary(evaluation: Evaluation) -> dict[str, Any]:
     }
 
 
-def tolerances(design: DesignFile) -> dict[str, Any]:
-    """What the table [tolerance] says, as plain data."""
-    return {} if design.tolerance is None else {"tolerances": design.tolerance.given()}
-
-
 def write_figures(folder: Path, evaluations: Evaluations) -> list[Path]:
     """Draws the scatter of all designs; gives the files."""
     scatters = _scatters(evaluations)
@@ -132,11 +113,3 @@ def _scatters(evaluations: Evaluations) -> Mapping[str, Scatter]:
 
 def _pairs(design: DesignFile, scatter: Scatter) -> str:
     return pairs_in_words(design, scatter.ppte.shape[0])
-
-
-def pairs_in_words(design: DesignFile, count: int) -> str:
-    """How many manufactured pairs of which class."""
-    assert design.tolerance is not None
-    classes = design.tolerance.quality_class
-    named = "/".join(map(str, classes)) if isinstance(classes, list) else str(classes)
-    return f"{count} manufactured pairs of quality class {named}"

@@ -18,6 +18,9 @@ from ..metrics import Finding, findings_of, quantities
 from ..numerics import program
 from ..optimize import Verified
 from ..studies.evaluation import Evaluation, grid_lines
+from ..studies.finding_lines import WARNING as WARNING
+from ..studies.finding_lines import finding_lines as finding_lines
+from ..studies.results import save_figures as save_figures
 from .terminal import console as console
 from .terminal import say as say
 from .terminal import say_rows as say_rows
@@ -55,7 +58,6 @@ _TABLE = (
     *("micropitting_safety", "scuffing_safety"),
 )
 _BY_FINITE_ELEMENTS = "  by finite elements"
-WARNING = "warning: "
 _HARRIS_CURVES = 7
 _ORDERS = 8  # of the transmission error that are drawn
 _TITLE = 9.0  # [pt]
@@ -125,22 +127,6 @@ def _support_deflection(mesh: Mesh, line_load) -> Float[Array, ""]:
     return jnp.mean(mesh.support_deflection(line_load))
 
 
-def finding_lines(found: Mapping[str, tuple[Finding, ...]]) -> Iterator[str]:
-    """A line for everything that is not usual, with the designs that have it and their numbers where they differ."""
-    grouped: dict[tuple[str, str], dict[str, Finding]] = {}
-    for design, several in found.items():
-        for finding in several:
-            grouped.setdefault((finding.name, finding.where), {})[design] = finding
-    for same in grouped.values():
-        finding = list(same.values())[-1]  # the last is the one that the run is about
-        numbers = {design: f"{each.value:.4g} {each.limit.unit}".rstrip() for design, each in same.items()}
-        if len(set(numbers.values())) > 1:
-            said = f"{', '.join(f'{design} {number}' for design, number in numbers.items())}: "
-        else:
-            said = "" if len(same) == len(found) else f"{', '.join(same)}: "
-        yield f"{WARNING}{said}{finding}"
-
-
 def grid(evaluations: Evaluations, more: str = "") -> Iterator[str]:
     """How fine the mesh was, and what a finer one would change, besides `more`."""
     positions = next(iter(evaluations.values())).cycle.kinematics.resolution.positions
@@ -181,13 +167,18 @@ def main_name(evaluations: Evaluations) -> str:
     return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
 
 
+def without_windows() -> None:
+    """Lets matplotlib draw into files alone: the command line never shows a window."""
+    import matplotlib
+    import matplotlib.pyplot  # waits for the thread that imports it ahead
+
+    matplotlib.use("Agg")
+
+
 def write_figures(
     folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray
 ) -> list[Path]:
     """Writes the figures of the designs; the Harris map shows the main one. Gives the files."""
-    import matplotlib
-
-    matplotlib.use("Agg")  # the command line never shows a window
     from .. import plot
 
     cycles = {name: evaluation.cycle for name, evaluation in evaluations.items()}
@@ -239,17 +230,6 @@ def _band(file: DesignFile, evaluations: Evaluations) -> dict[str, Any]:
     """The tolerance band of a chart about the main design, where the file names a quality class."""
     classes = quality_classes(file)
     return {} if classes is None else {"tolerance": classes, "about": main_name(evaluations)}
-
-
-def save_figures(folder: Path, axes: Mapping[str, Any], *, bold: str | None = None) -> list[Path]:
-    """Writes the figures that hold the axes, each under its name, the lines of one design bold; gives the files."""
-    from .. import plot
-
-    figures = {name: np.ravel(drawn)[0].figure for name, drawn in axes.items()}
-    if bold is not None:
-        for figure in figures.values():
-            plot.emphasize(figure, bold)
-    return [plot.save(figure, folder / f"{name}.png") for name, figure in figures.items()]
 
 
 def flanks(evaluations: Evaluations):

@@ -8,11 +8,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import jax
-import numpy as np
 from rich.table import Table
 
 from ..compliance import Compliance, TabulatedCompliance
-from ..contact import Mesh, Resolution
+from ..contact import Mesh
 from ..io import (
     DesignFile,
     DesignFileError,
@@ -38,19 +37,16 @@ from ..optimize import (
     verification,
 )
 from ..report import Table as Block
-from ..studies.evaluation import Evaluation, evaluate
+from ..studies.comparison import Modifications
+from ..studies.evaluation import Evaluation, coarse, evaluate, torques_of
+from ..studies.gear_data import mounting
 from . import interrupt, manufactured, optimum_report, report, summary_file
 from .cache import enable_cache
 from .document import CommandResult, Document
-from .geometry import mounting
 from .optimum_report import COMPROMISE, front_table
 from .progress import Stages
 
-_TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
-_QUICK_POSITIONS = 16
 _USUAL = "none, inputs and results lie within the usual ranges"
-
-Modifications = tuple[AbstractModification, AbstractModification]
 
 
 class CommandRun:
@@ -173,6 +169,7 @@ class CommandRun:
             document.write(self._folder, self.design, data, found)
 
     def _draw(self) -> list[Path]:
+        report.without_windows()
         files = report.write_figures(self._folder, self.design, self._mesh, self._evaluations, self._torques)
         files += manufactured.write_figures(self._folder, self._evaluations)
         if self._optimum is not None:
@@ -252,16 +249,6 @@ def opened(file: Path, *, cache: bool) -> DesignFile:
     if cache:
         enable_cache()
     return load_design(file)
-
-
-def coarse(size: Resolution) -> Resolution:
-    """The array sizes of a quick run."""
-    return dataclasses.replace(size, positions=min(size.positions, _QUICK_POSITIONS))
-
-
-def torques_of(design: DesignFile, *, quick: bool) -> np.ndarray:
-    """Torques over the range of a design file [N m], at which its designs are evaluated."""
-    return np.linspace(*design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
 
 
 def default_folder(file: Path, *command: str, quick: bool = False) -> Path:

@@ -1,27 +1,25 @@
 """What a run writes as `summary.json`: every number of its designs, its gears and its model."""
 
 import dataclasses
-import platform
 from collections.abc import Mapping
 from typing import Any
 
 import equinox as eqx
-import jax
 import numpy as np
 
-from ..contact import Mesh, Resolution
+from ..contact import Mesh
 from ..geometry import Gear
 from ..io import DesignFile, describe
-from ..io.table_keys import snake
 from ..metrics import Finding
 from ..numerics import Number, fields_of
 from ..optimize import Verified
 from ..shafts import RigidSupport
 from ..studies.evaluation import Evaluation
+from ..studies.gear_data import gears
+from ..studies.manufactured import tolerances
+from ..studies.summary_data import finding_data, identity, model, sizes, versions
 from . import manufactured
-from .geometry import gears
 from .report import Evaluations, diameters, reduction
-from .version import version
 
 
 def summary(
@@ -42,7 +40,7 @@ def summary(
         "gears": {name: _gear(getattr(mesh.pair, name)) | _drawn(drawn) for name, drawn in file.drawn.items()},
         "center_distance_mm": of_gears["geometry"]["pair"]["center_distance_mm"],
         **_misalignment(mesh),
-        **manufactured.tolerances(file),
+        **tolerances(file),
         **{name: _numbers(part) for name in ("lubricant", "strength") if (part := getattr(file, name)) is not None},
         "model": model(mesh),
         "designs": {
@@ -59,12 +57,6 @@ def summary(
         "resolution": sizes(mesh.resolution),
         "versions": versions(),
     }
-
-
-def identity(file: DesignFile) -> dict[str, Any]:
-    """What every `summary.json` begins with."""
-    project = {"project": file.project} if file.project else {}
-    return {"title": file.title, "design_file": file.path.name, **project}
 
 
 def _design(evaluation: Evaluation) -> dict[str, Any]:
@@ -118,48 +110,8 @@ def _key(name: str, field: Number) -> str:
     return f"{name}_{unit}" if unit else name
 
 
-def versions() -> dict[str, str]:
-    """Of everything that a result depends on, by name."""
-    return {
-        "jaxgear": version(),
-        "jax": jax.__version__,
-        "numpy": np.__version__,
-        "python": platform.python_version(),
-        "platform": platform.platform(),
-    }
-
-
-def sizes(of: Resolution) -> dict[str, Any]:
-    """Array sizes by name."""
-    return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
-
-
-def model(mesh: Mesh) -> dict[str, Any]:
-    """The compliance by the names of its parts, with their options, and its plane state."""
-    return {"compliance": _options(mesh.compliance), "plane": mesh.compliance.plane}
-
-
 def _misalignment(mesh: Mesh) -> dict[str, float]:
     """Misalignment over the face where the axes are not parallel [um]."""
     if not isinstance(mesh.support, RigidSupport):
         return {}
     return {"misalignment_um": float(mesh.support.misalignment.over_face(mesh.pair))}
-
-
-def _options(part: eqx.Module) -> dict[str, Any]:
-    """The type of a part and its options, in the words of a design file; of tables their sizes."""
-    data: dict[str, Any] = {"type": snake(type(part).__name__)}
-    for field in dataclasses.fields(part):
-        value = getattr(part, field.name)
-        if isinstance(value, eqx.Module):
-            data[field.name] = _options(value)
-        elif np.ndim(value):
-            data[field.name] = " x ".join(map(str, np.shape(value))) + " values"
-        elif value is not None and field.name != "plane":
-            data[field.name] = value if isinstance(value, str | bool | int) else np.asarray(value)
-    return data
-
-
-def finding_data(finding: Finding) -> dict[str, Any]:
-    """A finding by name, place, value and what is usual."""
-    return {"name": finding.name, "where": finding.where, "value": finding.value, **finding.limit._asdict()}

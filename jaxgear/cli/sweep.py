@@ -10,11 +10,12 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..io import sweep_request, writing
+from ..studies.evaluation import coarse
 from ..sweeps import SweepTable, sweep
 from . import interrupt, report, sweep_report
 from .document import document
 from .progress import Meter
-from .run import coarse, default_folder, opened
+from .run import default_folder, opened
 from .sweep_report import evaluate_best, said_of_best, write_figures
 
 _QUICK_SAMPLES = 4096

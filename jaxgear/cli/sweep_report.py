@@ -14,14 +14,14 @@ from ..io import DesignFile
 from ..metrics import Quantity, findings_of, quantity_of
 from ..microgeometry import NoModification
 from ..report import Chapter, Table, figure, text, write_variants, write_workbook
-from ..studies.evaluation import evaluate, grid_change, grid_lines
+from ..studies.comparison import Modifications
+from ..studies.evaluation import evaluate, grid_change, grid_lines, torques_of
+from ..studies.gear_data import gears
+from ..studies.summary_data import sizes, versions
 from ..sweeps import SweepTable, over_torques
 from . import report
 from .document import CommandResult, Document, project_facts
-from .geometry import gears
 from .progress import Stages
-from .run import Modifications, torques_of
-from .summary_file import sizes, versions
 
 _DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory does not grow with the table
 _CHARTS = 6  # radar charts

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import jax
 import numpy as np
 
-from ..contact import Mesh, MeshCycle, OperatingPoint
+from ..contact import Mesh, MeshCycle, OperatingPoint, Resolution
 from ..contact.mesh import half_way
 from ..io import DesignFile, quantities_of_tables
 from ..metrics import excited_by, face_load_factor, quantities, rating_factors, summary
@@ -18,6 +18,8 @@ from ..optimize import Verified
 from ..sweeps import Scatter, over_torques
 
 _SURFACE_REACH, _SURFACE_TORQUES = 2.0, 21
+_TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
+_QUICK_POSITIONS = 16
 # extremes over the positions, which depend on their number
 _EXTREMES = "ppte_um", "force_excitation_N", "max_flank_pressure_MPa", "max_corner_pressure_MPa"
 
@@ -56,6 +58,16 @@ class Evaluation:
     verified: Verified | None = None
     face_load: np.ndarray = field(default_factory=lambda: np.empty(0))
     scatter: Scatter | None = None
+
+
+def coarse(size: Resolution) -> Resolution:
+    """The array sizes of a quick run."""
+    return replace(size, positions=min(size.positions, _QUICK_POSITIONS))
+
+
+def torques_of(design: DesignFile, *, quick: bool) -> np.ndarray:
+    """Torques over the range of a design file [N m], at which its designs are evaluated."""
+    return np.linspace(*design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
 
 
 def evaluate(

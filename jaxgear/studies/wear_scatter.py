@@ -1,7 +1,6 @@
-"""What the designs of `jaxgear wear` are worth once they are made: lives of gears within the tolerances of the file."""
+"""What the designs of a wear study are worth once they are made: lives of gears within the tolerances of the file."""
 
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import jax
@@ -17,8 +16,7 @@ from ..numerics import Quantile, program, real
 from ..tolerance import Tolerance
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import LIVES_AHEAD, number_of
-from . import manufactured, report
-from .study import Kept
+from . import manufactured
 
 # of every manufactured pair of a design, by name of the quantity, shape (pairs,); NaN where it has failed
 Samples = Mapping[str, np.ndarray]
@@ -27,18 +25,6 @@ _PPTE, _DEPTH = "mean_ppte_over_life", "wear_depth"
 _LIVES = {"life_to_depth": ("depth_limit", LIVES_AHEAD), "life_to_ppte": ("ppte_limit", 1.0)}
 _LEVEL = 0.95
 _SIDE_BY_SIDE = 32  # lives
-
-
-class Arrays:
-    """Samples as arrays, for `Kept`."""
-
-    def arrays(self, found: Samples) -> dict[str, Any]:
-        """All of them."""
-        return dict(found)
-
-    def result(self, arrays: dict[str, Any]) -> Samples:
-        """The samples."""
-        return arrays
 
 
 def left_out(design: DesignFile) -> str:
@@ -58,7 +44,7 @@ def scattered(
     mesh: Mesh,
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]],
     tolerance: Tolerance,
-    kept: Kept[Samples],
+    kept: Callable[[Any, Callable[[], Samples]], Samples],
     *,
     quick: bool,
 ) -> dict[str, Samples]:
@@ -70,7 +56,7 @@ def scattered(
         mesh: on which the designs are compared.
         designs: modifications of pinion and wheel by name.
         tolerance: of the gears.
-        kept: what was found before the command was interrupted.
+        kept: checkpoints of what is found, arrays by name.
         quick: of few pairs.
     """
     assert design.tolerance is not None
@@ -164,15 +150,14 @@ def failed(samples: Samples) -> int:
     return int(np.sum(~np.isfinite(samples[_PPTE])))
 
 
-def write_figures(folder: Path, scatters: Mapping[str, Samples]) -> list[Path]:
-    """Draws the scatter of all designs; gives the files."""
+def figures(scatters: Mapping[str, Samples]) -> dict[str, Any]:
+    """Axes with the scatter of all designs; empty without a table [tolerance]."""
     if not scatters:
-        return []
+        return {}
     from .. import plot
 
     samples = {name: of[_PPTE] for name, of in scatters.items()}
-    axes = plot.ppte_distribution(samples, of="mean PPTE over the life")
-    return report.save_figures(folder, {"life_ppte_distribution": axes})
+    return {"life_ppte_distribution": plot.ppte_distribution(samples, of="mean PPTE over the life")}
 
 
 def _mean(samples: Samples, name: str) -> float:
