@@ -25,8 +25,7 @@ from report_page import Page, check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import app, cache, main, manufactured, optimum_report, report, run
-from jaxgear.cli.optimum_report import front_rows, front_table, gains
+from jaxgear.cli import app, cache, main, run
 from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
 from jaxgear.io.schema import METHODS_WITHOUT_VARIABLES
@@ -36,8 +35,10 @@ from jaxgear.metrics.findings import Range
 from jaxgear.microgeometry import NoModification
 from jaxgear.optimize import result as optimum_result
 from jaxgear.report import read_table
-from jaxgear.studies import evaluation
+from jaxgear.studies import evaluation, gear_data, manufactured, optimum_report, side_by_side
+from jaxgear.studies.comparison_run import ComparisonRun
 from jaxgear.studies.gear_data import gears
+from jaxgear.studies.optimum_report import front_rows, front_table, gains
 from jaxgear.tolerance import ToleranceClass, iso_rounded
 
 pytestmark = pytest.mark.usefixtures("no_cache")
@@ -237,7 +238,7 @@ def test_what_is_not_usual_is_said_once_of_all_designs_it_concerns():
             Finding("flank pressure", "", 3383.0, usual),
         ),
     }
-    assert list(report.finding_lines(found)) == [
+    assert list(side_by_side.finding_lines(found)) == [
         "warning: friction 3.7 is more than 0.5 (steel)",
         "warning: unmodified 4689 MPa, optimum 1837 MPa: corner pressure 1837 MPa is more than 1650 MPa "
         "(case-hardened)",
@@ -429,10 +430,9 @@ def test_a_front_is_tabulated_drawn_and_compared(monkeypatch):
     ):
         monkeypatch.setattr(owner, name, lambda *given, found=found, **options: found)
     monkeypatch.setattr(plot, "optimum_front", lambda front, **options: options)
-    monkeypatch.setattr(report, "save_figures", lambda folder, axes: axes)
     cycle = SimpleNamespace(unloaded_transmission_error=None, torque=1.0)
     optimum = SimpleNamespace(cycle=cycle, pinion=None, wheel=None, iterations=())
-    drawn = optimum_report.write_figures(None, SimpleNamespace(phase=None), 1.0, optimum, front, designs)["front"]
+    drawn = optimum_report.figures(SimpleNamespace(phase=None), 1.0, optimum, front, designs)["front"]
     assert drawn["chosen"] == 1 and {name: [*point] for name, point in drawn["others"].items()} == {
         name: both[name] for name in ("unmodified", "rule-based")
     }
@@ -523,7 +523,7 @@ def not_searched(monkeypatch):
             self.evaluate(name, *modifications)
         self.evaluate("optimum", *beside["rule-based"])
 
-    monkeypatch.setattr(run.CommandRun, "search", evaluated)
+    monkeypatch.setattr(ComparisonRun, "search", evaluated)
 
 
 def test_what_cannot_be_meshed_is_not_verified(tmp_path, not_searched):
@@ -788,9 +788,9 @@ def test_interruption_leaves_earlier_results_alone(folder, tmp_path, monkeypatch
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run.CommandRun, "prepare", lambda self, **_: None)
-    monkeypatch.setattr(run.CommandRun, "evaluate", interrupt)
-    monkeypatch.setattr(run.CommandRun, "search", interrupt)
+    monkeypatch.setattr(ComparisonRun, "prepare", lambda self, **_: None)
+    monkeypatch.setattr(ComparisonRun, "evaluate", interrupt)
+    monkeypatch.setattr(ComparisonRun, "search", interrupt)
     name = {"analyze": "fixed", "optimize": "free"}[command]
     result = call(command, folder / f"{name}.toml", "-o", target)
     assert result.code == 130
@@ -803,7 +803,7 @@ def test_a_defect_of_the_program_is_one_line_too(folder, tmp_path, monkeypatch):
     def fail(*_, **__):
         raise TypeError("two\nlines")
 
-    monkeypatch.setattr(run.CommandRun, "prepare", fail)
+    monkeypatch.setattr(ComparisonRun, "prepare", fail)
     target = tmp_path / "out"
     result = call("analyze", folder / "fixed.toml", "-o", target)
     assert_refused(result, "unexpected TypeError: two lines (JAXGEAR_DEBUG=1 shows where)")

@@ -9,11 +9,11 @@ import pytest
 from commands import LINE
 
 import jaxgear as jg
-from jaxgear.cli import commands, sweep
+from jaxgear.cli import run, sweep
 from jaxgear.contact import OperatingPoint
 from jaxgear.io import DesignFileError, load_design, optimize_request, quantities_of_tables, sweep_request
 from jaxgear.numerics import program
-from jaxgear.studies import evaluation
+from jaxgear.studies import Analysis, evaluation
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -185,7 +185,8 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
     with pytest.raises(ValueError, match=r"holds a sweep of other settings \(.*friction"):
         sweep_table(file(PAIR + "friction = 0.05" + OIL + STRENGTH + RELIEF), tmp_path)
     fixed = RELIEF.partition("[variables]")[0].replace('"amount"', "6.0")
-    assert commands.analyze(file(PAIR + OIL + STRENGTH + fixed), tmp_path / "out", figures=False, cache=False)
+    path = file(PAIR + OIL + STRENGTH + fixed)
+    assert run.run_study(Analysis.of, path, tmp_path / "out", figures=False, cache=False)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     modified, expected = summary["designs"]["modified"], solved(6.0)
     assert [modified[quantity.key] for quantity in numbers] == pytest.approx([float(number) for number in expected])

@@ -6,6 +6,7 @@ JAX and the library are imported when a command runs: help, version and what is 
 import os
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
 
@@ -90,6 +91,56 @@ def new(
     return OK
 
 
+def _run(
+    place: str,
+    context: typer.Context,
+    file: Path,
+    output: Path | None,
+    *,
+    no_figures: bool,
+    reported: bool,
+    no_cache: bool,
+    **options: Any,
+) -> int:
+    """Runs the command of a study.
+
+    Args:
+        place: of its class, as `module:class`.
+        context: of the command line.
+        file, output, no_figures, reported, no_cache: options that all studies have.
+        options: further ones of this study.
+    """
+    with interrupt.importing():
+        from . import run
+
+        study = registry.load(place)
+    shared: dict[str, Any] = {"figures": not no_figures, "cache": not no_cache, "command": typed(context, reported)}
+    return OK if run.run_study(partial(study.of, **options), file, output, **shared) else NOT_CONVERGED
+
+
+def _study(place: str, name: str) -> Callable[..., int]:
+    """The command of a study without options of its own.
+
+    Args:
+        place: of its class, as `module:class`.
+        name: of the command.
+    """
+
+    def command(
+        context: typer.Context,
+        file: File,
+        output: Annotated[Path | None, output_option(name)] = None,
+        quick: Quick = False,
+        no_figures: NoFigures = False,
+        reported: Reported = False,
+        no_cache: NoCache = False,
+    ) -> int:
+        shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
+        return _run(place, context, file, output, **shared, quick=quick)
+
+    return command
+
+
 @app.command()
 def analyze(
     context: typer.Context,
@@ -100,10 +151,8 @@ def analyze(
     no_cache: NoCache = False,
 ) -> int:
     """Analyze the unmodified pair and the modification of the design file."""
-    with interrupt.importing():
-        from . import commands
-    fine = commands.analyze(file, output, figures=not no_figures, cache=not no_cache, command=typed(context, reported))
-    return OK if fine else NOT_CONVERGED
+    shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
+    return _run("jaxgear.studies.analysis:Analysis", context, file, output, **shared)
 
 
 @app.command()
@@ -124,46 +173,9 @@ def optimize(
     Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
     the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
     """
-    with interrupt.importing():
-        from . import commands
-    fine = commands.optimize(
-        file,
-        output,
-        method=method,
-        quick=quick,
-        figures=not no_figures,
-        cache=not no_cache,
-        command=typed(context, reported),
-    )
-    return OK if fine else NOT_CONVERGED
-
-
-def _study(place: str, name: str) -> Callable[..., int]:
-    """The command of a study.
-
-    Args:
-        place: of its class, as `module:class`.
-        name: of the command.
-    """
-
-    def command(
-        context: typer.Context,
-        file: File,
-        output: Annotated[Path | None, output_option(name)] = None,
-        quick: Quick = False,
-        no_figures: NoFigures = False,
-        reported: Reported = False,
-        no_cache: NoCache = False,
-    ) -> int:
-        with interrupt.importing():
-            from . import study_command
-
-            study = registry.load(place)
-        options = {"quick": quick, "figures": not no_figures, "cache": not no_cache}
-        fine = study_command.run_study(study, file, output, **options, command=typed(context, reported))
-        return OK if fine else NOT_CONVERGED
-
-    return command
+    shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
+    place = "jaxgear.studies.optimization:Optimization"
+    return _run(place, context, file, output, **shared, method=method, quick=quick)
 
 
 for _name, _place in registry.own().items():
@@ -250,11 +262,11 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a title beyond the terminal's alphabet is no reason to fail
     with interrupt.listening(), streams.warnings():
-        code = _run(arguments)
+        code = _code_of(arguments)
     sys.exit(code)
 
 
-def _run(arguments: Sequence[str] | None) -> int:
+def _code_of(arguments: Sequence[str] | None) -> int:
     try:
         given = sys.argv[1:] if arguments is None else list(arguments)
         code = app(args=given, obj=given, prog_name="jaxgear", standalone_mode=False)

@@ -8,7 +8,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeE
 
 from .. import studies
 from ..io.folder import earlier
-from . import interrupt, report
+from . import interrupt, terminal
 
 _LINES = 10  # of a sweep, where there is no terminal, and more
 _QUIET = 30.0  # seconds after which there is a line anyway
@@ -16,7 +16,7 @@ _QUIET = 30.0  # seconds after which there is a line anyway
 
 class _Bar(Progress):
     def __init__(self, *columns: ProgressColumn, doing: str, note: str):
-        console = report.console(stderr=True)
+        console = terminal.console(stderr=True)
         super().__init__(*columns, console=console, transient=True, disable=not console.is_terminal)
         self._began = time.perf_counter()
         self._task = self.add_task(doing, total=None, note=note)

@@ -12,7 +12,8 @@ from rich.table import Table
 from ..io import sweep_request, writing
 from ..studies.evaluation import coarse
 from ..sweeps import SweepTable, sweep
-from . import interrupt, report, sweep_report
+from . import interrupt, sweep_report
+from . import terminal as report
 from .document import document
 from .progress import Meter
 from .run import default_folder, opened

@@ -14,12 +14,13 @@ from ..io import DesignFile
 from ..metrics import Quantity, findings_of, quantity_of
 from ..microgeometry import NoModification
 from ..report import Chapter, Table, figure, text, write_variants, write_workbook
+from ..studies import side_by_side as report
 from ..studies.comparison import Modifications
 from ..studies.evaluation import evaluate, grid_change, grid_lines, torques_of
 from ..studies.gear_data import gears
+from ..studies.results import save_figures
 from ..studies.summary_data import sizes, versions
 from ..sweeps import SweepTable, over_torques
-from . import report
 from .document import CommandResult, Document, project_facts
 from .progress import Stages
 
@@ -63,7 +64,7 @@ def write_figures(folder: Path, table: SweepTable, results: Sequence[str | Quant
         for name in axes.keys() - {"radar"}:
             axis = np.ravel(axes[name])[0]
             axis.set_title(note, loc="left", pad=32, fontsize=axis.xaxis.label.get_fontsize())
-    return report.save_figures(folder, axes)
+    return save_figures(folder, axes)
 
 
 def head_columns(table: SweepTable, results: Sequence[str | Quantity]) -> list[str]:
@@ -139,7 +140,7 @@ def evaluate_best(
         for number, parameters in reversed([*zip(first.column("variant"), first.designs())]):
             modifications[f"variant {number}"] = design.design(parameters)
         found = {name: evaluate(design, mesh, torques, *flanks) for name, flanks in modifications.items()}
-        drawn = report.write_figures(folder, design, mesh, found, torques) if figures else []
+        drawn = save_figures(folder, report.figures(design, mesh, found, torques)) if figures else []
         pages = _alone(folder, mesh, found) if figures else {}
     findings = report.finding_lines(report.findings(design, mesh, found))
     best_first = {name: found[name] for name in ("unmodified", *reversed(list(found)))}
@@ -173,7 +174,7 @@ def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, lis
             "k_chart": plot.k_chart(mesh, report.flanks(both)),
         }
         named = {f"{kind}_{name.replace(' ', '_')}": ax for kind, ax in axes.items()}
-        pages[name] = report.save_figures(folder, named, bold=name)
+        pages[name] = save_figures(folder, named, bold=name)
     return pages
 
 

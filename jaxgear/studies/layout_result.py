@@ -18,7 +18,7 @@ from ..microgeometry import AbstractModification
 from ..numerics import real
 from ..shafts import bearing_reactions, root_face_load_factor, tooth_height
 from .evaluation import grid_lines
-from .finding_lines import finding_lines
+from .side_by_side import finding_lines
 from .study import AbstractStudyResult
 from .summary_data import finding_data
 

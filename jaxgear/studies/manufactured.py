@@ -1,10 +1,117 @@
-"""The table [tolerance] of a design file in a study: how many manufactured pairs, and what is said of them."""
+"""What designs are worth once they are made: the scatter over gears within the tolerances of the file."""
 
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+import rich.table
+
+from ..contact import Mesh
 from ..io import DesignFile
+from ..report import Chapter, read_table
+from ..sweeps import Scatter, monte_carlo
+from ..tolerance import Tolerance
+from .evaluation import Evaluation
+from .side_by_side import Evaluations, main
 
 _QUICK_PAIRS = 16
+
+
+def scattered(
+    design: DesignFile, mesh: Mesh, evaluations: Evaluations, tolerance: Tolerance, *, quick: bool
+) -> dict[str, Evaluation]:
+    """The evaluations with their scatter within a tolerance; all designs meet the same gears."""
+    assert design.tolerance is not None
+    samples = pairs_of(design, quick=quick)
+    options: dict[str, Any] = {"tolerance": tolerance, "samples": samples, "seed": design.tolerance.seed}
+    return {
+        name: replace(
+            found, scatter=monte_carlo(mesh, design.torque, pinion=found.pinion, wheel=found.wheel, **options)
+        )
+        for name, found in evaluations.items()
+    }
+
+
+def lines(design: DesignFile, evaluations: Evaluations) -> Iterator[str]:
+    """The main design in words; nothing without a table [tolerance]."""
+    found = main(evaluations).scatter
+    if found is not None:
+        yield (
+            f"{_pairs(design, found)}: PPTE {float(found.mean):.3f} um on average, 95 % below "
+            f"{float(found.ppte_quantile95):.3f} um; {float(found.nominal_ppte):.3f} um without deviations"
+        )
+
+
+def failures(evaluations: Evaluations) -> Iterator[str]:
+    """A line for every design of which manufactured pairs have failed."""
+    for name, scatter in _scatters(evaluations).items():
+        if scatter.failed:
+            count = f"{scatter.failed} of {scatter.ppte.shape[0]}"
+            yield f"CONTACT SOLUTION NOT CONVERGED: {name}, {count} manufactured pairs; they count as the worst"
+
+
+def pages(design: DesignFile, evaluations: Evaluations) -> list[Chapter]:
+    """The part of the report about robustness; nothing without a table [tolerance]."""
+    scatters = _scatters(evaluations)
+    if not scatters:
+        return []
+    table = rich.table.Table(title=f"PPTE over manufactured pairs, {design.torque:g} N m on the pinion")
+    table.add_column("")
+    for name in scatters:
+        table.add_column(name)
+    for label, of in (
+        ("without deviations [um]", lambda scatter: scatter.nominal_ppte),
+        ("mean [um]", lambda scatter: scatter.mean),
+        ("standard deviation [um]", lambda scatter: scatter.std),
+        ("95 % quantile [um]", lambda scatter: scatter.ppte_quantile95),
+    ):
+        table.add_row(label, *(f"{float(of(scatter)):.3f}" for scatter in scatters.values()))
+    table.add_row("failed pairs", *(str(scatter.failed) for scatter in scatters.values()))
+    scatter = next(iter(scatters.values()))
+    text = (
+        f"{_pairs(design, scatter)}, drawn at random within the limits of ISO 1328-1:2013, the same for every design."
+    )
+    even = " Deviations along the face are left out, as one slice cannot show them."
+    return [
+        Chapter("Robustness", [text + (even if design.resolution().slices == 1 else "")], tables=[read_table(table)])
+    ]
+
+
+def summary(evaluation: Evaluation) -> dict[str, Any]:
+    """The scatter of a design as plain data."""
+    scatter = evaluation.scatter
+    if scatter is None:
+        return {}
+    return {
+        "manufactured": {
+            "pairs": scatter.ppte.shape[0],
+            "failed": scatter.failed,
+            "nominal_ppte_um": float(scatter.nominal_ppte),
+            "mean_ppte_um": float(scatter.mean),
+            "std_ppte_um": float(scatter.std),
+            "q95_ppte_um": float(scatter.ppte_quantile95),
+        }
+    }
+
+
+def figures(evaluations: Evaluations) -> dict[str, Any]:
+    """Axes with the scatter of all designs; empty without a table [tolerance]."""
+    scatters = _scatters(evaluations)
+    if not scatters:
+        return {}
+    from .. import plot
+
+    samples = {name: np.asarray(scatter.ppte) for name, scatter in scatters.items()}
+    return {"ppte_distribution": plot.ppte_distribution(samples)}
+
+
+def _scatters(evaluations: Evaluations) -> Mapping[str, Scatter]:
+    return {name: found.scatter for name, found in evaluations.items() if found.scatter is not None}
+
+
+def _pairs(design: DesignFile, scatter: Scatter) -> str:
+    return pairs_in_words(design, scatter.ppte.shape[0])
 
 
 def pairs_of(design: DesignFile, *, quick: bool) -> int:

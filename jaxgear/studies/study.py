@@ -1,7 +1,7 @@
 """What a study is: checked when it is made, worked out, and summed up, tabulated and drawn by its result."""
 
 import abc
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Self, TypeVar
@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Generic, Self, TypeVar
 import rich.table
 
 from ..io import DesignFile
+from ..report import Chapter, Table
 from . import manufactured
 from .checkpoints import Checkpoints
 from .progress import Callback, Stages
@@ -39,6 +40,18 @@ class AbstractStudyResult(abc.ABC):
         """The result in words, a line each."""
         return ()
 
+    def headlines(self) -> Iterable[Table]:
+        """Tables of two columns to be read before all others; they say what `findings` says."""
+        return ()
+
+    def details(self) -> Iterable[str]:
+        """How it was found, in words, said last."""
+        return ()
+
+    def chapters(self) -> Sequence[Chapter]:
+        """Further chapters of a report."""
+        return ()
+
     def failures(self) -> Iterable[str]:
         """A line for everything that is not to be trusted or not reached; a command fails where there is one."""
         return ()
@@ -65,8 +78,9 @@ class AbstractStudy(abc.ABC, Generic[R]):
     `jaxgear.studies`. Numbers are those of double precision where `jax_enable_x64` is set, as commands set it.
 
     Attributes:
-        name: of the study, of its command and of the folder of its results.
-        coarse: what a quick study has too few of.
+        name: of the study and of its command.
+        coarse: what a quick study has too few of; "" where its result says it.
+        needs: modules that it imports late; a command imports them ahead, beside its first compilation.
         files: names of files that its results may have beside those of the studies of jaxgear.
         takes_shafts: whether the study is on the shafts of the file at every load.
         design: the design file.
@@ -75,6 +89,7 @@ class AbstractStudy(abc.ABC, Generic[R]):
 
     name: ClassVar[str]
     coarse: ClassVar[str] = "coarse positions"
+    needs: ClassVar[tuple[str, ...]] = ()
     files: ClassVar[frozenset[str]] = frozenset()
     takes_shafts: ClassVar[bool] = False
 
@@ -115,6 +130,11 @@ class AbstractStudy(abc.ABC, Generic[R]):
             checkpoints: for what takes long.
             stages: to be told of every stage.
         """
+
+    @property
+    def folder(self) -> str:
+        """Folder of its results below that of the design file."""
+        return self.name
 
     def omits(self) -> str:
         """What of the file, but for its shafts, is not part of the study and why; "" for nothing."""

@@ -1,7 +1,6 @@
-"""What a run says and draws: table, lines and figures."""
+"""Designs side by side: table, lines and figures."""
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
@@ -17,14 +16,7 @@ from ..io.results import unit_of
 from ..metrics import Finding, findings_of, quantities
 from ..numerics import program
 from ..optimize import Verified
-from ..studies.evaluation import Evaluation, grid_lines
-from ..studies.finding_lines import WARNING as WARNING
-from ..studies.finding_lines import finding_lines as finding_lines
-from ..studies.results import save_figures as save_figures
-from .terminal import console as console
-from .terminal import say as say
-from .terminal import say_rows as say_rows
-from .terminal import warn as warn
+from .evaluation import Evaluation, grid_lines
 
 Evaluations = Mapping[str, Evaluation]
 
@@ -58,6 +50,7 @@ _TABLE = (
     *("micropitting_safety", "scuffing_safety"),
 )
 _BY_FINITE_ELEMENTS = "  by finite elements"
+WARNING = "warning: "
 _HARRIS_CURVES = 7
 _ORDERS = 8  # of the transmission error that are drawn
 _TITLE = 9.0  # [pt]
@@ -127,6 +120,22 @@ def _support_deflection(mesh: Mesh, line_load) -> Float[Array, ""]:
     return jnp.mean(mesh.support_deflection(line_load))
 
 
+def finding_lines(found: Mapping[str, tuple[Finding, ...]]) -> Iterator[str]:
+    """A line for everything that is not usual, with the designs that have it and their numbers where they differ."""
+    grouped: dict[tuple[str, str], dict[str, Finding]] = {}
+    for design, several in found.items():
+        for finding in several:
+            grouped.setdefault((finding.name, finding.where), {})[design] = finding
+    for same in grouped.values():
+        finding = list(same.values())[-1]  # the last is the one that the run is about
+        numbers = {design: f"{each.value:.4g} {each.limit.unit}".rstrip() for design, each in same.items()}
+        if len(set(numbers.values())) > 1:
+            said = f"{', '.join(f'{design} {number}' for design, number in numbers.items())}: "
+        else:
+            said = "" if len(same) == len(found) else f"{', '.join(same)}: "
+        yield f"{WARNING}{said}{finding}"
+
+
 def grid(evaluations: Evaluations, more: str = "") -> Iterator[str]:
     """How fine the mesh was, and what a finer one would change, besides `more`."""
     positions = next(iter(evaluations.values())).cycle.kinematics.resolution.positions
@@ -167,18 +176,8 @@ def main_name(evaluations: Evaluations) -> str:
     return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
 
 
-def without_windows() -> None:
-    """Lets matplotlib draw into files alone: the command line never shows a window."""
-    import matplotlib
-    import matplotlib.pyplot  # waits for the thread that imports it ahead
-
-    matplotlib.use("Agg")
-
-
-def write_figures(
-    folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray
-) -> list[Path]:
-    """Writes the figures of the designs; the Harris map shows the main one. Gives the files."""
+def figures(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
+    """Axes of the designs by name, the lines of the main one bold; the Harris map shows the main one."""
     from .. import plot
 
     cycles = {name: evaluation.cycle for name, evaluation in evaluations.items()}
@@ -198,7 +197,9 @@ def write_figures(
     }
     if mesh.resolution.slices > 1:
         axes |= _over_face(file, mesh, evaluations, torques)
-    return save_figures(folder, axes, bold=main_name(evaluations))
+    for drawn in axes.values():
+        plot.emphasize(np.ravel(drawn)[0].figure, main_name(evaluations))
+    return axes
 
 
 def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:

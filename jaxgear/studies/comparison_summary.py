@@ -1,4 +1,4 @@
-"""What a run writes as `summary.json`: every number of its designs, its gears and its model."""
+"""Designs side by side as plain data: every number of the designs, of the gears and of the model."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -14,12 +14,11 @@ from ..metrics import Finding
 from ..numerics import Number, fields_of
 from ..optimize import Verified
 from ..shafts import RigidSupport
-from ..studies.evaluation import Evaluation
-from ..studies.gear_data import gears
-from ..studies.manufactured import tolerances
-from ..studies.summary_data import finding_data, identity, model, sizes, versions
 from . import manufactured
-from .report import Evaluations, diameters, reduction
+from .evaluation import Evaluation
+from .gear_data import gears
+from .side_by_side import Evaluations, diameters, reduction
+from .summary_data import finding_data, model, sizes
 
 
 def summary(
@@ -29,18 +28,16 @@ def summary(
     torques: np.ndarray,
     found: Mapping[str, tuple[Finding, ...]],
 ) -> dict[str, Any]:
-    """Contents of `summary.json`, with the findings that were `found` of every design."""
-    of_gears = gears(file)
+    """The designs, with the findings that were `found` of each."""
     return {
-        **identity(file),
         "torque_Nm": file.torque,
         "torque_range_Nm": file.torque_range,
         "speed_rpm": file.speed,
         "friction": file.friction,
         "gears": {name: _gear(getattr(mesh.pair, name)) | _drawn(drawn) for name, drawn in file.drawn.items()},
-        "center_distance_mm": of_gears["geometry"]["pair"]["center_distance_mm"],
+        "center_distance_mm": gears(file)["geometry"]["pair"]["center_distance_mm"],
         **_misalignment(mesh),
-        **tolerances(file),
+        **manufactured.tolerances(file),
         **{name: _numbers(part) for name in ("lubricant", "strength") if (part := getattr(file, name)) is not None},
         "model": model(mesh),
         "designs": {
@@ -53,9 +50,7 @@ def summary(
             **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
         },
         "iso_6336": {name: evaluation.factors for name, evaluation in evaluations.items()},
-        **of_gears,
         "resolution": sizes(mesh.resolution),
-        "versions": versions(),
     }
 
 
