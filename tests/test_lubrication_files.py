@@ -13,7 +13,7 @@ from jaxgear.cli import run, sweep
 from jaxgear.contact import OperatingPoint
 from jaxgear.io import DesignFileError, load_design, optimize_request, quantities_of_tables, sweep_request
 from jaxgear.numerics import program
-from jaxgear.studies import Analysis, evaluation
+from jaxgear.studies import DesignAnalysis, evaluation
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -186,7 +186,7 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
         sweep_table(file(PAIR + "friction = 0.05" + OIL + STRENGTH + RELIEF), tmp_path)
     fixed = RELIEF.partition("[variables]")[0].replace('"amount"', "6.0")
     path = file(PAIR + OIL + STRENGTH + fixed)
-    assert run.run_study(Analysis.of, path, tmp_path / "out", figures=False, cache=False)
+    assert run.run_study(DesignAnalysis.of, path, tmp_path / "out", figures=False, cache=False)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     modified, expected = summary["designs"]["modified"], solved(6.0)
     assert [modified[quantity.key] for quantity in numbers] == pytest.approx([float(number) for number in expected])

@@ -350,7 +350,8 @@ def scatter(design, flanks, kept):
     """Lives of the manufactured pairs of a file, with reliefs of one height."""
     mesh, settings = design.mesh(), wear_request(design).settings
     designs = {"relieved": (relief(flanks), relief(flanks))}
-    found = wear_scatter.scattered(design, settings, mesh, designs, tolerance_of(design), kept, quick=False)
+    options = {"samples": design.tolerance.samples, "seed": design.tolerance.seed, "keep": kept}
+    found = wear_scatter.manufactured_wear(settings, mesh, 150.0, designs, tolerance_of(design), **options)
     return mesh, found["relieved"]
 
 

@@ -152,7 +152,7 @@ def analyze(
 ) -> int:
     """Analyze the unmodified pair and the modification of the design file."""
     shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-    return _run("jaxgear.studies.analysis:Analysis", context, file, output, **shared)
+    return _run("jaxgear.studies.analysis:DesignAnalysis", context, file, output, **shared)
 
 
 @app.command()
@@ -174,7 +174,7 @@ def optimize(
     the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
     """
     shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-    place = "jaxgear.studies.optimization:Optimization"
+    place = "jaxgear.studies.optimization:DesignOptimization"
     return _run(place, context, file, output, **shared, method=method, quick=quick)
 
 

@@ -16,7 +16,7 @@ from .study import AbstractStudy
 
 
 @dataclass(frozen=True)
-class Analysis(AbstractStudy[ComparisonResult]):
+class DesignAnalysis(AbstractStudy[ComparisonResult]):
     """Analyze the unmodified pair and the modification of the design file.
 
     Attributes:

@@ -48,11 +48,11 @@ def _iso_relief(pair: GearPair, torque, application_factor):
 def compared(
     design: DesignFile,
     torque: float,
-    search: OptimizeRequest | None,
-    checkpoints: Checkpoints,
-    stages: Stages,
+    search: OptimizeRequest | None = None,
+    checkpoints: Checkpoints | None = None,
+    stages: Stages | None = None,
     *,
-    quick: bool,
+    quick: bool = False,
 ) -> tuple[Mesh, dict[str, Modifications]]:
     """The designs by their names, and the mesh on which they are compared, up to a torque [N m].
 
@@ -60,10 +60,11 @@ def compared(
         design: the design file.
         torque: largest of interest [N m].
         search: for the optimum; None for none.
-        checkpoints: where what a search has found is kept.
-        stages: told what goes on.
+        checkpoints: where what a search has found is kept; None keeps nothing.
+        stages: told what goes on; None for silence.
         quick: on coarse positions.
     """
+    stages = Stages() if stages is None else stages
     stages.begin("preparing the mesh")
     mesh = first_mesh(design, torque, quick=quick)
     involute = NoModification()
@@ -75,6 +76,7 @@ def compared(
             designs["modified"] = given
     if search is not None:
         stages.begin(f"searching the optimum ({search.method})")
+        checkpoints = Checkpoints() if checkpoints is None else checkpoints
         mesh, designs["optimum"] = sought(design, "optimum", search, mesh, checkpoints, stages, quick=quick)
     return mesh, designs
 

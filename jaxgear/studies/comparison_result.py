@@ -37,7 +37,7 @@ class ComparisonResult(AbstractStudyResult):
         front: of which the optimum is the compromise; None without one.
         projection: of the optimum on a curve; None without one.
         searched_at: positions at which the search began.
-        unverified: why nothing is verified by finite elements; "" where it is, or nobody asks.
+        unverified: why nothing is verified by finite elements; "" where it is, or is not asked for.
     """
 
     design: DesignFile

@@ -22,9 +22,7 @@ def scattered(
     design: DesignFile, mesh: Mesh, evaluations: Evaluations, tolerance: Tolerance, *, quick: bool
 ) -> dict[str, Evaluation]:
     """The evaluations with their scatter within a tolerance; all designs meet the same gears."""
-    assert design.tolerance is not None
-    samples = pairs_of(design, quick=quick)
-    options: dict[str, Any] = {"tolerance": tolerance, "samples": samples, "seed": design.tolerance.seed}
+    options: dict[str, Any] = {"tolerance": tolerance, **drawn(design, quick=quick)}
     return {
         name: replace(
             found, scatter=monte_carlo(mesh, design.torque, pinion=found.pinion, wheel=found.wheel, **options)
@@ -114,10 +112,11 @@ def _pairs(design: DesignFile, scatter: Scatter) -> str:
     return pairs_in_words(design, scatter.ppte.shape[0])
 
 
-def pairs_of(design: DesignFile, *, quick: bool) -> int:
-    """How many manufactured pairs a design is judged by."""
+def drawn(design: DesignFile, *, quick: bool) -> dict[str, int]:
+    """How many manufactured pairs a design is judged by, and the seed of their deviations."""
     assert design.tolerance is not None
-    return min(design.tolerance.samples, _QUICK_PAIRS) if quick else design.tolerance.samples
+    samples = min(design.tolerance.samples, _QUICK_PAIRS) if quick else design.tolerance.samples
+    return {"samples": samples, "seed": design.tolerance.seed}
 
 
 def left_out(design: DesignFile, why: str = "") -> str:

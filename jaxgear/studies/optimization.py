@@ -17,7 +17,7 @@ from .study import AbstractStudy
 
 
 @dataclass(frozen=True)
-class Optimization(AbstractStudy[ComparisonResult]):
+class DesignOptimization(AbstractStudy[ComparisonResult]):
     """Find the best variables or flanks by the method and for the objective of the design file.
 
     Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.

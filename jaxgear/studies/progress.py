@@ -29,7 +29,7 @@ class Stages:
     """Tells a callback of the stages of a study.
 
     Args:
-        callback: called at the start of every stage and within it; None for nobody.
+        callback: called at the start of every stage and within it; None for silence.
     """
 
     def __init__(self, callback: Callback | None = None):

@@ -1,6 +1,6 @@
 """The studies by name, those of this package and those that other packages provide; imports one when it is asked for.
 
-A study `XStudy` of this package lies in the module `x` and stands among the public names in `__init__.pyi`. Another
+A study `XStudy` of this package lies in the module `x` and is one of the public names of `__init__.pyi`. Another
 package names its own as entry points of the group `jaxgear.studies`:
 
     [project.entry-points."jaxgear.studies"]

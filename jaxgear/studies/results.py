@@ -31,7 +31,7 @@ def write_results(
     """Writes `summary.json`, the further files of a result and its figures.
 
     Args:
-        folder: for the files; is there.
+        folder: for the files, which exists.
         study: the study.
         result: what it has found.
         figures: whether figures are drawn, which opens no window where the backend of matplotlib has none.

@@ -32,6 +32,10 @@ class AbstractStudyResult(abc.ABC):
     def summary(self) -> dict[str, Any]:
         """The result as plain data, names with their units; `study_summary` adds design file, gears and versions."""
 
+    def headlines(self) -> Iterable[Table]:
+        """Tables of two columns to be read before all others; they say what `findings` says."""
+        return ()
+
     def tables(self) -> Iterable[rich.table.Table]:
         """Tables to be read first."""
         return ()
@@ -40,31 +44,27 @@ class AbstractStudyResult(abc.ABC):
         """The result in words, a line each."""
         return ()
 
-    def headlines(self) -> Iterable[Table]:
-        """Tables of two columns to be read before all others; they say what `findings` says."""
-        return ()
-
     def details(self) -> Iterable[str]:
         """How it was found, in words, said last."""
-        return ()
-
-    def chapters(self) -> Sequence[Chapter]:
-        """Further chapters of a report."""
-        return ()
-
-    def failures(self) -> Iterable[str]:
-        """A line for everything that is not to be trusted or not reached; a command fails where there is one."""
         return ()
 
     def findings(self) -> Iterable[str] | None:
         """A line for everything out of the usual range; None where that is not checked."""
         return None
 
+    def failures(self) -> Iterable[str]:
+        """A line for everything that is not to be trusted or not reached; a command fails where there is one."""
+        return ()
+
+    def chapters(self) -> Sequence[Chapter]:
+        """Further chapters of a report."""
+        return ()
+
     def figures(self) -> Mapping[str, Any]:
         """Axes by the name of the picture, drawn anew."""
         return {}
 
-    def write(self, folder: Path) -> None:  # noqa: B027 - nothing to write is no mistake
+    def write(self, folder: Path) -> None:  # noqa: B027 - the default writes nothing
         """Writes further files, such as tables of every number, into a folder; `AbstractStudy.files` names them."""
 
 

@@ -12,7 +12,7 @@ from ..io.requests import tolerance_of
 from ..numerics import optional_real, real
 from ..tolerance import Tolerance
 from ..wear import WearLife, wear_in_steps
-from . import wear_scatter
+from . import manufactured, wear_scatter
 from .checkpoints import Checkpoints, CheckpointsOfKind, Marches, NamedArrays
 from .comparison import Modifications, compared, first_mesh, search_of, sought
 from .progress import Stages
@@ -77,8 +77,15 @@ class WearStudy(AbstractStudy[WearResult]):
             # of one length, as quantities take them, and as many as the nominal gears have taken
             blocks = min(max(len(life.revolutions) - 1 for life in lives.values()), _MOST_BLOCKS)
             settings = dataclasses.replace(self.request.settings, blocks=blocks)
-            of_pairs = checkpoints.of(NamedArrays())
-            scatters = wear_scatter.scattered(design, settings, mesh, designs, self.tolerance, of_pairs, quick=quick)
+            scatters = wear_scatter.manufactured_wear(
+                settings,
+                mesh,
+                design.torque,
+                designs,
+                self.tolerance,
+                **manufactured.drawn(design, quick=quick),
+                keep=checkpoints.of(NamedArrays()),
+            )
         return WearResult(design, self.request, designs, lives, scatters)
 
     def _life(self, mesh: Mesh, name: str, flanks: Modifications, kept: CheckpointsOfKind, stages: Stages) -> WearLife:

@@ -31,7 +31,7 @@ _QUANTITIES = (
     "max_flank_pressure",
     "max_corner_pressure",
 )
-# of the depth: what the blocks leave uncertain and nobody asks about
+# of the depth: an uncertainty by the blocks that is not told
 _WORTH_A_WORD = 0.01
 OVER_LIFE = "optimum over life"  # the design that is sought for the least mean PPTE over the life
 _PANEL, _HEIGHT = 80.0, 84.0  # [mm]
