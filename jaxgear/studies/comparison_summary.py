@@ -9,7 +9,7 @@ import numpy as np
 
 from ..contact import Mesh
 from ..geometry import Gear
-from ..io import DesignFile, describe
+from ..io import DesignFile
 from ..metrics import Finding
 from ..numerics import Number, fields_of
 from ..optimize import Verified
@@ -18,7 +18,7 @@ from . import manufactured
 from .evaluation import Evaluation
 from .gear_data import gears
 from .side_by_side import Evaluations, diameters, reduction
-from .summary_data import finding_data, model, sizes
+from .summary_data import finding_data, flanks_data, model, sizes
 
 
 def summary(
@@ -62,8 +62,7 @@ def _design(evaluation: Evaluation) -> dict[str, Any]:
         **({"verified": _verified(evaluation.verified)} if evaluation.verified else {}),
         **manufactured.summary(evaluation),
         "failed_torques_Nm": evaluation.failed_torques,
-        "pinion_modification": describe(evaluation.pinion),
-        "wheel_modification": describe(evaluation.wheel),
+        **flanks_data(evaluation.pinion, evaluation.wheel),
         "time_s": evaluation.seconds,
     }
 

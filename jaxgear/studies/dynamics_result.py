@@ -14,11 +14,11 @@ from rich.table import Table
 from ..contact import Mesh
 from ..dynamics import DOWN, KICKED, UP, Branch, Oscillator, RunUp, SpeedResponse, inertia_of, motion
 from ..dynamics.response import FORCE_REFERENCE
-from ..io import DesignFile, DynamicsRequest, describe
+from ..io import DesignFile, DynamicsRequest
 from ..microgeometry import AbstractModification
 from .evaluation import grid_lines
 from .study import AbstractStudyResult
-from .summary_data import model
+from .summary_data import flanks_data, model
 
 _COLUMNS = {
     "dynamic_factor": "dynamic_factor",
@@ -196,8 +196,7 @@ class DynamicsResult(AbstractStudyResult):
                 for other, torque, run, response in self.rows()
                 if other == name
             ]
-            flanks = {"pinion_modification": describe(pinion), "wheel_modification": describe(wheel)}
-            designs[name] = {"runs": runs, **flanks}
+            designs[name] = {"runs": runs, **flanks_data(pinion, wheel)}
             if name in self.grid_change:
                 designs[name]["change_at_twice_the_positions_and_steps"] = self.grid_change[name]
             if self.run_ups:

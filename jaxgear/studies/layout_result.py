@@ -11,7 +11,7 @@ from rich.table import Table
 
 from ..contact import Mesh, MeshCycle
 from ..contact.kinematics import kinematics
-from ..io import DesignFile, LayoutRequest, describe, write_flanks
+from ..io import DesignFile, LayoutRequest, write_flanks
 from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, ToleranceCases, gear_lives
 from ..metrics import Finding
 from ..microgeometry import AbstractModification
@@ -20,7 +20,7 @@ from ..shafts import bearing_reactions, root_face_load_factor, tooth_height
 from .evaluation import grid_lines
 from .side_by_side import finding_lines
 from .study import AbstractStudyResult
-from .summary_data import finding_data
+from .summary_data import finding_data, flanks_data
 
 STEPS = ("unmodified", "step 1", "step 2")
 LIVES = ("pinion_life_h", "wheel_life_h")
@@ -197,10 +197,7 @@ class LayoutResult(AbstractStudyResult):
             **({"change_at_twice_the_slices": self.slices_change} if self.slices_change else {}),
             "bearings": {name: _reactions(support) for name, support in self.request.supports.items()},
             "profiles": {name: self._profile(profile) for name, profile in self.profiles.items()},
-            "designs": {
-                name: {"pinion_modification": describe(pinion), "wheel_modification": describe(wheel)}
-                for name, (pinion, wheel) in self.designs().items()
-            },
+            "designs": {name: flanks_data(*flanks) for name, flanks in self.designs().items()},
         }
 
     def _profile(self, profile: ProfileLayout) -> dict[str, Any]:

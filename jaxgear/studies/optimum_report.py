@@ -20,6 +20,7 @@ from ..optimize.result import PENALIZED
 from ..report import Table
 from . import side_by_side
 from .evaluation import response_surface
+from .summary_data import flanks_data
 
 _PPTE = "ppte [um]"
 _SAME = 0.05  # [%]; a smaller change rounds to nothing
@@ -311,8 +312,7 @@ def summary(file: DesignFile, optimum: Optimum, projection: Projection | None) -
             "ppte_um": projection.ppte,
             "loss_um": projection.loss,
             "misfit_um": projection.misfit,
-            "pinion_modification": describe(projection.pinion),
-            "wheel_modification": describe(projection.wheel),
+            **flanks_data(projection.pinion, projection.wheel),
         }
     return data
 

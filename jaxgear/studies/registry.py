@@ -29,12 +29,7 @@ def provided() -> dict[str, str]:
     """Place of every study that installed packages provide, likewise."""
     from importlib import metadata  # which takes longer to import than the names of this package
 
-    return {entry.name: entry.value for entry in metadata.entry_points(group=_GROUP)}
-
-
-def place_of(name: str) -> str | None:
-    """Place of a study as `module:class`, of this package before those of others; None for an unknown name."""
-    return own().get(name) or provided().get(name)
+    return {entry.name: f"{entry.module}:{entry.attr}" for entry in metadata.entry_points(group=_GROUP)}
 
 
 def help_of(place: str) -> str:
@@ -44,7 +39,7 @@ def help_of(place: str) -> str:
         spec = importlib.util.find_spec(module)
         loader: Any = None if spec is None else spec.loader
         tree = ast.parse(loader.get_source(module))
-    except (ImportError, AttributeError, TypeError, ValueError):  # not there, or no source
+    except (ImportError, AttributeError, SyntaxError, TypeError, ValueError):  # not there, or no source
         return ""
     classes = {one.name: one for one in tree.body if isinstance(one, ast.ClassDef)}
     docstring = ast.get_docstring(classes[cls]) if cls in classes else None
@@ -66,7 +61,7 @@ def load(place: str) -> Any:
     try:
         found = getattr(importlib.import_module(module), cls)
     except (ImportError, AttributeError) as error:
-        raise ValueError(f"study {place}: cannot be imported: {error}") from None
+        raise ValueError(f"study {place}: cannot be imported: {error}") from error
     abstract = importlib.import_module(f"{__package__}.study").AbstractStudy
     if not (isinstance(found, type) and issubclass(found, abstract)):
         raise ValueError(f"study {place}: must be a subclass of jaxgear.studies.AbstractStudy")

@@ -9,9 +9,10 @@ import jax
 import numpy as np
 
 from ..contact import Mesh, Resolution
-from ..io import DesignFile
+from ..io import DesignFile, describe
 from ..io.table_keys import snake
 from ..metrics import Finding
+from ..microgeometry import AbstractModification
 from .version import version
 
 
@@ -19,6 +20,11 @@ def identity(file: DesignFile) -> dict[str, Any]:
     """What every `summary.json` begins with."""
     project = {"project": file.project} if file.project else {}
     return {"title": file.title, "design_file": file.path.name, **project}
+
+
+def flanks_data(pinion: AbstractModification, wheel: AbstractModification) -> dict[str, Any]:
+    """The modifications of both gears, part by part."""
+    return {"pinion_modification": describe(pinion), "wheel_modification": describe(wheel)}
 
 
 def versions() -> dict[str, str]:

@@ -11,13 +11,14 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from ..io import DesignFile, WearRequest, describe, write_worn
+from ..io import DesignFile, WearRequest, write_worn
 from ..metrics import quantity_of
 from ..microgeometry import AbstractModification
 from ..wear import WearLife, life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth, worn_volume
 from ..wear.quantities import blocks_are_short, number_of
 from . import manufactured, wear_scatter
 from .study import AbstractStudyResult
+from .summary_data import flanks_data
 
 _QUANTITIES = (
     "ppte",
@@ -204,8 +205,7 @@ class WearResult(AbstractStudyResult):
             name: {
                 **self._numbers(life),
                 "blocks": len(life.revolutions) - 1,
-                "pinion_modification": describe(self.designs[name][0]),
-                "wheel_modification": describe(self.designs[name][1]),
+                **flanks_data(*self.designs[name]),
                 **(wear_scatter.summary(self.scatters[name]) if name in self.scatters else {}),
             }
             for name, life in self.lives.items()
