@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).parent.parent / "jaxgear"
 # in the order of the pipeline; what they import from one another stands on the page of its owner
 PACKAGES = (
     "geometry microgeometry compliance compliance.finite_element contact shafts metrics tolerance conditions dynamics "
-    "dynamics.dimensionless wear manufacture sizing sweeps optimize layout io io.rexs plot numerics"
+    "dynamics.dimensionless wear manufacture sizing sweeps optimize layout io io.rexs studies plot numerics"
 ).split()
 _NAMES = re.compile(r" +(?:\w+, )+\w+:")  # with which a line of a docstring begins
 
@@ -31,11 +31,12 @@ def on_files(files, config):
 
 
 def public_names(package: str) -> list[str]:
-    """Functions and classes of a package, as its `__init__.py` says it: `from .module import name as name`.
+    """Functions and classes of a package, as its `__init__.py` or `.pyi` says it: `from .module import name as name`.
 
     Each as `module.name`: a module and its function may be called alike.
     """
-    init = PACKAGE.joinpath(*package.split("."), "__init__.py")
+    folder = PACKAGE.joinpath(*package.split("."))
+    init = next(path for path in (folder / "__init__.pyi", folder / "__init__.py") if path.exists())
     found = []
     for node in ast.parse(init.read_text("utf-8")).body:
         if isinstance(node, ast.ImportFrom) and node.level == 1 and node.module:

@@ -18,8 +18,8 @@ The pipeline in reading order, every step differentiable and vmappable:
     manufacture                 grinding wheel, volumes ground off, measuring charts
 
 The rest lives in the namespaces `jaxgear.geometry`, `compliance`, `contact`, `tolerance`, `conditions`, `metrics`,
-`sizing`, `sweeps`, `optimize`, `dynamics`, `wear`, `shafts`, `layout`, `manufacture`, `plot` and `io`, with their
-`Abstract...` classes as extension points.
+`sizing`, `sweeps`, `optimize`, `dynamics`, `wear`, `shafts`, `layout`, `manufacture`, `studies`, `plot` and `io`, with
+their `Abstract...` classes as extension points.
 
 Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in
 constructors.

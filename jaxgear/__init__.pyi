@@ -15,6 +15,7 @@ from . import optimize as optimize
 from . import plot as plot
 from . import shafts as shafts
 from . import sizing as sizing
+from . import studies as studies
 from . import sweeps as sweeps
 from . import tolerance as tolerance
 from . import wear as wear

@@ -35,6 +35,7 @@ ORDER = (
     "io",
     "plot",
     "report",
+    "studies",
     "cli",
 )
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -93,7 +94,7 @@ HEAVY = {
     "jaxgear.plot",
 }
 # so do the commands, and their help without any of the library
-_NAMES = "commands", "convert", "devices", "dynamics", "layout", "new", "sweep", "wear"
+_NAMES = "convert", "devices", "new", "run", "sweep"
 COMMANDS = {f"jaxgear.cli.{name}" for name in _NAMES}
 
 
@@ -254,7 +255,7 @@ def test_import_is_silent_and_changes_nothing():
         "        getattr(jaxgear, name)\n"
         "assert not {'matplotlib', 'optax', 'typer', 'pyarrow', 'evosax'} & set(sys.modules)\n"
         "assert dict(jax.config.values) == before\n"
-        "import jaxgear.cli.commands, jaxgear.cli.sweep\n"
+        "import jaxgear.cli.run, jaxgear.cli.sweep\n"
         "jax.config.update('jax_num_cpu_devices', 3)\n"  # nothing has chosen the devices either
         "jax.config.update('jax_enable_x64', True)\n"
         "assert jax.device_count() == 3\n"

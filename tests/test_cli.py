@@ -26,9 +26,7 @@ from report_page import Page, check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import app, cache, geometry, main, manufactured, optimum_report, report, run, study
-from jaxgear.cli.geometry import gears
-from jaxgear.cli.optimum_report import front_rows, front_table, gains
+from jaxgear.cli import app, cache, main, run
 from jaxgear.contact.status import Status
 from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
@@ -38,6 +36,10 @@ from jaxgear.metrics import Finding
 from jaxgear.microgeometry import NoModification
 from jaxgear.numerics import Usual
 from jaxgear.optimize import result as optimum_result
+from jaxgear.studies import evaluation, gear_data, manufactured, optimum_report, side_by_side
+from jaxgear.studies.comparison_run import ComparisonRun
+from jaxgear.studies.gear_data import gears
+from jaxgear.studies.optimum_report import front_rows, front_table, gains
 from jaxgear.tolerance import ToleranceClass, iso_rounded
 from jaxgear.vocabulary import quantities
 
@@ -73,8 +75,8 @@ couplings = [{ position = 190.0 }]
 @pytest.fixture(scope="module", autouse=True)
 def few_torques():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run, "_TORQUES", 5)
-        patch.setattr(run, "_QUICK_TORQUES", 5)
+        patch.setattr(evaluation, "_TORQUES", 5)
+        patch.setattr(evaluation, "_QUICK_TORQUES", 5)
         yield
 
 
@@ -238,7 +240,7 @@ def test_what_is_not_usual_is_said_once_of_all_designs_it_concerns():
             Finding("flank pressure", "", 3383.0, usual),
         ),
     }
-    assert list(report.finding_lines(found)) == [
+    assert list(side_by_side.finding_lines(found)) == [
         "warning: friction 3.7 is more than 0.5 (steel)",
         "warning: unmodified 4689 MPa, optimum 1837 MPa: corner pressure 1837 MPa is more than 1650 MPa "
         "(case-hardened)",
@@ -299,7 +301,7 @@ def test_the_reports_hold_what_was_found(folder, analyzed, optimized):
         assert width == pytest.approx(30e-3 * times, rel=1e-9 if key == "span" else 0.05)
     chosen = "span = [22.85, 22.88]\nteeth_spanned = 3"
     (folder / "thin.toml").write_text(file.read_text().replace("[pinion]", "[pinion]\n" + chosen, 1))
-    (teeth, ball, quality), (free, *_) = geometry.chosen(load_design(folder / "thin.toml"))
+    (teeth, ball, quality), (free, *_) = gear_data.chosen(load_design(folder / "thin.toml"))
     assert (float(teeth), ball, float(quality.quality_class), free) == (3.0, None, 5.0, None)
     factors = [one["pinion_form_factor"] for one in analyzed.summary["iso_6336"].values()]
     assert rows["pinion form factor, Y_F"] == [f"{factor:.6g}" for factor in factors] and factors[0] > 1
@@ -444,10 +446,9 @@ def test_a_front_is_tabulated_drawn_and_compared(monkeypatch):
     ):
         monkeypatch.setattr(owner, name, lambda *given, found=found, **options: found)
     monkeypatch.setattr(plot, "optimum_front", lambda front, **options: options)
-    monkeypatch.setattr(report, "save_figures", lambda folder, axes: axes)
     cycle = SimpleNamespace(unloaded_transmission_error=None, torque=1.0)
     optimum = SimpleNamespace(cycle=cycle, pinion=None, wheel=None, iterations=())
-    drawn = optimum_report.write_figures(None, SimpleNamespace(phase=None), 1.0, optimum, front, designs)["front"]
+    drawn = optimum_report.figures(SimpleNamespace(phase=None), 1.0, optimum, front, designs)["front"]
     assert drawn["chosen"] == 1 and {name: [*point] for name, point in drawn["others"].items()} == {
         name: both[name] for name in ("unmodified", "rule-based")
     }
@@ -541,7 +542,7 @@ def not_searched(monkeypatch):
             self.evaluate(name, *modifications)
         self.evaluate("optimum", *beside["rule-based"])
 
-    monkeypatch.setattr(run.CommandRun, "search", evaluated)
+    monkeypatch.setattr(ComparisonRun, "search", evaluated)
 
 
 def test_what_cannot_be_meshed_is_not_verified(tmp_path, not_searched):
@@ -712,7 +713,7 @@ def test_a_failed_contact_solution_is_loud(folder, tmp_path, monkeypatch, analyz
         cycles = jg.sweeps.over_torques(*arguments, **flanks)
         return [replace(cycle, status=jnp.full_like(cycle.status, Status.MORE_PAIRS_NEEDED)) for cycle in cycles]
 
-    monkeypatch.setattr(study, "over_torques", failed)
+    monkeypatch.setattr(evaluation, "over_torques", failed)
     path = tmp_path / "fails.toml"
     path.write_text(FIXED)
     result = call("analyze", path, "--no-figures", "-o", tmp_path / "out")
@@ -807,9 +808,9 @@ def test_interruption_leaves_earlier_results_alone(folder, tmp_path, monkeypatch
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run.CommandRun, "prepare", lambda self, **_: None)
-    monkeypatch.setattr(run.CommandRun, "evaluate", interrupt)
-    monkeypatch.setattr(run.CommandRun, "search", interrupt)
+    monkeypatch.setattr(ComparisonRun, "prepare", lambda self, **_: None)
+    monkeypatch.setattr(ComparisonRun, "evaluate", interrupt)
+    monkeypatch.setattr(ComparisonRun, "search", interrupt)
     name = {"analyze": "fixed", "optimize": "free"}[command]
     result = call(command, folder / f"{name}.toml", "-o", target)
     assert result.code == 130
@@ -822,7 +823,7 @@ def test_a_defect_of_the_program_is_one_line_too(folder, tmp_path, monkeypatch):
     def fail(*_, **__):
         raise TypeError("two\nlines")
 
-    monkeypatch.setattr(run.CommandRun, "prepare", fail)
+    monkeypatch.setattr(ComparisonRun, "prepare", fail)
     target = tmp_path / "out"
     result = call("analyze", folder / "fixed.toml", "-o", target)
     assert_refused(result, "unexpected TypeError: two lines (JAXGEAR_DEBUG=1 shows where)")

@@ -12,12 +12,11 @@ import pytest
 from commands import LINE, call
 from report_page import check_report
 
-from jaxgear.cli import interrupt
-from jaxgear.cli.dynamics_report import _bodies, _far_from_resonance, _still_rising
-from jaxgear.cli.study import Kept, SpeedResponses
 from jaxgear.dynamics import Oscillator, RectangularStiffness, SpeedResponse
 from jaxgear.io import DesignFileError, dynamics_request, load_design, sweep_request
 from jaxgear.io.folder import RESULT_FILES
+from jaxgear.studies import Checkpoints, DynamicsResult
+from jaxgear.studies.checkpoints import SpeedResponses
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -181,7 +180,7 @@ def test_masses_that_cannot_resonate_and_bores_left_open_are_said(file):
     study = SimpleNamespace(
         design=design, request=request, torque=200.0, natural_frequencies={"unmodified": {200.0: 20.0}}
     )
-    (far,), (bore,) = _far_from_resonance(study), _bodies(study)
+    (far,), (bore,) = DynamicsResult._far_from_resonance(study), DynamicsResult._bodies(study)
     assert "all speeds lie at 75 to 175 times the natural frequency of 20 Hz" in far and "pinion_inertia" in far
     assert bore.startswith("pinion: no bore_diameter, the inertia is of a solid disc, 0.00")
     assert "a bore of 71.2 mm" in bore
@@ -237,14 +236,16 @@ def test_kept_responses_are_not_made_again(tmp_path):
         given["state"] = numbers.uniform(size=(2, 1)), numbers.uniform(size=(2, 1))
         return SpeedResponse(**jax.tree.map(jnp.asarray, given), orders=(1.0, 2.0, 0.5), direction="up")
 
-    first = Kept(tmp_path / ".runs", SpeedResponses(), 2)((oscillator, "up"), sweep)
-    assert "1 of 2 runs are kept" in interrupt.state.written
-    again = Kept(tmp_path / ".runs", SpeedResponses(), 2)((oscillator, "up"), sweep)
+    told = []
+    checkpoints = Checkpoints(tmp_path / ".runs", lambda *of: told.append(of))
+    first = checkpoints.of(SpeedResponses(), 2)((oscillator, "up"), sweep)
+    assert told == [(1, 2)] and checkpoints.count() == 1
+    again = Checkpoints(tmp_path / ".runs").of(SpeedResponses(), 2)((oscillator, "up"), sweep)
     assert len(made) == 1
     for one, other in zip(jax.tree.leaves(first), jax.tree.leaves(again), strict=True):
         assert np.array_equal(one, other) and one.dtype == other.dtype
     assert (again.direction, again.orders) == (first.direction, first.orders)
-    kept = Kept(tmp_path / ".runs", SpeedResponses(), 2)
+    kept = checkpoints.of(SpeedResponses(), 2)
     kept((oscillator, "down"), sweep)
     assert len(made) == 2
     for file in (tmp_path / ".runs").iterdir():  # one bit, anywhere
@@ -254,7 +255,9 @@ def test_kept_responses_are_not_made_again(tmp_path):
     for direction in ("up", "down"):
         kept((oscillator, direction), sweep)
     assert len(made) == 4
-    kept.remove()
+    Checkpoints(tmp_path / ".runs").remove()  # of a study that has kept nothing there
+    assert checkpoints.count() == 2
+    checkpoints.remove()
     assert not (tmp_path / ".runs").exists()
 
 
@@ -270,5 +273,5 @@ def test_a_largest_dynamic_factor_at_the_highest_speed_is_told():
         request=SimpleNamespace(settings=SimpleNamespace(mesh_frequencies=frequencies)),
         rows=lambda: ((name, 50.0, "up", of) for name, of in runs.items()),
     )
-    (told,) = _still_rising(study)
+    (told,) = DynamicsResult._still_rising(study)
     assert told.startswith("largest dynamic factor at the highest speed, 300 Hz: rises;")

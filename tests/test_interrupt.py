@@ -1,6 +1,5 @@
 """Ctrl-C at any moment: it always ends the command, without a traceback, and what is said of the files is true."""
 
-import json
 import os
 import random
 import re
@@ -12,8 +11,10 @@ import time
 import pytest
 from commands import FIXED, call
 
-from jaxgear.cli import interrupt, launcher, run
+from jaxgear.cli import interrupt, launcher
 from jaxgear.io.folder import result_folder
+from jaxgear.studies import AbstractStudyResult
+from jaxgear.studies.comparison_run import ComparisonRun
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -72,6 +73,13 @@ def test_where_python_loses_it(capfd):
     assert capfd.readouterr().err == ""
 
 
+class Nothing(AbstractStudyResult):
+    """What a study has found that was kept from its work."""
+
+    def summary(self):
+        return {}
+
+
 @pytest.mark.parametrize("made_of_it", [None, RuntimeError("INTERNAL: KeyboardInterrupt"), TypeError("?")])
 def test_what_a_library_makes_of_it_does_not_matter(gear, tmp_path, monkeypatch, made_of_it):
     def evaluate(*_):
@@ -81,9 +89,9 @@ def test_what_a_library_makes_of_it_does_not_matter(gear, tmp_path, monkeypatch,
             if made_of_it is not None:
                 raise made_of_it from None
 
-    monkeypatch.setattr(run.CommandRun, "prepare", lambda self, **_: None)
-    monkeypatch.setattr(run.CommandRun, "evaluate", evaluate)
-    monkeypatch.setattr(run.CommandRun, "write", lambda self, **_: None)
+    monkeypatch.setattr(ComparisonRun, "prepare", lambda self, **_: None)
+    monkeypatch.setattr(ComparisonRun, "evaluate", evaluate)
+    monkeypatch.setattr(ComparisonRun, "result", lambda *_: Nothing())
     result = call("analyze", gear, "-o", tmp_path / "out")
     assert (result.code, result.err) == (130, NOTHING)
     assert not (tmp_path / "out").exists()
@@ -91,21 +99,19 @@ def test_what_a_library_makes_of_it_does_not_matter(gear, tmp_path, monkeypatch,
 
 @pytest.mark.parametrize("late", ["replace", "show"])
 def test_results_that_are_there_are_not_denied(gear, tmp_path, monkeypatch, late):
-    def written(self, **_):
-        (self._folder / "summary.json").write_text(json.dumps({}))
-
     def press(*arguments):
         signal.raise_signal(signal.SIGINT)
         return original(*arguments)
 
-    monkeypatch.setattr(run.CommandRun, "prepare", lambda self, **_: None)
-    monkeypatch.setattr(run.CommandRun, "evaluate", lambda *_: None)
-    monkeypatch.setattr(run.CommandRun, "write", written)
-    where = "jaxgear.io.folder._replace" if late == "replace" else "jaxgear.cli.run.CommandRun.show"
+    monkeypatch.setattr(ComparisonRun, "prepare", lambda self, **_: None)
+    monkeypatch.setattr(ComparisonRun, "evaluate", lambda *_: None)
+    monkeypatch.setattr(ComparisonRun, "result", lambda *_: Nothing())
+    where = "jaxgear.io.folder._replace" if late == "replace" else "jaxgear.cli.run._show"
     original = __import__("jaxgear.io.folder", fromlist=["_replace"])._replace
     monkeypatch.setattr(where, press)
     result = call("analyze", gear, "-o", tmp_path / "out")
-    assert (result.code, result.err) == (130, f"jaxgear: interrupted, the results are in {tmp_path / 'out'}{os.sep}\n")
+    told = f"jaxgear: writing the results\njaxgear: interrupted, the results are in {tmp_path / 'out'}{os.sep}\n"
+    assert (result.code, result.err) == (130, told)
     assert (tmp_path / "out" / "summary.json").exists()
 
 
@@ -130,7 +136,7 @@ def test_at_any_moment(gear):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_leaves_no_folder_behind(gear, tmp_path, monkeypatch, number):
-    monkeypatch.setattr(run.CommandRun, "prepare", lambda self, **_: signal.raise_signal(number))
+    monkeypatch.setattr(ComparisonRun, "prepare", lambda self, **_: signal.raise_signal(number))
     before = signal.getsignal(signal.SIGTERM)
     result = call("analyze", gear, "-o", tmp_path / "out")
     assert (result.code, result.err) == (130, NOTHING)
@@ -162,7 +168,7 @@ def test_kept_runs_are_told_of_before_the_first_result(tmp_path, monkeypatch):
     kept.mkdir()
     (kept / "0123").touch()
     (tmp_path / "gear.toml").write_text(FIXED + DYNAMICS)
-    monkeypatch.setattr("jaxgear.cli.dynamics.compared", lambda *_, **__: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr("jaxgear.studies.dynamics.compared", lambda *_, **__: signal.raise_signal(signal.SIGINT))
     result = call("dynamics", tmp_path / "gear.toml", "-o", tmp_path / "out", "--quick")
     line = f"jaxgear: interrupted, 1 runs are kept in {kept}{os.sep}, go on with the same command\n"
     assert result.code == 130 and result.err.endswith(line)

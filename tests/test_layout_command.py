@@ -11,12 +11,11 @@ from report_page import check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import layout_report
-from jaxgear.cli.layout_report import failures
 from jaxgear.io import layout_request, load_design
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.layout import at_stations, layout_flank_lines
 from jaxgear.metrics import face_load_factor
+from jaxgear.studies import LayoutResult
 from jaxgear.vocabulary import quantities
 
 pytestmark = pytest.mark.usefixtures("no_cache")
@@ -204,7 +203,6 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
     for name in others:
         monkeypatch.setattr(plot, name, lambda *given, **options: None)
     monkeypatch.setattr(plot, "radar", lambda table, *_: drawn.append(table))
-    monkeypatch.setattr(layout_report.report, "save_figures", lambda folder, axes: list(axes))
     profile = SimpleNamespace(
         table=SimpleNamespace(
             column=lambda name: np.asarray([1.2, 1.0, np.nan]),
@@ -216,7 +214,8 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
     study = SimpleNamespace(
         design=design, request=request, main=layout, over_torque={}, cycles={}, profile=profile, profiles={}
     )
-    assert layout_report.write_figures(None, study)[-1] == "radar"
+    study.lives = lambda profile: LayoutResult.lives(study, profile)
+    assert list(LayoutResult.figures(study))[-1] == "radar"
     (values,) = drawn
     lives = list(values)[-2:]
     assert [(of.key, of.better) for of in lives] == [("pinion_life_h", "larger"), ("wheel_life_h", "larger")]
@@ -224,7 +223,7 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
         uneven, even, none = values[of]
         assert uneven / even == pytest.approx(1.2**-6.6, rel=1e-9) and np.isnan(none)
     study.request = SimpleNamespace(**{**vars(request), "options": {}})
-    layout_report.write_figures(None, study)
+    LayoutResult.figures(study)
     assert list(drawn[1]) == list(values)[:-2]
 
 
@@ -528,7 +527,7 @@ def test_torques_without_a_load_over_the_face_are_told():
     nothing: dict = {"layouts": {}, "contacts": {}, "profiles": {}}
     over = {"unmodified": np.array([1.2, np.nan, 1.1]), "step 1": np.array([1.0, np.nan, 1.0])}
     study = SimpleNamespace(**nothing, over_torque=over, request=SimpleNamespace(torques=np.array([50.0, 75.0, 100.0])))
-    assert list(failures(study)) == ["LOAD OVER THE FACE NOT FOUND at 75 N m"]
+    assert list(LayoutResult.failures(study)) == ["LOAD OVER THE FACE NOT FOUND at 75 N m"]
 
 
 def test_a_layout_needs_its_table(file, tmp_path):

@@ -9,10 +9,11 @@ import pytest
 from commands import LINE
 
 import jaxgear as jg
-from jaxgear.cli import commands, study, sweep
+from jaxgear.cli import run, sweep
 from jaxgear.contact import OperatingPoint
 from jaxgear.io import DesignFileError, load_design, optimize_request, quantities_of_tables, sweep_request
 from jaxgear.numerics import program
+from jaxgear.studies import DesignAnalysis, evaluation
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -184,7 +185,8 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
     with pytest.raises(ValueError, match=r"holds a sweep of other settings \(.*friction"):
         sweep_table(file(PAIR + "friction = 0.05" + OIL + STRENGTH + RELIEF), tmp_path)
     fixed = RELIEF.partition("[variables]")[0].replace('"amount"', "6.0")
-    assert commands.analyze(file(PAIR + OIL + STRENGTH + fixed), tmp_path / "out", figures=False, cache=False)
+    path = file(PAIR + OIL + STRENGTH + fixed)
+    assert run.run_study(DesignAnalysis.of, path, tmp_path / "out", figures=False, cache=False)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     modified, expected = summary["designs"]["modified"], solved(6.0)
     assert [modified[quantity.key] for quantity in numbers] == pytest.approx([float(number) for number in expected])
@@ -199,12 +201,12 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
 @pytest.mark.slow
 def test_other_oils_and_strengths_are_other_numbers_of_one_program(load, monkeypatch):
     traced = []
-    monkeypatch.setattr(study, "summary", lambda cycle: {})
+    monkeypatch.setattr(evaluation, "summary", lambda cycle: {})
 
     @program
     def numbers(*of):
         traced.append(of)
-        return study._numbers.__wrapped__(*of)
+        return evaluation._numbers.__wrapped__(*of)
 
     cycle = jg.solve(load(PAIR).mesh(), OperatingPoint(50.0, 3000.0))
     for temperature in ("80.0", "90.0"):

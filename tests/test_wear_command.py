@@ -19,9 +19,6 @@ from report_page import check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import wear_report, wear_scatter
-from jaxgear.cli.comparison import compared, sought
-from jaxgear.cli.study import Kept, Marches
 from jaxgear.contact import removed_material
 from jaxgear.io import (
     DesignFileError,
@@ -35,6 +32,9 @@ from jaxgear.io import (
 )
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.io.requests import tolerance_of
+from jaxgear.studies import Checkpoints, NamedArrays, WearResult, wear_scatter
+from jaxgear.studies.checkpoints import Marches
+from jaxgear.studies.comparison import compared, sought
 from jaxgear.tolerance import deviated_material, sample_deviations
 from jaxgear.wear import March, mean_over_life, over_life, wear, wear_depth
 
@@ -60,7 +60,7 @@ def involute_as_relief(request, monkeypatch):
         return mesh, {name: (bare, bare) if name == "unmodified" else flanks for name, flanks in designs.items()}
 
     if request.node.get_closest_marker("slow") is None:
-        monkeypatch.setattr(importlib.import_module("jaxgear.cli.wear"), "compared", alike)
+        monkeypatch.setattr(importlib.import_module("jaxgear.studies.wear"), "compared", alike)
 
 
 GEAR = """
@@ -136,7 +136,7 @@ def test_the_command_writes_what_it_says(file, tmp_path):
 
 
 def test_the_figures_of_worn_flanks_show_every_design(monkeypatch):
-    drawn, depth = {}, np.linspace(0.0, 3.0, 10).reshape(5, 1, 2)
+    depth = np.linspace(0.0, 3.0, 10).reshape(5, 1, 2)
     gears = gear_pair().gears
     lives = {
         name: SimpleNamespace(
@@ -149,9 +149,8 @@ def test_the_figures_of_worn_flanks_show_every_design(monkeypatch):
         for times, name in enumerate(("unmodified", "rule-based", "optimum"), 1)
     }
     request = SimpleNamespace(settings=SimpleNamespace(dynamics=None))
-    monkeypatch.setattr(wear_report.report, "save_figures", lambda folder, axes: [*drawn, drawn.update(axes)][:0])
     monkeypatch.setattr(plot, "lives", lambda *given: None)
-    assert wear_report.write_figures(None, SimpleNamespace(lives=lives, request=request, scatters={})) == []
+    drawn = WearResult.figures(SimpleNamespace(lives=lives, request=request, scatters={}))
     for gear in ("pinion", "wheel"):
         panels = np.ravel(drawn[f"worn_{gear}"])
         assert [panel.get_title() for panel in panels] == list(lives)
@@ -271,12 +270,9 @@ def test_loads_of_the_table_wear_one_flank_together(file, monkeypatch):
 @pytest.mark.parametrize("weights, told", [("weights = [3.0, 1.0]", "for 75, 25 % of"), ("", "the same share of")])
 def test_the_shares_of_the_torques_are_told(file, weights, told):
     design = load_design(file(PAIR + LOADS.replace("weights = [3.0, 1.0]", weights)))
-    study = wear_report.WearStudy(design, wear_request(design), {}, {}, {})
-    summary = wear_report.summary(study)
-    assert (
-        told in summary["shares_of_revolutions"]
-        and summary["shares_of_revolutions"] in wear_report.tables(study)[0].title
-    )
+    result = WearResult(design, wear_request(design), {}, {}, {})
+    shares = result.summary()["shares_of_revolutions"]
+    assert told in shares and shares in result.tables()[0].title
 
 
 @pytest.mark.slow
@@ -358,7 +354,8 @@ def scatter(design, flanks, kept):
     """Lives of the manufactured pairs of a file, with reliefs of one height."""
     mesh, settings = design.mesh(), wear_request(design).settings
     designs = {"relieved": (relief(flanks), relief(flanks))}
-    found = wear_scatter.scattered(design, settings, mesh, designs, tolerance_of(design), kept, quick=False)
+    options = {"samples": design.tolerance.samples, "seed": design.tolerance.seed, "keep": kept}
+    found = wear_scatter.manufactured_wear(settings, mesh, 150.0, designs, tolerance_of(design), **options)
     return mesh, found["relieved"]
 
 
@@ -366,7 +363,7 @@ def scatter(design, flanks, kept):
 def test_manufactured_pairs_live_as_their_deviations_let_them(file, tmp_path, monkeypatch):
     """Each is the life of the gears that `sample_deviations` draws; finer gears scatter less."""
     design = load_design(file(PAIR + TABLE + TOLERANCE))
-    kept = Kept(tmp_path / ".runs", wear_scatter.Arrays())
+    kept = Checkpoints(tmp_path / ".runs").of(NamedArrays())
     mesh, found = scatter(design, 5.0, kept)
     assert list(found) == ["mean_ppte_over_life", "wear_depth", "life_to_depth"]
     drawn = sample_deviations(tolerance_of(design), mesh, 3, seed=0)
@@ -508,7 +505,7 @@ def test_kept_blocks_are_not_worn_again(tmp_path, file):
         raise Stop
 
     with pytest.raises(Stop):
-        wear(mesh, 150.0, 2e7, keep=Kept(tmp_path / ".runs", Marches()), callback=stopped, **options)
+        wear(mesh, 150.0, 2e7, keep=Checkpoints(tmp_path / ".runs").of(Marches()), callback=stopped, **options)
     made = []
 
     def counted(made_of, make):
@@ -516,7 +513,7 @@ def test_kept_blocks_are_not_worn_again(tmp_path, file):
             made.append(1)
             return make()
 
-        return Kept(tmp_path / ".runs", Marches())(made_of, making)
+        return Checkpoints(tmp_path / ".runs").of(Marches())(made_of, making)
 
     again = wear(mesh, 150.0, 2e7, keep=counted, **options)
     assert len(made) == 1  # of two pairs of blocks
@@ -547,7 +544,7 @@ class Search:
 
 def test_what_a_search_has_found_is_not_sought_again(tmp_path, file, monkeypatch):
     """The mesh on which it ended, and the flanks, come from a few numbers beside the results."""
-    monkeypatch.setattr(importlib.import_module("jaxgear.cli.comparison"), "prepare", prepared)
+    monkeypatch.setattr(importlib.import_module("jaxgear.studies.comparison"), "prepare", prepared)
     mesh, stages = load_design(file(PAIR)).mesh(), SimpleNamespace(step=None)
     search = Search({"amount": 12.3, "length": 2.1})
 
@@ -556,7 +553,7 @@ def test_what_a_search_has_found_is_not_sought_again(tmp_path, file, monkeypatch
         design = load_design(
             file(FAST + VARIABLES + '[lubricant]\nfile = "oil.toml"\ntemperature = 80.0\nroughness = 0.5\n' + text)
         )
-        return sought(design, name, search, mesh, tmp_path / "out", stages, quick=False)
+        return sought(design, name, search, mesh, Checkpoints(tmp_path / "kept"), stages, quick=False)
 
     first, again = found(), found()
     assert search.run == 1
@@ -575,7 +572,7 @@ def test_a_search_without_numbers_to_keep_gives_its_flanks(tmp_path, file):
     design, stages = load_design(file(PAIR + VARIABLES)), SimpleNamespace(step=None)
     search = Search({})
     search.method = "te_iteration"
-    mesh, flanks = sought(design, "optimum", search, design.mesh(), tmp_path / "out", stages, quick=False)
+    mesh, flanks = sought(design, "optimum", search, design.mesh(), Checkpoints(), stages, quick=False)
     assert mesh.resolution.positions == 24 and str(flanks[0]) == str(jg.TipRelief(12.3, 2.1))
 
 

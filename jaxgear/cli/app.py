@@ -5,15 +5,18 @@ JAX and the library are imported when a command runs: help, version and what is 
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import Annotated, Any, Literal, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
+from ..studies import registry
+from ..studies.version import version as own_version
 from . import interrupt, streams
 from .options import File, NoCache, NoFigures, Quick, Reported, output_option, typed
-from .version import version as own_version
 
 # of `optimize.METHODS` and of the search for flanks without parameters, as a test makes sure
 METHODS = (
@@ -22,7 +25,29 @@ METHODS = (
 
 OK, NOT_CONVERGED, FAILED, INTERRUPTED = 0, 1, 2, 130
 
+
+class _Commands(TyperGroup):
+    """The commands, and the studies of other packages, which are looked for where a name is not known."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names for the help."""
+        return list(dict.fromkeys([*super().list_commands(ctx), *registry.provided()]))
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of a name; None for an unknown one."""
+        found = super().get_command(ctx, cmd_name)
+        place = registry.own().get(cmd_name) if found else registry.provided().get(cmd_name)
+        if found is None and place is not None:
+            alone = typer.Typer(add_completion=False)
+            alone.command(cmd_name)(_study(place, cmd_name))
+            found = typer.main.get_command(alone)
+        if found is not None and place is not None:
+            found.help = registry.help_of(place)
+        return found
+
+
 app = typer.Typer(
+    cls=_Commands,
     add_completion=False,
     pretty_exceptions_enable=False,
     help="Flank design of spur gears by loaded tooth contact analysis. Exit codes: 0 success, 1 a contact solution did "
@@ -66,6 +91,56 @@ def new(
     return OK
 
 
+def _run(
+    place: str,
+    context: typer.Context,
+    file: Path,
+    output: Path | None,
+    *,
+    no_figures: bool,
+    reported: bool,
+    no_cache: bool,
+    **options: Any,
+) -> int:
+    """Runs the command of a study.
+
+    Args:
+        place: of its class, as `module:class`.
+        context: of the command line.
+        file, output, no_figures, reported, no_cache: options that all studies have.
+        options: further ones of this study.
+    """
+    with interrupt.importing():
+        from . import run
+
+        study = registry.load(place)
+    shared: dict[str, Any] = {"figures": not no_figures, "cache": not no_cache, "command": typed(context, reported)}
+    return OK if run.run_study(partial(study.of, **options), file, output, **shared) else NOT_CONVERGED
+
+
+def _study(place: str, name: str) -> Callable[..., int]:
+    """The command of a study without options of its own.
+
+    Args:
+        place: of its class, as `module:class`.
+        name: of the command.
+    """
+
+    def command(
+        context: typer.Context,
+        file: File,
+        output: Annotated[Path | None, output_option(name)] = None,
+        quick: Quick = False,
+        no_figures: NoFigures = False,
+        reported: Reported = False,
+        no_cache: NoCache = False,
+    ) -> int:
+        shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
+        return _run(place, context, file, output, **shared, quick=quick)
+
+    return command
+
+
 @app.command()
 def analyze(
     context: typer.Context,
@@ -76,10 +151,8 @@ def analyze(
     no_cache: NoCache = False,
 ) -> int:
     """Analyze the unmodified pair and the modification of the design file."""
-    with interrupt.importing():
-        from . import commands
-    fine = commands.analyze(file, output, figures=not no_figures, cache=not no_cache, command=typed(context, reported))
-    return OK if fine else NOT_CONVERGED
+    shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
+    return _run("jaxgear.studies.analysis:DesignAnalysis", context, file, output, **shared)
 
 
 @app.command()
@@ -100,87 +173,13 @@ def optimize(
     Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
     the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
     """
-    with interrupt.importing():
-        from . import commands
-    fine = commands.optimize(
-        file,
-        output,
-        method=method,
-        quick=quick,
-        figures=not no_figures,
-        cache=not no_cache,
-        command=typed(context, reported),
-    )
-    return OK if fine else NOT_CONVERGED
+    shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
+    place = "jaxgear.studies.optimization:DesignOptimization"
+    return _run(place, context, file, output, **shared, method=method, quick=quick)
 
 
-@app.command()
-def dynamics(
-    context: typer.Context,
-    file: File,
-    output: Annotated[Path | None, output_option("dynamics")] = None,
-    quick: Quick = False,
-    no_figures: NoFigures = False,
-    reported: Reported = False,
-    no_cache: NoCache = False,
-) -> int:
-    """Run the pair through the speeds of the table `dynamics`, up and down, under several torques.
-
-    Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the design file or
-    the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.
-    """
-    with interrupt.importing():
-        from . import dynamics
-    fine = dynamics.run_dynamics(
-        file, output, quick=quick, figures=not no_figures, cache=not no_cache, command=typed(context, reported)
-    )
-    return OK if fine else NOT_CONVERGED
-
-
-@app.command()
-def wear(
-    context: typer.Context,
-    file: File,
-    output: Annotated[Path | None, output_option("wear")] = None,
-    quick: Quick = False,
-    no_figures: NoFigures = False,
-    reported: Reported = False,
-    no_cache: NoCache = False,
-) -> int:
-    """Wear the flanks of the pair over the revolutions of the table `wear`.
-
-    Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the design file or
-    the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.
-    """
-    with interrupt.importing():
-        from . import wear
-    fine = wear.run_wear(
-        file, output, quick=quick, figures=not no_figures, cache=not no_cache, command=typed(context, reported)
-    )
-    return OK if fine else NOT_CONVERGED
-
-
-@app.command()
-def layout(
-    context: typer.Context,
-    file: File,
-    output: Annotated[Path | None, output_option("layout")] = None,
-    quick: Quick = False,
-    no_figures: NoFigures = False,
-    reported: Reported = False,
-    no_cache: NoCache = False,
-) -> int:
-    """Find the flank lines of the pair on its shafts, and its profile modifications, in three steps.
-
-    Step 1 levels the load over the face or finds the longest life under a duty cycle, step 2 keeps the load off the
-    edges within the tolerances, step 3 tries profile modifications in all combinations. With and without housing.
-    """
-    with interrupt.importing():
-        from . import layout as command
-    fine = command.run_layout(
-        file, output, quick=quick, figures=not no_figures, cache=not no_cache, command=typed(context, reported)
-    )
-    return OK if fine else NOT_CONVERGED
+for _name, _place in registry.own().items():
+    app.command(_name)(_study(_place, _name))
 
 
 @app.command()
@@ -263,11 +262,11 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a title beyond the terminal's alphabet is no reason to fail
     with interrupt.listening(), streams.warnings():
-        code = _run(arguments)
+        code = _code_of(arguments)
     sys.exit(code)
 
 
-def _run(arguments: Sequence[str] | None) -> int:
+def _code_of(arguments: Sequence[str] | None) -> int:
     try:
         given = sys.argv[1:] if arguments is None else list(arguments)
         code = app(args=given, obj=given, prog_name="jaxgear", standalone_mode=False)

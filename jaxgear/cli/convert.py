@@ -10,7 +10,7 @@ from ..geometry import GearPair
 from ..io import DesignFileError, load_design, read_rexs, write_design, write_rexs
 from ..io.toml import read
 from ..io.write_design import write_starter
-from . import interrupt, report
+from . import interrupt, terminal
 
 _REXS, _DESIGN = (".rexs", ".xml", ".rexsj", ".json"), (".toml",)
 _TAKEN = {"title", "materials", "pinion", "wheel", "pair", "load"}  # tables of a design file that REXS has a place for
@@ -80,12 +80,12 @@ def _to_rexs(source: Path, target: Path) -> None:
     left = [f"[{name}]" for name in tables if name not in _TAKEN]
     left += [f"load.{name}" for name in tables["load"] if name not in ("torque", "speed")]
     if left:
-        report.say(f"left out, REXS has no place for it: {', '.join(left)}")
+        terminal.say(f"left out, REXS has no place for it: {', '.join(left)}")
 
 
 def _say(target: Path, pair: GearPair) -> None:
     pinion, wheel = pair.pinion, pair.wheel
-    report.say(
+    terminal.say(
         f"{target}: {int(pinion.teeth)}/{int(wheel.teeth)} teeth, module {float(pinion.module):g} mm, "
         f"centre distance {float(pair.working_center_distance):.6g} mm"
     )
@@ -98,7 +98,7 @@ def new(
     jax.config.update("jax_enable_x64", True)
     with interrupt.held(f"{path} is there"):
         pair = write_starter(path, teeth, module=module, torque=torque, face_width=face_width, speed=speed)
-    report.say(
+    terminal.say(
         f"{path}: {teeth[0]}/{teeth[1]} teeth, module {module:g} mm, centre distance "
         f"{float(pair.working_center_distance):.6g} mm; jaxgear optimize {path} finds its tip reliefs"
     )

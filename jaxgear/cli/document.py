@@ -11,7 +11,7 @@ from ..io import DesignFile
 from ..io.errors import naming
 from ..io.toml import content
 from ..report import Chapter, Report, Source, Table, figure, heading, needed, numbers, text, write_report
-from .geometry import drawing_table, rating_page
+from ..studies.gear_data import drawing_table, rating_page
 
 REPORT = "report.html"
 _NOTHING = "-"

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from .. import studies
 from ..io.folder import earlier
-from . import interrupt, report
+from . import interrupt, terminal
 
 _LINES = 10  # of a sweep, where there is no terminal, and more
 _QUIET = 30.0  # seconds after which there is a line anyway
@@ -15,7 +16,7 @@ _QUIET = 30.0  # seconds after which there is a line anyway
 
 class _Bar(Progress):
     def __init__(self, *columns: ProgressColumn, doing: str, note: str):
-        console = report.console(stderr=True)
+        console = terminal.console(stderr=True)
         super().__init__(*columns, console=console, transient=True, disable=not console.is_terminal)
         self._began = time.perf_counter()
         self._task = self.add_task(doing, total=None, note=note)
@@ -30,18 +31,21 @@ class _Bar(Progress):
             self.console.print(f"jaxgear: {line}", soft_wrap=True)
 
 
-class Stages(_Bar):
+class Stages(_Bar, studies.Stages):
     """Progress of a command through its stages."""
 
     def __init__(self):
         columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn()
-        super().__init__(*columns, doing="reading the design file", note="")
+        _Bar.__init__(self, *columns, doing="reading the design file", note="")
+        studies.Stages.__init__(self, self.shown)
 
-    def begin(self, stage: str) -> None:
-        """Names the next stage."""
+    def shown(self, progress: studies.Progress) -> None:
+        """Shows how far a study is; its callback."""
         interrupt.check()
-        self.update(self._task, description=stage, total=None, completed=0, note="")
-        self._say(stage)
+        done, begins = progress.done or 0, progress.done is None
+        self.update(self._task, description=progress.stage, total=progress.total, completed=done, note=progress.note)
+        if begins:
+            self._say(progress.stage)
 
     def replaces(self, target: Path) -> None:
         """Says which earlier results a command is about to replace, as long as it can still be stopped."""
@@ -49,16 +53,6 @@ class Stages(_Bar):
         if held:
             line = f"jaxgear: replaces the results in {target}{os.sep} ({held}); --output keeps them"
             self.console.print(line, soft_wrap=True)
-
-    def step(self, step: int, total: int, best: float | None) -> None:
-        """Callback of the search."""
-        interrupt.check()
-        self.update(self._task, completed=step, total=total, note=f"best {best:.4g}")
-
-    def count(self, done: int, total: int, note: str) -> None:
-        """How much of the stage is done, and what is next."""
-        interrupt.check()
-        self.update(self._task, completed=done, total=total, note=note)
 
 
 class Meter(_Bar):

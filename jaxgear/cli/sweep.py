@@ -9,11 +9,13 @@ import jax
 
 from ..io import sweep_request, writing
 from ..report import Table
+from ..studies.evaluation import coarse
 from ..sweeps import SweepTable, sweep
-from . import interrupt, report, sweep_report
+from . import interrupt, sweep_report
+from . import terminal as report
 from .document import document
 from .progress import Meter
-from .run import coarse, default_folder, opened
+from .run import default_folder, opened
 from .sweep_report import evaluate_best, said_of_best, write_figures
 
 _QUICK_SAMPLES = 4096

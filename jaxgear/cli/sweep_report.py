@@ -13,14 +13,15 @@ from ..io import DesignFile
 from ..metrics import findings_of
 from ..microgeometry import NoModification
 from ..report import Chapter, Table, figure, text, write_variants, write_workbook
+from ..studies import side_by_side as report
+from ..studies.comparison import Modifications
+from ..studies.evaluation import evaluate, grid_change, grid_lines, torques_of
+from ..studies.gear_data import gears
+from ..studies.results import save_figures
+from ..studies.summary_data import sizes, versions
 from ..sweeps import SweepTable, over_torques
-from . import report
 from .document import CommandResult, Document, project_facts
-from .geometry import gears
 from .progress import Stages
-from .run import Modifications, torques_of
-from .study import evaluate, grid_change, grid_lines
-from .summary_file import sizes, versions
 
 _DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory does not grow with the table
 _CHARTS = 6  # radar charts
@@ -57,7 +58,7 @@ def write_figures(folder: Path, table: SweepTable) -> list[Path]:
         for name in axes.keys() - {"radar"}:
             axis = np.ravel(axes[name])[0]
             axis.set_title(note, loc="left", pad=32, fontsize=axis.xaxis.label.get_fontsize())
-    return report.save_figures(folder, axes)
+    return save_figures(folder, axes)
 
 
 def _names(best: SweepTable) -> list[str]:
@@ -149,7 +150,7 @@ def _draw(
     from .. import plot
 
     with plot.same_styles(_styles(best)):
-        return report.write_figures(folder, design, mesh, found, torques), _alone(folder, mesh, found)
+        return save_figures(folder, report.figures(design, mesh, found, torques)), _alone(folder, mesh, found)
 
 
 def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, list[Path]]:
@@ -165,7 +166,7 @@ def _alone(folder: Path, mesh: Mesh, found: report.Evaluations) -> dict[str, lis
             "k_chart": plot.k_chart(mesh, report.flanks(both)),
         }
         named = {f"{kind}_{name.replace(' ', '_')}": ax for kind, ax in axes.items()}
-        pages[name] = report.save_figures(folder, named, bold=name)
+        pages[name] = save_figures(folder, named, bold=name)
     return pages
 
 

@@ -67,7 +67,7 @@ RESULT_FILES = frozenset(
 
 
 @contextmanager
-def result_folder(target: str | Path) -> Iterator[Path]:
+def result_folder(target: str | Path, files: frozenset[str] = frozenset()) -> Iterator[Path]:
     """A temporary folder beside `target` that takes its place when the block ends without an exception.
 
     An earlier result in `target` is replaced. After an exception or an interruption nothing is left behind and an
@@ -75,13 +75,14 @@ def result_folder(target: str | Path) -> Iterator[Path]:
 
     Args:
         target: folder of the results.
+        files: names that results may have beside `RESULT_FILES`.
 
     Raises:
         ValueError: when the target is a file, a folder with other content or the one the caller is in, or cannot be
             written.
     """
     target = Path(target)
-    _check_target(target)
+    _check_target(target, RESULT_FILES | files)
     parent = target.absolute().parent
     missing = [folder for folder in (parent, *parent.parents) if not folder.exists()]
     temporary = None
@@ -152,14 +153,14 @@ def writing(path: str | Path) -> Iterator[None]:
         raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
-def _check_target(target: Path) -> None:
+def _check_target(target: Path, known: frozenset[str]) -> None:
     with writing(target):
         if not target.exists() and not target.is_symlink():
             return
         if not target.is_dir():
             raise ValueError(f"{target}: is a file, not a folder")
         names = sorted(entry.name for entry in target.iterdir())
-    others = [name for name in names if name not in RESULT_FILES]
+    others = [name for name in names if name not in known]
     if names and (others or not _is_ours(target)):
         found = (others or names)[0]
         raise ValueError(f"{target}: holds other files than results of jaxgear ({found}), choose another folder")

@@ -1,7 +1,6 @@
-"""What a run says and draws: table, lines and figures."""
+"""Designs side by side: table, lines and figures."""
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
@@ -18,11 +17,7 @@ from ..numerics import program
 from ..optimize import Verified
 from ..report import Table
 from ..vocabulary import quantities
-from .study import Evaluation, grid_lines
-from .terminal import console as console
-from .terminal import say as say
-from .terminal import say_rows as say_rows
-from .terminal import warn as warn
+from .evaluation import Evaluation, grid_lines
 
 Evaluations = Mapping[str, Evaluation]
 
@@ -156,13 +151,8 @@ def main_name(evaluations: Evaluations) -> str:
     return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
 
 
-def write_figures(
-    folder: Path, file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray
-) -> list[Path]:
-    """Writes the figures of the designs; the Harris map shows the main one. Gives the files."""
-    import matplotlib
-
-    matplotlib.use("Agg")  # the command line never shows a window
+def figures(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
+    """Axes of the designs by name, the lines of the main one bold; the Harris map shows the main one."""
     from .. import plot
 
     cycles = {name: evaluation.cycle for name, evaluation in evaluations.items()}
@@ -182,7 +172,9 @@ def write_figures(
     }
     if mesh.resolution.slices > 1:
         axes |= _over_face(file, mesh, evaluations, torques)
-    return save_figures(folder, axes, bold=main_name(evaluations))
+    for drawn in axes.values():
+        plot.emphasize(np.ravel(drawn)[0].figure, main_name(evaluations))
+    return axes
 
 
 def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
@@ -214,17 +206,6 @@ def _band(file: DesignFile, evaluations: Evaluations) -> dict[str, Any]:
     """The tolerance band of a chart about the main design, where the file names a quality class."""
     classes = quality_classes(file)
     return {} if classes is None else {"tolerance": classes, "about": main_name(evaluations)}
-
-
-def save_figures(folder: Path, axes: Mapping[str, Any], *, bold: str | None = None) -> list[Path]:
-    """Writes the figures that hold the axes, each under its name, the lines of one design bold; gives the files."""
-    from .. import plot
-
-    figures = {name: np.ravel(drawn)[0].figure for name, drawn in axes.items()}
-    if bold is not None:
-        for figure in figures.values():
-            plot.emphasize(figure, bold)
-    return [plot.save(figure, folder / f"{name}.png") for name, figure in figures.items()]
 
 
 def flanks(evaluations: Evaluations):

@@ -1,16 +1,14 @@
-"""What the command `layout` does, with its options."""
+"""The layout study: from a design file with shafts to its flank lines and profiles, in three steps."""
 
-from dataclasses import replace
-from functools import partial
-from pathlib import Path
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ..contact import Mesh, MeshCycle, Resolution, solve
-from ..contact.kinematics import kinematics
-from ..io import DesignFile, LayoutRequest, layout_request, write_flanks
+from ..io import DesignFile, LayoutRequest, layout_request
 from ..io.schema_shafts import ProfileSection
 from ..layout import (
     FlankLine,
@@ -24,94 +22,107 @@ from ..layout import (
     layout_flank_lines,
     vary_profiles,
 )
-from ..numerics import real
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
-from . import layout_report, manufactured
-from .layout_report import LayoutStudy, designs, flank_lines
+from . import manufactured
+from .checkpoints import Checkpoints
+from .evaluation import coarse, face_change
+from .layout_result import LayoutResult, flank_lines
 from .progress import Stages
-from .run import coarse
-from .study import face_change
-from .study_command import Make, StudyCommand
+from .study import AbstractStudy
 
 
-def _plan(design: DesignFile, quick: bool) -> Make[LayoutStudy]:
-    request = layout_request(design, quick=quick)
-    return lambda target, stages: (_study(design, request, stages, quick=quick), lambda: None)
+@dataclass(frozen=True)
+class LayoutStudy(AbstractStudy[LayoutResult]):
+    """Find the flank lines of the pair on its shafts, and its profile modifications, in three steps.
 
+    Step 1 levels the load over the face or finds the longest life under a duty cycle, step 2 keeps the load off the
+    edges within the tolerances, step 3 tries profile modifications in all combinations. With and without housing.
 
-def _write(folder: Path, study: LayoutStudy) -> None:
-    design = study.design
-    # the flanks need no mesh, which only step 3 has
-    moving = kinematics(design.pair(), real(0.0), design.resolution(), "strain")
-    write_flanks(folder / "flanks.csv", moving, designs(study))
-    if study.profile is not None:
-        study.profile.table.to_csv(folder / "profiles.csv")
+    Attributes:
+        request: what the file asks for.
+    """
 
+    name: ClassVar = "layout"
+    coarse: ClassVar = "few stations and variants"
+    takes_shafts: ClassVar = True
 
-def _study(design: DesignFile, request: LayoutRequest, stages: Stages, *, quick: bool) -> LayoutStudy:
-    layouts: dict[str, FlankLineLayout] = {}
-    for name, support in request.supports.items():
-        stages.begin(f"flank lines, {name}")
-        layouts[name] = layout_flank_lines(support, request.tolerances, **request.options)
-    stages.begin("face load factor over the torque")
-    over_torque = _over_torque(request, next(iter(layouts.values())))
-    meshes: dict[str, Mesh] = {}
-    contacts: dict[str, dict[str, dict[str, float]]] = {}
-    cases: dict[str, dict[str, dict[str, np.ndarray]]] = {}
-    cycles: dict[str, MeshCycle] = {}
-    factors: dict[str, dict[str, float]] = {}
-    profiles: dict[str, ProfileLayout] = {}
-    wanted = request.profile
-    if wanted is not None:
-        for name in layouts if wanted.shafts else list(layouts)[:1]:
-            stages.begin("preparing the mesh" + (f", {name}" if wanted.shafts else ""))
-            size = design.resolution()
-            held = _held(request.supports[name], request.profile_torque, size)
-            given = coarse(size) if quick else size, held if wanted.shafts else None
-            mesh = jax.block_until_ready(design.mesh(*given, rigid=not wanted.shafts))
-            stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
-            meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
-            if wanted.shafts:
-                contacts[name], cases[name] = _contacts(request, mesh, layouts[name], profiles[name])
-                cycles = cycles or _cycles(request, mesh, layouts[name], profiles[name])
-                factors[name] = _factors(request, name, layouts[name], stations=size.slices)
-    stations_change: dict[str, dict[str, float]] = {}
-    slices_change: dict[str, dict[str, float]] = {}
-    if not quick:
-        stages.begin("face load factor on a finer grid")
-        name, stations = next(iter(layouts)), request.options["stations"]
-        once, again = (_factors(request, name, layouts[name], stations=count) for count in (stations, 2 * stations))
-        stations_change = {step: {"face_load_factor": again[step] - value} for step, value in once.items()}
-        if cycles:
-            finer = _finer(design, request, name)
-            between = _cycles(request, finer, layouts[name], profiles[name])
-            slices_change = {which: face_change(cycle, between[which]) for which, cycle in cycles.items()}
-    duty_cycle = request.options.get("duty_cycle")
-    unusual = {
-        name: findings_of(
-            layout,
-            request.supports[name],
-            duty_cycle=duty_cycle,
-            profiles=profiles.get(name),
-            contact=cases.get(name),
+    request: LayoutRequest
+
+    @classmethod
+    def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
+        """As `AbstractStudy.of`."""
+        return cls(design, quick, layout_request(design, quick=quick))
+
+    def omits(self) -> str:
+        """Tolerances other than those of the flank lines."""
+        return manufactured.left_out(self.design, "flank lines deviate by the limits of [layout]")
+
+    def work_out(self, checkpoints: Checkpoints, stages: Stages) -> LayoutResult:
+        """Flank lines on every support, then profile modifications; keeps no checkpoints."""
+        design, request, quick = self.design, self.request, self.quick
+        layouts: dict[str, FlankLineLayout] = {}
+        for name, support in request.supports.items():
+            stages.begin(f"flank lines, {name}")
+            layouts[name] = layout_flank_lines(support, request.tolerances, **request.options)
+        stages.begin("face load factor over the torque")
+        over_torque = _over_torque(request, next(iter(layouts.values())))
+        meshes: dict[str, Mesh] = {}
+        contacts: dict[str, dict[str, dict[str, float]]] = {}
+        cases: dict[str, dict[str, dict[str, np.ndarray]]] = {}
+        cycles: dict[str, MeshCycle] = {}
+        factors: dict[str, dict[str, float]] = {}
+        profiles: dict[str, ProfileLayout] = {}
+        wanted = request.profile
+        if wanted is not None:
+            for name in layouts if wanted.shafts else list(layouts)[:1]:
+                stages.begin("preparing the mesh" + (f", {name}" if wanted.shafts else ""))
+                size = design.resolution()
+                held = _held(request.supports[name], request.profile_torque, size)
+                given = coarse(size) if quick else size, held if wanted.shafts else None
+                mesh = jax.block_until_ready(design.mesh(*given, rigid=not wanted.shafts))
+                stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
+                meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
+                if wanted.shafts:
+                    contacts[name], cases[name] = _contacts(request, mesh, layouts[name], profiles[name])
+                    cycles = cycles or _cycles(request, mesh, layouts[name], profiles[name])
+                    factors[name] = _factors(request, name, layouts[name], stations=size.slices)
+        stations_change: dict[str, dict[str, float]] = {}
+        slices_change: dict[str, dict[str, float]] = {}
+        if not quick:
+            stages.begin("face load factor on a finer grid")
+            name, stations = next(iter(layouts)), request.options["stations"]
+            once, again = (_factors(request, name, layouts[name], stations=count) for count in (stations, 2 * stations))
+            stations_change = {step: {"face_load_factor": again[step] - value} for step, value in once.items()}
+            if cycles:
+                finer = _finer(design, request, name)
+                between = _cycles(request, finer, layouts[name], profiles[name])
+                slices_change = {which: face_change(cycle, between[which]) for which, cycle in cycles.items()}
+        duty_cycle = request.options.get("duty_cycle")
+        unusual = {
+            name: findings_of(
+                layout,
+                request.supports[name],
+                duty_cycle=duty_cycle,
+                profiles=profiles.get(name),
+                contact=cases.get(name),
+            )
+            for name, layout in layouts.items()
+        }
+        return LayoutResult(
+            design,
+            request,
+            layouts,
+            over_torque,
+            meshes,
+            contacts,
+            cases,
+            cycles,
+            factors,
+            profiles,
+            unusual,
+            stations_change,
+            slices_change,
         )
-        for name, layout in layouts.items()
-    }
-    return LayoutStudy(
-        design,
-        request,
-        layouts,
-        over_torque,
-        meshes,
-        contacts,
-        cases,
-        cycles,
-        factors,
-        profiles,
-        unusual,
-        stations_change,
-        slices_change,
-    )
 
 
 def _finer(design: DesignFile, request: LayoutRequest, name: str) -> Mesh:
@@ -200,19 +211,3 @@ def _profile(
         length=wanted.length,
         callback=lambda done, total, _: stages.count(done, total, "variants"),
     )
-
-
-run_layout = StudyCommand(
-    "layout",
-    "few stations and variants",
-    _plan,
-    layout_report.summary,
-    _write,
-    layout_report.write_figures,
-    layout_report.tables,
-    layout_report.verdict,
-    layout_report.failures,
-    findings=layout_report.findings,
-    takes_shafts=True,
-    omits=partial(manufactured.left_out, why="flank lines deviate by the limits of [layout]"),
-)

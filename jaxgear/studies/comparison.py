@@ -1,20 +1,21 @@
 """The designs that a study compares: unmodified, rule-based, that of the file or the optimum of its variables."""
 
 import dataclasses
-from pathlib import Path
-from typing import Any
 
 import jax
+import numpy as np
 
 from ..contact import Mesh, prepare
+from ..geometry import GearPair
 from ..io import DesignFile, OptimizeRequest, optimize_request
 from ..io.schema import METHODS_WITHOUT_VARIABLES
 from ..microgeometry import AbstractModification, NoModification
+from ..numerics import program
 from ..optimize import Front, Optimum
-from .commands import rule_based
+from ..sizing import iso_relief
+from .checkpoints import Checkpoints, NamedArrays
+from .evaluation import coarse
 from .progress import Stages
-from .run import coarse
-from .study import Kept, runs_beside
 
 Modifications = tuple[AbstractModification, AbstractModification]
 
@@ -34,8 +35,24 @@ def first_mesh(design: DesignFile, torque: float, *, quick: bool) -> Mesh:
     return jax.block_until_ready(design.mesh(coarse(size) if quick else size))
 
 
+def rule_based(design: DesignFile) -> AbstractModification:
+    """The relief of ISO 6336-1 for both tips."""
+    return _iso_relief(design.pair(), np.asarray(design.torque), np.asarray(design.optimize.application_factor))
+
+
+@program
+def _iso_relief(pair: GearPair, torque, application_factor):
+    return iso_relief(pair, torque, application_factor=application_factor)
+
+
 def compared(
-    design: DesignFile, torque: float, search: OptimizeRequest | None, target: Path, stages: Stages, *, quick: bool
+    design: DesignFile,
+    torque: float,
+    search: OptimizeRequest | None = None,
+    checkpoints: Checkpoints | None = None,
+    stages: Stages | None = None,
+    *,
+    quick: bool = False,
 ) -> tuple[Mesh, dict[str, Modifications]]:
     """The designs by their names, and the mesh on which they are compared, up to a torque [N m].
 
@@ -43,10 +60,11 @@ def compared(
         design: the design file.
         torque: largest of interest [N m].
         search: for the optimum; None for none.
-        target: result folder, beside which what a search has found is kept until the results are there.
-        stages: told what goes on.
+        checkpoints: where what a search has found is kept; None keeps nothing.
+        stages: told what goes on; None for silence.
         quick: on coarse positions.
     """
+    stages = Stages() if stages is None else stages
     stages.begin("preparing the mesh")
     mesh = first_mesh(design, torque, quick=quick)
     involute = NoModification()
@@ -58,12 +76,20 @@ def compared(
             designs["modified"] = given
     if search is not None:
         stages.begin(f"searching the optimum ({search.method})")
-        mesh, designs["optimum"] = sought(design, "optimum", search, mesh, target, stages, quick=quick)
+        checkpoints = Checkpoints() if checkpoints is None else checkpoints
+        mesh, designs["optimum"] = sought(design, "optimum", search, mesh, checkpoints, stages, quick=quick)
     return mesh, designs
 
 
 def sought(
-    design: DesignFile, name: str, search: OptimizeRequest, mesh: Mesh, target: Path, stages: Stages, *, quick: bool
+    design: DesignFile,
+    name: str,
+    search: OptimizeRequest,
+    mesh: Mesh,
+    checkpoints: Checkpoints,
+    stages: Stages,
+    *,
+    quick: bool,
 ) -> tuple[Mesh, Modifications]:
     """The mesh on which a search has ended, and what it has found, now or before the command was interrupted.
 
@@ -72,7 +98,7 @@ def sought(
         name: of what the search gives; one search of a file has it.
         search: to be run.
         mesh: on which it begins.
-        target, stages, quick: as for `compared`.
+        checkpoints, stages, quick: as for `compared`.
     """
 
     def found() -> Optimum:
@@ -84,7 +110,8 @@ def sought(
         return optimum.mesh, (optimum.pinion, optimum.wheel)
     lowest = design.design({name: low for name, (low, _) in design.bounds.items()})  # with what files hold
     asked = name, quick, design.says, design.lubricant, design.strength
-    numbers = Kept(runs_beside(target), _Numbers())((mesh, lowest, asked), lambda: _numbers(found()))
+    kept = checkpoints.of(NamedArrays())((mesh, lowest, asked), lambda: _numbers(found()))
+    numbers = {name: float(value) for name, value in kept.items()}
     sizes = dataclasses.replace(mesh.resolution, positions=int(numbers[_POSITIONS]), pairs=int(numbers[_PAIRS]))
     flanks = design.design({name: numbers[name] for name in design.bounds})
     if sizes == mesh.resolution:
@@ -96,15 +123,3 @@ def _numbers(optimum: Optimum) -> dict[str, float]:
     """Numbers that give design and mesh of an optimum again."""
     sizes = optimum.mesh.resolution
     return {**optimum.parameters, _POSITIONS: sizes.positions, _PAIRS: sizes.chosen_pairs}
-
-
-class _Numbers:
-    """Named numbers as arrays."""
-
-    def arrays(self, found: dict[str, float]) -> dict[str, Any]:
-        """All of them."""
-        return found
-
-    def result(self, arrays: dict[str, Any]) -> dict[str, float]:
-        """The numbers."""
-        return {name: float(value) for name, value in arrays.items()}

@@ -1,10 +1,9 @@
-"""What a run says and writes about its optimum, alike for every method."""
+"""What is said and drawn of an optimum, alike for every method."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, repeat
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -20,8 +19,9 @@ from ..optimize.result import PENALIZED
 from ..optimize.verdict import over_cases
 from ..report import Table
 from ..vocabulary import quantities
-from . import report
-from .study import response_surface
+from . import side_by_side
+from .evaluation import response_surface
+from .summary_data import flanks_data
 
 _SAME = 0.05  # [%]; a smaller change rounds to nothing
 _NO_RATIO = ("degC",)  # units whose zero is a convention
@@ -65,14 +65,14 @@ class Judged:
         return f"{before:{form}} -> {after:{form}} {self.of.unit}".rstrip() + f": {said}" * bool(said)
 
 
-def gains(evaluations: report.Evaluations, problem: Problem | None) -> Iterator[tuple[str, str]]:
+def gains(evaluations: side_by_side.Evaluations, problem: Problem | None) -> Iterator[tuple[str, str]]:
     """Rows of label and text: the objectives, then PPTE where it is none of them, each by finite elements too.
 
     Args:
         evaluations: designs by their names, the first of which is unmodified.
         problem: by whose measure they were judged; None for PPTE alone.
     """
-    main = report.main_name(evaluations)
+    main = side_by_side.main_name(evaluations)
     compared = {name: found for name, found in evaluations.items() if not name.startswith("as ")}
     compared = {name: compared[name] for name in (*(name for name in compared if name != main), main)}
     for judged in _numbers(compared, problem):
@@ -81,7 +81,7 @@ def gains(evaluations: report.Evaluations, problem: Problem | None) -> Iterator[
             yield "  by finite elements", judged.row(judged.verified)
 
 
-def _numbers(evaluations: report.Evaluations, problem: Problem | None) -> Iterator[Judged]:
+def _numbers(evaluations: side_by_side.Evaluations, problem: Problem | None) -> Iterator[Judged]:
     labels = list(next(iter(evaluations.values())).objectives)
     asked = [] if problem is None else [(of, f"{over_cases(problem)}{of.words}") for of in problem.objectives]
     several = all(found.verified is not None for found in evaluations.values())
@@ -100,7 +100,7 @@ COMPROMISE = "compromise"  # what the design of a front is called that the run s
 _SHOWN_PARAMETERS = 6  # more columns than these are for a file
 
 
-def others_of(front: Front, evaluations: report.Evaluations) -> dict[str, np.ndarray]:
+def others_of(front: Front, evaluations: side_by_side.Evaluations) -> dict[str, np.ndarray]:
     """Values of the objectives of the designs that the front is compared with, by their names."""
     return {
         name: np.asarray(list(found.objectives.values()))
@@ -109,7 +109,7 @@ def others_of(front: Front, evaluations: report.Evaluations) -> dict[str, np.nda
     }
 
 
-def front_table(front: Front, evaluations: report.Evaluations, of_variables: Mapping[str, str]) -> Table:
+def front_table(front: Front, evaluations: side_by_side.Evaluations, of_variables: Mapping[str, str]) -> Table:
     """All designs of a front, with the others below; variables with their units."""
     title = f"Pareto front, {len(front.values)} designs, all in front.csv"
     names = list(front.parameters) if len(front.parameters) <= _SHOWN_PARAMETERS else []
@@ -126,7 +126,7 @@ def front_table(front: Front, evaluations: report.Evaluations, of_variables: Map
     return result
 
 
-def front_rows(front: Front, signs: Sequence[int], evaluations: report.Evaluations) -> Iterator[tuple[str, str]]:
+def front_rows(front: Front, signs: Sequence[int], evaluations: side_by_side.Evaluations) -> Iterator[tuple[str, str]]:
     """What the main design of a front is, and how many of the front beat the other designs.
 
     Args:
@@ -227,7 +227,7 @@ def first_screen(
     optimum: Optimum,
     front: Front | None,
     projection: Projection | None,
-    evaluations: report.Evaluations,
+    evaluations: side_by_side.Evaluations,
     *,
     searched_at: int,
     trust: Iterable[tuple[str, str]],
@@ -243,7 +243,7 @@ def first_screen(
         searched_at: positions at which the search began.
         trust: further rows about the last, such as what is not usual.
     """
-    name, best = report.main_name(evaluations), report.main(evaluations)
+    name, best = side_by_side.main_name(evaluations), side_by_side.main(evaluations)
     rows = [*to_grind(optimum.mesh, best.pinion, best.wheel)]
     if projection is not None:
         rows += to_grind(optimum.mesh, projection.pinion, projection.wheel, f"as {projection.curve}")
@@ -299,20 +299,19 @@ def summary(file: DesignFile, optimum: Optimum, projection: Projection | None) -
             "ppte_um": projection.ppte,
             "loss_um": projection.loss,
             "misfit_um": projection.misfit,
-            "pinion_modification": describe(projection.pinion),
-            "wheel_modification": describe(projection.wheel),
+            **flanks_data(projection.pinion, projection.wheel),
         }
     return data
 
 
-def write_figures(
-    folder: Path, mesh: Mesh, torque: float, optimum: Optimum, front: Front | None, evaluations: report.Evaluations
-) -> list[Path]:
-    """Writes the figures of the search and of the optimum over all loads; gives the files."""
+def figures(
+    mesh: Mesh, torque: float, optimum: Optimum, front: Front | None, evaluations: side_by_side.Evaluations
+) -> dict[str, Any]:
+    """Axes of the search and of the optimum over all loads, by name."""
     from .. import plot
 
     torques, errors = response_surface(mesh, torque, optimum.pinion, optimum.wheel)
-    unloaded, name = optimum.cycle.unloaded_transmission_error, report.main_name(evaluations)
+    unloaded, name = optimum.cycle.unloaded_transmission_error, side_by_side.main_name(evaluations)
     axes: dict[str, Any] = {
         "response_surface": plot.response_surface(
             mesh.phase, torques, errors, unloaded, design_torque=float(optimum.cycle.torque), design=name
@@ -325,7 +324,7 @@ def write_figures(
         axes["iterations_transmission_error"] = plot.iterations_transmission_error(optimum, mesh.phase)
     if front is not None:
         axes["front"] = plot.optimum_front(front, chosen=front.chosen, others=others_of(front, evaluations))
-    return report.save_figures(folder, axes)
+    return axes
 
 
 def _feasibility(optimum: Optimum) -> Iterator[tuple[str, str]]:
@@ -358,13 +357,14 @@ def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:
         yield label, "no variable is at a bound"
 
 
-def _positions(optimum: Optimum, evaluations: report.Evaluations, searched_at: int) -> Iterator[str]:
+def _positions(optimum: Optimum, evaluations: side_by_side.Evaluations, searched_at: int) -> Iterator[str]:
     said = f"searched at {searched_at} positions, " if searched_at != optimum.positions else ""
     change = f"the objective by {optimum.grid_change:+.2g} {optimum.objective_unit}".rstrip()
     shown = {
-        name: evaluations[name] for name in dict.fromkeys([next(iter(evaluations)), report.main_name(evaluations)])
+        name: evaluations[name]
+        for name in dict.fromkeys([next(iter(evaluations)), side_by_side.main_name(evaluations)])
     }
-    first, *others = report.grid(shown, change * bool(np.isfinite(optimum.grid_change)))
+    first, *others = side_by_side.grid(shown, change * bool(np.isfinite(optimum.grid_change)))
     yield said + first
     yield from others
 

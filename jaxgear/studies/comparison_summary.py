@@ -1,27 +1,24 @@
-"""What a run writes as `summary.json`: every number of its designs, its gears and its model."""
+"""Designs side by side as plain data: every number of the designs, of the gears and of the model."""
 
 import dataclasses
-import platform
 from collections.abc import Mapping
 from typing import Any
 
 import equinox as eqx
-import jax
 import numpy as np
 
-from ..contact import Mesh, Resolution
+from ..contact import Mesh
 from ..geometry import Gear
-from ..io import DesignFile, describe
-from ..io.table_keys import snake
+from ..io import DesignFile
 from ..metrics import Finding
 from ..numerics import Number, fields_of
 from ..optimize import Verified
 from ..shafts import RigidSupport
 from . import manufactured
-from .geometry import gears
-from .report import Evaluations, diameters, reduction
-from .study import Evaluation
-from .version import version
+from .evaluation import Evaluation
+from .gear_data import gears
+from .side_by_side import Evaluations, diameters, reduction
+from .summary_data import finding_data, flanks_data, model, sizes
 
 
 def summary(
@@ -31,16 +28,14 @@ def summary(
     torques: np.ndarray,
     found: Mapping[str, tuple[Finding, ...]],
 ) -> dict[str, Any]:
-    """Contents of `summary.json`, with the findings that were `found` of every design."""
-    of_gears = gears(file)
+    """The designs, with the findings that were `found` of each."""
     return {
-        **identity(file),
         "torque_Nm": file.torque,
         "torque_range_Nm": file.torque_range,
         "speed_rpm": file.speed,
         "friction": file.friction,
         "gears": {name: _gear(getattr(mesh.pair, name)) | _drawn(drawn) for name, drawn in file.drawn.items()},
-        "center_distance_mm": of_gears["geometry"]["pair"]["center_distance_mm"],
+        "center_distance_mm": gears(file)["geometry"]["pair"]["center_distance_mm"],
         **_misalignment(mesh),
         **manufactured.tolerances(file),
         **{name: _numbers(part) for name in ("lubricant", "strength") if (part := getattr(file, name)) is not None},
@@ -55,16 +50,8 @@ def summary(
             **{f"{name}_um": evaluation.ppte for name, evaluation in evaluations.items()},
         },
         "iso_6336": {name: evaluation.factors for name, evaluation in evaluations.items()},
-        **of_gears,
         "resolution": sizes(mesh.resolution),
-        "versions": versions(),
     }
-
-
-def identity(file: DesignFile) -> dict[str, Any]:
-    """What every `summary.json` begins with."""
-    project = {"project": file.project} if file.project else {}
-    return {"title": file.title, "design_file": file.path.name, **project}
 
 
 def _design(evaluation: Evaluation) -> dict[str, Any]:
@@ -75,8 +62,7 @@ def _design(evaluation: Evaluation) -> dict[str, Any]:
         **({"verified": _verified(evaluation.verified)} if evaluation.verified else {}),
         **manufactured.summary(evaluation),
         "failed_torques_Nm": evaluation.failed_torques,
-        "pinion_modification": describe(evaluation.pinion),
-        "wheel_modification": describe(evaluation.wheel),
+        **flanks_data(evaluation.pinion, evaluation.wheel),
         "time_s": evaluation.seconds,
     }
 
@@ -118,48 +104,8 @@ def _key(name: str, field: Number) -> str:
     return f"{name}_{unit}" if unit else name
 
 
-def versions() -> dict[str, str]:
-    """Of everything that a result depends on, by name."""
-    return {
-        "jaxgear": version(),
-        "jax": jax.__version__,
-        "numpy": np.__version__,
-        "python": platform.python_version(),
-        "platform": platform.platform(),
-    }
-
-
-def sizes(of: Resolution) -> dict[str, Any]:
-    """Array sizes by name."""
-    return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
-
-
-def model(mesh: Mesh) -> dict[str, Any]:
-    """The compliance by the names of its parts, with their options, and its plane state."""
-    return {"compliance": _options(mesh.compliance), "plane": mesh.compliance.plane}
-
-
 def _misalignment(mesh: Mesh) -> dict[str, float]:
     """Misalignment over the face where the axes are not parallel [um]."""
     if not isinstance(mesh.support, RigidSupport):
         return {}
     return {"misalignment_um": float(mesh.support.misalignment.over_face(mesh.pair))}
-
-
-def _options(part: eqx.Module) -> dict[str, Any]:
-    """The type of a part and its options, in the words of a design file; of tables their sizes."""
-    data: dict[str, Any] = {"type": snake(type(part).__name__)}
-    for field in dataclasses.fields(part):
-        value = getattr(part, field.name)
-        if isinstance(value, eqx.Module):
-            data[field.name] = _options(value)
-        elif np.ndim(value):
-            data[field.name] = " x ".join(map(str, np.shape(value))) + " values"
-        elif value is not None and field.name != "plane":
-            data[field.name] = value if isinstance(value, str | bool | int) else np.asarray(value)
-    return data
-
-
-def finding_data(finding: Finding) -> dict[str, Any]:
-    """A finding by name, place, value and what is usual."""
-    return {"name": finding.key, "where": finding.where, "value": finding.value, **finding.usual._asdict()}

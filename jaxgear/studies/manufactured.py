@@ -1,8 +1,7 @@
-"""What the designs of a run are worth once they are made: the scatter over gears within the tolerances of the file."""
+"""What designs are worth once they are made: the scatter over gears within the tolerances of the file."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,8 @@ from ..io import DesignFile
 from ..report import Chapter, Table
 from ..sweeps import Scatter, monte_carlo
 from ..tolerance import Tolerance
-from . import report
-from .report import Evaluations
-from .study import Evaluation
+from .evaluation import Evaluation
+from .side_by_side import Evaluations, main
 
 _QUICK_PAIRS = 16
 
@@ -23,9 +21,7 @@ def scattered(
     design: DesignFile, mesh: Mesh, evaluations: Evaluations, tolerance: Tolerance, *, quick: bool
 ) -> dict[str, Evaluation]:
     """The evaluations with their scatter within a tolerance; all designs meet the same gears."""
-    assert design.tolerance is not None
-    samples = pairs_of(design, quick=quick)
-    options: dict[str, Any] = {"tolerance": tolerance, "samples": samples, "seed": design.tolerance.seed}
+    options: dict[str, Any] = {"tolerance": tolerance, **drawn(design, quick=quick)}
     return {
         name: replace(
             found, scatter=monte_carlo(mesh, design.torque, pinion=found.pinion, wheel=found.wheel, **options)
@@ -34,22 +30,9 @@ def scattered(
     }
 
 
-def pairs_of(design: DesignFile, *, quick: bool) -> int:
-    """How many manufactured pairs a design is judged by."""
-    assert design.tolerance is not None
-    return min(design.tolerance.samples, _QUICK_PAIRS) if quick else design.tolerance.samples
-
-
-def left_out(design: DesignFile, why: str = "") -> str:
-    """That an analysis is of nominal gears though the file has tolerances; "" where it has none."""
-    if design.tolerance is None:
-        return ""
-    return "[tolerance] is not part of this analysis, the gears are nominal" + f" ({why})" * bool(why)
-
-
 def lines(design: DesignFile, evaluations: Evaluations) -> Iterator[str]:
     """The main design in words; nothing without a table [tolerance]."""
-    found = report.main(evaluations).scatter
+    found = main(evaluations).scatter
     if found is not None:
         yield (
             f"{_pairs(design, found)}: PPTE {float(found.mean):.3f} um on average, 95 % below "
@@ -104,20 +87,15 @@ def summary(evaluation: Evaluation) -> dict[str, Any]:
     }
 
 
-def tolerances(design: DesignFile) -> dict[str, Any]:
-    """What the table [tolerance] says, as plain data."""
-    return {} if design.tolerance is None else {"tolerances": design.tolerance.given()}
-
-
-def write_figures(folder: Path, evaluations: Evaluations) -> list[Path]:
-    """Draws the scatter of all designs; gives the files."""
+def figures(evaluations: Evaluations) -> dict[str, Any]:
+    """Axes with the scatter of all designs; empty without a table [tolerance]."""
     scatters = _scatters(evaluations)
     if not scatters:
-        return []
+        return {}
     from .. import plot
 
     samples = {name: np.asarray(scatter.ppte) for name, scatter in scatters.items()}
-    return report.save_figures(folder, {"ppte_distribution": plot.ppte_distribution(samples)})
+    return {"ppte_distribution": plot.ppte_distribution(samples)}
 
 
 def _scatters(evaluations: Evaluations) -> Mapping[str, Scatter]:
@@ -126,6 +104,25 @@ def _scatters(evaluations: Evaluations) -> Mapping[str, Scatter]:
 
 def _pairs(design: DesignFile, scatter: Scatter) -> str:
     return pairs_in_words(design, scatter.ppte.shape[0])
+
+
+def drawn(design: DesignFile, *, quick: bool) -> dict[str, int]:
+    """How many manufactured pairs a design is judged by, and the seed of their deviations."""
+    assert design.tolerance is not None
+    samples = min(design.tolerance.samples, _QUICK_PAIRS) if quick else design.tolerance.samples
+    return {"samples": samples, "seed": design.tolerance.seed}
+
+
+def left_out(design: DesignFile, why: str = "") -> str:
+    """That an analysis is of nominal gears though the file has tolerances; "" where it has none."""
+    if design.tolerance is None:
+        return ""
+    return "[tolerance] is not part of this analysis, the gears are nominal" + f" ({why})" * bool(why)
+
+
+def tolerances(design: DesignFile) -> dict[str, Any]:
+    """What the table [tolerance] says, as plain data."""
+    return {} if design.tolerance is None else {"tolerances": design.tolerance.given()}
 
 
 def pairs_in_words(design: DesignFile, count: int) -> str:

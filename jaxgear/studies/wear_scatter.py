@@ -1,7 +1,6 @@
-"""What the designs of `jaxgear wear` are worth once they are made: lives of gears within the tolerances of the file."""
+"""What the designs of a wear study are worth once they are made: lives of gears within the tolerances of the file."""
 
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import jax
@@ -16,8 +15,8 @@ from ..report import Table
 from ..tolerance import Tolerance
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import LIVES_AHEAD, number_of
-from . import manufactured, report
-from .study import Kept
+from . import manufactured
+from .checkpoints import Checkpoints, NamedArrays
 
 # of every manufactured pair of a design, by name of the quantity, shape (pairs,); NaN where it has failed
 Samples = Mapping[str, np.ndarray]
@@ -26,18 +25,6 @@ _PPTE, _DEPTH = "mean_ppte_over_life", "wear_depth"
 _LIVES = {"life_to_depth": ("depth_limit", LIVES_AHEAD), "life_to_ppte": ("ppte_limit", 1.0)}
 _LEVEL = 0.95
 _SIDE_BY_SIDE = 32  # lives
-
-
-class Arrays:
-    """Samples as arrays, for `Kept`."""
-
-    def arrays(self, found: Samples) -> dict[str, Any]:
-        """All of them."""
-        return dict(found)
-
-    def result(self, arrays: dict[str, Any]) -> Samples:
-        """The samples."""
-        return arrays
 
 
 def left_out(design: DesignFile) -> str:
@@ -51,39 +38,46 @@ def left_out(design: DesignFile) -> str:
     )
 
 
-def scattered(
-    design: DesignFile,
+def manufactured_wear(
     settings: Wear,
     mesh: Mesh,
+    torque: Any,
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]],
     tolerance: Tolerance,
-    kept: Kept[Samples],
     *,
-    quick: bool,
+    samples: int,
+    seed: int = 0,
+    keep: Callable[[Any, Callable[[], Samples]], Samples] | None = None,
 ) -> dict[str, Samples]:
-    """Lives of all designs over manufactured pairs; all designs meet the same gears.
+    """Wears manufactured pairs of several designs; all designs meet the same gears.
 
     Args:
-        design: the design file.
-        settings: of the lives, under the static load.
-        mesh: on which the designs are compared.
+        settings: of the wear, under the static line load.
+        mesh: prepared mesh.
+        torque: on the pinion [N m]; has no effect where the settings have torques of their own.
         designs: modifications of pinion and wheel by name.
         tolerance: of the gears.
-        kept: what was found before the command was interrupted.
-        quick: of few pairs.
+        samples: manufactured pairs.
+        seed: of their deviations.
+        keep: checkpoints of arrays by name, one per design; None keeps nothing.
+
+    Returns:
+        quantities of every pair by the name of the design and of the quantity, shape (samples,); NaN where it failed.
+
+    Raises:
+        ValueError: as `jaxgear.monte_carlo`.
     """
-    assert design.tolerance is not None
-    options = {"samples": manufactured.pairs_of(design, quick=quick), "seed": design.tolerance.seed}
-    cases = conditions("jaxgear wear", mesh, design.torque, tolerance=tolerance, **options).on(mesh)
+    cases = conditions("manufactured_wear", mesh, torque, tolerance=tolerance, samples=samples, seed=seed).on(mesh)
     assert cases.removed is not None
-    names, torque, removed = tuple(asked(settings)), cases.torque[0], cases.removed[0]
+    kept = Checkpoints().of(NamedArrays()) if keep is None else keep
+    names, load, removed = tuple(asked(settings)), cases.torque[0], cases.removed[0]
 
     def of(pinion: AbstractModification, wheel: AbstractModification) -> Samples:
         def make() -> Samples:
-            found = _numbers(settings, names, mesh, torque, pinion, wheel, removed)
+            found = _numbers(settings, names, mesh, load, pinion, wheel, removed)
             return {name: np.asarray(found[name]) for name in names}
 
-        return kept((mesh, torque, removed, pinion, wheel, settings, settings.blocks), make)
+        return kept((mesh, load, removed, pinion, wheel, settings, settings.blocks), make)
 
     return {name: of(*flanks) for name, flanks in designs.items()}
 
@@ -160,15 +154,14 @@ def failed(samples: Samples) -> int:
     return int(np.sum(~np.isfinite(samples[_PPTE])))
 
 
-def write_figures(folder: Path, scatters: Mapping[str, Samples]) -> list[Path]:
-    """Draws the scatter of all designs; gives the files."""
+def figures(scatters: Mapping[str, Samples]) -> dict[str, Any]:
+    """Axes with the scatter of all designs; empty without a table [tolerance]."""
     if not scatters:
-        return []
+        return {}
     from .. import plot
 
     samples = {name: of[_PPTE] for name, of in scatters.items()}
-    axes = plot.ppte_distribution(samples, of=_PPTE)
-    return report.save_figures(folder, {"life_ppte_distribution": axes})
+    return {"life_ppte_distribution": plot.ppte_distribution(samples, of=_PPTE)}
 
 
 def _mean(samples: Samples, name: str) -> float:

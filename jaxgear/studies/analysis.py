@@ -1,0 +1,54 @@
+"""The analysis of the designs that a file gives as numbers."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+from ..io import DesignFile, DesignFileError
+from ..io.errors import naming
+from ..io.requests import tolerance_of
+from ..microgeometry import NoModification
+from ..tolerance import Tolerance
+from .checkpoints import Checkpoints
+from .comparison_result import ComparisonResult
+from .comparison_run import ComparisonRun
+from .progress import Stages
+from .study import AbstractStudy
+
+
+@dataclass(frozen=True)
+class DesignAnalysis(AbstractStudy[ComparisonResult]):
+    """Analyze the unmodified pair and the modification of the design file.
+
+    Attributes:
+        tolerance: of manufactured gears; None without the table [tolerance].
+    """
+
+    name: ClassVar = "analyze"
+    coarse: ClassVar = ""
+
+    tolerance: Tolerance | None
+
+    @classmethod
+    def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
+        """As `AbstractStudy.of`; every variable of the file needs a value."""
+        free = [name for name in design.bounds if design.open_case or name not in design.values]
+        if free:
+            says = "give each a value or use jaxgear optimize"
+            problem = f"analyze needs numbers, these are free: {', '.join(free)}; {says}"
+            raise DesignFileError("variables", problem, design.path)
+        with naming(design.path):
+            return cls(design, quick, tolerance_of(design))
+
+    def omits(self) -> str:
+        """Nothing."""
+        return ""
+
+    def work_out(self, checkpoints: Checkpoints, stages: Stages) -> ComparisonResult:
+        """Both designs; keeps no checkpoints."""
+        run = ComparisonRun(self.design, stages, quick=self.quick)
+        run.prepare()
+        run.evaluate("unmodified", NoModification(), NoModification())
+        pinion, wheel = self.design.design(self.design.values)
+        if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
+            run.evaluate("modified", pinion, wheel)
+        return run.result(self.tolerance)

@@ -1,0 +1,147 @@
+"""A comparison of designs as it goes on: its mesh, its search, and what it has found so far."""
+
+import dataclasses
+import time
+from collections.abc import Mapping
+
+import jax
+
+from ..compliance import Compliance, TabulatedCompliance
+from ..contact import Mesh
+from ..io import DesignFile, DesignFileError, OptimizeRequest
+from ..microgeometry import AbstractModification
+from ..optimize import (
+    Front,
+    Optimum,
+    Problem,
+    Projection,
+    begin_verification,
+    judged,
+    project,
+    structure_for,
+    verification,
+)
+from ..tolerance import Tolerance
+from . import manufactured, side_by_side
+from .comparison import Modifications
+from .comparison_result import ComparisonResult
+from .evaluation import Evaluation, coarse, evaluate, torques_of
+from .optimum_report import COMPROMISE
+from .progress import Stages
+
+
+class ComparisonRun:
+    """Evaluates designs on one mesh and collects them.
+
+    Args:
+        design: the design file.
+        stages: told what goes on.
+        quick: on coarse positions and few torques.
+    """
+
+    def __init__(self, design: DesignFile, stages: Stages, *, quick: bool = False):
+        self.design, self._stages, self._quick = design, stages, quick
+        self._evaluations: dict[str, Evaluation] = {}
+        self._problem: Problem | None = None  # by whose measure designs are evaluated
+        self._optimum: Optimum | None = None
+        self._front: Front | None = None
+        self._projection: Projection | None = None
+        self._second: TabulatedCompliance | None = None  # by which designs are verified
+        self._unverified = ""  # why not
+
+    def prepare(self, *, finer: int | None = None, verify: bool | None = False) -> None:
+        """Prepares the mesh.
+
+        Args:
+            finer: positions on which a search will end.
+            verify: whether the designs are evaluated with the finite-element structure too; None where that goes.
+
+        Raises:
+            DesignFileError: where it is asked for and does not go.
+        """
+        self._stages.begin("preparing the mesh")
+        size = self.design.resolution()
+        if finer is not None:
+            self.design.begin_contact(size, dataclasses.replace(size, positions=max(finer, size.positions)))
+        self._mesh: Mesh = jax.block_until_ready(self.design.mesh(coarse(size) if self._quick else size))
+        self._searched_at = self._mesh.resolution.positions
+        self._torques = torques_of(self.design, quick=self._quick)
+        if verify or (verify is None and isinstance(self._mesh.compliance, Compliance)):
+            self._make_tables(finer, required=verify is not None)
+
+    def _make_tables(self, finer: int | None, *, required: bool) -> None:
+        """Before the search: what cannot be verified is known at once, and an interruption costs no optimum."""
+        self._stages.begin("finite-element tables of pinion and wheel, made once and kept")
+        try:
+            self._second = structure_for(self._mesh)
+        except ValueError as error:
+            if required:
+                raise DesignFileError("optimize.verify", str(error), self.design.path) from None
+            self._unverified = str(error)
+            return
+        begin_verification(self._mesh, self._second, finer)
+
+    def evaluate(self, name: str, pinion: AbstractModification, wheel: AbstractModification) -> None:
+        """Evaluates a design and keeps it."""
+        self._stages.begin(f"solving the {name} design")
+        found = evaluate(self.design, self._mesh, self._torques, pinion, wheel)
+        if self._problem is not None:
+            found = dataclasses.replace(found, objectives=judged(self._problem, pinion, wheel))
+        self._evaluations[name] = found
+
+    def search(self, request: OptimizeRequest, beside: Mapping[str, Modifications]) -> None:
+        """Finds the optimum, and for flanks without parameters the named curve in their place.
+
+        All designs, those `beside` it too, are evaluated on the mesh on which the search has ended and by its measure.
+        """
+        self._stages.begin(f"searching the optimum ({request.method})")
+        began = time.perf_counter()
+        found = request(self._mesh, self._stages.step)
+        self._front = found if isinstance(found, Front) else None
+        optimum = found.compromise if isinstance(found, Front) else found
+        spent = time.perf_counter() - began
+        self._mesh, self._problem = optimum.mesh, optimum.problem
+        for name, modifications in beside.items():
+            self.evaluate(name, *modifications)
+        name = "optimum" if self._front is None else COMPROMISE
+        self.evaluate(name, optimum.pinion, optimum.wheel)
+        evaluated = dataclasses.replace(self._evaluations[name], seconds=spent)
+        self._evaluations[name] = evaluated
+        # of several torques it shows another one than the table does
+        ppte = float(evaluated.metrics["ppte_um"])
+        self._optimum = optimum = dataclasses.replace(optimum, cycle=evaluated.cycle, ppte=ppte)
+        if request.curve is not None:
+            self._stages.begin(f"projecting the flanks on a {request.curve} curve")
+            self._projection = projection = project(optimum, request.curve)
+            self.evaluate(f"as {request.curve}", projection.pinion, projection.wheel)
+        if self._second is not None:
+            self._verify(self._second)
+
+    def _verify(self, second: TabulatedCompliance) -> None:
+        """Evaluates all designs again with the finite-element structure."""
+        self._stages.begin("verifying with the finite-element structure")
+        by_finite_elements = verification(self._mesh, second, self._problem)
+        for name, claimed in self._evaluations.items():
+            found = by_finite_elements(claimed.cycle, claimed.objectives, claimed.pinion, claimed.wheel)
+            self._evaluations[name] = dataclasses.replace(claimed, verified=found)
+
+    def result(self, tolerance: Tolerance | None) -> ComparisonResult:
+        """What was found, with the scatter of all designs within a tolerance; None for nominal gears alone."""
+        evaluations = self._evaluations
+        if tolerance is not None:
+            self._stages.begin("manufacturing the designs within their tolerances")
+            of = self.design, self._mesh, evaluations
+            evaluations = manufactured.scattered(*of, tolerance, quick=self._quick)
+        return ComparisonResult(
+            self.design,
+            self._quick,
+            self._mesh,
+            self._torques,
+            evaluations,
+            side_by_side.findings(self.design, self._mesh, evaluations),
+            self._optimum,
+            self._front,
+            self._projection,
+            self._searched_at,
+            self._unverified,
+        )

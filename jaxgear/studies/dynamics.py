@@ -1,0 +1,213 @@
+"""The speed study: from a design file to the vibration of its designs over the speed."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar, Self
+
+import jax
+import numpy as np
+
+from ..contact import Mesh
+from ..dynamics import (
+    UP,
+    Branch,
+    Dynamics,
+    Oscillator,
+    RunUp,
+    SpeedResponse,
+    find_orbit,
+    follow_orbits,
+    natural_frequencies,
+    run_up,
+    speed_sweep,
+    steps_for,
+)
+from ..dynamics.oscillator import Natural
+from ..dynamics.speed_sweep import STABLE_STEPS
+from ..io import DesignFile, DesignFileError, DynamicsRequest, OptimizeRequest, dynamics_request
+from ..io.errors import naming
+from .checkpoints import Checkpoints, SpeedResponses
+from .comparison import Modifications, compared, search_of
+from .dynamics_result import DynamicsResult, next_to_design, peak
+from .progress import Stages
+from .study import AbstractStudy
+
+_POINTS = 400  # of a branch: through the folds of an unmodified pair it takes about 120
+_SAME = 1e-3  # relative difference of dynamic factors of one orbit, by two integrations
+_BESIDE = 4  # speeds on either side of a peak that are gone through again on a finer grid
+
+
+def branches_of(oscillator: Oscillator, runs: Mapping[str, SpeedResponse], steps: tuple[int, ...]) -> list[Branch]:
+    """The branch of the lowest speed, and those that falling runs begin on, each once.
+
+    Args:
+        oscillator: one oscillator.
+        runs: by name.
+        steps: of the integrator per mesh cycle, at every speed.
+    """
+    found: list[Branch] = []
+    for name, response in runs.items():
+        speeds = np.flatnonzero(np.asarray(response.period) > 0)
+        if not len(speeds):
+            continue
+        place = int(speeds[0] if name == UP else speeds[-1])
+        if not any(_on(branch, response, place) for branch in found):
+            found += _followed(oscillator, response, place, "up" if name == UP else "down", max(steps))
+    return found
+
+
+def _followed(oscillator, response: SpeedResponse, place: int, direction: Any, steps: int) -> Iterator[Branch]:
+    frequencies = np.asarray(response.mesh_frequency, float)
+    periods, start = int(response.period[place]), jax.tree.map(lambda part: part[place], response.state)
+    orbit = find_orbit(oscillator, frequencies[place], start, periods=periods, steps=steps)
+    if not bool(orbit.converged):
+        return
+    within = frequencies[0], frequencies[-1]
+    yield follow_orbits(oscillator, orbit, within=within, direction=direction, points=_POINTS, steps=steps)
+
+
+def _on(branch: Branch, response: SpeedResponse, place: int) -> bool:
+    """Whether a branch passes through the steady state of a run, by its neighbours there."""
+    if branch.orbits.periods != int(response.period[place]):
+        return False
+    at, factors = np.asarray(branch.mesh_frequency, float), np.asarray(branch.orbits.dynamic_factor, float)
+    frequency, factor = float(response.mesh_frequency[place]), float(response.dynamic_factor[place])
+    inside = (at[1:] - frequency) * (at[:-1] - frequency) <= 0
+    low, high = np.minimum(factors[1:], factors[:-1]), np.maximum(factors[1:], factors[:-1])
+    return bool((inside & (factor > (1 - _SAME) * low) & (factor < (1 + _SAME) * high)).any())
+
+
+def _grid_change(result: DynamicsResult) -> dict[str, dict[str, float]]:
+    """By how much the largest dynamic factor of every design changes at twice the positions of the mesh force and the
+    steps, which meet no more positions than they are themselves."""
+    settings = result.request.settings
+    finer = replace(settings, positions=2 * settings.positions)
+    last = len(settings.mesh_frequencies)
+    width = min(2 * _BESIDE + 1, last)
+    found = {}
+    for name, (pinion, wheel) in result.designs.items():
+        of_design = [
+            (factor, torque, run, response)
+            for other, torque, run, response in result.rows()
+            if other == name and np.isfinite(factor := peak(response, "dynamic_factor")[0])
+        ]
+        if not of_design:
+            continue
+        largest, torque, run, response = max(of_design, key=lambda row: row[0])
+        first = min(max(int(np.nanargmax(response.dynamic_factor)) - _BESIDE, 0), last - width)
+        near = slice(first, first + width)
+        begin = near.stop - 1 if response.direction == "down" else near.start
+        dte, rate = (part[begin] for part in response.state)
+        again = speed_sweep(
+            finer.oscillator(result.mesh, torque, pinion=pinion, wheel=wheel),
+            settings.mesh_frequencies[near],
+            direction=response.direction,
+            start=(dte, rate),
+            steps=[2 * count for count in result.steps[near]],
+            kicks=settings.kicks_of(run),
+        )
+        found[name] = {"worst_dynamic_factor": peak(again, "dynamic_factor")[0] - largest}
+    return found
+
+
+def _steps(
+    settings: Dynamics,
+    oscillators: Mapping[str, Mapping[float, Oscillator]],
+    natural: Mapping[str, Mapping[float, Natural]],
+) -> tuple[int, ...]:
+    """As many as the stiffest oscillator needs at every speed: one compiled program serves all."""
+    if settings.steps is not None:
+        lowest = float(settings.mesh_frequencies[0])
+        highest = max(float(of.highest) for several in natural.values() for of in several.values())
+        fewest = math.ceil(STABLE_STEPS * highest / lowest)
+        if settings.steps < fewest:
+            at = f"{lowest:g} Hz and a natural frequency of {highest:.0f} Hz"
+            text = f"{settings.steps} must be at least {fewest} for {at}"
+            raise DesignFileError("dynamics.steps", f"{text}, with fewer the integration diverges")
+        return (settings.steps,) * len(settings.mesh_frequencies)
+    each = [steps_for(one, settings.mesh_frequencies) for several in oscillators.values() for one in several.values()]
+    return tuple(int(count) for count in np.max(each, axis=0))
+
+
+@dataclass(frozen=True)
+class DynamicsStudy(AbstractStudy[DynamicsResult]):
+    """Run the pair through the speeds of the table `dynamics`, up and down, under several torques.
+
+    Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the design file or
+    the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.
+
+    Attributes:
+        request: what the file asks for.
+        search: for the optimum of the file; None where its modifications are numbers.
+    """
+
+    name: ClassVar = "dynamics"
+    coarse: ClassVar = "coarse positions and few speeds"
+
+    request: DynamicsRequest
+    search: OptimizeRequest | None
+
+    @classmethod
+    def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
+        """As `AbstractStudy.of`."""
+        return cls(design, quick, dynamics_request(design, quick=quick), search_of(design, quick=quick))
+
+    def work_out(self, checkpoints: Checkpoints, stages: Stages) -> DynamicsResult:
+        """All runs of all designs under all torques, and the branches of one, a quick study its first branch."""
+        highest = max(self.design.torque, *self.request.torques)
+        found = compared(self.design, highest, self.search, checkpoints, stages, quick=self.quick)
+        result = self._responses(*found, checkpoints, stages)
+        if self.quick:
+            return result
+        stages.begin("the largest dynamic factors on a finer grid")
+        return replace(result, grid_change=_grid_change(result))
+
+    def _responses(
+        self, mesh: Mesh, designs: dict[str, Modifications], checkpoints: Checkpoints, stages: Stages
+    ) -> DynamicsResult:
+        design, request, settings = self.design, self.request, self.request.settings
+        oscillators: dict[str, dict[float, Oscillator]] = {}
+        for name, (pinion, wheel) in designs.items():
+            stages.begin(f"mesh force of the {name} design")
+            oscillators[name] = {
+                torque: settings.oscillator(mesh, torque, pinion=pinion, wheel=wheel) for torque in request.torques
+            }
+        natural = {
+            name: {torque: natural_frequencies(one) for torque, one in several.items()}
+            for name, several in oscillators.items()
+        }
+        with naming(design.path):
+            steps = _steps(settings, oscillators, natural)
+        stages.begin("running through the speeds")
+        responses: dict[str, dict[float, dict[str, Any]]] = {}
+        total, done = len(designs) * len(request.torques) * len(settings.run_names), 0
+        kept = checkpoints.of(SpeedResponses(), total)
+        for name, of_torques in oscillators.items():
+            responses[name] = {}
+            for torque, oscillator in of_torques.items():
+                runs = responses[name][torque] = {}
+                for run in settings.run_names:
+                    stages.count(done, total, f"{name}, {torque:g} N m, {run}")
+                    made_of = oscillator, settings.mesh_frequencies, settings.kick, settings.kicks
+                    runs[run] = kept((made_of, run, steps), partial(settings.run, oscillator, run, steps=steps))
+                    done += 1
+        run_ups: dict[str, dict[float, RunUp]] = {}
+        if request.run_up is not None:
+            stages.begin("running up")
+            first, last = (float(settings.mesh_frequencies[place]) for place in (0, -1))
+            options: dict[str, Any] = {"first": first, "last": last, "duration": request.run_up, "steps": steps[0]}
+            run_ups = {
+                name: {torque: run_up(oscillator, **options) for torque, oscillator in of_torques.items()}
+                for name, of_torques in oscillators.items()
+            }
+        stages.begin("following the orbits of the unmodified design")
+        torque = next_to_design(design, request)
+        runs = responses["unmodified"][torque]
+        branches = branches_of(oscillators["unmodified"][torque], {UP: runs[UP]} if self.quick else runs, steps)
+        frequencies = {
+            name: {torque: float(of.mesh) for torque, of in several.items()} for name, several in natural.items()
+        }
+        found = responses, steps, tuple(branches), run_ups
+        return DynamicsResult(design, request, mesh, designs, oscillators, frequencies, *found)

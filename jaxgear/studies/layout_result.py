@@ -1,0 +1,430 @@
+"""What a layout study has found: its tables, words, figures and files."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..contact import Mesh, MeshCycle
+from ..contact.kinematics import kinematics
+from ..contact.status import Status
+from ..io import DesignFile, LayoutRequest, write_flanks
+from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, ToleranceCases, gear_lives
+from ..metrics import Finding
+from ..microgeometry import AbstractModification
+from ..numerics import real
+from ..report import Table
+from ..shafts import bearing_reactions, root_face_load_factor, tooth_height
+from ..sweeps.columns import described
+from .evaluation import grid_lines
+from .side_by_side import finding_lines
+from .study import AbstractStudyResult
+from .summary_data import finding_data, flanks_data
+
+STEPS = ("unmodified", "step 1", "step 2")
+LIVES = ("pinion_life_h", "wheel_life_h")
+FACTORS = ("face_load_factor", "root_face_load_factor", "edge_load_factor")
+_PANEL, _HEIGHT = 92.0, 90.0  # [mm]
+
+
+@dataclass(frozen=True)
+class LayoutResult(AbstractStudyResult):
+    """What has been found.
+
+    Attributes:
+        design: the design file.
+        request: what it asks for.
+        layouts: flank lines, by the name of the support; the first is that of the design.
+        over_torque: K_Hbeta of the design after every of the `STEPS` at the torques of the request, without deviations.
+        meshes: of step 3, by the name of the support; empty without it.
+        contacts: what the contact says of the flank lines of every step on their shafts, by the names of the support
+            and of the step; empty without step 3 on shafts.
+        contact_cases: K_Hbeta of the contact in the five cases of deviations, by the names of the support, of the
+            tolerance and of the step, likewise.
+        cycles: contact of the first support without modification and with all three steps, likewise.
+        factors: K_Hbeta of the one-dimensional analysis at the same torque and on as many stations, likewise.
+        profiles: profile modifications of step 3, by the name of the support.
+        unusual: what of every layout is not usual, by the name of the support.
+        stations_change: by how much K_Hbeta of the one-dimensional analysis changes at twice the stations, of the
+            design at the torque of the profiles, by step; empty in a quick run.
+        slices_change: by how much numbers of `cycles` change at twice the slices, by name and unit; empty in a quick
+            run.
+    """
+
+    design: DesignFile
+    request: LayoutRequest
+    layouts: Mapping[str, FlankLineLayout]
+    over_torque: Mapping[str, np.ndarray]
+    meshes: Mapping[str, Mesh]
+    contacts: Mapping[str, Mapping[str, Mapping[str, float]]]
+    contact_cases: Mapping[str, Mapping[str, Mapping[str, np.ndarray]]]
+    cycles: Mapping[str, MeshCycle]
+    factors: Mapping[str, Mapping[str, float]]
+    profiles: Mapping[str, ProfileLayout]
+    unusual: Mapping[str, tuple[Finding, ...]]
+    stations_change: Mapping[str, Mapping[str, float]]
+    slices_change: Mapping[str, Mapping[str, float]]
+
+    @property
+    def profile(self) -> ProfileLayout | None:
+        """The profile modifications of the design; None without step 3."""
+        return next(iter(self.profiles.values()), None)
+
+    @property
+    def main(self) -> FlankLineLayout:
+        """The layout of the design."""
+        return next(iter(self.layouts.values()))
+
+    def lives(self, profile: ProfileLayout) -> dict[str, np.ndarray]:
+        """Life [h] of pinion and wheel with every profile modification, by K_Hbeta of its contact, shape (variants,).
+
+        That factor is of the torque of step 3 and stands for every load. Empty without a duty cycle.
+        """
+        load, strength = (self.request.options.get(name) for name in ("duty_cycle", "strength"))
+        if load is None or strength is None:
+            return {}
+        found = gear_lives(self.design.pair(), load, strength, profile.table.column("face_load_factor"))
+        return dict(zip(LIVES, np.asarray(found).T))
+
+    def designs(self) -> dict[str, tuple[AbstractModification, AbstractModification]]:
+        """Modifications of pinion and wheel after every step."""
+        _, first, _ = flank_lines(self.main).values()
+        pinion, wheel = self.main.modifications
+        found = {"step 1": (first[0].modification, first[1].modification), "step 2": (pinion, wheel)}
+        if self.profile is not None:
+            # the profile was made on the further crowning, which the flank line has as well
+            of_pinion, of_wheel = self.profile.profiles
+            found["step 3"] = pinion + of_pinion, wheel + of_wheel
+        return found
+
+    def verdict(self) -> Iterator[str]:
+        """The layout in words."""
+        layout = self.main
+        for name, line in (("pinion", layout.pinion), ("wheel", layout.wheel)):
+            yield f"flank line of the {name}: slope {float(line.slope):.1f} um, crowning {float(line.crowning):.1f} um"
+        added = float(np.sum(layout.further))
+        yield f"further crowning of step 2: {added:.1f} um on both together, the least is {float(layout.needed):.1f} um"
+        if layout.damage:
+            before, _, after = np.asarray(layout.relative_life)
+            yield f"life relative to the even load: {before:.2f} without modification, {after:.2f} after step 2"
+            for name in layout.lives:
+                none, first, second = np.asarray(layout.worst_relative_life(name))
+                yield (
+                    f"  worst case of {name} deviations: {none:.2f} without modification, {first:.2f} after step 1, "
+                    f"{second:.2f} after step 2"
+                )
+        for name, profile in self.profiles.items():
+            yield from self._profile_verdict(profile, f", {name}" if len(self.profiles) > 1 else "")
+        if self.stations_change:
+            grid = f"{self.request.options['stations']} stations (ISO 6336-1 Annex E)"
+            yield from grid_lines(grid, self.stations_change)
+        if self.slices_change:
+            yield from grid_lines(f"{self.design.resolution().slices} slices (contact analysis)", self.slices_change)
+
+    def _profile_verdict(self, profile: ProfileLayout, where: str) -> Iterator[str]:
+        words = "tip relief" if profile.kind == "tip_relief" else "profile crowning"
+        first, second = profile.amounts
+        torque = self.request.profile_torque
+        yield f"step 3 at {torque:g} N m{where}: {words} {first:g} um on the pinion, {second:g} um on the wheel"
+        if any(profile.further):
+            slope, crowning = profile.further
+            yield f"  on top of the flank lines, over the common face: slope {slope:+g} um, crowning {crowning:+g} um"
+        ratio = profile.table.column("effective_contact_ratio")
+        yield (
+            f"  than without it: PPTE {profile.change('ppte'):+.0f} %, "
+            f"loss {profile.change('mesh_loss_factor'):+.0f} %, "
+            f"max flank pressure {profile.change('max_flank_pressure'):+.0f} %, "
+            f"effective contact ratio {ratio[0]:.3f} -> {ratio[profile.best]:.3f} "
+            f"(theoretical {profile.contact_ratio:.3f})"
+        )
+
+    def failures(self) -> Iterator[str]:
+        """What is not to be trusted or not reached."""
+        for name, layout in self.layouts.items():
+            cases = [one for of in layout.cases for one in of.values()]
+            statuses = [*(one.load.status for one in cases), *(one.status for one in layout.damage)]
+            status = Status(max(int(np.max(one)) for one in statuses))
+            if status != Status.CONVERGED:
+                yield f"LOAD OVER THE FACE NOT FOUND: {name}, {status.text}; its numbers are not to be trusted"
+            if layout.touches_edges:
+                yield f"the largest load is at an edge: {name}"
+        known = np.isfinite(list(self.over_torque.values())).all(axis=0)
+        if not known.all():
+            missed = ", ".join(f"{torque:g}" for torque in self.request.torques[~known])
+            yield f"LOAD OVER THE FACE NOT FOUND at {missed} N m"
+        for name, steps in self.contacts.items():
+            for step, numbers in steps.items():
+                if not np.isfinite(numbers["face_load_factor"]):
+                    yield f"NOT CONVERGED: contact analysis of {step}, {name}; raise resolution.newton_steps"
+        for profile in self.profiles.values():
+            failed = profile.table.failures()
+            if failed:
+                total = len(profile.table)
+                yield f"NOT CONVERGED: {failed} of {total} profile modifications; raise resolution.newton_steps"
+            if not profile.without_shock[profile.best]:
+                yield "every profile modification has contact shock: larger amounts are needed"
+
+    def findings(self) -> Iterator[str]:
+        """What is not usual."""
+        return finding_lines(self.unusual)
+
+    def summary(self) -> dict[str, Any]:
+        """Tolerances, layouts, contact, bearings and profiles."""
+        return {
+            "torque_Nm": self.design.torque,
+            "tolerances": {
+                name: {"f_Hbeta_um": one.helix_slope, "f_ma_um": one.misalignment}
+                for name, one in self.request.tolerances.items()
+            },
+            "layouts": {
+                name: {**_layout(layout), "findings": [finding_data(finding) for finding in self.unusual[name]]}
+                for name, layout in self.layouts.items()
+            },
+            "face_load_over_torque": {"torque_Nm": self.request.torques, **_by_step(self.over_torque)},
+            "contact": {
+                name: {
+                    "torque_Nm": self.request.profile_torque,
+                    **_by_step(steps),
+                    "annex_e_face_load_factor": _by_step(self.factors[name]),
+                    "cases": CASES,
+                    "cases_face_load_factor": {
+                        tolerance: _by_step(factors) for tolerance, factors in self.contact_cases[name].items()
+                    },
+                }
+                for name, steps in self.contacts.items()
+            },
+            **({"change_at_twice_the_stations": _by_step(self.stations_change)} if self.stations_change else {}),
+            **({"change_at_twice_the_slices": self.slices_change} if self.slices_change else {}),
+            "bearings": {name: _reactions(support) for name, support in self.request.supports.items()},
+            "profiles": {name: self._profile(profile) for name, profile in self.profiles.items()},
+            "designs": {name: flanks_data(*flanks) for name, flanks in self.designs().items()},
+        }
+
+    def _profile(self, profile: ProfileLayout) -> dict[str, Any]:
+        values = {name: profile.table.column(name) for name in profile.table.results} | self.lives(profile)
+        return {
+            "type": profile.kind,
+            "torque_Nm": self.request.profile_torque,
+            "variants": len(profile.table),
+            "amounts_um": profile.amounts,
+            "further_slope_and_crowning_um": profile.further,
+            "contact_ratio": profile.contact_ratio,
+            "unmodified": {name: column[0] for name, column in values.items()},
+            "best": {name: column[profile.best] for name, column in values.items()},
+        }
+
+    def tables(self) -> Iterator[Table]:
+        """The steps, what the contact says of them, and the bearings."""
+        yield self._steps()
+        if self.contacts:
+            yield self._contacts()
+            yield self._contact_cases()
+        yield self._bearings()
+
+    def _steps(self) -> Table:
+        result = Table(("", *self.layouts), title=f"{self.design.title}: flank lines")
+
+        def row(text: str, values: Iterator[str]) -> None:
+            result.add_row(text, *values)
+
+        each = list(self.layouts.values())
+        row("torque of the layout [N m]", (f"{float(one.torque):g}" for one in each))
+        row("K_Hbeta without modification", (f"{float(one.factors[0]):.3f}" for one in each))
+        row("K_Fbeta without modification", (f"{float(root_factor(one, one.factors[0])):.3f}" for one in each))
+        result.add_section()
+        row(f"step 1, {self.main.gear}: slope [um]", (f"{float(one.line.slope):.2f}" for one in each))
+        row("  crowning [um]", (f"{float(one.line.crowning):.2f}" for one in each))
+        row("  K_Hbeta", (f"{float(one.factors[1]):.3f}" for one in each))
+        row("  K_Fbeta", (f"{float(root_factor(one, one.factors[1])):.3f}" for one in each))
+        result.add_section()
+        for index, gear in enumerate(("pinion", "wheel")):
+            row(f"step 2, {gear}: crowning C_b [um]", (f"{float(one.further[index]):.2f}" for one in each))
+        row("  least of both together [um]", (f"{float(one.needed):.2f}" for one in each))
+        for name in self.request.tolerances:
+            result.add_section()
+            tolerance = self.request.tolerances[name]
+            row(
+                f"{name}: f_Hb {float(tolerance.helix_slope):.1f}, f_ma {float(tolerance.misalignment):.1f} um",
+                ("unmodified / step 1 / step 2" for _ in each),
+            )
+            for number, case in enumerate(CASES):
+                row(
+                    f"  K_Hbeta, {case}",
+                    (" / ".join(_cell(of[name], number) for of in one.cases) for one in each),
+                )
+            row("  K_Fbeta, worst case", (_worst_root(one, name) for one in each))
+            if self.main.damage:
+                row("  life, worst case [h]", (_worst_life(one, name) for one in each))
+        if self.main.damage:
+            result.add_section()
+            for number, text in enumerate(("without modification", "after step 1", "after step 2")):
+                row(f"life {text} [h]", (f"{float(one.damage[number].life):.4g}" for one in each))
+        result.note = "* largest load at an edge" + ("; last rows: no deviation" if self.main.damage else "")
+        return result
+
+    def _contacts(self) -> Table:
+        """The contact analysis of every step, beside the one-dimensional one at the same torque."""
+        title = f"contact analysis at {self.request.profile_torque:g} N m, without deviations"
+        result = Table(("", "K_Hbeta", "K_Fbeta", "edge load factor", "K_Hbeta of Annex E"), title=title)
+        for support, steps in self.contacts.items():
+            for step, found in steps.items():
+                cells = [_number(found[name]) for name in FACTORS]
+                given = self.factors[support].get(step)
+                result.add_row(f"{support}: {step}", *cells, "" if given is None else _number(given))
+        return result
+
+    def _contact_cases(self) -> Table:
+        """K_Hbeta of the contact analysis in the five cases."""
+        title = f"K_Hbeta of the contact analysis at {self.request.profile_torque:g} N m in the cases of deviations"
+        result = Table(("", *CASES), title=title)
+        for support, tolerances in self.contact_cases.items():
+            for tolerance, steps in tolerances.items():
+                for step, factors in steps.items():
+                    result.add_row(f"{support}, {tolerance}: {step}", *map(_number, factors))
+        return result
+
+    def _bearings(self) -> Table:
+        """Displacements of the shafts at the bearings."""
+        found = {name: bearing_reactions(support.gearbox) for name, support in self.request.supports.items()}
+        header = "bearing", "force [N]", *(f"{way}, {name}" for name in found for way in "xy")
+        result = Table(header, title="bearings: displacement of the shaft [um]")
+        first = next(iter(found.values()))
+        for number, name in enumerate(first.names):
+            force = float(np.hypot(*np.asarray(first.force)[number, :2]))
+            moved = [f"{float(each.shaft[number, way]):.2f}" for each in found.values() for way in range(2)]
+            result.add_row(name, f"{force:.0f}", *moved)
+        return result
+
+    def write(self, folder: Path) -> None:
+        """The flanks after every step as `flanks.csv`, and the variants of step 3 as `profiles.csv`."""
+        # the flanks need no mesh, which only step 3 has
+        moving = kinematics(self.design.pair(), real(0.0), self.design.resolution(), "strain")
+        write_flanks(folder / "flanks.csv", moving, self.designs())
+        if self.profile is not None:
+            self.profile.table.to_csv(folder / "profiles.csv")
+
+    def figures(self) -> dict[str, Any]:
+        """The cases, K_Hbeta over the torque, shafts, profiles and the contact."""
+        from .. import plot
+
+        layout = self.main
+        name = list(layout.after)[-1]
+        axes: dict[str, Any] = {}
+        with plot.figure.report_axes(None, columns=3, width=3 * _PANEL, height=_HEIGHT) as panels:
+            for panel, of, title in zip(np.ravel(panels), layout.cases, STEPS):
+                plot.tolerance_line_load(of[name], panel, title=f"{title}, {name} deviations")
+            for panel in panels[1:]:
+                panel.set_ylabel("")
+        axes["tolerance_cases"] = panels
+        shown = {f"{step}, {kind}": one for step, of in zip(STEPS, layout.cases) for kind, one in of.items()}
+        axes["face_load_factors"] = plot.face_load_factors(shown)
+        axes["face_load_over_torque"] = plot.face_load_over_torque(
+            self.request.torques, self.over_torque, design_torque=self.design.torque
+        )
+        axes["shaft_deflection"] = plot.shaft_deflection(next(iter(self.request.supports.values())).gearbox)
+        if self.cycles:
+            axes["transmission_error"] = plot.transmission_error(self.cycles)
+            axes["load_sharing"] = plot.load_sharing(self.cycles)
+            for step, cycle in self.cycles.items():
+                axes[f"contact_pattern_{step}"] = plot.contact_pattern(cycle)
+            mesh = next(iter(self.meshes.values()))
+            axes["lead_chart"] = plot.lead_chart(mesh, self.designs())
+        if self.profile is not None:
+            rows, names = self.profile.radar_variants()
+            results = "ppte", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure"
+            values: dict[Any, np.ndarray] = {**self.profile.table.values(*results)}
+            for gear, hours in zip(("pinion", "wheel"), self.lives(self.profile).values()):
+                if np.isfinite(hours[rows]).all():
+                    values[described(f"{gear}_life", "h", better="larger")] = hours
+            axes["radar"] = plot.radar(values, rows, names)
+        return axes
+
+
+def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine]]:
+    """Flank lines of pinion and wheel over their own faces, after every of the `STEPS`."""
+    none = FlankLine()
+    level = layout.line.on(layout.pair, layout.gear)
+    first = (level, none) if layout.gear == "pinion" else (none, level)
+    return dict(zip(STEPS, ((none, none), first, (layout.pinion, layout.wheel))))
+
+
+def root_factor(layout: FlankLineLayout, factor) -> np.ndarray:
+    """K_Fbeta of K_Hbeta."""
+    pair = layout.pair
+    return np.asarray(root_face_load_factor(np.maximum(factor, 1.0), pair.face_width, tooth_height(pair)))
+
+
+def _layout(layout: FlankLineLayout) -> dict[str, Any]:
+    def line(of: FlankLine) -> dict[str, Any]:
+        return {"slope_um": of.slope, "crowning_um": of.crowning}
+
+    def cases(of: Mapping[str, ToleranceCases], step: int) -> dict[str, Any]:
+        return {
+            name: {
+                **({"life_h": layout.lives[name][step]} if layout.lives else {}),
+                "face_load_factor": one.face_load_factor,
+                "root_face_load_factor": root_factor(layout, one.face_load_factor),
+                "edge_contact": one.edge_contact,
+                "loaded_share": one.loaded_share,
+            }
+            for name, one in of.items()
+        }
+
+    life = (
+        {
+            "life_h": [one.life for one in layout.damage],
+            "relative_life": layout.relative_life,
+            "worst_relative_life": {name: layout.worst_relative_life(name) for name in layout.lives},
+        }
+        if layout.damage
+        else {}
+    )
+    factors = np.asarray(layout.factors)
+    return {
+        "torque_Nm": layout.torque,
+        "gear": layout.gear,
+        "step_1": line(layout.line),
+        "further_crowning_um": layout.further,
+        "least_further_crowning_um": layout.needed,
+        "pinion": line(layout.pinion),
+        "wheel": line(layout.wheel),
+        "face_load_factor": dict(zip(("unmodified", "step_1"), factors)),
+        "root_face_load_factor": dict(zip(("unmodified", "step_1"), root_factor(layout, factors))),
+        "cases": CASES,
+        **{
+            f"{step.replace(' ', '_')}_cases": cases(of, number)
+            for number, (step, of) in enumerate(zip(STEPS, layout.cases))
+        },
+        **life,
+    }
+
+
+def _by_step(of: Mapping[str, Any]) -> dict[str, Any]:
+    return {step.replace(" ", "_"): value for step, value in of.items()}
+
+
+def _reactions(support) -> dict[str, Any]:
+    found = bearing_reactions(support.gearbox)
+    return {
+        name: {"force_N": force[:3], "shaft_um": shaft[:3], "seat_um": seat[:3]}
+        for name, force, shaft, seat in zip(found.names, *map(np.asarray, (found.force, found.shaft, found.seat)))
+    }
+
+
+def _cell(cases: ToleranceCases, number: int) -> str:
+    return f"{float(cases.face_load_factor[number]):.3f}{'*' if bool(cases.edge_contact[number]) else ' '}"
+
+
+def _worst_root(layout: FlankLineLayout, name: str) -> str:
+    worst = (np.max(of[name].face_load_factor) for of in layout.cases)
+    return " / ".join(f"{float(root_factor(layout, factor)):.3f} " for factor in worst)
+
+
+def _worst_life(layout: FlankLineLayout, name: str) -> str:
+    return " / ".join(f"{float(np.min(lives)):.4g} " for lives in layout.lives[name])
+
+
+def _number(value: float) -> str:
+    return f"{value:.3f}"

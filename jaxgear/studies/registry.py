@@ -1,0 +1,68 @@
+"""The studies by name, those of this package and those that other packages provide; imports one when it is asked for.
+
+A study `XStudy` of this package lies in the module `x` and is one of the public names of `__init__.pyi`. Another
+package names its own as entry points of the group `jaxgear.studies`:
+
+    [project.entry-points."jaxgear.studies"]
+    heat = "my_package.heat:HeatStudy"
+"""
+
+import ast
+import importlib
+import importlib.util
+from typing import Any
+
+from . import __all__ as public
+
+_GROUP = "jaxgear.studies"
+_ENDING = "Study"
+
+
+def own() -> dict[str, str]:
+    """Place of every study of this package by its name, as `module:class`."""
+    classes = [name for name in public if name.endswith(_ENDING) and not name.startswith("Abstract")]
+    names = {cls: cls.removesuffix(_ENDING).lower() for cls in classes}
+    return {name: f"{__package__}.{name}:{cls}" for cls, name in names.items()}
+
+
+def provided() -> dict[str, str]:
+    """Place of every study that installed packages provide, likewise."""
+    from importlib import metadata  # which takes longer to import than the names of this package
+
+    return {entry.name: f"{entry.module}:{entry.attr}" for entry in metadata.entry_points(group=_GROUP)}
+
+
+def help_of(place: str) -> str:
+    """The docstring of a study up to its first section, read without importing it; "" where there is no source."""
+    module, _, cls = place.partition(":")
+    try:
+        spec = importlib.util.find_spec(module)
+        loader: Any = None if spec is None else spec.loader
+        tree = ast.parse(loader.get_source(module))
+    except (ImportError, AttributeError, SyntaxError, TypeError, ValueError):  # not there, or no source
+        return ""
+    classes = {one.name: one for one in tree.body if isinstance(one, ast.ClassDef)}
+    docstring = ast.get_docstring(classes[cls]) if cls in classes else None
+    paragraphs = [" ".join(paragraph.split()) for paragraph in (docstring or "").split("\n\n")]
+    first = next((number for number, one in enumerate(paragraphs) if one.startswith("Attributes:")), len(paragraphs))
+    return "\n\n".join(paragraphs[:first])
+
+
+def load(place: str) -> Any:
+    """The class of a study.
+
+    Args:
+        place: as `module:class`.
+
+    Raises:
+        ValueError: when it cannot be imported, or is not an `AbstractStudy`.
+    """
+    module, _, cls = place.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), cls)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"study {place}: cannot be imported: {error}") from error
+    abstract = importlib.import_module(f"{__package__}.study").AbstractStudy
+    if not (isinstance(found, type) and issubclass(found, abstract)):
+        raise ValueError(f"study {place}: must be a subclass of jaxgear.studies.AbstractStudy")
+    return found

@@ -1,0 +1,144 @@
+"""What a study is: checked when it is made, worked out, and summed up, tabulated and drawn by its result."""
+
+import abc
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Generic, Self, TypeVar
+
+from ..io import DesignFile
+from ..report import Chapter, Table
+from . import manufactured
+from .checkpoints import Checkpoints
+from .progress import Callback, Stages
+
+R = TypeVar("R", bound="AbstractStudyResult", covariant=True)
+
+
+class AbstractStudyResult(abc.ABC):
+    """What a study has found.
+
+    All but `summary` have a default: a result of numbers alone needs nothing else.
+
+    Attributes:
+        assumptions: of the study, beside those of every contact analysis, for a report.
+    """
+
+    assumptions: ClassVar[tuple[str, ...]] = ()
+
+    @abc.abstractmethod
+    def summary(self) -> dict[str, Any]:
+        """The result as plain data, names with their units; `study_summary` adds design file, gears and versions."""
+
+    def headlines(self) -> Iterable[Table]:
+        """Tables of two columns to be read before all others; they say what `findings` says."""
+        return ()
+
+    def tables(self) -> Iterable[Table]:
+        """Tables to be read first."""
+        return ()
+
+    def verdict(self) -> Iterable[str]:
+        """The result in words, a line each."""
+        return ()
+
+    def details(self) -> Iterable[str]:
+        """How it was found, in words, said last."""
+        return ()
+
+    def findings(self) -> Iterable[str] | None:
+        """A line for everything out of the usual range; None where that is not checked."""
+        return None
+
+    def failures(self) -> Iterable[str]:
+        """A line for everything that is not to be trusted or not reached; a command fails where there is one."""
+        return ()
+
+    def chapters(self) -> Sequence[Chapter]:
+        """Further chapters of a report."""
+        return ()
+
+    def figures(self) -> Mapping[str, Any]:
+        """Axes by the name of the picture, drawn anew."""
+        return {}
+
+    def write(self, folder: Path) -> None:  # noqa: B027 - the default writes nothing
+        """Writes further files, such as tables of every number, into a folder; `AbstractStudy.files` names them."""
+
+
+@dataclass(frozen=True)
+class AbstractStudy(abc.ABC, Generic[R]):
+    """A study of a design file.
+
+    A library calls `Study.of(design).run()`; the command line makes a command of every study that it knows, with
+    progress, report, interruption and resumption. The docstring of a study, up to its first section, is the help of
+    that command. A study of another package is a command where the package names it as an entry point of the group
+    `jaxgear.studies`. Numbers are those of double precision where `jax_enable_x64` is set, as commands set it.
+
+    Attributes:
+        name: of the study and of its command.
+        coarse: what a quick study has too few of; "" where its result says it.
+        needs: modules that it imports late; a command imports them ahead, beside its first compilation.
+        files: names of files that its results may have beside those of the studies of jaxgear.
+        takes_shafts: whether the study is on the shafts of the file at every load.
+        design: the design file.
+        quick: whether the study is a preview on few positions.
+    """
+
+    name: ClassVar[str]
+    coarse: ClassVar[str] = "coarse positions"
+    needs: ClassVar[tuple[str, ...]] = ()
+    files: ClassVar[frozenset[str]] = frozenset()
+    takes_shafts: ClassVar[bool] = False
+
+    design: DesignFile
+    quick: bool
+
+    @classmethod
+    def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
+        """The study that a design file asks for, checked before anything is worked out.
+
+        Args:
+            design: the design file.
+            quick: a preview on few positions.
+
+        Raises:
+            DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
+        """
+        return cls(design, quick)
+
+    def run(self, *, checkpoints: Checkpoints | None = None, callback: Callback | None = None) -> R:
+        """Works the study out.
+
+        Args:
+            checkpoints: what an interrupted run has found, and where this one keeps what it finds; None keeps nothing.
+            callback: told how far the study is; an exception that it raises ends the study.
+
+        Raises:
+            DesignFileError: for what only shows in the calculation.
+            ValueError: when a checkpoint cannot be written.
+        """
+        return self.work_out(Checkpoints() if checkpoints is None else checkpoints, Stages(callback))
+
+    @abc.abstractmethod
+    def work_out(self, checkpoints: Checkpoints, stages: Stages) -> R:
+        """What `run` does.
+
+        Args:
+            checkpoints: for what takes long.
+            stages: to be told of every stage.
+        """
+
+    @property
+    def folder(self) -> str:
+        """Folder of its results below that of the design file."""
+        return self.name
+
+    def omits(self) -> str:
+        """What of the file, but for its shafts, is not part of the study and why; "" for nothing."""
+        return manufactured.left_out(self.design)
+
+    @property
+    def left_out(self) -> str:
+        """What of the shafts of the file is not part of the study and why; "" for nothing."""
+        return "" if self.takes_shafts else self.design.left_out

@@ -1,0 +1,67 @@
+"""What the `summary.json` of every study says of its design file, its model, its findings and what made it."""
+
+import dataclasses
+import platform
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from ..contact import Mesh, Resolution
+from ..io import DesignFile, describe
+from ..io.table_keys import snake
+from ..metrics import Finding
+from ..microgeometry import AbstractModification
+from .version import version
+
+
+def identity(file: DesignFile) -> dict[str, Any]:
+    """What every `summary.json` begins with."""
+    project = {"project": file.project} if file.project else {}
+    return {"title": file.title, "design_file": file.path.name, **project}
+
+
+def flanks_data(pinion: AbstractModification, wheel: AbstractModification) -> dict[str, Any]:
+    """The modifications of both gears, part by part."""
+    return {"pinion_modification": describe(pinion), "wheel_modification": describe(wheel)}
+
+
+def versions() -> dict[str, str]:
+    """Of everything that a result depends on, by name."""
+    return {
+        "jaxgear": version(),
+        "jax": jax.__version__,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+    }
+
+
+def sizes(of: Resolution) -> dict[str, Any]:
+    """Array sizes by name."""
+    return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
+
+
+def model(mesh: Mesh) -> dict[str, Any]:
+    """The compliance by the names of its parts, with their options, and its plane state."""
+    return {"compliance": _options(mesh.compliance), "plane": mesh.compliance.plane}
+
+
+def _options(part: eqx.Module) -> dict[str, Any]:
+    """The type of a part and its options, in the words of a design file; of tables their sizes."""
+    data: dict[str, Any] = {"type": snake(type(part).__name__)}
+    for field in dataclasses.fields(part):
+        value = getattr(part, field.name)
+        if isinstance(value, eqx.Module):
+            data[field.name] = _options(value)
+        elif np.ndim(value):
+            data[field.name] = " x ".join(map(str, np.shape(value))) + " values"
+        elif value is not None and field.name != "plane":
+            data[field.name] = value if isinstance(value, str | bool | int) else np.asarray(value)
+    return data
+
+
+def finding_data(finding: Finding) -> dict[str, Any]:
+    """A finding by name, place, value and what is usual."""
+    return {"name": finding.key, "where": finding.where, "value": finding.value, **finding.usual._asdict()}

@@ -1,0 +1,116 @@
+"""The wear study: from a design file to its flanks over their life."""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+from ..contact import Mesh, OperatingPoint
+from ..io import DesignFile, OptimizeRequest, WearRequest, wear_request
+from ..io.errors import naming
+from ..io.requests import tolerance_of
+from ..numerics import optional_real, real
+from ..tolerance import Tolerance
+from ..wear import WearHistory, wear
+from . import manufactured, wear_scatter
+from .checkpoints import Checkpoints, CheckpointsOfKind, Marches, NamedArrays
+from .comparison import Modifications, compared, first_mesh, search_of, sought
+from .progress import Stages
+from .study import AbstractStudy
+from .wear_result import OVER_LIFE, WearResult
+
+_MOST_BLOCKS = 1000  # of a life of manufactured gears
+
+
+@dataclass(frozen=True)
+class WearStudy(AbstractStudy[WearResult]):
+    """Wear the flanks of the pair over the revolutions of the table `wear`.
+
+    Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the design file or
+    the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.
+
+    Attributes:
+        request: what the file asks for.
+        search: for the optimum of the file; None where its modifications are numbers.
+        over_life: for the lowest mean PPTE over the life, under the static load; None where nothing is sought for it.
+        tolerance: of manufactured gears; None where they are not worn.
+    """
+
+    name: ClassVar = "wear"
+    coarse: ClassVar = "coarse positions and few blocks"
+
+    request: WearRequest
+    search: OptimizeRequest | None
+    over_life: OptimizeRequest | None
+    tolerance: Tolerance | None
+
+    @classmethod
+    def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
+        """As `AbstractStudy.of`."""
+        request = wear_request(design, quick=quick)
+        search = search_of(design, quick=quick)
+        # a step of the search wears a life: under the static load, which takes far less than a motion in every block
+        static = dataclasses.replace(request.settings, line_load=None, dynamics=None)
+        over_life = None if search is None else search.over_life(static)
+        with naming(design.path):
+            tolerance = None if wear_scatter.left_out(design) else tolerance_of(design)
+        return cls(design, quick, request, search, over_life, tolerance)
+
+    def omits(self) -> str:
+        """Manufactured gears under the dynamic line load."""
+        return wear_scatter.left_out(self.design)
+
+    def work_out(self, checkpoints: Checkpoints, stages: Stages) -> WearResult:
+        """The lives of all designs, and of manufactured pairs where the file has tolerances."""
+        design, quick = self.design, self.quick
+        highest = max(design.torque, design.torque_range[1])
+        mesh, designs = compared(design, highest, self.search, checkpoints, stages, quick=quick)
+        if self.over_life is not None:
+            stages.begin("searching the optimum over the life")
+            start = first_mesh(design, highest, quick=quick)
+            _, designs[OVER_LIFE] = sought(design, OVER_LIFE, self.over_life, start, checkpoints, stages, quick=quick)
+        kept = checkpoints.of(Marches())
+        lives = {name: self._life(mesh, name, flanks, kept, stages) for name, flanks in designs.items()}
+        scatters: Mapping[str, wear_scatter.Samples] = {}
+        if self.tolerance is not None:
+            stages.begin("wearing manufactured gears of all designs")
+            # of one length, as quantities take them, and as many as the nominal gears have taken
+            blocks = min(max(len(life.revolutions) - 1 for life in lives.values()), _MOST_BLOCKS)
+            settings = dataclasses.replace(self.request.settings, blocks=blocks)
+            scatters = wear_scatter.manufactured_wear(
+                settings,
+                mesh,
+                design.torque,
+                designs,
+                self.tolerance,
+                **manufactured.drawn(design, quick=quick),
+                keep=checkpoints.of(NamedArrays()),
+            )
+        return WearResult(design, self.request, designs, lives, scatters)
+
+    def _life(
+        self, mesh: Mesh, name: str, flanks: Modifications, kept: CheckpointsOfKind, stages: Stages
+    ) -> WearHistory:
+        """The life of one design, at the torque of the file."""
+        stages.begin(f"wearing the {name} design")
+        design, settings, (pinion, wheel) = self.design, self.request.settings, flanks
+
+        def progress(done: float, total: float) -> None:
+            stages.count(int(done), int(total), f"{done:.3g} of {total:.3g} revolutions")
+
+        return wear(
+            mesh,
+            settings.loads
+            or OperatingPoint(real(design.torque), optional_real(design.speed), optional_real(design.friction)),
+            settings.revolutions,
+            coefficient=settings.coefficients,
+            pinion=pinion,
+            wheel=wheel,
+            points=settings.points,
+            dynamics=settings.dynamics,
+            line_load=settings.line_load,
+            blocks=settings.blocks,
+            largest_increment=self.request.largest_increment,
+            keep=kept,
+            callback=progress,
+        )
