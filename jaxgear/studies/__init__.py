@@ -1,8 +1,8 @@
 """Studies of a design file: worked out, summed up, tabulated and drawn, with or without the command line.
 
     study = WearStudy.of(load_design("pair.toml"))
-    result = study.run(checkpoints=Checkpoints(Path("kept")), callback=print)
-    write_results(Path("results"), study, result)
+    result = study.run(checkpoints=Checkpoints("kept"), callback=print)
+    write_results("results", study, result)
 
 `AbstractStudy` and `AbstractStudyResult` are the extension points; `registry` says how a study of another package
 becomes a command. The public names are listed in `__init__.pyi` and imported when they are asked for, so that the

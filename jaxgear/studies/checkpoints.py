@@ -85,9 +85,9 @@ class Checkpoints:
             is not known.
     """
 
-    def __init__(self, folder: Path | None = None, callback: Callable[[int, int | None], None] | None = None):
-        self.folder, self._callback = folder, callback
-        self._used = False
+    def __init__(self, folder: str | Path | None = None, callback: Callable[[int, int | None], None] | None = None):
+        self.folder = None if folder is None else Path(folder)
+        self._callback, self._used = callback, False
 
     def of(self, codec: Codec[R], total: int | None = None) -> "CheckpointsOfKind[R]":
         """The checkpoints of one kind of result.

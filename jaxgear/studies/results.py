@@ -26,12 +26,12 @@ def study_summary(study: AbstractStudy, result: AbstractStudyResult) -> dict[str
 
 
 def write_results(
-    folder: Path, study: AbstractStudy, result: AbstractStudyResult, *, figures: bool = True
+    folder: str | Path, study: AbstractStudy, result: AbstractStudyResult, *, figures: bool = True
 ) -> tuple[dict[str, Any], list[Path]]:
     """Writes `summary.json`, the further files of a result and its figures.
 
     Args:
-        folder: for the files, which exists.
+        folder: for the files; made where it is missing.
         study: the study.
         result: what it has found.
         figures: whether figures are drawn, which opens no window where the backend of matplotlib has none.
@@ -42,7 +42,8 @@ def write_results(
     Raises:
         OSError: when a file cannot be written.
     """
-    data = study_summary(study, result)
+    data, folder = study_summary(study, result), Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     write_summary(folder / "summary.json", data)
     result.write(folder)
     return data, save_figures(folder, result.figures()) if figures else []

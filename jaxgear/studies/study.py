@@ -80,7 +80,7 @@ class AbstractStudy(abc.ABC, Generic[R]):
         coarse: what a quick study has too few of; "" where its result says it.
         needs: modules that it imports late; a command imports them ahead, beside its first compilation.
         files: names of files that its results may have beside those of the studies of jaxgear.
-        takes_shafts: whether the study is on the shafts of the file at every load.
+        takes_shafts: whether the shafts of the file support the gears at every load.
         design: the design file.
         quick: whether the study is a preview on few positions.
     """
