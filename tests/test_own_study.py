@@ -26,8 +26,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from rich.table import Table
 
+from jaxgear.report import Table
 from jaxgear.studies import AbstractStudy, AbstractStudyResult, NamedArrays
 
 ASKED = []  # torques that were worked out
@@ -42,9 +42,7 @@ class ShareResult(AbstractStudyResult):
         return {"share_Nm": list(self.shares.values())}
 
     def tables(self):
-        table = Table(title="shares of the torque")
-        table.add_column("torque [N m]")
-        table.add_column("share [N m]")
+        table = Table(("torque [N m]", "share [N m]"), title="shares of the torque")
         for torque, share in self.shares.items():
             table.add_row(f"{torque:g}", f"{share:.3f}")
         yield table
