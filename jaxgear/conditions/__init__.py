@@ -15,6 +15,7 @@ from .variant import Parameters as Parameters
 from .variant import Variant as Variant
 from .variant import Variants as Variants
 from .variant import check_used as check_used
+from .variant import cycle_status as cycle_status
 from .variant import solve_case as solve_case
 from .variant import solved as solved
 from .variant import two_modifications as two_modifications

@@ -10,8 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ..conditions import LoadSpectrum, solved
-from ..conditions.variant import cycle_status
+from ..conditions import LoadSpectrum, cycle_status, solved
 from ..contact import Mesh, MeshCycle, OperatingPoint, RemovedMaterial, removed_material, solve_removed
 from ..contact.cycle import FLATTEST, flank_pressure
 from ..contact.face_coupling import check_torque
