@@ -8,13 +8,13 @@ from .folder import writing as writing
 from .layout_request import LayoutRequest as LayoutRequest
 from .layout_request import layout_request as layout_request
 from .load import load_design as load_design
+from .named_quantities import quantities_of_tables as quantities_of_tables
 from .optimize_request import OptimizeRequest as OptimizeRequest
 from .optimize_request import optimize_request as optimize_request
 from .reference import reference as reference
 from .requests import DynamicsRequest as DynamicsRequest
 from .requests import WearRequest as WearRequest
 from .requests import dynamics_request as dynamics_request
-from .requests import quantities_of_tables as quantities_of_tables
 from .requests import wear_request as wear_request
 from .results import describe as describe
 from .results import flank_rows as flank_rows

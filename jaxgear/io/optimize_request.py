@@ -26,7 +26,8 @@ from ..wear.quantities import LIVES_AHEAD
 from . import schema
 from .design_file import DesignFile
 from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
-from .requests import load_of, quantity_named, tolerance_of
+from .named_quantities import quantity_named
+from .requests import load_of, tolerance_of
 from .table_keys import FileTable
 from .toml import decode
 from .value_types import outside

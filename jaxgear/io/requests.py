@@ -1,20 +1,17 @@
-"""What the tables [dynamics], [wear] and [tolerance] of a design file ask for, and the names of quantities."""
+"""What the tables [dynamics], [wear] and [tolerance] of a design file ask for."""
 
 import dataclasses
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from ..conditions import LoadSpectrum
-from ..dynamics import DYNAMIC_QUANTITIES, Dynamics
+from ..dynamics import Dynamics
 from ..dynamics.motion import SAMPLES
-from ..metrics import Quantity, quantities
-from ..metrics.settings import WithoutSettings, without_settings
 from ..tolerance import Tolerance, ToleranceClass
-from ..wear import WEAR_QUANTITIES, Wear
+from ..wear import Wear
 from .design_file import DesignFile
-from .errors import DesignFileError, check_known, naming, problem, refuse_given, refused
+from .errors import DesignFileError, naming, problem, refuse_given, refused
 from .schema import DynamicsSection, OptimizeSection, SweepSection, WearSection
 from .template import part_of
 from .variables import increasing
@@ -124,18 +121,6 @@ def _check_run_up(settings: Dynamics, duration: float | None) -> None:
         raise DesignFileError("dynamics.run_up", f"{duration:g} s holds {cycles:.0f} mesh cycles, needs {SAMPLES}")
 
 
-def dynamic_quantity(design: DesignFile, key: str, name: str) -> Quantity:
-    """A dynamic quantity with the settings of the table [dynamics], which is there.
-
-    Raises:
-        DesignFileError: without a speed that the quantity needs.
-    """
-    assert design.dynamics is not None  # `quantity_named` has looked
-    if DYNAMIC_QUANTITIES[name].at_speed and design.speed is None:
-        raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{name}" is that of all speeds of [dynamics]')
-    return dynamics_of(design).quantity(name)
-
-
 def dynamics_of(design: DesignFile) -> Dynamics:
     """The settings of the table [dynamics], which is there."""
     assert design.dynamics is not None
@@ -203,17 +188,6 @@ def wear_request(design: DesignFile, *, quick: bool = False) -> WearRequest:
         return WearRequest(settings, section.largest_increment)
 
 
-def wear_quantity(design: DesignFile, name: str) -> Quantity:
-    """A quantity of worn flanks with the settings of the table [wear], which has what the quantity needs."""
-    section = design.wear
-    assert section is not None  # `quantity_named` has looked
-    if section.largest_increment is not None and section.blocks is None:
-        problem = f'missing, "{name}" needs it: wear.largest_increment is for the lives of `jaxgear wear` alone'
-        raise DesignFileError("wear.blocks", problem)
-    vibrates = WEAR_QUANTITIES[name].needs == "dynamics" or section.line_load == "dynamic"
-    return _wear_settings(design, vibrates=vibrates).quantity(name)
-
-
 def _wear_settings(design: DesignFile, *, vibrates: bool) -> Wear:
     """The settings of the library: flanks wear under the static load unless the file says otherwise."""
     section = design.wear
@@ -239,60 +213,3 @@ def _loads(design: DesignFile, section: WearSection) -> LoadSpectrum | None:
         if free.key.startswith("load.") and free.key not in own:
             raise DesignFileError("wear.torques", f'{free.key} is the variable "{free.name}", which they do not follow')
     return spectrum(design, "wear", section.torques, section.weights, section.speeds)
-
-
-def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
-    """What a name of the vocabulary means in a design file: some quantities come with settings of one of its tables.
-
-    Args:
-        design: the design file.
-        key: where the name stands.
-        name: in either spelling.
-
-    Raises:
-        DesignFileError: for an unknown name, and for one that needs a table or a key that the file does not have.
-    """
-    check_known(key, name, quantities)
-    plain = quantities[name].name
-    stands = without_settings(quantities[plain])
-    if stands is None:
-        return name
-    missing = _missing(design, stands)
-    if missing:
-        raise DesignFileError(key, f'"{plain}" needs {missing}')
-    if plain in DYNAMIC_QUANTITIES:
-        return dynamic_quantity(design, key, plain)
-    if plain in WEAR_QUANTITIES:
-        return wear_quantity(design, plain)
-    settings = getattr(design, stands.table)
-    return name if settings is None else settings.quantity(plain)
-
-
-def quantities_of_tables(design: DesignFile) -> Iterator[Quantity]:
-    """All quantities that need a speed, a lubricant or strengths, as far as a design file tells what they need."""
-    for name, quantity in quantities.items():
-        stands = without_settings(quantity)
-        if stands is None or stands.of is None or _missing(design, stands):
-            continue
-        settings = getattr(design, stands.table)
-        yield quantity if settings is None else settings.quantity(name)
-
-
-def _missing(design: DesignFile, stands: WithoutSettings) -> str:
-    """What a design file lacks for a quantity of one of its tables; "" for nothing."""
-    settings = getattr(design, stands.table)
-    if stands.needs == "dynamics":  # which other settings hold, and a file has a table for
-        for known, name in ((settings, f"the table [{stands.table}]"), (design.dynamics, "the table [dynamics]")):
-            if known is None:
-                return name
-        speeds = design.wear and design.wear.speeds  # the only such settings that have their own
-        return "" if design.speed is not None or speeds else "load.speed"
-    if settings is not None:
-        unset = stands.needs is not None and getattr(settings, stands.needs) is None
-        return f"{stands.table}.{stands.needs}" if unset else ""
-    if stands.otherwise is None:
-        return f"the table [{stands.table}]"
-    for name in stands.operating_point:
-        if getattr(design, name) is None:
-            return f"load.{name}" + (f" or the table [{stands.table}]" if name != "speed" else "")
-    return ""

@@ -13,7 +13,8 @@ from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
 from .design_file import DesignFile
 from .errors import DesignFileError, naming, referring, refuse_given, refused
-from .requests import load_of, quantity_named, tolerance_of
+from .named_quantities import quantity_named
+from .requests import load_of, tolerance_of
 from .rows import read_variants
 from .schema import SweepSection
 
