@@ -725,7 +725,7 @@ def test_whatever_is_written_in_a_file_it_is_read_or_refused_in_one_line(load, t
             problem = str(error).partition("gear.toml: ")[2]
             assert "\n" not in problem
             assert re.match(r"[\w.\[\]]+: ", problem), problem  # a key, then what is wrong with it
-            assert not re.search(r"\b(Gear|GearPair|Material|TipRelief|LoadSpectrum|Quadratic|pydantic)\b", problem)
+            assert not re.search(r"\b(Gear|GearPair|Material|TipRelief|LoadSpectrum|Quadratic)\b", problem)
     assert refusals > 0.75 * times
 
 
@@ -736,7 +736,7 @@ def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
     sections += [*schema.method_options().values(), schema.SweepSection, schema.ToleranceSection]
     sections += [section_of(cls) for cls in (*family(AbstractModification, users=False).values(), jg.Material)]
     for section in sections:
-        assert not [name for name in section.model_fields if f"| `{name}` | " not in text]
+        assert not [name for name in section.keys if f"| `{name}` | " not in text]
     assert "| `module` | a number or the name of a variable | mm | greater than 0 | required |" in text
     assert "| `density` | a number or the name of a variable | kg/m^3 | greater than 0 | `7850` | " in text
     assert '| `side` | one of "both", "negative", "positive" |  |  | `"both"` | ' in text

@@ -24,8 +24,9 @@ from .gearbox import layout_of, support_of
 from .gears import both_classes, drawing_of, gear_of, materials_of, pair_of, quality_of
 from .model import model_part, resolution_of, with_tables
 from .schema import OptimizeSection
+from .table_keys import decode
 from .template import FileDesign, FileMesh
-from .toml import decode, read
+from .toml import read
 from .variables import read_variables
 
 # Tooth pairs are carried along up to this many times the deflection of a single pair after ISO 6336-1.

@@ -89,6 +89,11 @@ def referring(key: str, name: str) -> Iterator[None]:
         raise DesignFileError(key, ": ".join(part for part in parts if part)) from None
 
 
+def join(key: str, name: str) -> str:
+    """Dotted key."""
+    return f"{key}.{name}" if key and name else key or name
+
+
 def check_file(path: Path) -> None:
     """Refuses what is no regular file: a pipe or a device may never come to its end.
 

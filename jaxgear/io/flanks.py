@@ -23,7 +23,7 @@ from . import schema, template
 from .errors import DesignFileError, naming, referring
 from .results import MEASURED
 from .rows import Rows, read_rows
-from .toml import decode
+from .table_keys import decode
 
 # Shares of the active profile or of the face. A trace may run over the edges by so much, which also covers the
 # tolerance of the tip diameter; and it may leave out four times what ISO 1328-1 leaves out of the evaluation.

@@ -32,9 +32,8 @@ from . import schema_shafts as schema
 from .errors import DesignFileError, check_file, referring, refuse_given, refused
 from .gears import Materials, fixed_gear, fixed_material, with_quality
 from .schema import FileSection
-from .table_keys import section_of
+from .table_keys import decode, section_of
 from .template import part_of
-from .toml import decode
 
 
 def over_slices(support: ShaftSupport, sizes: Resolution) -> TabulatedSupport:

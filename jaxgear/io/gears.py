@@ -12,7 +12,7 @@ from ..numerics import Number, fields_of
 from . import schema, template
 from .errors import DesignFileError, check_known
 from .flanks import flank_part
-from .toml import decode
+from .table_keys import decode
 from .value_types import not_of_kind
 
 _STEEL = "STEEL"
@@ -65,7 +65,7 @@ def fixed_gear(key: str, table: schema.Tables, materials: Materials) -> Gear:
     """A gear of numbers, whose flanks do not count."""
     section = decode(key, table, schema.GearSection)
     for name in _WITHOUT_FLANKS:
-        if name in section.model_fields_set:
+        if name in section.given():
             raise DesignFileError(f"{key}.{name}", "has no effect, only pinion and wheel have flanks")
     return _fixed(_gear(key, section, materials))
 
@@ -127,7 +127,7 @@ def with_quality(key: str, section: Any, own: list[int] | None) -> Any:
     if section.quality_class is None:
         if own is None:
             raise DesignFileError(f"{key}.quality_class", "missing, this key is required where the gears have none")
-        return section.model_copy(update={"quality_class": own})
+        return section.changed(quality_class=own)
     if own is not None:
         raise DesignFileError(
             f"{key}.quality_class", "has no effect, the gears have classes of their own: take one of them out"

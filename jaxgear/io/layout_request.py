@@ -18,8 +18,8 @@ from .design_file import DesignFile
 from .errors import DesignFileError, naming, refuse_given, refused
 from .gears import both_classes
 from .schema_shafts import LayoutSection, MisalignmentSection, ProfileSection, WoehlerSection
+from .table_keys import decode
 from .template import part_of
-from .toml import decode
 
 _QUICK_STATIONS, _QUICK_AMOUNTS = 21, 3
 _TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
@@ -166,7 +166,7 @@ def _profile(layout: LayoutSection, quick: bool) -> ProfileSection | None:
             raise DesignFileError(f"layout.profile.{key}", "must all be different")
     if quick:
         amounts = {key: values[:: -(-len(values) // _QUICK_AMOUNTS)] for key, values in amounts.items()}
-    return section.model_copy(update=amounts)
+    return section.changed(**amounts)
 
 
 def _profile_torque(design: DesignFile, section: ProfileSection | None) -> float:

@@ -7,7 +7,7 @@ from ..contact import Resolution
 from ..geometry import GearPair
 from . import schema, template
 from .errors import DesignFileError, check_file, referring, refuse_given, refused
-from .toml import decode
+from .table_keys import decode
 
 # Slices where a modification varies along the face: the mean of a parabola over the middles of n slices is 1 / n^2 too
 # small, so that 11 show a lead crowning to 1 %.

@@ -28,8 +28,7 @@ from .design_file import DesignFile
 from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
 from .named_quantities import quantity_named
 from .requests import load_of, tolerance_of
-from .table_keys import FileTable
-from .toml import decode
+from .table_keys import FileTable, decode
 from .value_types import outside
 
 CURVE = "cubic"  # on which flanks without parameters are projected
@@ -66,7 +65,8 @@ def tables(section: schema.OptimizeSection) -> dict[str, FileTable]:
 
 def options_of(section: schema.OptimizeSection, name: str, *, of_the_file: bool) -> dict[str, Any]:
     """The options of a method; the file may name others where it is not the file that asks for the method."""
-    options = {key: value for key, value in tables(section).get(name, ()) if value is not None}
+    table = tables(section).get(name, FileTable())
+    options = {key: value for key in table.keys if (value := getattr(table, key)) is not None}
     shared = {"starts": section.starts, "steps": section.steps, "seed": section.seed or 0}
     taken = {field.name for field in dataclasses.fields(METHODS[name])} if name in METHODS else set()
     if of_the_file:
@@ -182,7 +182,7 @@ def check_optimize(design: DesignFile) -> None:
     section = design.optimize
     check_method(section.method or _DEFAULT_METHOD)
     for name, options in tables(section).items():
-        if options.model_fields_set:
+        if options.given():
             check_options(design, name, options.given())
     _objectives(design, section)
     _measure(section)

@@ -2,15 +2,15 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Any, TypeVar
 
 from ..metrics import Lubricant, Strength
 from ..numerics import Number
-from .errors import DesignFileError, referring
+from .errors import DesignFileError, join, referring
 from .schema import LoadSection, Tables
-from .table_keys import FileTable, section_of
+from .table_keys import FileTable, decode, key, section_of
 from .template import part_of
-from .toml import decode, join, read
+from .toml import read
 from .value_types import outside, text
 
 S = TypeVar("S", bound=FileTable)
@@ -26,7 +26,7 @@ class FileKey(FileTable):
         file: TOML file beside the design file, with any of the other keys; no key stands in both.
     """
 
-    file: Annotated[str | None, text()] = None
+    file: str | None = key(text())
 
 
 class LubricantSection(FileKey, section_of(Lubricant, open=False)):  # type: ignore[misc]

@@ -127,21 +127,21 @@ def _table(title: str, section: type[FileTable], of: Callable[..., Any] | None) 
     own = bool(section.__doc__) and section.__doc__ != FileTable.__doc__
     yield f"\n## {_heading(title)}\n"
     yield summary(section if own or of is None else of) + "\n"
-    if not section.model_fields:
+    if not section.keys:
         return
     texts = {**meanings(of), **meanings(section)} if of else meanings(section)
     yield "| Key | Value | Unit | Range | Default | Meaning |"
     yield "| --- | --- | --- | --- | --- | --- |"
-    for name, field in section.model_fields.items():
-        kind = section.kind(name)
-        default = "required" if field.is_required() else _default(name, field.default, of)
+    for name, field in section.keys.items():
+        kind = field.kind
+        default = "required" if field.default is ... else _default(name, field.default, of)
         cells = [
             f"`{name}`",
             kind.words,
             kind.number.unit if kind.number else "",
             allowed(dataclasses.replace(kind.number, unit="")) if kind.number else "",
             default,
-            texts.get(name, ""),
+            field.meaning or texts.get(name, ""),
         ]
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 

@@ -4,10 +4,7 @@ Numbers of modifications and curves may be the name of a variable instead. Defau
 there: None means that the key is absent.
 """
 
-import inspect
-from typing import Annotated, Any
-
-from pydantic import create_model
+from typing import Any
 
 from ..compliance import Compliance
 from ..contact import OperatingPoint, Resolution
@@ -19,7 +16,7 @@ from ..optimize import METHODS, Pareto
 from ..shafts import Misalignment
 from ..tolerance import Tolerance
 from ..wear import Wear
-from .table_keys import FileTable, section_of
+from .table_keys import FileTable, Key, key, section_of
 from .value_types import (
     LEVEL,
     QUALITY_CLASS,
@@ -71,28 +68,28 @@ class FileSection(FileTable):
         layout: what `jaxgear layout` does.
     """
 
-    pinion: Annotated[Tables, table()]
-    wheel: Annotated[Tables, table()]
-    load: Annotated[Tables, table()]
-    title: Annotated[str | None, text()] = None
-    project: Annotated[Tables | None, table()] = None
-    materials: Annotated[Tables | None, table(table())] = None
-    pair: Annotated[Tables | None, table()] = None
-    model: Annotated[Tables | None, table()] = None
-    misalignment: Annotated[Tables | None, table()] = None
-    resolution: Annotated[Tables | None, table()] = None
-    variables: Annotated[Tables | None, table(table())] = None
-    optimize: Annotated[Tables | None, table()] = None
-    sweep: Annotated[Tables | None, table()] = None
-    tolerance: Annotated[Tables | None, table()] = None
-    dynamics: Annotated[Tables | None, table()] = None
-    wear: Annotated[Tables | None, table()] = None
-    lubricant: Annotated[Tables | None, table()] = None
-    strength: Annotated[Tables | None, table()] = None
-    shafts: Annotated[list[Tables], _TABLES] = []
-    meshes: Annotated[list[Tables], _TABLES] = []
-    housing: Annotated[Tables | None, table()] = None
-    layout: Annotated[Tables | None, table()] = None
+    pinion: Tables = key(table(), ...)
+    wheel: Tables = key(table(), ...)
+    load: Tables = key(table(), ...)
+    title: str | None = key(text())
+    project: Tables | None = key(table())
+    materials: Tables | None = key(table(table()))
+    pair: Tables | None = key(table())
+    model: Tables | None = key(table())
+    misalignment: Tables | None = key(table())
+    resolution: Tables | None = key(table())
+    variables: Tables | None = key(table(table()))
+    optimize: Tables | None = key(table())
+    sweep: Tables | None = key(table())
+    tolerance: Tables | None = key(table())
+    dynamics: Tables | None = key(table())
+    wear: Tables | None = key(table())
+    lubricant: Tables | None = key(table())
+    strength: Tables | None = key(table())
+    shafts: list[Tables] = key(_TABLES, [])
+    meshes: list[Tables] = key(_TABLES, [])
+    housing: Tables | None = key(table())
+    layout: Tables | None = key(table())
 
 
 class ProjectSection(FileTable):
@@ -108,13 +105,13 @@ class ProjectSection(FileTable):
         remark: what else is to stand there.
     """
 
-    name: Annotated[str | None, text()] = None
-    number: Annotated[str | None, text()] = None
-    customer: Annotated[str | None, text()] = None
-    drawing: Annotated[str | None, text()] = None
-    revision: Annotated[str | None, text()] = None
-    author: Annotated[str | None, text()] = None
-    remark: Annotated[str | None, text()] = None
+    name: str | None = key(text())
+    number: str | None = key(text())
+    customer: str | None = key(text())
+    drawing: str | None = key(text())
+    revision: str | None = key(text())
+    author: str | None = key(text())
+    remark: str | None = key(text())
 
 
 _ThicknessKeys = section_of(ToothThickness, most=(("teeth_spanned", 1000),))
@@ -139,9 +136,9 @@ class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
         modification: modifications of the flank; several add up.
     """
 
-    material: Annotated[Any, either(text(), table(), "the name of a material, or a table")] = None
-    quality_class: Annotated[int | None, QUALITY_CLASS] = None
-    modification: Annotated[list[Tables], _TABLES] = []
+    material: Any = key(either(text(), table(), "the name of a material, or a table"))
+    quality_class: int | None = key(QUALITY_CLASS)
+    modification: list[Tables] = key(_TABLES, [])
 
 
 class FlankFileSection(FileTable):
@@ -156,11 +153,11 @@ class FlankFileSection(FileTable):
         method: of interpolation along the profile.
     """
 
-    file: Annotated[str, text()]
-    gear: Annotated[str | None, choice("pinion", "wheel")] = None
-    design: Annotated[str | None, text()] = None
-    revolutions: Annotated[float | None, real(Number("", low=0.0))] = None
-    method: Annotated[str, choice("linear", "natural_cubic", "monotonic")] = "linear"
+    file: str = key(text(), ...)
+    gear: str | None = key(choice("pinion", "wheel"))
+    design: str | None = key(text())
+    revolutions: float | None = key(real(Number("", low=0.0)))
+    method: str = key(choice("linear", "natural_cubic", "monotonic"), "linear")
 
 
 class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[misc]
@@ -171,7 +168,7 @@ class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[mi
             the centre distance where both do.
     """
 
-    backlash: Annotated[Any, real(Number("um", low=0.0), open=True)] = None
+    backlash: Any = key(real(Number("um", low=0.0), open=True))
 
 
 MisalignmentSection = section_of(Misalignment)
@@ -188,8 +185,8 @@ class LoadSection(section_of(OperatingPoint)):  # type: ignore[misc]
             law of [lubricant].
     """
 
-    torque: Annotated[Any, real(Number("N m", low=0.0, open_low=True), open=True)]
-    torque_range: Annotated[list[float] | None, list_of(positive("N m"), length=2)] = None
+    torque: Any = key(real(Number("N m", low=0.0, open_low=True), open=True), ...)
+    torque_range: list[float] | None = key(list_of(positive("N m"), length=2))
 
 
 class ModelSection(section_of(Compliance)):  # type: ignore[misc]
@@ -203,10 +200,10 @@ class ModelSection(section_of(Compliance)):  # type: ignore[misc]
         wheel_table: the same for the wheel.
     """
 
-    preset: Annotated[str, choice("default", "legacy")] = "default"
-    structure: Annotated[str, choice("closed_form", "finite_element")] = "closed_form"
-    pinion_table: Annotated[str | None, text()] = None
-    wheel_table: Annotated[str | None, text()] = None
+    preset: str = key(choice("default", "legacy"), "default")
+    structure: str = key(choice("closed_form", "finite_element"), "closed_form")
+    pinion_table: str | None = key(text())
+    wheel_table: str | None = key(text())
 
 
 # Sizes up to these: a slip of the finger must not fill the memory or compile for hours.
@@ -225,10 +222,10 @@ class VariableSection(FileTable):
         unit: checked against its use.
     """
 
-    low: Annotated[float, _BOUND]
-    high: Annotated[float, _BOUND]
-    value: Annotated[float | None, _BOUND] = None
-    unit: Annotated[str | None, text(empty=True)] = None
+    low: float = key(_BOUND, ...)
+    high: float = key(_BOUND, ...)
+    value: float | None = key(_BOUND)
+    unit: str | None = key(text(empty=True))
 
 
 class DynamicsSection(section_of(Dynamics, ("mesh_frequencies",), open=False)):  # type: ignore[misc]
@@ -243,11 +240,11 @@ class DynamicsSection(section_of(Dynamics, ("mesh_frequencies",), open=False)): 
             acceleration; no run-up without it.
     """
 
-    mesh_frequencies: Annotated[list[float] | None, list_of(positive("Hz"), length=2)] = None
-    speeds: Annotated[list[float] | None, list_of(positive("rpm"), length=2)] = None
-    number: Annotated[int, count(2, 10_000)] = 100
-    torque_factors: Annotated[list[float], list_of(positive(""))] = [0.5, 1.0, 2.0]
-    run_up: Annotated[float | None, positive("s")] = None
+    mesh_frequencies: list[float] | None = key(list_of(positive("Hz"), length=2))
+    speeds: list[float] | None = key(list_of(positive("rpm"), length=2))
+    number: int = key(count(2, 10_000), 100)
+    torque_factors: list[float] = key(list_of(positive("")), [0.5, 1.0, 2.0])
+    run_up: float | None = key(positive("s"))
 
 
 class WearSection(section_of(Wear, ("dynamics", "loads"), open=False)):  # type: ignore[misc]
@@ -263,11 +260,11 @@ class WearSection(section_of(Wear, ("dynamics", "loads"), open=False)):  # type:
         speeds: of the pinion at every torque; that of the file without it.
     """
 
-    line_load: Annotated[str, choice("static", "dynamic")] = "static"
-    largest_increment: Annotated[float | None, positive("um")] = None
-    torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
-    weights: Annotated[list[float] | None, WEIGHTS] = None
-    speeds: Annotated[list[float] | None, list_of(positive("rpm"))] = None
+    line_load: str = key(choice("static", "dynamic"), "static")
+    largest_increment: float | None = key(positive("um"))
+    torques: list[float] | None = key(list_of(positive("N m")))
+    weights: list[float] | None = key(WEIGHTS)
+    speeds: list[float] | None = key(list_of(positive("rpm")))
 
 
 class SweepSection(FileTable):
@@ -285,22 +282,21 @@ class SweepSection(FileTable):
         part_rows: variants per file of the table; without it there are about 64 files.
     """
 
-    sampling: Annotated[str, choice("sobol", "latin_hypercube", "full_factorial", "list")] = "sobol"
-    samples: Annotated[int | None, count(1, 2**40)] = None
-    seed: Annotated[int | None, SEED] = None
-    levels: Annotated[
-        int | dict[str, int | list[float]] | None,
+    sampling: str = key(choice("sobol", "latin_hypercube", "full_factorial", "list"), "sobol")
+    samples: int | None = key(count(1, 2**40))
+    seed: int | None = key(SEED)
+    levels: int | dict[str, int | list[float]] | None = key(
         either(
             LEVEL,
             table(either(LEVEL, list_of(real()), "a whole number or a list of values")),
             "a whole number, or a table with one entry per variable",
-        ),
-    ] = None
-    file: Annotated[str | None, text()] = None
-    torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
-    weights: Annotated[list[float] | None, WEIGHTS] = None
-    results: Annotated[list[str] | None, list_of(text())] = None
-    part_rows: Annotated[int | None, count(1, 2**24)] = None
+        )
+    )
+    file: str | None = key(text())
+    torques: list[float] | None = key(list_of(positive("N m")))
+    weights: list[float] | None = key(WEIGHTS)
+    results: list[str] | None = key(list_of(text()))
+    part_rows: int | None = key(count(1, 2**24))
 
 
 class ToleranceSection(section_of(Tolerance, ("pinion", "wheel", "distribution"), open=False)):  # type: ignore[misc]
@@ -312,9 +308,9 @@ class ToleranceSection(section_of(Tolerance, ("pinion", "wheel", "distribution")
         seed: of their deviations.
     """
 
-    quality_class: Annotated[int | list[int] | None, QUALITY_CLASSES] = None
-    samples: Annotated[int, count(2, 100_000)] = 64
-    seed: Annotated[int, SEED] = 0
+    quality_class: int | list[int] | None = key(QUALITY_CLASSES)
+    samples: int = key(count(2, 100_000), 64)
+    seed: int = key(SEED, 0)
 
 
 _NUMBER = real()
@@ -342,19 +338,19 @@ class OptimizeSection(FileTable):
         constraint: limits of quantities or of combinations of variables.
     """
 
-    method: Annotated[str | None, text()] = None
-    objective: Annotated[str | list[str] | None, _NAMES] = None
-    measure: Annotated[str | None, choice("mean", "worst", "quantile", "cvar")] = None
-    level: Annotated[float | None, _SHARE] = None
-    torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
-    weights: Annotated[list[float] | None, WEIGHTS] = None
-    manufactured: Annotated[int | None, count(1, 10_000)] = None
-    seed: Annotated[int | None, SEED] = None
-    starts: Annotated[int | None, count(1, 4096)] = None
-    steps: Annotated[int | None, count(10, 100_000)] = None
-    application_factor: Annotated[float, real(Number(low=0.0, high=100.0, open_low=True))] = 1.0
-    verify: Annotated[bool | None, switch()] = None
-    constraint: Annotated[list[Tables], _TABLES] = []
+    method: str | None = key(text())
+    objective: str | list[str] | None = key(_NAMES)
+    measure: str | None = key(choice("mean", "worst", "quantile", "cvar"))
+    level: float | None = key(_SHARE)
+    torques: list[float] | None = key(list_of(positive("N m")))
+    weights: list[float] | None = key(WEIGHTS)
+    manufactured: int | None = key(count(1, 10_000))
+    seed: int | None = key(SEED)
+    starts: int | None = key(count(1, 4096))
+    steps: int | None = key(count(10, 100_000))
+    application_factor: float = key(real(Number(low=0.0, high=100.0, open_low=True)), 1.0)
+    verify: bool | None = key(switch())
+    constraint: list[Tables] = key(_TABLES, [])
 
 
 class ConstraintSection(FileTable):
@@ -367,34 +363,33 @@ class ConstraintSection(FileTable):
         high: greatest value.
     """
 
-    of: Annotated[str | None, text()] = None
-    variables: Annotated[dict[str, float] | None, table(_NUMBER)] = None
-    low: Annotated[float | None, real(plausible=False)] = None
-    high: Annotated[float | None, real(plausible=False)] = None
+    of: str | None = key(text())
+    variables: dict[str, float] | None = key(table(_NUMBER))
+    low: float | None = key(real(plausible=False))
+    high: float | None = key(real(plausible=False))
 
 
 class FactorialOptions(FileTable):
-    levels: Annotated[
-        int | dict[str, int] | None,
-        either(LEVEL, table(LEVEL), "a whole number, or a table with one entry per variable"),
-    ] = None
+    levels: int | dict[str, int] | None = key(
+        either(LEVEL, table(LEVEL), "a whole number, or a table with one entry per variable")
+    )
 
 
 class IterationOptions(FileTable):
-    start: Annotated[str, choice("unmodified", "given", "low_pressure")] = "unmodified"
-    max_relief: Annotated[float, positive("um")] = 7.0
-    max_pressure: Annotated[float | None, positive("MPa")] = None
-    rtol: Annotated[float | None, positive("")] = None
-    steps: Annotated[int | None, count(1, 1000)] = None
-    curve: Annotated[str | None, text()] = None
+    start: str = key(choice("unmodified", "given", "low_pressure"), "unmodified")
+    max_relief: float = key(positive("um"), 7.0)
+    max_pressure: float | None = key(positive("MPa"))
+    rtol: float | None = key(positive(""))
+    steps: int | None = key(count(1, 1000))
+    curve: str | None = key(text())
 
 
 class FreeFormOptions(FileTable):
-    points: Annotated[int | None, count(4, 500)] = None
-    max_relief: Annotated[float | None, positive("um")] = None
-    curvature: Annotated[float | None, real(Number(low=0.0))] = None
-    steps: Annotated[int | None, count(1, 10_000)] = None
-    curve: Annotated[str | None, text()] = None
+    points: int | None = key(count(4, 500))
+    max_relief: float | None = key(positive("um"))
+    curvature: float | None = key(real(Number(low=0.0)))
+    steps: int | None = key(count(1, 10_000))
+    curve: str | None = key(text())
 
 
 # They seek the flanks themselves.
@@ -406,13 +401,10 @@ def method_options() -> dict[str, type[FileTable]]:
     found = {name: section_of(cls, ("starts", "steps", "seed"), open=False) for name, cls in METHODS.items()}
     found |= {"factorial": FactorialOptions, "pareto": section_of(Pareto)}
     found |= {"te_iteration": IterationOptions, "free_form": FreeFormOptions}
-    return {name: section for name, section in found.items() if section.model_fields}
+    return {name: section for name, section in found.items() if section.keys}
 
 
 def optimize_section() -> type[OptimizeSection]:
     """The table [optimize] with those of the methods."""
-    methods = method_options()
-    texts = "".join(f"\n    {name}: options of the method." for name in methods)
-    tables: dict[str, Any] = {name: (Annotated[Tables | None, table()], None) for name in methods}
-    text = inspect.cleandoc(OptimizeSection.__doc__ or "") + texts  # Python 3.13 removes the indentation by itself
-    return create_model("OptimizeSection", __base__=OptimizeSection, __doc__=text, **tables)
+    tables = {name: Key(table(), meaning="options of the method.") for name in method_options()}
+    return type("OptimizeSection", (OptimizeSection,), {**tables, "__doc__": OptimizeSection.__doc__})

@@ -1,12 +1,12 @@
 """The layout of the tables [[shafts]], [[meshes]], [housing] and [layout]."""
 
-from typing import Annotated, Any
+from typing import Any
 
 from ..layout import SNCurve
 from ..numerics import Number
 from ..shafts import Bearing, Coupling, GearMesh, MatrixBearing, Misalignment, MountedGear, ShaftLoad
 from ..shafts import Section as ShaftPart
-from .table_keys import FileTable, section_of
+from .table_keys import FileTable, key, section_of
 from .value_types import QUALITY_CLASSES, choice, count, either, list_of, positive, real, switch, table, text
 
 Tables = dict[str, Any]
@@ -40,13 +40,13 @@ class ShaftSection(FileTable):
         material: of the shaft and what stiffens it, name in [materials] or elastic constants; "STEEL" without it.
     """
 
-    name: Annotated[str, text()]
-    sections: Annotated[list[Tables], _ROWS]
-    bearings: Annotated[list[Tables], _ROWS]
-    gears: Annotated[list[Tables], _ROWS_OR_NONE] = []
-    couplings: Annotated[list[Tables], _ROWS_OR_NONE] = []
-    loads: Annotated[list[Tables], _ROWS_OR_NONE] = []
-    material: Annotated[Any, either(text(), table(), "the name of a material, or a table")] = None
+    name: str = key(text(), ...)
+    sections: list[Tables] = key(_ROWS, ...)
+    bearings: list[Tables] = key(_ROWS, ...)
+    gears: list[Tables] = key(_ROWS_OR_NONE, [])
+    couplings: list[Tables] = key(_ROWS_OR_NONE, [])
+    loads: list[Tables] = key(_ROWS_OR_NONE, [])
+    material: Any = key(either(text(), table(), "the name of a material, or a table"))
 
 
 class MountedGearSection(section_of(MountedGear, ("name", "gear"), open=False)):  # type: ignore[misc]
@@ -58,9 +58,9 @@ class MountedGearSection(section_of(MountedGear, ("name", "gear"), open=False)):
         integral: whether it is cut into the shaft, which its teeth stiffen; in place of `body_diameter`.
     """
 
-    name: Annotated[str, text()]
-    gear: Annotated[Tables | None, table()] = None
-    integral: Annotated[bool, switch()] = False
+    name: str = key(text(), ...)
+    gear: Tables | None = key(table())
+    integral: bool = key(switch(), False)
 
 
 class MeshSection(section_of(GearMesh, ("pinion", "wheel", "misalignment"), open=False)):  # type: ignore[misc]
@@ -72,9 +72,9 @@ class MeshSection(section_of(GearMesh, ("pinion", "wheel", "misalignment"), open
         misalignment: of their axes, with `skew`, `inclination`, `bearing_span` and `direct`.
     """
 
-    pinion: Annotated[str, text()]
-    wheel: Annotated[str, text()]
-    misalignment: Annotated[Tables | None, table()] = None
+    pinion: str = key(text(), ...)
+    wheel: str = key(text(), ...)
+    misalignment: Tables | None = key(table())
 
 
 class HousingSection(FileTable):
@@ -84,7 +84,7 @@ class HousingSection(FileTable):
         file: CSV or npz file beside the design file with the stiffness or compliance of the housing between the seats.
     """
 
-    file: Annotated[str, text()]
+    file: str = key(text(), ...)
 
 
 class LayoutSection(FileTable):
@@ -112,20 +112,20 @@ class LayoutSection(FileTable):
         profile: profile modifications to be tried in step 3; none without it.
     """
 
-    quality_class: Annotated[int | list[int] | None, QUALITY_CLASSES] = None
-    misalignment: Annotated[str | Tables | None, _AXES] = None
-    gear: Annotated[str, choice("pinion", "wheel")] = "wheel"
-    direction: Annotated[str, choice("counterclockwise", "clockwise")] = "counterclockwise"
-    further_crowning: Annotated[str, choice("rule", "least")] = "rule"
-    edge_share: Annotated[float, real(Number(low=0.0, high=1.0, open_low=True))] = 1.0
-    negative_crowning: Annotated[bool, switch()] = False
-    stations: Annotated[int, count(5, 1001)] = 41
-    torques: Annotated[list[float] | None, list_of(positive("N m"))] = None
-    hours: Annotated[list[float] | None, _HOURS] = None
-    speeds: Annotated[list[float] | None, list_of(positive("rpm"))] = None
-    pitting: Annotated[Tables | None, table()] = None
-    bending: Annotated[Tables | None, table()] = None
-    profile: Annotated[Tables | None, table()] = None
+    quality_class: int | list[int] | None = key(QUALITY_CLASSES)
+    misalignment: str | Tables | None = key(_AXES)
+    gear: str = key(choice("pinion", "wheel"), "wheel")
+    direction: str = key(choice("counterclockwise", "clockwise"), "counterclockwise")
+    further_crowning: str = key(choice("rule", "least"), "rule")
+    edge_share: float = key(real(Number(low=0.0, high=1.0, open_low=True)), 1.0)
+    negative_crowning: bool = key(switch(), False)
+    stations: int = key(count(5, 1001), 41)
+    torques: list[float] | None = key(list_of(positive("N m")))
+    hours: list[float] | None = key(_HOURS)
+    speeds: list[float] | None = key(list_of(positive("rpm")))
+    pitting: Tables | None = key(table())
+    bending: Tables | None = key(table())
+    profile: Tables | None = key(table())
 
 
 class ProfileSection(FileTable):
@@ -144,11 +144,11 @@ class ProfileSection(FileTable):
             every support. Without them it has the further crowning alone, as on shafts whose bending is compensated.
     """
 
-    type: Annotated[str, choice("tip_relief", "profile_crowning")] = "tip_relief"
-    pinion_amounts: Annotated[list[float], _AMOUNTS]
-    wheel_amounts: Annotated[list[float] | None, _AMOUNTS] = None
-    slopes: Annotated[list[float] | None, _FURTHER] = None
-    crownings: Annotated[list[float] | None, _FURTHER] = None
-    length: Annotated[float | None, positive("mm")] = None
-    torque_factor: Annotated[float, positive("")] = 0.9
-    shafts: Annotated[bool, switch()] = True
+    type: str = key(choice("tip_relief", "profile_crowning"), "tip_relief")
+    pinion_amounts: list[float] = key(_AMOUNTS, ...)
+    wheel_amounts: list[float] | None = key(_AMOUNTS)
+    slopes: list[float] | None = key(_FURTHER)
+    crownings: list[float] | None = key(_FURTHER)
+    length: float | None = key(positive("mm"))
+    torque_factor: float = key(positive(""), 0.9)
+    shafts: bool = key(switch(), True)

@@ -76,9 +76,9 @@ def _request(design: DesignFile, samples: int | None, most: int | None) -> Sweep
         if "samples" not in _KEYS[section.sampling]:
             problem = f'"{section.sampling}" takes no number of samples from the command line'
             raise DesignFileError("sweep.sampling", problem)
-        section = section.model_copy(update={"samples": samples})
+        section = section.changed(samples=samples)
     if most is not None and section.samples is not None:
-        section = section.model_copy(update={"samples": min(section.samples, most)})
+        section = section.changed(samples=min(section.samples, most))
     results = _results(design, section)
     tolerance = design.tolerance
     load, highest = _load(design, section)

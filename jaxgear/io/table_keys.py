@@ -5,36 +5,99 @@ ones is known to design files by its name in snake case (`TipRelief`: `type = "t
 """
 
 import dataclasses
+import functools
 import inspect
+import operator
 import re
 import types
 import typing
-from functools import cache
-from typing import Annotated, Any
+from collections.abc import Callable
+from typing import Any, ClassVar, Self, TypeVar
 
 import equinox as eqx
-from pydantic import BaseModel, ConfigDict, create_model
 
 from ..numerics import Number, fields_of
-from .value_types import Kind, choice, either, list_of, real, rows_of, switch, table, text
+from .errors import DesignFileError, join, suggestion
+from .value_types import Kind, choice, either, list_of, not_of_kind, real, rows_of, switch, table, text
 
 
-class FileTable(BaseModel):
-    """A table of the file: its fields are the allowed keys."""
+@dataclasses.dataclass(frozen=True)
+class Key:
+    """A key of a table.
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    Attributes:
+        kind: what may stand after it.
+        default: what holds where the file does not have it; `...` where it must.
+        meaning: for the reference; "" for that in the docstring of the table.
+    """
+
+    kind: Kind
+    default: Any = None
+    meaning: str = ""
+
+
+def key(kind: Kind, default: Any = None) -> Any:
+    """Declares a key of a table as an attribute of its class, see `Key`."""
+    return Key(kind, default)
+
+
+class FileTable:
+    """A table of the file: the attributes that `key` declares are the allowed keys.
+
+    Attributes:
+        keys: by their names.
+        source: class of the library, or function, whose fields they are in part; None for none.
+    """
+
+    keys: ClassVar[dict[str, Key]] = {}
+    source: ClassVar[Callable[..., Any] | None] = None
+
+    def __init_subclass__(cls) -> None:
+        own = {name: value for name, value in vars(cls).items() if isinstance(value, Key)}
+        inherited = [vars(base).get("keys", {}) for base in reversed(cls.__mro__[1:])]
+        cls.keys = functools.reduce(operator.or_, [*inherited, own])
+
+    def __init__(self, **given: Any):
+        self._given = given
+        for name, allowed in self.keys.items():
+            if not hasattr(FileTable, name):
+                setattr(self, name, given.get(name, None if allowed.default is ... else allowed.default))
 
     def given(self) -> dict[str, Any]:
         """The keys that the file sets."""
-        return {name: value for name, value in self if name in self.model_fields_set}
+        return {name: self._given[name] for name in self.keys if name in self._given}
 
-    @classmethod
-    def kind(cls, name: str) -> Kind:
-        """What may stand after a key."""
-        return next(item for item in cls.model_fields[name].metadata if isinstance(item, Kind))
+    def changed(self, **values: Any) -> Self:
+        """The same with other values of some keys, as if the file set them."""
+        return type(self)(**{**self._given, **values})
 
 
-@cache
+S = TypeVar("S", bound=FileTable)
+
+
+def decode(key: str, data: Any, section: type[S]) -> S:
+    """A table with the keys of a class; the table's own key is "" at the top level.
+
+    Raises:
+        DesignFileError: for unknown or missing keys, values of a wrong type and numbers out of range.
+    """
+    if not isinstance(data, dict):
+        raise DesignFileError(key, not_of_kind("a table", data))
+    unknown = next((name for name in data if name not in section.keys), None)
+    values = {}
+    for name, allowed in section.keys.items():
+        if name in data:
+            values[name] = allowed.kind.read(join(key, name), data[name])
+        elif allowed.default is ... and unknown is None:  # often it is there, misspelt
+            raise DesignFileError(join(key, name), "missing, this key is required")
+        elif allowed.default is ...:
+            break
+    if unknown is not None:
+        raise DesignFileError(join(key, unknown), f"unknown key, {suggestion(unknown, section.keys)}")
+    return section(**values)
+
+
+@functools.cache
 def section_of(
     cls: type[eqx.Module],
     without: tuple[str, ...] = (),
@@ -60,10 +123,10 @@ def section_of(
         kind = _kind(cls, field, dict(most).get(field.name), open)
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
         if kind is not None:
-            keys[field.name] = (Annotated[Any, kind], ... if needed else None)
+            keys[field.name] = key(kind, ... if needed else None)
         elif needed:
             raise TypeError(f"{cls.__name__}: {field.name} cannot be written in a design file")
-    return create_model(cls.__name__, __base__=FileTable, __doc__=cls.__doc__, **keys)
+    return type(cls.__name__, (FileTable,), {**keys, "source": cls, "__doc__": cls.__doc__})
 
 
 def modules_of(cls: type[eqx.Module]) -> dict[str, type[eqx.Module]]:

@@ -16,9 +16,8 @@ from ..contact import Mesh, Resolution, prepare
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Number, fields_of, real
 from ..shafts import RigidSupport
-from .errors import DesignFileError, check_known, not_known, problem
-from .table_keys import FileTable, family, modules_of, section_of
-from .toml import decode, join
+from .errors import DesignFileError, check_known, join, not_known, problem
+from .table_keys import FileTable, decode, family, modules_of, section_of
 
 # `tip_diameter = 3 mm must be`, `wheel module = 4 mm must be`: what the library says of a field
 _FIELD = re.compile(r"((?P<part>\w+) )?(?P<name>\w+)(( =|:) | (?=has shape ))")
@@ -114,7 +113,7 @@ def part_of(key: str, section: FileTable, cls: type[eqx.Module], *, without: tup
             fields[name] = parse(here, value, modules[name])
         elif name in numbers:
             fields[name] = opened(value, here, numbers[name])
-        elif name in section_of(cls).model_fields:
+        elif name in section_of(cls).keys:
             fields[name] = value
     return Part(cls, fields, key)
 

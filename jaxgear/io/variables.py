@@ -4,14 +4,12 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeVar
 
-from pydantic import BaseModel
-
 from . import schema, template
 from .errors import DesignFileError, suggestion
 from .gears import with_quality
 from .model import FINITE_ELEMENTS
 from .schema import METHODS_WITHOUT_VARIABLES
-from .toml import decode
+from .table_keys import FileTable, decode
 from .value_types import outside
 
 _QUANTITY = re.compile(r"\s*[-+]?[.,]?\d")
@@ -75,7 +73,7 @@ def increasing(key: str, low: float, high: float, unit: str = "") -> None:
         raise DesignFileError(key, f"{high:g}{unit} must be greater than {low:g}{unit}")
 
 
-S = TypeVar("S", bound=BaseModel)
+S = TypeVar("S", bound=FileTable)
 
 
 def optional(name: str, table: schema.Tables | None, section: type[S]) -> S | None:
