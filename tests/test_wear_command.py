@@ -34,7 +34,7 @@ from jaxgear.io import (
     write_worn,
 )
 from jaxgear.io.folder import RESULT_FILES
-from jaxgear.io.requests import tolerance_of
+from jaxgear.io.tolerance import tolerance_of
 from jaxgear.tolerance import deviated_material, sample_deviations
 from jaxgear.wear import March, mean_over_life, over_life, wear, wear_depth, wear_in_steps
 

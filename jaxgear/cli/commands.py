@@ -9,6 +9,7 @@ import numpy as np
 
 from ..geometry import GearPair
 from ..io import DesignFile, DesignFileError, optimize_request
+from ..io.optimize import optimize_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import compile_quickly, program
 from ..sizing import iso_relief
@@ -83,7 +84,7 @@ def import_ahead(*modules: str) -> None:
 
 def rule_based(design: DesignFile) -> AbstractModification:
     """The relief of ISO 6336-1 for both tips."""
-    return _iso_relief(design.pair(), np.asarray(design.torque), np.asarray(design.optimize.application_factor))
+    return _iso_relief(design.pair(), np.asarray(design.torque), np.asarray(optimize_of(design).application_factor))
 
 
 @program

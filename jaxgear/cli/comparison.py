@@ -8,7 +8,7 @@ import jax
 
 from ..contact import Mesh, prepare
 from ..io import DesignFile, OptimizeRequest, optimize_request
-from ..io.schema import METHODS_WITHOUT_VARIABLES
+from ..io.optimize import METHODS_WITHOUT_VARIABLES, optimize_of
 from ..microgeometry import AbstractModification, NoModification
 from ..optimize import Front, Optimum
 from .commands import rule_based
@@ -23,7 +23,7 @@ _POSITIONS, _PAIRS = "positions of the mesh", "pairs of the mesh"  # no names of
 
 def search_of(design: DesignFile, *, quick: bool) -> OptimizeRequest | None:
     """The search that the file asks for; None where its modifications are numbers and it names no method."""
-    if design.bounds or design.optimize.method in METHODS_WITHOUT_VARIABLES:
+    if design.bounds or optimize_of(design).method in METHODS_WITHOUT_VARIABLES:
         return optimize_request(design, quick=quick)
     return None
 
@@ -83,7 +83,7 @@ def sought(
         optimum = found()
         return optimum.mesh, (optimum.pinion, optimum.wheel)
     lowest = design.design({name: low for name, (low, _) in design.bounds.items()})  # with what files hold
-    asked = name, quick, design.says, design.lubricant, design.strength
+    asked = name, quick, design.says, design.tables.get("lubricant"), design.tables.get("strength")
     numbers = Kept(runs_beside(target), _Numbers())((mesh, lowest, asked), lambda: _numbers(found()))
     sizes = dataclasses.replace(mesh.resolution, positions=int(numbers[_POSITIONS]), pairs=int(numbers[_PAIRS]))
     flanks = design.design({name: numbers[name] for name in design.bounds})

@@ -11,7 +11,7 @@ import numpy as np
 from ..contact import Mesh, MeshCycle, Resolution, solve
 from ..contact.kinematics import kinematics
 from ..io import DesignFile, LayoutRequest, layout_request, write_flanks
-from ..io.schema_shafts import ProfileSection
+from ..io.layout import ProfileSection
 from ..layout import (
     FlankLine,
     FlankLineLayout,

@@ -24,9 +24,8 @@ def scattered(
     design: DesignFile, mesh: Mesh, evaluations: Evaluations, tolerance: Tolerance, *, quick: bool
 ) -> dict[str, Evaluation]:
     """The evaluations with their scatter within a tolerance; all designs meet the same gears."""
-    assert design.tolerance is not None
     samples = pairs_of(design, quick=quick)
-    options: dict[str, Any] = {"tolerance": tolerance, "samples": samples, "seed": design.tolerance.seed}
+    options: dict[str, Any] = {"tolerance": tolerance, "samples": samples, "seed": design.tables["tolerance"].seed}
     return {
         name: replace(
             found, scatter=monte_carlo(mesh, design.torque, pinion=found.pinion, wheel=found.wheel, **options)
@@ -37,13 +36,13 @@ def scattered(
 
 def pairs_of(design: DesignFile, *, quick: bool) -> int:
     """How many manufactured pairs a design is judged by."""
-    assert design.tolerance is not None
-    return min(design.tolerance.samples, _QUICK_PAIRS) if quick else design.tolerance.samples
+    samples: int = design.tables["tolerance"].samples
+    return min(samples, _QUICK_PAIRS) if quick else samples
 
 
 def left_out(design: DesignFile, why: str = "") -> str:
     """That an analysis is of nominal gears though the file has tolerances; "" where it has none."""
-    if design.tolerance is None:
+    if "tolerance" not in design.tables:
         return ""
     return "[tolerance] is not part of this analysis, the gears are nominal" + f" ({why})" * bool(why)
 
@@ -112,7 +111,7 @@ def summary(evaluation: Evaluation) -> dict[str, Any]:
 
 def tolerances(design: DesignFile) -> dict[str, Any]:
     """What the table [tolerance] says, as plain data."""
-    return {} if design.tolerance is None else {"tolerances": design.tolerance.given()}
+    return {"tolerances": design.tables["tolerance"].given()} if "tolerance" in design.tables else {}
 
 
 def write_figures(folder: Path, evaluations: Evaluations) -> list[Path]:
@@ -136,7 +135,6 @@ def _pairs(design: DesignFile, scatter: Scatter) -> str:
 
 def pairs_in_words(design: DesignFile, count: int) -> str:
     """How many manufactured pairs of which class."""
-    assert design.tolerance is not None
-    classes = design.tolerance.quality_class
+    classes = design.tables["tolerance"].quality_class
     named = "/".join(map(str, classes)) if isinstance(classes, list) else str(classes)
     return f"{count} manufactured pairs of quality class {named}"

@@ -24,7 +24,7 @@ from ..io import (
     write_summary,
 )
 from ..io.errors import naming
-from ..io.requests import tolerance_of
+from ..io.tolerance import tolerance_of
 from ..microgeometry import AbstractModification
 from ..optimize import (
     Front,

@@ -87,7 +87,7 @@ def evaluate(
     bare = replace(cycles[0], pinion=None, wheel=None, operating_point=running)
     # names and settings, which are arrays: one program serves all oils and strengths
     further = tuple(quantity.name for quantity in quantities_of_tables(file))
-    tables = {"lubricant": file.lubricant, "strength": file.strength}
+    tables = {name: file.tables.get(name) for name in ("lubricant", "strength")}
     metrics, factors = jax.tree.map(lambda value: np.asarray(value).item(), _numbers(bare, further, tables))
     return Evaluation(
         pinion=pinion,

@@ -7,7 +7,7 @@ from pathlib import Path
 from ..contact import OperatingPoint
 from ..io import DesignFile, WearRequest, wear_request, write_worn
 from ..io.errors import naming
-from ..io.requests import tolerance_of
+from ..io.tolerance import tolerance_of
 from ..numerics import optional_real, real
 from ..wear import WearLife, wear_in_steps
 from . import wear_report, wear_scatter

@@ -155,8 +155,8 @@ def _torques(study: WearStudy) -> str:
 
 def _shares(study: WearStudy) -> str:
     """Which shares of the revolutions the torques have."""
-    assert study.design.wear is not None and study.request.settings.loads is not None
-    if study.design.wear.weights is None:
+    assert study.request.settings.loads is not None
+    if study.design.tables["wear"].weights is None:
         return "each for the same share of the revolutions, the default without wear.weights"
     shares = study.request.settings.loads.weights.tolist()
     return "for " + ", ".join(f"{100 * share:.3g}" for share in shares) + " % of the revolutions"

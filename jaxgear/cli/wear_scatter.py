@@ -43,7 +43,7 @@ class Arrays:
 
 def left_out(design: DesignFile) -> str:
     """Why the scatter is not told where the file has tolerances; "" where it is."""
-    if design.wear is None or design.wear.line_load != "dynamic":
+    if "wear" not in design.tables or design.tables["wear"].line_load != "dynamic":
         return ""
     return manufactured.left_out(
         design,
@@ -73,8 +73,7 @@ def scattered(
         kept: what was found before the command was interrupted.
         quick: of few pairs.
     """
-    assert design.tolerance is not None
-    options = {"samples": manufactured.pairs_of(design, quick=quick), "seed": design.tolerance.seed}
+    options = {"samples": manufactured.pairs_of(design, quick=quick), "seed": design.tables["tolerance"].seed}
     cases = conditions("jaxgear wear", mesh, design.torque, tolerance=tolerance, **options).on(mesh)
     assert cases.removed is not None
     names, torque, removed = tuple(asked(settings)), cases.torque[0], cases.removed[0]

@@ -66,6 +66,8 @@ class Dynamics(Checked):
             that hang together with no other, and goes on with the strongest; 2.5, 3 and 3.7 without it or `kick`.
     """
 
+    table = "dynamics"
+
     mesh_frequencies: Float[Array, " speeds"] = number("Hz", low=0.0, open_low=True, shape=("speeds",))
     damping_ratio: Scalar | None = number("", low=0.0, high=1.0, optional=True, default=None)
     damping: Scalar | None = number("N s/um", low=0.0, optional=True, default=None)

@@ -119,13 +119,6 @@ def refused(key: str, make: Callable[..., T], *args, **kwargs) -> T:
         raise DesignFileError(f"{key}.{part}" if part else key, problem(error)) from None
 
 
-def refuse_given(table: str, section: object, keys: Iterable[str], why: str) -> None:
-    """Refuses the keys of a table that have no effect."""
-    for key in keys:
-        if getattr(section, key) not in (None, []):
-            raise DesignFileError(f"{table}.{key}" if table else key, f"has no effect{why}")
-
-
 def check_known(key: str, name: str, names: Collection[str]) -> None:
     """Refuses a name that is none of several."""
     if name not in names:

@@ -7,8 +7,9 @@ from ..metrics import Quantity, quantities
 from ..metrics.settings import WithoutSettings, without_settings
 from ..wear import WEAR_QUANTITIES
 from .design_file import DesignFile
+from .dynamics import dynamics_of
 from .errors import DesignFileError, check_known
-from .requests import _wear_settings, dynamics_of
+from .wear import wear_of
 
 
 def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
@@ -34,7 +35,7 @@ def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
         return dynamic_quantity(design, key, plain)
     if plain in WEAR_QUANTITIES:
         return wear_quantity(design, plain)
-    settings = getattr(design, stands.table)
+    settings = design.tables.get(stands.table)
     return name if settings is None else settings.quantity(plain)
 
 
@@ -44,18 +45,21 @@ def quantities_of_tables(design: DesignFile) -> Iterator[Quantity]:
         stands = without_settings(quantity)
         if stands is None or stands.of is None or _missing(design, stands):
             continue
-        settings = getattr(design, stands.table)
+        settings = design.tables.get(stands.table)
         yield quantity if settings is None else settings.quantity(name)
 
 
 def _missing(design: DesignFile, stands: WithoutSettings) -> str:
     """What a design file lacks for a quantity of one of its tables; "" for nothing."""
-    settings = getattr(design, stands.table)
+    settings = design.tables.get(stands.table)
     if stands.needs == "dynamics":  # which other settings hold, and a file has a table for
-        for known, name in ((settings, f"the table [{stands.table}]"), (design.dynamics, "the table [dynamics]")):
+        for known, name in (
+            (settings, f"the table [{stands.table}]"),
+            (design.tables.get("dynamics"), "the table [dynamics]"),
+        ):
             if known is None:
                 return name
-        speeds = design.wear and design.wear.speeds  # the only such settings that have their own
+        speeds = getattr(design.tables.get("wear"), "speeds", None)  # the only such settings that have their own
         return "" if design.speed is not None or speeds else "load.speed"
     if settings is not None:
         unset = stands.needs is not None and getattr(settings, stands.needs) is None
@@ -74,7 +78,6 @@ def dynamic_quantity(design: DesignFile, key: str, name: str) -> Quantity:
     Raises:
         DesignFileError: without a speed that the quantity needs.
     """
-    assert design.dynamics is not None  # `quantity_named` has looked
     if DYNAMIC_QUANTITIES[name].at_speed and design.speed is None:
         raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{name}" is that of all speeds of [dynamics]')
     return dynamics_of(design).quantity(name)
@@ -82,10 +85,9 @@ def dynamic_quantity(design: DesignFile, key: str, name: str) -> Quantity:
 
 def wear_quantity(design: DesignFile, name: str) -> Quantity:
     """A quantity of worn flanks with the settings of the table [wear], which has what the quantity needs."""
-    section = design.wear
-    assert section is not None  # `quantity_named` has looked
+    section = design.tables["wear"]  # `quantity_named` has looked
     if section.largest_increment is not None and section.blocks is None:
         problem = f'missing, "{name}" needs it: wear.largest_increment is for the lives of `jaxgear wear` alone'
         raise DesignFileError("wear.blocks", problem)
     vibrates = WEAR_QUANTITIES[name].needs == "dynamics" or section.line_load == "dynamic"
-    return _wear_settings(design, vibrates=vibrates).quantity(name)
+    return wear_of(design, vibrates=vibrates).quantity(name)

@@ -13,6 +13,7 @@ from typing import Any
 from ..numerics import Number, fields_of
 from ..tolerance import ToleranceClass
 from .errors import DesignFileError, join, not_known
+from .template import Free
 
 # Magnitudes that an engineer can mean, by unit: (least of a number that must be positive, most). Beyond them the number
 # or its unit is a slip, and arithmetic on it overflows or loses all digits.
@@ -93,7 +94,7 @@ def real(limits: Number = Number(), *, open: bool = False, plausible: bool = Tru
 
     Args:
         limits: unit and range.
-        open: the name of a variable may stand for it.
+        open: the name of a variable may stand for it, which is read as `Free`.
         plausible: it must be of an engineer's range; otherwise that is checked later, once its unit is known.
     """
     words = "a whole number" if limits.whole else "a number"
@@ -103,7 +104,7 @@ def real(limits: Number = Number(), *, open: bool = False, plausible: bool = Tru
         if open and isinstance(value, str) and value:
             if _is_number(value):
                 raise DesignFileError(key, not_of_kind("a number", value))
-            return value
+            return Free(value, key, limits)
         if isinstance(value, bool) or not isinstance(value, int if limits.whole else int | float):
             raise DesignFileError(key, not_of_kind(words, value))
         if problem := outside(limits, value, plausible=plausible):

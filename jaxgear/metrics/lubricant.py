@@ -71,6 +71,8 @@ class Lubricant(Checked):
         scuffing_temperature: contact temperature at which the oil fails, from a test.
     """
 
+    table = "lubricant"
+
     viscosity_40: Scalar = number("mm2/s", low=2.0)
     viscosity_100: Scalar = number("mm2/s", low=2.0)
     temperature: Scalar = number("degC", low=-60.0, high=250.0)

@@ -44,6 +44,8 @@ class Strength(Checked):
         bending_cycles: that `bending` is borne for.
     """
 
+    table = "strength"
+
     pitting: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
     wheel_pitting: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)
     bending: Scalar | None = number("MPa", low=0.0, open_low=True, optional=True, default=None)

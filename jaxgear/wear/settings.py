@@ -38,6 +38,8 @@ class Wear(Checked):
             under which a mesh is looked at.
     """
 
+    table = "wear"
+
     revolutions: Scalar = number("revolutions", low=0.0, open_low=True)
     coefficient: Scalar = number("m2/N", low=0.0, high=LARGEST_COEFFICIENT)
     wheel_coefficient: Scalar | None = number("m2/N", low=0.0, high=LARGEST_COEFFICIENT, optional=True, default=None)
