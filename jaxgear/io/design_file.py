@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..compliance import AbstractCompliance
+from ..conditions import LoadSpectrum
 from ..contact import Mesh, OperatingPoint, Resolution, begin_contact, fewest_pairs, prepare
 from ..geometry import GearPair, Material
 from ..metrics.findings import LIMITS
@@ -210,6 +211,24 @@ class DesignFile:
         if name not in self.tables:
             raise DesignFileError(name, f"missing; {why}")
         return self.tables[name]
+
+    def spectrum(self, section: Any) -> LoadSpectrum:
+        """The load spectrum of a table with torques, weights and, where it knows them, speeds.
+
+        Without torques it is the design torque, without speeds it runs at that of the file.
+
+        Raises:
+            DesignFileError: for weights or speeds that are not of the torques.
+        """
+        if section.torques is None:
+            known = [name for name in ("weights", "speeds") if name in section.keys]
+            section.refuse(known, f" without {section.at}.torques")
+        torques, speeds = section.torques or [self.torque], getattr(section, "speeds", None)
+        run_at = {"speeds": self.speed if speeds is None else speeds, "friction": self.friction}
+        key = f"{section.at}.{'torques' if speeds is None else 'speeds'}"
+        load = refused(key, LoadSpectrum, torques, **run_at)
+        given = section.weights
+        return load if given is None else refused(f"{section.at}.weights", LoadSpectrum, torques, given, **run_at)
 
     def pair(self, parameters: Mapping[str, Any] | None = None) -> GearPair:
         """The gear pair.

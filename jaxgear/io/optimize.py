@@ -27,7 +27,6 @@ from .design_file import DesignFile
 from .errors import DesignFileError, check_known, naming, refused, suggestion
 from .model import FINITE_ELEMENTS
 from .named_quantities import quantity_named
-from .spectra import load_of
 from .table_keys import FileTable, Key, entry, nested, section_of
 from .tables import FurtherTable, Rest
 from .tolerance import tolerance_of
@@ -167,7 +166,7 @@ class OptimizeSection(FurtherTable):
         _objectives(design, self)
         _measure(self)
         _constraints(design, self)
-        load_of(design, self)
+        design.spectrum(self)
 
     def options(self, method: str) -> dict[str, Any]:
         """Those of a method, with the defaults of its keys."""
@@ -278,7 +277,7 @@ class OptimizeRequest:
         if self.method not in METHODS or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
             return None
         kept = {name: value for name, value in self._common.items() if name in ("constraints", "seed")}
-        kept |= {"torque": load_of(self._design, OptimizeSection("optimize")), "positions": None}
+        kept |= {"torque": self._design.spectrum(OptimizeSection("optimize")), "positions": None}
         kept |= {"objective": settings.quantity(_LASTING), "method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE)}
         return dataclasses.replace(self, method=_DEFAULT_METHOD, _common=kept)
 
@@ -350,7 +349,7 @@ def _common(design: DesignFile, section: OptimizeSection, name: str, quick: bool
     """Objective, cases and constraints."""
     found: dict[str, Any] = {
         **_objective(design, section, name),
-        "torque": load_of(design, section),
+        "torque": design.spectrum(section),
         "measure": _measure(section),
         "constraints": _constraints(design, section),
         "seed": section.seed or 0,

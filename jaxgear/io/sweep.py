@@ -15,7 +15,6 @@ from .design_file import DesignFile
 from .errors import DesignFileError, naming, referring, refused
 from .named_quantities import quantity_named
 from .rows import read_variants
-from .spectra import load_of
 from .table_keys import entry
 from .tables import FurtherTable, Rest
 from .tolerance import tolerance_of
@@ -158,7 +157,7 @@ def _load(design: DesignFile, section: SweepSection):
     """The load and the highest torque."""
     variables = {free.key: free.name for free in design.open_case if free.key.startswith("load.")}
     if not variables:
-        load = load_of(design, section)
+        load = design.spectrum(section)
         return load, float(np.max(load.torques))
     key, name = next(iter(variables.items()))
     section.refuse(["torques", "weights"], f', {key} is "{name}"')

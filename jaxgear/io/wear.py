@@ -7,7 +7,6 @@ from ..wear import Wear
 from .design_file import DesignFile
 from .dynamics import dynamics_of
 from .errors import DesignFileError, naming
-from .spectra import spectrum
 from .table_keys import entry, part_of, section_of
 from .tables import FurtherTable
 from .value_types import WEIGHTS, choice, list_of, positive
@@ -91,11 +90,11 @@ def wear_of(design: DesignFile, *, vibrates: bool) -> Wear:
 
 def _loads(design: DesignFile, section: WearSection) -> LoadSpectrum | None:
     """The spectrum of the table; None where it names no torques."""
+    load = design.spectrum(section)
     if section.torques is None:
-        section.refuse(["weights", "speeds"], " without wear.torques")
         return None
     own = ("load.torque", *(["load.speed"] if section.speeds is not None else []))
     for free in design.open_case:
         if free.key.startswith("load.") and free.key not in own:
             raise DesignFileError("wear.torques", f'{free.key} is the variable "{free.name}", which they do not follow')
-    return spectrum(design, "wear", section.torques, section.weights, section.speeds)
+    return load
