@@ -506,6 +506,10 @@ MALFORMED = {
     "key of absurd depth": ("a = 1\n" + "a." * 3000 + "b = 1", "line 2: a key has more than 32 parts between dots"),
     "table of absurd depth": ("[" + '"a" . ' * 40 + "'b']", "line 1: a key has more than 32 parts between dots"),
     "nested absurdly": ("a = " + "[" * 100_000, "tables or lists are nested too deeply"),
+    "bound beyond all numbers": (
+        text(pinion=RELIEF, tail=VARIABLE.replace("high = 20.0", "high = 1" + "0" * 400)),
+        "variables.height.high: a whole number of about 401 digits must be at most 1.79769e+308",
+    ),
     "number beyond all bounds": (text().replace("module = 3.0", "module = 1" + "0" * 400), "pinion.module: "),
     "empty": ("", "pinion: missing, this key is required"),
 }

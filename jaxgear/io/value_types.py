@@ -6,6 +6,7 @@ What is wrong with a value is said in one line, with its full key.
 import dataclasses
 import datetime
 import math
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -36,6 +37,8 @@ def outside(number: Number, value: float, *, plausible: bool = True) -> str:
     if isinstance(value, float) and not math.isfinite(value):
         return f"{value} must be finite"
     shown = f"{_shortened(value)}{unit}"
+    if abs(value) > sys.float_info.max:  # a whole number, which no calculation can take
+        return f"{shown} must be at most {sys.float_info.max:g}"
     low, high = number.low, number.high
     if low is not None and (value <= low if number.open_low else value < low):
         return f"{shown} must be {allowed(number)}"
