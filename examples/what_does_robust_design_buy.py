@@ -30,7 +30,7 @@ def robust_optimum(file, mesh, tolerance, fast=False):
     """As the file asks; in fast mode of half as many gears, and without the search on a finer mesh."""
     if not fast:
         return optimize_request(file)(mesh)
-    asked = file.optimize
+    asked = file.tables["optimize"]
     return jg.minimize(
         file.design,
         file.bounds,
@@ -50,7 +50,7 @@ def study(fast=False):
     file = load_design(FILE)
     # quick: contacts that stay at their nominal places
     mesh = file.mesh(replace(file.resolution(), slide_steps=0)) if fast else file.mesh()
-    tolerance = jg.Tolerance.from_class(mesh.pair, file.tolerance.quality_class).without_lead()
+    tolerance = jg.Tolerance.from_class(mesh.pair, file.tables["tolerance"].quality_class).without_lead()
     nominal = jg.minimize(file.design, file.bounds, mesh=mesh, torque=file.torque)
     robust = robust_optimum(file, mesh, tolerance, fast)
     # reliefs of amount zero: gears without any are judged by the program of the others

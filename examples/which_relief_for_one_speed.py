@@ -41,7 +41,7 @@ RELIEFS = ("none", "static", "dynamic")
 
 def identified(file, mesh):
     """Steps 1 and 2: the dimensionless model of the unmodified pair under the torque of the file."""
-    given = file.dynamics
+    given = file.tables["dynamics"]
     mass = dynamics.equivalent_mass(mesh.pair, (given.pinion_inertia, given.wheel_inertia))
     cycle = jg.solve(mesh, file.torque)
     return dimensionless.from_mesh(
@@ -82,7 +82,7 @@ def optima(found, mesh, omega, fast) -> dict:
 
 def judged(file, mesh, found, relief, frequencies, fast) -> dict:
     """What the contact analysis says of a flank, and the responses that its own mesh force settles to, one per kick."""
-    given, torque = file.dynamics, file.torque
+    given, torque = file.tables["dynamics"], file.torque
     force = dynamics.mesh_force(mesh, torque=torque, pinion=relief, wheel=relief, positions=128 if fast else 512)
     fluctuation = dynamics.Excitation([FLUCTUATION], [0.0], [0.0], [0.0], [1.0])
     oscillator = dynamics.torsional(

@@ -13,7 +13,8 @@ from jaxgear.compliance.edge import cut_off
 from jaxgear.contact import solve_removed
 from jaxgear.contact.kinematics import contacts, corner_gap
 from jaxgear.contact.slide import nothing_removed
-from jaxgear.io.model import resolution_of
+from jaxgear.io.model import ResolutionSection, resolution_of
+from jaxgear.io.table_keys import decode
 
 # Gap [um] of the approach corner when the mate stays, over the distance before A in base pitches, and its parabola.
 TABLE = {
@@ -238,7 +239,8 @@ def test_corner_contact_is_softer_than_the_flank_and_regular(fine):
 def test_without_extended_contact_pairs_carry_load_on_the_path_alone():
     """Nothing else changes: where no corner touches anyway, the transmission error is the same."""
     table = {"positions": 16, "pairs": 2, "slide_steps": 0}
-    sizes = [resolution_of(table | {"extended_contact": on}, [], bent=False) for on in (False, True)]
+    tables = [decode("resolution", table | {"extended_contact": on}, ResolutionSection) for on in (False, True)]
+    sizes = [resolution_of(table, [], bent=False) for table in tables]
     assert sizes[1] == LINE
     meshes = [prepare(gear_pair(), resolution=of) for of in sizes]
     removed = nothing_removed(LINE, meshes[0].path.dtype)

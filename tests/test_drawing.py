@@ -17,7 +17,7 @@ from jaxgear.compliance.toothload import tooth_load
 from jaxgear.geometry import outline, pair_with_backlash
 from jaxgear.geometry.involute import half_tooth_angle
 from jaxgear.io import DesignFileError, load_design
-from jaxgear.io.requests import quality_classes
+from jaxgear.io.tolerance import quality_classes
 from jaxgear.manufacture import drawn_gear, over_balls, span
 
 PINION = {"teeth": 19, "module": 3.0, "face_width": 20.0, "profile_shift": 0.1}
@@ -300,7 +300,7 @@ def test_classes_of_the_gears_are_those_of_tolerance_and_charts(load):
     variables = "[variables]\nx = { low = 0.0, high = 5.0 }\n[sweep]\nsamples = 4\n[tolerance]\n"
     relief = '\n[[wheel.modification]]\ntype = "profile_crowning"\namount = "x"\n'
     design = load(classes.format(6), classes.format(7) + relief, variables)
-    assert design.tolerance.quality_class == [6, 7]
+    assert design.tables["tolerance"].quality_class == [6, 7]
 
 
 SPAN = "span = 23.0\nteeth_spanned = 3"

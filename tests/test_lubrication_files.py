@@ -70,12 +70,12 @@ def test_an_oil_may_stand_in_a_file_of_its_own(load):
     whole = load(PAIR + "[lubricant]\n" + SHEET + "temperature = 80.0\nroughness = 0.5")
     design = load(PAIR + OIL + STRENGTH)
     assert (
-        repr(design.lubricant)
-        == repr(whole.lubricant)
+        repr(design.tables["lubricant"])
+        == repr(whole.tables["lubricant"])
         == repr(jg.metrics.Lubricant(100.0, 11.0, 80.0, 0.5, scuffing_temperature=250.0))
     )
-    assert repr(design.strength) == repr(jg.metrics.Strength(1500.0, bending=900.0))
-    assert load(PAIR).lubricant is None and load(PAIR).strength is None
+    assert repr(design.tables["strength"]) == repr(jg.metrics.Strength(1500.0, bending=900.0))
+    assert load(PAIR).tables == {}
 
 
 def test_tables_bring_the_quantities_that_they_tell_of(load):
@@ -149,8 +149,8 @@ def test_what_is_wrong_in_the_file_of_the_oil_names_that_file(load, tmp_path):
 def test_a_constraint_and_a_column_need_their_table(load):
     design = load(PAIR + OIL + STRENGTH + RELIEF)
     (constraint,) = optimize_request(design)._common["constraints"]
-    assert constraint.quantity == design.lubricant.quantity("scuffing_safety")
-    assert sweep_request(design).results[2] == design.strength.quantity("pinion_root_safety")
+    assert constraint.quantity == design.tables["lubricant"].quantity("scuffing_safety")
+    assert sweep_request(design).results[2] == design.tables["strength"].quantity("pinion_root_safety")
     for text, message in (
         (PAIR + STRENGTH + RELIEF, 'optimize.constraint[0].of: "scuffing_safety" needs the table [lubricant]'),
         (PAIR + OIL + RELIEF.replace("scuffing", "micropitting"), "needs lubricant.permissible_film"),
@@ -170,7 +170,10 @@ def test_a_constraint_and_a_column_need_their_table(load):
 @pytest.mark.slow
 def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, capsys):
     design = load(PAIR + OIL + STRENGTH + RELIEF)
-    numbers = design.lubricant.quantity("scuffing_safety"), design.strength.quantity("pinion_root_safety")
+    numbers = (
+        design.tables["lubricant"].quantity("scuffing_safety"),
+        design.tables["strength"].quantity("pinion_root_safety"),
+    )
     mesh = design.mesh()
 
     of_cycle = eqx.filter_jit(lambda cycle: [quantity(cycle) for quantity in numbers])
@@ -212,7 +215,7 @@ def test_other_oils_and_strengths_are_other_numbers_of_one_program(load, monkeyp
     for temperature in ("80.0", "90.0"):
         design = load(PAIR + OIL.replace("80.0", temperature) + STRENGTH.replace("900.0", f"9{temperature}"))
         further = tuple(quantities_of_tables(design))
-        tables = {"lubricant": design.lubricant, "strength": design.strength}
+        tables = {"lubricant": design.tables["lubricant"], "strength": design.tables["strength"]}
         found, _ = numbers(cycle, tuple(quantity.name for quantity in further), tables)
         each = eqx.filter_jit(lambda cycle, of=further: {quantity.key: quantity(cycle) for quantity in of})(cycle)
         expected = {name: float(value) for name, value in each.items()}
@@ -225,7 +228,7 @@ def test_a_sweep_over_the_speed(load, file, tmp_path):
     variable = RELIEF.replace("[variables]", '[variables]\nn = { low = 500.0, high = 5000.0, unit = "rpm" }')
     text = PAIR.replace("speed = 3000.0", 'speed = "n"') + OIL + STRENGTH + variable
     design = load(text)
-    mesh, quantity = design.mesh(), design.lubricant.quantity("loss_power")
+    mesh, quantity = design.mesh(), design.tables["lubricant"].quantity("loss_power")
     for row in sweep_table(file(text), tmp_path):
         cycle = jg.solve(mesh, OperatingPoint(50.0, row["n"]), pinion=jg.TipRelief(row["amount"], 4.0))
         assert row["loss_power_W"] == pytest.approx(float(quantity(cycle)), rel=1e-9)

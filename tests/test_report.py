@@ -159,7 +159,7 @@ def test_numbers_of_nested_data_keep_their_place():
 
 
 def test_what_nobody_looked_at_is_not_called_usual(tmp_path):
-    design = SimpleNamespace(title="pair", project={}, support=None, resolution=lambda: SimpleNamespace(slices=1))
+    design = SimpleNamespace(title="pair", tables={}, support=None, resolution=lambda: SimpleNamespace(slices=1))
     source = report.Source.of(Path("pair.toml"), b"title = 1\n")
     pair = {name: {"teeth": 19} for name in ("pinion", "wheel", "pair")}
     data = {"versions": {"jaxgear": "1"}, "geometry": pair}

@@ -31,7 +31,7 @@ from jaxgear.io import (
     write_worn,
 )
 from jaxgear.io.folder import RESULT_FILES
-from jaxgear.io.requests import tolerance_of
+from jaxgear.io.tolerance import tolerance_of
 from jaxgear.studies import Checkpoints, NamedArrays, WearResult, wear_scatter
 from jaxgear.studies.checkpoints import Marches
 from jaxgear.studies.comparison import compared, sought
@@ -354,7 +354,7 @@ def scatter(design, flanks, kept):
     """Lives of the manufactured pairs of a file, with reliefs of one height."""
     mesh, settings = design.mesh(), wear_request(design).settings
     designs = {"relieved": (relief(flanks), relief(flanks))}
-    options = {"samples": design.tolerance.samples, "seed": design.tolerance.seed, "keep": kept}
+    options = {"samples": design.tables["tolerance"].samples, "seed": design.tables["tolerance"].seed, "keep": kept}
     found = wear_scatter.manufactured_wear(settings, mesh, 150.0, designs, tolerance_of(design), **options)
     return mesh, found["relieved"]
 

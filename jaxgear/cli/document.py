@@ -171,7 +171,8 @@ def document(command: Sequence[str] | None, file: Path, *libraries: str) -> Docu
 
 def project_facts(design: DesignFile) -> list[tuple[str, str]]:
     """Whose gears these are."""
-    return [(_PROJECT.get(name, name), said) for name, said in design.project.items()]
+    given = design.tables["project"].given() if "project" in design.tables else {}
+    return [(_PROJECT.get(name, name), said) for name, said in given.items()]
 
 
 def _gears(data: Mapping[str, Any]) -> list[Table]:

@@ -1,21 +1,20 @@
 """Files: design files (TOML) in, results (JSON, CSV) out, gear pairs exchanged with other programs (REXS)."""
 
 from .design_file import DesignFile as DesignFile
+from .design_file import load_design as load_design
+from .dynamics import DynamicsRequest as DynamicsRequest
+from .dynamics import dynamics_request as dynamics_request
 from .errors import DesignFileError as DesignFileError
 from .flanks import read_flank as read_flank
 from .folder import result_folder as result_folder
 from .folder import writing as writing
-from .layout_request import LayoutRequest as LayoutRequest
-from .layout_request import layout_request as layout_request
-from .load import load_design as load_design
-from .optimize_request import OptimizeRequest as OptimizeRequest
-from .optimize_request import optimize_request as optimize_request
+from .layout import LayoutRequest as LayoutRequest
+from .layout import layout_request as layout_request
+from .named_quantities import quantities_of_tables as quantities_of_tables
+from .optimize import OptimizeRequest as OptimizeRequest
+from .optimize import optimize_request as optimize_request
+from .rating import LubricantSection as LubricantSection
 from .reference import reference as reference
-from .requests import DynamicsRequest as DynamicsRequest
-from .requests import WearRequest as WearRequest
-from .requests import dynamics_request as dynamics_request
-from .requests import quantities_of_tables as quantities_of_tables
-from .requests import wear_request as wear_request
 from .results import describe as describe
 from .results import flank_rows as flank_rows
 from .results import write_flanks as write_flanks
@@ -28,8 +27,10 @@ from .rexs import RexsPair as RexsPair
 from .rexs import read_rexs as read_rexs
 from .rexs import write_rexs as write_rexs
 from .rows import read_variants as read_variants
-from .sweep_request import SweepRequest as SweepRequest
-from .sweep_request import sweep_request as sweep_request
+from .sweep import SweepRequest as SweepRequest
+from .sweep import sweep_request as sweep_request
+from .wear import WearRequest as WearRequest
+from .wear import wear_request as wear_request
 from .worn import read_worn as read_worn
 from .worn import write_worn as write_worn
 from .write_design import write_design as write_design

@@ -4,29 +4,42 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..compliance import AbstractCompliance
+from ..conditions import LoadSpectrum
 from ..contact import Mesh, OperatingPoint, Resolution, begin_contact, fewest_pairs, prepare
-from ..geometry import GearPair
-from ..metrics import Lubricant, Strength
+from ..geometry import GearPair, Material
 from ..metrics.findings import LIMITS
+from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from ..sizing import iso_stiffness
-from . import gearbox, rating, schema, schema_shafts, template, variables
+from . import gearbox
 from .errors import DesignFileError, naming, printable, refused
 from .flanks import check_files
-from .gearbox import layout_of, support_of
-from .gears import both_classes, drawing_of, gear_of, materials_of, pair_of, quality_of
-from .model import model_part, resolution_of, with_tables
-from .schema import OptimizeSection
-from .template import FileDesign, FileMesh
-from .toml import decode, read
-from .variables import read_variables
+from .gears import (
+    GearSection,
+    PairSection,
+    both_classes,
+    drawing_of,
+    flank_of,
+    gear_part,
+    materials_of,
+    pair_of,
+    quality_of,
+)
+from .model import ModelSection, ResolutionSection, model_part, resolution_of, with_tables
+from .table_keys import FileTable, Key, decode, described, entry, nested, part_of, section_of, summary
+from .tables import FurtherTable, LoadSection, Rest, further_tables
+from .template import Free, Part, build
+from .toml import read
+from .value_types import list_of, table, text
+from .variables import VariableSection, increasing, read_variables
 
 # Tooth pairs are carried along up to this many times the deflection of a single pair after ISO 6336-1.
 _DEFLECTIONS = 2.0
@@ -38,6 +51,114 @@ _OPEN_PAIRS = 4
 _TORQUE_RANGE = (0.5, 2.0)
 
 
+_MISALIGNMENT = section_of(Misalignment)
+
+
+class FileSection(FileTable):
+    """The tables of a file, and its title.
+
+    Attributes:
+        pinion: the driving gear.
+        wheel: the driven gear.
+        load: torque and speed.
+        title: free text; the name of the file without it.
+        materials: of gears and shafts, by names of the file's own; "STEEL" is known without it.
+        pair: how the gears are mounted.
+        model: the stiffness model; the library's default without it.
+        misalignment: of the axes; parallel ones without it.
+        resolution: array sizes; the library's defaults without it.
+        variables: numbers left open, with their bounds.
+        shafts: that carry the gears, for `jaxgear layout`.
+        meshes: of their gears; that of pinion and wheel alone without it.
+        housing: that holds their bearings; rigid seats without it.
+    """
+
+    pinion: GearSection = entry(nested(GearSection), ...)
+    wheel: GearSection = entry(nested(GearSection), ...)
+    load: LoadSection = entry(nested(LoadSection), ...)
+    title: str | None = entry(text())
+    materials: dict[str, Part] | None = entry(table(described(Material)))
+    pair: PairSection = entry(nested(PairSection), PairSection("pair"))
+    model: ModelSection = entry(nested(ModelSection), ModelSection("model"))
+    misalignment: FileTable = entry(nested(_MISALIGNMENT), _MISALIGNMENT("misalignment"))
+    resolution: FileTable = entry(nested(ResolutionSection), ResolutionSection("resolution"))
+    variables: dict[str, VariableSection] = entry(table(nested(VariableSection)), {})
+    shafts: list[gearbox.ShaftSection] = entry(list_of(nested(gearbox.ShaftSection), empty=True), [])
+    meshes: list[gearbox.MeshSection] = entry(list_of(nested(gearbox.MeshSection), empty=True), [])
+    housing: gearbox.HousingSection | None = entry(nested(gearbox.HousingSection))
+
+
+def file_section(further: Mapping[str, type[FurtherTable]]) -> type[FileSection]:
+    """The keys of a whole file with further tables."""
+    texts = {name: summary(cls) for name, cls in further.items()}
+    keys = {name: Key(table(), meaning=text[:1].lower() + text[1:]) for name, text in texts.items()}
+    return type("FileSection", (FileSection,), {**keys, "__doc__": FileSection.__doc__})
+
+
+class FileDesign(eqx.Module):
+    """The flanks of a design file as a function of its free parameters; pure and traceable.
+
+    Attributes:
+        names: of the parameters.
+        pinion, wheel: the modifications, which are added up.
+    """
+
+    names: tuple[str, ...] = eqx.field(static=True)
+    pinion: list[Part]
+    wheel: list[Part]
+
+    def __call__(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
+        """Modifications of pinion and wheel.
+
+        Args:
+            parameters: value of every free parameter, scalar.
+        """
+        if set(parameters) != set(self.names):
+            raise ValueError(
+                f"design: parameters {', '.join(sorted(parameters)) or '(none)'} must be those of the file: "
+                f"{', '.join(sorted(self.names)) or '(none)'}"
+            )
+        return build(self.pinion, parameters), build(self.wheel, parameters)
+
+
+class MeshParts(NamedTuple):
+    """What a mesh is prepared of.
+
+    Attributes:
+        pair: gear pair.
+        compliance: stiffness model.
+        support: misaligned axes; None for parallel ones.
+    """
+
+    pair: GearPair
+    compliance: AbstractCompliance
+    support: RigidSupport | None
+
+
+class FileMesh(eqx.Module):
+    """The prepared mesh of a design file as a function of its free parameters; pure and traceable."""
+
+    pair: Part
+    model: Part
+    misalignment: Part
+    resolution: Resolution
+
+    def free(self) -> list[Free]:
+        """Every open number."""
+        return [*self.pair.free(), *self.model.free(), *self.misalignment.free()]
+
+    def parts(self, parameters: Mapping[str, Any]) -> MeshParts:
+        """What it is prepared of."""
+        pair, compliance = self.pair.build(parameters), self.model.build(parameters)
+        axes = RigidSupport(pair, self.misalignment.build(parameters)) if self.misalignment.fields else None
+        return MeshParts(pair, compliance, axes)
+
+    def __call__(self, parameters: Mapping[str, Any]) -> Mesh:
+        """The mesh."""
+        parts = self.parts(parameters)
+        return prepare(parts.pair, compliance=parts.compliance, resolution=self.resolution, support=parts.support)
+
+
 @dataclass(frozen=True)
 class DesignFile:
     """A design file, checked: what it says is physically possible.
@@ -46,61 +167,68 @@ class DesignFile:
         path: the file.
         says: all that it held when it was read, as one text.
         title: free text, the file's stem if it has none.
-        project: what the table of that name says, by its keys.
         torque: design torque on the pinion [N m]; the middle of its bounds where it is a variable.
         torque_range: lowest and highest torque of interest [N m].
         speed: of the pinion [rpm], None if the file names none; the middle of its bounds where it is a variable.
         friction: mean coefficient of friction; None for the library's default.
         quality_classes: flank tolerance classes of pinion and wheel, of the gears or of [tolerance]; None without.
+        drawn: of pinion and wheel, what the file gives as name of the material and as measures of the tooth thickness.
         bounds: (low, high) of every free parameter, in its unit.
         units: unit of every free parameter, "" for a pure number.
-        drawn: of pinion and wheel, what the file gives as name of the material and as measures of the tooth thickness.
         values: of the free parameters that name one, which `jaxgear analyze` takes.
-        optimize: the table of that name; `optimize_request` makes sense of it.
-        sweep: the table of that name, None if the file has none; `sweep_request` makes sense of it.
-        tolerance: likewise, see `sweep_request`.
-        dynamics: likewise, see `dynamics_request`.
-        wear: likewise, see `wear_request`.
-        lubricant: the oil; None if the file has none.
-        strength: permissible stresses of both gears; None if the file has none.
-        layout: likewise, see `layout_request`.
-        support: the mesh on its shafts; None without them.
-        design: makes the modifications of pinion and wheel from the free parameters.
         open_case: numbers of gears, pair, model, misalignment and load that are variables; a sweep alone can vary them.
+        design: makes the modifications of pinion and wheel from the free parameters.
+        support: the mesh on its shafts; None without them.
+        tables: the further tables that the file has, by their names: an object of the class of each, see `io.tables`.
     """
 
     path: Path
     says: str
     title: str
-    project: dict[str, str]
     torque: float
     torque_range: tuple[float, float]
     speed: float | None
     friction: float | None
     quality_classes: tuple[int, int] | None
+    drawn: dict[str, dict[str, Any]]
     bounds: dict[str, tuple[float, float]]
     units: dict[str, str]
-    drawn: dict[str, dict[str, Any]]
     values: dict[str, float]
-    optimize: OptimizeSection
-    sweep: schema.SweepSection | None
-    tolerance: schema.ToleranceSection | None
-    dynamics: schema.DynamicsSection | None
-    wear: schema.WearSection | None
-    lubricant: Lubricant | None
-    strength: Strength | None
-    layout: schema_shafts.LayoutSection | None
-    support: ShaftSupport | None
+    open_case: tuple[Free, ...]
     design: FileDesign
-    open_case: tuple[template.Free, ...]
-    _pair: template.Part
-    _middle: GearPair
-    _model: template.Part
-    _compliance: AbstractCompliance
-    _misalignment: template.Part
-    _support: RigidSupport | None
-    _load: template.Part
-    _resolution: Resolution
+    support: ShaftSupport | None
+    tables: dict[str, Any]
+    _load: Part
+    _mesh: FileMesh
+    _middle: MeshParts
+
+    def needed(self, name: str, why: str) -> Any:
+        """A further table, of which a command says why it needs it.
+
+        Raises:
+            DesignFileError: where the file does not have it.
+        """
+        if name not in self.tables:
+            raise DesignFileError(name, f"missing; {why}")
+        return self.tables[name]
+
+    def spectrum(self, section: Any) -> LoadSpectrum:
+        """The load spectrum of a table with torques, weights and, where it knows them, speeds.
+
+        Without torques it is the design torque, without speeds it runs at that of the file.
+
+        Raises:
+            DesignFileError: for weights or speeds that are not of the torques.
+        """
+        if section.torques is None:
+            known = [name for name in ("weights", "speeds") if name in section.keys]
+            section.refuse(known, f" without {section.at}.torques")
+        torques, speeds = section.torques or [self.torque], getattr(section, "speeds", None)
+        run_at = {"speeds": self.speed if speeds is None else speeds, "friction": self.friction}
+        key = f"{section.at}.{'torques' if speeds is None else 'speeds'}"
+        load = refused(key, LoadSpectrum, torques, **run_at)
+        given = section.weights
+        return load if given is None else refused(f"{section.at}.weights", LoadSpectrum, torques, given, **run_at)
 
     def pair(self, parameters: Mapping[str, Any] | None = None) -> GearPair:
         """The gear pair.
@@ -108,7 +236,7 @@ class DesignFile:
         Args:
             parameters: value of every free parameter, they may be tracers; None for the middle of their bounds.
         """
-        return self._middle if parameters is None else self._pair.build(parameters)
+        return self._middle.pair if parameters is None else self._mesh.pair.build(parameters)
 
     def resolution(self, torque: float | None = None) -> Resolution:
         """The array sizes that the file asks for, with as few tooth pairs as the load needs where it names none.
@@ -120,44 +248,40 @@ class DesignFile:
         Raises:
             DesignFileError: when no number of pairs is enough, because of a torque or modulus in another unit.
         """
-        if self._resolution.pairs is not None:
-            return self._resolution
+        if self._mesh.resolution.pairs is not None:
+            return self._mesh.resolution
         torque = max(self.torque, self.torque_range[1]) if torque is None else torque
-        torque = max([torque, *((self.wear and self.wear.torques) or ())])
-        times = _DEFLECTIONS if self.dynamics is None else _DYNAMIC_DEFLECTIONS
-        deflection = times * float(_single_deflection(self._middle, np.asarray(torque)))
+        torque = max([torque, *(("wear" in self.tables and self.tables["wear"].torques) or ())])
+        pair, times = self._middle.pair, _DYNAMIC_DEFLECTIONS if "dynamics" in self.tables else _DEFLECTIONS
+        deflection = times * float(_single_deflection(pair, np.asarray(torque)))
         try:
-            pairs = fewest_pairs(self._middle, deflection=deflection)
+            pairs = fewest_pairs(pair, deflection=deflection)
         except ValueError:
-            given = f"deflects a pair of teeth of module {float(self._middle.pinion.module):g} mm by"
+            given = f"deflects a pair of teeth of module {float(pair.pinion.module):g} mm by"
             given = f"{torque:g} N m {given} {deflection / times:.3g} um"
-            for name, gear in (("pinion", self._middle.pinion), ("wheel", self._middle.wheel)):
+            for name, gear in (("pinion", pair.pinion), ("wheel", pair.wheel)):
                 modulus, usual = float(gear.material.elastic_modulus), LIMITS["elastic modulus"]
                 if modulus < usual.low:
-                    material = self._pair.fields[name].fields["material"]
+                    material = self._mesh.pair.fields[name].fields["material"]
                     problem = f"{modulus:g} MPa is less than {usual.low:g} MPa ({usual.remark}), and {given}"
                     raise DesignFileError(f"{material.key}.elastic_modulus", problem, self.path) from None
             problem = f"{given}: give the torque in N m"
             raise DesignFileError("load.torque", problem, self.path) from None
-        if self._pair.free():  # other variants can have a larger contact ratio
+        if self._mesh.pair.free():  # other variants can have a larger contact ratio
             pairs = max(pairs, _OPEN_PAIRS)
-        return replace(self._resolution, pairs=pairs)
+        return replace(self._mesh.resolution, pairs=pairs)
 
     @property
     def left_out(self) -> str:
         """What of shafts, bearings and housing `mesh` lacks and why, in words; "" for nothing."""
         if self.support is None:
             return ""
-        vibrates = self.dynamics is not None
-        return gearbox.left_out(self.support, self._resolution, open_gears=self._open_gears, vibrates=vibrates)
+        options = {"open_gears": bool(self._mesh.free()), "vibrates": "dynamics" in self.tables}
+        return gearbox.left_out(self.support, self._mesh.resolution, **options)
 
-    @property
-    def _open_gears(self) -> bool:
-        return any(part.free() for part in (self._pair, self._model, self._misalignment))
-
-    def _held(self, sizes: Resolution) -> AbstractSupport | None:
+    def _support(self, sizes: Resolution) -> AbstractSupport | None:
         if self.support is None or self.left_out:
-            return self._support
+            return self._middle.support
         return gearbox.over_slices(self.support, sizes)
 
     def mesh(
@@ -176,20 +300,18 @@ class DesignFile:
         """
         sizes = resolution or self.resolution()
         if support is None:
-            support = self._support if rigid else self._held(sizes)
-        options = {"compliance": self._compliance, "resolution": sizes, "support": support}
+            support = self._middle.support if rigid else self._support(sizes)
+        options = {"compliance": self._middle.compliance, "resolution": sizes, "support": support}
         with naming(self.path):
-            return refused("resolution", prepare, self._middle, **options)
+            return refused("resolution", prepare, self._middle.pair, **options)
 
     def begin_contact(self, first: Resolution, resolution: Resolution) -> None:
         """Starts to compile what prepares and solves the mesh, see `contact.begin_contact`."""
-        begin_contact(self._middle, self._compliance, first, resolution, self._held(first))
+        begin_contact(self._middle.pair, self._middle.compliance, first, resolution, self._support(first))
 
     def sweep_mesh(self, resolution: Resolution) -> Mesh | Callable[[Mapping[str, Any]], Mesh]:
         """The prepared mesh; a function of the parameters that prepares it where numbers of the gears are free."""
-        if not self._open_gears:
-            return self.mesh(resolution)
-        return FileMesh(self._pair, self._model, self._misalignment, resolution)
+        return replace(self._mesh, resolution=resolution) if self._mesh.free() else self.mesh(resolution)
 
     def operating_point(self, parameters: Mapping[str, Any]) -> OperatingPoint:
         """Torque, speed and friction; pure and traceable.
@@ -207,90 +329,91 @@ def _single_deflection(pair: GearPair, torque) -> Float[Array, ""]:
     return line_load / iso_stiffness(pair, line_load).single
 
 
-def read_design(file: Path) -> DesignFile:
-    """Reads a design file and checks all but what only the tables of its commands say, see `load_design`.
+def load_design(path: str | Path) -> DesignFile:
+    """Reads and checks a design file, the tables of all commands included.
+
+    Left to the commands is what their options can change (the method of a search, the number of variants), files of
+    variants, and which numbers may be variables.
+
+    Args:
+        path: TOML file; examples/spur_19_48.toml shows and lists what it can say.
 
     Raises:
         DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
     """
+    file = Path(path)
     with naming(file):
-        says = read(file)
-        return _checked(file, json.dumps(says, sort_keys=True, default=str), decode("", says, schema.FileSection))
+        design = _read(file, read(file))
+        for each in design.tables.values():
+            if isinstance(each, FurtherTable):
+                each.check(design)
+    return design
 
 
-def _checked(file: Path, says: str, top: schema.FileSection) -> DesignFile:
-    materials = materials_of(top)
-    (pinion_says, pinion, pinion_flank), (wheel_says, wheel, wheel_flank) = (
-        gear_of(name, getattr(top, name), materials, file.parent) for name in ("pinion", "wheel")
-    )
-    flanks = [*pinion_flank, *wheel_flank]
-    pair, quality = pair_of(top, pinion, wheel), quality_of(pinion_says, wheel_says)
-    load = variables.load_of(top.load)
-    operating_point = template.part_of("load", load, OperatingPoint)
-    stiffness = decode("model", top.model or {}, schema.ModelSection)
-    model = model_part(stiffness)
-    optimize = variables.optimize_of(top, stiffness)
-    axes = template.part_of(
-        "misalignment", decode("misalignment", top.misalignment or {}, schema.MisalignmentSection), Misalignment
-    )
-    open_case = [*pair.free(), *model.free(), *axes.free(), *operating_point.free()]
-    open_flanks = [free for part in flanks for free in part.free()]
-    both = {"pinion": pinion_says, "wheel": wheel_says}
-    empty = [f"{name}.modification" for name, says_of in both.items() if says_of.given().get("modification") == []]
-    bounds, units, values = read_variables(top.variables or {}, [*open_flanks, *open_case], empty)
-    ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
+def _read(file: Path, says: dict[str, Any]) -> DesignFile:
+    further = {name: cls for name, cls in further_tables().items() if name not in FileSection.keys}
+    top = decode("", says, file_section(further))
+    folder, load = file.parent, top.load
+    if load.torque_range is not None:
+        increasing("load.torque_range[1]", load.torque_range[0], load.torque_range[1], unit=" N m")
+    materials = materials_of(top.materials)
+    sections = {"pinion": top.pinion, "wheel": top.wheel}
+    flanks = {name: flank_of(section, folder) for name, section in sections.items()}
+    pair = pair_of(top.pair, *(gear_part(section, materials) for section in sections.values()))
+    axes, point = part_of(top.misalignment, Misalignment), part_of(load, OperatingPoint)
+    model = model_part(top.model)
+    open_case = [*pair.free(), *model.free(), *axes.free(), *point.free()]
+    modifications = [*flanks["pinion"], *flanks["wheel"]]
+    empty = [f"{name}.modification" for name, section in sections.items() if section.given().get("modification") == []]
+    open_flanks = [free for part in modifications for free in part.free()]
+    bounds, units, values = read_variables(top.variables, [*open_flanks, *open_case], empty)
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
-    usual_pair = pair.build(middle)
+    usual_pair, usual = pair.build(middle), point.build(middle)
     if not pair.free():
-        check_files({"pinion": pinion_flank, "wheel": wheel_flank}, usual_pair)
-    built = {part.key: [part.build(end) for end in ends] for part in flanks}
-    built[axes.key] = [axes.build(end) for end in ends]
-    uneven = [key for key, both in built.items() if any(one.varies_along_face for one in both)]
+        check_files(flanks, usual_pair)
+    ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
+    uneven = [part.key for part in (*modifications, axes) if any(part.build(end).varies_along_face for end in ends)]
     if axes.key not in uneven:  # zeros are parallel axes
         axes = replace(axes, fields={})
-    usual = operating_point.build(middle)
-    torque = float(usual.torque)
-    tolerance, sweep = variables.tolerance_of(top, quality), variables.sweep_of(top)
+    torque, quality = float(usual.torque), quality_of(top.pinion, top.wheel)
+    rest = Rest(folder, list(says), load, top.model, bounds, quality)
+    tables = {name: cls.read(says[name], rest) for name, cls in further.items() if name in says}
+    layout, support = tables.get("layout"), None
+    if layout is None:
+        top.refuse(["shafts", "meshes", "housing"], " without [layout]")
+    else:
+        if axes.fields:
+            raise DesignFileError("misalignment", "has no effect with [layout], which takes that of [[meshes]]")
+        if layout.profile is not None:
+            uneven.append("the flank lines of layout.profile")
+        if not top.shafts:
+            raise DesignFileError("layout", "has no effect without [[shafts]]")
+        options: dict[str, Any] = {"torque": torque, "folder": folder, "materials": materials}
+        shafts = usual_pair, top.shafts, top.meshes, top.housing
+        support = gearbox.support_of(*shafts, direction=layout.direction, **options)
+    sizes = resolution_of(top.resolution, uneven, bent=layout is not None and len(top.meshes) < 2)
+    model = with_tables(model, top.model, folder, pair, usual_pair)  # last, as it takes longer than all the rest
+    mesh = FileMesh(pair, model, axes, sizes)
+    classes = tables["tolerance"].quality_class if "tolerance" in tables else quality
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
-    layout = layout_of(top.layout, quality)
-    if layout is not None and axes.fields:
-        raise DesignFileError("misalignment", "has no effect with [layout], which takes that of [[meshes]]")
-    if layout is not None and layout.profile is not None:
-        uneven.append("the flank lines of layout.profile")
-    resolution = resolution_of(top.resolution or {}, uneven, bent=layout is not None and len(top.meshes) < 2)
-    model = with_tables(model, stiffness, file.parent, pair, usual_pair)  # last, as it takes longer than all the rest
-    classes = quality if tolerance is None else tolerance.quality_class
     return DesignFile(
         path=file,
-        says=says,
+        says=json.dumps(says, sort_keys=True, default=str),
         title=top.title or printable(file.stem),
-        project=decode("project", top.project or {}, schema.ProjectSection).given(),
         torque=torque,
         torque_range=(low, high),
         speed=None if usual.speed is None else float(usual.speed),
         friction=None if usual.friction is None else float(usual.friction),
         quality_classes=None if classes is None else both_classes(classes),
+        drawn={name: drawing_of(section) for name, section in sections.items()},
         bounds=bounds,
         units=units,
-        drawn={"pinion": drawing_of(pinion_says), "wheel": drawing_of(wheel_says)},
         values=values,
-        optimize=optimize,
-        sweep=sweep,
-        tolerance=tolerance,
-        dynamics=variables.optional("dynamics", top.dynamics, schema.DynamicsSection),
-        wear=variables.optional("wear", top.wear, schema.WearSection),
-        lubricant=rating.lubricant_of(top.lubricant, load, bounds, file.parent),
-        strength=rating.strength_of(top.strength, file.parent),
-        layout=layout,
-        support=support_of(top, layout, usual_pair, torque, file.parent, materials),
-        design=FileDesign(tuple(bounds), pinion_flank, wheel_flank),
         open_case=tuple(open_case),
-        _pair=pair,
-        _middle=usual_pair,
-        _model=model,
-        _compliance=model.build(middle),
-        _misalignment=axes,
-        _support=RigidSupport(usual_pair, axes.build(middle)) if axes.fields else None,
-        _load=operating_point,
-        _resolution=resolution,
+        design=FileDesign(tuple(bounds), flanks["pinion"], flanks["wheel"]),
+        support=support,
+        tables=tables,
+        _load=point,
+        _mesh=mesh,
+        _middle=mesh.parts(middle),
     )

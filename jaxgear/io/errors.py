@@ -89,6 +89,11 @@ def referring(key: str, name: str) -> Iterator[None]:
         raise DesignFileError(key, ": ".join(part for part in parts if part)) from None
 
 
+def join(key: str, name: str) -> str:
+    """Dotted key."""
+    return f"{key}.{name}" if key and name else key or name
+
+
 def check_file(path: Path) -> None:
     """Refuses what is no regular file: a pipe or a device may never come to its end.
 
@@ -112,13 +117,6 @@ def refused(key: str, make: Callable[..., T], *args, **kwargs) -> T:
     except (ValueError, OverflowError) as error:
         part = getattr(error, "part", "")
         raise DesignFileError(f"{key}.{part}" if part else key, problem(error)) from None
-
-
-def refuse_given(table: str, section: object, keys: Iterable[str], why: str) -> None:
-    """Refuses the keys of a table that have no effect."""
-    for key in keys:
-        if getattr(section, key) not in (None, []):
-            raise DesignFileError(f"{table}.{key}" if table else key, f"has no effect{why}")
 
 
 def check_known(key: str, name: str, names: Collection[str]) -> None:

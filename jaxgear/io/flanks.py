@@ -18,12 +18,14 @@ from ..contact import Side
 from ..geometry import Gear, GearPair, path_of_contact
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
 from ..microgeometry.base import AMOUNTS
-from ..numerics import check, real
-from . import schema, template
+from ..numerics import Number, check, real
+from . import template
 from .errors import DesignFileError, naming, referring
 from .results import MEASURED
 from .rows import Rows, read_rows
-from .toml import decode
+from .table_keys import FileTable, entry
+from .value_types import choice, text
+from .value_types import real as real_kind
 
 # Shares of the active profile or of the face. A trace may run over the edges by so much, which also covers the
 # tolerance of the tip diameter; and it may leave out four times what ISO 1328-1 leaves out of the evaluation.
@@ -157,20 +159,37 @@ def read_flank(
         return flank
 
 
-def flank_part(key: str, table: Mapping[str, Any], folder: Path) -> template.Part:
+class FlankFileSection(FileTable):
+    """A flank from a file, measured, computed or worn: points on a grid of roll_length_mm and, where it varies over the
+    face, face_coordinate_mm, with measured_um (excess material), modification_um or wear_depth_um (material removed).
+
+    Attributes:
+        file: CSV or Parquet file, beside the design file.
+        gear: of a file with flanks of both gears; the one that the table stands at where the key is left out.
+        design: of a file with several designs.
+        revolutions: of the pinion, of a file with several lives.
+        method: of interpolation along the profile.
+    """
+
+    file: str = entry(text(), ...)
+    gear: str | None = entry(choice("pinion", "wheel"))
+    design: str | None = entry(text())
+    revolutions: float | None = entry(real_kind(Number("", low=0.0)))
+    method: str = entry(choice("linear", "natural_cubic", "monotonic"), "linear")
+
+
+def flank_part(section: FlankFileSection, folder: Path) -> template.Part:
     """The modification of a gear that a table of a design file takes from a file in the folder."""
-    given = {name: value for name, value in table.items() if name != "type"}
-    section = decode(key, given, schema.FlankFileSection)
     path = folder / section.file
-    with referring(f"{key}.file", path.name):
+    with referring(f"{section.at}.file", path.name):
         rows = read_rows(path)
         gear = section.gear
         if gear is None and _GEAR in rows[0]:
-            gear = key.partition(".")[0]
+            gear = section.at.partition(".")[0]
         method: Any = section.method
         rows = _at_life(_chosen(rows, {_GEAR: gear, "design": section.design}), section.revolutions)
         flank, reach = _table(rows, None, method)
-    return template.Part(_FromFile(path.name, reach), {"flank": flank}, key)
+    return template.Part(_FromFile(path.name, reach), {"flank": flank}, section.at)
 
 
 def check_files(parts: Mapping[str, Sequence[template.Part]], pair: GearPair) -> None:

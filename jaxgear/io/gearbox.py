@@ -28,13 +28,81 @@ from ..shafts import (
     support,
 )
 from ..shafts import Section as ShaftPart
-from . import schema_shafts as schema
-from .errors import DesignFileError, check_file, referring, refuse_given, refused
-from .gears import Materials, fixed_gear, fixed_material, with_quality
-from .schema import FileSection
-from .table_keys import section_of
-from .template import part_of
-from .toml import decode
+from .errors import DesignFileError, check_file, referring, refused
+from .gears import MATERIAL, GearSection, Materials, fixed_gear, fixed_material
+from .table_keys import FileTable, built, decode, entry, nested, section_of
+from .template import Part
+from .value_types import Kind, list_of, switch, table, text
+
+
+def _bearing(key: str, value: Any) -> FileTable:
+    return decode(key, value, _MATRIX_BEARING if "stiffness" in table().read(key, value) else _BEARING)
+
+
+_PART, _COUPLING, _LOAD = (section_of(cls, open=False) for cls in (ShaftPart, Coupling, ShaftLoad))
+_BEARING, _MATRIX_BEARING = section_of(Bearing, open=False), section_of(MatrixBearing, open=False)
+_MISALIGNMENT = section_of(Misalignment, open=False)
+
+
+class MountedGearSection(section_of(MountedGear, ("name", "gear"), open=False)):  # type: ignore[misc]
+    """A gear on a shaft.
+
+    Attributes:
+        name: "pinion" or "wheel" for those of the file, another name for another gear.
+        gear: of another name, the keys of [pinion]; its modifications have no part in a layout.
+        integral: whether it is cut into the shaft, which its teeth stiffen; in place of `body_diameter`.
+    """
+
+    name: str = entry(text(), ...)
+    gear: GearSection | None = entry(nested(GearSection))
+    integral: bool = entry(switch(), False)
+
+
+class ShaftSection(FileTable):
+    """A stepped shaft with what sits on it.
+
+    Attributes:
+        name: of the shaft.
+        sections: from left to right, each with `length`, `diameter` and `bore`.
+        bearings: each with `name`, `position`, `radial`, `axial`, `tilting` and `clearance`, or with `stiffness`, a
+            matrix of 5 x 5 numbers, in place of all but the first two.
+        gears: on the shaft.
+        couplings: where torque enters and leaves, each with `position` and `torque`; one of a gearbox has no torque.
+        loads: from outside, each with `position`, `force` and `moment`.
+        material: of the shaft and what stiffens it, name in [materials] or elastic constants; "STEEL" without it.
+    """
+
+    name: str = entry(text(), ...)
+    sections: list[FileTable] = entry(list_of(nested(_PART)), ...)
+    bearings: list[FileTable] = entry(list_of(Kind("a table", _bearing)), ...)
+    gears: list[MountedGearSection] = entry(list_of(nested(MountedGearSection), empty=True), [])
+    couplings: list[FileTable] = entry(list_of(nested(_COUPLING), empty=True), [])
+    loads: list[FileTable] = entry(list_of(nested(_LOAD), empty=True), [])
+    material: str | Part | None = entry(MATERIAL)
+
+
+class MeshSection(section_of(GearMesh, ("pinion", "wheel", "misalignment"), open=False)):  # type: ignore[misc]
+    """Two gears that mesh, by their names.
+
+    Attributes:
+        pinion: the driving one.
+        wheel: the driven one.
+        misalignment: of their axes, with `skew`, `inclination`, `bearing_span` and `direct`.
+    """
+
+    pinion: str = entry(text(), ...)
+    wheel: str = entry(text(), ...)
+    misalignment: FileTable | None = entry(nested(_MISALIGNMENT))
+
+
+class HousingSection(FileTable):
+    """What holds the bearing seats.
+
+    Attributes:
+        file: CSV or npz file beside the design file with the stiffness or compliance of the housing between the seats.
+    """
+
+    file: str = entry(text(), ...)
 
 
 def over_slices(support: ShaftSupport, sizes: Resolution) -> TabulatedSupport:
@@ -87,34 +155,23 @@ _SAME_MATERIAL = 0.05  # relative, of elastic constants: as far as tables of ste
 _SAME_TORQUE = 1e-3  # relative; what is left is rounding of ratios written by hand
 
 
-def layout_of(table: Mapping[str, Any] | None, quality: list[int] | None) -> schema.LayoutSection | None:
-    """The table of that name, with the quality classes of the gears where it has none of its own.
-
-    Raises:
-        DesignFileError: for anything that is wrong with it.
-    """
-    if table is None:
-        return None
-    if "bearing_span" in table:
-        instead = 'misalignment = "class", or misalignment = { skew = ..., inclination = ..., bearing_span = ... }'
-        raise DesignFileError("layout.bearing_span", f"has no effect without skew or inclination: write {instead}")
-    return with_quality("layout", decode("layout", table, schema.LayoutSection), quality)
-
-
 def support_of(
-    top: FileSection,
-    layout: schema.LayoutSection | None,
     pair: GearPair,
+    shafts: Sequence[ShaftSection],
+    meshes: Sequence[MeshSection],
+    housing: HousingSection | None,
+    *,
+    direction: str,
     torque: float,
     folder: Path,
     materials: Materials,
-) -> ShaftSupport | None:
-    """The mesh of pinion and wheel on its shafts; None for a file without a layout.
+) -> ShaftSupport:
+    """The mesh of pinion and wheel on its shafts.
 
     Args:
-        top: all tables.
-        layout: the table of that name.
         pair: of the file.
+        shafts, meshes, housing: the tables of these names.
+        direction: in which the first shaft turns.
         torque: of the file, on the pinion [N m].
         folder: of the design file.
         materials: of the file.
@@ -123,75 +180,53 @@ def support_of(
         DesignFileError: for tables that do not make a gearbox with pinion and wheel in it, or whose couplings bring
             another torque to the pinion.
     """
-    if layout is None:
-        refuse_given("", top, ["shafts", "meshes", "housing"], " without [layout]")
-        return None
-    if not top.shafts:
-        raise DesignFileError("layout", "has no effect without [[shafts]]")
-    _check_names(top.shafts)
-    made = [_shaft(f"shafts[{i}]", each, pair, materials) for i, each in enumerate(top.shafts)]
+    _check_names(shafts)
+    made = [_shaft(each, pair, materials) for each in shafts]
     names = [gear.name for shaft in made for gear in shaft.gears]
     for name in _OWN:
         if name not in names:
             raise DesignFileError("shafts", f'no shaft carries the gear "{name}"')
-    given = [_mesh(f"meshes[{i}]", each, pair) for i, each in enumerate(top.meshes)]
+    given = [_mesh(each, pair) for each in meshes]
     given = given or [GearMesh(*_OWN, center_distance=pair.center_distance, axial_offset=pair.axial_offset)]
     own = [index for index, mesh in enumerate(given) if (mesh.pinion, mesh.wheel) == _OWN]
     if not own:
         raise DesignFileError("meshes", 'none is that of "pinion" and "wheel"')
-    box = refused("meshes" if top.meshes else "shafts", Gearbox, made, given, None, layout.direction)
+    box = refused("meshes" if meshes else "shafts", Gearbox, made, given, None, direction)
     brought = float(box.pinion_torques()[own[0]])
     if not np.isclose(brought, torque, rtol=_SAME_TORQUE):
         raise DesignFileError("load.torque", f"{torque:g} N m must be {brought:g} N m, which the couplings bring")
-    if top.housing is not None:
-        section = decode("housing", top.housing, schema.HousingSection)
-        with referring("housing.file", section.file):
-            check_file(folder / section.file)
-        seats = refused("housing.file", read_housing, folder / section.file)
+    if housing is not None:
+        with referring("housing.file", housing.file):
+            check_file(folder / housing.file)
+        seats = refused("housing.file", read_housing, folder / housing.file)
         box = refused("housing.file", replace, box, housing=seats)
     return support(box, own[0])
 
 
-def _check_names(shafts: Sequence[Mapping[str, Any]]) -> None:
+def _check_names(shafts: Sequence[ShaftSection]) -> None:
     """Refuses a name that is given twice, before anything is made of the second: that would be wrong for its place."""
-    for kind in ("", "bearings", "gears"):
-        first: dict[Any, str] = {}
-        for i, shaft in enumerate(shafts):
-            parts = shaft.get(kind) if kind else [shaft]
-            for j, part in enumerate(parts if isinstance(parts, list) else []):
-                key = f"shafts[{i}].{kind}[{j}].name" if kind else f"shafts[{i}].name"
-                name = part.get("name") if isinstance(part, dict) else None
-                if isinstance(name, str) and first.setdefault(name, key) != key:
-                    raise DesignFileError(key, f'"{name}" is given twice, first as {first[name]}')
+    bearings = [bearing for shaft in shafts for bearing in shaft.bearings]
+    gears = [gear for shaft in shafts for gear in shaft.gears]
+    for parts in (shafts, bearings, gears):
+        first: dict[str, str] = {}
+        for part in parts:
+            key, name = f"{part.at}.name", part.given()["name"]
+            if first.setdefault(name, key) != key:
+                raise DesignFileError(key, f'"{name}" is given twice, first as {first[name]}')
 
 
-def _shaft(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materials) -> Shaft:
-    section = decode(key, table, schema.ShaftSection)
-    material = fixed_material(f"{key}.material", section.material, materials)
-
-    def each(name, make):
-        return [make(f"{key}.{name}[{i}]", item) for i, item in enumerate(getattr(section, name))]
-
-    return refused(
-        key,
-        Shaft,
-        section.name,
-        each("sections", lambda at, item: _plain(at, item, ShaftPart)),
-        each("bearings", lambda at, item: _plain(at, item, MatrixBearing if "stiffness" in item else Bearing)),
-        each("gears", lambda at, item: _gear(at, item, pair, materials, material)),
-        each("couplings", lambda at, item: _plain(at, item, Coupling)),
-        each("loads", lambda at, item: _plain(at, item, ShaftLoad)),
-        material,
+def _shaft(section: ShaftSection, pair: GearPair, materials: Materials) -> Shaft:
+    material = fixed_material(section, section.material, materials)
+    gears = [_gear(each, pair, materials, material) for each in section.gears]
+    sections, bearings, couplings, loads = (
+        [built(each) for each in several]
+        for several in (section.sections, section.bearings, section.couplings, section.loads)
     )
+    return refused(section.at, Shaft, section.name, sections, bearings, gears, couplings, loads, material)
 
 
-def _plain(key: str, table: Mapping[str, Any], cls):
-    """An object of numbers from its table."""
-    return part_of(key, decode(key, table, section_of(cls, open=False)), cls).build({})
-
-
-def _gear(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materials, of_shaft: Material) -> MountedGear:
-    section = decode(key, table, schema.MountedGearSection)
+def _gear(section: MountedGearSection, pair: GearPair, materials: Materials, of_shaft: Material) -> MountedGear:
+    key = section.at
     if section.name in _OWN:
         if section.gear is not None:
             raise DesignFileError(f"{key}.gear", f"has no effect, [{section.name}] is the {section.name}")
@@ -199,9 +234,9 @@ def _gear(key: str, table: Mapping[str, Any], pair: GearPair, materials: Materia
     elif section.gear is None:
         raise DesignFileError(f"{key}.gear", f'missing, "{section.name}" is not the pinion or wheel of the file')
     else:
-        gear = fixed_gear(f"{key}.gear", section.gear, materials)
-    if section.integral and section.body_diameter is not None:
-        raise DesignFileError(f"{key}.body_diameter", "has no effect on an integral gear")
+        gear = fixed_gear(section.gear, materials)
+    if section.integral:
+        section.refuse(["body_diameter"], " on an integral gear")
     if section.integral and _differ(gear.material, of_shaft):
         problem = "a gear that is cut into its shaft is of its material, but these differ: material of [[shafts]]"
         raise DesignFileError(f"{key}.integral", problem)
@@ -218,14 +253,28 @@ def _differ(one: Material, other: Material) -> bool:
     return any(a is not None and b is not None and not np.isclose(a, b, rtol=_SAME_MATERIAL) for a, b in pairs)
 
 
-def _mesh(key: str, table: Mapping[str, Any], pair: GearPair) -> GearMesh:
-    section = decode(key, table, schema.MeshSection)
+def _mesh(section: MeshSection, pair: GearPair) -> GearMesh:
     numbers = {name: value for name, value in section.given().items() if name in ("angle", *_OF_PAIR)}
     if (section.pinion, section.wheel) == _OWN:
         for name in _OF_PAIR:
             if name in numbers:
-                raise DesignFileError(f"{key}.{name}", f"has no effect, pair.{name} is that of the pair")
+                raise DesignFileError(f"{section.at}.{name}", f"has no effect, pair.{name} is that of the pair")
             numbers[name] = getattr(pair, name)
     if section.misalignment is not None:
-        numbers["misalignment"] = _plain(f"{key}.misalignment", section.misalignment, Misalignment)
-    return refused(key, GearMesh, section.pinion, section.wheel, **numbers)
+        numbers["misalignment"] = built(section.misalignment)
+    return refused(section.at, GearMesh, section.pinion, section.wheel, **numbers)
+
+
+# By their headings in the reference.
+TABLES: Mapping[str, type[FileTable]] = {
+    "[[shafts]]": ShaftSection,
+    "[[shafts.sections]]": _PART,
+    "[[shafts.bearings]]": _BEARING,
+    "[[shafts.bearings]] with stiffness": _MATRIX_BEARING,
+    "[[shafts.gears]]": MountedGearSection,
+    "[[shafts.couplings]]": _COUPLING,
+    "[[shafts.loads]]": _LOAD,
+    "[[meshes]]": MeshSection,
+    "[meshes.misalignment]": _MISALIGNMENT,
+    "[housing]": HousingSection,
+}

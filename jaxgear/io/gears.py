@@ -9,111 +9,144 @@ from ..geometry import Gear, GearPair, Material, pair_with_backlash
 from ..manufacture import ToothThickness, drawn_gear
 from ..microgeometry import AbstractModification
 from ..numerics import Number, fields_of
-from . import schema, template
 from .errors import DesignFileError, check_known
-from .flanks import flank_part
-from .toml import decode
-from .value_types import not_of_kind
+from .flanks import FlankFileSection, flank_part
+from .table_keys import FileTable, as_field, decode, described, entry, part_of, section_of
+from .template import Free, Part
+from .value_types import QUALITY_CLASS, Kind, either, list_of, not_of_kind, real, table, text
 
 _STEEL = "STEEL"
-_BACKLASH = Number("um", low=0.0)
 # with any of these a gear says how thick its teeth are
 _THICKNESS = ("span", "over_balls", "tooth_thickness_allowance", "tooth_thickness_tolerance")
 _WITHOUT_FLANKS = "modification", "quality_class"
 
-Materials = Mapping[str, template.Part]
+_ThicknessKeys = section_of(ToothThickness, most=(("teeth_spanned", 1000),))
+_GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance"))
+
+_BACKLASH = Number("um", low=0.0)
+MATERIAL = either(text(), described(Material), "the name of a material, or a table")
+Materials = Mapping[str, Part]
 
 
-def materials_of(top: schema.FileSection) -> Materials:
+def _modification(key: str, value: Any) -> Part | FlankFileSection:
+    given = table().read(key, value)
+    if given.get("type") == "file":
+        return decode(key, {name: item for name, item in given.items() if name != "type"}, FlankFileSection)
+    return described(AbstractModification).read(key, given)
+
+
+class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
+    """A gear and the modifications of its flanks.
+
+    The tooth thickness stands in one of three ways: as the allowance E_sns, with the tolerance T_sn down to E_sni where
+    there is one; as the span W_k over so many teeth; as the dimension over balls. A list of two is lower and upper
+    limit, between which the tooth is in the middle.
+
+    Attributes:
+        tooth_thickness_allowance: E_sns on the reference cylinder, negative for backlash, or [E_sni, E_sns].
+        span: base tangent length W_k over `teeth_spanned` teeth, or its limits.
+        teeth_spanned: k.
+        over_balls: dimension M_dK over two balls or pins of `ball_diameter`, or its limits.
+        ball_diameter: D_M.
+        material: name in [materials], "STEEL", or elastic constants.
+        quality_class: flank tolerance class of ISO 1328-1, of [tolerance], [layout] and the charts.
+        modification: modifications of the flank; several add up.
+    """
+
+    source = Gear
+
+    material: str | Part | None = entry(MATERIAL)
+    quality_class: int | None = entry(QUALITY_CLASS)
+    modification: list[Part | FlankFileSection] = entry(list_of(Kind("a table", _modification), empty=True), [])
+
+
+class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[misc]
+    """Pinion (driving) and wheel (driven) on their centre distance.
+
+    Attributes:
+        backlash: play on the line of action; by the tooth thickness of the gears that say nothing of their own, or by
+            the centre distance where both do.
+    """
+
+    backlash: float | Free | None = entry(real(_BACKLASH, open=True))
+
+
+def materials_of(given: Mapping[str, Part] | None) -> Materials:
     """The materials of a file by their names, with the library's."""
-    found = {_STEEL: template.Part(Material, {}, "material")}
-    for name, table in (top.materials or {}).items():
-        key = f"materials.{name}"
-        if name in found:
-            raise DesignFileError(key, "is a material of the library, choose another name")
-        found[name] = template.parse(key, table, Material)
-    return found
+    if given and _STEEL in given:
+        raise DesignFileError(f"materials.{_STEEL}", "is a material of the library, choose another name")
+    return {_STEEL: Part(Material, {}, "material"), **(given or {})}
 
 
-def gear_of(
-    key: str, table: schema.Tables, materials: Materials, folder: Path
-) -> tuple[schema.GearSection, template.Part, list[template.Part]]:
-    """What a file says of a gear, the gear and its modifications; paths begin in the folder."""
-    section = decode(key, table, schema.GearSection)
-    flank = []
-    for index, each in enumerate(section.modification):
-        at = f"{key}.modification[{index}]"
-        read = each.get("type") == "file"
-        flank.append(flank_part(at, each, folder) if read else template.parse(at, each, AbstractModification))
-    return section, _gear(key, section, materials), flank
+def flank_of(section: GearSection, folder: Path) -> list[Part]:
+    """The modifications of a gear; paths begin in the folder."""
+    given = section.modification
+    return [flank_part(each, folder) if isinstance(each, FlankFileSection) else each for each in given]
 
 
-def drawing_of(section: schema.GearSection) -> dict[str, Any]:
+def drawing_of(section: GearSection) -> dict[str, Any]:
     """What a file gives of a gear that its numbers do not tell: the name of the material, the measured tooth thickness.
 
     By name and unit; lower and upper limit as a list of both.
     """
     given, units = section.given(), fields_of(ToothThickness)
-    found: dict[str, Any] = {} if isinstance(section.material, dict) else {"material": section.material or _STEEL}
+    found: dict[str, Any] = {} if isinstance(section.material, Part) else {"material": section.material or _STEEL}
     for name in units:
-        if name in given and not isinstance(given[name], str):
+        if name in given and not isinstance(given[name], Free):
             found[f"{name}_{units[name].unit}" if units[name].unit else name] = given[name]
     return found
 
 
-def fixed_gear(key: str, table: schema.Tables, materials: Materials) -> Gear:
+def fixed_gear(section: GearSection, materials: Materials) -> Gear:
     """A gear of numbers, whose flanks do not count."""
-    section = decode(key, table, schema.GearSection)
     for name in _WITHOUT_FLANKS:
-        if name in section.model_fields_set:
-            raise DesignFileError(f"{key}.{name}", "has no effect, only pinion and wheel have flanks")
-    return _fixed(_gear(key, section, materials))
+        if name in section.given():
+            raise DesignFileError(f"{section.at}.{name}", "has no effect, only pinion and wheel have flanks")
+    return _fixed(gear_part(section, materials))
 
 
-def _gear(key: str, section: schema.GearSection, materials: Materials) -> template.Part:
-    gear = template.part_of(key, section, Gear, without=("material",))
-    fields = {**gear.fields, **template.part_of(key, section, ToothThickness).fields}
+def gear_part(section: GearSection, materials: Materials) -> Part:
+    """A gear without its modifications."""
+    gear, measures = part_of(section, Gear, without=("material",)), part_of(section, ToothThickness)
     if section.material is not None:
-        fields["material"] = _material(f"{key}.material", section.material, materials)
+        gear = gear.having(material=_material(f"{section.at}.material", section.material, materials))
+    gear = gear.having(**measures.fields)
     # without any measure of a drawing the gear is the library's: messages then name its own fields
-    return replace(gear, make=drawn_gear if set(fields) & set(fields_of(ToothThickness)) else Gear, fields=fields)
+    return replace(gear, make=drawn_gear if set(gear.fields) & set(fields_of(ToothThickness)) else Gear)
 
 
-def _material(key: str, given: str | schema.Tables, materials: Materials) -> template.Part:
-    if not isinstance(given, str):
-        return template.parse(key, given, Material)
+def _material(key: str, given: str | Part, materials: Materials) -> Part:
+    if isinstance(given, Part):
+        return given
     check_known(key, given, materials)
     return materials[given]
 
 
-def fixed_material(key: str, given: str | schema.Tables | None, materials: Materials) -> Material:
-    """A material of numbers, by its name or table; steel for None."""
-    return _fixed(_material(key, _STEEL if given is None else given, materials))
+def fixed_material(section: FileTable, given: str | Part | None, materials: Materials) -> Material:
+    """A material of numbers, of a table with such a key, by its name or described; steel for None."""
+    return _fixed(_material(f"{section.at}.material", _STEEL if given is None else given, materials))
 
 
-def _fixed(part: template.Part) -> Any:
+def _fixed(part: Part) -> Any:
     for free in part.free():
         raise DesignFileError(free.key, not_of_kind("a number", free.name))
     return part.build({})
 
 
-def pair_of(top: schema.FileSection, pinion: template.Part, wheel: template.Part) -> template.Part:
+def pair_of(section: PairSection, pinion: Part, wheel: Part) -> Part:
     """The pair of two gears, with what its table says."""
-    section = decode("pair", top.pair or {}, schema.PairSection)
-    mounting = template.part_of("pair", section, GearPair)
-    fields: dict[str, Any] = {"pinion": pinion, "wheel": wheel, **mounting.fields}
+    pair = Part(GearPair, {"pinion": pinion, "wheel": wheel}, section.at).having(**part_of(section, GearPair).fields)
     if section.backlash is None:
-        return replace(mounting, fields=fields)
-    open_gears = [name for name in ("pinion", "wheel") if not set(fields[name].fields) & set(_THICKNESS)]
+        return pair
+    open_gears = [name for name in ("pinion", "wheel") if not set(pair.fields[name].fields) & set(_THICKNESS)]
     if not open_gears and section.center_distance is not None:
         problem = "has no effect, centre distance and tooth thickness of both gears are given"
         raise DesignFileError("pair.backlash", problem)
     by = {0: "center_distance", 1: open_gears[-1] if open_gears else "", 2: "both"}[len(open_gears)]
-    fields |= {"backlash": template.opened(section.backlash, "pair.backlash", _BACKLASH), "by": by}
-    return replace(mounting, make=pair_with_backlash, fields=fields)
+    return replace(pair.having(backlash=as_field(section.backlash, _BACKLASH), by=by), make=pair_with_backlash)
 
 
-def quality_of(pinion: schema.GearSection, wheel: schema.GearSection) -> list[int] | None:
+def quality_of(pinion: GearSection, wheel: GearSection) -> list[int] | None:
     """Flank tolerance classes of both gears; None where they have none."""
     given = {"pinion": pinion.quality_class, "wheel": wheel.quality_class}
     missing = [name for name, number in given.items() if number is None]
@@ -122,16 +155,15 @@ def quality_of(pinion: schema.GearSection, wheel: schema.GearSection) -> list[in
     return None if missing else [number for number in given.values() if number is not None]
 
 
-def with_quality(key: str, section: Any, own: list[int] | None) -> Any:
+def with_quality(section: Any, own: list[int] | None) -> Any:
     """A table that needs classes: with its own, or with those of the gears."""
+    key = f"{section.at}.quality_class"
     if section.quality_class is None:
         if own is None:
-            raise DesignFileError(f"{key}.quality_class", "missing, this key is required where the gears have none")
-        return section.model_copy(update={"quality_class": own})
+            raise DesignFileError(key, "missing, this key is required where the gears have none")
+        return section.changed(quality_class=own)
     if own is not None:
-        raise DesignFileError(
-            f"{key}.quality_class", "has no effect, the gears have classes of their own: take one of them out"
-        )
+        raise DesignFileError(key, "has no effect, the gears have classes of their own: take one of them out")
     return section
 
 

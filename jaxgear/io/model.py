@@ -5,27 +5,52 @@ from pathlib import Path
 from ..compliance import AbstractCompliance, Compliance, finite_element_compliance, legacy_compliance
 from ..contact import Resolution
 from ..geometry import GearPair
-from . import schema, template
-from .errors import DesignFileError, check_file, referring, refuse_given, refused
-from .toml import decode
+from . import template
+from .errors import DesignFileError, check_file, referring, refused
+from .table_keys import FileTable, entry, part_of, section_of
+from .value_types import choice, text
 
 # Slices where a modification varies along the face: the mean of a parabola over the middles of n slices is 1 / n^2 too
 # small, so that 11 show a lead crowning to 1 %.
 _SLICES = 11
 
 
-def resolution_of(table: schema.Tables, uneven: list[str], *, bent: bool) -> Resolution:
+class ModelSection(section_of(Compliance)):  # type: ignore[misc]
+    """The stiffness model: tooth, gear body and contact law, each by its name, or as a table with `type` and options.
+
+    Attributes:
+        preset: "legacy" is the model of older studies and takes no other key.
+        structure: "finite_element" takes tooth and body from finite elements, made once per gear and then kept; `plane`
+            and the tables are its only other keys.
+        pinion_table: CSV file, beside the design file, with the table of another finite-element program in place of it.
+        wheel_table: the same for the wheel.
+    """
+
+    preset: str = entry(choice("default", "legacy"), "default")
+    structure: str = entry(choice("closed_form", "finite_element"), "closed_form")
+    pinion_table: str | None = entry(text())
+    wheel_table: str | None = entry(text())
+
+
+# Sizes up to these: a slip of the finger must not fill the memory or compile for hours.
+ResolutionSection = section_of(
+    Resolution,
+    most=(("positions", 4096), ("slices", 1024), ("pairs", 12), ("patch_nodes", 64), ("newton_steps", 100)),
+)
+
+
+def resolution_of(section: FileTable, uneven: list[str], *, bent: bool) -> Resolution:
     """The array sizes.
 
     Args:
-        table: of that name.
+        section: the table of that name.
         uneven: keys of the modifications that vary along the face.
         bent: shafts bend; slices show it where the file says nothing else.
 
     Raises:
         DesignFileError: for one slice where modifications vary along the face.
     """
-    sizes = decode("resolution", table, schema.ResolutionSection).given()
+    sizes = section.given()
     if sizes.get("slice_widths") is not None:
         sizes.setdefault("slices", len(sizes["slice_widths"]))
     if bent:
@@ -51,16 +76,16 @@ _FREE = {
 }
 
 
-def model_part(section: schema.ModelSection) -> template.Part:
+def model_part(section: ModelSection) -> template.Part:
     """The model as far as it needs no gears: all of it, or the plane of what `finite_elements` makes."""
     if section.structure == FINITE_ELEMENTS:
         others = set(section.given()) - {"structure", "plane", *_TABLES}
         if others:
             raise DesignFileError(f"model.{min(others)}", f'cannot be combined with structure = "{FINITE_ELEMENTS}"')
         return template.Part(Compliance, {}, "model")
-    refuse_given("model", section, _TABLES, f' without structure = "{FINITE_ELEMENTS}"')
+    section.refuse(_TABLES, f' without structure = "{FINITE_ELEMENTS}"')
     if section.preset == "default":
-        return template.part_of("model", section, Compliance)
+        return part_of(section, Compliance)
     given = set(section.given()) - {"preset", "structure"}
     if given:
         raise DesignFileError(f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
@@ -68,7 +93,7 @@ def model_part(section: schema.ModelSection) -> template.Part:
 
 
 def with_tables(
-    model: template.Part, section: schema.ModelSection, folder: Path, pair: template.Part, middle: GearPair
+    model: template.Part, section: ModelSection, folder: Path, pair: template.Part, middle: GearPair
 ) -> template.Part:
     """The model, with the tables of the gears where the file asks for finite elements.
 

@@ -7,24 +7,24 @@ import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import equinox as eqx
 import jax
 import numpy as np
 
-from .. import shafts
-from ..compliance import AbstractBody, AbstractContact, AbstractTooth, Compliance
-from ..contact import OperatingPoint, Resolution
-from ..dynamics import Dynamics
-from ..geometry import Gear, GearPair, Material
-from ..metrics import Lubricant, Strength
+from ..compliance import AbstractBody, AbstractContact, AbstractTooth
+from ..geometry import Material
 from ..microgeometry import AbstractCurve, AbstractModification
-from ..optimize import METHODS, Pareto, free_form, iterate_transmission_error
 from ..shafts import Misalignment
-from ..tolerance import Tolerance
 from ..vocabulary import quantities
-from ..wear import Wear
-from . import rating, schema, schema_shafts
+from . import gearbox
+from .design_file import file_section
+from .flanks import FlankFileSection
+from .gears import GearSection, PairSection
+from .model import ModelSection, ResolutionSection
 from .table_keys import FileTable, family, meanings, section_of, snake, summary
+from .tables import LoadSection, further_tables
 from .value_types import allowed
+from .variables import VariableSection
 
 _HEAD = """# Design files
 
@@ -52,17 +52,12 @@ torque = 50.0      # N m on the pinion
 ```
 """
 _QUANTITIES = "Quantities"
-_EXTRAS: dict[str, Callable[..., Any]] = {
-    "pareto": Pareto,
-    "te_iteration": iterate_transmission_error,
-    "free_form": free_form,
-}
 
 
 def reference() -> str:
     """The reference of design files as Markdown: every table with keys, kinds, units, ranges, defaults and meanings."""
-    tables = (line for title, section, of in _tables() for line in _table(title, section, of))
-    contents = (f"- [{_heading(title)}](#{_anchor(title)})" for title in (*(one for one, *_ in _tables()), _QUANTITIES))
+    tables = (line for title, section in _tables() for line in _table(title, section))
+    contents = (f"- [{_heading(title)}](#{_anchor(title)})" for title in (*(one for one, _ in _tables()), _QUANTITIES))
     return "\n".join([_HEAD.rstrip(), "\nTables:\n", *contents, *tables, *_quantities()]) + "\n"
 
 
@@ -75,72 +70,50 @@ def _anchor(title: str) -> str:
     return re.sub(r"[^\w -]", "", title).strip().lower().replace(" ", "-")
 
 
-def _tables() -> Iterator[tuple[str, type[FileTable], Callable[..., Any] | None]]:
-    yield "The top level", schema.FileSection, None
-    yield "[project]", schema.ProjectSection, None
-    yield "[pinion] and [wheel]", schema.GearSection, Gear
-    yield "[materials.NAME], [pinion.material] and [wheel.material]", section_of(Material), Material
-    yield "[pair]", schema.PairSection, GearPair
-    for name, cls in family(AbstractModification, users=False).items():
-        yield f'[[pinion.modification]] of type "{name}"', section_of(cls), cls
-    yield '[[pinion.modification]] of type "file"', schema.FlankFileSection, None
-    for name, cls in family(AbstractCurve, users=False).items():
-        yield f'curve of type "{name}"', section_of(cls), cls
-    yield "[load]", schema.LoadSection, OperatingPoint
-    yield "[model]", schema.ModelSection, Compliance
+def _tables() -> Iterator[tuple[str, type[FileTable]]]:
+    further = further_tables(users=False)
+    yield "The top level", file_section(further)
+    yield "[pinion] and [wheel]", GearSection
+    yield "[materials.NAME], [pinion.material] and [wheel.material]", section_of(Material)
+    yield "[pair]", PairSection
+    yield from _types("[[pinion.modification]]", AbstractModification)
+    yield '[[pinion.modification]] of type "file"', FlankFileSection
+    yield from _types("curve", AbstractCurve)
+    yield "[load]", LoadSection
+    yield "[model]", ModelSection
     for key, base in (("tooth", AbstractTooth), ("body", AbstractBody), ("contact", AbstractContact)):
-        for name, cls in family(base, users=False).items():
-            yield f'{key} of type "{name}"', section_of(cls), cls
-    yield "[misalignment]", schema.MisalignmentSection, Misalignment
-    yield "[resolution]", schema.ResolutionSection, Resolution
-    yield "[variables.NAME]", schema.VariableSection, None
-    yield "[optimize]", schema.optimize_section(), None
-    yield "[[optimize.constraint]]", schema.ConstraintSection, None
-    for name, section in schema.method_options().items():
-        yield f"[optimize.{name}]", section, METHODS.get(name, _EXTRAS.get(name))
-    yield "[sweep]", schema.SweepSection, None
-    yield "[tolerance]", schema.ToleranceSection, Tolerance
-    yield "[dynamics]", schema.DynamicsSection, Dynamics
-    yield "[wear]", schema.WearSection, Wear
-    yield "[lubricant]", rating.LubricantSection, Lubricant
-    yield "[strength]", rating.StrengthSection, Strength
-    yield from _gearbox_tables()
+        yield from _types(key, base)
+    yield "[misalignment]", section_of(Misalignment)
+    yield "[resolution]", ResolutionSection
+    yield "[variables.NAME]", VariableSection
+    yield from gearbox.TABLES.items()
+    for name, section in further.items():
+        yield f"[{name}]", section
+        yield from section.inner().items()
 
 
-def _gearbox_tables() -> Iterator[tuple[str, type[FileTable], Callable[..., Any] | None]]:
-    yield "[[shafts]]", schema_shafts.ShaftSection, None
-    yield "[[shafts.sections]]", schema_shafts.PartSection, shafts.Section
-    yield "[[shafts.bearings]]", schema_shafts.BearingSection, shafts.Bearing
-    yield "[[shafts.bearings]] with stiffness", schema_shafts.MatrixBearingSection, shafts.MatrixBearing
-    yield "[[shafts.gears]]", schema_shafts.MountedGearSection, shafts.MountedGear
-    yield "[[shafts.couplings]]", schema_shafts.CouplingSection, shafts.Coupling
-    yield "[[shafts.loads]]", schema_shafts.LoadOnShaftSection, shafts.ShaftLoad
-    yield "[[meshes]]", schema_shafts.MeshSection, shafts.GearMesh
-    yield "[meshes.misalignment]", schema_shafts.MisalignmentSection, shafts.Misalignment
-    yield "[housing]", schema_shafts.HousingSection, None
-    yield "[layout]", schema_shafts.LayoutSection, None
-    yield "[layout.profile]", schema_shafts.ProfileSection, None
+def _types(title: str, base: type[eqx.Module]) -> Iterator[tuple[str, type[FileTable]]]:
+    for name, cls in family(base, users=False).items():
+        yield f'{title} of type "{name}"', section_of(cls)
 
 
-def _table(title: str, section: type[FileTable], of: Callable[..., Any] | None) -> Iterator[str]:
-    own = bool(section.__doc__) and section.__doc__ != FileTable.__doc__
+def _table(title: str, section: type[FileTable]) -> Iterator[str]:
     yield f"\n## {_heading(title)}\n"
-    yield summary(section if own or of is None else of) + "\n"
-    if not section.model_fields:
+    yield summary(section if section.__doc__ else section.source) + "\n"
+    if not section.keys:
         return
-    texts = {**meanings(of), **meanings(section)} if of else meanings(section)
+    texts = meanings(section.source) | meanings(section)
     yield "| Key | Value | Unit | Range | Default | Meaning |"
     yield "| --- | --- | --- | --- | --- | --- |"
-    for name, field in section.model_fields.items():
-        kind = section.kind(name)
-        default = "required" if field.is_required() else _default(name, field.default, of)
+    for name, key in section.keys.items():
+        number = key.kind.number
         cells = [
             f"`{name}`",
-            kind.words,
-            kind.number.unit if kind.number else "",
-            allowed(dataclasses.replace(kind.number, unit="")) if kind.number else "",
-            default,
-            texts.get(name, ""),
+            key.kind.words,
+            number.unit if number else "",
+            allowed(dataclasses.replace(number, unit="")) if number else "",
+            "required" if key.default is ... else _default(name, key.default, section.source),
+            key.meaning or texts.get(name, ""),
         ]
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 

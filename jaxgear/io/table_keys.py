@@ -5,36 +5,116 @@ ones is known to design files by its name in snake case (`TipRelief`: `type = "t
 """
 
 import dataclasses
+import difflib
+import functools
 import inspect
+import operator
 import re
 import types
 import typing
-from functools import cache
-from typing import Annotated, Any
+from collections.abc import Iterable, Iterator
+from typing import Any, ClassVar, Self, TypeVar
 
 import equinox as eqx
-from pydantic import BaseModel, ConfigDict, create_model
 
 from ..numerics import Number, fields_of
-from .value_types import Kind, choice, either, list_of, real, rows_of, switch, table, text
+from ..numerics import real as real_number
+from .errors import DesignFileError, check_known, join, not_known, suggestion
+from .template import Free, Part
+from .value_types import Kind, choice, either, list_of, not_of_kind, real, rows_of, switch, table, text
 
 
-class FileTable(BaseModel):
-    """A table of the file: its fields are the allowed keys."""
+@dataclasses.dataclass(frozen=True)
+class Key:
+    """A key of a table.
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    Attributes:
+        kind: what may stand after it.
+        default: what holds where the file does not have it; `...` where it must.
+        meaning: for the reference; "" for that in the docstring of the table.
+    """
+
+    kind: Kind
+    default: Any = None
+    meaning: str = ""
+
+
+def entry(kind: Kind, default: Any = None) -> Any:
+    """Declares a key of a table as an attribute of its class, see `Key`."""
+    return Key(kind, default)
+
+
+class FileTable:
+    """A table of the file: the attributes that `entry` declares are the allowed keys.
+
+    Attributes:
+        keys: by their names.
+        source: class of the library, or function, whose fields they are in part; None for none.
+        table: its name where it is one of the top level and its class says so; "" for another.
+        at: its dotted key in the file, "" for the top level.
+    """
+
+    keys: ClassVar[dict[str, Key]] = {}
+    source: ClassVar[Any] = None
+    table: ClassVar[str] = ""
+
+    def __init_subclass__(cls) -> None:
+        own = {name: value for name, value in vars(cls).items() if isinstance(value, Key)}
+        inherited = [vars(base).get("keys", {}) for base in reversed(cls.__mro__[1:])]
+        cls.keys = functools.reduce(operator.or_, [*inherited, own])
+
+    def __init__(self, at: str, /, **given: Any):
+        self.at, self._given = at, given
+        for name, allowed in self.keys.items():
+            if not hasattr(FileTable, name):
+                setattr(self, name, given.get(name, None if allowed.default is ... else allowed.default))
 
     def given(self) -> dict[str, Any]:
         """The keys that the file sets."""
-        return {name: value for name, value in self if name in self.model_fields_set}
+        return {name: self._given[name] for name in self.keys if name in self._given}
 
-    @classmethod
-    def kind(cls, name: str) -> Kind:
-        """What may stand after a key."""
-        return next(item for item in cls.model_fields[name].metadata if isinstance(item, Kind))
+    def changed(self, **values: Any) -> Self:
+        """The same with other values of some keys, as if the file set them."""
+        return type(self)(self.at, **{**self._given, **values})
+
+    def refuse(self, keys: Iterable[str], why: str) -> None:
+        """Raises a `DesignFileError` where the file sets any of the keys, which have no effect."""
+        for name in keys:
+            if getattr(self, name) not in (None, []):
+                raise DesignFileError(join(self.at, name), f"has no effect{why}")
 
 
-@cache
+S = TypeVar("S", bound=FileTable)
+
+
+def decode(key: str, data: Any, section: type[S]) -> S:
+    """A table with the keys of a class; the table's own key is "" at the top level.
+
+    Raises:
+        DesignFileError: for unknown or missing keys, values of a wrong type and numbers out of range.
+    """
+    if not isinstance(data, dict):
+        raise DesignFileError(key, not_of_kind("a table", data))
+    unknown = next((name for name in data if name not in section.keys), None)
+    values = {}
+    for name, allowed in section.keys.items():
+        if name in data:
+            values[name] = allowed.kind.read(join(key, name), data[name])
+        elif allowed.default is ... and unknown is None:
+            raise DesignFileError(join(key, name), "missing, this key is required")
+        elif allowed.default is ...:  # often it is there, misspelt
+            break
+    if unknown is not None:
+        raise DesignFileError(join(key, unknown), f"unknown key, {suggestion(unknown, section.keys)}")
+    return section(key, **values)
+
+
+def nested(section: type[FileTable]) -> Kind:
+    """A table with the keys of a class, within another one."""
+    return Kind("a table", lambda key, value: decode(key, value, section), container=dict)
+
+
+@functools.cache
 def section_of(
     cls: type[eqx.Module],
     without: tuple[str, ...] = (),
@@ -60,16 +140,62 @@ def section_of(
         kind = _kind(cls, field, dict(most).get(field.name), open)
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
         if kind is not None:
-            keys[field.name] = (Annotated[Any, kind], ... if needed else None)
+            keys[field.name] = entry(kind, ... if needed else None)
         elif needed:
             raise TypeError(f"{cls.__name__}: {field.name} cannot be written in a design file")
-    return create_model(cls.__name__, __base__=FileTable, __doc__=cls.__doc__, **keys)
+    said = {"source": cls, "table": getattr(cls, "table", ""), "__doc__": cls.__doc__}
+    return type(cls.__name__, (FileTable,), {**keys, **said})
 
 
-def modules_of(cls: type[eqx.Module]) -> dict[str, type[eqx.Module]]:
-    """The fields that hold a Module, with its class: a curve, a material."""
-    found = {field.name: _module(_hint(cls, field)) for field in dataclasses.fields(cls) if field.init}
-    return {name: kind for name, kind in found.items() if kind is not None}
+def described(cls: type[eqx.Module]) -> Kind:
+    """A table that describes an object of a class of the library, or the name of a type; it is read as a `Part`.
+
+    Of an abstract class its `type` says which class derived from it is meant, or its name alone where that says all.
+    """
+    words = "the name of a type, or a table" if inspect.isabstract(cls) else "a table"
+    kind = either(text(empty=True), table(), words) if inspect.isabstract(cls) else table()
+    return Kind(words, lambda key, value: _parse(key, kind.read(key, value), cls), container=dict)
+
+
+def _parse(key: str, given: dict[str, Any] | str, cls: type[eqx.Module]) -> Part:
+    if inspect.isabstract(cls):
+        known = family(cls)
+        if isinstance(given, str):
+            check_known(key, given, known)
+            given = {"type": given}
+        name = given.get("type")
+        misspelt = difflib.get_close_matches("type", given, n=1)
+        if name is None and misspelt:
+            raise DesignFileError(join(key, misspelt[0]), 'unknown key, did you mean "type"?')
+        if name is None:
+            raise DesignFileError(join(key, "type"), f"missing, must be one of {', '.join(known)}")
+        if not isinstance(name, str) or name not in known:
+            raise DesignFileError(join(key, "type"), not_known(name, known))
+        cls, given = known[name], {other: value for other, value in given.items() if other != "type"}
+    return part_of(decode(key, given, section_of(cls)), cls)
+
+
+def part_of(section: FileTable, cls: type[eqx.Module], *, without: tuple[str, ...] = ()) -> Part:
+    """An object of a class from those keys of a table that are its fields, `without` some of them."""
+    numbers, names = fields_of(cls), {field.name for field in dataclasses.fields(cls)} - set(without)
+    given = {name: value for name, value in section.given().items() if name in names}
+    return Part(cls, {name: as_field(value, numbers.get(name)) for name, value in given.items()}, section.at)
+
+
+def built(section: FileTable) -> Any:
+    """The object of the library that a table of numbers describes."""
+    return part_of(section, section.source).build({})
+
+
+def as_field(value: Any, number: Number | None) -> Any:
+    """What a `Part` holds for a value: numbers are arrays."""
+    if isinstance(value, list):
+        return [as_field(item, number) for item in value]
+    if number is None or number.static:
+        return value
+    if isinstance(value, Free):
+        return dataclasses.replace(value, number=number)
+    return real_number(value) if value else value  # an amount of zero is known to do nothing only if it is not traced
 
 
 def family(base: type[eqx.Module], *, users: bool = True) -> dict[str, type[eqx.Module]]:
@@ -81,7 +207,7 @@ def family(base: type[eqx.Module], *, users: bool = True) -> dict[str, type[eqx.
         base: the abstract class.
         users: with those that are defined outside the library.
     """
-    classes = [cls for cls in _descendants(base) if _writable(cls)]
+    classes = [cls for cls in descendants(base) if _writable(cls)]
     layer = base.__module__.rpartition(".")[0]  # what another layer derives is a part of it, no choice of the user
     library = {snake(cls.__name__): cls for cls in classes if cls.__module__.startswith(layer)}
     own = {snake(cls.__name__): cls for cls in classes if not cls.__module__.startswith("jaxgear.")}
@@ -119,10 +245,8 @@ def _kind(cls, field: dataclasses.Field, most: int | None, open: bool) -> Kind |
     hint = _hint(cls, field)
     module = _module(hint)
     if module is not None:
-        if not inspect.isabstract(module):
-            return table()
         # what contains another of its family is made by the lists of the file
-        return None if issubclass(cls, module) else either(text(empty=True), table(), "the name of a type, or a table")
+        return None if inspect.isabstract(module) and issubclass(cls, module) else described(module)
     if typing.get_origin(hint) is typing.Literal:
         return choice(*typing.get_args(hint))
     plain = {bool: switch(), str: text(), int: real(Number(whole=True)), float: real()}
@@ -158,10 +282,12 @@ def _module(hint) -> type[eqx.Module] | None:
     return hint if isinstance(hint, type) and issubclass(hint, eqx.Module) else None
 
 
-def _descendants(base):
+def descendants(base: type) -> Iterator[Any]:
+    """All classes that are derived from one."""
+    cls: type
     for cls in base.__subclasses__():
         yield cls
-        yield from _descendants(cls)
+        yield from descendants(cls)
 
 
 def _writable(cls) -> bool:

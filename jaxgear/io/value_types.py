@@ -1,19 +1,20 @@
 """Types of values in a design file: what may stand after a key, how it is checked and how it is described.
 
-Pydantic finds its way through the tables and says where a value is wrong; these functions say what is wrong with it.
+What is wrong with a value is said in one line, with its full key.
 """
 
+import dataclasses
 import datetime
 import math
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic_core import CoreSchema, core_schema
-
 from ..numerics import Number, fields_of
 from ..tolerance import ToleranceClass
-from .errors import not_known
+from .errors import DesignFileError, join, not_known
+from .template import Free
 
 # Magnitudes that an engineer can mean, by unit: (least of a number that must be positive, most). Beyond them the number
 # or its unit is a slip, and arithmetic on it overflows or loses all digits.
@@ -36,6 +37,8 @@ def outside(number: Number, value: float, *, plausible: bool = True) -> str:
     if isinstance(value, float) and not math.isfinite(value):
         return f"{value} must be finite"
     shown = f"{_shortened(value)}{unit}"
+    if abs(value) > sys.float_info.max:  # a whole number, which no calculation can take
+        return f"{shown} must be at most {sys.float_info.max:g}"
     low, high = number.low, number.high
     if low is not None and (value <= low if number.open_low else value < low):
         return f"{shown} must be {allowed(number)}"
@@ -72,26 +75,21 @@ def allowed(number: Number) -> str:
     return " and ".join(parts)
 
 
-# Tags of alternatives; they are no part of a key.
-TAGS = ("<plain>", "<many>")
-
-
 @dataclass(frozen=True, eq=False)
 class Kind:
     """What may stand after a key.
 
     Attributes:
         words: what is allowed, for messages and the reference.
-        schema: for pydantic.
+        read: from a key and what stands after it to the value; raises a `DesignFileError` where that is not allowed.
         number: unit and range of the number or numbers; None for something else.
+        container: list or dict; None for a plain value.
     """
 
     words: str
-    schema: CoreSchema
+    read: Callable[[str, Any], Any]
     number: Number | None = None
-
-    def __get_pydantic_core_schema__(self, source, handler) -> CoreSchema:
-        return self.schema
+    container: type | None = None
 
 
 def real(limits: Number = Number(), *, open: bool = False, plausible: bool = True) -> Kind:
@@ -99,24 +97,24 @@ def real(limits: Number = Number(), *, open: bool = False, plausible: bool = Tru
 
     Args:
         limits: unit and range.
-        open: the name of a variable may stand for it.
+        open: the name of a variable may stand for it, which is read as `Free`.
         plausible: it must be of an engineer's range; otherwise that is checked later, once its unit is known.
     """
     words = "a whole number" if limits.whole else "a number"
     words += " or the name of a variable" if open else ""
 
-    def read(value: Any) -> Any:
+    def read(key: str, value: Any) -> Any:
         if open and isinstance(value, str) and value:
             if _is_number(value):
-                raise ValueError(not_of_kind("a number", value))
-            return value
+                raise DesignFileError(key, not_of_kind("a number", value))
+            return Free(value, key, limits)
         if isinstance(value, bool) or not isinstance(value, int if limits.whole else int | float):
-            raise ValueError(not_of_kind(words, value))
+            raise DesignFileError(key, not_of_kind(words, value))
         if problem := outside(limits, value, plausible=plausible):
-            raise ValueError(problem)
+            raise DesignFileError(key, problem)
         return value if limits.whole else float(value)
 
-    return _plain(words, read, limits)
+    return Kind(words, read, limits)
 
 
 def count(low: int, high: int) -> Kind:
@@ -131,80 +129,67 @@ def positive(unit: str) -> Kind:
 
 def text(*, empty: bool = False) -> Kind:
     """A string; `empty` allows the empty one."""
-
-    def read(value: Any) -> str:
-        if not isinstance(value, str):
-            raise ValueError(not_of_kind("a string", value))
-        if not value and not empty:
-            raise ValueError('"" is empty')
-        return value
-
-    return _plain("a string", read)
+    return _plain("a string", lambda value: _no_text(value) or ("" if value or empty else '"" is empty'))
 
 
 def switch() -> Kind:
     """True or false."""
-
-    def read(value: Any) -> bool:
-        if not isinstance(value, bool):
-            raise ValueError(not_of_kind("true or false", value))
-        return value
-
-    return _plain("true or false", read)
+    words = "true or false"
+    return _plain(words, lambda value: "" if isinstance(value, bool) else not_of_kind(words, value))
 
 
 def choice(*names: str) -> Kind:
     """One of several names."""
-
-    def read(value: Any) -> str:
-        if not isinstance(value, str):
-            raise ValueError(not_of_kind("a string", value))
-        if value not in names:
-            raise ValueError(not_known(value, names))
-        return value
-
-    return _plain("one of " + ", ".join(f'"{name}"' for name in names), read)
+    words = "one of " + ", ".join(f'"{name}"' for name in names)
+    return _plain(words, lambda value: _no_text(value) or ("" if value in names else not_known(value, names)))
 
 
 def list_of(item: Kind, *, length: int | None = None, empty: bool = False) -> Kind:
     """A list of a length, None for any; `empty` allows the empty one."""
-    least = 0 if empty else length or 1
-    schema = core_schema.list_schema(item.schema, min_length=least, max_length=length, strict=True)
-    return Kind(f"a list, each {item.words}", schema, item.number)
+
+    def read(key: str, value: Any) -> list[Any]:
+        _check_container(key, value, list, empty)
+        if length is not None and len(value) != length:
+            raise DesignFileError(key, f"must be a list of length {length}, not {len(value)}")
+        return [item.read(f"{key}[{index}]", each) for index, each in enumerate(value)]
+
+    return Kind(f"a list, each {item.words}", read, item.number, list)
 
 
 def rows_of(item: Kind) -> Kind:
     """A list of rows, lists that are as long as the first."""
     rows = list_of(list_of(item))
 
-    def even(value: list[list[Any]]) -> list[list[Any]]:
-        for number, row in enumerate(value):
-            if len(row) != len(value[0]):
-                raise ValueError(f"row {number} has {len(row)} numbers, must have {len(value[0])} as the first")
-        return value
+    def read(key: str, value: Any) -> list[list[Any]]:
+        found = rows.read(key, value)
+        for number, row in enumerate(found):
+            if len(row) != len(found[0]):
+                problem = f"row {number} has {len(row)} numbers, must have {len(found[0])} as the first"
+                raise DesignFileError(key, problem)
+        return found
 
-    return Kind(rows.words, core_schema.no_info_after_validator_function(even, rows.schema), item.number)
+    return dataclasses.replace(rows, read=read)
 
 
 def table(item: Kind | None = None) -> Kind:
     """A table with keys of its own and values of one kind; None for a table that is looked into later."""
-    keys = core_schema.str_schema()
-    if item is None:
-        return Kind("a table", core_schema.dict_schema(keys, strict=True))
-    return Kind("a table", core_schema.dict_schema(keys, item.schema, min_length=1, strict=True), item.number)
+
+    def read(key: str, value: Any) -> dict[str, Any]:
+        _check_container(key, value, dict, empty=item is None)
+        return value if item is None else {name: item.read(join(key, name), each) for name, each in value.items()}
+
+    return Kind("a table", read, None if item is None else item.number, dict)
 
 
 def either(plain: Kind, many: Kind, words: str) -> Kind:
     """A plain value, or a list or table."""
-    wanted, other = (list, dict) if many.schema["type"] == "list" else (dict, list)
 
-    def choose(value: Any) -> str | None:
-        return None if isinstance(value, other) else TAGS[isinstance(value, wanted)]
+    def read(key: str, value: Any) -> Any:
+        if isinstance(value, list | dict) and not isinstance(value, many.container or ()):
+            raise DesignFileError(key, f"must be {words}")
+        return (many if isinstance(value, list | dict) else plain).read(key, value)
 
-    message = f"must be {words}"
-    choices = dict(zip(TAGS, (plain.schema, many.schema)))
-    schema = core_schema.tagged_union_schema(choices, choose, custom_error_type="kind", custom_error_message=message)
-    return Kind(words, schema, plain.number)
+    return Kind(words, read, plain.number, many.container)
 
 
 def not_of_kind(wanted: str, value: Any) -> str:
@@ -212,9 +197,26 @@ def not_of_kind(wanted: str, value: Any) -> str:
     return f"must be {wanted}, not {_kind(value)}"
 
 
-def _plain(words: str, read: Callable[[Any], Any], number: Number | None = None) -> Kind:
-    """One value, as `read` returns it; what is wrong with it stands in the `ValueError` that it raises."""
-    return Kind(words, core_schema.no_info_plain_validator_function(read), number)
+def _plain(words: str, problem: Callable[[Any], str]) -> Kind:
+    """A value that is taken as it is, unless there is a problem with it."""
+
+    def read(key: str, value: Any) -> Any:
+        if found := problem(value):
+            raise DesignFileError(key, found)
+        return value
+
+    return Kind(words, read)
+
+
+def _no_text(value: Any) -> str:
+    return "" if isinstance(value, str) else not_of_kind("a string", value)
+
+
+def _check_container(key: str, value: Any, of: type, empty: bool) -> None:
+    if not isinstance(value, of):
+        raise DesignFileError(key, not_of_kind("a list" if of is list else "a table", value))
+    if not value and not empty:
+        raise DesignFileError(key, f"{value} is empty")
 
 
 def _is_number(value: str) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from ..contact import Mesh, prepare
 from ..geometry import GearPair
 from ..io import DesignFile, OptimizeRequest, optimize_request
-from ..io.schema import METHODS_WITHOUT_VARIABLES
+from ..io.optimize import METHODS_WITHOUT_VARIABLES, optimize_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import program
 from ..optimize import Front, Optimum
@@ -24,7 +24,7 @@ _POSITIONS, _PAIRS = "positions of the mesh", "pairs of the mesh"  # no names of
 
 def search_of(design: DesignFile, *, quick: bool) -> OptimizeRequest | None:
     """The search that the file asks for; None where its modifications are numbers and it names no method."""
-    if design.bounds or design.optimize.method in METHODS_WITHOUT_VARIABLES:
+    if design.bounds or optimize_of(design).method in METHODS_WITHOUT_VARIABLES:
         return optimize_request(design, quick=quick)
     return None
 
@@ -37,7 +37,7 @@ def first_mesh(design: DesignFile, torque: float, *, quick: bool) -> Mesh:
 
 def rule_based(design: DesignFile) -> AbstractModification:
     """The relief of ISO 6336-1 for both tips."""
-    return _iso_relief(design.pair(), np.asarray(design.torque), np.asarray(design.optimize.application_factor))
+    return _iso_relief(design.pair(), np.asarray(design.torque), np.asarray(optimize_of(design).application_factor))
 
 
 @program
@@ -109,7 +109,7 @@ def sought(
         optimum = found()
         return optimum.mesh, (optimum.pinion, optimum.wheel)
     lowest = design.design({name: low for name, (low, _) in design.bounds.items()})  # with what files hold
-    asked = name, quick, design.says, design.lubricant, design.strength
+    asked = name, quick, design.says, design.tables.get("lubricant"), design.tables.get("strength")
     kept = checkpoints.of(NamedArrays())((mesh, lowest, asked), lambda: _numbers(found()))
     numbers = {name: float(value) for name, value in kept.items()}
     sizes = dataclasses.replace(mesh.resolution, positions=int(numbers[_POSITIONS]), pairs=int(numbers[_PAIRS]))

@@ -38,7 +38,7 @@ def summary(
         "center_distance_mm": gears(file)["geometry"]["pair"]["center_distance_mm"],
         **_misalignment(mesh),
         **manufactured.tolerances(file),
-        **{name: _numbers(part) for name in ("lubricant", "strength") if (part := getattr(file, name)) is not None},
+        **{name: _numbers(part) for name in ("lubricant", "strength") if (part := file.tables.get(name)) is not None},
         "model": model(mesh),
         "designs": {
             name: {**_design(evaluations[name]), "findings": [finding_data(finding) for finding in several]}

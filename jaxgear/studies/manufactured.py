@@ -108,26 +108,24 @@ def _pairs(design: DesignFile, scatter: Scatter) -> str:
 
 def drawn(design: DesignFile, *, quick: bool) -> dict[str, int]:
     """How many manufactured pairs a design is judged by, and the seed of their deviations."""
-    assert design.tolerance is not None
-    samples = min(design.tolerance.samples, _QUICK_PAIRS) if quick else design.tolerance.samples
-    return {"samples": samples, "seed": design.tolerance.seed}
+    asked = design.tables["tolerance"]
+    return {"samples": min(asked.samples, _QUICK_PAIRS) if quick else asked.samples, "seed": asked.seed}
 
 
 def left_out(design: DesignFile, why: str = "") -> str:
     """That an analysis is of nominal gears though the file has tolerances; "" where it has none."""
-    if design.tolerance is None:
+    if "tolerance" not in design.tables:
         return ""
     return "[tolerance] is not part of this analysis, the gears are nominal" + f" ({why})" * bool(why)
 
 
 def tolerances(design: DesignFile) -> dict[str, Any]:
     """What the table [tolerance] says, as plain data."""
-    return {} if design.tolerance is None else {"tolerances": design.tolerance.given()}
+    return {"tolerances": design.tables["tolerance"].given()} if "tolerance" in design.tables else {}
 
 
 def pairs_in_words(design: DesignFile, count: int) -> str:
     """How many manufactured pairs of which class."""
-    assert design.tolerance is not None
-    classes = design.tolerance.quality_class
+    classes = design.tables["tolerance"].quality_class
     named = "/".join(map(str, classes)) if isinstance(classes, list) else str(classes)
     return f"{count} manufactured pairs of quality class {named}"

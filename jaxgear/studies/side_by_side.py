@@ -10,8 +10,8 @@ from jaxtyping import Array, Float
 from ..contact import Mesh
 from ..geometry import Gear
 from ..io import DesignFile, describe
-from ..io.requests import quality_classes
 from ..io.results import unit_of
+from ..io.tolerance import quality_classes
 from ..metrics import Finding, Quantity, findings_of
 from ..numerics import program
 from ..optimize import Verified
@@ -70,7 +70,7 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
 def findings(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, tuple[Finding, ...]]:
     """What is not usual of every design."""
     options: dict[str, Any] = {"torque_range": file.torque_range, "speed": file.speed, "friction": file.friction}
-    options |= {"compliance": mesh.compliance, "lubricant": file.lubricant}
+    options |= {"compliance": mesh.compliance, "lubricant": file.tables.get("lubricant")}
     found = {}
     for name, design in evaluations.items():
         options |= {"pinion": design.pinion, "wheel": design.wheel}

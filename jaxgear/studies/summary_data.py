@@ -18,7 +18,7 @@ from .version import version
 
 def identity(file: DesignFile) -> dict[str, Any]:
     """What every `summary.json` begins with."""
-    project = {"project": file.project} if file.project else {}
+    project = {"project": file.tables["project"].given()} if "project" in file.tables else {}
     return {"title": file.title, "design_file": file.path.name, **project}
 
 

@@ -155,8 +155,8 @@ class WearResult(AbstractStudyResult):
 
     def _shares(self) -> str:
         """Which shares of the revolutions the torques have."""
-        assert self.design.wear is not None and self.request.settings.loads is not None
-        if self.design.wear.weights is None:
+        assert self.request.settings.loads is not None
+        if self.design.tables["wear"].weights is None:
             return "each for the same share of the revolutions, the default without wear.weights"
         shares = self.request.settings.loads.weights.tolist()
         return "for " + ", ".join(f"{100 * share:.3g}" for share in shares) + " % of the revolutions"

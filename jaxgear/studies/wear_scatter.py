@@ -29,7 +29,7 @@ _SIDE_BY_SIDE = 32  # lives
 
 def left_out(design: DesignFile) -> str:
     """Why the scatter is not told where the file has tolerances; "" where it is."""
-    if design.wear is None or design.wear.line_load != "dynamic":
+    if "wear" not in design.tables or design.tables["wear"].line_load != "dynamic":
         return ""
     return manufactured.left_out(
         design,

@@ -188,6 +188,8 @@ class Tolerance(Checked):
         ValueError: for a negative or non-finite limit.
     """
 
+    table = "tolerance"
+
     pinion: GearTolerance = eqx.field(default_factory=GearTolerance)
     wheel: GearTolerance = eqx.field(default_factory=GearTolerance)
     misalignment: Scalar | None = number("um", low=0.0, optional=True, default=None)

@@ -12,10 +12,13 @@ from ..metrics import Quantity
 from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
 from ..tolerance import Tolerance
 from .design_file import DesignFile
-from .errors import DesignFileError, naming, referring, refuse_given, refused
-from .requests import load_of, quantity_named, tolerance_of
+from .errors import DesignFileError, naming, referring, refused
+from .named_quantities import quantity_named
 from .rows import read_variants
-from .schema import SweepSection
+from .table_keys import entry
+from .tables import FurtherTable, Rest
+from .tolerance import tolerance_of
+from .value_types import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, table, text
 
 # The keys that a kind of sampling takes, the first of which it needs; what another kind takes has no effect and is
 # refused.
@@ -26,6 +29,56 @@ _KEYS = {
     "list": ("file",),
 }
 _RESULTS = ("ppte", "max_flank_pressure", "effective_contact_ratio")
+
+
+_LEVELS = either(
+    LEVEL,
+    table(either(LEVEL, list_of(real()), "a whole number or a list of values")),
+    "a whole number, or a table with one entry per variable",
+)
+
+
+class SweepSection(FurtherTable):
+    """Variants to be evaluated by `jaxgear sweep`.
+
+    Attributes:
+        sampling: how they are spread over the bounds of the variables.
+        samples: number of variants, of "sobol" and "latin_hypercube".
+        seed: of the same.
+        levels: values per variable, of "full_factorial": one number, or a number or list of values per variable.
+        file: CSV or Parquet file of the variants, of "list".
+        torques: on the pinion; the design torque alone without it.
+        weights: of the torques.
+        results: quantities to be listed.
+        part_rows: variants per file of the table; without it there are about 64 files.
+    """
+
+    table = "sweep"
+
+    sampling: str = entry(choice("sobol", "latin_hypercube", "full_factorial", "list"), "sobol")
+    samples: int | None = entry(count(1, 2**40))
+    seed: int | None = entry(SEED)
+    levels: int | dict[str, int | list[float]] | None = entry(_LEVELS)
+    file: str | None = entry(text())
+    torques: list[float] | None = entry(list_of(positive("N m")))
+    weights: list[float] | None = entry(WEIGHTS)
+    results: list[str] | None = entry(list_of(text()))
+    part_rows: int | None = entry(count(1, 2**24))
+
+    def check_beside(self, rest: Rest) -> None:
+        """Refuses variants of nothing, and what another kind of sampling takes."""
+        if not rest.bounds:
+            raise DesignFileError("sweep", "has no effect without [variables]")
+        others = [key for key in ("samples", "seed", "levels", "file") if key not in _KEYS[self.sampling]]
+        self.refuse(others, f' with sampling = "{self.sampling}"')
+
+    def check(self, design: DesignFile) -> None:
+        """As a sweep does, but for a file of variants."""
+        _results(design, self)
+        _load(design, self)
+        needed = _KEYS[self.sampling][0]  # the command line may give it
+        if self.sampling != "list" and getattr(self, needed) is not None:
+            _plan(design, self)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,18 +121,16 @@ def sweep_request(design: DesignFile, *, samples: int | None = None, most: int |
 
 
 def _request(design: DesignFile, samples: int | None, most: int | None) -> SweepRequest:
-    section = design.sweep
-    if section is None:
-        raise DesignFileError("sweep", "missing; it says which variants to evaluate")
+    section = design.needed("sweep", "it says which variants to evaluate")
     if samples is not None:
         if "samples" not in _KEYS[section.sampling]:
             problem = f'"{section.sampling}" takes no number of samples from the command line'
             raise DesignFileError("sweep.sampling", problem)
-        section = section.model_copy(update={"samples": samples})
+        section = section.changed(samples=samples)
     if most is not None and section.samples is not None:
-        section = section.model_copy(update={"samples": min(section.samples, most)})
+        section = section.changed(samples=min(section.samples, most))
     results = _results(design, section)
-    tolerance = design.tolerance
+    tolerance = design.tables.get("tolerance")
     load, highest = _load(design, section)
     return SweepRequest(
         plan=_plan(design, section),
@@ -91,20 +142,6 @@ def _request(design: DesignFile, samples: int | None, most: int | None) -> Sweep
         samples=None if tolerance is None else tolerance.samples,
         seed=0 if tolerance is None else tolerance.seed,
     )
-
-
-def check_sweep(design: DesignFile, section: SweepSection) -> None:
-    """Checks the table [sweep] for commands that do not need it, but for a file of variants.
-
-    Raises:
-        DesignFileError: for anything that is wrong with it, in one line that names the key.
-    """
-    _results(design, section)
-    _load(design, section)
-    _check_keys(section)
-    needed = _KEYS[section.sampling][0]  # the command line may give it
-    if section.sampling != "list" and getattr(section, needed) is not None:
-        _plan(design, section)
 
 
 def _results(design: DesignFile, section: SweepSection) -> tuple[str | Quantity, ...]:
@@ -120,22 +157,16 @@ def _load(design: DesignFile, section: SweepSection):
     """The load and the highest torque."""
     variables = {free.key: free.name for free in design.open_case if free.key.startswith("load.")}
     if not variables:
-        load = load_of(design, "sweep", section)
+        load = design.spectrum(section)
         return load, float(np.max(load.torques))
     key, name = next(iter(variables.items()))
-    refuse_given("sweep", section, ["torques", "weights"], f', {key} is "{name}"')
+    section.refuse(["torques", "weights"], f', {key} is "{name}"')
     torque = variables.get("load.torque")
     return design.operating_point, design.torque if torque is None else design.bounds[torque][1]
 
 
-def _check_keys(section: SweepSection) -> None:
-    others = [key for key in ("samples", "seed", "levels", "file") if key not in _KEYS[section.sampling]]
-    refuse_given("sweep", section, others, f' with sampling = "{section.sampling}"')
-
-
 def _plan(design: DesignFile, section: SweepSection) -> AbstractPlan:
     kind = section.sampling
-    _check_keys(section)
     needed = _KEYS[kind][0]
     if getattr(section, needed) is None:
         raise DesignFileError(f"sweep.{needed}", f'missing, sampling = "{kind}" needs it')

@@ -24,56 +24,200 @@ from ..optimize.refine import POSITIONS
 from ..vocabulary import quantity_of
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import LIVES_AHEAD
-from . import schema
 from .design_file import DesignFile
-from .errors import DesignFileError, check_known, naming, refuse_given, refused, suggestion
-from .requests import load_of, quantity_named, tolerance_of
-from .table_keys import FileTable
-from .toml import decode
-from .value_types import outside
+from .errors import DesignFileError, check_known, naming, refused, suggestion
+from .model import FINITE_ELEMENTS
+from .named_quantities import quantity_named
+from .table_keys import FileTable, Key, entry, nested, section_of
+from .tables import FurtherTable, Rest
+from .tolerance import tolerance_of
+from .value_types import (
+    LEVEL,
+    SEED,
+    WEIGHTS,
+    choice,
+    count,
+    either,
+    list_of,
+    outside,
+    positive,
+    real,
+    switch,
+    table,
+    text,
+)
 
+# They seek the flanks themselves.
+METHODS_WITHOUT_VARIABLES = ("te_iteration", "free_form")
 CURVE = "cubic"  # on which flanks without parameters are projected
 PARETO = "pareto"
 
 
-def check_method(name: str) -> None:
+class ConstraintSection(FileTable):
+    """A limit, of either a quantity or a linear combination of variables.
+
+    Attributes:
+        of: name of a quantity.
+        variables: coefficient of every variable of the combination.
+        low: least value.
+        high: greatest value.
+    """
+
+    of: str | None = entry(text())
+    variables: dict[str, float] | None = entry(table(real()))
+    low: float | None = entry(real(plausible=False))
+    high: float | None = entry(real(plausible=False))
+
+
+class FactorialOptions(FileTable):
+    source = METHODS["factorial"]
+
+    levels: int | dict[str, int] | None = entry(
+        either(LEVEL, table(LEVEL), "a whole number, or a table with one entry per variable")
+    )
+
+
+class IterationOptions(FileTable):
+    source = iterate_transmission_error
+
+    start: str = entry(choice("unmodified", "given", "low_pressure"), "unmodified")
+    max_relief: float = entry(positive("um"), 7.0)
+    max_pressure: float | None = entry(positive("MPa"))
+    rtol: float | None = entry(positive(""))
+    steps: int | None = entry(count(1, 1000))
+    curve: str | None = entry(text())
+
+
+class FreeFormOptions(FileTable):
+    source = free_form
+
+    points: int | None = entry(count(4, 500))
+    max_relief: float | None = entry(positive("um"))
+    curvature: float | None = entry(real(Number(low=0.0)))
+    steps: int | None = entry(count(1, 10_000))
+    curve: str | None = entry(text())
+
+
+def method_options() -> dict[str, type[FileTable]]:
+    """The tables [optimize.<method>] of the methods that have one, of a user's own too: the fields of their classes."""
+    found = {name: section_of(cls, ("starts", "steps", "seed"), open=False) for name, cls in METHODS.items()}
+    found |= {"factorial": FactorialOptions, PARETO: section_of(Pareto)}
+    found |= {"te_iteration": IterationOptions, "free_form": FreeFormOptions}
+    return {name: section for name, section in found.items() if section.keys}
+
+
+class OptimizeSection(FurtherTable):
+    """A search for the best values of the variables, or for flanks without any; what `jaxgear optimize` does.
+
+    Attributes:
+        method: name of the method; "slp" without it.
+        objective: a quantity to be made small, or large where that is better; several for "pareto"; "ppte" without it.
+        measure: joins the cases of several torques or manufactured gears into one number; "mean" without it.
+        level: of the measures "quantile" and "cvar".
+        torques: on the pinion; the design torque alone without it.
+        weights: of the torques.
+        manufactured: pairs of manufactured gears under every torque; needs [tolerance].
+        seed: of random searches and of the manufactured gears.
+        starts: searches, of methods "slp", "adam" and "lbfgs".
+        steps: most steps of every search, of the same methods.
+        application_factor: K_A of the rule-based relief.
+        verify: whether the designs are evaluated with the finite-element structure too; without it they are where the
+            gears can be meshed. A quick run never does.
+        constraint: limits of quantities or of combinations of variables.
+    """
+
+    table = "optimize"
+
+    method: str | None = entry(text())
+    objective: str | list[str] | None = entry(either(text(), list_of(text()), "a string or a list of strings"))
+    measure: str | None = entry(choice("mean", "worst", "quantile", "cvar"))
+    level: float | None = entry(real(Number(low=0.0, high=1.0, open_low=True, open_high=True)))
+    torques: list[float] | None = entry(list_of(positive("N m")))
+    weights: list[float] | None = entry(WEIGHTS)
+    manufactured: int | None = entry(count(1, 10_000))
+    seed: int | None = entry(SEED)
+    starts: int | None = entry(count(1, 4096))
+    steps: int | None = entry(count(10, 100_000))
+    application_factor: float = entry(real(Number(low=0.0, high=100.0, open_low=True)), 1.0)
+    verify: bool | None = entry(switch())
+    constraint: list[ConstraintSection] = entry(list_of(nested(ConstraintSection), empty=True), [])
+
+    @classmethod
+    def now(cls) -> "type[OptimizeSection]":
+        """With the options of the methods that are known by now."""
+        options = method_options().items()
+        keys = {name: Key(nested(section), meaning="options of the method.") for name, section in options}
+        return type(cls.__name__, (OptimizeSection,), {**keys, "__doc__": OptimizeSection.__doc__, "made": True})
+
+    def check_beside(self, rest: Rest) -> None:
+        """Refuses a search without variables, one by manufactured gears without tolerances, and a needless check."""
+        if not rest.bounds and self.method not in METHODS_WITHOUT_VARIABLES:
+            raise DesignFileError("optimize", "has no effect without [variables]")
+        if self.verify and rest.model.structure == FINITE_ELEMENTS:
+            raise DesignFileError("optimize.verify", f'has no effect with model.structure = "{FINITE_ELEMENTS}"')
+        if self.manufactured is not None and "tolerance" not in rest.names:
+            raise DesignFileError("optimize.manufactured", "needs the table [tolerance]")
+
+    def check(self, design: DesignFile) -> None:
+        """As a search does, whatever method the command line asks for."""
+        _check_method(self.method or _DEFAULT_METHOD)
+        for name in method_options():
+            if self.given().get(name) is not None:
+                _check_options(design, name, self.options(name))
+        _objectives(design, self)
+        _measure(self)
+        _constraints(design, self)
+        design.spectrum(self)
+
+    def options(self, method: str) -> dict[str, Any]:
+        """Those of a method, with the defaults of its keys."""
+        section = getattr(self, method, None) or method_options().get(method, FileTable)("")
+        return {name: value for name in section.keys if (value := getattr(section, name)) is not None}
+
+    @classmethod
+    def inner(cls) -> dict[str, type[FileTable]]:
+        """Constraints, and options of the methods."""
+        options = {f"[optimize.{name}]": section for name, section in method_options().items()}
+        return {"[[optimize.constraint]]": ConstraintSection, **options}
+
+
+def optimize_of(design: DesignFile) -> OptimizeSection:
+    """The table [optimize], with its defaults where the file has none."""
+    return design.tables.get("optimize") or OptimizeSection("optimize")
+
+
+def _check_method(name: str) -> None:
     """Refuses a name that is no method."""
-    check_known("optimize.method", name, (*METHODS, PARETO, *schema.METHODS_WITHOUT_VARIABLES))
+    check_known("optimize.method", name, (*METHODS, PARETO, *METHODS_WITHOUT_VARIABLES))
 
 
-def made_by(name: str) -> type[Any]:
+def _made_by(name: str) -> type[Any]:
     """The class of a method with variables."""
     return Pareto if name == PARETO else METHODS[name]
 
 
-def check_options(design: DesignFile, name: str, options: Mapping[str, Any]) -> None:
+def _check_options(design: DesignFile, name: str, options: Mapping[str, Any]) -> None:
     """Whether a method with variables can be made of its options, and a method without them of its curve."""
-    if name in schema.METHODS_WITHOUT_VARIABLES:
+    if name in METHODS_WITHOUT_VARIABLES:
         check_known(f"optimize.{name}.curve", options.get("curve", CURVE), CURVES)
         return
     levels = options.get("levels")
     if isinstance(levels, dict) and set(levels) != set(design.bounds):
         problem = f"must name all variables and nothing else: {', '.join(design.bounds)}"
         raise DesignFileError("optimize.factorial.levels", problem)
-    refused(f"optimize.{name}", made_by(name), **options)
+    refused(f"optimize.{name}", _made_by(name), **options)
 
 
-def tables(section: schema.OptimizeSection) -> dict[str, FileTable]:
-    """The tables of all methods, decoded."""
-    layouts = schema.method_options().items()
-    return {key: decode(f"optimize.{key}", getattr(section, key) or {}, layout) for key, layout in layouts}
-
-
-def options_of(section: schema.OptimizeSection, name: str, *, of_the_file: bool) -> dict[str, Any]:
+def _options_of(section: OptimizeSection, name: str, *, of_the_file: bool) -> dict[str, Any]:
     """The options of a method; the file may name others where it is not the file that asks for the method."""
-    options = {key: value for key, value in tables(section).get(name, ()) if value is not None}
+    options = section.options(name)
     shared = {"starts": section.starts, "steps": section.steps, "seed": section.seed or 0}
     taken = {field.name for field in dataclasses.fields(METHODS[name])} if name in METHODS else set()
     if of_the_file:
         why = f' with method "{name}"'
-        refuse_given("optimize", section, [key for key in ("starts", "steps") if key not in taken], why)
+        section.refuse([key for key in ("starts", "steps") if key not in taken], why)
         if "seed" not in taken and section.manufactured is None:
-            refuse_given("optimize", section, ["seed"], f"{why} and nominal gears")
+            section.refuse(["seed"], f"{why} and nominal gears")
     return options | {key: value for key, value in shared.items() if key in taken and value is not None}
 
 
@@ -134,7 +278,7 @@ class OptimizeRequest:
         if self.method not in METHODS or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
             return None
         kept = {name: value for name, value in self._common.items() if name in ("constraints", "seed")}
-        kept |= {"torque": load_of(self._design, "optimize", schema.OptimizeSection()), "positions": None}
+        kept |= {"torque": self._design.spectrum(OptimizeSection("optimize")), "positions": None}
         kept |= {"objective": settings.quantity(_LASTING), "method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE)}
         return dataclasses.replace(self, method=_DEFAULT_METHOD, _common=kept)
 
@@ -173,36 +317,17 @@ def optimize_request(design: DesignFile, *, method: str | None = None, quick: bo
         return _request(design, method, quick)
 
 
-def check_optimize(design: DesignFile) -> None:
-    """Checks the table [optimize] for commands that do not need it, whatever method the command line asks for.
-
-    Raises:
-        DesignFileError: for anything that is wrong with it, in one line that names the key.
-    """
-    section = design.optimize
-    check_method(section.method or _DEFAULT_METHOD)
-    for name, options in tables(section).items():
-        if options.model_fields_set:
-            check_options(design, name, options.given())
-    _objectives(design, section)
-    _measure(section)
-    _constraints(design, section)
-    load_of(design, "optimize", section)
-    if section.manufactured is not None and design.tolerance is None:
-        raise DesignFileError("optimize.manufactured", "needs the table [tolerance]")
-
-
 def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeRequest:
-    section = design.optimize
+    section = optimize_of(design)
     name = method or section.method or _DEFAULT_METHOD
-    flanks_alone = name in schema.METHODS_WITHOUT_VARIABLES
-    check_method(name)
+    flanks_alone = name in METHODS_WITHOUT_VARIABLES
+    _check_method(name)
     if not design.bounds and not flanks_alone:
         raise DesignFileError("variables", "missing, nothing to optimize; use jaxgear analyze")
     for free in design.open_case:
         raise DesignFileError(free.key, f'"{free.name}" is a variable, which a sweep alone can vary here')
-    options = options_of(section, name, of_the_file=method is None)
-    check_options(design, name, options)
+    options = _options_of(section, name, of_the_file=method is None)
+    _check_options(design, name, options)
     curve = options.pop("curve", CURVE) if flanks_alone else None
     verify = False if quick else section.verify
     common = _common(design, section, name, quick)
@@ -215,67 +340,64 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
     elif name == "free_form":
         common |= options | fewer
     else:
-        common["method"] = made_by(name)(**options | fewer)
+        common["method"] = _made_by(name)(**options | fewer)
     if quick:  # a quick look stays on its mesh
         common["positions"] = None
     return OptimizeRequest(name, curve, verify, design, common)
 
 
-def _common(design: DesignFile, section: schema.OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
+def _common(design: DesignFile, section: OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
     """Objective, cases and constraints."""
     found: dict[str, Any] = {
         **_objective(design, section, name),
-        "torque": load_of(design, "optimize", section),
+        "torque": design.spectrum(section),
         "measure": _measure(section),
         "constraints": _constraints(design, section),
         "seed": section.seed or 0,
     }
     if section.manufactured is not None:
-        if design.tolerance is None:
-            raise DesignFileError("optimize.manufactured", "needs the table [tolerance]")
         found["tolerance"] = tolerance_of(design)
         found["samples"] = min(section.manufactured, _QUICK_GEARS) if quick else section.manufactured
     return found
 
 
 def _objectives(
-    design: DesignFile, section: schema.OptimizeSection, default: tuple[str, ...] = ()
+    design: DesignFile, section: OptimizeSection, default: tuple[str, ...] = ()
 ) -> tuple[str | Quantity, ...]:
     asked = section.objective or default
     named = (asked,) if isinstance(asked, str) else tuple(asked)
     return tuple(quantity_named(design, "optimize.objective", each) for each in named)
 
 
-def _objective(design: DesignFile, section: schema.OptimizeSection, name: str) -> dict[str, Any]:
+def _objective(design: DesignFile, section: OptimizeSection, name: str) -> dict[str, Any]:
     """What the function of a method takes for the objective; nothing where it knows its own."""
     objectives = _objectives(design, section, _FRONT if name == PARETO else ("ppte",))
     if (len(objectives) > 1) != (name == PARETO):
         problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
         raise DesignFileError("optimize.objective", problem)
-    if name in schema.METHODS_WITHOUT_VARIABLES:
+    if name in METHODS_WITHOUT_VARIABLES:
         if objectives != ("ppte",):
             raise DesignFileError("optimize.objective", f'must be "ppte" with method "{name}"')
         return {}
     return {"objectives": objectives} if name == PARETO else {"objective": objectives[0]}
 
 
-def _measure(section: schema.OptimizeSection) -> AbstractMeasure:
+def _measure(section: OptimizeSection) -> AbstractMeasure:
     kind = section.measure or "mean"
     if section.torques is None and section.manufactured is None:
         why = " on a single case: give optimize.torques or optimize.manufactured"
-        refuse_given("optimize", section, ["measure"], why)
+        section.refuse(["measure"], why)
     if kind not in _WITH_LEVEL:
-        refuse_given("optimize", section, ["level"], f' with measure = "{kind}"')
+        section.refuse(["level"], f' with measure = "{kind}"')
     return _MEASURES[kind]() if section.level is None else _MEASURES[kind](section.level)
 
 
-def _constraints(design: DesignFile, section: schema.OptimizeSection) -> tuple[Constraint, ...]:
-    return tuple(_constraint(design, number, each) for number, each in enumerate(section.constraint))
+def _constraints(design: DesignFile, section: OptimizeSection) -> tuple[Constraint, ...]:
+    return tuple(_constraint(design, each) for each in section.constraint)
 
 
-def _constraint(design: DesignFile, number: int, table: schema.Tables) -> Constraint:
-    key = f"optimize.constraint[{number}]"
-    section = decode(key, table, schema.ConstraintSection)
+def _constraint(design: DesignFile, section: ConstraintSection) -> Constraint:
+    key = section.at
     of: Any = section.variables if section.of is None else section.of
     unit = ""
     if of is None or (section.of is not None and section.variables is not None):
@@ -298,18 +420,18 @@ def _constraint(design: DesignFile, number: int, table: schema.Tables) -> Constr
 def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:
     """A life to a limit is known for so many of the lives that are looked at: no design can be shown to last longer."""
     lives = {"life_to_ppte": 1.0, "life_to_depth": LIVES_AHEAD}
-    if design.wear is None or low is None or not (isinstance(of, Quantity) and of.name in lives):
+    if low is None or not (isinstance(of, Quantity) and of.name in lives):
         return
-    looked_at = design.wear.revolutions
+    looked_at = design.tables["wear"].revolutions  # or there were no such quantity
     if low > lives[of.name] * looked_at:
         most = f"{lives[of.name] * looked_at:g}, the end of the searched range"
         raise DesignFileError(key, f"{low:g} must be at most {most}: wear.revolutions = {looked_at:g}")
 
 
-def _check_iteration(design: DesignFile, start: str, section: schema.OptimizeSection) -> None:
+def _check_iteration(design: DesignFile, start: str, section: OptimizeSection) -> None:
     """The iteration levels the transmission error at the design torque and knows nothing else."""
     keys = ("measure", "level", "torques", "weights", "manufactured", "constraint")
-    refuse_given("optimize", section, keys, ' with method "te_iteration"')
+    section.refuse(keys, ' with method "te_iteration"')
     if start == "given" and design.bounds:
         problem = '"given" needs numbers in the modifications, these are free: ' + ", ".join(design.bounds)
         raise DesignFileError("optimize.te_iteration.start", problem)

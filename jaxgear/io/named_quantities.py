@@ -1,0 +1,94 @@
+"""The names of quantities in a design file, some of which need one of its tables."""
+
+from collections.abc import Iterator
+
+from ..dynamics import Dynamics
+from ..dynamics.quantities import AT_SPEED
+from ..metrics import Quantity
+from ..vocabulary import quantities
+from ..wear import Wear
+from .design_file import DesignFile
+from .dynamics import dynamics_of
+from .errors import DesignFileError, check_known
+from .wear import wear_of
+
+
+def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
+    """What a name of the vocabulary means in a design file: some quantities come with settings of one of its tables.
+
+    Args:
+        design: the design file.
+        key: where the name stands.
+        name: in either spelling.
+
+    Raises:
+        DesignFileError: for an unknown name, and for one that needs a table or a key that the file does not have.
+    """
+    check_known(key, name, quantities)
+    quantity = quantities[name]
+    if quantity.takes is None:
+        return name
+    missing = _missing(design, quantity)
+    if missing:
+        raise DesignFileError(key, f'"{quantity.name}" needs {missing}')
+    if quantity.takes is Dynamics:
+        return dynamic_quantity(design, key, quantity)
+    if quantity.takes is Wear:
+        return wear_quantity(design, quantity)
+    settings = design.tables.get(quantity.takes.table)
+    return name if settings is None else quantity.with_settings(settings)
+
+
+def quantities_of_tables(design: DesignFile) -> Iterator[Quantity]:
+    """All quantities of settings but of vibration and wear, as far as a design file tells what they need."""
+    for quantity in quantities.values():
+        if quantity.takes in (None, Dynamics, Wear) or _missing(design, quantity):
+            continue
+        settings = design.tables.get(quantity.takes.table)
+        yield quantity if settings is None else quantity.with_settings(settings)
+
+
+def _missing(design: DesignFile, quantity: Quantity) -> str:
+    """What a design file lacks for a quantity of one of its tables; "" for nothing."""
+    assert quantity.takes is not None
+    table, settings = quantity.takes.table, design.tables.get(quantity.takes.table)
+    if quantity.needs == "dynamics":  # which other settings hold, and a file has a table for
+        known = (settings, f"the table [{table}]"), (design.tables.get("dynamics"), "the table [dynamics]")
+        for of, name in known:
+            if of is None:
+                return name
+        speeds = getattr(design.tables.get("wear"), "speeds", None)  # the only such settings that have their own
+        return "" if design.speed is not None or speeds else "load.speed"
+    if settings is not None:
+        unset = quantity.needs and getattr(settings, quantity.needs) is None
+        return f"{table}.{quantity.needs}" if unset else ""
+    if quantity.without is None:
+        return f"the table [{table}]"
+    for name in quantity.without:
+        if getattr(design, name) is None:
+            return f"load.{name}" + (f" or the table [{table}]" if name != "speed" else "")
+    return ""
+
+
+def dynamic_quantity(design: DesignFile, key: str, quantity: Quantity) -> Quantity:
+    """A dynamic quantity with the settings of the table [dynamics], which is there.
+
+    Raises:
+        DesignFileError: without a speed that the quantity needs.
+    """
+    name = quantity.name
+    if name in AT_SPEED and design.speed is None:
+        raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{name}" is that of all speeds of [dynamics]')
+    return quantity.with_settings(dynamics_of(design))
+
+
+def wear_quantity(design: DesignFile, quantity: Quantity) -> Quantity:
+    """A quantity of worn flanks with the settings of the table [wear], which has what the quantity needs."""
+    section = design.tables["wear"]  # `quantity_named` has looked
+    if section.largest_increment is not None and section.blocks is None:
+        problem = (
+            f'missing, "{quantity.name}" needs it: wear.largest_increment is for the lives of `jaxgear wear` alone'
+        )
+        raise DesignFileError("wear.blocks", problem)
+    vibrates = quantity.needs == "dynamics" or section.line_load == "dynamic"
+    return quantity.with_settings(wear_of(design, vibrates=vibrates))

@@ -1,0 +1,188 @@
+"""The tables of a design file: those of every file, and further ones, each by a class that says its name.
+
+A class with the attribute `table = "name"` is the table [name], and is known to design files without being listed: one
+derived from `FurtherTable`, or a class of settings derived from `Checked`, of the library or of a user's own module.
+`DesignFile.tables["name"]` is then an object of it.
+"""
+
+import functools
+import inspect
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from ..contact import OperatingPoint
+from ..numerics import Checked, Number
+from .errors import DesignFileError, join, referring
+from .model import ModelSection
+from .table_keys import FileTable, built, decode, descendants, entry, section_of
+from .template import Free
+from .toml import read
+from .value_types import list_of, positive, real, text
+
+FILE = "file"  # key of a table that stands in a file of its own
+
+
+class LoadSection(section_of(OperatingPoint)):  # type: ignore[misc]
+    """Under what the pair runs.
+
+    Attributes:
+        torque: design torque on the pinion.
+        torque_range: lowest and highest torque of interest; half and twice the design torque without it.
+        speed: of the pinion, for temperatures, film and loss.
+        friction: mean coefficient of friction, for efficiency and, with a speed, loss and temperatures; in place of the
+            law of [lubricant].
+    """
+
+    torque: float | Free = entry(real(Number("N m", low=0.0, open_low=True), open=True), ...)
+    torque_range: list[float] | None = entry(list_of(positive("N m"), length=2))
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What every file says, as far as the rules of further tables look at it.
+
+    Attributes:
+        folder: of the file, in which paths begin.
+        names: of the tables that the file has.
+        load: the table of that name.
+        model: likewise.
+        bounds: (low, high) of every free parameter.
+        quality_classes: flank tolerance classes of both gears; None where they have none.
+    """
+
+    folder: Path
+    names: Sequence[str]
+    load: LoadSection
+    model: ModelSection
+    bounds: Mapping[str, tuple[float, float]]
+    quality_classes: list[int] | None
+
+
+class FurtherTable(FileTable):
+    """A table that a file may have besides those of gears, load and model.
+
+    Attributes:
+        made: of another class, which is found in its place.
+    """
+
+    made: ClassVar[bool] = False
+
+    @classmethod
+    def now(cls) -> type[Self]:
+        """The class with the keys that are known by now; itself where these do not change."""
+        return cls
+
+    @classmethod
+    def read(cls, given: Mapping[str, Any], rest: Rest) -> Any:
+        """What `DesignFile.tables` holds for the table: an object of this class.
+
+        Args:
+            given: the table as it stands in the file.
+            rest: of the file.
+
+        Raises:
+            DesignFileError: for anything that is wrong with it, in one line that names the key.
+        """
+        section = decode(cls.table, given, cls)
+        section.check_beside(rest)
+        return section
+
+    def check_beside(self, rest: Rest) -> None:
+        """Raises a `DesignFileError` where the table does not go together with the rest of the file."""
+
+    def check(self, design: Any) -> None:
+        """Raises a `DesignFileError` for what is wrong with the table in a design file that is read otherwise."""
+
+    @classmethod
+    def inner(cls) -> Mapping[str, type[FileTable]]:
+        """Tables within it, by their headings in the reference."""
+        return {}
+
+
+class SettingsTable(FurtherTable):
+    """A table whose keys are the fields of a class of settings, of which `DesignFile.tables` holds an object.
+
+    Attributes:
+        file: TOML file beside the design file, with any of the other keys; no key stands in both.
+    """
+
+    file: str | None = entry(text())
+
+    @classmethod
+    def read(cls, given: Mapping[str, Any], rest: Rest) -> Any:
+        """The settings, see `FurtherTable.read`."""
+        section = cls._whole(given, rest.folder)
+        section.check_beside(rest)
+        return built(section)
+
+    @classmethod
+    def _whole(cls, given: Mapping[str, Any], folder: Path) -> Self:
+        """A table with what stands in its file."""
+        name = decode(cls.table, {FILE: given[FILE]} if FILE in given else {}, SettingsTable).file
+        if name is None:
+            return decode(cls.table, given, cls)
+        with referring(f"{cls.table}.{FILE}", name):
+            held: dict[str, Any] = read(folder / name)
+        for twice in held.keys() & given.keys():
+            raise DesignFileError(join(cls.table, twice), f"stands in {name} too")
+        try:
+            return decode(cls.table, {**held, **given}, cls)
+        except DesignFileError as error:
+            own = error.key.removeprefix(f"{cls.table}.")
+            if own.partition("[")[0] in held:
+                raise DesignFileError(f"{cls.table}.{FILE}", f"{name}: {own}: {error.problem}") from None
+            raise
+
+
+def further_tables(*, users: bool = True) -> dict[str, type[FurtherTable]]:
+    """The further tables by their names.
+
+    A user's class cannot take the place of one of the library; of two of his own with one name the later is meant.
+
+    Args:
+        users: with those that are defined outside the library.
+    """
+    found = [cls for base in (Checked, FurtherTable) for cls in descendants(base) if _names_a_table(cls)]
+    library = {cls.table: cls for cls in found if cls.__module__.startswith("jaxgear.")}
+    own = {cls.table: cls for cls in found if users and cls.table not in library}
+    return {name: _table_of(cls).now() for name, cls in sorted((library | own).items())}
+
+
+def _names_a_table(cls: Any) -> bool:
+    """Whether a class is a further table: not by what it is derived from, nor by what it is made of."""
+    own = cls.table if issubclass(cls, FurtherTable) and not cls.made else vars(cls).get("table")
+    return bool(own) and isinstance(own, str) and not inspect.isabstract(cls)
+
+
+@functools.cache
+def _table_of(cls: Any) -> type[FurtherTable]:
+    """The table of a class of settings, which knows nothing of design files, or of one that does."""
+    if issubclass(cls, FurtherTable):
+        return cls
+    return type(cls.__name__, (SettingsTable, section_of(cls, open=False)), {"__doc__": cls.__doc__, "made": True})
+
+
+class ProjectSection(FurtherTable):
+    """Whose gears these are: texts that stand in the head of the report and in `summary.json`.
+
+    Attributes:
+        name: of the project.
+        number: of the project or order.
+        customer: for whom it is.
+        drawing: number of the drawing.
+        revision: of the drawing.
+        author: who made the design.
+        remark: what else is to stand there.
+    """
+
+    table = "project"
+
+    name: str | None = entry(text())
+    number: str | None = entry(text())
+    customer: str | None = entry(text())
+    drawing: str | None = entry(text())
+    revision: str | None = entry(text())
+    author: str | None = entry(text())
+    remark: str | None = entry(text())
