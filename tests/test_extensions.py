@@ -16,7 +16,7 @@ from jaxtyping import Array
 
 import jaxgear as jg
 from jaxgear.compliance import AbstractCompliance, ContactGeometry, Plane
-from jaxgear.io import DesignFileError, describe, optimize_request
+from jaxgear.io import DesignFileError, describe, optimize_request, quantities_of_tables, sweep_request
 from jaxgear.metrics import AbstractSettings, Quantity
 from jaxgear.microgeometry import AbstractCurve, AbstractModification
 from jaxgear.numerics import AbstractSpring, Checked, number
@@ -25,6 +25,7 @@ from jaxgear.numerics.reductions import Harmonic
 from jaxgear.vocabulary import quantities
 
 ROLL_LENGTH = np.linspace(0.0, 60.0, 13)
+FREE_TIP = {"pinion": 'modification = [{ type = "tip_relief", amount = "a", length = 4.0 }]'}
 BY_FACTORIAL = FREE.replace("starts = 2\nsteps = 100", 'method = "factorial"')
 
 
@@ -183,16 +184,39 @@ class Microphone(AbstractSettings):
     distance: jax.Array = number("m", low=0.0, open_low=True)
 
 
-def test_a_quantity_of_own_settings_is_swept_limited_and_compiled_once(monkeypatch):
-    """Other settings compile nothing, and a gradient goes through them."""
-    traced = []
+@pytest.fixture
+def traced(monkeypatch):
+    """The settings that a quantity of them is traced with, which the vocabulary has until the end of the test."""
+    seen = []
 
     def level(analysis, microphone):
-        traced.append(microphone)
+        seen.append(microphone)
         return jg.peak_to_peak(analysis.cycle.transmission_error) / microphone.distance
 
     monkeypatch.setattr(quantities, "_known", dict(quantities._known))
-    quantities.add(Quantity("level", level, "um/m", takes=Microphone, needs="distance"))
+    quantities.add(Quantity("level", level, "um/m", takes=Microphone, label="sound level"))
+    return seen
+
+
+def test_design_files_know_a_quantity_of_own_settings(traced, load):
+    """As result of a sweep, objective, limit, and number of the table of designs."""
+    asked = "[variables]\na = { low = 0.0, high = 9.0 }\n"
+    asked += '[sweep]\nsamples = 8\nresults = ["level"]\n'
+    asked += '[optimize]\nobjective = "level"\nconstraint = [{ of = "level", high = 9.0 }]\n'
+    design = load(text(**FREE_TIP, tail=f"[microphone]\ndistance = 0.5\n{asked}"))
+    (result,) = sweep_request(design).results
+    request = optimize_request(design)
+    asked_for = request._common
+    (limit,) = asked_for["constraints"]
+    known = {quantity.name: quantity for quantity in quantities_of_tables(design)}
+    for quantity in (result, asked_for["objective"], limit.quantity, known["level"]):
+        assert float(quantity.settings.distance) == 0.5 and quantity.heading == "sound level [um/m]"
+    with pytest.raises(DesignFileError, match=r'optimize.objective: "level" needs the table \[microphone\]'):
+        load(text(**FREE_TIP, tail=asked))
+
+
+def test_a_quantity_of_own_settings_is_swept_limited_and_compiled_once(traced):
+    """Other settings compile nothing, and a gradient goes through them."""
     mesh = jg.prepare(gear_pair(), resolution=LINE)
     plan = jg.VariantList(["amount"], [[0.0], [6.0]])
 
