@@ -122,6 +122,26 @@ def test_no_import_hides_a_circle():
     assert {path: names for path, names in found.items() if names} == {}
 
 
+# what is imported by a name that is data
+BY_NAME = {
+    "cli/run.py": "libraries that a study will need, in another thread",
+    "studies/registry.py": "studies, those of other packages by their entry points",
+}
+
+
+def test_nothing_else_is_imported_by_its_name():
+    """No module of the package, and no class of it is named in a string."""
+    sources = {path.relative_to(PACKAGE).as_posix(): path.read_text(encoding="utf-8") for path in FILES}
+    assert {place for place, source in sources.items() if "import_module" in source} == set(BY_NAME)
+    texts = {
+        node.value
+        for path in FILES
+        for node in nodes(path)[0]
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.startswith("jaxgear.")
+    }
+    assert [text for text in texts if any(part[:1].isupper() for part in text.split("."))] == []
+
+
 def test_the_check_sees_imports():
     assert {"geometry", "numerics"} <= set(imported(PACKAGE / "contact" / "mesh.py"))
 

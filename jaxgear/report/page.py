@@ -2,10 +2,10 @@
 
 import base64
 import hashlib
-import importlib
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from unicodedata import category
 
@@ -28,10 +28,8 @@ def needed(*modules: str) -> None:
         ValueError: for the first that is not installed.
     """
     for module in modules:
-        try:
-            importlib.import_module(module)
-        except ImportError:
-            raise ValueError(f"--report needs the library {module}: pip install 'jaxgear[report]'") from None
+        if find_spec(module) is None:
+            raise ValueError(f"--report needs the library {module}: pip install 'jaxgear[report]'")
 
 
 @dataclass(frozen=True)
