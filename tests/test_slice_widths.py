@@ -447,7 +447,7 @@ def test_few_slices_over_an_end_relief_are_a_finding(mesh):
 
     def shown(*relief):
         found = findings_of(cycle, pinion=jg.EndRelief(10.0, *relief))
-        return [finding.value for finding in found if finding.name == "slices over the end relief"]
+        return [finding.value for finding in found if finding.key == "slices over the end relief"]
 
     assert shown(3.6) == [1.5] and shown(5.4) == [] and shown(1.8) == [1.0]
     assert shown(5.3, jg.Linear(), "positive") == [pytest.approx(1 + 3.5 / 3.6, abs=1e-6)]

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxgear as jg
+from jaxgear.contact.status import Status
 from jaxgear.dynamics import Dynamics, ForceMap, Oscillator, torsional
 
 TORQUE = 200.0  # N m
@@ -47,8 +48,8 @@ def imagined(torque=TORQUE, positions=POSITIONS) -> Oscillator:
     force = stiffness * deflection * (1 + _STIFFENING * deflection)
     slope = stiffness * (1 + 2 * _STIFFENING * deflection)
     touching = np.stack([np.sin(turn), _CLEARANCE + np.sin(turn)])
-    tables = 0.0, touching, _REACH, np.stack([force, force]), np.stack([slope, slope]), True
-    made = ForceMap(*(jnp.asarray(part) for part in tables))
+    tables = 0.0, touching, _REACH, np.stack([force, force]), np.stack([slope, slope])
+    made = ForceMap(*(jnp.asarray(part) for part in tables), jnp.asarray(Status.CONVERGED.value, jnp.int8))
     return torsional(made, pair=gears(), torque=torque, inertias=(_INERTIA, _INERTIA), damping_ratio=DAMPING_RATIO)
 
 

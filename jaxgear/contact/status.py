@@ -49,12 +49,12 @@ class WithStatus:
     status: Any
 
     @property
-    def converged(self) -> Bool[Array, "..."]:
+    def converged(self) -> Bool[Array | np.ndarray, "..."] | bool | np.bool_:
         """Where the status is `Status.CONVERGED`, bools of its shape."""
         return self.status == Status.CONVERGED.value
 
 
-def status_of(causes: Mapping[Status, Bool[Array, "..."] | bool], *parts: Statuses) -> Statuses:
+def status_of(causes: Mapping[Status, Bool[Array | np.ndarray, "..."] | bool], *parts: Statuses) -> Statuses:
     """The status of a result; `CONVERGED` where there is none of the causes.
 
     Args:

@@ -134,6 +134,10 @@ class Quantity(eqx.Module):
         """1 where small values are the better ones, else -1."""
         return 1 if self.better == "smaller" else -1
 
+    def __repr__(self) -> str:
+        given = "" if self.settings is None else f", settings={self.settings!r}"
+        return f"Quantity({self.named!r}, {self.meaning!r}{given})"
+
     def with_settings(self, settings: AbstractSettings) -> "Quantity":
         """The quantity computed with settings.
 
