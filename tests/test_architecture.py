@@ -189,6 +189,7 @@ TO_BE_TYPED = {
     "sweeps/table.py",
 }
 OF_ANY_TYPE = {
+    "contact/status.py WithStatus.converged": "of the kind of array that the status is, of JAX or NumPy",
     "manufacture/tooth_thickness.py drawn_gear": "takes the arguments of two classes, each of a type of its own",
     "optimize/iteration.py iterate_from_low_pressure": "passes options of another function on",
     "numerics/fields.py count": "stands for the value of a field, whose annotation says the type",

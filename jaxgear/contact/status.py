@@ -49,7 +49,7 @@ class WithStatus:
     status: Any
 
     @property
-    def converged(self) -> Bool[Array | np.ndarray, "..."] | bool | np.bool_:
+    def converged(self) -> Any:
         """Where the status is `Status.CONVERGED`, bools of its shape."""
         return self.status == Status.CONVERGED.value
 
