@@ -374,7 +374,7 @@ def test_the_table_lines_up_and_shows_what_was_asked(optimized):
 
 def test_the_first_screen_says_what_to_grind_what_it_gains_and_whether_to_trust_it(optimized):
     """Before the table, in the words of a drawing; how the search has gone comes last."""
-    named = "What to grind: optimum", "What it gains at 50 N m", "Whether to trust it"
+    named = "Modification to grind: optimum", "Gain at 50 N m", "Checks of the result"
     parts = [*named, "a [small] pair, 50 N m", "contact analyses by"]
     places = [optimized.out.index(part) for part in parts]
     assert places == sorted(places)
@@ -583,7 +583,7 @@ def test_table_and_verdict_are_of_one_torque_and_one_measure(folder, robust):
     optimum, designs = robust.summary["optimum"], robust.summary["designs"]
     before, after = designs["unmodified"], designs["optimum"]
     assert optimum["ppte_um"] == pytest.approx(after["ppte_um"], rel=1e-9)
-    assert "What it gains at 50 N m" in robust.out
+    assert "Gain at 50 N m" in robust.out
     assert re.search(rf"  PPTE +{before['ppte_um']:.3f} -> {after['ppte_um']:.3f} um", robust.out)
     mesh = load_design(folder / "robust.toml").mesh()
     relief = designs["rule-based"]["pinion_modification"][0]

@@ -80,7 +80,7 @@ def test_one_quantile_in_every_engine(tolerance):
     assert float(scatter.joined("ppte", jg.CVaR(0.5))) == pytest.approx(tail, rel=1e-9)
     assert table.column("ppte_um_cvar50")[0] == pytest.approx(tail, rel=1e-9)
     assert float(scatter.joined("mean_te", jg.Mean())) == pytest.approx(float(scatter.numbers["mean_te_um"].mean()))
-    with pytest.raises(ValueError, match='"max_line_load_N_per_mm" is not there'):
+    with pytest.raises(ValueError, match='"max_line_load_N_per_mm" is not among the results'):
         scatter.joined("max_line_load", jg.Mean())
 
 

@@ -747,6 +747,8 @@ def test_the_reference_mentions_every_key_and_the_guide_is_up_to_date():
     assert "| `density` | a number or the name of a variable | kg/m^3 | greater than 0 | `7850` | " in text
     assert '| `side` | one of "both", "negative", "positive" |  |  | `"both"` | ' in text
     guide = Path(__file__).parent.parent / "examples" / "guides" / "design_files.md"
+    rows = [line for line in text.splitlines() if line.startswith("| `")]
+    assert not [row for row in rows if re.search(r"\|\s*\|$", row)], "every key has a meaning"
     assert guide.read_text(encoding="utf-8") == text, "python -m jaxgear.io > examples/guides/design_files.md"
 
 

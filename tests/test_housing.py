@@ -131,7 +131,7 @@ def test_spread_forces_have_the_resultant_they_stand_for():
     np.testing.assert_allclose(moments, np.eye(3, 5, 3), atol=1e-12)
     with pytest.raises(ValueError, match="lie on one line$"):
         spread_forces(np.outer(np.arange(4.0), [1, 1, 0]), [0, 0, 0], np.arange(12).reshape(4, 3), 12)
-    with pytest.raises(ValueError, match="^spread_forces: degrees_of_freedom .* no node of a seat can be held$"):
+    with pytest.raises(ValueError, match="^spread_forces: degrees_of_freedom .* the nodes of a seat must be free$"):
         spread_forces(nodes, center, np.arange(-1, 20).reshape(7, 3), 21)
 
 
@@ -174,7 +174,7 @@ def test_units_of_other_programs(tmp_path, unit, factor):
 HEAD = "stiffness N/um, A.x, A.y\n"
 FAULTS = {
     "": "is empty",
-    "stiffness N/furlong, A.x\nA.x, 1\n": '"stiffness N/furlong" is no kind and unit of a housing',
+    "stiffness N/furlong, A.x\nA.x, 1\n": '"stiffness N/furlong" is not a kind and unit of a housing',
     HEAD + "A.y, 1, 0\nA.x, 0, 1\n": "rows must have the names of the columns",
     HEAD + "A.x, 1, 0\nA.y, 0\n": "row A.y has 1 numbers, must have 2",
     HEAD + "A.x, 1, 0\nA.y, 0, one\n": r"\(A.y, A.y\) = 'one' must be a number",
@@ -207,8 +207,8 @@ def test_other_files_are_refused_in_one_line(tmp_path):
     (tmp_path / "latin.csv").write_bytes(b"stiffness N/\xb5m")
     for name, fault in {
         "bare.npz": "must hold nodes, holds stiffness",
-        "broken.npz": "is no npz archive",
-        "cut.npz": "is no npz archive",
+        "broken.npz": "is not a valid npz archive",
+        "cut.npz": "is not a valid npz archive",
         "words.npz": "stiffness must hold real numbers",
         "wide.npz": r"stiffness has shape \(2, 2\), must be \(1, 1\) as its nodes",
         "latin.csv": "must be text in UTF-8",

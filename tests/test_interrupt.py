@@ -170,5 +170,5 @@ def test_kept_runs_are_told_of_before_the_first_result(tmp_path, monkeypatch):
     (tmp_path / "gear.toml").write_text(FIXED + DYNAMICS)
     monkeypatch.setattr("jaxgear.studies.dynamics.compared", lambda *_, **__: signal.raise_signal(signal.SIGINT))
     result = call("dynamics", tmp_path / "gear.toml", "-o", tmp_path / "out", "--quick")
-    line = f"jaxgear: interrupted, 1 runs are kept in {kept}{os.sep}, go on with the same command\n"
+    line = f"jaxgear: interrupted, 1 runs are stored in {kept}{os.sep}, resume with the same command\n"
     assert result.code == 130 and result.err.endswith(line)

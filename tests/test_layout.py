@@ -282,7 +282,7 @@ def test_a_load_that_is_not_found_is_not_level(face):
     assert np.isnan([line.slope, line.crowning, crowning_off_the_edges(face, tolerance)]).all()
     cases = tolerance_cases(face, tolerance)
     assert cases.edge_contact.all() and np.isnan(cases.loaded_share).all() and np.isnan(cases.face_load_factor).all()
-    with pytest.raises(ValueError, match="^layout_flank_lines: the load over the face is not found: "):
+    with pytest.raises(ValueError, match="^layout_flank_lines: the load over the face did not converge: "):
         layout_flank_lines(face, tolerance, stations=STATIONS)
 
 
@@ -585,7 +585,7 @@ def test_hours_are_weights_with_a_duration():
 @pytest.mark.parametrize(
     "make, fault",
     [
-        (lambda: level_load(rigid()), "at_stations: torque must be given: no coupling tells it"),
+        (lambda: level_load(rigid()), "at_stations: torque must be given: no coupling has one"),
         (lambda: level_load(SUPPORT, -1.0), "at_stations: torque = -1 N m must be at least 0 N m"),
         (
             lambda: level_load(at_stations(rigid(), 9.0, stations=STATIONS), 10.0),
@@ -595,7 +595,10 @@ def test_hours_are_weights_with_a_duration():
             lambda: level_load(at_stations(rigid(), 9.0, stations=STATIONS), stations=7),
             "at_stations: stations = 7 must be 21, which",
         ),
-        (lambda: at_torque(support(two_stages_idle(), 0), 5.0), "at_torque: the couplings bring no torque to the mesh"),
+        (
+            lambda: at_torque(support(two_stages_idle(), 0), 5.0),
+            "at_torque: the couplings transmit no torque to the mesh",
+        ),
         (lambda: FlankLineTolerance(-1.0), "FlankLineTolerance: helix_slope = -1 um must be at least 0 um"),
         (lambda: flank_line_tolerance(PAIR, 6, kind="usual"), "flank_line_tolerance: kind = 'usual' must be"),
         (lambda: flank_line_tolerance(PAIR, 6, 80.0), "flank_line_tolerance: axes = 80.0 must be a Misalignment"),

@@ -444,7 +444,7 @@ WRONG = [
     ),
     (
         replaced("torque = 150.0 }]", "torque = 100.0 }]"),
-        "load.torque: 150 N m must be 100 N m, which the couplings bring",
+        "load.torque: 150 N m must be 100 N m, that of the couplings",
     ),
     (
         replaced("[{ position = 190.0 }]", "[{ position = 190.0, torque = 3.0 }]"),
@@ -495,9 +495,9 @@ WRONG = [
     (FILE + "[[wheel.modification]]\ntype = 'lead_slope'\namount = 3.0\n", "wheel.modification: layout finds the"),
     (
         replaced("[layout]", '[[meshes]]\npinion = "wheel"\nwheel = "pinion"\n[layout]'),
-        'meshes: none is that of "pinion"',
+        'meshes: missing, one must have pinion = "pinion"',
     ),
-    (replaced("[layout]", '[[meshes]]\npinion = "x"\nwheel = "wheel"\n[layout]'), "meshes: none is that of"),
+    (replaced("[layout]", '[[meshes]]\npinion = "x"\nwheel = "wheel"\n[layout]'), "meshes: missing, one must have"),
     (FILE.replace("housing.csv", "none.csv"), "housing.file: none.csv: No such file"),
 ]
 WRONG_HOUSINGS = [
@@ -506,7 +506,7 @@ WRONG_HOUSINGS = [
     (HOUSING.replace("A.x, 1e-3, 0,", "A.x, 1e-3, 5e-4,"), "must be symmetric"),
     (HOUSING.replace("8e-3", "-8e-3"), "compliance of D.x is -0.008, must be at least 0"),
     (HOUSING.replace("8e-3", "x"), "(D.x, D.x) = 'x' must be a number"),
-    (HOUSING.replace("um/N", "in/lb"), '"compliance in/lb" is no kind and unit of a housing'),
+    (HOUSING.replace("um/N", "in/lb"), '"compliance in/lb" is not a kind and unit of a housing'),
     ("\n".join(HOUSING.splitlines()[:-1]), "rows must have the names of the columns"),
 ]
 
@@ -527,7 +527,7 @@ def test_torques_without_a_load_over_the_face_are_told():
     nothing: dict = {"layouts": {}, "contacts": {}, "profiles": {}}
     over = {"unmodified": np.array([1.2, np.nan, 1.1]), "step 1": np.array([1.0, np.nan, 1.0])}
     study = SimpleNamespace(**nothing, over_torque=over, request=SimpleNamespace(torques=np.array([50.0, 75.0, 100.0])))
-    assert list(LayoutResult.failures(study)) == ["LOAD OVER THE FACE NOT FOUND at 75 N m"]
+    assert list(LayoutResult.failures(study)) == ["LOAD OVER THE FACE NOT CONVERGED at 75 N m"]
 
 
 def test_a_layout_needs_its_table(file, tmp_path):

@@ -115,7 +115,7 @@ def test_tables_bring_the_quantities_that_they_tell_of(load):
             PAIR + "friction = 0.05" + OIL + "friction_factor = 1.0",
             "friction_factor: has no effect beside load.friction",
         ),
-        (PAIR + OIL + "viscosity_40 = 220.0", "pair.toml: lubricant.viscosity_40: stands in oil.toml too"),
+        (PAIR + OIL + "viscosity_40 = 220.0", "pair.toml: lubricant.viscosity_40: is given in oil.toml too"),
         (PAIR + OIL.replace("oil.toml", "no.toml"), "no.toml: No such file"),
         (PAIR + OIL.replace('"oil.toml"', "3"), "lubricant.file: must be a string, not a number"),
         (PAIR + OIL.replace("roughness = 0.5", ""), "pair.toml: lubricant.roughness: missing"),

@@ -150,7 +150,7 @@ def test_flanks_csv_is_read_again(moving, side, tmp_path):
                 np.testing.assert_allclose(trace.design, wanted.design, atol=6e-6)
     with pytest.raises(io.DesignFileError, match="flanks.csv: holds several: gear must be one of pinion, wheel"):
         io.read_flank(tmp_path / "flanks.csv", design="plain")
-    with pytest.raises(io.DesignFileError, match='design = "plane" is not there, must be one of plain, crowned'):
+    with pytest.raises(io.DesignFileError, match='design = "plane" is not in the file, must be one of plain, crowned'):
         io.read_flank(tmp_path / "flanks.csv", gear="wheel", design="plane")
 
 
@@ -299,7 +299,9 @@ def test_a_design_file_takes_the_flank_of_the_gear_that_it_stands_at(tmp_path):
 
     assert amounts("") == amounts('gear = "pinion"') == [1.0, 2.0] and amounts('gear = "wheel"') == [3.0, 4.0]
     written(tmp_path, "\n".join(line for line in both.splitlines() if "pinion" not in line))
-    with pytest.raises(io.DesignFileError, match='file: measured.csv: gear = "pinion" is not there, must be one of wh'):
+    with pytest.raises(
+        io.DesignFileError, match='file: measured.csv: gear = "pinion" is not in the file, must be one of wh'
+    ):
         amounts("")
     assert amounts('gear = "wheel"') == [3.0, 4.0]
 
@@ -358,7 +360,11 @@ def test_a_design_file_takes_a_measured_flank(tmp_path):
     ("file", "more", "problem"),
     [
         ("none.csv", "", "pinion.modification[0].file: none.csv: No such file or directory"),
-        ("measured.csv", 'gear = "wheel"', 'file: measured.csv: gear = "wheel" is not there, there is no column gear'),
+        (
+            "measured.csv",
+            'gear = "wheel"',
+            'file: measured.csv: gear = "wheel" is not in the file, there is no column gear',
+        ),
         ("measured.csv", 'gear = "ring"', 'pinion.modification[0].gear: "ring" is not known, must be one of'),
         ("measured.csv", "amount = 3.0", "pinion.modification[0].amount: unknown key"),
         (

@@ -154,7 +154,7 @@ def test_it_goes_on_after_an_interruption(file, tmp_path, package, monkeypatch):
     module, path, folder, kept = package(), file(FIXED), tmp_path / "out", tmp_path / ".out.runs"
     monkeypatch.setattr(module, "ASKED", Pressed())
     done = call("share", path, "-o", folder, "--no-figures")
-    told = f"jaxgear: interrupted, 1 of 3 runs are kept in {kept}{os.sep}, go on with the same command\n"
+    told = f"jaxgear: interrupted, 1 of 3 runs are stored in {kept}{os.sep}, resume with the same command\n"
     assert done.code == 130 and done.err.endswith(told) and not folder.exists()
     monkeypatch.setattr(module, "ASKED", [])
     done = call("share", path, "-o", folder, "--no-figures")

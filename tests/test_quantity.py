@@ -68,7 +68,7 @@ def test_both_spellings_and_the_nearest_name():
     assert quantities["max_line_load"].key == "max_line_load_N_per_mm"
     with pytest.raises(ValueError, match='^sweep: "ppet" is not known, did you mean "ppte"?'):
         quantity_of("ppet", "sweep")
-    with pytest.raises(ValueError, match="there already"):
+    with pytest.raises(ValueError, match="exists already"):
         quantities.add(Quantity("ppte", lambda cycle: cycle.transmission_error))
 
 

@@ -168,10 +168,10 @@ def test_what_nobody_looked_at_is_not_called_usual(tmp_path):
         asked.write(tmp_path, design, data, document.CommandResult(["line"], findings=findings))
         page = (tmp_path / "report.html").read_text("utf-8")
         assert ("within the usual ranges" in page) == said and ("warning: this" in page) == bool(findings)
-        assert "no limit is passed" in page
+        assert "no limit is exceeded" in page
     asked.write(tmp_path, design, data, document.CommandResult(["line"], ["NOT CONVERGED"]))
     page = (tmp_path / "report.html").read_text("utf-8")
-    assert "no limit is passed" not in page and page.count("NOT CONVERGED") == 2
+    assert "no limit is exceeded" not in page and page.count("NOT CONVERGED") == 2
 
 
 def test_the_workbook_holds_the_table(tmp_path):

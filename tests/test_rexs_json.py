@@ -68,16 +68,16 @@ def test_arrays_may_be_in_base64(written):
 @pytest.mark.parametrize(
     "text, wanted",
     [
-        ("{", "line 1, column 2: no JSON: Expecting property name"),
-        ("{}", "model: must be an object of JSON"),
-        ('{"model": []}', "model: must be an object of JSON"),
-        ('{"model": {"version": "2.0.0", "components": {}}}', "components: must be a list of JSON"),
-        ('{"model": {"version": "2.0.0", "components": [1]}}', "components: must be an object of JSON"),
+        ("{", "line 1, column 2: not valid JSON: Expecting property name"),
+        ("{}", "model: must be a JSON object"),
+        ('{"model": []}', "model: must be a JSON object"),
+        ('{"model": {"version": "2.0.0", "components": {}}}', "components: must be a JSON array"),
+        ('{"model": {"version": "2.0.0", "components": [1]}}', "components: must be a JSON object"),
         ('{"model": {"version": "2.0.0", "components": [{"id": 1.5}]}}', 'component: id: "1.5" is not a whole number'),
         ('{"model": {"version": "2.0.0"}}', "has no cylindrical_stage"),
         ('{"model": {"version": 2}}', 'model: version: "2" is not a version of REXS'),
-        ('{"model":' * 5000, "no JSON"),
-        (b'{"\xff', "no JSON: not UTF-8 text"),
+        ('{"model":' * 5000, "not valid JSON"),
+        (b'{"\xff', "not valid JSON: not UTF-8 text"),
     ],
 )
 def test_what_is_no_model_is_refused_in_one_line(written, text, wanted):

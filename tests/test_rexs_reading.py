@@ -384,21 +384,21 @@ REFUSED = {
     "not additive": ('id="is_additive_modification" unit="none">true',
                      'id="is_additive_modification" unit="none">false',
                      "is_additive_modification: must be true beside other modifications"),
-    "unknown kind": ('type="helix_slope"', 'type="profile_twist"', "profile_twist 18: is no modification"),
+    "unknown kind": ('type="helix_slope"', 'type="profile_twist"', "profile_twist 18: is not a supported modification"),
     "offset faces": ('id="common_face_width" unit="mm">18.0', 'id="common_face_width" unit="mm">15', "15 mm must be"),
     "no component": ('<ref id="9" role="gear_2"', '<ref id="99" role="gear_2"', "names component 99, which"),
     "no gear": ('role="gear_2"', 'role="gear_3"', "cylindrical_stage 2: gear_2: missing"),
-    "twice": ('<component id="4"', '<component id="3"', "material 3: stands twice in the file"),
+    "twice": ('<component id="4"', '<component id="3"', "material 3: is given twice in the file"),
     "old": ('version="2.0.0"', 'version="1.3"', "is of REXS 1.3, must be of 1.4 to 2"),
     "new": ('version="2.0.0"', 'version="3.0"', "is of REXS 3.0, must be of 1.4 to 2"),
     "no version": ('version="2.0.0"', 'version="DEV"', 'model: version: "DEV" is not a version of REXS'),
     "no id": ('<component id="4"', '<component id="four"', 'component: id: "four" is not a whole number'),
     "no flank": ('type="flank"', 'type="flanks"', "cylindrical_gear 3: has no left or right flank"),
     "no stage": ('type="cylindrical_stage"', 'type="bevel_stage"', "has no cylindrical_stage"),
-    "not closed": ("</components>", "", "no XML: mismatched tag"),
-    "cut off": ("</model>", "", "no XML: no element found"),
-    "something else": ("<model ", "<other ", "no XML: mismatched tag"),
-    "not text": ("pinion left flank", "\x01", "no XML: not well-formed (invalid token)"),
+    "not closed": ("</components>", "", "not valid XML: mismatched tag"),
+    "cut off": ("</model>", "", "not valid XML: no element found"),
+    "something else": ("<model ", "<other ", "not valid XML: mismatched tag"),
+    "not text": ("pinion left flank", "\x01", "not valid XML: not well-formed (invalid token)"),
     "nested": ("</components>", "<a>" * 40 + "</a>" * 40 + "</components>", "elements are nested too deeply"),
 }  # fmt: skip
 
@@ -539,7 +539,7 @@ def test_a_file_that_is_none_is_refused(tmp_path):
         with pytest.raises(DesignFileError, match=wanted):
             read_rexs(path)
     (tmp_path / "empty.rexs").write_bytes(b"")
-    with pytest.raises(DesignFileError, match="empty.rexs: line 1, column 1: no XML: no element found"):
+    with pytest.raises(DesignFileError, match="empty.rexs: line 1, column 1: not valid XML: no element found"):
         read_rexs(tmp_path / "empty.rexs")
 
 

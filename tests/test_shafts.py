@@ -406,7 +406,7 @@ def pair_of(meshes, first=None, second=None, **changes):
     [
         (lambda: pair_of([GearMesh("p", "x")]), 'gear "x" is not known, must be one of p, w'),
         (lambda: pair_of([]), 'no mesh joins shaft "in" to "out"'),
-        (lambda: pair_of([GearMesh("p", "w"), GearMesh("w", "p")]), "closes a circle"),
+        (lambda: pair_of([GearMesh("p", "w"), GearMesh("w", "p")]), "closes a loop"),
         (lambda: pair_of([GearMesh("w", "p")]), 'the torque of gear "w" is .* the pinion of a mesh drives its wheel'),
         (
             lambda: pair_of([GearMesh("p", "w")], {"couplings": [Coupling(0.0)]}),

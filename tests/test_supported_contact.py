@@ -112,7 +112,7 @@ def test_a_contact_on_shafts_that_cannot_be_does_not_converge(mesh):
     refused = eqx.tree_at(lambda of: of.support_status, mesh, jnp.int8(Status.SUPPORT_NOT_POSSIBLE))
     cycle = jg.solve(refused, TORQUE, pinion=FLANK)
     assert not np.any(cycle.converged) and np.all(cycle.status == Status.SUPPORT_NOT_POSSIBLE)
-    assert "NOT CONVERGED (shafts, bearings or housing are not possible)" in str(cycle)
+    assert "NOT CONVERGED (shafts, bearings or housing are invalid)" in str(cycle)
 
     def valid(position):
         """As a traced position, which nothing checks."""

@@ -315,7 +315,7 @@ def test_units_ranges_and_settings_are_in_the_files(folder):
         said = "words", "unit", "meaning", "form", "better", "key"
         assert [getattr(column.quantity, name) for name in said] == [getattr(of, name) for name in said]
         assert (column.name, column.torque, column.statistic) == (of.key, None, "")
-    with pytest.raises(ValueError, match="known by its description only"):
+    with pytest.raises(ValueError, match="its description only and no function"):
         table.find("ppte").quantity.of(None)
     assert table.units["ppte_um"] == "um" and table.units["effective_contact_ratio"] == ""
     table.to_csv(folder.parent / "table.csv")
@@ -399,7 +399,7 @@ def test_a_part_that_is_damaged_later_is_named(folder):
     table = jg.open_sweep(folder)
     part = parts_of(folder)[1]
     part.write_bytes(b"PAR1" + bytes(200))
-    with pytest.raises(ValueError, match=rf"{part.name}: is damaged or gone: repeat the sweep"):
+    with pytest.raises(ValueError, match=rf"{part.name}: is damaged or missing: repeat the sweep"):
         table.column("ppte")
 
 

@@ -138,7 +138,7 @@ def test_repeated_it_finds_everything_there(folder):
     folder, _ = folder
     before = {path.name: path.stat().st_mtime_ns for path in (folder / "out" / "table").glob("part-*")}
     result = sweep(folder / "gear.toml", "-o", folder / "out")
-    assert result.code == 0 and "resuming, 60 of 60 variants are there" in result.err
+    assert result.code == 0 and "resuming, 60 of 60 variants are complete" in result.err
     assert {path.name: path.stat().st_mtime_ns for path in (folder / "out" / "table").glob("part-*")} == before
     other = sweep(folder / "gear.toml", "-o", folder / "out", "--samples", "61")
     assert_refused(other, "table: holds a sweep of other settings (plan, variants)")
@@ -266,7 +266,7 @@ def test_an_interrupted_sweep_says_how_to_go_on_and_does(tmp_path):
         ("samples = 60", "samples = 60\nlevels = 3", ['sweep.levels: has no effect with sampling = "latin_hypercube"']),
         ('"latin_hypercube"', '"sobbol"', ['sweep.sampling: "sobbol" is not known, did you mean "sobol"?']),
         ('"ppte"', '"pte"', ['sweep.results[0]: "pte" is not known, did you mean "ppte"?']),
-        ('"ppte"', '"effective_contact_ratio"', ['sweep.results[1]: "effective_contact_ratio" is there twice']),
+        ('"ppte"', '"effective_contact_ratio"', ['sweep.results[1]: "effective_contact_ratio" is given twice']),
         ('"ppte"', '"te_harmonic_3", "ppte"', None),
         ("part_rows = 25", "weights = [1.0]", ["sweep.weights: has no effect without sweep.torques"]),
         ("part_rows = 25", "torques = [-1.0]", ["sweep.torques[0]: -1 N m must be greater than 0 N m"]),

@@ -116,7 +116,7 @@ def test_what_no_measurement_gives():
     with pytest.raises(ValueError, match=r"allowance_of_balls: measured = 50 mm must be greater than 61.* mm"):
         allowance_of_balls(gear, 5.25, 50.0)
     tall = jg.Gear(20, 3.0, face_width=20.0, profile_shift=0.6, addendum=1.25, dedendum=1.25)
-    with pytest.raises(ValueError, match="does not stand out of the tip circle"):
+    with pytest.raises(ValueError, match="does not protrude beyond the tip circle"):
         over_balls(tall, 4.2)
     # the gears of `gear_pair` stand for traced ones: nothing is refused while tracing
     assert np.isfinite(float(jax.jit(lambda g: over_balls(g, 5.25))(gear_pair().pinion)))

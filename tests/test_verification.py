@@ -113,7 +113,7 @@ def test_claims_beyond_a_model_are_findings(best, flat, tabulated):
     of_tables = {claim: finding_of_claim(claim, tabulated.compliance) for claim in (0.11, 0.05, 0.02)}
     assert [len(found) for found in of_default.values()] == [0, 1, 1]
     assert [len(found) for found in of_tables.values()] == [0, 0, 1]
-    expected = "PPTE 0.05 um is less than 0.1 um (finer than the model can claim of modified flanks; "
+    expected = "PPTE 0.05 um is less than 0.1 um (below the accuracy of the model for modified flanks; "
     assert str(of_default[0.05][0]) == expected + "with finite-element structure: 0.0712 um)"
     level = eqx.tree_at(lambda each: each.ppte, best, 0.02)
     assert "PPTE 0.02 um is less than 0.1 um" in str(level) and "warning" not in str(best)

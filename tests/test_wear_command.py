@@ -611,7 +611,7 @@ def test_flanks_over_the_face_are_read_back(tmp_path, skewed, name):
     assert np.ptp(skewed.flanks()[0].amount[0]) > 0.1
     for options, message in (
         ({}, "holds several: revolutions must be one of 0, 1e.07, 2e.07"),
-        ({"revolutions": 3e7}, "revolutions = 3e.07 is not there, revolutions must be one of 0, "),
+        ({"revolutions": 3e7}, "revolutions = 3e.07 is not in the file, revolutions must be one of 0, "),
     ):
         with pytest.raises(DesignFileError, match=f"{name}: {message}"):
             read_flank(path, gear="pinion", design="skewed", **options)

@@ -23,14 +23,14 @@ _GEOMETRY_NOTE = (
     "root form diameter to the tip form diameter, the mate's tip touches it down to the active root diameter."
 )
 _ASSUMED = (
-    "External involute spur gears; load is where both faces overlap.",
-    "The contact is frictionless, quasi-static and linear elastic; bores are held.",
+    "External involute spur gears; the load acts where both faces overlap.",
+    "The contact is frictionless, quasi-static and linear elastic; bores are fixed.",
     "Gear bodies are solid: thin rims, webs and spokes are not in the closed forms.",
     "The pressure of a tip corner is an estimate, which depends on the edge radius, and is given apart.",
 )
 _RIGID = "In the contact analysis shafts, bearings and housing are rigid."
 _SUPPORTED = "Shafts, bearings and housing are those of the design file."
-_EVEN = "One slice stands for the whole face: the load is the same everywhere over it."
+_EVEN = "One slice represents the whole face: the load is even over it."
 # what summary.json says of the inputs, before its results
 _INPUTS = (
     "torque_Nm",
@@ -200,7 +200,7 @@ def _validity(found: CommandResult, data: Mapping[str, Any]) -> Chapter:
     """What the numbers can be trusted for."""
     lines = []
     if not found.warnings:
-        lines.append("Every solution converged, and no limit is passed.")
+        lines.append("Every solution converged, and no limit is exceeded.")
     if data.get("quick"):
         lines.append("Quick run, coarse positions and a short search: a preview, do not use for design.")
     if found.findings is not None and not found.findings:

@@ -23,7 +23,7 @@ Quick = Annotated[
 
 
 Reported = Annotated[
-    bool, typer.Option("--report", help="Write report.html too, one file to hand in (needs jaxgear\\[report]).")
+    bool, typer.Option("--report", help="Write report.html too, a self-contained file (needs jaxgear\\[report]).")
 ]
 
 

@@ -73,7 +73,7 @@ class Meter(_Bar):
         if self.done is None:
             self._first, self._since = done, time.perf_counter()
             if done:
-                self.console.print(f"jaxgear: resuming, {done:,} of {total:,} variants are there", soft_wrap=True)
+                self.console.print(f"jaxgear: resuming, {done:,} of {total:,} variants are complete", soft_wrap=True)
         self.done = done
         there = f"{done:,} of {total:,} variants"
         interrupt.note(f"{there} are in {self._target}{os.sep}, resume with the same command")

@@ -113,7 +113,7 @@ def _checkpoints(target: Path) -> Checkpoints:
     folder = target.parent / f".{target.name}.runs"
 
     def note(count: str) -> None:
-        interrupt.note(f"{count} runs are kept in {folder}{os.sep}, go on with the same command")
+        interrupt.note(f"{count} runs are stored in {folder}{os.sep}, resume with the same command")
 
     made = Checkpoints(folder, lambda done, total: note(f"{done}" if total is None else f"{done} of {total}"))
     there = made.count()

@@ -146,7 +146,7 @@ def check_support(support: AbstractSupport | None, pair: GearPair, resolution: R
     if support.needs_even_slices and resolution.parts is not None:
         raise ValueError(
             f"prepare: support is a {type(support).__name__}, over slices of equal width, the mesh has others: leave "
-            "slice_widths out of the resolution, or give a support that is known all over the face"
+            "slice_widths out of the resolution, or give a support that is defined all over the face"
         )
     # numbers that one pair has and the other leaves to its defaults cannot be compared one by one
     given, own = (jax.tree.leaves(each, is_leaf=lambda leaf: leaf is None) for each in (support.pair, pair))
@@ -198,6 +198,6 @@ def check_torque(owner: str, wanted: Float[Array, ""] | None, torque: Float[Arra
     others = np.atleast_1d(given)[~np.isclose(np.atleast_1d(given), known, rtol=_SAME_TORQUE, atol=0.0)]
     if len(others):
         raise ValueError(
-            f"{owner}: torque = {float(others[0]):g} N m, but the gearbox that holds the gears has {float(known):g} "
+            f"{owner}: torque = {float(others[0]):g} N m, but the gearbox that supports the gears has {float(known):g} "
             "N m on this pinion: prepare with the gearbox at that torque"
         )

@@ -66,7 +66,7 @@ class Resolution(Checked):
         if self.slide_steps and self.patch_nodes < _SLIDING_NODES:
             raise ValueError(
                 f"Resolution: slide_steps = {self.slide_steps} needs patch_nodes >= {_SLIDING_NODES}, is "
-                f"{self.patch_nodes}: fewer points across the contact do not see slope and curvature of a flank"
+                f"{self.patch_nodes}: fewer points across the contact do not resolve slope and curvature of a flank"
             )
 
         if self.slice_widths is None:

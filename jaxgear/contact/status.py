@@ -33,11 +33,11 @@ class Status(IntEnum):
 _TEXTS = {
     Status.CONVERGED: "converged",
     Status.NOT_CONVERGED: "the iteration did not converge",
-    Status.NO_STEADY_MOTION: "the motion settles on no orbit within the largest number of mesh cycles",
+    Status.NO_STEADY_MOTION: "the motion does not converge to an orbit within the largest number of mesh cycles",
     Status.MORE_PAIRS_NEEDED: "tooth pairs beyond those of the mesh come into contact, more are needed",
-    Status.OUT_OF_VALIDITY: "a number is outside of its range, or of that for which model or support are valid",
-    Status.SUPPORT_NOT_POSSIBLE: "shafts, bearings or housing are not possible",
-    Status.GEARS_CANNOT_RUN: "the gears cannot run: their teeth are not possible, jam, or are worn through",
+    Status.OUT_OF_VALIDITY: "a number is out of its range, or out of the validity of the model or the support",
+    Status.SUPPORT_NOT_POSSIBLE: "shafts, bearings or housing are invalid",
+    Status.GEARS_CANNOT_RUN: "the gears cannot run: their teeth are invalid, have no backlash, or are worn through",
 }
 
 Statuses = Int8[Array, "..."]

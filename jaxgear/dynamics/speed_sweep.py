@@ -116,7 +116,7 @@ def checked_frequencies(owner: str, given: Numbers) -> Speeds:
     check(owner, "mesh_frequencies", frequencies, "Hz", low=0.0, open_low=True)
     known = concrete(frequencies)
     if known is not None and (np.diff(known) <= 0).any():
-        raise ValueError(f"{owner}: mesh_frequencies must increase; direction says which way they are gone through")
+        raise ValueError(f"{owner}: mesh_frequencies must increase; direction gives the order of the sweep")
     return frequencies
 
 
@@ -132,7 +132,9 @@ def steps_for(oscillator: Oscillator, mesh_frequencies: Numbers) -> tuple[int, .
     """
     frequencies = concrete(checked_frequencies("steps_for", mesh_frequencies))
     if frequencies is None or any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(oscillator)):
-        raise ValueError("steps_for: what is being traced has no natural frequency yet; give steps")
+        raise ValueError(
+            "steps_for: the oscillator is traced, steps cannot be chosen by its natural frequency; give steps"
+        )
     of_many = natural_frequencies
     for _ in range(oscillator.mass.ndim - 1):
         of_many = jax.vmap(of_many)

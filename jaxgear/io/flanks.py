@@ -265,7 +265,7 @@ def _chosen(rows: Rows, wanted: Mapping[str, str | None]) -> Rows:
             raise DesignFileError("", f"holds several: {name} must be one of {', '.join(map(str, known))}")
         if value is not None and value not in known:
             held = f"must be one of {', '.join(map(str, known))}" if known else f"there is no column {name}"
-            raise DesignFileError("", f'{name} = "{value}" is not there, {held}')
+            raise DesignFileError("", f'{name} = "{value}" is not in the file, {held}')
         rows = [row for row in rows if value is None or row[name] == value]
     return rows
 
@@ -275,7 +275,7 @@ def _at_life(rows: Rows, revolutions: float | None) -> Rows:
     if _LIFE not in rows[0]:
         if revolutions is None:
             return rows
-        raise DesignFileError("", f"{_LIFE} = {revolutions:g} is not there, there is no column {_LIFE}")
+        raise DesignFileError("", f"{_LIFE} = {revolutions:g} is not in the file, there is no column {_LIFE}")
     lives = _numbers(rows, _LIFE)
     known = np.unique(lives)
     if revolutions is None and len(known) == 1:
@@ -285,7 +285,7 @@ def _at_life(rows: Rows, revolutions: float | None) -> Rows:
         raise DesignFileError("", f"holds several: {held}")
     wanted = np.isclose(lives, revolutions, rtol=_SAME_LIFE, atol=0.0)
     if not wanted.any():
-        raise DesignFileError("", f"{_LIFE} = {revolutions:g} is not there, {held}")
+        raise DesignFileError("", f"{_LIFE} = {revolutions:g} is not in the file, {held}")
     return [row for row, is_wanted in zip(rows, wanted) if is_wanted]
 
 

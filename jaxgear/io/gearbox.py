@@ -190,11 +190,11 @@ def support_of(
     given = given or [GearMesh(*_OWN, center_distance=pair.center_distance, axial_offset=pair.axial_offset)]
     own = [index for index, mesh in enumerate(given) if (mesh.pinion, mesh.wheel) == _OWN]
     if not own:
-        raise DesignFileError("meshes", 'none is that of "pinion" and "wheel"')
+        raise DesignFileError("meshes", 'missing, one must have pinion = "pinion" and wheel = "wheel"')
     box = refused("meshes" if meshes else "shafts", Gearbox, made, given, None, direction)
     brought = float(box.pinion_torques()[own[0]])
     if not np.isclose(brought, torque, rtol=_SAME_TORQUE):
-        raise DesignFileError("load.torque", f"{torque:g} N m must be {brought:g} N m, which the couplings bring")
+        raise DesignFileError("load.torque", f"{torque:g} N m must be {brought:g} N m, that of the couplings")
     if housing is not None:
         with referring("housing.file", housing.file):
             check_file(folder / housing.file)

@@ -78,6 +78,14 @@ class FactorialOptions(FileTable):
 
 
 class IterationOptions(FileTable):
+    """Levels the transmission error by removing it from the flanks.
+
+    Attributes:
+        start: flanks of the first step: involutes ("unmodified"), the modifications of the file ("given"), or a relief
+            designed for the lowest pressure ("low_pressure").
+        curve: name of the curve that the flanks are projected on, such as "power"; "cubic" without it.
+    """
+
     source = iterate_transmission_error
 
     start: str = entry(choice("unmodified", "given", "low_pressure"), "unmodified")
@@ -89,6 +97,12 @@ class IterationOptions(FileTable):
 
 
 class FreeFormOptions(FileTable):
+    """Finds the flanks with the least PPTE, of any form, by sequential linear programming.
+
+    Attributes:
+        curve: name of the curve that the flanks are projected on, such as "power"; "cubic" without it.
+    """
+
     source = free_form
 
     points: int | None = entry(count(4, 500))

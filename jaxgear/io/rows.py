@@ -59,7 +59,7 @@ def _read_csv(path: Path) -> Rows:
     except OSError as error:
         raise DesignFileError("", error.strerror or str(error)) from None
     except csv.Error as error:
-        raise DesignFileError("", f"is no CSV file: {error}") from None
+        raise DesignFileError("", f"is not a valid CSV file: {error}") from None
     if not rows:
         raise DesignFileError("", "holds no points")
     _check_table(names, rows)

@@ -149,7 +149,7 @@ def _results(design: DesignFile, section: SweepSection) -> tuple[str | Quantity,
     for index, name in enumerate(wanted):
         results.append(quantity_named(design, f"sweep.results[{index}]", name))
         if name in wanted[:index]:
-            raise DesignFileError(f"sweep.results[{index}]", f'"{name}" is there twice')
+            raise DesignFileError(f"sweep.results[{index}]", f'"{name}" is given twice')
     return tuple(results)
 
 

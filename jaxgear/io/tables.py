@@ -126,7 +126,7 @@ class SettingsTable(FurtherTable):
         with referring(f"{cls.table}.{FILE}", name):
             held: dict[str, Any] = read(folder / name)
         for twice in held.keys() & given.keys():
-            raise DesignFileError(join(cls.table, twice), f"stands in {name} too")
+            raise DesignFileError(join(cls.table, twice), f"is given in {name} too")
         try:
             return decode(cls.table, {**held, **given}, cls)
         except DesignFileError as error:

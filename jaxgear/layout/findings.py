@@ -31,8 +31,8 @@ LIMITS = {
         0.0,
         np.inf,
         "",
-        f"fewer than {_FEWEST} stations carry the load, so that it depends on their number: more stations? are the "
-        "units of bearings, shafts and housing right?",
+        f"fewer than {_FEWEST} stations carry the load, the result depends on their number: take more stations; are "
+        "the units of bearings, shafts and housing right?",
     ),
     "K_Hbeta without deviations": Usual(
         0.0,
@@ -45,24 +45,22 @@ LIMITS = {
         0.0, np.inf, "", 'no better than without the further crowning; try layout.further_crowning = "least"'
     ),
     "slope and crowning in modules": Usual(
-        0.0, 0.04, "", "twice the tip relief of ISO 53:1974: are the units of bearings, shafts and housing right?"
+        0.0, 0.04, "", "above twice the tip relief of ISO 53:1974: are the units of bearings, shafts and housing right?"
     ),
     "radial displacement in modules": Usual(
-        0.0, 0.05, "", "about the backlash of a gear: center distance and contact ratio are those of shafts in place"
+        0.0, 0.05, "", "about the backlash of a gear: center distance and contact ratio are those of undeflected shafts"
     ),
-    "radial stiffness": Usual(1.0, 20_000.0, "N/um", "rolling bearings have ten to some thousands: is it in N/um?"),
+    "radial stiffness": Usual(1.0, 20_000.0, "N/um", "rolling bearings have ten to some thousand: is it in N/um?"),
     "clearance": Usual(0.1, 500.0, "um", "rolling bearings have 2 to 100 um to either side: is it in um?"),
     "distance from the face": Usual(
-        0.0, np.inf, "mm", "a bearing under the teeth holds a gear in its bore, but not a shaft: is its position right?"
+        0.0, np.inf, "mm", "a bearing within the face of a gear cannot support the shaft: is its position right?"
     ),
-    "number of meshes": Usual(1.0, np.inf, "", "it turns idle, no force acts on it: is a mesh missing?"),
-    "tip clearance": Usual(
-        0.0, np.inf, "mm", "they run into each other: are angles of the meshes and positions right?"
-    ),
+    "number of meshes": Usual(1.0, np.inf, "", "a gear without load: is a mesh missing?"),
+    "tip clearance": Usual(0.0, np.inf, "mm", "they overlap: are angles of the meshes and positions right?"),
     "shaft diameter over bore": Usual(
-        0.0, 1.0, "", "only a gear that is cut into its shaft is on one thicker than its bore: integral?"
+        0.0, 1.0, "", "only an integral gear has a shaft thicker than its bore: is integral missing?"
     ),
-    "misalignment over the face": Usual(0.1, np.inf, "um", "less than axes can be measured to: is it in mm?"),
+    "misalignment over the face": Usual(0.1, np.inf, "um", "below what can be measured: is it in mm?"),
     "damage by the duty cycle": Usual(
         1e-12, 1.0, "", "1 is the end of life: are torques in N m, strengths in MPa and cycles single ones?"
     ),

@@ -101,7 +101,7 @@ def at_torque(support: ShaftSupport, torque) -> ShaftSupport:
     now = support.torque
     known = concrete(now)
     if known is not None and known <= 0:
-        raise ValueError("at_torque: the couplings bring no torque to the mesh, there is nothing to be scaled")
+        raise ValueError("at_torque: the couplings transmit no torque to the mesh, which could be scaled")
     factor = real(torque) / now
     given = [
         (i, j)
@@ -137,7 +137,7 @@ def at_stations(support: AbstractSupport, torque=None, *, stations: int | None =
             )
         return support
     if not isinstance(support, ShaftSupport) and torque is None:
-        raise ValueError("at_stations: torque must be given: no coupling tells it")
+        raise ValueError("at_stations: torque must be given: no coupling has one")
     check("at_stations", "torque", torque, "N m", low=0.0)
     count = whole("at_stations", "stations", STATIONS if stations is None else stations, 2, 1001)
     return _at_stations(support, optional_real(torque), count)

@@ -252,8 +252,8 @@ def longest_life(
     missed = np.asarray(load.torques)[~np.asarray(unmodified.converged)]
     if len(missed):
         raise ValueError(
-            f"longest_life: the load over the face at {float(missed[0]):g} N m is not found, "
-            f"{reason(unmodified.status)}: do loads leave a shaft afloat in its clearances?"
+            f"longest_life: the load over the face at {float(missed[0]):g} N m did not converge, "
+            f"{reason(unmodified.status)}: do the loads leave a shaft loose in its clearances?"
         )
     worst = int(np.argmax(np.sum(unmodified.pitting, axis=0)))
     start = level_load(support, load.torques[worst], negative_crowning=negative_crowning, stations=stations)

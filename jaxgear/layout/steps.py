@@ -190,7 +190,8 @@ def layout_flank_lines(
     needed = jnp.max(jnp.stack(each))
     if not bool(jnp.isfinite(line.slope)):
         raise ValueError(
-            "layout_flank_lines: the load over the face is not found: do loads leave a shaft afloat in its clearances?"
+            "layout_flank_lines: the load over the face did not converge: do the loads leave a shaft loose in its "
+            "clearances?"
         )
     if not bool(jnp.isfinite(needed)):
         raise ValueError("layout_flank_lines: no crowning keeps the load off the edges: the shafts are too soft")

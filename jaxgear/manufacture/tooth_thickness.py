@@ -202,7 +202,7 @@ def _check_ball(gear: Gear, ball: Given, wanted: Scalar, radius: Scalar) -> None
     if room <= 0 or centre - size / 2 < root:
         raise ValueError(f"over_balls: ball = {size:g} mm touches no flanks above the root circle, must be larger")
     if centre + size / 2 < tip:
-        raise ValueError(f"over_balls: ball = {size:g} mm does not stand out of the tip circle, must be larger")
+        raise ValueError(f"over_balls: ball = {size:g} mm does not protrude beyond the tip circle, must be larger")
 
 
 def _check_touched(owner: str, name: str, value: Given, unit: str, touched: Scalar, gear: Gear) -> None:

@@ -32,19 +32,21 @@ def _of_field(cls: type[eqx.Module], name: str) -> Usual:
 
 
 LIMITS = {
-    "torque": Usual(0.0, np.inf, "N m", "the design torque lies outside the range of torques that is looked at"),
+    "torque": Usual(0.0, np.inf, "N m", "the design torque lies outside of load.torque_range"),
     "module": Usual(0.05, 100.0, "mm", "ISO 54 lists 1 to 50 mm, fine mechanics goes down to 0.1 mm"),
     "elastic modulus": _of_field(Material, "elastic_modulus"),
     "density": Usual(500.0, 25_000.0, "kg/m^3", "steel 7850 kg/m^3: is it in g/cm^3?"),
-    "bore to root diameter": Usual(0.1, 0.95, "", "a ring held at its bore, outside of the usual proportions"),
+    "bore to root diameter": Usual(0.1, 0.95, "", "a ring fixed at its bore, out of the usual proportions"),
     "face width in modules, plane stress": Usual(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
-    "face width in modules": Usual(2.0, 48.0, "", "as compared with finite elements; narrower contacts are softer"),
-    "overhang in modules, one slice": Usual(0.0, 1.0, "", "load gathers beside it, which takes Resolution(slices=9)"),
-    "tip edge radius in modules": Usual(0.0, 0.2, "", "an edge is broken by 0.01 to 0.1 modules"),
-    "least backlash": Usual(-0.1, np.inf, "um", "the thickest teeth that the tolerances allow jam"),
+    "face width in modules": Usual(2.0, 48.0, "", "range compared with finite elements; narrower contacts are softer"),
+    "overhang in modules, one slice": Usual(
+        0.0, 1.0, "", "the load concentrates beside it: take resolution.slices = 9"
+    ),
+    "tip edge radius in modules": Usual(0.0, 0.2, "", "usual tip edge radii are 0.01 to 0.1 modules"),
+    "least backlash": Usual(-0.1, np.inf, "um", "the thickest teeth within the tolerances have no backlash"),
     "coefficient of friction": Usual(0.0, 0.5, "", "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"),
     "coefficient of friction of the oil": Usual(
-        0.01, 0.2, "", "lubricated gears 0.03 to 0.12: the law is not made for it"
+        0.01, 0.2, "", "lubricated gears 0.03 to 0.12: out of the validity of the law"
     ),
     "bulk temperature": Usual(
         -np.inf, 180.0, "degC", "case-hardened steel softens there, and mineral oil ages above 120"
@@ -53,23 +55,21 @@ LIMITS = {
         -30.0, np.inf, "degC", "mineral gear oils stop flowing at -10 to -30 degC, synthetic ones at -30 to -60"
     ),
     "cooling factor": Usual(0.2, 1.2, "", "ISO/TS 6336-20: X_S is 0.2 for submerged teeth, 1 for dip, 1.2 for spray"),
-    "contact ratio": Usual(1.0, 2.0, "", "stresses and safeties of ISO 6336-2 and -3 are made for 1 to 2"),
+    "contact ratio": Usual(1.0, 2.0, "", "stresses and safeties of ISO 6336-2 and -3 are valid for 1 to 2"),
     "pitch line velocity": Usual(0.0, 250.0, "m/s", "turbo gears reach 200 m/s: is the speed in rpm?"),
     "amount of the modification": Usual(0.0, np.inf, "um", "negative: material is added; positive removes it"),
     "depth of the modification": _of_field(TipRelief, "amount"),
     "depth of the modification in modules": Usual(0.0, 0.04, "", "ISO 53:1974 limits tip relief to 0.02 modules"),
-    "length of the modification": Usual(0.0, np.inf, "mm", "more than the flank has: the start is never reached"),
-    "length of the end relief": Usual(0.0, np.inf, "mm", "less than the gear is wider than its mate: it has no effect"),
+    "length of the modification": Usual(0.0, np.inf, "mm", "longer than the flank: it has no start on the flank"),
+    "length of the end relief": Usual(0.0, np.inf, "mm", "shorter than the overhang beyond the mate: it has no effect"),
     "slices over the end relief": Usual(2.0, np.inf, "", "the load peaks beside it: jaxgear.contact.end_relief_widths"),
-    "mean transmission error in modules": Usual(0.0, 0.02, "", "the teeth bend beyond what the model is made for"),
-    "PPTE": Usual(0.1, np.inf, "um", "finer than the model can claim of modified flanks"),
-    "PPTE by finite elements": Usual(0.03, np.inf, "um", "finer than a model in two dimensions can claim"),
+    "mean transmission error in modules": Usual(0.0, 0.02, "", "the deflection is out of the validity of the model"),
+    "PPTE": Usual(0.1, np.inf, "um", "below the accuracy of the model for modified flanks"),
+    "PPTE by finite elements": Usual(0.03, np.inf, "um", "below the accuracy of a two-dimensional model"),
     "flank pressure": Usual(0.0, 1650.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
-    "corner pressure": Usual(
-        0.0, 1650.0, "MPa", "tip edges dig into the mates, which no flank endures: relieve the tips"
-    ),
+    "corner pressure": Usual(0.0, 1650.0, "MPa", "edge contact above the endurance limit of any flank: add tip relief"),
     "root stress": Usual(0.0, 1050.0, "MPa", "endurance limit of the best case-hardened steel (ISO 6336-5)"),
-    "effective contact ratio": Usual(1.0, np.inf, "", "the teeth lose contact, and shocks follow"),
+    "effective contact ratio": Usual(1.0, np.inf, "", "less than one pair in contact: the teeth lose contact"),
 }
 
 _RELIEFS = TipRelief, RootRelief, EndRelief

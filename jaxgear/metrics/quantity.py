@@ -210,7 +210,7 @@ class Vocabulary(Mapping[str, Quantity]):
         """
         for quantity in quantities:
             if quantity.name in self:
-                raise ValueError(f'quantities: "{quantity.name}" is there already')
+                raise ValueError(f'quantities: "{quantity.name}" exists already')
             self._known[quantity.name] = quantity
             if quantity.takes is not None:
                 _OF_SETTINGS.setdefault(quantity.takes, {})[quantity.name] = quantity

@@ -199,7 +199,7 @@ RATED = (
     *_of_gears(
         "pitting_damage",
         pitting_damage,
-        "share of the life that pitting takes in 1e6 revolutions of the pinion",
+        "damage sum of pitting in 1e6 revolutions of the pinion",
         needs="pitting_exponent",
         better="smaller",
         label="pitting damage per 1e6 revolutions",
@@ -208,7 +208,7 @@ RATED = (
     *_of_gears(
         "root_damage",
         root_damage,
-        "share of the life that bending takes in 1e6 revolutions of the pinion",
+        "damage sum of tooth root bending in 1e6 revolutions of the pinion",
         needs="bending_exponent",
         better="smaller",
         label="root damage per 1e6 revolutions",

@@ -120,7 +120,7 @@ class Met:
             seek_limits(self.record.linearizer, self, self.compromise()[0])
         if not self.found:
             raise RuntimeError(
-                "pareto: no design that was met keeps the constraints, though one was sought by their violation alone"
+                "pareto: no evaluated design meets the constraints, also when their violation alone is minimized"
             )
         self.thin(most)
 

@@ -179,7 +179,7 @@ class BinaryGenetic(Checked, AbstractMethod):
         for generation in range(1, self.generations + 1):
             ranks = np.asarray(fitness(record.judge(decoded(strings, self.bits))))
             if (ranks < 0).any():
-                raise ValueError("binary_genetic: needs an objective that is positive and to be made small")
+                raise ValueError("binary_genetic: needs a positive objective that is minimized")
             record.look(generation, self.generations)
             key, breed = jax.random.split(key)
             # relative to the best, so that neither an objective of zero nor its unit matters

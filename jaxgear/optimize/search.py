@@ -41,7 +41,7 @@ class Record:
     def check(self) -> None:
         """Raises a `RuntimeError` when nothing was found."""
         if not np.isfinite(self.value):
-            raise RuntimeError("the search met no design within the bounds that gave a converged contact solution")
+            raise RuntimeError("no design that the search evaluated within the bounds has a converged contact solution")
 
     def spend(self, designs: int, *, analyses: int = 1) -> None:
         """Counts contact analyses: of so many designs in every case, each worth so many."""

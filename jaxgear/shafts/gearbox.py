@@ -57,7 +57,7 @@ def torque_path(shafts: Sequence[str], meshes: Sequence[tuple[int, int]], outlet
     if left:
         one, two = (shafts[index] for index in meshes[min(left)])
         raise ValueError(
-            f'Gearbox: the mesh of shafts "{one}" and "{two}" closes a circle, which shares its torque by its play: '
+            f'Gearbox: the mesh of shafts "{one}" and "{two}" closes a loop, whose load sharing depends on backlash: '
             "model the branches one by one"
         )
     start = turning[0]
@@ -200,7 +200,7 @@ class Gearbox(Checked):
             return 0
         if len(free) != 1:
             raise ValueError(
-                f"Gearbox: {len(free)} couplings have no torque of their own, must be 1, the way out of the others"
+                f"Gearbox: {len(free)} couplings have no torque, must be 1, which takes the sum of the others"
             )
         return free[0]
 

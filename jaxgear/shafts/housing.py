@@ -204,7 +204,7 @@ def write_housing(path: str | Path, housing: Housing) -> None:
 def _made(kind: str, unit: str, nodes: list[str], matrix: np.ndarray) -> Housing:
     if (kind, unit) not in _UNITS:
         known = ", ".join(" ".join(pair) for pair in _UNITS)
-        raise ValueError(f'"{kind} {unit}" is no kind and unit of a housing, must be one of {known}')
+        raise ValueError(f'"{kind} {unit}" is not a kind and unit of a housing, must be one of {known}')
     size = len(nodes)
     if matrix.shape != (size, size):
         raise ValueError(f"{kind} has shape {matrix.shape}, must be ({size}, {size}) as its nodes")
@@ -251,7 +251,7 @@ def _number(cell: str, row: str, column: str) -> float:
 
 def _from_npz(path: Path) -> tuple[str, str, list[str], np.ndarray]:
     if not zipfile.is_zipfile(path):
-        raise ValueError("is no npz archive")
+        raise ValueError("is not a valid npz archive")
     with np.load(path, allow_pickle=False) as given:
         kinds = [kind for kind in ("stiffness", "compliance") if kind in given]
         missing = [name for name in ("nodes", "unit") if name not in given]
@@ -293,7 +293,7 @@ def spread_forces(
     if rows.shape != (count, 3) or rows.min() < 0 or rows.max() >= size:
         raise ValueError(
             f"spread_forces: degrees_of_freedom of shape {rows.shape} must be {count} times 3 rows from 0 to "
-            f"{size - 1}: no node of a seat can be held"
+            f"{size - 1}: the nodes of a seat must be free"
         )
     # resultant of nodal forces: x, y, z and moments about the centre
     zero, (x, y, z) = np.zeros(count), arms.T
@@ -358,8 +358,8 @@ def condense(
     missed = np.abs(matrix @ moved - loads).max() / np.abs(loads).max()
     if not missed < _MISSED:  # a model that floats is singular but for rounding
         raise ValueError(
-            f"condense: stiffness is singular, forces are missed by {missed:.2g} of their size: is the housing fixed "
-            "to its foundation?"
+            f"condense: stiffness is singular, residual forces are {missed:.2g} of the given ones: is the housing "
+            "fixed to its foundation?"
         )
     compliance = loads.T @ moved  # mm and rad per N and N mm
     return Housing(tuple(nodes), 1e3 * 0.5 * (compliance + compliance.T), "compliance")

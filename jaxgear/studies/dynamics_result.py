@@ -148,7 +148,7 @@ class DynamicsResult(AbstractStudyResult):
         low, high = (float(self.request.settings.mesh_frequencies[place]) / natural for place in (0, -1))
         if low > _FAR or high < 1 / _FAR:
             yield (
-                f"PLEASE CHECK: all speeds lie at {low:.3g} to {high:.3g} times the natural frequency of {natural:.4g} "
+                f"WARNING: all speeds lie at {low:.3g} to {high:.3g} times the natural frequency of {natural:.4g} "
                 "Hz; see dynamics.pinion_inertia [kg m2], wheel_inertia and the speeds"
             )
 
@@ -171,8 +171,8 @@ class DynamicsResult(AbstractStudyResult):
             if bad:
                 why = reason([of.status for of in of_torques.values()])
                 yield (
-                    f"MESH FORCE NOT CONVERGED: {name} at {', '.join(bad)} N m, {why}; its numbers are not to be "
-                    "trusted. Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
+                    f"MESH FORCE NOT CONVERGED: {name} at {', '.join(bad)} N m, {why}; do not use its numbers. "
+                    "Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
                 )
 
     def summary(self) -> dict[str, Any]:

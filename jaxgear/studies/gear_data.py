@@ -60,7 +60,7 @@ _FACTORS = {
     "wheel_root_stress_MPa": "sigma_F",
 }
 _RATING_NOTE = (
-    "Factors of application, dynamics and transverse load distribution belong into the torque and are 1 here; so are "
+    "Application factor, dynamic factor and transverse load factor are 1 here, include them in the torque; so are "
     "Y_beta, Y_B and Y_DT, for spur gears with solid bodies and contact ratios up to 2. K_Hbeta is that of the contact "
     "analysis, 1 on one slice."
 )

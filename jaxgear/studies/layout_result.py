@@ -147,13 +147,13 @@ class LayoutResult(AbstractStudyResult):
             statuses = [*(one.load.status for one in cases), *(one.status for one in layout.damage)]
             status = Status(max(int(np.max(one)) for one in statuses))
             if status != Status.CONVERGED:
-                yield f"LOAD OVER THE FACE NOT FOUND: {name}, {status.text}; its numbers are not to be trusted"
+                yield f"LOAD OVER THE FACE NOT CONVERGED: {name}, {status.text}; do not use its numbers"
             if layout.touches_edges:
                 yield f"the largest load is at an edge: {name}"
         known = np.isfinite(list(self.over_torque.values())).all(axis=0)
         if not known.all():
             missed = ", ".join(f"{torque:g}" for torque in self.request.torques[~known])
-            yield f"LOAD OVER THE FACE NOT FOUND at {missed} N m"
+            yield f"LOAD OVER THE FACE NOT CONVERGED at {missed} N m"
         for name, steps in self.contacts.items():
             for step, numbers in steps.items():
                 if not np.isfinite(numbers["face_load_factor"]):

@@ -247,17 +247,17 @@ def first_screen(
     rows = [*to_grind(optimum.mesh, best.pinion, best.wheel)]
     if projection is not None:
         rows += to_grind(optimum.mesh, projection.pinion, projection.wheel, f"as {projection.curve}")
-    yield Table(("", ""), tuple(rows), f"What to grind: {name} of {file.title}")
+    yield Table(("", ""), tuple(rows), f"Modification to grind: {name} of {file.title}")
     gained = [*gains(evaluations, optimum.problem)]
     if front is not None and optimum.problem is not None:
         gained += front_rows(front, [of.sign for of in optimum.problem.objectives], evaluations)
-    yield Table(("", ""), tuple(gained), f"What it gains at {file.torque:g} N m: unmodified -> {name}")
+    yield Table(("", ""), tuple(gained), f"Gain at {file.torque:g} N m: unmodified -> {name}")
     judged_by = (
         *_feasibility(optimum),
         *_bounds(file, optimum),
         *zip(chain(("grid",), repeat("")), _positions(optimum, evaluations, searched_at)),
     )
-    yield Table(("", ""), (*judged_by, *trust), "Whether to trust it")
+    yield Table(("", ""), (*judged_by, *trust), "Checks of the result")
 
 
 def search_lines(optimum: Optimum, front: Front | None, projection: Projection | None) -> Iterator[str]:
@@ -333,10 +333,10 @@ def _feasibility(optimum: Optimum) -> Iterator[tuple[str, str]]:
         yield label, f"{name} {limit}"
         label = ""
     if not optimum.feasible:
-        passed = f"the nearest passes one by {100 * optimum.violation:.2g} %"
+        passed = f"the nearest design exceeds one by {100 * optimum.violation:.2g} %"
         alone = optimum.problem is not None and len(optimum.problem.objectives) == 1
-        sought = ", not by their violation alone either" if alone else ""
-        yield label, f"NOT FEASIBLE: the search met no design within all limits{sought}; {passed}"
+        sought = ", also when it minimized their violation alone" if alone else ""
+        yield label, f"NOT FEASIBLE: the search found no design within all limits{sought}; {passed}"
 
 
 def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:

@@ -62,8 +62,8 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
         if evaluation.failed_torques:
             torques = ", ".join(f"{torque:g}" for torque in evaluation.failed_torques)
             yield (
-                f"CONTACT SOLUTION NOT CONVERGED: {name} at {torques} N m, {evaluation.cause}; its numbers are not "
-                "to be trusted. Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
+                f"CONTACT SOLUTION NOT CONVERGED: {name} at {torques} N m, {evaluation.cause}; do not use its numbers. "
+                "Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
             )
 
 

@@ -73,7 +73,7 @@ class WearStudy(AbstractStudy[WearResult]):
         lives = {name: self._life(mesh, name, flanks, kept, stages) for name, flanks in designs.items()}
         scatters: Mapping[str, wear_scatter.Samples] = {}
         if self.tolerance is not None:
-            stages.begin("wearing manufactured gears of all designs")
+            stages.begin("wear of manufactured gears of all designs")
             # of one length, as quantities take them, and as many as the nominal gears have taken
             blocks = min(max(len(life.revolutions) - 1 for life in lives.values()), _MOST_BLOCKS)
             settings = dataclasses.replace(self.request.settings, blocks=blocks)
@@ -92,7 +92,7 @@ class WearStudy(AbstractStudy[WearResult]):
         self, mesh: Mesh, name: str, flanks: Modifications, kept: CheckpointsOfKind, stages: Stages
     ) -> WearHistory:
         """The life of one design, at the torque of the file."""
-        stages.begin(f"wearing the {name} design")
+        stages.begin(f"wear of the {name} design")
         design, settings, (pinion, wheel) = self.design, self.request.settings, flanks
 
         def progress(done: float, total: float) -> None:

@@ -46,7 +46,7 @@ _WORTH_A_WORD = 0.01
 OVER_LIFE = "optimum over life"  # the design that is sought for the least mean PPTE over the life
 _PANEL, _HEIGHT = 80.0, 84.0  # [mm]
 _BEYOND = "*"  # marks lives that are longer than what was looked at
-_OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks touch: jaxgear dynamics tells."
+_OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks touch: run jaxgear dynamics."
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class WearResult(AbstractStudyResult):
 
     assumptions: ClassVar = (
         "Wear follows Archard: depth is the coefficient times pressure and sliding distance, at the torque of the file "
-        "or the torques of [wear]. Lives, flanks and figures over the life are of gears without manufacturing "
+        "or the torques of [wear]. Wear histories, flanks and figures over the life are of gears without manufacturing "
         "deviations. Under several torques every number of the mesh is the mean by their shares of the revolutions.",
     )
 
@@ -135,7 +135,7 @@ class WearResult(AbstractStudyResult):
             numbers = self._numbers(life)
             result.add_row(name, *(_cell(key, numbers[key], ended) for key in columns))
             if ended < numbers.get("life_to_depth_revolutions", 0.0) < np.inf:
-                result.note = f"{_BEYOND} beyond the revolutions that were worn, at the rate of the last block"
+                result.note = f"{_BEYOND} beyond wear.revolutions, extrapolated at the rate of the last block"
         return result
 
     def _loads(self) -> str:
@@ -195,13 +195,13 @@ class WearResult(AbstractStudyResult):
             if lost.any():
                 first = float(life.revolutions[int(lost.argmax())])
                 yield (
-                    f"NOT CONVERGED: {name} from {first:.3g} revolutions on, {reason(life.cycles.status)}; its numbers "
-                    "are not to be trusted. Take more blocks, or raise resolution.newton_steps or resolution.pairs."
+                    f"NOT CONVERGED: {name} from {first:.3g} revolutions on, {reason(life.cycles.status)}; do not use "
+                    "its numbers. Take more blocks, or raise resolution.newton_steps or resolution.pairs."
                     + _OF_MOTION
                     * (life.dynamic_factor is not None)
                 )
             elif not blocks_are_short(life):
-                yield f"BLOCKS TOO LONG: {name}, flanks overshoot; its numbers are not to be trusted. Take more blocks."
+                yield f"BLOCKS TOO LONG: {name}, flanks overshoot; do not use its numbers. Take more blocks."
         yield from wear_scatter.failures(self.scatters)
 
     def summary(self) -> dict[str, Any]:

@@ -33,8 +33,7 @@ def left_out(design: DesignFile) -> str:
         return ""
     return manufactured.left_out(
         design,
-        "lives under the motion are not worked out for every manufactured pair, those under wear.line_load = "
-        '"static" are',
+        'wear of manufactured pairs is computed under the static line load only: wear.line_load = "static"',
     )
 
 
@@ -133,7 +132,7 @@ def failures(scatters: Mapping[str, Samples]) -> Iterator[str]:
         if failed(samples):
             yield (
                 f"NOT CONVERGED: {name}, {failed(samples)} of {len(samples[_PPTE])} manufactured pairs, which count as "
-                "the worst: their contact was not found, or their blocks are too long. Take more blocks."
+                "the worst: their contact did not converge, or their blocks are too long. Take more blocks."
             )
 
 

@@ -54,7 +54,7 @@ def described(
 
 
 def _not_computed(cycle: MeshCycle) -> NoReturn:
-    raise ValueError("Quantity: is known by its description only, it cannot be computed")
+    raise ValueError("Quantity: has its description only and no function, it cannot be computed")
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ class Scatter(Checked):
         wanted = quantity_of(of, "Scatter")
         known = {"ppte_um": self.ppte, **self.numbers}
         if wanted.key not in known:
-            raise ValueError(f'Scatter: "{wanted.key}" is not there, must be one of {", ".join(known)}')
+            raise ValueError(f'Scatter: "{wanted.key}" is not among the results, must be one of {", ".join(known)}')
         return joined(measure, known[wanted.key], jnp.ones_like(self.ppte), wanted.better)
 
     @property

@@ -304,7 +304,7 @@ def open_sweep(folder: str | Path) -> SweepTable:
     problems = [f"{missing} of {store.parts} parts are missing"] if missing else []
     problems += [f"{path.name} is damaged or displaced" for path in unsound[:1]]
     if problems:
-        raise ValueError(f"{folder}: is not complete, {' and '.join(problems)}: repeat the sweep, which mends it")
+        raise ValueError(f"{folder}: is not complete, {' and '.join(problems)}: repeat the sweep to complete it")
     sizes = [stop - start for start, stop in map(store.span, range(store.parts))]
     return SweepTable(manifest.title, manifest.columns, sizes, lambda part, names: _stored(paths[part], names))
 
@@ -317,7 +317,7 @@ def _stored(path: Path, names: Sequence[str] | None):
         with parquet.ParquetFile(path, page_checksum_verification=True) as file:
             return file.read(names)
     except (OSError, pyarrow.ArrowException):
-        raise ValueError(f"{path}: is damaged or gone: repeat the sweep, which mends it") from None
+        raise ValueError(f"{path}: is damaged or missing: repeat the sweep to complete it") from None
 
 
 def _text(value) -> str:

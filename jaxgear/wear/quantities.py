@@ -116,14 +116,14 @@ WEAR_QUANTITIES = Vocabulary(
         _quantity(
             "life_to_depth",
             "revolutions",
-            "life to the limit of the wear depth, at most a thousand of those looked at",
+            "life to the limit of the wear depth, at most 1000 times the revolutions of the wear history",
             better="larger",
             needs="depth_limit",
         ),
         _quantity(
             "life_to_ppte",
             "revolutions",
-            "life to the limit of peak-to-peak transmission error, at most the life looked at",
+            "life to the limit of peak-to-peak transmission error, at most the revolutions of the wear history",
             better="larger",
             needs="ppte_limit",
         ),

@@ -153,7 +153,7 @@ def _neighbours(path: Path, rows: list[Row], rho: np.ndarray) -> np.ndarray:
     most = max(map(abs, tables), default=0)
     missing = [k for k in range(1, most + 1) if k not in tables]
     if missing:
-        raise ValueError(f"{path}: neighbour {missing[0]}: no rows, must be there up to neighbour {most}")
+        raise ValueError(f"{path}: neighbour {missing[0]}: no rows, must have rows up to neighbour {most}")
     for k in range(1, most + 1):
         if -k not in tables:
             continue

@@ -35,16 +35,16 @@ def parse_json(content: bytes) -> Model:
     """The model of a file.
 
     Raises:
-        DesignFileError: for what is no JSON, or no REXS model.
+        DesignFileError: for what is not valid JSON, or no REXS model.
     """
     try:
         data = json.loads(content.decode("utf-8-sig"), parse_float=str, parse_int=str, parse_constant=str)
     except json.JSONDecodeError as error:
-        raise DesignFileError("", f"line {error.lineno}, column {error.colno}: no JSON: {error.msg}") from None
+        raise DesignFileError("", f"line {error.lineno}, column {error.colno}: not valid JSON: {error.msg}") from None
     except UnicodeDecodeError:
-        raise DesignFileError("", "no JSON: not UTF-8 text") from None
+        raise DesignFileError("", "not valid JSON: not UTF-8 text") from None
     except RecursionError:
-        raise DesignFileError("", "no JSON: nested too deeply") from None
+        raise DesignFileError("", "not valid JSON: nested too deeply") from None
     root = _object(_object(data, "file").get("model"), "model")
     model = Model(checked_version(str(root.get("version", ""))))
     for item in _objects(root, "components"):
@@ -142,12 +142,12 @@ def _plain(held: Attribute) -> Any:
 
 def _object(data: Any, where: str) -> dict[str, Any]:
     if not isinstance(data, dict):
-        raise DesignFileError("", f"{where}: must be an object of JSON")
+        raise DesignFileError("", f"{where}: must be a JSON object")
     return data
 
 
 def _objects(data: dict[str, Any], key: str) -> list[dict[str, Any]]:
     found = data.get(key, [])
     if not isinstance(found, list):
-        raise DesignFileError("", f"{key}: must be a list of JSON")
+        raise DesignFileError("", f"{key}: must be a JSON array")
     return [_object(item, key) for item in found]

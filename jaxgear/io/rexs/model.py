@@ -185,13 +185,13 @@ class Model:
     def put(self, component: Component) -> None:
         """Takes up a component of a file."""
         if component.id in self.components:
-            raise DesignFileError(component.where(), "stands twice in the file")
+            raise DesignFileError(component.where(), "is given twice in the file")
         self.components[component.id] = component
 
     def put_case(self, number: int, said: Iterable[Component]) -> None:
         """Takes up a load case of a file."""
         if number in self.cases:
-            raise DesignFileError(f"load_case {number}", "stands twice in the file")
+            raise DesignFileError(f"load_case {number}", "is given twice in the file")
         self.cases[number] = {component.id: component for component in said}
 
     def related(self, kind: str, role: str, number: int, wanted: str) -> list[Component]:
@@ -334,11 +334,11 @@ def _tree(content: bytes) -> Element:
         parser.Parse(content, True)
     except expat.ExpatError as error:
         problem = expat.errors.messages.get(error.code, "not well-formed")
-        raise DesignFileError("", f"line {error.lineno}, column {error.offset + 1}: no XML: {problem}") from None
+        raise DesignFileError("", f"line {error.lineno}, column {error.offset + 1}: not valid XML: {problem}") from None
     except (ValueError, LookupError) as error:  # of an encoding
         if isinstance(error, DesignFileError):
             raise
-        raise DesignFileError("", f"no XML: {error}") from None
+        raise DesignFileError("", f"not valid XML: {error}") from None
     return builder.close()
 
 

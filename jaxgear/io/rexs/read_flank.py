@@ -37,7 +37,7 @@ def read_modification(component: Component, frame: Frame) -> Iterator[AbstractMo
     """
     read = _READERS.get(component.type)
     if read is None:
-        raise component.refuse("", "is no modification that this library has")
+        raise component.refuse("", "is not a supported modification")
     try:
         yield from read(component, frame)
     except DesignFileError:
