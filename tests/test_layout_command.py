@@ -1,6 +1,7 @@
 """The command `jaxgear layout` and its tables: what it writes and says, and one line for what is wrong."""
 
 import csv
+import importlib
 import json
 from types import SimpleNamespace
 
@@ -26,11 +27,13 @@ teeth = 19
 module = 3.0
 face_width = 18.0
 bore_diameter = 24.0
+tip_diameter = 63.0
 [wheel]
 teeth = 48
 module = 3.0
 face_width = 18.0
 bore_diameter = 70.0
+tip_diameter = 150.0
 [load]
 torque = 150.0
 [resolution]
@@ -67,9 +70,9 @@ pinion_amounts = [10.0, 20.0]
 ONE_PROFILE = PROFILE.replace(", 20.0", "") + "wheel_amounts = [10.0]\n"
 AXES = "{ skew = 15.0, inclination = 30.0, bearing_span = 80.0 }"
 LIFE = """
-torques = [60.0, 150.0]
-hours = [1000.0, 50.0]
-speeds = [900.0, 600.0]
+torques = [60.0, 75.0, 150.0, 300.0]
+hours = [1000.0, 0.0, 50.0, 0.0]
+speeds = [900.0, 600.0, 600.0, 600.0]
 [strength]
 pitting = 1500.0
 pitting_exponent = 13.2
@@ -103,9 +106,12 @@ def file(file, tmp_path):
 DOUBTFUL = FILE.replace("bore_diameter = 70.0", "bore_diameter = 44.0")  # less than the shaft
 
 
-def test_the_command_writes_what_it_says(file, tmp_path):
-    """Flank lines for a duty cycle."""
-    found, _ = laid_out(file(DOUBTFUL.replace('[housing]\nfile = "housing.csv"\n', "") + LIFE), tmp_path / "out")
+@pytest.mark.parametrize("quick", [["--quick"], pytest.param([], marks=pytest.mark.slow)])
+def test_the_command_writes_what_it_says(file, tmp_path, monkeypatch, quick):
+    """Flank lines for a duty cycle, whose torques are all of a quick run: one program for both."""
+    monkeypatch.setattr(importlib.import_module("jaxgear.io.layout"), "_QUICK_TORQUES", 2)
+    path = file(DOUBTFUL.replace('[housing]\nfile = "housing.csv"\n', "") + LIFE)
+    found, _ = laid_out(path, tmp_path / "out", *quick)
     assert list(found["layouts"]) == list(found["bearings"]) == ["rigid seats"]
 
 
@@ -121,9 +127,9 @@ def test_the_command_compares_with_rigid_seats(file, tmp_path):
     assert not any(np.any(each["seat_um"]) for each in found["bearings"]["rigid seats"].values())
 
 
-def laid_out(path, folder):
+def laid_out(path, folder, *quick):
     """Summary and output of the command, after what holds with and without a housing."""
-    done = call("layout", str(path), "--output", str(folder), "--report")
+    done = call("layout", str(path), "--output", str(folder), "--report", *quick)
     assert done.code == 0, done.err
     findings = [line for line in done.out.splitlines() if line.startswith("warning")]
     assert len(findings) == 1 and findings[0].startswith(
@@ -133,7 +139,7 @@ def laid_out(path, folder):
     names = {entry.name for entry in folder.iterdir()}
     figures = {"tolerance_cases.png", "face_load_factors.png", "face_load_over_torque.png", "shaft_deflection.png"}
     assert names == {"summary.json", "report.html", "flanks.csv", *figures} <= RESULT_FILES
-    check_report(folder, path, "layout", path, "--output", folder, "--report")
+    check_report(folder, path, "layout", path, "--output", folder, "--report", *quick)
     found = json.loads((folder / "summary.json").read_text())
     main = next(iter(found["layouts"].values()))
     assert main["face_load_factor"]["unmodified"] > 1.3 and main["face_load_factor"]["step_1"] < 1.1
@@ -161,10 +167,13 @@ def laid_out(path, folder):
     end = main["wheel"]["slope_um"] / 2 + main["wheel"]["crowning_um"]
     assert float(flanks["step 2"]["modification_um"]) == pytest.approx(end, abs=1e-5)
     assert float(flanks["step 1"]["modification_um"]) < end
-    changes = {step: of["face_load_factor"] for step, of in found["change_at_twice_the_stations"].items()}
-    assert 0 < abs(changes["unmodified"]) < 0.02 * factor and list(changes) == ["unmodified", "step_1", "step_2"]
-    said = f"twice as many change face load factor K_Hbeta: unmodified by {changes['unmodified']:+.2g}"
-    assert f"evaluated at 21 stations (ISO 6336-1 Annex E); {said}" in done.out
+    if quick:
+        assert "change_at_twice_the_stations" not in found and found["quick"] and "quick run, " in done.out
+    else:
+        changes = {step: of["face_load_factor"] for step, of in found["change_at_twice_the_stations"].items()}
+        assert 0 < abs(changes["unmodified"]) < 0.02 * factor and list(changes) == ["unmodified", "step_1", "step_2"]
+        said = f"twice as many change face load factor K_Hbeta: unmodified by {changes['unmodified']:+.2g}"
+        assert f"evaluated at 21 stations (ISO 6336-1 Annex E); {said}" in done.out
     assert "life relative to the even load" in done.out and "life after step 1 [h]" in done.out
     assert found["profiles"] == {}
     for one in found["layouts"].values():

@@ -68,6 +68,7 @@ teeth = 30
 module = 2.0
 face_width = 20.0
 bore_diameter = 12.6
+tip_diameter = 64.0
 """
 PAIR = f"""
 [pinion]{GEAR}
