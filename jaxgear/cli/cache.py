@@ -37,7 +37,7 @@ def enable_cache() -> Path | None:
 class Files(KeptFiles):
     """Programs as files of a folder, named by all that they depend on."""
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path) -> None:
         super().__init__(folder, _surroundings(), executed=True)
 
 

@@ -4,11 +4,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer.models import OptionInfo
 
 File = Annotated[Path, typer.Argument(metavar="FILE.toml", help="Design file.", show_default=False)]
 
 
-def output_option(folder: str):
+def output_option(folder: str) -> OptionInfo:
     """The option --output of a command with its own folder, which a quick run marks with -quick."""
     return typer.Option("--output", "-o", metavar="DIR", help="Result folder.", show_default=f"results/FILE/{folder}")
 

@@ -34,7 +34,7 @@ class _Bar(Progress):
 class Stages(_Bar, studies.Stages):
     """Progress of a command through its stages."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn()
         _Bar.__init__(self, *columns, doing="reading the design file", note="")
         studies.Stages.__init__(self, self.shown)
@@ -62,7 +62,7 @@ class Meter(_Bar):
         done: variants of this process, None before the first.
     """
 
-    def __init__(self, target: Path):
+    def __init__(self, target: Path) -> None:
         columns = TextColumn("{task.fields[note]}"), BarColumn(), TextColumn("{task.percentage:.0f} %")
         super().__init__(*columns, TimeRemainingColumn(), doing="", note="preparing")
         self.done: int | None = None

@@ -1,17 +1,15 @@
 """Contact of the mesh at a prescribed transmission error, or under a force of every position: for dynamics and wear."""
 
-from typing import Any
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, check, program, real, result, tangent_stiffness
+from ..numerics import Checked, Numbers, check, program, real, result, tangent_stiffness
 from .face_coupling import check_torque
 from .mesh import Mesh
-from .operating_point import operating_point_of
+from .operating_point import Torque, operating_point_of
 from .slide import RemovedMaterial, for_contact, loaded_material
 from .solve import check_mesh, contact_of, contact_status, flanks_of, pair_forces
 from .status import Status, Statuses, WithStatus, status_of
@@ -52,9 +50,9 @@ class PrescribedContact(WithStatus, Checked):
 
 def solve_at(
     mesh: Mesh,
-    transmission_error: Any,
+    transmission_error: Numbers,
+    torque: Torque,
     *,
-    torque: Any,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
 ) -> PrescribedContact:

@@ -15,6 +15,7 @@ from ..microgeometry import AbstractModification, NoModification, terms
 from ..numerics import (
     ContactProblem,
     ContactSolution,
+    Given,
     concrete,
     minimum,
     program,
@@ -26,7 +27,7 @@ from ..numerics.programs import begin
 from .cycle import MeshCycle
 from .face_coupling import check_torque, ends_together, holds_at
 from .mesh import Mesh, begin_mesh, prepare
-from .operating_point import OperatingPoint, operating_point_of
+from .operating_point import OperatingPoint, Torque, operating_point_of
 from .resolution import Resolution
 from .slide import RemovedMaterial, as_removed, for_contact, loaded_material, nothing_removed
 from .status import Status, Statuses, status_of
@@ -41,7 +42,7 @@ Load = Float[Array, "pairs slices positions"]
 
 def solve(
     mesh: Mesh,
-    torque: Any,
+    torque: Torque,
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
@@ -80,8 +81,8 @@ def solve(
 
 def solve_removed(
     mesh: Mesh,
-    torque: Any,
-    removed: Any,
+    torque: Torque,
+    removed: RemovedMaterial | Given,
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
@@ -115,7 +116,7 @@ def solve_removed(
 
 def removed_material(
     mesh: Mesh,
-    torque: Any,
+    torque: Torque,
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
@@ -182,13 +183,15 @@ def begin_contact(
         begin(_solve_removed, eqx.filter_eval_shape(for_contact, mesh), np.zeros((), dtype), nothing)
 
 
-def check_mesh(owner: str, mesh: Any) -> None:
+def check_mesh(owner: str, mesh: object) -> None:
     """Raises a one-line `TypeError` for something else than a prepared mesh."""
     if not isinstance(mesh, Mesh):
         raise TypeError(f"{owner}: mesh is a {type(mesh).__name__}, must be a Mesh: jaxgear.prepare makes one")
 
 
-def flanks_of(owner: str, mesh: Mesh, pinion: Any, wheel: Any) -> tuple[AbstractModification, AbstractModification]:
+def flanks_of(
+    owner: str, mesh: Mesh, pinion: AbstractModification | None, wheel: AbstractModification | None
+) -> tuple[AbstractModification, AbstractModification]:
     """Both modifications, that of the nominal involute for None.
 
     Raises:

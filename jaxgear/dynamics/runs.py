@@ -1,6 +1,6 @@
 """Several runs through the same speeds in one program, of one oscillator or of many designs, on all devices."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Literal, NamedTuple
@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
 from ..conditions.join import divided, local_devices, over_devices, padded
-from ..numerics import kernel, quick_jit, whole
+from ..numerics import Numbers, kernel, quick_jit, whole
 from .oscillator import Oscillator
 from .response import SpeedResponse
 from .speed_sweep import check_single, checked_frequencies, prepared, steps_for, swept
@@ -38,10 +38,10 @@ class Run(NamedTuple):
 
     direction: Direction = "up"
     kick: Any = None
-    kicks: Any = ()
+    kicks: Sequence[float] | jax.Array = ()
 
 
-def speed_runs(oscillator: Oscillator, mesh_frequencies, runs: Mapping[str, Run], **options: Any) -> Responses:
+def speed_runs(oscillator: Oscillator, mesh_frequencies: Numbers, runs: Mapping[str, Run], **options: Any) -> Responses:
     """`speed_sweep` of one oscillator for each of some runs, one after the other in one program.
 
     Args:
@@ -64,7 +64,7 @@ def speed_runs(oscillator: Oscillator, mesh_frequencies, runs: Mapping[str, Run]
 def design_runs(
     make: Callable[[Any], Oscillator],
     designs: Any,
-    mesh_frequencies,
+    mesh_frequencies: Numbers,
     runs: Mapping[str, Run],
     *,
     keep: Callable[[Responses], Any] | None = None,
@@ -120,7 +120,9 @@ def _in_batches(
     return found if keep else _named(found, _ways(runs), axis=1)
 
 
-def speed_sweeps(oscillators: Oscillator, mesh_frequencies, *, batch: int | None = None, **options: Any):
+def speed_sweeps(
+    oscillators: Oscillator, mesh_frequencies: Numbers, *, batch: int | None = None, **options: Any
+) -> SpeedResponse:
     """`speed_sweep` of many oscillators: designs, torques, or both.
 
     What is in memory besides the results does not grow with their number.

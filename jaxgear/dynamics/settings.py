@@ -178,7 +178,7 @@ class Dynamics(AbstractSettings):
         ways = {UP: Run("up"), DOWN: Run("down"), KICKED: Run("down", self.kick, kicks)}
         return {name: ways[name] for name in self.run_names}
 
-    def kicks_of(self, name: str) -> Any:
+    def kicks_of(self, name: str) -> Sequence[float] | jax.Array:
         """Dynamic factors of the kicks at every speed of one of `run_names`."""
         return self._runs[name].kicks
 

@@ -1,6 +1,7 @@
 """Mesh cycles until the motion at one speed repeats, from where it starts to its record."""
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -9,6 +10,8 @@ from jaxtyping import Array, Bool, Float, Int
 from .integrate import Cycle, nodes_of, one_step, step_of
 from .oscillator import Oscillator, Rest, State
 from .response import Numbers, no_sums, numbers_of, with_cycle, with_step
+
+T = TypeVar("T")
 
 Scalar = Float[Array, ""]
 Unknowns = Float[Array, " unknowns"]
@@ -31,7 +34,7 @@ class Speed(NamedTuple):
     steps: Int[Array, ""]
     most_steps: int
 
-    def over_cycle(self, function, carry):
+    def over_cycle(self, function: Callable[..., T], carry: T) -> T:
         """Folds function(carry, step, indices of the nodes of its begin, middle and end) over the steps of a cycle."""
         # a position lies in the middle of the shortest step
         stride = 2 * (self.most_steps // self.steps)
@@ -173,7 +176,13 @@ class AtOneSpeed(NamedTuple):
 
 
 def steady_state(
-    oscillator: Oscillator, y: State, speed: Speed, limits: Any, sizes: Any, static: Scalar, waves
+    oscillator: Oscillator,
+    y: State,
+    speed: Speed,
+    limits: Any,
+    sizes: Any,
+    static: Scalar,
+    waves: Float[Array, "nodes waves"],
 ) -> AtOneSpeed:
     """Steady state at one speed that a start leads to, and its record.
 

@@ -58,7 +58,7 @@ def speed_sweep(
     most_periods: int = 4,
     points: int = 32,
     orders: Sequence[float] = ORDERS,
-    kicks: Sequence[float] = (),
+    kicks: Sequence[float] | jax.Array = (),
 ) -> SpeedResponse:
     """Steady state at every mesh frequency, gone through upwards or downwards.
 
@@ -179,7 +179,7 @@ def prepared(
     most_periods: int = 4,
     points: int = 32,
     orders: Sequence[float] = ORDERS,
-    kicks: Sequence[float] = (),
+    kicks: Sequence[float] | jax.Array = (),
 ) -> tuple[_Sizes, _Limits]:
     """Options of a sweep, checked: what is static and what is not; without an oscillator for given steps alone."""
     if direction not in ("up", "down"):

@@ -377,7 +377,7 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
         axes = replace(axes, fields={})
     torque, quality = float(usual.torque), quality_of(top.pinion, top.wheel)
     rest = Rest(folder, list(says), load, top.model, bounds, quality)
-    tables = {name: cls.read(says[name], rest) for name, cls in further.items() if name in says}
+    tables: dict[str, Any] = {name: cls.read(says[name], rest) for name, cls in further.items() if name in says}
     layout, support = tables.get("layout"), None
     if layout is None:
         top.refuse(["shafts", "meshes", "housing"], " without [layout]")

@@ -53,7 +53,7 @@ _OF_HELICAL_GEARS = "helixangle", "helix", "beta"
 class DesignFileError(ValueError):
     """A design file that cannot be used; the message is one line and names the file and the dotted key."""
 
-    def __init__(self, key: str, problem: object, file: object = ""):
+    def __init__(self, key: str, problem: object, file: object = "") -> None:
         self.key, self.problem, self.file = key, str(problem), str(file)
         parts = [self.file, key, self.problem]
         super().__init__(printable(" ".join(": ".join(part for part in parts if part).split())))
@@ -110,7 +110,7 @@ def check_file(path: Path) -> None:
         raise DesignFileError("", "is a folder, not a file" if stat.S_ISDIR(mode) else "is not a regular file")
 
 
-def refused(key: str, make: Callable[..., T], *args, **kwargs) -> T:
+def refused(key: str, make: Callable[..., T], *args: object, **kwargs: object) -> T:
     """What `make` returns; what it refuses is wrong with the key of the design file."""
     try:
         return make(*args, **kwargs)

@@ -18,7 +18,7 @@ from ..contact import Side
 from ..geometry import Gear, GearPair, path_of_contact
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
 from ..microgeometry.base import AMOUNTS
-from ..numerics import Number, check, real
+from ..numerics import Given, Number, check, real
 from . import template
 from .errors import DesignFileError, naming, referring
 from .results import MEASURED
@@ -46,7 +46,7 @@ class FlankRange:
     face_coordinate: tuple[float, float]
     step: float = 0.0
 
-    def check_on(self, gear: Gear, start_roll_length, common_width, common_middle) -> None:
+    def check_on(self, gear: Gear, start_roll_length: Given, common_width: Given, common_middle: Given) -> None:
         """Refuses a gear whose flank this is not.
 
         Args:

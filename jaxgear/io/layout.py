@@ -95,7 +95,7 @@ class LayoutSection(FurtherTable):
     profile: ProfileSection | None = entry(nested(ProfileSection))
 
     @classmethod
-    def read(cls, given: Mapping[str, Any], rest: Rest) -> Any:
+    def read(cls, given: Mapping[str, Any], rest: Rest) -> object:
         """The table, with the quality classes of the gears where it has none of its own."""
         if "bearing_span" in given:
             instead = 'misalignment = "class", or misalignment = { skew = ..., inclination = ..., bearing_span = ... }'

@@ -12,7 +12,7 @@ import operator
 import re
 import types
 import typing
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, ClassVar, Self, TypeVar
 
 import equinox as eqx
@@ -63,7 +63,7 @@ class FileTable:
         inherited = [vars(base).get("keys", {}) for base in reversed(cls.__mro__[1:])]
         cls.keys = functools.reduce(operator.or_, [*inherited, own])
 
-    def __init__(self, at: str, /, **given: Any):
+    def __init__(self, at: str, /, **given: object) -> None:
         self.at, self._given = at, given
         for name, allowed in self.keys.items():
             if not hasattr(FileTable, name):
@@ -73,7 +73,7 @@ class FileTable:
         """The keys that the file sets."""
         return {name: self._given[name] for name in self.keys if name in self._given}
 
-    def changed(self, **values: Any) -> Self:
+    def changed(self, **values: object) -> Self:
         """The same with other values of some keys, as if the file set them."""
         return type(self)(self.at, **{**self._given, **values})
 
@@ -87,7 +87,7 @@ class FileTable:
 S = TypeVar("S", bound=FileTable)
 
 
-def decode(key: str, data: Any, section: type[S]) -> S:
+def decode(key: str, data: object, section: type[S]) -> S:
     """A table with the keys of a class; the table's own key is "" at the top level.
 
     Raises:
@@ -219,7 +219,7 @@ def snake(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
 
 
-def meanings(of: Any) -> dict[str, str]:
+def meanings(of: Callable[..., object]) -> dict[str, str]:
     """What every field means, from the list in the docstring of a class, of one that it extends, or of a function."""
     found: dict[str, str] = {}
     for owner in reversed(of.__mro__) if isinstance(of, type) else [of]:
@@ -232,7 +232,7 @@ def meanings(of: Any) -> dict[str, str]:
     return found
 
 
-def summary(of: Any) -> str:
+def summary(of: object) -> str:
     """The first paragraph of a docstring."""
     return inspect.cleandoc(of.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
 

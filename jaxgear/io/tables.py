@@ -75,7 +75,7 @@ class FurtherTable(FileTable):
         return cls
 
     @classmethod
-    def read(cls, given: Mapping[str, Any], rest: Rest) -> Any:
+    def read(cls, given: Mapping[str, Any], rest: Rest) -> object:
         """What `DesignFile.tables` holds for the table: an object of this class.
 
         Args:
@@ -111,7 +111,7 @@ class SettingsTable(FurtherTable):
     file: str | None = entry(text())
 
     @classmethod
-    def read(cls, given: Mapping[str, Any], rest: Rest) -> Any:
+    def read(cls, given: Mapping[str, Any], rest: Rest) -> object:
         """The settings, see `FurtherTable.read`."""
         section = cls._whole(given, rest.folder)
         section.check_beside(rest)

@@ -63,7 +63,7 @@ class Part(eqx.Module):
                     raise DesignFileError(join(owner.key, field["name"]), said) from error
             raise DesignFileError(self.key, text) from error
 
-    def having(self, **fields: Any) -> "Part":
+    def having(self, **fields: object) -> "Part":
         """The same with further fields."""
         return dataclasses.replace(self, fields={**self.fields, **fields})
 

@@ -28,7 +28,7 @@ class ToleranceSection(FurtherTable, _LIMITS):  # type: ignore[misc, valid-type]
     seed: int = entry(SEED, 0)
 
     @classmethod
-    def read(cls, given: Mapping[str, Any], rest: Rest) -> Any:
+    def read(cls, given: Mapping[str, Any], rest: Rest) -> object:
         """The table, with the quality classes of the gears where it has none of its own."""
         return with_quality(super().read(given, rest), rest.quality_classes)
 

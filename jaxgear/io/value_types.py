@@ -192,7 +192,7 @@ def either(plain: Kind, many: Kind, words: str) -> Kind:
     return Kind(words, read, plain.number, many.container)
 
 
-def not_of_kind(wanted: str, value: Any) -> str:
+def not_of_kind(wanted: str, value: object) -> str:
     """`must be a number, not a string`."""
     return f"must be {wanted}, not {_kind(value)}"
 

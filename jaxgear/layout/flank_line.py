@@ -16,7 +16,19 @@ from jaxtyping import Array, Float
 from ..contact.status import Statuses
 from ..geometry import GearPair
 from ..microgeometry import AbstractModification, LeadCrowning, LeadSlope
-from ..numerics import Checked, check, concrete, implicit_root, number, optional_real, program, real, result, whole
+from ..numerics import (
+    Checked,
+    Given,
+    check,
+    concrete,
+    implicit_root,
+    number,
+    optional_real,
+    program,
+    real,
+    result,
+    whole,
+)
 from ..numerics.fits import fit
 from ..shafts import AbstractSupport, ShaftSupport, TabulatedSupport, annex_e
 from ..shafts.mesh_support import even_coordinates
@@ -84,7 +96,7 @@ class Stations(AbstractSupport):
         return jnp.sum(influence, axis=-1) * force + (0.0 if gap is None else gap)
 
 
-def at_torque(support: ShaftSupport, torque) -> ShaftSupport:
+def at_torque(support: ShaftSupport, torque: Given) -> ShaftSupport:
     """The gearbox with the torques of all couplings in proportion, so that the pinion of the mesh carries a torque.
 
     Loads from outside stay as they are.
@@ -116,7 +128,7 @@ def at_torque(support: ShaftSupport, torque) -> ShaftSupport:
     return eqx.tree_at(torques, support, [factor * each for each in torques(support)])
 
 
-def at_stations(support: AbstractSupport, torque=None, *, stations: int | None = None) -> Stations:
+def at_stations(support: AbstractSupport, torque: Given | None = None, *, stations: int | None = None) -> Stations:
     """A support at the stations of the one-dimensional analysis.
 
     Args:
@@ -194,17 +206,17 @@ class FlankLine(Checked):
         slope = self.slope - 8 * self.crowning * middle / common
         return FlankLine(slope * own / common, self.crowning * (own / common) ** 2)
 
-    def crowned(self, further) -> "FlankLine":
+    def crowned(self, further: Given) -> "FlankLine":
         """With so much crowning on top [um]."""
         return FlankLine(self.slope, self.crowning + further)
 
 
 def level_load(
     support: AbstractSupport,
-    torque=None,
+    torque: Given | None = None,
     *,
     negative_crowning: bool = False,
-    stiffness=None,
+    stiffness: Given | None = None,
     stations: int | None = None,
 ) -> FlankLine:
     """The flank line with the most even load over the face at a torque, by least squares of the line load.

@@ -26,7 +26,7 @@ from ..contact.status import Status, WithStatus, reason, status_of
 from ..geometry import GearPair
 from ..metrics.safety import Mode, Strength, damage_per_cycle
 from ..metrics.stress import nominal_stress_squares, single_contact_root_stress
-from ..numerics import Checked, concrete, kernel, maximum, program, real, result, whole
+from ..numerics import Checked, Numbers, concrete, kernel, maximum, program, real, result, whole
 from ..shafts import AbstractSupport, FaceLoad, annex_e, face_load_factor, root_face_load_factor, tooth_height
 from .flank_line import STATIONS, FlankLine, Stations, at_stations, level_load
 
@@ -138,7 +138,9 @@ def damage_of(faces: Stations, load: LoadSpectrum, strength: Strength, pinion: F
     return summed(pair, loaded, load, strength)
 
 
-def gear_lives(pair: GearPair, load: LoadSpectrum, strength: Strength, factors) -> Float[Array, "variants gears"]:
+def gear_lives(
+    pair: GearPair, load: LoadSpectrum, strength: Strength, factors: Numbers
+) -> Float[Array, "variants gears"]:
     """`Damage.gear_lives` of pinion and wheel where one face load factor stands for every load.
 
     Args:
@@ -301,7 +303,7 @@ def _soft_damage(faces: Stations, load: LoadSpectrum, strength, at: Float[Array,
 
 def face_load_over_torques(
     support: AbstractSupport,
-    torques,
+    torques: Numbers,
     *,
     pinion: FlankLine | None = None,
     wheel: FlankLine | None = None,

@@ -7,20 +7,21 @@ References:
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..conditions.cases import Loads
 from ..contact import Mesh
 from ..geometry import GearPair, path_of_contact
 from ..metrics import Quantity
 from ..microgeometry import AbstractCurve, AbstractModification, ProfileCrowning, TipRelief
-from ..numerics import Callback, check, real
+from ..numerics import Callback, Given, check, real
 from ..sizing import long_relief_length
 from ..sweeps import SweepTable, VariantList, sweep
 from .flank_line import FlankLine
@@ -101,13 +102,13 @@ class ProfileLayout:
 
 def vary_profiles(
     mesh: Mesh,
-    torque,
+    torque: Loads,
     flank_lines: tuple[AbstractModification, AbstractModification],
     pinion_amounts: Sequence[float],
     wheel_amounts: Sequence[float],
     *,
     kind: Kind = "tip_relief",
-    length=None,
+    length: Given | None = None,
     curve: AbstractCurve | None = None,
     slopes: Sequence[float] = (0.0,),
     crownings: Sequence[float] = (0.0,),
@@ -157,7 +158,7 @@ def vary_profiles(
     rows = [(0.0,) * len(_VARIABLES), *itertools.product(*crossed.values())]
     wanted = (*RESULTS, *(one for one in results if one not in RESULTS))
     plan = VariantList(_VARIABLES, rows)
-    given = {"mesh": mesh, "torque": torque, "results": wanted, "units": _UNITS}
+    given: dict[str, Any] = {"mesh": mesh, "torque": torque, "results": wanted, "units": _UNITS}
     table = sweep(design, plan, output=output, callback=callback, title="profile modifications", **given)
     theoretical = float(path_of_contact(mesh.pair).contact_ratio)
     best = _best(table, theoretical)
@@ -170,10 +171,10 @@ def vary_profiles(
 
 def flank_line_contact(
     mesh: Mesh,
-    torque,
+    torque: Loads,
     flank_lines: tuple[AbstractModification, AbstractModification],
     *,
-    deviations=(0.0,),
+    deviations: Iterable[Given] = (0.0,),
     kind: Kind = "tip_relief",
 ) -> dict[str, Float[np.ndarray, " deviations"]]:
     """What the loaded tooth contact says of flank lines without profile modifications: `RESULTS`, NaN where it fails.

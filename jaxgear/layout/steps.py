@@ -12,7 +12,7 @@ from ..conditions import LoadSpectrum
 from ..geometry import GearPair
 from ..metrics.safety import Strength
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, check, real, result
+from ..numerics import Checked, Given, Numbers, check, real, result
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
 from .flank_line import STATIONS, FlankLine, GearName, at_stations, level_load
 from .life import Damage, damage, longest_life
@@ -136,12 +136,12 @@ class FlankLineLayout(Checked):
 def layout_flank_lines(
     support: AbstractSupport,
     tolerances: Mapping[str, FlankLineTolerance] | FlankLineTolerance,
+    torque: Given | None = None,
     *,
-    torque=None,
     duty_cycle: LoadSpectrum | None = None,
     strength: Strength | None = None,
     gear: GearName = "wheel",
-    further=None,
+    further: Numbers | None = None,
     share: float = 1.0,
     negative_crowning: bool = False,
     stations: int = STATIONS,

@@ -8,6 +8,7 @@ Without deviations further crowning only gathers the load in the middle and shor
 where the flanks deviate.
 """
 
+from collections.abc import Sequence
 from typing import Literal
 
 import equinox as eqx
@@ -18,7 +19,7 @@ from jaxtyping import Array, Bool, Float
 from ..conditions import LoadSpectrum
 from ..geometry import GearPair
 from ..metrics.safety import Strength
-from ..numerics import Checked, bracketed_root, check, concrete, maximum, number, program, real, result, whole
+from ..numerics import Checked, Given, bracketed_root, check, concrete, maximum, number, program, real, result, whole
 from ..shafts import AbstractSupport, FaceLoad, Misalignment, annex_e, axis_tolerance, face_load_factor
 from ..tolerance import ToleranceClass
 from .flank_line import STATIONS, FlankLine, Stations, at_stations
@@ -27,6 +28,7 @@ from .life import damage_of, under_loads
 Scalar = Float[Array, ""]
 Cases = Float[Array, " cases"]
 Kind = Literal["maximum", "statistical"]
+Classes = Given | Sequence[Given]  # one flank tolerance class for both gears, or those of pinion and wheel
 Axes = Misalignment | Literal["class"] | None
 
 CASES = ("no deviation", "+f_Hb +f_ma", "+f_Hb -f_ma", "-f_Hb +f_ma", "-f_Hb -f_ma")
@@ -53,7 +55,7 @@ class FlankLineTolerance(Checked):
 
 
 def flank_line_tolerance(
-    pair: GearPair, quality_class, axes: Axes = None, *, kind: Kind = "statistical"
+    pair: GearPair, quality_class: Classes, axes: Axes = None, *, kind: Kind = "statistical"
 ) -> FlankLineTolerance:
     """Deviations that flank tolerance classes and the parallelism of the axes allow.
 
@@ -109,7 +111,7 @@ def _over_face(pair: GearPair, axes) -> list[Scalar]:
     return [axes.direct, share * axes.skew * jnp.cos(angle), share * axes.inclination * jnp.sin(angle)]
 
 
-def helix_slope_limits(pair: GearPair, quality_class) -> Float[Array, "2"]:
+def helix_slope_limits(pair: GearPair, quality_class: Classes) -> Float[Array, "2"]:
     """Further crowning C_b of pinion and wheel over the common face [um], that of equation 1 of the study.
 
     Ground over its own face each has C_b = f_HbetaT; of a wider gear the common face has (common / own)^2 of that.
@@ -163,11 +165,11 @@ class ToleranceCases(Checked):
 def tolerance_cases(
     support: AbstractSupport,
     tolerance: FlankLineTolerance,
+    torque: Given | None = None,
     *,
     pinion: FlankLine | None = None,
     wheel: FlankLine | None = None,
-    torque=None,
-    stiffness=None,
+    stiffness: Given | None = None,
     stations: int | None = None,
 ) -> ToleranceCases:
     """Load over the face without deviations and in the four combinations of the largest ones.
@@ -175,8 +177,8 @@ def tolerance_cases(
     Args:
         support: shafts at the mesh, `support` of a gearbox or `RigidSupport`.
         tolerance: the deviations.
-        pinion, wheel: flank lines of the gears; None for none.
         torque: on the pinion [N m]; None for that of the couplings, which are scaled for another one.
+        pinion, wheel: flank lines of the gears; None for none.
         stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1.
         stations: over the face; None for 41, or those that `Stations` have.
     """
@@ -197,11 +199,11 @@ def _cases(face: Stations, tolerance: FlankLineTolerance, pinion: FlankLine, whe
 def crowning_off_the_edges(
     support: AbstractSupport,
     tolerance: FlankLineTolerance,
+    torque: Given | None = None,
     *,
     line: FlankLine | None = None,
-    torque=None,
     share: float = 1.0,
-    stiffness=None,
+    stiffness: Given | None = None,
     stations: int | None = None,
 ) -> Scalar:
     """Smallest further crowning, of both gears together, with which no case touches an edge [um].
@@ -213,8 +215,8 @@ def crowning_off_the_edges(
     Args:
         support: shafts at the mesh.
         tolerance: the deviations.
-        line: flank line of step 1 over the common face, on either gear; None for none.
         torque: on the pinion [N m]; None for that of the couplings.
+        line: flank line of step 1 over the common face, on either gear; None for none.
         share: of the largest load inside, up to which an end may be loaded.
         stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1.
         stations: over the face; None for 41, or those that `Stations` have.

@@ -2,17 +2,18 @@
 
 from collections.abc import Callable
 from functools import wraps
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 T = TypeVar("T")
+Function = TypeVar("Function", bound=Callable[..., object])
 Result = TypeVar("Result")
 
 
-def over_batch(function):
+def over_batch(function: Function) -> Function:
     """Maps a function over the leading batch axes of its first argument, which tells their number as `batch_ndim`.
 
     A Module made by `jax.vmap` has the batch axes in front of every array; the function sees arrays without them, and
@@ -28,7 +29,7 @@ def over_batch(function):
             of_one = eqx.filter_vmap(of_one)
         return of_one(first)
 
-    return mapped
+    return cast(Function, mapped)
 
 
 def on_both(function: Callable[[T], Result], first: T, second: T) -> tuple[Result, Result]:

@@ -4,7 +4,7 @@ import dataclasses
 import hashlib
 import io
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -36,11 +36,11 @@ class Codec(Protocol[R]):
 class NamedArrays:
     """Results that are arrays by name, as they are."""
 
-    def arrays(self, found: Any) -> dict[str, Any]:
+    def arrays(self, found: Mapping[str, Any]) -> dict[str, Any]:
         """All of them."""
         return dict(found)
 
-    def result(self, arrays: dict[str, Any]) -> Any:
+    def result(self, arrays: dict[str, Any]) -> Mapping[str, Any]:
         """The arrays."""
         return arrays
 
@@ -85,7 +85,9 @@ class Checkpoints:
             is not known.
     """
 
-    def __init__(self, folder: str | Path | None = None, callback: Callable[[int, int | None], None] | None = None):
+    def __init__(
+        self, folder: str | Path | None = None, callback: Callable[[int, int | None], None] | None = None
+    ) -> None:
         self.folder = None if folder is None else Path(folder)
         self._callback, self._used = callback, False
 
@@ -125,10 +127,10 @@ class Checkpoints:
 class CheckpointsOfKind(Generic[R]):
     """Results of one kind; made by `Checkpoints.of`."""
 
-    def __init__(self, checkpoints: Checkpoints, codec: Codec[R], total: int | None):
+    def __init__(self, checkpoints: Checkpoints, codec: Codec[R], total: int | None) -> None:
         self._checkpoints, self._codec, self._total, self._done = checkpoints, codec, total, 0
 
-    def __call__(self, made_of: Any, make: Callable[[], R]) -> R:
+    def __call__(self, made_of: object, make: Callable[[], R]) -> R:
         """The result that is there, or that is made and then kept.
 
         Args:

@@ -39,7 +39,7 @@ class ComparisonRun:
         quick: on coarse positions and few torques.
     """
 
-    def __init__(self, design: DesignFile, stages: Stages, *, quick: bool = False):
+    def __init__(self, design: DesignFile, stages: Stages, *, quick: bool = False) -> None:
         self.design, self._stages, self._quick = design, stages, quick
         self._evaluations: dict[str, Evaluation] = {}
         self._problem: Problem | None = None  # by whose measure designs are evaluated

@@ -157,7 +157,9 @@ def grid_lines(grid: str, changes: Mapping[str, Mapping[str, float]], more: str 
     yield from (f"  and {change}" for change in said[1:])
 
 
-def response_surface(mesh: Mesh, torque: float, pinion: AbstractModification, wheel: AbstractModification):
+def response_surface(
+    mesh: Mesh, torque: float, pinion: AbstractModification, wheel: AbstractModification
+) -> tuple[np.ndarray, np.ndarray]:
     """Transmission error from zero load to twice the design torque.
 
     Returns:

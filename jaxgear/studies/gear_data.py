@@ -13,7 +13,7 @@ from ..geometry import Gear, GearPair, PathOfContact, diameter, margins, outline
 from ..io import DesignFile
 from ..io.tolerance import quality_classes
 from ..manufacture import measures
-from ..numerics import program
+from ..numerics import Given, program
 from ..report import Chapter, Table, heading, text
 from ..tolerance import ToleranceClass, iso_rounded
 
@@ -81,7 +81,9 @@ def chosen(file: DesignFile) -> tuple[Any, ...]:
     return tuple((*beside, quality) for beside, quality in zip(measured, classes))
 
 
-def numbers(gear: Gear, teeth, ball, quality: ToleranceClass | None) -> tuple[tuple[Scalar, ...], ...]:
+def numbers(
+    gear: Gear, teeth: Given | None, ball: Given | None, quality: ToleranceClass | None
+) -> tuple[tuple[Scalar, ...], ...]:
     """`_MEASURES`, and `_DEVIATIONS` where the gear has a class; to be traced."""
     upper = gear.tooth_thickness_allowance
 

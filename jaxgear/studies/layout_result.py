@@ -14,7 +14,7 @@ from ..io import DesignFile, LayoutRequest, write_flanks
 from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, ToleranceCases, gear_lives
 from ..metrics import Finding
 from ..microgeometry import AbstractModification
-from ..numerics import real
+from ..numerics import Given, real
 from ..report import Table
 from ..shafts import bearing_reactions, root_face_load_factor, tooth_height
 from ..sweeps.columns import described
@@ -350,7 +350,7 @@ def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine
     return dict(zip(STEPS, ((none, none), first, (layout.pinion, layout.wheel))))
 
 
-def root_factor(layout: FlankLineLayout, factor) -> np.ndarray:
+def root_factor(layout: FlankLineLayout, factor: Given) -> np.ndarray:
     """K_Fbeta of K_Hbeta."""
     pair = layout.pair
     return np.asarray(root_face_load_factor(np.maximum(factor, 1.0), pair.face_width, tooth_height(pair)))

@@ -32,7 +32,7 @@ class Stages:
         callback: called at the start of every stage and within it; None for silence.
     """
 
-    def __init__(self, callback: Callback | None = None):
+    def __init__(self, callback: Callback | None = None) -> None:
         self._callback, self._stage = callback, ""
 
     def begin(self, stage: str) -> None:

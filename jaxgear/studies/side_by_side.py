@@ -13,6 +13,7 @@ from ..io import DesignFile, describe
 from ..io.results import unit_of
 from ..io.tolerance import quality_classes
 from ..metrics import Finding, Quantity, findings_of
+from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..optimize import Verified
 from ..report import Table
@@ -113,7 +114,7 @@ def grid(evaluations: Evaluations, more: str = "") -> Iterator[str]:
 
 
 @program
-def diameters(gear: Gear):
+def diameters(gear: Gear) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
     """Diameters of tip, tip form circle and bore [mm]."""
     return 2 * gear.tip_radius, 2 * gear.tip_form_radius, 2 * gear.bore_radius
 
@@ -208,7 +209,7 @@ def _band(file: DesignFile, evaluations: Evaluations) -> dict[str, Any]:
     return {} if classes is None else {"tolerance": classes, "about": main_name(evaluations)}
 
 
-def flanks(evaluations: Evaluations):
+def flanks(evaluations: Evaluations) -> dict[str, tuple[AbstractModification, AbstractModification]]:
     """The modifications of every design."""
     return {name: (evaluation.pinion, evaluation.wheel) for name, evaluation in evaluations.items()}
 

@@ -7,6 +7,7 @@ import jax
 import numpy as np
 
 from ..conditions import conditions, ranked
+from ..conditions.cases import Loads
 from ..contact import Mesh
 from ..io import DesignFile
 from ..microgeometry import AbstractModification
@@ -40,7 +41,7 @@ def left_out(design: DesignFile) -> str:
 def manufactured_wear(
     settings: Wear,
     mesh: Mesh,
-    torque: Any,
+    torque: Loads,
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]],
     tolerance: Tolerance,
     *,

@@ -53,7 +53,7 @@ class Store:
         manifest: what the sweep is.
     """
 
-    def __init__(self, folder: str | Path, manifest: Manifest):
+    def __init__(self, folder: str | Path, manifest: Manifest) -> None:
         self.folder, self.manifest = Path(folder), manifest
         self._variants, self._part_rows = (int(manifest.settings[key]) for key in ("variants", "part_rows"))
         self._schema = _schema(manifest)
@@ -124,7 +124,7 @@ class Store:
         except OSError as error:
             raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
 
-    def table(self, part: int, columns: Mapping[str, np.ndarray]):
+    def table(self, part: int, columns: Mapping[str, np.ndarray]) -> Any:
         """A part as an Arrow table; numbers of failed variants are null."""
         import pyarrow
 

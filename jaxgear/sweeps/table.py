@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,13 @@ class SweepTable:
         columns: all columns, each with the quantity that it holds and its cases.
     """
 
-    def __init__(self, title: str, columns: Sequence[Column], sizes: Sequence[int], read: Callable):
+    def __init__(
+        self,
+        title: str,
+        columns: Sequence[Column],
+        sizes: Sequence[int],
+        read: Callable[[int, Sequence[str] | None], Any],
+    ) -> None:
         """Made by `sweep` and `open_sweep`.
 
         Args:
@@ -186,7 +193,7 @@ class SweepTable:
             raise ValueError("SweepTable.pareto: needs two or three different columns")
         return self.take(front(self._ranked(columns)))
 
-    def take(self, numbers) -> "SweepTable":
+    def take(self, numbers: Sequence[int] | np.ndarray) -> "SweepTable":
         """Some rows, in the order of their numbers given, as a table in memory."""
         import pyarrow
 
@@ -205,19 +212,19 @@ class SweepTable:
         rows = zip(*(self.column(name).tolist() for name in self.parameters))
         return [dict(zip(self.parameters, row)) for row in rows]
 
-    def to_arrow(self):
+    def to_arrow(self) -> Any:
         """The whole table as a `pyarrow.Table`; the metadata of its fields hold unit, kind and range."""
         import pyarrow
 
         return pyarrow.Table.from_batches(self._stream(), self._schema)
 
-    def to_pandas(self):
+    def to_pandas(self) -> Any:
         """The whole table as a `pandas.DataFrame`; `attrs` hold the title and the units of the columns."""
         frame = self.to_arrow().to_pandas()
         frame.attrs = {"title": self.title, "units": self.units}
         return frame
 
-    def to_xarray(self):
+    def to_xarray(self) -> Any:
         """The whole table as an `xarray.Dataset` over the variants; attributes hold title, units and ranges."""
         import xarray
 
@@ -228,7 +235,7 @@ class SweepTable:
             variables[column.name] = ((VARIANT,), self.column(column.name), kept)
         return xarray.Dataset(variables, attrs={"title": self.title})
 
-    def __arrow_c_stream__(self, requested_schema=None):
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """The table part by part, for whatever takes Arrow data: `polars.DataFrame(table)`, `pyarrow.table(table)`."""
         import pyarrow
 

@@ -8,9 +8,11 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..conditions import LoadSpectrum, cycle_status, solved
+from ..conditions.cases import Loads
 from ..contact import Mesh, MeshCycle, OperatingPoint, RemovedMaterial, removed_material, solve_removed
 from ..contact.cycle import FLATTEST, flank_pressure
 from ..contact.face_coupling import check_torque
@@ -25,7 +27,7 @@ from ..geometry import GearPair
 from ..geometry.involute import half_tooth_angle
 from ..metrics.lubrication import flash_temperature
 from ..microgeometry import AbstractModification, Flank, TabulatedFlank, TabulatedProfile
-from ..numerics import check, kernel, program, real, result, whole
+from ..numerics import Numbers, check, kernel, program, real, result, whole
 from .march import Analysis, Depth, March, march
 from .vibration import Flanks, LineLoad, Vibration, vibration_of
 from .worn_volume import PARTS, Deposit, deposit, grid, worn
@@ -49,7 +51,7 @@ class WornFlank(AbstractModification):
     def varies_along_face(self) -> bool:
         return len(self.amount) > 1
 
-    def __call__(self, flank: Flank):
+    def __call__(self, flank: Flank) -> Float[Array, "..."]:
         cells = self.amount.shape[-1] - 1
         first, last = self.roll_length[0], self.roll_length[-1]
         place = jnp.clip((flank.roll_length - first) * (cells / (last - first)), 0.0, cells)
@@ -82,6 +84,9 @@ def worn_through(
 
 Field = Float[Array, "#gears #pairs #slices #positions"]
 _GEARS = 2
+
+# one of both gears, or a pair; or a function of the state of lubrication at every contact
+Coefficient = Numbers | Callable[..., Any]
 
 # Lubricated steel has 1e-18 to 5e-16 m2/N, see `wear`; two hundred times the upper end is no such gear any more, and a
 # larger number most often one in mm2/N, which is 1e6 times as large.
@@ -128,7 +133,7 @@ class OfLubrication(eqx.Module):
         return jnp.where(loaded, jnp.stack([jnp.broadcast_to(field, shape) for field in fields]), 0.0)
 
 
-def wear_law(coefficient: Any, loads: OperatingPoint, dtype) -> Constant | OfLubrication:
+def wear_law(coefficient: Coefficient, loads: OperatingPoint, dtype: np.dtype) -> Constant | OfLubrication:
     """What gives the coefficient of both gears at every contact of a cycle, (gears, pairs, slices, positions).
 
     Raises:
@@ -255,12 +260,12 @@ class Case(eqx.Module):
         status = status_of({Status.OUT_OF_VALIDITY: motion.back_side_contact}, jnp.max(statuses), motion.status)
         return jnp.mean(rates, axis=0), status
 
-    def flanks(self, roll_length, depth: Depth) -> dict[str, AbstractModification]:
+    def flanks(self, roll_length: Float[Array, "gears points"], depth: Depth) -> dict[str, AbstractModification]:
         """Both flanks with what is worn off them."""
         pinion, wheel = tables(roll_length, self.face_coordinate, depth)
         return {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
 
-    def cycles(self, roll_length, marched: March) -> MeshCycle:
+    def cycles(self, roll_length: Float[Array, "gears points"], marched: March) -> MeshCycle:
         """The mesh on all flanks of a march, leading axis (steps,); (steps, torques) under a load spectrum."""
 
         def under(flanks, load: OperatingPoint, found) -> MeshCycle:
@@ -278,7 +283,9 @@ class Case(eqx.Module):
         cycles = jax.vmap(on)(marched.depth, marched.seen, marched.status)
         return jax.tree.map(lambda leaf: leaf[:, 0], cycles) if self.weights is None else cycles
 
-    def pressure_errors(self, roll_length, marched: March, cycles: MeshCycle) -> Float[Array, "steps *torques"]:
+    def pressure_errors(
+        self, roll_length: Float[Array, "gears points"], marched: March, cycles: MeshCycle
+    ) -> Float[Array, "steps *torques"]:
         """Estimated error of the largest flank pressure at all time steps of a march, as its `cycles` [MPa].
 
         By how much it changes where the worn flanks are known on every other point only, and where the contacts are as
@@ -313,7 +320,9 @@ class Case(eqx.Module):
         return found[:, 0] if self.weights is None else found
 
 
-def tables(roll_length, face_coordinate, depth) -> tuple[AbstractModification, AbstractModification]:
+def tables(
+    roll_length: Float[Array, "gears points"], face_coordinate: Float[Array, "gears slices"], depth: Depth
+) -> tuple[AbstractModification, AbstractModification]:
     """Worn material (gears, parts, slices, points) as modifications of pinion and wheel."""
     total = jnp.sum(depth, axis=1)
 
@@ -361,12 +370,12 @@ _marched, _marched_quickly = kernel(_march), program(_march)
 def case_of(
     owner: str,
     mesh: Mesh,
-    torque: Any,
+    torque: Loads,
     *,
-    coefficient: Any,
+    coefficient: Coefficient,
     pinion: AbstractModification | None,
     wheel: AbstractModification | None,
-    deviation: Any,
+    deviation: Numbers | None,
     points: int | None,
     dynamics: Dynamics | None = None,
     line_load: LineLoad | None = None,
@@ -385,7 +394,7 @@ def case_of(
     return Case(mesh, loads, weights, law, pinion, wheel, other, points, vibration)
 
 
-def _deviation(owner: str, mesh: Mesh, deviation: Any) -> Float[Array, "*shape"]:
+def _deviation(owner: str, mesh: Mesh, deviation: Numbers | None) -> Float[Array, "*shape"]:
     """Material removed by manufacturing deviations [um]; zero where there are none."""
     if deviation is None:
         return jnp.zeros((), mesh.slice_width.dtype)
@@ -398,7 +407,7 @@ def _deviation(owner: str, mesh: Mesh, deviation: Any) -> Float[Array, "*shape"]
     return deviation
 
 
-def _loads(owner: str, torque: Any, dtype) -> tuple[OperatingPoint, Float[Array, " torques"] | None]:
+def _loads(owner: str, torque: Loads, dtype: np.dtype) -> tuple[OperatingPoint, Float[Array, " torques"] | None]:
     """Operations with a leading axis (torques,), and the shares of a spectrum; None for a single load."""
     if not isinstance(torque, LoadSpectrum):
         single = operating_point_of(owner, torque, dtype)

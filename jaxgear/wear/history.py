@@ -8,13 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int8
 
+from ..conditions.cases import Loads
 from ..contact import Mesh, MeshCycle
 from ..contact.status import WithStatus
 from ..dynamics import Dynamics
 from ..geometry import Gear
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, check, maximum, program, quick_jit, real, result, whole
-from .case import Case, case_of, marched, tables
+from ..numerics import Checked, Given, Numbers, check, maximum, program, quick_jit, real, result, whole
+from .case import Case, Coefficient, case_of, marched, tables
 from .march import BLOCKS_OF_A_PAIR, Depth, March
 from .vibration import LineLoad
 from .worn_volume import arcs, grid
@@ -105,18 +106,18 @@ class WearHistory(WithStatus, Checked):
 
 def wear(
     mesh: Mesh,
-    torque: Any,
-    revolutions: Any,
+    torque: Loads,
+    revolutions: Given,
     *,
-    coefficient: Any,
+    coefficient: Coefficient,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
-    deviation: Any = None,
+    deviation: Numbers | None = None,
     blocks: int = BLOCKS,
     points: int | None = None,
     dynamics: Dynamics | None = None,
     line_load: LineLoad | None = None,
-    largest_increment: Any = None,
+    largest_increment: Given | None = None,
     keep: Callable[[Any, Make], March] | None = None,
     callback: Callable[[float, float], None] | None = None,
 ) -> WearHistory:

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 from ..conditions import joined, solved
 from ..dynamics import DYNAMIC_QUANTITIES, Dynamics
 from ..metrics import MESH_QUANTITIES, Quantity, Vocabulary
-from ..numerics import AbstractMeasure, Mean, check, maximum, quick_jit, real
+from ..numerics import AbstractMeasure, Given, Mean, check, maximum, quick_jit, real
 from .history import WearHistory
 
 Scalar = Float[Array, ""]
@@ -98,7 +98,7 @@ def worn_volume(life: WearHistory) -> Float[Array, "lives gears parts"]:
     return jnp.where(life.converged[:, None, None], volume, jnp.nan)
 
 
-def life_to_depth(life: WearHistory, limit: Any, gear: Worn = "both") -> Scalar:
+def life_to_depth(life: WearHistory, limit: Given, gear: Worn = "both") -> Scalar:
     """Revolutions of the pinion until the deepest wear reaches a limit [um].
 
     Between two lives the depth is linear; beyond the last one it goes on as in the last block. Infinite where nothing
@@ -112,7 +112,9 @@ def life_to_depth(life: WearHistory, limit: Any, gear: Worn = "both") -> Scalar:
     return _reached(life.revolutions, wear_depth(life, gear), limit, goes_on=True)
 
 
-def life_to(life: WearHistory, of: str | Quantity | Any, limit: Any, measure: AbstractMeasure | None = None) -> Scalar:
+def life_to(
+    life: WearHistory, of: str | Quantity | Any, limit: Given, measure: AbstractMeasure | None = None
+) -> Scalar:
     """Revolutions of the pinion until a quantity first passes a limit on its bad side; infinite where it never does.
 
     Between two lives the quantity is linear. Zero where the new flanks are beyond the limit; NaN where the contact was

@@ -6,14 +6,14 @@ quantity, and a design file has the table [wear].
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..conditions import solved
 from ..metrics import Analysis, Quantity, Vocabulary
-from ..numerics import maximum
+from ..numerics import Given, maximum
 from .history import WearHistory
 from .over_life import life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth
 from .settings import Wear
@@ -53,8 +53,10 @@ OF_LIFE: Mapping[str, Callable[[WearHistory, Wear], Float[Array, ""]]] = {
     "pinion_wear_depth": lambda life, _: wear_depth(life, "pinion")[-1],
     "wheel_wear_depth": lambda life, _: wear_depth(life, "wheel")[-1],
     _ERROR: lambda life, _: life.error[-1],
-    "life_to_depth": lambda life, wear: _at_most(LIVES_AHEAD * wear.revolutions, life_to_depth(life, wear.depth_limit)),
-    "life_to_ppte": lambda life, wear: _at_most(wear.revolutions, life_to(life, "ppte", wear.ppte_limit)),
+    "life_to_depth": lambda life, wear: _at_most(
+        LIVES_AHEAD * wear.revolutions, life_to_depth(life, cast(Given, wear.depth_limit))
+    ),
+    "life_to_ppte": lambda life, wear: _at_most(wear.revolutions, life_to(life, "ppte", cast(Given, wear.ppte_limit))),
 }
 
 

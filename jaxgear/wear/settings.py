@@ -7,10 +7,11 @@ from jaxtyping import Array, Float
 
 from ..conditions import LoadSpectrum
 from ..contact import Mesh
+from ..contact.operating_point import Torque
 from ..dynamics import Dynamics
 from ..metrics import AbstractSettings
 from ..microgeometry import AbstractModification
-from ..numerics import count, number
+from ..numerics import Numbers, count, number
 from .case import LARGEST_COEFFICIENT
 from .history import BLOCKS, WearHistory, check_blocks, wear
 from .vibration import LineLoad, check_line_load
@@ -74,11 +75,11 @@ class Wear(AbstractSettings):
     def life(
         self,
         mesh: Mesh,
-        torque: Any = None,
+        torque: Torque | None = None,
         *,
         pinion: AbstractModification | None = None,
         wheel: AbstractModification | None = None,
-        deviation: Any = None,
+        deviation: Numbers | None = None,
     ) -> WearHistory:
         """The life of a design; arguments and errors as `wear`.
 
@@ -93,7 +94,9 @@ class Wear(AbstractSettings):
         """
         if (torque is None) == (self.loads is None):
             raise ValueError("Wear: give a torque where there are no loads, and none where there are")
+        loads = self.loads if torque is None else torque
+        assert loads is not None
         options: dict[str, Any] = {"coefficient": self.coefficients, "blocks": self.blocks, "points": self.points}
         options |= {"dynamics": self.dynamics, "line_load": self.line_load}
         flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
-        return wear(mesh, torque if self.loads is None else self.loads, self.revolutions, **flanks, **options)
+        return wear(mesh, loads, self.revolutions, **flanks, **options)

@@ -100,7 +100,7 @@ def vibration_of(
     return Vibration(settings, fine, coast, off, steps, line_load != "static")
 
 
-def check_line_load(owner: str, line_load: Any, dynamics: Any) -> None:
+def check_line_load(owner: str, line_load: object, dynamics: object) -> None:
     """Checks under which load flanks are to wear.
 
     Raises:

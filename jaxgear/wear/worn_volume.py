@@ -29,7 +29,6 @@ References:
 """
 
 from math import comb
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -41,7 +40,7 @@ from ..contact import Mesh, MeshCycle
 from ..contact.contact_width import patch_nodes, place_of
 from ..contact.kinematics import contacts
 from ..geometry import PathOfContact
-from ..numerics import check, program, real, safe_divide, safe_sqrt
+from ..numerics import Given, Numbers, check, program, real, safe_divide, safe_sqrt
 
 Scalar = Float[Array, ""]
 Field = Float[Array, "pairs positions"]
@@ -163,7 +162,7 @@ Load = Float[Array, "pairs slices positions"]
 UM_PER_LOAD = 1e9
 
 
-def specific_sliding(contact: PathOfContact, path: Any) -> tuple[Any, Any]:
+def specific_sliding(contact: PathOfContact, path: Given) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
     """Sliding over rolling |u1 - u2| / u_i of pinion and wheel at a path position [mm], of its shape.
 
     Beyond the path of contact it is that at its end: there a tip corner slides over the mate's flank.
@@ -175,7 +174,7 @@ def specific_sliding(contact: PathOfContact, path: Any) -> tuple[Any, Any]:
     return sliding / pinion, sliding / wheel
 
 
-def passage_depth(cycle: MeshCycle, coefficient: Any) -> tuple[Load, Load]:
+def passage_depth(cycle: MeshCycle, coefficient: Numbers) -> tuple[Load, Load]:
     """Wear depth that one passage of a pair leaves where every contact of a cycle is, on pinion and wheel [um].
 
     Args:
@@ -196,7 +195,7 @@ def passage_depth(cycle: MeshCycle, coefficient: Any) -> tuple[Load, Load]:
 
 
 @program
-def worn(line_load: Load, coefficient: Any, place: Deposit) -> Float[Array, "gears parts slices points"]:
+def worn(line_load: Load, coefficient: Given, place: Deposit) -> Float[Array, "gears parts slices points"]:
     """Wear depth that one passage leaves on the grids of both flanks [um], on the flank and by tip corners.
 
     Args:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import Array, Float
 
 from ...microgeometry import (
     AbstractCurve,
@@ -51,7 +52,9 @@ _PROPORTIONAL = (
 )
 
 
-def plain_terms(modification: AbstractModification, factor=None) -> Iterator[AbstractModification]:
+def plain_terms(
+    modification: AbstractModification, factor: Float[Array, "..."] | None = None
+) -> Iterator[AbstractModification]:
     """The terms of a modification without sums and factors, except for factors of classes from outside the library."""
     if isinstance(modification, NoModification):
         return

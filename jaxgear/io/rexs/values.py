@@ -9,10 +9,11 @@ import binascii
 import re
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Any, Literal
+from typing import Literal
 
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...geometry import Gear, GearPair, path_of_contact
 from ...microgeometry import AbstractModification, Flank
@@ -23,7 +24,7 @@ _TEXTS = ("model_name",)  # the other words are of lists
 _CODES = {"float64": "<f8", "float32": "<f4", "int32": "<i4"}
 
 
-def kind_of(name: str, value: Any, unit: str) -> str:
+def kind_of(name: str, value: object, unit: str) -> str:
     """The type of a value; text is a word of a list, or a number that `shifted` wrote."""
     if isinstance(value, bool):
         return "boolean"
@@ -50,7 +51,7 @@ def whole(text: object, where: str) -> int:
     return int(text)
 
 
-def written(value: Any) -> str | tuple[str, ...]:
+def written(value: object) -> str | tuple[str, ...]:
     """A value as text: numbers by the shortest digits that read back as the same number."""
     if isinstance(value, str):
         return value
@@ -60,7 +61,7 @@ def written(value: Any) -> str | tuple[str, ...]:
     return tuple(str(item) for item in array) if array.ndim else str(array[()])
 
 
-def shifted(value: Any, shift: int) -> str | tuple[str, ...]:
+def shifted(value: object, shift: int) -> str | tuple[str, ...]:
     """Numbers times 10^shift as text; the shift is of the decimal digits, so that it is exact."""
     text = written(value)
     if isinstance(text, tuple):
@@ -110,11 +111,11 @@ class Frame:
     width: float
     datum: int = -1
 
-    def diameter(self, roll_length):
+    def diameter(self, roll_length: ArrayLike) -> np.ndarray | np.floating:
         """Diameter at a roll length."""
         return 2 * np.hypot(self.base_radius, roll_length)
 
-    def roll_length(self, diameter):
+    def roll_length(self, diameter: ArrayLike) -> np.ndarray:
         """Roll length at a diameter; NaN below the base circle."""
         square = (0.5 * np.asarray(diameter)) ** 2 - self.base_radius**2
         below = square < -_ROUNDING * self.base_radius**2
@@ -128,7 +129,9 @@ class Frame:
         """At which face coordinates the "datum_face" or the "non_datum_face" is."""
         return "negative" if self.place(face, 1.0) < 0 else "positive"
 
-    def removed(self, modification: AbstractModification, roll_length, face_coordinate) -> np.ndarray:
+    def removed(
+        self, modification: AbstractModification, roll_length: ArrayLike, face_coordinate: ArrayLike
+    ) -> np.ndarray:
         """Material removed at points of the flank [um], of the shape of their coordinates."""
         shape, count = np.shape(roll_length), np.size(roll_length)
         chunks = -(-count // _POINTS)

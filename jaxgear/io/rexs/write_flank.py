@@ -39,7 +39,7 @@ class Writer:
         error: of a curve that goes out as points [um].
     """
 
-    def __init__(self, model: Model, flanks: list[Component], frame: Frame, owner: str, error: float):
+    def __init__(self, model: Model, flanks: list[Component], frame: Frame, owner: str, error: float) -> None:
         self._model, self._flanks, self._frame, self._owner, self._error = model, flanks, frame, owner, error
 
     def write(self, modification: AbstractModification) -> None:
