@@ -6,6 +6,7 @@ import ctypes
 import functools
 import gc
 import os
+import threading
 import uuid
 import zlib
 from pathlib import Path
@@ -14,6 +15,7 @@ import jax
 import pytest
 import typechecker
 from jax._src import compilation_cache
+from jax._src.interpreters import mlir
 from jax._src.lru_cache import LRUCache
 
 jax.config.update("jax_enable_x64", True)
@@ -126,6 +128,26 @@ try:
     compilation_cache.zlib = _QuickZlib
 except OSError:  # a read-only home: the tests run all the same, only slower
     pass
+
+
+class _Context(threading.local):
+    """In place of `mlir.make_ir_context`: one context for the programs that a thread lowers, not one for each.
+
+    To make one takes half of the time of lowering a small program, of which tests have thousands. What a context has
+    been told stays in it, so that a new one takes its place now and then.
+    """
+
+    MOST = 500  # programs
+    made, programs, make = None, 0, staticmethod(mlir.make_ir_context)
+
+    def __call__(self):
+        if self.made is None or self.programs >= self.MOST:
+            self.made, self.programs = self.make(), 0
+        self.programs += 1
+        return self.made
+
+
+mlir.make_ir_context = _Context()
 
 
 # Each compiled program holds some mappings of memory, of which Linux grants a process 65530, and memory, of which two
