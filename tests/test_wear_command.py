@@ -430,7 +430,9 @@ def test_tolerances_are_left_out_under_the_dynamic_load_alone(file):
     assert wear_scatter.left_out(load_design(file(PAIR + TABLE + TOLERANCE))) == ""
     assert wear_scatter.left_out(load_design(file(FAST + DYNAMICS + DYNAMIC))) == ""
     told = wear_scatter.left_out(load_design(file(FAST + DYNAMICS + DYNAMIC + TOLERANCE)))
-    assert told.startswith("[tolerance] is not part of this analysis, the gears are nominal (lives under")
+    assert told.startswith(
+        "[tolerance] is not part of this analysis, the gears are nominal (wear of manufactured pairs"
+    )
     assert "\n" not in told
 
 

@@ -68,14 +68,14 @@ Curve = Float[Array, " positions"]
 class MeshCycle(WithStatus, eqx.Module):
     """Result of `solve`: one design under one torque, over one base pitch.
 
-    It holds what it was solved for, but not the prepared mesh (see `metrics.Analysis`), so that many can be kept and
-    stacked. Of many cycles made by `jax.vmap` every array has the batch axes in front, and so have properties and
+    It contains its pair, load and modifications, but not the prepared mesh (see `metrics.Analysis`), so that many can
+    be stacked. Of many cycles made by `jax.vmap` every array has the batch axes in front, and so have properties and
     metrics.
 
     Attributes:
         kinematics: the pair, its path of contact and the array sizes.
-        margins: how far the pair is from what cannot run.
-        operating_point: what the mesh was run at.
+        margins: distances of the pair from geometry that cannot run.
+        operating_point: torque, speed and friction.
         pinion, wheel: modifications of the flanks; None where only the material removed was given (`solve_removed`).
         transmission_error: loaded, on the line of action, positive when the wheel lags [um], shape (positions,);
             with the deflection of shafts, bearings and housing, where the mesh was prepared with them.
@@ -84,12 +84,11 @@ class MeshCycle(WithStatus, eqx.Module):
         pair_force: force on the line of action that every pair contributes [N], shape (pairs, positions); the pairs of
             a position sum to `force`.
         opening: remaining gap [um] where positive, minus the contact deflection where loaded.
-        gap: gap of the undeformed flanks at zero transmission error [um]: corner gap plus both modifications, where the
-            contact slides to, on rigid, parallel shafts.
-        shift: of the centre of contact along the flanks, which the slope of the modifications brings about, positive
+        gap: gap of the undeformed flanks at zero transmission error [um]: corner gap plus both modifications, at the
+            shifted contact, on rigid, parallel shafts.
+        shift: contact shift: of the centre of contact along the flanks, by the slope of the modifications, positive
             towards the pinion tip [mm]; shape (pairs, slices or 1, positions).
-        bend: what the modifications add to the relative curvature of the flanks, times their relative radius; of
-            the same shape.
+        bend: relative curvature added by the modifications, times the relative radius of the flanks; of the same shape.
         tangent_stiffness: d force / d transmission error at fixed position [N/um].
         residual: largest relative violation of the contact conditions, shape (positions,).
         status: of every position, see `Status`, shape (positions,): `converged` where the residual is below the

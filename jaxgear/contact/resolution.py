@@ -25,22 +25,24 @@ class Resolution(Checked):
         pairs: tooth pairs carried along; None for as few as the gears and the load need, see `prepare`. Pair i runs at
             phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two base pitches on either side of the pitch
             point: contact ratios up to 3.
-        patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks
-            and steep flanks over its own width; 1 takes the nominal contact point alone.
-        slide_steps: steps in which the contact slides down the slope of a modification; 0 keeps it at its nominal
-            place. None for 2, and 0 where fewer than 3 points across the contact do not see slope and curvature.
-        coupled_slices: whether slices are elastically coupled, as those of a real face are; without it each slice bends
-            on its own, and the peak of line loads that vary over the face comes out 10 to 40 % too small. One slice has
-            nothing to feel.
-        face_modes: waves over the face by which slices are coupled; more than slices are as many as slices. With 5
-            line loads are within 0.4 % of those with all on faces of 6 modules, 0.7 % on 67. Gears of unequal width
-            take two more, at least 7, of which four decay from the ends: 0.1 % on 6 modules, 0.9 % on 20.
+        patch_nodes: points across the contact width at which modifications are averaged; 1 takes the nominal contact
+            point alone.
+        slide_steps: steps of the contact shift on the slope of a modification; 0 keeps the contact at its nominal
+            place. None for 2, and for 0 with fewer than 3 points across the contact, which do not resolve slope and
+            curvature.
+        coupled_slices: whether slices are elastically coupled, as those of a real face are; without it each slice
+            deflects on its own, and the peak of line loads that vary over the face is 10 to 40 % too small. No effect
+            on one slice.
+        face_modes: waves over the face by which slices are coupled; a number above that of the slices acts as that of
+            the slices. With 5, line loads are within 0.4 % of those with all on faces of 6 modules, 0.7 % on 67. Gears
+            of unequal width take two more, at least 7, of which four decay from the ends: 0.1 % on 6 modules, 0.9 % on
+            20.
         newton_steps: largest number of steps of the contact solution.
         rtol: residual at which the contact solution ends, relative to the transmission error and to the force;
             None for 1e-11 in double and 5e-6 in single precision.
         slice_widths: relative widths of the slices as whole numbers, from the negative end of the face to the positive
-            one; None for slices of equal width. What changes over a short piece of the face takes narrow slices there,
-            see `end_relief_widths`.
+            one; None for slices of equal width. Short features such as an end relief need narrow slices, see
+            `end_relief_widths`.
         extended_contact: whether pairs touch with their tip corners beyond the path of contact too, as those of loaded
             gears do; without it every pair takes load from the start of the path to its end alone, as in many published
             models, and the transmission error jumps there.

@@ -1,4 +1,4 @@
-"""Worn flanks, and what they make of the mesh over the life."""
+"""Worn flanks, and quantities of the mesh over the wear history."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Literal
@@ -19,12 +19,12 @@ _SHOWN = 4  # lives
 
 
 def worn_flank(life: WearHistory, gear: Literal["pinion", "wheel"], ax: Axes | None = None, *, title: str = "") -> Axes:
-    """Wear depth [um] of one gear over its roll angle [deg] at several lives, in the line that is worn deepest.
+    """Wear depth [um] of one gear over its roll angle [deg] at several time steps, in the line that is worn deepest.
 
     Material removed goes down, as in the K-chart.
 
     Args:
-        life: of the pair.
+        life: wear history of the pair.
         gear: "pinion" or "wheel".
         ax: Axes to draw into; None for a new figure.
         title: of the Axes.
@@ -58,7 +58,7 @@ def lives(
     """A quantity of several designs over the revolutions of the pinion.
 
     Args:
-        of: lives by the name of the design; up to eight differ in style.
+        of: wear histories by the name of the design; up to eight differ in style.
         quantity: "wear_depth" for the deepest wear of both gears, a name of the vocabulary, a `Quantity`, or a
             function of a cycle.
         ax: Axes to draw into; None for a new figure.

@@ -51,14 +51,14 @@ _OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks tou
 
 @dataclass(frozen=True)
 class WearResult(AbstractStudyResult):
-    """The lives of all designs.
+    """Wear histories of all designs.
 
     Attributes:
         design: the design file.
         request: what it asks for.
         designs: their modifications (pinion, wheel) by name.
-        lives: by name.
-        scatters: lives of manufactured pairs by name; empty where the file has no tolerances.
+        lives: wear histories by name.
+        scatters: numbers of the wear histories of manufactured pairs by name; empty where the file has no tolerances.
     """
 
     assumptions: ClassVar = (

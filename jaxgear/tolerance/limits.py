@@ -52,7 +52,7 @@ class ToleranceClass(Checked):
     """Tolerances of one gear in a flank tolerance class (ISO 1328-1:2013, 5.3), unrounded and differentiable.
 
     All follow `(terms in d, m_n, b) * sqrt(2)^(class - 5)`; slopes and pitch are limits of either sign, form and total
-    deviations are widths of a band. `iso_rounded` gives the numbers that stand on a drawing.
+    deviations are widths of a band. `iso_rounded` gives the rounded numbers of a drawing.
 
     Attributes:
         diameter: reference diameter d.
