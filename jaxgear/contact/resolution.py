@@ -25,7 +25,7 @@ class Resolution(Checked):
         pairs: tooth pairs carried along; None for as few as the gears and the load need, see `prepare`. Pair i runs at
             phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two base pitches on either side of the pitch
             point: contact ratios up to 3.
-        patch_nodes: points across the contact width at which modifications are averaged; 1 takes the nominal contact
+        contact_nodes: points across the contact width at which modifications are averaged; 1 takes the nominal contact
             point alone.
         slide_steps: steps of the contact shift on the slope of a modification; 0 keeps the contact at its nominal
             place. None for 2, and for 0 with fewer than 3 points across the contact, which do not resolve slope and
@@ -51,7 +51,7 @@ class Resolution(Checked):
     positions: int = count(low=4, default=64)
     slices: int = count(default=1)
     pairs: int | None = count(low=2, optional=True, default=None)
-    patch_nodes: int = count(default=4)
+    contact_nodes: int = count(default=4)
     slide_steps: int | None = count(low=0, high=20, optional=True, default=None)
     coupled_slices: bool = eqx.field(static=True, default=True)
     face_modes: int = count(low=2, default=5)
@@ -65,10 +65,10 @@ class Resolution(Checked):
     extended_contact: bool = eqx.field(static=True, default=True)
 
     def check_together(self) -> None:
-        if self.slide_steps and self.patch_nodes < _SLIDING_NODES:
+        if self.slide_steps and self.contact_nodes < _SLIDING_NODES:
             raise ValueError(
-                f"Resolution: slide_steps = {self.slide_steps} needs patch_nodes >= {_SLIDING_NODES}, is "
-                f"{self.patch_nodes}: fewer points across the contact do not resolve slope and curvature of a flank"
+                f"Resolution: slide_steps = {self.slide_steps} needs contact_nodes >= {_SLIDING_NODES}, is "
+                f"{self.contact_nodes}: fewer points across the contact do not resolve slope and curvature of a flank"
             )
 
         if self.slice_widths is None:
@@ -108,7 +108,7 @@ class Resolution(Checked):
         """`slide_steps`, with its default."""
         if self.slide_steps is not None:
             return self.slide_steps
-        return _SLIDE_STEPS if self.patch_nodes >= _SLIDING_NODES else 0
+        return _SLIDE_STEPS if self.contact_nodes >= _SLIDING_NODES else 0
 
     @property
     def is_coupled(self) -> bool:
@@ -135,7 +135,7 @@ class Resolution(Checked):
     @property
     def of_material(self) -> "Resolution":
         """What the material depends on that is removed from the flanks of a prepared mesh, likewise."""
-        nodes, steps = self.patch_nodes, self.chosen_slide_steps
+        nodes, steps = self.contact_nodes, self.chosen_slide_steps
         return Resolution(self.positions, self.slices, self.pairs, nodes, steps, slice_widths=self.parts)
 
     @property

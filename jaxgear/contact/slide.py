@@ -36,8 +36,8 @@ from .contact_width import (
     Node,
     Place,
     Sided,
+    contact_nodes,
     flank_at,
-    patch_nodes,
     place_of,
     probe,
     secant_slope,
@@ -93,7 +93,7 @@ def nominal_material(
     """Mean of the removed material around the nominal contact [um], linear in the modifications."""
     place, sizes = place_of(mesh, torque), mesh.resolution
     total = jnp.zeros((sizes.chosen_pairs, sizes.slices, sizes.positions), torque.dtype)
-    nodes = patch_nodes(sizes.patch_nodes)
+    nodes = contact_nodes(sizes.contact_nodes)
     for sided in terms_of(mesh, torque.dtype, pinion, wheel):
         total = total + probe([sided], place, jnp.zeros_like(place.radius), nodes).mean
     return total
@@ -119,7 +119,7 @@ def slid_material(
         amount = amount + term(flank_at(side, place, jnp.zeros_like(place.radius)))
     if not along:
         return as_removed(sizes, amount)
-    found = _slide(along, place, patch_nodes(sizes.patch_nodes), sizes.chosen_slide_steps)
+    found = _slide(along, place, contact_nodes(sizes.contact_nodes), sizes.chosen_slide_steps)
     return RemovedMaterial(amount + found[0], found[1], found[2])
 
 
