@@ -149,7 +149,7 @@ def test_the_figures_of_worn_flanks_show_every_design(monkeypatch):
         for times, name in enumerate(("unmodified", "rule-based", "optimum"), 1)
     }
     request = SimpleNamespace(settings=SimpleNamespace(dynamics=None))
-    monkeypatch.setattr(plot, "lives", lambda *given: None)
+    monkeypatch.setattr(plot, "wear_history", lambda *given: None)
     drawn = WearResult.figures(SimpleNamespace(lives=lives, request=request, scatters={}))
     for gear in ("pinion", "wheel"):
         panels = np.ravel(drawn[f"worn_{gear}"])

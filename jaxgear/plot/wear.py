@@ -15,7 +15,7 @@ from .figure import legend_above, line_style, marker_style, report_axes, styled
 from .variants import meaning_label
 
 _GEARS = "pinion", "wheel"
-_SHOWN = 4  # lives
+_SHOWN = 4  # time steps
 
 
 def worn_flank(life: WearHistory, gear: Literal["pinion", "wheel"], ax: Axes | None = None, *, title: str = "") -> Axes:
@@ -50,7 +50,7 @@ def worn_flank(life: WearHistory, gear: Literal["pinion", "wheel"], ax: Axes | N
     return ax
 
 
-def lives(
+def wear_history(
     of: Mapping[str, WearHistory],
     quantity: str | Quantity | Callable[[MeshCycle], Any] = "ppte",
     ax: Axes | None = None,
@@ -69,7 +69,7 @@ def lives(
             done = np.asarray(life.revolutions)
             every = max(1, len(done) // 10)
             ax.plot(done, np.asarray(values), label=name, markevery=every, **marker_style(index))
-        ax.set(xlabel="revolutions of the pinion", ylabel=meaning_label(quantity_of(quantity, "lives")))
+        ax.set(xlabel="revolutions of the pinion", ylabel=meaning_label(quantity_of(quantity, "wear_history")))
         ax.set_xlim(left=0)
         legend_above(ax)
     return ax

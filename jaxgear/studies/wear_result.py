@@ -260,10 +260,10 @@ class WearResult(AbstractStudyResult):
                     plot.worn_flank(self.lives[name], gear, panel, title=name)
                     panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
             axes[f"worn_{gear}"] = panels
-        axes["ppte_over_life"] = plot.lives(self.lives, "ppte")
-        axes["depth_over_life"] = plot.lives(self.lives, "wear_depth")
+        axes["ppte_over_life"] = plot.wear_history(self.lives, "ppte")
+        axes["depth_over_life"] = plot.wear_history(self.lives, "wear_depth")
         if self.request.settings.dynamics is not None:
-            axes["dynamic_factor_over_life"] = plot.lives(self.lives, "dynamic_factor")
+            axes["dynamic_factor_over_life"] = plot.wear_history(self.lives, "dynamic_factor")
         return axes | wear_scatter.figures(self.scatters)
 
 
