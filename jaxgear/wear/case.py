@@ -154,7 +154,7 @@ _FOUND = (
     "opening",
     "gap",
     "shift",
-    "bend",
+    "relative_curvature",
     "tangent_stiffness",
     "residual",
     "status",
@@ -288,10 +288,10 @@ class Case(eqx.Module):
         def largest(depth, cycle: MeshCycle, load: OperatingPoint, line_load):
             flanks = self._worn(roll_length, depth)
             removed = slid_material(self.mesh, load.torque, flanks["pinion"], flanks["wheel"], line_load)
-            return jnp.max(flank_pressure(cycle.kinematics, cycle.line_load, removed.bend))
+            return jnp.max(flank_pressure(cycle.kinematics, cycle.line_load, removed.relative_curvature))
 
         def under(depth, load: OperatingPoint, cycle: MeshCycle):
-            own = cycle.line_load / jnp.maximum(1 + cycle.bend, FLATTEST)
+            own = cycle.line_load / jnp.maximum(1 + cycle.relative_curvature, FLATTEST)
             given = cycle.line_load if self.mesh.compliance.averages_over_loaded_width else None
             here = largest(depth, cycle, load, given)
             coarse, narrow = largest(every_other(depth), cycle, load, given), largest(depth, cycle, load, own)
