@@ -193,7 +193,7 @@ def flanks_of(owner: str, mesh: Mesh, pinion: Any, wheel: Any) -> tuple[Abstract
 
     Raises:
         TypeError: for something else than a modification.
-        ValueError: for what a mesh of one slice cannot show: it would be ignored without a word. A traced amount
+        ValueError: for a modification that a mesh of one slice cannot show: it would have no effect. A traced amount
             counts.
     """
     for gear, modification in (("pinion", pinion), ("wheel", wheel)):

@@ -30,13 +30,13 @@ class Gear(Checked):
     """External involute spur gear, every number a differentiable leaf.
 
     Attributes:
-        teeth: number of teeth.
-        module: [mm].
-        pressure_angle: of the basic rack [deg].
-        profile_shift: coefficient of the module (x); positive thickens the tooth.
-        face_width: [mm].
-        addendum, dedendum, root_radius: of the basic rack, coefficients of the module (h_aP, h_fP, rho_fP; ISO 53).
-        tip_diameter: [mm]; None for m (z + 2 x + 2 addendum).
+        teeth: number of teeth z.
+        module: module m [mm].
+        pressure_angle: pressure angle of the basic rack [deg].
+        profile_shift: profile shift coefficient x; positive thickens the tooth.
+        face_width: face width b [mm].
+        addendum, dedendum, root_radius: coefficients h_aP, h_fP and rho_fP of the basic rack, in modules (ISO 53).
+        tip_diameter: tip diameter d_a [mm]; None for m (z + 2 x + 2 addendum).
         bore_diameter: diameter at which the body is rigidly fixed [mm]; None for half the root diameter, which `str`
             prints. For an integral shaft give the shaft's diameter beside the gear. The body is a plane ring: without a
             fixed circle its wind-up has no limit.

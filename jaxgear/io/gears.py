@@ -64,8 +64,8 @@ class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[mi
     """Pinion (driving) and wheel (driven) on their centre distance.
 
     Attributes:
-        backlash: play on the line of action; by the tooth thickness of the gears that say nothing of their own, or by
-            the centre distance where both do.
+        backlash: backlash on the line of action, by the tooth thickness of the gears without a thickness of their own,
+            or by the centre distance where both have one.
     """
 
     backlash: float | Free | None = entry(real(_BACKLASH, open=True))

@@ -239,7 +239,7 @@ class Tolerance(Checked):
 def check_slices(owner: str, tolerance: Tolerance, mesh: Mesh) -> None:
     """Raises a `ValueError` when the tolerance has lead deviations and the mesh has one slice, which cannot show them.
 
-    A traced limit counts as one: its influence would be zero without a word.
+    A traced limit counts as one: its derivative would be zero.
     """
     if mesh.resolution.slices > 1:
         return

@@ -187,7 +187,7 @@ class Case(eqx.Module):
         pinion, wheel: modifications of the new flanks.
         deviation: material that manufacturing deviations remove besides [um].
         points: of the grid on each flank.
-        vibration: what vibrates; None where nobody asks for it.
+        vibration: the vibrating system; None without dynamics.
     """
 
     mesh: Mesh
@@ -306,7 +306,7 @@ class Case(eqx.Module):
         return jnp.where(solved(cycles), jax.lax.map(on, (marched.depth, cycles)), jnp.nan)
 
     def dynamic_factor(self, marched: March) -> Float[Array, "steps *torques"] | None:
-        """At all time steps of a march, as its `cycles`; None where nobody asks for it."""
+        """At all time steps of a march, as its `cycles`; None without dynamics."""
         if self.vibration is None:
             return None
         found = jnp.where(marched.status[:, None] == Status.CONVERGED, marched.seen[_DYNAMIC_FACTOR], jnp.nan)
