@@ -140,7 +140,7 @@ def static(mesh: jg.Mesh, tables: dict) -> dict:
         loaded = np.asarray(nominal.pair_force) > 0
         pressure = np.asarray(nominal.contact_pressure)[:, 0].max(axis=0)
         # off the start of the relief, whose kink bends the flank under the contact
-        bend = np.where(loaded, np.abs(np.asarray(nominal.bend)[:, 0]), 0.0).max(axis=0)
+        bend = np.where(loaded, np.abs(np.asarray(nominal.relative_curvature)[:, 0]), 0.0).max(axis=0)
         single = (loaded.sum(axis=0) == 1) & (bend < 0.01)
         found |= {
             f"{name}_ppte": float(ppte[name][TORQUES.index(NOMINAL)]),

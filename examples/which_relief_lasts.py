@@ -123,7 +123,7 @@ def draw(results):
     width = 92.0 * len(results)
     with plot.figure.report_axes(None, columns=len(results), width=width, height=84.0) as panels:
         for number, (panel, (name, (_, of_designs))) in enumerate(zip(np.ravel(panels), results.items())):
-            plot.lives(of_designs, "ppte", panel)
+            plot.wear_history(of_designs, "ppte", panel)
             panel.set_title(name, pad=28)
             panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
     plot.save(np.ravel(panels)[0].figure, "results/which_relief_lasts.png")

@@ -14,7 +14,7 @@ from jaxgear.microgeometry import AbstractModification
 # their nominal places, contacts that slide (where sliding is argued), and coupled slices.
 LINE = jg.Resolution(positions=16, pairs=2, slide_steps=0)
 SLIDING = jg.Resolution(positions=16, pairs=2)
-FACE = jg.Resolution(positions=8, slices=6, pairs=2, face_modes=3, slide_steps=0, patch_nodes=1)
+FACE = jg.Resolution(positions=8, slices=6, pairs=2, face_modes=3, slide_steps=0, contact_nodes=1)
 # two pairs reach as far as 40 um of deflection at contact ratios below 2, and compile in half the time of four
 TWO_PAIRS = jg.Resolution(positions=32, pairs=2)
 FOUR_PAIRS = jg.Resolution(positions=32, pairs=4)

@@ -11,7 +11,7 @@ from jaxgear.cli import main
 
 # the array sizes of `catalogue.LINE` and `catalogue.FACE`: one program of a size serves all tests
 LINE = "positions = 16\npairs = 2\nslide_steps = 0"
-FACE = "positions = 8\nslices = 6\npairs = 2\nface_modes = 3\nslide_steps = 0\npatch_nodes = 1"
+FACE = "positions = 8\nslices = 6\npairs = 2\nface_modes = 3\nslide_steps = 0\ncontact_nodes = 1"
 
 FIXED = f"""
 title = "a [small] pair"

@@ -19,7 +19,7 @@ class Known:
     """The mesh, the torque [N m] that deflects a single pair by DELTA0, and the length of double contact [mm]."""
 
     def __init__(self):
-        resolution = jg.Resolution(positions=32, pairs=2, patch_nodes=1)
+        resolution = jg.Resolution(positions=32, pairs=2, contact_nodes=1)
         double = DOUBLE / resolution.positions
         gear = gear_pair((50, 50)).pinion
         rho = gear.base_radius * jnp.tan(jnp.deg2rad(20.0)) + 0.5 * (1 + double) * gear.base_pitch

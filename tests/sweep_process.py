@@ -23,7 +23,7 @@ def design(x):
 
 seen: list[tuple] = []
 gears = (jg.Gear(teeth=teeth, module=3.0, face_width=18.0) for teeth in (19, 48))
-sizes = jg.Resolution(positions=8, patch_nodes=1, pairs=2, newton_steps=6)
+sizes = jg.Resolution(positions=8, contact_nodes=1, pairs=2, newton_steps=6)
 jg.sweep(
     design,
     jg.LatinHypercube({"pinion": (0.0, 20.0), "wheel": (0.0, 20.0)}, VARIANTS, seed=2),

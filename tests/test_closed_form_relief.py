@@ -29,13 +29,13 @@ def pair_with(contact_ratio):
 @pytest.fixture(scope="module")
 def mesh():
     return constant_stiffness_mesh(
-        pair_with(CONTACT_RATIO), STIFFNESS, jg.Resolution(positions=POSITIONS, patch_nodes=1)
+        pair_with(CONTACT_RATIO), STIFFNESS, jg.Resolution(positions=POSITIONS, contact_nodes=1)
     )
 
 
 @pytest.fixture(scope="module")
 def fine():
-    return constant_stiffness_mesh(pair_with(CONTACT_RATIO), STIFFNESS, jg.Resolution(positions=1024, patch_nodes=1))
+    return constant_stiffness_mesh(pair_with(CONTACT_RATIO), STIFFNESS, jg.Resolution(positions=1024, contact_nodes=1))
 
 
 def torque(mesh, load):
@@ -179,7 +179,7 @@ def test_gradient_of_the_closed_forms(mesh):
 def test_two_and_three_pairs_in_contact():
     """Contact ratio 2.36: the deflection varies between a half and a third of delta0."""
     pair = high_contact_ratio_pair()
-    mesh = constant_stiffness_mesh(pair, STIFFNESS, jg.Resolution(positions=POSITIONS, patch_nodes=1))
+    mesh = constant_stiffness_mesh(pair, STIFFNESS, jg.Resolution(positions=POSITIONS, contact_nodes=1))
     cycle = solve(mesh, torque(mesh, 1.0))
     assert ppte(cycle) == pytest.approx(1 / 2 - 1 / 3, rel=1e-12)
     loaded = np.sum(np.asarray(cycle.line_load)[:, 0] > 0, axis=0)

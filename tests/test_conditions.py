@@ -101,7 +101,7 @@ def test_a_sweep_of_geometry_load_and_flanks_is_a_loop_over_them():
     rows = [[AMOUNT, 0.9, 0.0, 50.0], [AMOUNT, 0.0, 0.0, 50.0], [8.0, 0.2, 0.1, 30.0], [8.0, 0.2, 0.0, -30.0]]
     plan = jg.VariantList(("amount", "shift", "wider", "torque"), rows)
 
-    sizes = jg.Resolution(positions=8, pairs=2, patch_nodes=1)
+    sizes = jg.Resolution(positions=8, pairs=2, contact_nodes=1)
 
     def mesh_of(v):
         return jg.prepare(pair(v["shift"], 101.8 + v["wider"]), resolution=sizes)

@@ -121,7 +121,7 @@ def test_nothing_stays_nothing_and_nan_stays_nan():
 def over_meshes(x):
     """Slices that are coupled through gears and shafts, and their contact."""
     held = support(stage(1.0, radial=300.0 * x))
-    sizes = jg.Resolution(positions=8, patch_nodes=1, slices=7, pairs=2, slide_steps=0, newton_steps=2)
+    sizes = jg.Resolution(positions=8, contact_nodes=1, slices=7, pairs=2, slide_steps=0, newton_steps=2)
     return jg.solve(jg.prepare(held.pair, support=held, resolution=sizes), 40.0).transmission_error
 
 

@@ -263,7 +263,7 @@ def test_settings_and_lives_without_dynamics_are_refused(resonant):
     with pytest.raises(ValueError, match='Wear: quantity "worn_dynamic_factor" needs dynamics'):
         Wear(REVOLUTIONS, COEFFICIENT).quantity("worn_dynamic_factor")
     life = replace(resonant, dynamic_factor=None)
-    with pytest.raises(ValueError, match='over_life: "dynamic_factor" needs a life with dynamics'):
+    with pytest.raises(ValueError, match='over_life: "dynamic_factor" needs a wear history with dynamics'):
         over_life(life, "dynamic_factor")
 
 

@@ -35,7 +35,7 @@ def pair_of(pinion=18.0, wheel=18.0, offset=0.0):
 
 
 # with as many modes as slices, by which both forms of the coupling are exact
-SIZES = jg.Resolution(positions=4, slices=4, pairs=2, patch_nodes=1)
+SIZES = jg.Resolution(positions=4, slices=4, pairs=2, contact_nodes=1)
 
 
 def mesh_of(pair, slices=4):

@@ -457,7 +457,7 @@ WRONG = [
     ),
     (
         replaced("[{ position = 190.0 }]", "[{ position = 190.0, torque = 3.0 }]"),
-        "couplings have no torque of their own",
+        "couplings have no torque, must be 1",
     ),
     (
         replaced('name = "D"', 'name = "A"'),

@@ -177,7 +177,7 @@ def test_every_slice_has_its_own_width(mesh, cycle):
 
 @pytest.mark.slow
 def test_slices_that_feel_each_other_have_their_own_widths(mesh, cycle):
-    sizes = replace(FACE, patch_nodes=SLIDING.patch_nodes, slide_steps=SLIDING.slide_steps)
+    sizes = replace(FACE, contact_nodes=SLIDING.contact_nodes, slide_steps=SLIDING.slide_steps)
     sliced = jg.prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes)
     flat = jg.solve(sliced, TORQUE, **reliefs())
     np.testing.assert_allclose(flat.transmission_error, cycle.transmission_error[::2], rtol=1e-9)

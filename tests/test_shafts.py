@@ -410,9 +410,9 @@ def pair_of(meshes, first=None, second=None, **changes):
         (lambda: pair_of([GearMesh("w", "p")]), 'the torque of gear "w" is .* the pinion of a mesh drives its wheel'),
         (
             lambda: pair_of([GearMesh("p", "w")], {"couplings": [Coupling(0.0)]}),
-            "2 couplings have no torque of",
+            "2 couplings have no torque, must be 1",
         ),
-        (lambda: pair_of([GearMesh("p", "w")], None, {"couplings": []}), "0 couplings have no torque of their own"),
+        (lambda: pair_of([GearMesh("p", "w")], None, {"couplings": []}), "0 couplings have no torque, must be 1"),
         (lambda: pair_of([GearMesh("p", "w", 0.0, 90.0)]), "center_distance|contact"),
         (
             lambda: pair_of([GearMesh("p", "w")], None, {"bearings": [Bearing("A", 0, 1e3), Bearing("B", 100, 1e3)]}),

@@ -89,7 +89,7 @@ STIFFNESS, DELTA0 = 300.0, 10.0
 def uniform():
     """Tooth pairs of one constant stiffness each, without corner contact."""
     mesh = constant_stiffness_mesh(
-        jg.GearPair(kahraman_gear(), kahraman_gear()), STIFFNESS, jg.Resolution(positions=64, patch_nodes=1)
+        jg.GearPair(kahraman_gear(), kahraman_gear()), STIFFNESS, jg.Resolution(positions=64, contact_nodes=1)
     )
     torque = STIFFNESS * DELTA0 * mesh.pair.pinion.base_radius * 1e-3
     return mesh, torque

@@ -35,7 +35,7 @@ def pair_of(pinion=WIDTH, wheel=WIDTH):
 
 def mesh_of(widths=UNEVEN, slices=None, pair=None, support=None, **sizes):
     """Few pairs and waves, which compile fast."""
-    sizes = {"positions": 4, "pairs": 2, "face_modes": 3, "patch_nodes": 1} | sizes
+    sizes = {"positions": 4, "pairs": 2, "face_modes": 3, "contact_nodes": 1} | sizes
     resolution = jg.Resolution(slices=slices or len(widths), slice_widths=widths, **sizes)
     return jg.prepare(pair_of() if pair is None else pair, resolution=resolution, support=support)
 
@@ -72,7 +72,7 @@ def uneven_kernel(parts):
 
 
 def test_sizes_by_position_keep_their_order():
-    assert jg.Resolution(8, 6, 3, 1) == jg.Resolution(positions=8, slices=6, pairs=3, patch_nodes=1)
+    assert jg.Resolution(8, 6, 3, 1) == jg.Resolution(positions=8, slices=6, pairs=3, contact_nodes=1)
 
 
 def test_slices_fill_the_face(mesh):

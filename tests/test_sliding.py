@@ -73,7 +73,7 @@ def test_nothing_slides_without_a_slope(mesh, sliced):
     given = (mesh, None, None), (mesh, flank(constant=4.0), flank()), (sliced, lead, None)
     for prepared, pinion, wheel in given:
         found = removed_material(prepared, TORQUE, pinion=pinion, wheel=wheel)
-        assert np.abs(found.shift).max() < 1e-12 and np.abs(found.bend).max() < 1e-10
+        assert np.abs(found.shift).max() < 1e-12 and np.abs(found.relative_curvature).max() < 1e-10
         amount = np.asarray(found.amount)
         assert np.ptp(amount, axis=(0, 2)).max() < 1e-12 and (amount.max() > 1.0) == (pinion is not None)
 
@@ -162,7 +162,7 @@ def test_a_concave_or_convex_flank_changes_the_pressure(mesh):
     roll, base = np.asarray(side.contact_roll_length), float(side.base_radius)
     middle = np.abs(roll - float(side.tip_roll_length - half)) < 0.2
     bend = 1e-3 * 2 * amount / half**2 * (base / roll) ** 2 * radius(mesh)
-    np.testing.assert_allclose(np.asarray(crowned.bend)[:, 0][middle], bend[middle], rtol=0.05)
+    np.testing.assert_allclose(np.asarray(crowned.relative_curvature)[:, 0][middle], bend[middle], rtol=0.05)
     plain = jg.contact.solve_removed(mesh, TORQUE, crowned.gap - mesh.corner_gap[:, None])
     loaded = np.asarray(crowned.line_load)[:, 0] > 0
     ratio = np.asarray(crowned.contact_pressure / plain.contact_pressure)[:, 0]
@@ -286,7 +286,7 @@ def test_slices_slide_on_their_own(mesh, sliced):
         alone = removed_material(
             mesh, TORQUE, pinion=jg.TabulatedProfile(roll, columns[:, number], method="natural_cubic")
         )
-        for name in ("amount", "shift", "bend"):
+        for name in ("amount", "shift", "relative_curvature"):
             mine, theirs = getattr(found, name)[:, number], getattr(alone, name)[:, 0]
             np.testing.assert_allclose(mine, theirs, atol=1e-9)
 
@@ -301,6 +301,6 @@ def test_a_prescribed_error_gives_the_forces_of_the_cycle(mesh):
 
 
 def test_points_across_the_contact_have_to_see_a_slope():
-    with pytest.raises(ValueError, match="slide_steps = 1 needs patch_nodes >= 3, is 2"):
-        jg.Resolution(patch_nodes=2, slide_steps=1)
-    assert jg.Resolution(patch_nodes=1).chosen_slide_steps == 0 and jg.Resolution().chosen_slide_steps == 2
+    with pytest.raises(ValueError, match="slide_steps = 1 needs contact_nodes >= 3, is 2"):
+        jg.Resolution(contact_nodes=2, slide_steps=1)
+    assert jg.Resolution(contact_nodes=1).chosen_slide_steps == 0 and jg.Resolution().chosen_slide_steps == 2

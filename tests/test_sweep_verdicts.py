@@ -31,7 +31,7 @@ def test_the_flag_of_a_sweep_is_the_verdict_of_the_constructors():
     table = jg.sweep(
         lambda v: (None, None),
         jg.VariantList(tuple(BOUNDS), rows),
-        mesh=lambda v: jg.prepare(pair_of(v), resolution=jg.Resolution(positions=8, patch_nodes=2, pairs=3)),
+        mesh=lambda v: jg.prepare(pair_of(v), resolution=jg.Resolution(positions=8, contact_nodes=2, pairs=3)),
         torque=50.0,
     )
     np.testing.assert_array_equal(table.column("converged"), expected)

@@ -150,7 +150,7 @@ def test_the_figures_of_worn_flanks_show_every_design(monkeypatch):
         for times, name in enumerate(("unmodified", "rule-based", "optimum"), 1)
     }
     request = SimpleNamespace(settings=SimpleNamespace(dynamics=None))
-    monkeypatch.setattr(plot, "lives", lambda *given: None)
+    monkeypatch.setattr(plot, "wear_history", lambda *given: None)
     drawn = WearResult.figures(SimpleNamespace(lives=lives, request=request, scatters={}))
     for gear in ("pinion", "wheel"):
         panels = np.ravel(drawn[f"worn_{gear}"])
@@ -431,7 +431,9 @@ def test_tolerances_are_left_out_under_the_dynamic_load_alone(file):
     assert wear_scatter.left_out(load_design(file(PAIR + TABLE + TOLERANCE))) == ""
     assert wear_scatter.left_out(load_design(file(FAST + DYNAMICS + DYNAMIC))) == ""
     told = wear_scatter.left_out(load_design(file(FAST + DYNAMICS + DYNAMIC + TOLERANCE)))
-    assert told.startswith("[tolerance] is not part of this analysis, the gears are nominal (lives under")
+    assert told.startswith(
+        "[tolerance] is not part of this analysis, the gears are nominal (wear of manufactured pairs"
+    )
     assert "\n" not in told
 
 

@@ -89,7 +89,7 @@ def plain(mesh) -> Problem:
     force = 1e3 * TORQUE / float(gears[0].base_radius)
     half_width = np.sqrt(np.asarray(mesh.width_factor) * force / float(mesh.pair.face_width))
     # Chebyshev nodes of the second kind integrate with the semi-elliptic pressure as their weight
-    count = mesh.resolution.patch_nodes
+    count = mesh.resolution.contact_nodes
     angle = np.pi * np.arange(1, count + 1) / (count + 1)
     offset = np.cos(angle)[:, None, None] * half_width
     loads = [tooth_load(outline(side.gear), side.contact_roll_length) for side in mesh.sides]

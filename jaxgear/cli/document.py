@@ -66,8 +66,8 @@ class CommandResult:
 
     Attributes:
         lines: its results in words.
-        warnings: what is not to be trusted, or is not reached.
-        findings: what is not usual; None where nobody looked.
+        warnings: results that did not converge, or limits that are not met.
+        findings: values out of the usual range; None where they were not checked.
         tables: those that it prints.
         figures: files of its pictures.
         pages: further parts.

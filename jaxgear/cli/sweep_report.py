@@ -84,7 +84,7 @@ class Chosen:
         figures: files of their pictures.
         pages: those of each variant alone, by its name.
         findings: what is not usual of them; None where they are not evaluated.
-        failures: what is not to be trusted.
+        failures: results that did not converge.
         lines: why they are not evaluated.
     """
 

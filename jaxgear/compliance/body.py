@@ -80,7 +80,7 @@ class AbstractBody(Checked):
 
 
 class ElasticRing(AbstractBody):
-    """Elastic ring held at the bore, with exact coupling of neighbouring teeth (see `ring`).
+    """Elastic ring fixed at the bore, with exact coupling of neighbouring teeth (see `ring`).
 
     Attributes:
         hub_windup: include the torsion of the ring between bore and root circle. It is common to all teeth: it shifts

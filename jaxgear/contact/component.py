@@ -11,7 +11,7 @@ from .solve import check_mesh, solve
 
 
 class ModifiedMesh(eqx.Module):
-    """A prepared mesh with its flank modifications, to be held by a larger model.
+    """A prepared mesh with its flank modifications, as a component of a larger model.
 
     The numbers of the modifications are its trainable parameters, nothing else is: the prepared arrays are `Frozen`. A
     `Mesh` held directly would train its own compliances.

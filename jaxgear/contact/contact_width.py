@@ -149,7 +149,7 @@ class Node(NamedTuple):
     curvature: float
 
 
-def patch_nodes(nodes: int) -> tuple[Node, ...]:
+def contact_nodes(nodes: int) -> tuple[Node, ...]:
     """Chebyshev nodes of the second kind, which integrate with the weight of the semi-elliptic pressure."""
     angle = np.pi * np.arange(1, nodes + 1) / (nodes + 1)
     x, mean = np.cos(angle), np.sin(angle) ** 2 * 2 / (nodes + 1)

@@ -14,7 +14,7 @@ from .operating_point import OperatingPoint
 from .status import WithStatus, reason
 
 Load = Float[Array, "pairs slices positions"]
-Bend = Float[Array, "pairs #slices positions"]
+Curvature = Float[Array, "pairs #slices positions"]
 
 # A concave flank is taken to be this much flatter than the involutes at most: one that fits its mate closer has no
 # Hertzian contact.
@@ -22,23 +22,24 @@ FLATTEST = 0.1
 
 
 @program
-def pressures(kinematics: Kinematics, line_load: Load, bend: Bend) -> tuple[Load, Load]:
+def pressures(kinematics: Kinematics, line_load: Load, relative_curvature: Curvature) -> tuple[Load, Load]:
     """`flank_pressure` and `corner_pressure`."""
-    return flank_pressure(kinematics, line_load, bend), corner_pressure(kinematics, line_load)
+    return flank_pressure(kinematics, line_load, relative_curvature), corner_pressure(kinematics, line_load)
 
 
-def flank_pressure(kinematics: Kinematics, line_load: Load, bend: Bend) -> Load:
+def flank_pressure(kinematics: Kinematics, line_load: Load, relative_curvature: Curvature) -> Load:
     """p = sqrt(q E* / (pi R)) [MPa] with the local radii of both flanks; zero outside the path of contact.
 
-    `bend` is what modifications add to 1 / R, relative to that of the involutes, as seen over the contact. At a kink,
-    where the pressure is singular, that is its mean over the contact: finite elements have up to 55 % more there.
+    `relative_curvature` is the curvature 1 / R that modifications add, as a share of that of the involutes, over the
+    contact width. At a kink, where the pressure is singular, that is its mean over the contact: finite elements have up
+    to 55 % more there.
 
     E* is that of plane strain, the usual form, unless the compliance model is in plane stress throughout: 5 % less.
     """
     pinion, wheel = kinematics.sides
     reduced = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)
     inside = kinematics.outside <= 0
-    reduced = reduced[:, None] / jnp.maximum(1 + bend, FLATTEST)
+    reduced = reduced[:, None] / jnp.maximum(1 + relative_curvature, FLATTEST)
     return jnp.where(inside[:, None], _hertz(kinematics, line_load, reduced), 0.0)
 
 
@@ -68,14 +69,14 @@ Curve = Float[Array, " positions"]
 class MeshCycle(WithStatus, eqx.Module):
     """Result of `solve`: one design under one torque, over one base pitch.
 
-    It holds what it was solved for, but not the prepared mesh (see `metrics.Analysis`), so that many can be kept and
-    stacked. Of many cycles made by `jax.vmap` every array has the batch axes in front, and so have properties and
+    It contains its pair, load and modifications, but not the prepared mesh (see `metrics.Analysis`), so that many can
+    be stacked. Of many cycles made by `jax.vmap` every array has the batch axes in front, and so have properties and
     metrics.
 
     Attributes:
         kinematics: the pair, its path of contact and the array sizes.
-        margins: how far the pair is from what cannot run.
-        operating_point: what the mesh was run at.
+        margins: distances of the pair from geometry that cannot run.
+        operating_point: torque, speed and friction.
         pinion, wheel: modifications of the flanks; None where only the material removed was given (`solve_removed`).
         transmission_error: loaded, on the line of action, positive when the wheel lags [um], shape (positions,);
             with the deflection of shafts, bearings and housing, where the mesh was prepared with them.
@@ -84,12 +85,12 @@ class MeshCycle(WithStatus, eqx.Module):
         pair_force: force on the line of action that every pair contributes [N], shape (pairs, positions); the pairs of
             a position sum to `force`.
         opening: remaining gap [um] where positive, minus the contact deflection where loaded.
-        gap: gap of the undeformed flanks at zero transmission error [um]: corner gap plus both modifications, where the
-            contact slides to, on rigid, parallel shafts.
-        shift: of the centre of contact along the flanks, which the slope of the modifications brings about, positive
+        gap: gap of the undeformed flanks at zero transmission error [um]: corner gap plus both modifications, at the
+            shifted contact, on rigid, parallel shafts.
+        shift: contact shift: of the centre of contact along the flanks, by the slope of the modifications, positive
             towards the pinion tip [mm]; shape (pairs, slices or 1, positions).
-        bend: what the modifications add to the relative curvature of the flanks, times their relative radius; of
-            the same shape.
+        relative_curvature: curvature that the modifications add, times the relative radius of the flanks; of the same
+            shape.
         tangent_stiffness: d force / d transmission error at fixed position [N/um].
         residual: largest relative violation of the contact conditions, shape (positions,).
         status: of every position, see `Status`, shape (positions,): `converged` where the residual is below the
@@ -108,7 +109,7 @@ class MeshCycle(WithStatus, eqx.Module):
     opening: Load
     gap: Load
     shift: Float[Array, "pairs #slices positions"]
-    bend: Float[Array, "pairs #slices positions"]
+    relative_curvature: Float[Array, "pairs #slices positions"]
     tangent_stiffness: Curve
     residual: Curve
     status: Int8[Array, " positions"]
@@ -146,13 +147,13 @@ class MeshCycle(WithStatus, eqx.Module):
         p = sqrt(q E* / (pi R)) (Hertz) with the curvature 1 / R of both involutes and of what is removed from them, in
         plane strain unless the compliance model is in plane stress throughout.
         """
-        return pressures(self.kinematics.explicit, self.line_load, self.bend)[0]
+        return pressures(self.kinematics.explicit, self.line_load, self.relative_curvature)[0]
 
     @property
     @over_batch
     def corner_pressure(self) -> Load:
         """Hertzian pressure of the tip edge on the mate's flank [MPa]; zero on the theoretical path of contact."""
-        return pressures(self.kinematics.explicit, self.line_load, self.bend)[1]
+        return pressures(self.kinematics.explicit, self.line_load, self.relative_curvature)[1]
 
     def __str__(self) -> str:
         if self.batch_ndim:

@@ -25,22 +25,24 @@ class Resolution(Checked):
         pairs: tooth pairs carried along; None for as few as the gears and the load need, see `prepare`. Pair i runs at
             phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two base pitches on either side of the pitch
             point: contact ratios up to 3.
-        patch_nodes: points across the Hertzian contact at which modifications are averaged. The contact bridges kinks
-            and steep flanks over its own width; 1 takes the nominal contact point alone.
-        slide_steps: steps in which the contact slides down the slope of a modification; 0 keeps it at its nominal
-            place. None for 2, and 0 where fewer than 3 points across the contact do not see slope and curvature.
-        coupled_slices: whether slices are elastically coupled, as those of a real face are; without it each slice bends
-            on its own, and the peak of line loads that vary over the face comes out 10 to 40 % too small. One slice has
-            nothing to feel.
-        face_modes: waves over the face by which slices are coupled; more than slices are as many as slices. With 5
-            line loads are within 0.4 % of those with all on faces of 6 modules, 0.7 % on 67. Gears of unequal width
-            take two more, at least 7, of which four decay from the ends: 0.1 % on 6 modules, 0.9 % on 20.
+        contact_nodes: points across the contact width at which modifications are averaged; 1 takes the nominal contact
+            point alone.
+        slide_steps: steps of the contact shift on the slope of a modification; 0 keeps the contact at its nominal
+            place. None for 2, and for 0 with fewer than 3 points across the contact, which do not resolve slope and
+            curvature.
+        coupled_slices: whether slices are elastically coupled, as those of a real face are; without it each slice
+            deflects on its own, and the peak of line loads that vary over the face is 10 to 40 % too small. No effect
+            on one slice.
+        face_modes: waves over the face by which slices are coupled; a number above that of the slices acts as that of
+            the slices. With 5, line loads are within 0.4 % of those with all on faces of 6 modules, 0.7 % on 67. Gears
+            of unequal width take two more, at least 7, of which four decay from the ends: 0.1 % on 6 modules, 0.9 % on
+            20.
         newton_steps: largest number of steps of the contact solution.
         rtol: residual at which the contact solution ends, relative to the transmission error and to the force;
             None for 1e-11 in double and 5e-6 in single precision.
         slice_widths: relative widths of the slices as whole numbers, from the negative end of the face to the positive
-            one; None for slices of equal width. What changes over a short piece of the face takes narrow slices there,
-            see `end_relief_widths`.
+            one; None for slices of equal width. Short features such as an end relief need narrow slices, see
+            `end_relief_widths`.
         extended_contact: whether pairs touch with their tip corners beyond the path of contact too, as those of loaded
             gears do; without it every pair takes load from the start of the path to its end alone, as in many published
             models, and the transmission error jumps there.
@@ -49,7 +51,7 @@ class Resolution(Checked):
     positions: int = count(low=4, default=64)
     slices: int = count(default=1)
     pairs: int | None = count(low=2, optional=True, default=None)
-    patch_nodes: int = count(default=4)
+    contact_nodes: int = count(default=4)
     slide_steps: int | None = count(low=0, high=20, optional=True, default=None)
     coupled_slices: bool = eqx.field(static=True, default=True)
     face_modes: int = count(low=2, default=5)
@@ -63,10 +65,10 @@ class Resolution(Checked):
     extended_contact: bool = eqx.field(static=True, default=True)
 
     def check_together(self) -> None:
-        if self.slide_steps and self.patch_nodes < _SLIDING_NODES:
+        if self.slide_steps and self.contact_nodes < _SLIDING_NODES:
             raise ValueError(
-                f"Resolution: slide_steps = {self.slide_steps} needs patch_nodes >= {_SLIDING_NODES}, is "
-                f"{self.patch_nodes}: fewer points across the contact do not resolve slope and curvature of a flank"
+                f"Resolution: slide_steps = {self.slide_steps} needs contact_nodes >= {_SLIDING_NODES}, is "
+                f"{self.contact_nodes}: fewer points across the contact do not resolve slope and curvature of a flank"
             )
 
         if self.slice_widths is None:
@@ -106,7 +108,7 @@ class Resolution(Checked):
         """`slide_steps`, with its default."""
         if self.slide_steps is not None:
             return self.slide_steps
-        return _SLIDE_STEPS if self.patch_nodes >= _SLIDING_NODES else 0
+        return _SLIDE_STEPS if self.contact_nodes >= _SLIDING_NODES else 0
 
     @property
     def is_coupled(self) -> bool:
@@ -133,7 +135,7 @@ class Resolution(Checked):
     @property
     def of_material(self) -> "Resolution":
         """What the material depends on that is removed from the flanks of a prepared mesh, likewise."""
-        nodes, steps = self.patch_nodes, self.chosen_slide_steps
+        nodes, steps = self.contact_nodes, self.chosen_slide_steps
         return Resolution(self.positions, self.slices, self.pairs, nodes, steps, slice_widths=self.parts)
 
     @property

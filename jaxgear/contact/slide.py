@@ -36,8 +36,8 @@ from .contact_width import (
     Node,
     Place,
     Sided,
+    contact_nodes,
     flank_at,
-    patch_nodes,
     place_of,
     probe,
     secant_slope,
@@ -60,16 +60,16 @@ class RemovedMaterial(Checked):
         amount: by which the gap is wider than that of the unmodified flanks [um], shape (pairs, slices, positions).
         shift: of the centre of contact along the flanks, positive towards the pinion tip [mm], shape (pairs, slices or
             1, positions).
-        bend: what the removed material adds to the relative curvature of the flanks, times their relative radius, same
-            shape.
+        relative_curvature: curvature that the removed material adds, times the relative radius of the flanks; of the
+            same shape.
     """
 
     amount: Load = result("um")
     shift: Field = result("mm")
-    bend: Field = result()
+    relative_curvature: Field = result()
 
     def __add__(self, field: Float[Array, "..."] | float) -> "RemovedMaterial":
-        return RemovedMaterial(self.amount + field, self.shift, self.bend)
+        return RemovedMaterial(self.amount + field, self.shift, self.relative_curvature)
 
     __radd__ = __add__
 
@@ -93,7 +93,7 @@ def nominal_material(
     """Mean of the removed material around the nominal contact [um], linear in the modifications."""
     place, sizes = place_of(mesh, torque), mesh.resolution
     total = jnp.zeros((sizes.chosen_pairs, sizes.slices, sizes.positions), torque.dtype)
-    nodes = patch_nodes(sizes.patch_nodes)
+    nodes = contact_nodes(sizes.contact_nodes)
     for sided in terms_of(mesh, torque.dtype, pinion, wheel):
         total = total + probe([sided], place, jnp.zeros_like(place.radius), nodes).mean
     return total
@@ -119,12 +119,12 @@ def slid_material(
         amount = amount + term(flank_at(side, place, jnp.zeros_like(place.radius)))
     if not along:
         return as_removed(sizes, amount)
-    found = _slide(along, place, patch_nodes(sizes.patch_nodes), sizes.chosen_slide_steps)
+    found = _slide(along, place, contact_nodes(sizes.contact_nodes), sizes.chosen_slide_steps)
     return RemovedMaterial(amount + found[0], found[1], found[2])
 
 
 def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], steps: int) -> tuple[Real, Real, Real]:
-    """Amount [um], shift [mm] and bend of `RemovedMaterial`, of the shape that the terms have."""
+    """Amount [um], shift [mm] and relative curvature of `RemovedMaterial`, of the shape that the terms have."""
     bulge = 1e3 / place.radius
     moved = shift = jnp.zeros_like(place.radius)
     tried: tuple[_Tried, ...] = ()
@@ -225,7 +225,7 @@ def loaded_material(
     removed = slid_material(prepared, torque, pinion, wheel, line_load)
     # written so that NaN counts as not known
     known = jnp.where(residual < max(_WIDTHS_KNOWN, sizes.rtol or 0.0), removed.amount, jnp.nan)
-    return RemovedMaterial(known, removed.shift, removed.bend)
+    return RemovedMaterial(known, removed.shift, removed.relative_curvature)
 
 
 def for_contact(mesh: Mesh) -> Mesh:

@@ -141,7 +141,7 @@ def removed_material(
         wheel: modification of the wheel flank; None for the nominal involute.
 
     Returns:
-        amount, shift of the contact and bend of the flanks; fields add to the amount with `+`.
+        amount, contact shift and relative curvature of the flanks; fields add to the amount with `+`.
 
     Raises:
         TypeError: for something else than a prepared mesh or a modification.
@@ -196,7 +196,7 @@ def flanks_of(
 
     Raises:
         TypeError: for something else than a modification.
-        ValueError: for what a mesh of one slice cannot show: it would be ignored without a word. A traced amount
+        ValueError: for a modification that a mesh of one slice cannot show: it would have no effect. A traced amount
             counts.
     """
     for gear, modification in (("pinion", pinion), ("wheel", wheel)):
@@ -337,7 +337,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
         "opening": solution.opening,
         "gap": gap,
         "shift": removed.shift,
-        "bend": removed.bend,
+        "relative_curvature": removed.relative_curvature,
         "tangent_stiffness": 1 / (1 / contact_stiffness + mesh.hub / mesh.pair.face_width),
         "residual": solution.residual,
         "status": status,

@@ -52,9 +52,10 @@ class Dynamics(AbstractSettings):
         mesh_frequencies: [Hz], increasing, shape (speeds,).
         damping_ratio: of the DTE, to the critical damping at the mean stiffness; 0.05 without it or `damping`.
         damping: viscous damping of the DTE, in place of the ratio.
-        pinion_inertia: polar moment of inertia of the pinion and what turns with it; that of the body without it.
+        pinion_inertia: polar moment of inertia of the pinion and the parts that turn with it; that of the body without
+            it.
         wheel_inertia: the same of the wheel.
-        compliance: of what lies between the teeth and the inertias, in series with the mesh.
+        compliance: of the parts between the teeth and the inertias, in series with the mesh.
         pinion_bearing: stiffness of the support of the pinion along and across the line of action; rigid without it.
             The supports of both gears are given, or of none.
         wheel_bearing: the same of the wheel.
@@ -62,11 +63,12 @@ class Dynamics(AbstractSettings):
         wheel_bearing_damping: the same of the wheel.
         model: of the mesh force.
         positions: mesh positions of the force, which is linear between them.
-        kick: dynamic factor with which a second run from the highest speed down begins, in place of `kicks`; 1 for no
-            such run.
-        steps: of the integrator per mesh cycle; chosen by the natural frequency without it.
-        kicks: dynamic factors with which a second run down throws the flanks apart at every speed, to find orbits
-            that hang together with no other, and goes on with the strongest; 2.5, 3 and 3.7 without it or `kick`.
+        kick: dynamic factor at the start of a second run from the highest speed down, in place of `kicks`; 1 for no
+            second run.
+        steps: integrator steps per mesh cycle; chosen by the natural frequency without it.
+        kicks: dynamic factors of the starts with separated flanks that a second run down tries at every speed, to find
+            orbits that are not connected with others; it continues with the strongest. 2.5, 3 and 3.7 without it or
+            `kick`.
     """
 
     table = "dynamics"

@@ -30,20 +30,19 @@ class Gear(Checked):
     """External involute spur gear, every number a differentiable leaf.
 
     Attributes:
-        teeth: number of teeth.
-        module: [mm].
-        pressure_angle: of the basic rack [deg].
-        profile_shift: coefficient of the module (x); positive thickens the tooth.
-        face_width: [mm].
-        addendum, dedendum, root_radius: of the basic rack, coefficients of the module (h_aP, h_fP, rho_fP; ISO 53).
-        tip_diameter: [mm]; None for m (z + 2 x + 2 addendum).
-        bore_diameter: diameter at which the body is rigidly held [mm]; None for half the root diameter, which `str`
-            prints. An integral shaft has no bore: give the shaft's diameter beside the gear. The body is a plane ring,
-            which cannot pass its torque on along the axis, so without a held circle its wind-up has no limit.
+        teeth: number of teeth z.
+        module: module m [mm].
+        pressure_angle: pressure angle of the basic rack [deg].
+        profile_shift: profile shift coefficient x; positive thickens the tooth.
+        face_width: face width b [mm].
+        addendum, dedendum, root_radius: coefficients h_aP, h_fP and rho_fP of the basic rack, in modules (ISO 53).
+        tip_diameter: tip diameter d_a [mm]; None for m (z + 2 x + 2 addendum).
+        bore_diameter: diameter at which the body is rigidly fixed [mm]; None for half the root diameter, which `str`
+            prints. For an integral shaft give the shaft's diameter beside the gear. The body is a plane ring: without a
+            fixed circle its wind-up has no limit.
         tip_form_diameter: d_Fa, where chamfer or rounding of the tip begins and the active flank ends [mm] (ISO 21771);
-            None for a flank up to the tip diameter. The path of contact ends there, the corner that touches beyond it
-            is the edge there, and tip reliefs count from it. A chamfer is taken to lie at 45 degrees; it
-            must leave some of the tip land.
+            None for a flank up to the tip diameter. The path of contact ends there, corner contact is with the edge
+            there, and tip reliefs count from it. Chamfers have 45 degrees and must leave some of the tip land.
         tip_edge_radius: radius of the edge between flank and tip cylinder or chamfer [mm], used for the pressure of
             corner contact only.
         tooth_thickness_allowance: E_sns, upper allowance of the tooth thickness (ISO 21771), by which the tooth is
@@ -57,8 +56,8 @@ class Gear(Checked):
     Raises:
         ValueError: for a number outside its range or an array of numbers, a pointed tooth, a tip inside the base
             circle, a tip form circle outside the tip circle or inside the base circle, or a bore that reaches the root
-            circle or is less than 2 % of it; the message names the parameter, its value and what is allowed.
-            While being traced only shapes are checked: `margins` of the pair tell then.
+            circle or is less than 2 % of it; the message names the parameter, its value and what is allowed. While
+            being traced only shapes are checked: see `margins` of the pair.
     """
 
     teeth: Scalar = number("", low=5.0, whole=True)

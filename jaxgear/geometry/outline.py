@@ -92,7 +92,7 @@ class Outline(Checked):
 
     @property
     def root_chord(self) -> Scalar:
-        """Thickness of the tooth where it stands on the root circle [mm], 2 r_f sin(theta_f)."""
+        """Thickness of the tooth at the root circle [mm], 2 r_f sin(theta_f)."""
         return 2 * self.gear.root_circle_radius * jnp.sin(self.root_half_angle)
 
 

@@ -62,15 +62,15 @@ class FileSection(FileTable):
         wheel: the driven gear.
         load: torque and speed.
         title: free text; the name of the file without it.
-        materials: of gears and shafts, by names of the file's own; "STEEL" is known without it.
+        materials: of gears and shafts, by name; "STEEL" is built in.
         pair: how the gears are mounted.
-        model: the stiffness model; the library's default without it.
-        misalignment: of the axes; parallel ones without it.
-        resolution: array sizes; the library's defaults without it.
+        model: stiffness model; the default model without it.
+        misalignment: deviation of the axes; parallel ones without it.
+        resolution: array sizes; the defaults without it.
         variables: numbers left open, with their bounds.
-        shafts: that carry the gears, for `jaxgear layout`.
-        meshes: of their gears; that of pinion and wheel alone without it.
-        housing: that holds their bearings; rigid seats without it.
+        shafts: shafts that carry the gears, with their bearings.
+        meshes: meshes of the gears on the shafts; that of pinion and wheel alone without it.
+        housing: elastic housing of the bearings; rigid seats without it.
     """
 
     pinion: GearSection = entry(nested(GearSection), ...)

@@ -39,7 +39,7 @@ class FlankRange:
     Attributes:
         roll_length: first and last [mm].
         face_coordinate: first and last, from the middle of the gear's face [mm]; the same for a profile alone.
-        step: from one to the next [mm]: lines may stand in the middles of slices.
+        step: distance from one to the next [mm]: lines may lie in the middles of slices.
     """
 
     roll_length: tuple[float, float]

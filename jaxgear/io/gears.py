@@ -38,9 +38,9 @@ def _modification(key: str, value: Any) -> Part | FlankFileSection:
 class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
     """A gear and the modifications of its flanks.
 
-    The tooth thickness stands in one of three ways: as the allowance E_sns, with the tolerance T_sn down to E_sni where
-    there is one; as the span W_k over so many teeth; as the dimension over balls. A list of two is lower and upper
-    limit, between which the tooth is in the middle.
+    The tooth thickness is given in one of three ways: as the allowance E_sns, with the tolerance T_sn down to E_sni
+    where there is one; as the span W_k over so many teeth; as the dimension over balls. A list of two is lower and
+    upper limit, between which the tooth is in the middle.
 
     Attributes:
         tooth_thickness_allowance: E_sns on the reference cylinder, negative for backlash, or [E_sni, E_sns].
@@ -64,8 +64,8 @@ class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[mi
     """Pinion (driving) and wheel (driven) on their centre distance.
 
     Attributes:
-        backlash: play on the line of action; by the tooth thickness of the gears that say nothing of their own, or by
-            the centre distance where both do.
+        backlash: backlash on the line of action, by the tooth thickness of the gears without a thickness of their own,
+            or by the centre distance where both have one.
     """
 
     backlash: float | Free | None = entry(real(_BACKLASH, open=True))

@@ -33,16 +33,17 @@ class ProfileSection(FileTable):
     """Profile modifications that step 3 tries, those of both gears in all combinations.
 
     Attributes:
-        type: of the modification.
+        type: type of the modification.
         pinion_amounts: amounts on the pinion.
         wheel_amounts: amounts on the wheel; those of the pinion without it.
         slopes: helix slopes of either sign on top of the flank line of the wheel, over the common face, crossed with
             the amounts; none without it.
         crownings: crownings of either sign, likewise.
-        length: of a tip relief; the long one, over the zone of double contact, without it.
+        length: length of a tip relief; that of the zone of double contact (long relief) without it.
         torque_factor: torque of the contact analysis, in design torques.
-        shafts: whether the contact feels shafts, bearings and housing, with the flank lines of both steps and once for
-            every support. Without them it has the further crowning alone, as on shafts whose bending is compensated.
+        shafts: whether the contact analysis includes shafts, bearings and housing, with the flank lines of both steps
+            and once for every support. Without them the flanks have the further crowning alone, as on shafts whose
+            deflection is compensated.
     """
 
     type: str = entry(choice("tip_relief", "profile_crowning"), "tip_relief")
@@ -65,16 +66,16 @@ class LayoutSection(FurtherTable):
             `bearing_span`, or `direct`, f_ma over the face, as in [misalignment]; "class" takes those of ISO/TR 10064-3
             by F_beta of the quality class, which over the face are the same for every bearing span. Parallel axes
             without it.
-        gear: whose flank line levels the load.
-        direction: in which the first shaft turns, seen against z.
+        gear: gear with the flank line that levels the load.
+        direction: sense of rotation of the first shaft, seen against z.
         further_crowning: "rule" takes C_b = f_Hbeta of ISO 6336-1 Annex B for both gears and more where that does not
-            suffice; "least" as little as keeps the load off the edges.
-        edge_share: of the largest load inside, up to which the end of a face may be loaded.
+            suffice; "least" takes the least crowning that keeps the load off the edges.
+        edge_share: permissible line load at an end of the face, as a share of the largest one inside.
         negative_crowning: whether the crowning of step 1 may be negative.
-        stations: over the face, of the one-dimensional analysis.
+        stations: number of stations over the face in the analysis of ISO 6336-1 Annex E.
         torques: on the pinion, of a duty cycle, with the S-N curves of [strength]; the load is levelled at the design
             torque without it.
-        hours: at every torque.
+        hours: operating hours at every torque.
         speeds: of the pinion at every torque.
         profile: profile modifications to be tried in step 3; none without it.
     """
@@ -126,7 +127,7 @@ class LayoutRequest:
         supports: the mesh on its shafts, in the housing first where there is one, then on rigid seats.
         tolerances: by name.
         options: of `layout_flank_lines`.
-        torques: on the pinion, at which K_Hbeta is told: the range of the file, and those of the duty cycle [N m].
+        torques: on the pinion, at which K_Hbeta is computed: the range of the file, and those of the duty cycle [N m].
         profile: what step 3 tries; None for no step 3.
         profile_torque: on the pinion, of step 3 [N m].
     """

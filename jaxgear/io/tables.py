@@ -105,7 +105,7 @@ class SettingsTable(FurtherTable):
     """A table whose keys are the fields of a class of settings, of which `DesignFile.tables` holds an object.
 
     Attributes:
-        file: TOML file beside the design file, with any of the other keys; no key stands in both.
+        file: TOML file beside the design file, with any of the other keys; no key is in both.
     """
 
     file: str | None = entry(text())
@@ -165,7 +165,7 @@ def _table_of(cls: Any) -> type[FurtherTable]:
 
 
 class ProjectSection(FurtherTable):
-    """Whose gears these are: texts that stand in the head of the report and in `summary.json`.
+    """Texts for the head of the report and for `summary.json`.
 
     Attributes:
         name: of the project.

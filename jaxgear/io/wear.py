@@ -16,12 +16,12 @@ class WearSection(FurtherTable, section_of(Wear, ("dynamics", "loads"), open=Fal
     """How long the pair runs, and how fast it wears; for `jaxgear wear` and for the quantities that need it.
 
     Attributes:
-        line_load: under which the flanks wear; "dynamic" is that of the steady motion, which needs the table
+        line_load: line load that wears the flanks; "dynamic" is that of the steady motion, which needs the table
             [dynamics] and load.speed.
-        largest_increment: depth that no block of the lives of `jaxgear wear` wears off beyond a tenth more; blocks of
-            equal length without it. Quantities and the search over the life take `blocks` in any case.
-        torques: on the pinion, of a spectrum whose loads wear one flank together; the load of the file without it.
-        weights: of the torques in the revolutions.
+        largest_increment: wear depth per block of `jaxgear wear`, exceeded by at most a tenth; blocks of equal length
+            without it. Quantities and the search over the life take `blocks` in any case.
+        torques: on the pinion, of a load spectrum that wears one flank; the load of the file without it.
+        weights: shares of the revolutions at every torque; equal shares without it.
         speeds: of the pinion at every torque; that of the file without it.
     """
 

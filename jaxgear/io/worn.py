@@ -21,16 +21,16 @@ Worn = tuple[AbstractModification, AbstractModification]
 
 
 def write_worn(path: str | Path, lives: Mapping[str, WearHistory]) -> None:
-    """Writes the worn flanks of all designs at every life, one row per point of a flank, to all digits.
+    """Writes the worn flanks of all designs at every time step, one row per point of a flank, to all digits.
 
     `read_worn` gives the same flanks of all, `read_flank` one of them.
 
     Args:
         path: file to write: Parquet where its name ends in .parquet, otherwise CSV.
-        lives: by the name of the design.
+        lives: wear histories by the name of the design.
 
     Raises:
-        ValueError: for no lives, and when the file cannot be written.
+        ValueError: for no wear history, and when the file cannot be written.
     """
     path = Path(path)
     if not lives:

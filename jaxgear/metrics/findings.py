@@ -76,14 +76,14 @@ _RELIEFS = TipRelief, RootRelief, EndRelief
 
 
 class Finding(NamedTuple):
-    """A number, and what is usual of it.
+    """A number with its usual range.
 
     Attributes:
-        key: what number it is, of `LIMITS` or the like.
+        key: name of the number, as in `LIMITS`.
         where: "pinion", "wheel", or another part; "" for the pair.
         value: the number, in the unit of the usual range.
-        usual: range; a number out of it is a finding to be told.
-        severity: how it is told.
+        usual: usual range; a number out of it is reported.
+        severity: "warning".
     """
 
     key: str

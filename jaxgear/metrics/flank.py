@@ -102,10 +102,10 @@ def relief_reversal(
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
 ) -> Scalar:
-    """By how much the material removed fails to grow steadily from the pitch point towards tip and root [um].
+    """Sum of the decreases of the material removed on the ways from the pitch point to tip and root [um].
 
-    The sum of all its decreases along both ways, in the middle of the face, of the worse gear. It is zero for any
-    relief that only grows, and the depth of the dip for one that dips. A profile slope decreases on one of the ways.
+    It is that of the worse gear, in the middle of the face: zero for a monotone relief, and the depth of the dip for
+    one that dips. A profile slope decreases on one of the ways.
     """
     worst = [_decrease(side, modification) for side, modification in _flanks(mesh, pinion, wheel)]
     return maximum(jnp.stack(worst))

@@ -29,7 +29,7 @@ class ContactShock(Checked):
     Attributes:
         approach: loaded path length before its start, where the wheel's tip corner touches.
         recess: loaded path length after its end, where the pinion's tip corner touches.
-        force: largest force on a pair there.
+        force: largest force on a pair beyond the theoretical path of contact [N].
     """
 
     approach: Scalar = result("mm")

@@ -151,7 +151,7 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
 
 @over_batch
 def loss_power(cycle: MeshCycle, lubricant: Lubricant | None = None) -> Scalar:
-    """Power that friction of the flanks takes [W]: input power * coefficient of friction * loss factor H_VL.
+    """Power loss by friction of the flanks [W]: input power * coefficient of friction * loss factor H_VL.
 
     Args:
         cycle: solved mesh cycle, with a speed.
@@ -166,7 +166,7 @@ def loss_power(cycle: MeshCycle, lubricant: Lubricant | None = None) -> Scalar:
 
 @over_batch
 def mesh_efficiency(cycle: MeshCycle, lubricant: Lubricant | None = None) -> Scalar:
-    """Share of the input power that the flanks pass on, 1 - mu H_VL; arguments and errors as `loss_power`.
+    """Efficiency of the mesh, transmitted over input power, 1 - mu H_VL; arguments and errors as `loss_power`.
 
     What seals, bearings and churned oil take is not in it.
     """

@@ -1,8 +1,8 @@
-"""Safety factors, and damage by a load: what material and oil bear over what the mesh does to them.
+"""Safety factors, permissible over occurring stress, temperature or film, and damage by a load.
 
-Palmgren and Miner: every cycle at a stress takes 1 / N of a life, N = N_0 (sigma_0 / sigma)^p, and the shares add up.
-So the mean over a load spectrum, whose weights are shares of the revolutions, is the damage sum, a life is 1e6 / damage
-revolutions of the pinion, and the lives of two designs are as the inverse of their damage.
+Palmgren and Miner: every cycle at a stress adds 1 / N to the damage sum, N = N_0 (sigma_0 / sigma)^p. The mean over a
+load spectrum, whose weights are shares of the revolutions, is the damage sum of 1e6 revolutions of the pinion; the life
+is 1e6 / damage revolutions.
 
 References:
     ISO 6336-6 (load spectra); ISO 6336-2 and -3 for the nominal stresses.
@@ -25,7 +25,7 @@ Mode = Literal["pitting", "bending"]
 Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
 
-# A stress that is not there is borne as often as one likes, which is no failure, as numbers that are not finite are.
+# The safety without any stress: a finite number, since numbers that are not finite count as failures.
 LARGEST_SAFETY = 1000.0
 
 
@@ -36,15 +36,15 @@ class Strength(AbstractSettings):
     given.
 
     Attributes:
-        pitting: nominal contact stress that the pinion bears, and the wheel where it has none of its own: sigma_HG
-            of ISO 6336-2.
+        pitting: permissible nominal contact stress of the pinion, and of the wheel where it has none of its own:
+            sigma_HG of ISO 6336-2.
         wheel_pitting: the same of the wheel; None for that of the pinion.
-        bending: nominal stress in the tooth root that the pinion bears, with its notch, and the wheel where it has
-            none of its own: sigma_FG of ISO 6336-3.
+        bending: permissible nominal tooth root stress of the pinion, notch included, and of the wheel where it has none
+            of its own: sigma_FG of ISO 6336-3.
         wheel_bending: the same of the wheel; None for that of the pinion.
         pressure: permissible pressure of the contact analysis, tip edges included.
         pitting_exponent: p of the S-N curve N = `pitting_cycles` (pitting / stress)^p of the pinion, and of the wheel
-            where it has none of its own, for damage; without an end below.
+            where it has none of its own, for damage; without an endurance limit.
         pitting_cycles: load cycles for which `pitting` is permissible, likewise.
         bending_exponent: of the S-N curve of the tooth roots, likewise.
         bending_cycles: load cycles for which `bending` is permissible, likewise.
@@ -78,7 +78,7 @@ class Strength(AbstractSettings):
 
 
 def safety_factor(borne: Real, reached: Real) -> Real:
-    """What is borne over what is reached, at most 1000."""
+    """Permissible over occurring stress, at most 1000."""
     return borne / jnp.maximum(reached, borne / LARGEST_SAFETY)
 
 

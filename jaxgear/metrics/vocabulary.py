@@ -156,7 +156,7 @@ MESH_QUANTITIES = Vocabulary(
             label="face load factor K_Hbeta",
             form=".3f",
         ),
-        Quantity("root_face_load_factor", root_face_load_factor, meaning="K_Fbeta, the same for root stress"),
+        Quantity("root_face_load_factor", root_face_load_factor, meaning="K_Fbeta, face load factor for root stress"),
         Quantity("edge_load_factor", edge_load_factor, meaning="line load at an end of the face over its mean"),
         Quantity(
             "contact_ratio",
@@ -173,7 +173,14 @@ MESH_QUANTITIES = Vocabulary(
             form=".3f",
         ),
         Quantity("corner_contact_length", _corner_length, "mm", "loaded path beyond the theoretical path of contact"),
-        Quantity("corner_force", corner_force, "N", "largest force on a pair there", Max(), local=True),
+        Quantity(
+            "corner_force",
+            corner_force,
+            "N",
+            "largest force on a pair beyond the theoretical path of contact",
+            Max(),
+            local=True,
+        ),
         *_stresses(
             "root_stress", nominal_root_stress, "root stress after ISO 6336-3", "root stress, ISO 6336-3", form=".1f"
         ),
@@ -203,7 +210,7 @@ MESH_QUANTITIES = Vocabulary(
                 ("rim_thickness", "from the bore to the root circle"),
             )
         ),
-        Quantity("backlash", _margin("backlash"), "um", "play on the line of action", better="larger"),
+        Quantity("backlash", _margin("backlash"), "um", "backlash on the line of action", better="larger"),
         Quantity(
             "min_backlash", _backlash_limit(0), "um", "least backlash, of the thickest teeth allowed", better="larger"
         ),
@@ -238,7 +245,9 @@ MESH_QUANTITIES = Vocabulary(
         ),
         Quantity("removed_material", mean_removed_material, "um", "mean material removed from both flanks together"),
         Quantity("max_relief", _of_flanks(max_relief), "um", "largest material removed from a flank"),
-        Quantity("relief_reversal", _of_flanks(relief_reversal), "um", "by how much removal fails to be monotone"),
+        Quantity(
+            "relief_reversal", _of_flanks(relief_reversal), "um", "sum of decreases of the relief towards tip and root"
+        ),
         Quantity("removed_volume", _of_flanks(removed_volume), "mm3", "material ground off all flanks"),
         *LUBRICATED,
         *RATED,

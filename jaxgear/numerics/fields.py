@@ -69,7 +69,7 @@ class Number:
         limits: lower and upper limit, shape (2,), may stand for a single number.
         static: a Python number that is part of the structure, not a leaf; with a shape, a tuple of whole numbers.
         checked: False for a result, which may hold anything, NaN included.
-        usual: beyond which a number is asked about: the logger of the package, ".unusual", warns once per field.
+        usual: usual range; beyond it the logger of the package, ".unusual", warns once per field.
     """
 
     unit: str = ""

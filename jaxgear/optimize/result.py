@@ -86,10 +86,10 @@ class Optimum(eqx.Module):
         objective: least value found of what was minimized, in its unit.
         objective_unit: "" for a pure number.
         positions: of the mesh on which objective, cycle and constraints were evaluated, per base pitch.
-        grid_change: by how much the objective changes when these are doubled, in its unit; NaN where nobody looked,
-            as where the search was told to stay on its mesh.
-        optimality: fastest decrease of the objective that is left within bounds and constraints, per step of the
-            full range of every parameter; 0 at an optimum. It comes from the linearized problem (`linear_model`) and
+        grid_change: change of the objective when these are doubled, in its unit; NaN where it was not evaluated, as
+            with a search that stays on its mesh.
+        optimality: first-order optimality: largest predicted decrease of the objective within bounds and constraints,
+            per full range of a parameter; 0 at an optimum. It comes from the linearized problem (`linear_model`) and
             counts the kinks of extremes, where the plain gradient does not vanish. NaN where there are no parameters,
             and where the slopes are not finite.
         active_bounds: which parameters ended at their "lower" or "upper" bound.
@@ -97,13 +97,14 @@ class Optimum(eqx.Module):
         violation: largest relative excess over a constraint; 0 where all are kept.
         evaluations: contact analyses spent, one per design, torque and manufactured gear; one with its gradient
             counts as three, each further gradient as two.
-        history: best objective after every look at the search, on the mesh that it had reached.
+        history: best objective after every report of the search, on its mesh at that time.
         history_evaluations: contact analyses spent until then.
         history_positions: positions of that mesh; None where they are `positions` all the way.
         seconds: wall time of the search, compilation included [s].
-        iterations: states of the transmission-error iteration, the first one before any change; else empty.
-        problem: what was solved, on `mesh`; `judged` tells by it what other designs are worth. None of the
-            transmission-error iteration, which levels one curve.
+        iterations: states of the transmission-error iteration, the first one before any change; empty for other
+            methods.
+        problem: the optimization problem, on `mesh`, by which `judged` evaluates other designs; None of the
+            transmission-error iteration.
     """
 
     method: str = eqx.field(static=True)

@@ -47,5 +47,5 @@ from .variants import ppte_distribution as ppte_distribution
 from .variants import ppte_histogram as ppte_histogram
 from .variants import ppte_over_torque as ppte_over_torque
 from .variants import response_surface as response_surface
-from .wear import lives as lives
+from .wear import wear_history as wear_history
 from .wear import worn_flank as worn_flank

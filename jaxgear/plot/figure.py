@@ -285,7 +285,7 @@ def mark_path(ax: Axes, contact: PathOfContact, *, zorder: float = 0.5) -> None:
 
 
 def text_above(ax: Axes, x: float, text: str) -> None:
-    """Grey text that stands on the upper edge of the Axes, centred at x."""
+    """Grey text on the upper edge of the Axes, centred at x."""
     ax.annotate(
         text,
         (x, 1.0),

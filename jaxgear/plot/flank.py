@@ -204,7 +204,7 @@ def k_chart(
     """Material removed from pinion and wheel [um] over the roll angle [deg], in the middle of the face.
 
     From the start of the active profile to the tip; the nominal involute is the zero line, material removed goes down
-    as on the print of a gear measuring machine. The diameter [mm] stands on the upper axis.
+    as on the print of a gear measuring machine. The upper axis is the diameter [mm].
 
     Args:
         mesh: prepared mesh.

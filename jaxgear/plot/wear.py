@@ -1,4 +1,4 @@
-"""Worn flanks, and what they make of the mesh over the life."""
+"""Worn flanks, and quantities of the mesh over the wear history."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Literal
@@ -15,16 +15,16 @@ from .figure import legend_above, line_style, marker_style, report_axes, styled
 from .variants import meaning_label
 
 _GEARS = "pinion", "wheel"
-_SHOWN = 4  # lives
+_SHOWN = 4  # time steps
 
 
 def worn_flank(life: WearHistory, gear: Literal["pinion", "wheel"], ax: Axes | None = None, *, title: str = "") -> Axes:
-    """Wear depth [um] of one gear over its roll angle [deg] at several lives, in the line that is worn deepest.
+    """Wear depth [um] of one gear over its roll angle [deg] at several time steps, in the line that is worn deepest.
 
     Material removed goes down, as in the K-chart.
 
     Args:
-        life: of the pair.
+        life: wear history of the pair.
         gear: "pinion" or "wheel".
         ax: Axes to draw into; None for a new figure.
         title: of the Axes.
@@ -50,7 +50,7 @@ def worn_flank(life: WearHistory, gear: Literal["pinion", "wheel"], ax: Axes | N
     return ax
 
 
-def lives(
+def wear_history(
     of: Mapping[str, WearHistory],
     quantity: str | Quantity | Callable[[MeshCycle], Any] = "ppte",
     ax: Axes | None = None,
@@ -58,7 +58,7 @@ def lives(
     """A quantity of several designs over the revolutions of the pinion.
 
     Args:
-        of: lives by the name of the design; up to eight differ in style.
+        of: wear histories by the name of the design; up to eight differ in style.
         quantity: "wear_depth" for the deepest wear of both gears, a name of the vocabulary, a `Quantity`, or a
             function of a cycle.
         ax: Axes to draw into; None for a new figure.
@@ -69,7 +69,7 @@ def lives(
             done = np.asarray(life.revolutions)
             every = max(1, len(done) // 10)
             ax.plot(done, np.asarray(values), label=name, markevery=every, **marker_style(index))
-        ax.set(xlabel="revolutions of the pinion", ylabel=meaning_label(quantity_of(quantity, "lives")))
+        ax.set(xlabel="revolutions of the pinion", ylabel=meaning_label(quantity_of(quantity, "wear_history")))
         ax.set_xlim(left=0)
         legend_above(ax)
     return ax

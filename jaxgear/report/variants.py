@@ -22,8 +22,8 @@ _WIDEST, _MARGIN = 30, 4  # of a column [characters]
 def write_workbook(path: Path, facts: Sequence[tuple[str, str]], best: SweepTable, table: SweepTable) -> None:
     """Writes three sheets: what the workbook is about, the best variants, and the table.
 
-    Units stand in the header, which is frozen and filters the columns. Of more than `MOST_ROWS` variants the best by
-    the first result are written. Results of failed variants are empty cells.
+    Units are in the header, which is frozen and filters the columns. Of more than `MOST_ROWS` variants the best by the
+    first result are written. Results of failed variants are empty cells.
 
     Args:
         path: file to write.

@@ -120,7 +120,7 @@ def beam(edges: Float[Array, " edges"], diameter: Pieces, bore: Pieces, material
 
 
 def flexibility(held: SteppedBeam, at: Points) -> Float[Array, "points 5 points 5"]:
-    """Displacement at every point under unit loads at every other one, of the beam held at its left end.
+    """Displacement at every point under unit loads at every other one, of the beam fixed at its left end.
 
     Args:
         held: the pieces.

@@ -149,7 +149,7 @@ def annex_e(
     """
     of_gearbox = isinstance(support, ShaftSupport)
     if (torque is None) != of_gearbox:
-        problem = "has no effect: that of the couplings counts" if of_gearbox else "must be given: no coupling tells it"
+        problem = "has no effect: that of the couplings counts" if of_gearbox else "must be given: no coupling has one"
         raise ValueError(f"annex_e: torque {problem}")
     check("annex_e", "torque", torque, "N m", low=0.0)
     check("annex_e", "stiffness", stiffness, "N/(mm um)", low=0.0, open_low=True)

@@ -33,7 +33,7 @@ def relief_amount(pair: GearPair, torque: Given, application_factor: Given = 1.0
     """Tip relief C_a = F_t K_A / (b c') [um], the amount that zeroes the profile term B_k of ISO 6336-1's K_v.
 
     It is the deflection of one pair under the whole load. A study of industrial gearboxes starts from a simple rule of
-    Niemann (Maschinenelemente II) without printing it; that formula was not at hand, so this one stands in for it.
+    Niemann (Maschinenelemente II) without printing it; that formula was not at hand, so this one replaces it.
 
     Args:
         pair: gear pair.
@@ -68,7 +68,7 @@ def mesh_stiffness_relief(pair: GearPair, torque: Given, application_factor: Giv
     """Delta_max = (K_A F_t / b) / (epsilon_alpha c_gamma) [um], as printed in the genetic-algorithm study of the 19/48
     pair; for comparison with it only.
 
-    The study calls it an ISO formula, but ISO 6336 has no such one, and it counts the contact ratio twice: c_gamma
+    The study calls it an ISO formula, but ISO 6336 does not contain it, and it counts the contact ratio twice: c_gamma
     contains it. It gives 3.1 um where the study itself states 7.81 um at 97.5 N/mm. That is, within 3 %, F_t / (b c')
     with the stiffness c' of one pair: use `relief_amount`.
 
@@ -84,8 +84,8 @@ def mesh_stiffness_relief(pair: GearPair, torque: Given, application_factor: Giv
 def run_in_relief(hertz_limit: Given) -> Scalar:
     """Tip relief that running in wears off, C_ay = (sigma_Hlim / 97 - 18.45)^2 / 18 + 1.5 [um] (ISO 6336-1).
 
-    It stands in for the relief in K_v where none was ground; of two materials take the mean. As quoted in secondary
-    sources. The parabola is least, 1.5 um, at 1790 MPa: below, harder flanks run in less.
+    It replaces the relief in K_v where none was ground; of two materials take the mean. As quoted in secondary sources.
+    The parabola is least, 1.5 um, at 1790 MPa: below, harder flanks run in less.
 
     Args:
         hertz_limit: allowable contact stress number sigma_Hlim of the softer flank's material [MPa].

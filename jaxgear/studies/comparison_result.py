@@ -115,11 +115,11 @@ class ComparisonResult(AbstractStudyResult):
             yield from optimum_report.search_lines(self.optimum, self.front, self.projection)
 
     def findings(self) -> Iterator[str]:
-        """What is not usual of the designs."""
+        """Values of the designs out of the usual range."""
         return side_by_side.finding_lines(self.unusual)
 
     def failures(self) -> Iterator[str]:
-        """What is not to be trusted, or not reached."""
+        """Results that did not converge, and limits that are not met."""
         yield from self._not_converged()
         if self.optimum is not None and not self.optimum.feasible:
             yield "constraints are not met"

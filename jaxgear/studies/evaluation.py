@@ -50,7 +50,7 @@ class Evaluation:
         cause: why, in words: the most basic cause at all of them.
         seconds: what finding and evaluating it took, without compilation of the latter [s].
         factors: of the rating by ISO 6336 at the design torque, by name and unit.
-        verified: what it is worth with the finite-element structure; None where nobody asked.
+        verified: results with the finite-element structure; None where they were not computed.
         face_load: face load factor over the torques; empty on one slice.
         scatter: over manufactured gears; None where the file has no tolerances.
     """

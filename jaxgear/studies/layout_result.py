@@ -141,7 +141,7 @@ class LayoutResult(AbstractStudyResult):
         )
 
     def failures(self) -> Iterator[str]:
-        """What is not to be trusted or not reached."""
+        """Results that did not converge, and limits that are not met."""
         for name, layout in self.layouts.items():
             cases = [one for of in layout.cases for one in of.values()]
             statuses = [*(one.load.status for one in cases), *(one.status for one in layout.damage)]

@@ -44,7 +44,7 @@ class Judged:
     verified: Mapping[str, float]
 
     def change(self, before: float, after: float, than: str) -> str:
-        """What becomes of a number: "31.1 % less than unmodified"; "" where nobody can say."""
+        """What becomes of a number: "31.1 % less than unmodified"; "" where it is not defined."""
         if not (math.isfinite(before) and math.isfinite(after)):
             return ""
         worse = " (worse)" if self.of.sign * (after - before) > 0 else ""

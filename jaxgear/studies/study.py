@@ -51,7 +51,7 @@ class AbstractStudyResult(abc.ABC):
         return None
 
     def failures(self) -> Iterable[str]:
-        """A line for everything that is not to be trusted or not reached; a command fails where there is one."""
+        """A line for every result that did not converge or limit that is not met; a command fails with any."""
         return ()
 
     def chapters(self) -> Sequence[Chapter]:

@@ -51,14 +51,14 @@ _OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks tou
 
 @dataclass(frozen=True)
 class WearResult(AbstractStudyResult):
-    """The lives of all designs.
+    """Wear histories of all designs.
 
     Attributes:
         design: the design file.
         request: what it asks for.
         designs: their modifications (pinion, wheel) by name.
-        lives: by name.
-        scatters: lives of manufactured pairs by name; empty where the file has no tolerances.
+        lives: wear histories by name.
+        scatters: numbers of the wear histories of manufactured pairs by name; empty where the file has no tolerances.
     """
 
     assumptions: ClassVar = (
@@ -260,10 +260,10 @@ class WearResult(AbstractStudyResult):
                     plot.worn_flank(self.lives[name], gear, panel, title=name)
                     panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
             axes[f"worn_{gear}"] = panels
-        axes["ppte_over_life"] = plot.lives(self.lives, "ppte")
-        axes["depth_over_life"] = plot.lives(self.lives, "wear_depth")
+        axes["ppte_over_life"] = plot.wear_history(self.lives, "ppte")
+        axes["depth_over_life"] = plot.wear_history(self.lives, "wear_depth")
         if self.request.settings.dynamics is not None:
-            axes["dynamic_factor_over_life"] = plot.lives(self.lives, "dynamic_factor")
+            axes["dynamic_factor_over_life"] = plot.wear_history(self.lives, "dynamic_factor")
         return axes | wear_scatter.figures(self.scatters)
 
 

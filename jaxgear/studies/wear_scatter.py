@@ -142,7 +142,7 @@ def summary(samples: Samples) -> dict[str, Any]:
     found: dict[str, Any] = {"pairs": len(samples[_PPTE]), "failed": failed(samples)}
     for name in samples:
         values, key = samples[name], f"{name}_{WEAR_QUANTITIES[name].unit}"
-        if name in _LIVES:  # which nobody follows for ever: their mean would be that of the time looked at
+        if name in _LIVES:  # they end at the simulated revolutions: a mean would depend on these
             found[key] = {"half_last": _lasts(samples, name, 0.5), "95_percent_last": _lasts(samples, name, _LEVEL)}
             continue
         found[key] = {"mean": _mean(samples, name), "std": float(np.std(values, ddof=1)), "q95": _bound(samples, name)}

@@ -39,7 +39,7 @@ class AbstractPlan(ABC):
     def rows(self, start: int, stop: int) -> np.ndarray:
         """Parameter values of the variants `start` to `stop - 1`.
 
-        A variant has the same values however the plan is cut into ranges, and only the range is held in memory.
+        A variant has the same values however the plan is cut into ranges, and only the range is in memory.
 
         Returns:
             float64, shape (stop - start, len(names)).

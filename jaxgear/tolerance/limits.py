@@ -52,7 +52,7 @@ class ToleranceClass(Checked):
     """Tolerances of one gear in a flank tolerance class (ISO 1328-1:2013, 5.3), unrounded and differentiable.
 
     All follow `(terms in d, m_n, b) * sqrt(2)^(class - 5)`; slopes and pitch are limits of either sign, form and total
-    deviations are widths of a band. `iso_rounded` gives the numbers that stand on a drawing.
+    deviations are widths of a band. `iso_rounded` gives the rounded numbers of a drawing.
 
     Attributes:
         diameter: reference diameter d.
@@ -239,7 +239,7 @@ class Tolerance(Checked):
 def check_slices(owner: str, tolerance: Tolerance, mesh: Mesh) -> None:
     """Raises a `ValueError` when the tolerance has lead deviations and the mesh has one slice, which cannot show them.
 
-    A traced limit counts as one: its influence would be zero without a word.
+    A traced limit counts as one: its derivative would be zero.
     """
     if mesh.resolution.slices > 1:
         return

@@ -159,7 +159,7 @@ _FOUND = (
     "opening",
     "gap",
     "shift",
-    "bend",
+    "relative_curvature",
     "tangent_stiffness",
     "residual",
     "status",
@@ -192,7 +192,7 @@ class Case(eqx.Module):
         pinion, wheel: modifications of the new flanks.
         deviation: material that manufacturing deviations remove besides [um].
         points: of the grid on each flank.
-        vibration: what vibrates; None where nobody asks for it.
+        vibration: the vibrating system; None without dynamics.
     """
 
     mesh: Mesh
@@ -295,10 +295,10 @@ class Case(eqx.Module):
         def largest(depth, cycle: MeshCycle, load: OperatingPoint, line_load):
             flanks = self._worn(roll_length, depth)
             removed = slid_material(self.mesh, load.torque, flanks["pinion"], flanks["wheel"], line_load)
-            return jnp.max(flank_pressure(cycle.kinematics, cycle.line_load, removed.bend))
+            return jnp.max(flank_pressure(cycle.kinematics, cycle.line_load, removed.relative_curvature))
 
         def under(depth, load: OperatingPoint, cycle: MeshCycle):
-            own = cycle.line_load / jnp.maximum(1 + cycle.bend, FLATTEST)
+            own = cycle.line_load / jnp.maximum(1 + cycle.relative_curvature, FLATTEST)
             given = cycle.line_load if self.mesh.compliance.averages_over_loaded_width else None
             here = largest(depth, cycle, load, given)
             coarse, narrow = largest(every_other(depth), cycle, load, given), largest(depth, cycle, load, own)
@@ -313,7 +313,7 @@ class Case(eqx.Module):
         return jnp.where(solved(cycles), jax.lax.map(on, (marched.depth, cycles)), jnp.nan)
 
     def dynamic_factor(self, marched: March) -> Float[Array, "steps *torques"] | None:
-        """At all time steps of a march, as its `cycles`; None where nobody asks for it."""
+        """At all time steps of a march, as its `cycles`; None without dynamics."""
         if self.vibration is None:
             return None
         found = jnp.where(marched.status[:, None] == Status.CONVERGED, marched.seen[_DYNAMIC_FACTOR], jnp.nan)

@@ -1,4 +1,4 @@
-"""What wear makes of a mesh over its life: quantities at every life, their mean, and the life to a limit."""
+"""Effect of wear on a mesh: quantities at every time step of a wear history, their mean, and the life to a limit."""
 
 from typing import Any, Literal
 
@@ -12,17 +12,17 @@ from ..numerics import AbstractMeasure, Given, Mean, check, maximum, quick_jit, 
 from .history import WearHistory
 
 Scalar = Float[Array, ""]
-Lives = Float[Array, " lives"]
+Steps = Float[Array, " steps"]
 Worn = Literal["pinion", "wheel", "both"]
 
 _quantity_of = Vocabulary((*MESH_QUANTITIES.values(), *DYNAMIC_QUANTITIES.values())).quantity_of
 
 
-def over_life(life: WearHistory, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Lives:
-    """A quantity of the mesh at every life, shape (lives,); NaN where a contact was not found, then or before.
+def over_life(life: WearHistory, of: str | Quantity | Any, measure: AbstractMeasure | None = None) -> Steps:
+    """A quantity of the mesh at every time step, shape (steps,); NaN from a contact on that has not converged.
 
     Args:
-        life: of one pair of flanks.
+        life: wear history of one pair of flanks.
         of: a name of the vocabulary, a `Quantity`, or a function of a cycle; "dynamic_factor" is that of the dynamics
             of the life.
         measure: how the torques of a load spectrum are joined; None for their mean.
@@ -35,7 +35,7 @@ def over_life(life: WearHistory, of: str | Quantity | Any, measure: AbstractMeas
     if quantity.name == "dynamic_factor" and quantity.takes is Dynamics:
         if life.dynamic_factor is None:
             raise ValueError(
-                'over_life: "dynamic_factor" needs a life with dynamics: wear(..., dynamics=Dynamics(...))'
+                'over_life: "dynamic_factor" needs a wear history with dynamics: wear(..., dynamics=Dynamics(...))'
             )
         values = life.dynamic_factor
     else:
@@ -43,8 +43,8 @@ def over_life(life: WearHistory, of: str | Quantity | Any, measure: AbstractMeas
     return _of_all_loads(life, values, quantity.better, measure)
 
 
-def _of_all_loads(life: WearHistory, values, better, measure: AbstractMeasure | None) -> Lives:
-    """Values (lives, torques) joined over the torques of a spectrum."""
+def _of_all_loads(life: WearHistory, values, better, measure: AbstractMeasure | None) -> Steps:
+    """Values (steps, torques) joined over the torques of a spectrum."""
     if life.weights is None:
         return values
     many = jnp.stack([joined(measure or Mean(), row, life.weights, better) for row in values])
@@ -52,11 +52,11 @@ def _of_all_loads(life: WearHistory, values, better, measure: AbstractMeasure | 
     return jnp.where(jnp.any(jnp.isnan(values), axis=-1), jnp.nan, many)
 
 
-def pressure_error(life: WearHistory, measure: AbstractMeasure | None = None) -> Lives:
-    """Estimated error of the largest flank pressure at every life [MPa], shape (lives,).
+def pressure_error(life: WearHistory, measure: AbstractMeasure | None = None) -> Steps:
+    """Estimated error of the largest flank pressure at every time step [MPa], shape (steps,).
 
-    By how much it changes where the worn flanks are known on every other point only, and where contacts are as wide as
-    their own loads make them. Arguments as for `over_life`.
+    It is the change of the pressure with the worn flanks on every other grid point, and with the contact width of each
+    load. Arguments as for `over_life`.
     """
     _single("pressure_error", life)
     return _of_all_loads(life, life.pressure_error, "smaller", measure)
@@ -68,8 +68,8 @@ def mean_over_life(life: WearHistory, of: str | Quantity | Any, measure: Abstrac
     return 0.5 * jnp.sum((values[1:] + values[:-1]) * jnp.diff(done)) / (done[-1] - done[0])
 
 
-def wear_depth(life: WearHistory, gear: Worn = "both") -> Lives:
-    """Largest wear depth of the flank of a gear, or of both, at every life [um], shape (lives,).
+def wear_depth(life: WearHistory, gear: Worn = "both") -> Steps:
+    """Largest wear depth of the flank of a gear, or of both, at every time step [um], shape (steps,).
 
     NaN after a life whose contact was not found.
 
@@ -87,7 +87,7 @@ def wear_depth(life: WearHistory, gear: Worn = "both") -> Lives:
     return jnp.where(life.converged, maximum(jnp.stack(depths[gear]), axis=(0, 2, 3)), jnp.nan)
 
 
-def worn_volume(life: WearHistory) -> Float[Array, "lives gears parts"]:
+def worn_volume(life: WearHistory) -> Float[Array, "steps gears parts"]:
     """Volume worn off one flank of every tooth of pinion and wheel, on the flank and at tip corners [mm3].
 
     Where a gear wears at tip corners, its tip edge and its flank at the mate's tip corners count alike.
@@ -101,8 +101,8 @@ def worn_volume(life: WearHistory) -> Float[Array, "lives gears parts"]:
 def life_to_depth(life: WearHistory, limit: Given, gear: Worn = "both") -> Scalar:
     """Revolutions of the pinion until the deepest wear reaches a limit [um].
 
-    Between two lives the depth is linear; beyond the last one it goes on as in the last block. Infinite where nothing
-    wears.
+    Between two time steps the depth is linear; beyond the last one it is extrapolated from the last block. Infinite
+    where nothing wears.
 
     Raises:
         ValueError: for a limit that is not greater than 0, and as `wear_depth`.
@@ -117,8 +117,8 @@ def life_to(
 ) -> Scalar:
     """Revolutions of the pinion until a quantity first passes a limit on its bad side; infinite where it never does.
 
-    Between two lives the quantity is linear. Zero where the new flanks are beyond the limit; NaN where the contact was
-    not found before.
+    Between two time steps the quantity is linear. Zero where the new flanks exceed the limit; NaN where the contact has
+    not converged before.
 
     Args:
         life, of, measure: as for `over_life`.
@@ -132,13 +132,13 @@ def life_to(
 
 
 def _single(owner: str, life: WearHistory) -> None:
-    """Refuses lives of many designs: their axis would be taken for that of the lives of one."""
+    """Refuses histories of many designs: their axis would be taken for that of the time steps of one."""
     if life.revolutions.ndim != 1:
         raise ValueError(f"{owner}: life is of a batch of designs, must be of one: put jax.vmap around {owner} as well")
 
 
 @quick_jit
-def _reached(done: Lives, values: Lives, limit: Scalar, *, goes_on: bool) -> Scalar:
+def _reached(done: Steps, values: Steps, limit: Scalar, *, goes_on: bool) -> Scalar:
     """Where values first exceed a limit."""
     # written so that NaN counts as reached, and is what comes out
     beyond = ~(values < limit)

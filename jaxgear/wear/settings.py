@@ -23,30 +23,29 @@ class Wear(AbstractSettings):
     """How long a mesh runs, and how fast it wears.
 
     `quantity` gives with it the numbers of worn flanks, `WEAR_QUANTITIES`. With `loads` these wear one flank together,
-    whatever the load under which the quantity is asked for. Without, every load of a spectrum and every manufactured
-    pair is taken to run the whole life, and the lives are joined as all numbers of such cases are. Under a spectrum
-    join them by `Worst()`: that is the life of a pair which runs at one of the loads, while a mean joins numbers of
-    different flanks, of which no pair has all.
+    independent of the load of the cycle. Without `loads`, every load of a spectrum and every manufactured pair has a
+    wear history of its own, and their numbers are joined as those of all cases. Under a spectrum join them by
+    `Worst()`, which is the number of a pair that runs at one of the loads; a mean joins numbers of different flanks.
 
-    A number is NaN where a contact was not found, and where blocks are so long that flanks overshoot: the error of the
-    depth, as `wear_depth_error` estimates it, is more than a tenth of the depth, or a block wears off more than twice
-    what the new teeth deflect. `wear_depth_error` itself is told in any case. The steps of the integrator are those of
-    the dynamics, or 256.
+    A number is NaN where a contact has not converged, and where blocks are so long that flanks overshoot: the error of
+    the depth, as `wear_depth_error` estimates it, is more than a tenth of the depth, or a block wears off more than
+    twice the deflection of the new teeth. `wear_depth_error` itself is never NaN for this reason. The steps of the
+    integrator are those of the dynamics, or 256.
 
     Attributes:
         revolutions: of the pinion.
         coefficient: of wear of the pinion, and of the wheel where it has none of its own: from 1e-18 for good films to
             5e-16 for mild wear in mixed lubrication.
         wheel_coefficient: of wear of the wheel; None for that of the pinion.
-        blocks: contact analyses and steps of wear in turn, of equal length; even.
-        points: of the grid on each flank; None for one and a half times the positions, from 33 to 97.
-        depth_limit: depth to which a life is asked for.
-        ppte_limit: peak-to-peak transmission error to which a life is asked for.
-        line_load: under which the flanks wear: "static", or that of the steady motion at the speed of the load,
-            "dynamic"; None for "dynamic" with dynamics, "static" without.
-        dynamics: what vibrates, its speeds aside; None for no vibration.
-        loads: a spectrum whose loads wear one flank together, its weights shares of the revolutions; None for the load
-            under which a mesh is looked at.
+        blocks: number of blocks of equal length, each a contact analysis and a step of wear; even.
+        points: number of grid points along each flank; None for one and a half times the positions, from 33 to 97.
+        depth_limit: wear depth at which the life ends, for `life_to_depth`.
+        ppte_limit: peak-to-peak transmission error at which the life ends, for `life_to_ppte`.
+        line_load: line load that wears the flanks: "static", or "dynamic" for that of the steady motion at the speed of
+            the load; None for "dynamic" with dynamics, "static" without.
+        dynamics: masses and damping, whose speeds are not used; None for no vibration.
+        loads: load spectrum that wears one flank, its weights shares of the revolutions; None for the load of the
+            cycle.
     """
 
     table = "wear"

@@ -57,7 +57,7 @@ def vibration_of(
     flanks: Flanks,
     deviation: Deviation | None,
 ) -> Vibration | None:
-    """What vibrates; None where nobody asks for it.
+    """The vibrating system; None without dynamics.
 
     Where nothing is traced the mesh has as many pairs and the integrator as many steps as the new flanks need.
 

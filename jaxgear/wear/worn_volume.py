@@ -37,7 +37,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import Mesh, MeshCycle
-from ..contact.contact_width import patch_nodes, place_of
+from ..contact.contact_width import contact_nodes, place_of
 from ..contact.kinematics import contacts
 from ..geometry import PathOfContact
 from ..numerics import Given, Numbers, check, program, real, safe_divide, safe_sqrt
@@ -109,7 +109,7 @@ def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
 
     def over(width) -> Float[Array, "gears parts points pairs positions"]:
         made = [
-            _spread(roll, width * half_width, sliding, knots, side.base_radius, mesh.resolution.patch_nodes)
+            _spread(roll, width * half_width, sliding, knots, side.base_radius, mesh.resolution.contact_nodes)
             for roll, side, knots in zip(rolls, mesh.sides, lengths)
         ]
         return jnp.stack(made)
@@ -141,7 +141,7 @@ def _spread(roll, half_width, sliding, knots, base_radius, nodes: int) -> Float[
     """Sliding by the points of one grid."""
     total = jnp.zeros((sliding.shape[0], *knots.shape, *roll.shape[:-1]), roll.dtype)
     width, first, last = knots[1] - knots[0], _arc(knots[0], base_radius), _arc(knots[-1], base_radius)
-    for node in patch_nodes(nodes):
+    for node in contact_nodes(nodes):
         arc = _arc(roll, base_radius) + node.place * half_width
         # the contact ends with the flank: the share that would lie beyond wears what is left of it
         arc = jnp.clip(jnp.where(arc < first, 2 * first - arc, jnp.where(arc > last, 2 * last - arc, arc)), first, last)
