@@ -30,7 +30,7 @@ from jaxgear.cli import app, cache, main, run
 from jaxgear.contact.status import Status
 from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
-from jaxgear.io.optimize import METHODS_WITHOUT_VARIABLES
+from jaxgear.io.optimize_table import METHODS_WITHOUT_VARIABLES
 from jaxgear.manufacture import over_balls
 from jaxgear.metrics import Finding
 from jaxgear.microgeometry import NoModification
@@ -479,7 +479,7 @@ def test_a_quick_run_is_coarse_and_short(folder, tmp_path, monkeypatch):
         asked.update(options, bounds=bounds)
         raise Searched
 
-    monkeypatch.setattr(importlib.import_module("jaxgear.io.optimize"), "minimize", search)
+    monkeypatch.setattr(importlib.import_module("jaxgear.io.optimize_table"), "minimize", search)
     monkeypatch.setenv("JAXGEAR_DEBUG", "1")
     path = tmp_path / "fine.toml"
     path.write_text(FREE.replace("positions = 16", "positions = 4096"))
@@ -637,7 +637,7 @@ def test_a_quick_run_verifies_nothing(searched):
 
 
 def test_an_optimum_that_keeps_not_its_limits_is_no_success(folder, tmp_path, monkeypatch, searched):
-    request = importlib.import_module("jaxgear.io.optimize").OptimizeRequest
+    request = importlib.import_module("jaxgear.io.optimize_table").OptimizeRequest
     search, limit = request.__call__, optimum_result.Limit(432.1, None, 100.0, "MPa", False)
 
     def passing(self, *arguments):

@@ -33,10 +33,10 @@ from jaxgear.io import (
 from jaxgear.io.design_file import file_section
 from jaxgear.io.gears import GearSection
 from jaxgear.io.model import ModelSection
-from jaxgear.io.optimize import METHODS_WITHOUT_VARIABLES, method_options, optimize_of
+from jaxgear.io.optimize_table import METHODS_WITHOUT_VARIABLES, method_options, optimize_of
 from jaxgear.io.table_keys import family, section_of
 from jaxgear.io.tables import LoadSection, further_tables
-from jaxgear.io.tolerance import tolerance_of
+from jaxgear.io.tolerance_table import tolerance_of
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, NoModification, ParabolicLinear
 from jaxgear.numerics import number
 

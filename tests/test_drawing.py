@@ -17,7 +17,7 @@ from jaxgear.compliance.toothload import tooth_load
 from jaxgear.geometry import outline, pair_with_backlash
 from jaxgear.geometry.involute import half_tooth_angle
 from jaxgear.io import DesignFileError, load_design
-from jaxgear.io.tolerance import quality_classes
+from jaxgear.io.tolerance_table import quality_classes
 from jaxgear.manufacture import drawn_gear, over_balls, span
 
 PINION = {"teeth": 19, "module": 3.0, "face_width": 20.0, "profile_shift": 0.1}

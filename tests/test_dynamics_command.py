@@ -62,7 +62,7 @@ FIGURES = (
 
 @pytest.mark.parametrize("quick", [["--quick"], pytest.param([], marks=pytest.mark.slow)])
 def test_the_command_writes_what_it_says(file, tmp_path, monkeypatch, quick):
-    monkeypatch.setattr(importlib.import_module("jaxgear.io.dynamics"), "_QUICK_NUMBER", 9)
+    monkeypatch.setattr(importlib.import_module("jaxgear.io.dynamics_table"), "_QUICK_NUMBER", 9)
     path, folder = file(PAIR + TABLE + "run_up = 0.1\n[tolerance]\nquality_class = 7\n"), tmp_path / "out"
     done = call("dynamics", str(path), "--output", str(folder), "--report", *quick)
     code, out, err = done.code, done.out, done.err

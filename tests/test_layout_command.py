@@ -109,7 +109,7 @@ DOUBTFUL = FILE.replace("bore_diameter = 70.0", "bore_diameter = 44.0")  # less 
 @pytest.mark.parametrize("quick", [["--quick"], pytest.param([], marks=pytest.mark.slow)])
 def test_the_command_writes_what_it_says(file, tmp_path, monkeypatch, quick):
     """Flank lines for a duty cycle, whose torques are all of a quick run: one program for both."""
-    monkeypatch.setattr(importlib.import_module("jaxgear.io.layout"), "_QUICK_TORQUES", 2)
+    monkeypatch.setattr(importlib.import_module("jaxgear.io.layout_table"), "_QUICK_TORQUES", 2)
     path = file(DOUBTFUL.replace('[housing]\nfile = "housing.csv"\n', "") + LIFE)
     found, _ = laid_out(path, tmp_path / "out", *quick)
     assert list(found["layouts"]) == list(found["bearings"]) == ["rigid seats"]

@@ -31,7 +31,7 @@ from jaxgear.io import (
     write_worn,
 )
 from jaxgear.io.folder import RESULT_FILES
-from jaxgear.io.tolerance import tolerance_of
+from jaxgear.io.tolerance_table import tolerance_of
 from jaxgear.studies import Checkpoints, NamedArrays, WearResult, wear_scatter
 from jaxgear.studies.checkpoints import Marches
 from jaxgear.studies.comparison import compared, sought

@@ -152,7 +152,7 @@ def analyze(
 ) -> int:
     """Analyze the unmodified pair and the modification of the design file."""
     shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-    return _run("jaxgear.studies.analysis:DesignAnalysis", context, file, output, **shared)
+    return _run("jaxgear.studies.design_analysis:DesignAnalysis", context, file, output, **shared)
 
 
 @app.command()

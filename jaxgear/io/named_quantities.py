@@ -8,9 +8,9 @@ from ..metrics import Quantity
 from ..vocabulary import quantities
 from ..wear import Wear
 from .design_file import DesignFile
-from .dynamics import dynamics_of
+from .dynamics_table import dynamics_of
 from .errors import DesignFileError, check_known
-from .wear import wear_of
+from .wear_table import wear_of
 
 
 def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:

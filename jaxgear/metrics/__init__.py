@@ -50,6 +50,9 @@ from .lubrication import lubricated_flash_temperature as lubricated_flash_temper
 from .lubrication import mesh_efficiency as mesh_efficiency
 from .lubrication import ohlendorf_loss_factor as ohlendorf_loss_factor
 from .lubrication import specific_film_thickness as specific_film_thickness
+from .mesh_quantities import MESH_QUANTITIES as MESH_QUANTITIES
+from .mesh_quantities import mean_removed_material as mean_removed_material
+from .mesh_quantities import summary as summary
 from .quantity import AbstractSettings as AbstractSettings
 from .quantity import Quantity as Quantity
 from .quantity import Vocabulary as Vocabulary
@@ -74,6 +77,3 @@ from .stress import nominal_root_stress as nominal_root_stress
 from .stress import rating_factors as rating_factors
 from .stress import root_factors as root_factors
 from .stress import root_stress as root_stress
-from .vocabulary import MESH_QUANTITIES as MESH_QUANTITIES
-from .vocabulary import mean_removed_material as mean_removed_material
-from .vocabulary import summary as summary

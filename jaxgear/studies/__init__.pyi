@@ -1,12 +1,12 @@
 """The public names, for type checkers and for `__init__.py`, which imports each when it is asked for."""
 
-from .analysis import DesignAnalysis as DesignAnalysis
 from .checkpoints import Checkpoints as Checkpoints
 from .checkpoints import NamedArrays as NamedArrays
 from .comparison import compared as compared
 from .comparison import rule_based as rule_based
 from .comparison import search_of as search_of
 from .comparison_result import ComparisonResult as ComparisonResult
+from .design_analysis import DesignAnalysis as DesignAnalysis
 from .dynamics import DynamicsStudy as DynamicsStudy
 from .dynamics_result import DynamicsResult as DynamicsResult
 from .evaluation import Evaluation as Evaluation

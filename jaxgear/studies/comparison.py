@@ -8,7 +8,7 @@ import numpy as np
 from ..contact import Mesh, prepare
 from ..geometry import GearPair
 from ..io import DesignFile, OptimizeRequest, optimize_request
-from ..io.optimize import METHODS_WITHOUT_VARIABLES, optimize_of
+from ..io.optimize_table import METHODS_WITHOUT_VARIABLES, optimize_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import program
 from ..optimize import Front, Optimum

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import Gear, GearPair, PathOfContact, diameter, margins, outline, path_of_contact
 from ..io import DesignFile
-from ..io.tolerance import quality_classes
+from ..io.tolerance_table import quality_classes
 from ..manufacture import measures
 from ..numerics import Given, program
 from ..report import Chapter, Table, heading, text

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..contact import Mesh, MeshCycle, Resolution, solve
 from ..io import DesignFile, LayoutRequest, layout_request
-from ..io.layout import ProfileSection
+from ..io.layout_table import ProfileSection
 from ..layout import (
     FlankLine,
     FlankLineLayout,

@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 
 from ..io import DesignFile, OptimizeRequest, optimize_request
 from ..io.errors import naming
-from ..io.tolerance import tolerance_of
+from ..io.tolerance_table import tolerance_of
 from ..microgeometry import NoModification
 from ..tolerance import Tolerance
 from .checkpoints import Checkpoints

@@ -11,7 +11,7 @@ from ..contact import Mesh
 from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.results import unit_of
-from ..io.tolerance import quality_classes
+from ..io.tolerance_table import quality_classes
 from ..metrics import Finding, Quantity, findings_of
 from ..microgeometry import AbstractModification
 from ..numerics import program

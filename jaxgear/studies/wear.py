@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 from ..contact import Mesh, OperatingPoint
 from ..io import DesignFile, OptimizeRequest, WearRequest, wear_request
 from ..io.errors import naming
-from ..io.tolerance import tolerance_of
+from ..io.tolerance_table import tolerance_of
 from ..numerics import optional_real, real
 from ..tolerance import Tolerance
 from ..wear import WearHistory, wear

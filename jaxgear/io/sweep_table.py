@@ -17,7 +17,7 @@ from .named_quantities import quantity_named
 from .rows import read_variants
 from .table_keys import entry
 from .tables import FurtherTable, Rest
-from .tolerance import tolerance_of
+from .tolerance_table import tolerance_of
 from .value_types import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, table, text
 
 # The keys that a kind of sampling takes, the first of which it needs; what another kind takes has no effect and is

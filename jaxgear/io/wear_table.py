@@ -5,7 +5,7 @@ import dataclasses
 from ..conditions import LoadSpectrum
 from ..wear import Wear
 from .design_file import DesignFile
-from .dynamics import dynamics_of
+from .dynamics_table import dynamics_of
 from .errors import DesignFileError, naming
 from .table_keys import entry, part_of, section_of
 from .tables import FurtherTable

@@ -30,7 +30,7 @@ from .model import FINITE_ELEMENTS
 from .named_quantities import quantity_named
 from .table_keys import FileTable, Key, entry, nested, section_of
 from .tables import FurtherTable, Rest
-from .tolerance import tolerance_of
+from .tolerance_table import tolerance_of
 from .value_types import (
     LEVEL,
     SEED,
