@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import jax
 
@@ -25,7 +26,7 @@ _FIGURES = ("matplotlib.pyplot",)
 
 
 def run_study(
-    asked_for: Callable[[DesignFile], AbstractStudy],
+    asked_for: Callable[[DesignFile], AbstractStudy[Any]],
     file: Path,
     output: Path | None,
     *,

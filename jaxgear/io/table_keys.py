@@ -237,7 +237,7 @@ def summary(of: object) -> str:
     return inspect.cleandoc(of.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
 
 
-def _kind(cls, field: dataclasses.Field, most: int | None, open: bool) -> Kind | None:
+def _kind(cls, field: dataclasses.Field[Any], most: int | None, open: bool) -> Kind | None:
     """What may stand after the key of a field; None where nothing can."""
     number = fields_of(cls).get(field.name)
     if number is not None:
@@ -264,7 +264,7 @@ def _number(number: Number, open: bool) -> Kind | None:
     return list_of(kind) if number.shape else kind
 
 
-def _hint(cls, field: dataclasses.Field) -> Any:
+def _hint(cls, field: dataclasses.Field[Any]) -> Any:
     """The annotation, without None."""
     hint = field.type
     if isinstance(hint, str):

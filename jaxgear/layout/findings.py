@@ -5,6 +5,7 @@ Nothing is refused here: a finding is a warning. The limits are of this project 
 
 from collections.abc import Iterator, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,7 @@ LIMITS = {
 
 # K_Hbeta of the five cases by the names of tolerance and step
 ContactCases = Mapping[str, Mapping[str, np.ndarray]]
-_Factors = dict[str, list]  # of every step, by the deviations
+_Factors = dict[str, list[Any]]  # of every step, by the deviations
 
 
 def findings_of(

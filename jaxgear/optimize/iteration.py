@@ -179,7 +179,7 @@ def _least_slant(
     mesh: Mesh, flanks: IteratedFlanks, pressure: Pressure, *, limited: bool
 ) -> tuple[AbstractModification, AbstractModification, MeshCycle, float, int]:
     """Both flanks with the least slant that keeps the pressure, or else the least pressure; solved, by how many."""
-    tried: dict[float, tuple] = {}
+    tried: dict[float, tuple[Any, ...]] = {}
 
     def passed(slant: float) -> float:
         pinion, wheel = flanks.modifications(slant)

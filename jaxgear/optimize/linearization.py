@@ -86,7 +86,7 @@ def pieces_of(quantity: Quantity, sloped: Sloped, sign: int) -> Pieces:
 
 
 def local_slopes(
-    quantities: Sequence[Quantity], solve: Callable[[Any], Analysis], removed_of: Callable, x: Vector
+    quantities: Sequence[Quantity], solve: Callable[[Any], Analysis], removed_of: Callable[..., Any], x: Vector
 ) -> tuple[list[Sloped], Bool[Array, ""]]:
     """Values and slopes of local quantities.
 

@@ -12,7 +12,7 @@ from .study import AbstractStudy, AbstractStudyResult
 from .summary_data import identity, versions
 
 
-def study_summary(study: AbstractStudy, result: AbstractStudyResult) -> dict[str, Any]:
+def study_summary(study: AbstractStudy[Any], result: AbstractStudyResult) -> dict[str, Any]:
     """Contents of `summary.json`: the result between its design file and its gears, and what it leaves out."""
     design, left_out = study.design, "; ".join(line for line in (study.left_out, study.omits()) if line)
     return {
@@ -26,7 +26,7 @@ def study_summary(study: AbstractStudy, result: AbstractStudyResult) -> dict[str
 
 
 def write_results(
-    folder: str | Path, study: AbstractStudy, result: AbstractStudyResult, *, figures: bool = True
+    folder: str | Path, study: AbstractStudy[Any], result: AbstractStudyResult, *, figures: bool = True
 ) -> tuple[dict[str, Any], list[Path]]:
     """Writes `summary.json`, the further files of a result and its figures.
 

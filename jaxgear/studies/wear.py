@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from ..contact import Mesh, OperatingPoint
 from ..io import DesignFile, OptimizeRequest, WearRequest, wear_request
@@ -89,7 +89,7 @@ class WearStudy(AbstractStudy[WearResult]):
         return WearResult(design, self.request, designs, lives, scatters)
 
     def _life(
-        self, mesh: Mesh, name: str, flanks: Modifications, kept: CheckpointsOfKind, stages: Stages
+        self, mesh: Mesh, name: str, flanks: Modifications, kept: CheckpointsOfKind[Any], stages: Stages
     ) -> WearHistory:
         """The life of one design, at the torque of the file."""
         stages.begin(f"wear of the {name} design")

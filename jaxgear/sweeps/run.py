@@ -179,7 +179,7 @@ def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts: dict[int
     report = callback or (lambda done, total, best: None)
     report(done, total, None)
     writer = ThreadPoolExecutor(1)
-    under_way: deque[tuple[int, Future]] = deque()
+    under_way: deque[tuple[int, Future[Any]]] = deque()
 
     def finish(part: int, values: np.ndarray, results: Callable[[], dict[str, np.ndarray]]) -> None:
         keep(part, {**dict(zip(plan.names, values.T)), **results()})

@@ -269,7 +269,7 @@ class SweepTable:
     def _schema(self):
         return self._read(0, None).schema
 
-    def _stream(self) -> Iterator:
+    def _stream(self) -> Iterator[Any]:
         """The rows as Arrow batches, one part after the other in memory."""
         for part in range(len(self._sizes)):
             yield from self._read(part, None).to_batches()
@@ -285,7 +285,7 @@ class SweepTable:
             first += len(values)
 
 
-def in_memory(title: str, columns: Sequence[Column], tables: Sequence) -> SweepTable:
+def in_memory(title: str, columns: Sequence[Column], tables: Sequence[Any]) -> SweepTable:
     """A table of Arrow tables."""
     sizes = [len(table) for table in tables]
     return SweepTable(

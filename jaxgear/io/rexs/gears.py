@@ -281,7 +281,9 @@ def _thickness(gear: Component, made: Gear) -> dict[str, Any]:
     return {}
 
 
-def _deviations(gear: Component, made: Gear) -> Iterator[tuple[tuple[str, str], list[float | None], Callable]]:
+def _deviations(
+    gear: Component, made: Gear
+) -> Iterator[tuple[tuple[str, str], list[float | None], Callable[..., Any]]]:
     """Names of the limits, upper one first, what they say [mm], and the allowance on the arc [um] for one of them."""
     yield _ALLOWANCES, [gear.number(name, "mm") for name in _ALLOWANCES], lambda chord: _of_chord(made, chord)
     cosine = float(np.cos(np.deg2rad(made.pressure_angle)))
