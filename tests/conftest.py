@@ -150,10 +150,12 @@ class _Context(threading.local):
 mlir.make_ir_context = _Context()
 
 
-# Each compiled program holds some mappings of memory, of which Linux grants a process 65530, and memory, of which two
-# workers, a browser and the processes of a test have to share what a small machine has.
-MOST_MAPPINGS = 40_000
-MOST_MEMORY = 3 << 30  # bytes
+# Each compiled program holds some 20 mappings of memory, of which Linux grants a process 65530, and memory, of which
+# all workers, a browser and the processes of a test have to share what a machine has. A worker may hold the smaller
+# size on any machine, and up to the larger one as long as all of them hold no more than a third of it; what one file
+# adds, less than 2 GiB, comes on top.
+MOST_MAPPINGS = 50_000
+MOST_MEMORY = 3 << 30, 5 << 30  # bytes
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -172,7 +174,9 @@ def _holds_much() -> bool:
         mappings = (process / "maps").read_bytes().count(b"\n")
     except OSError:
         return True
-    return mappings > MOST_MAPPINGS or pages * os.sysconf("SC_PAGE_SIZE") > MOST_MEMORY
+    page, (least, most) = os.sysconf("SC_PAGE_SIZE"), MOST_MEMORY
+    share = os.sysconf("SC_PHYS_PAGES") * page // (3 * int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", 1)))
+    return mappings > MOST_MAPPINGS or pages * page > min(max(least, share), most)
 
 
 def _forget():

@@ -60,7 +60,7 @@ FIGURES = (
 )
 
 
-@pytest.mark.parametrize("quick", [["--quick"], pytest.param([], marks=pytest.mark.slow)])
+@pytest.mark.parametrize("quick", [["--quick"], pytest.param([], marks=pytest.mark.slow)], ids=["quick", "whole"])
 def test_the_command_writes_what_it_says(file, tmp_path, monkeypatch, quick):
     monkeypatch.setattr(importlib.import_module("jaxgear.io.dynamics_table"), "_QUICK_NUMBER", 9)
     path, folder = file(PAIR + TABLE + "run_up = 0.1\n[tolerance]\nquality_class = 7\n"), tmp_path / "out"

@@ -134,13 +134,29 @@ def test_common_face():
 def test_equal_faces_are_the_limit():
     """The form for two gears, at equal widths, is that for one, and adds nothing to the structure."""
     mesh = mesh_of(pair_of())
-    even = solved(mesh, slope=20.0)
-    mean, load, *_ = contact(slope=20.0)
-    assert mean == pytest.approx(float(np.mean(even.transmission_error)), rel=1e-10)
-    np.testing.assert_allclose(load, even.line_load, atol=1e-7)
+    one, both = (
+        {jax.tree_util.keystr(path): np.asarray(leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(each)}
+        for each in (mesh, overhanging(pair_of()))
+    )
+    added = {name: both.pop(name) for name in both.keys() - one.keys()}
+    assert {".coupling.other.share", ".coupling.other.rest"} <= added.keys()
+    assert all(name.startswith(".coupling.other.") for name in added) and both.keys() == one.keys()
+    for name, value in one.items():
+        np.testing.assert_allclose(both[name], value, rtol=1e-10, atol=1e-14, err_msg=name)
+    for name in (".coupling.other.share", ".coupling.other.rest"):
+        np.testing.assert_allclose(added[name], 0.0, atol=1e-14)
     limit = mesh_of(pair_of(18.0 + 1e-9))
     assert mesh.even and not limit.even
     np.testing.assert_allclose(limit.structure, mesh.structure, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_contacts_of_equal_faces_are_the_limit():
+    """As `test_equal_faces_are_the_limit`, of what the contact makes of both forms."""
+    even = solved(mesh_of(pair_of()), slope=20.0)
+    mean, load, *_ = contact(slope=20.0)
+    assert mean == pytest.approx(float(np.mean(even.transmission_error)), rel=1e-10)
+    np.testing.assert_allclose(load, even.line_load, atol=1e-7)
 
 
 @pytest.mark.slow

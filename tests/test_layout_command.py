@@ -106,7 +106,7 @@ def file(file, tmp_path):
 DOUBTFUL = FILE.replace("bore_diameter = 70.0", "bore_diameter = 44.0")  # less than the shaft
 
 
-@pytest.mark.parametrize("quick", [["--quick"], pytest.param([], marks=pytest.mark.slow)])
+@pytest.mark.parametrize("quick", [["--quick"], pytest.param([], marks=pytest.mark.slow)], ids=["quick", "whole"])
 def test_the_command_writes_what_it_says(file, tmp_path, monkeypatch, quick):
     """Flank lines for a duty cycle, whose torques are all of a quick run: one program for both."""
     monkeypatch.setattr(importlib.import_module("jaxgear.io.layout_table"), "_QUICK_TORQUES", 2)
