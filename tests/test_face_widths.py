@@ -297,6 +297,17 @@ def test_models_of_two_dimensions_know_no_overhang():
 
     compliance = jg.default_compliance(plane="strain")
     wide, same = (jg.prepare(pair_of(width), compliance=compliance, resolution=SIZES) for width in (24.0, 18.0))
+    for of in ("structure", "law", "hub", "lever", "corner_gap", "slice_width", "width_factor", "coupling"):
+        one, other = (jax.tree.leaves(getattr(mesh, of)) for mesh in (wide, same))
+        assert len(one) == len(other) > 0
+        for each in zip(one, other):
+            np.testing.assert_allclose(*each, rtol=1e-12, atol=1e-14, err_msg=of)
+
+
+@pytest.mark.slow
+def test_contacts_of_models_of_two_dimensions_know_no_overhang():
+    compliance = jg.default_compliance(plane="strain")
+    wide, same = (jg.prepare(pair_of(width), compliance=compliance, resolution=SIZES) for width in (24.0, 18.0))
     np.testing.assert_allclose(solved(wide).transmission_error, solved(same).transmission_error, rtol=1e-12)
 
 
