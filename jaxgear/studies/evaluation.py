@@ -93,7 +93,7 @@ def evaluate(
     seconds = time.perf_counter() - began
     curves = np.asarray([cycle.transmission_error for cycle in cycles])
     infinite = Status.NOT_CONVERGED * ~np.isfinite(curves).all(axis=1)
-    status = np.maximum([np.max(cycle.status) for cycle in cycles], infinite)
+    status = np.maximum([np.asarray(cycle.status).max() for cycle in cycles], infinite)
     # without the flanks: one program serves every kind of them
     running = OperatingPoint(real(file.torque), optional_real(file.speed), optional_real(file.friction))
     bare = replace(cycles[0], pinion=None, wheel=None, operating_point=running)
