@@ -12,6 +12,7 @@ import jaxgear as jg
 from jaxgear.cli import run, sweep
 from jaxgear.contact import OperatingPoint
 from jaxgear.io import DesignFileError, load_design, optimize_request, quantities_of_tables, sweep_request
+from jaxgear.metrics import share_settings
 from jaxgear.numerics import program
 from jaxgear.studies import DesignAnalysis, evaluation
 
@@ -215,8 +216,7 @@ def test_other_oils_and_strengths_are_other_numbers_of_one_program(load, monkeyp
     for temperature in ("80.0", "90.0"):
         design = load(PAIR + OIL.replace("80.0", temperature) + STRENGTH.replace("900.0", f"9{temperature}"))
         further = tuple(quantities_of_tables(design))
-        tables = {"lubricant": design.tables["lubricant"], "strength": design.tables["strength"]}
-        found, _ = numbers(cycle, tuple(quantity.name for quantity in further), tables)
+        found, _ = numbers(cycle, *share_settings(further))
         each = eqx.filter_jit(lambda cycle, of=further: {quantity.key: quantity(cycle) for quantity in of})(cycle)
         expected = {name: float(value) for name, value in each.items()}
         assert {name: float(value) for name, value in found.items()} == pytest.approx(expected, rel=1e-9)

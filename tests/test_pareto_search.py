@@ -137,7 +137,7 @@ def test_four_objectives(known):
 
 
 def test_limits_that_no_design_keeps(known):
-    with pytest.raises(RuntimeError, match="keeps the constraints"):
+    with pytest.raises(RuntimeError, match="meets the constraints"):
         three_within(known, -41.0, steps=2)
 
 

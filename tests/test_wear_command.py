@@ -131,7 +131,7 @@ def test_the_command_writes_what_it_says(file, tmp_path):
     assert unmodified["life_to_depth_revolutions"] == pytest.approx(2e7 * 5 / unmodified["pinion_wear_depth_um"], 0.15)
     assert f"{unmodified['worn_ppte_um']:.3f}" in done.out and "to 5 um" in done.out
     ruled = summary["designs"]["rule-based"]["life_to_depth_revolutions"]
-    assert ruled > 2e7 and f"{ruled:.3g} *" in done.out and "* beyond the revolutions" in done.out
+    assert ruled > 2e7 and f"{ruled:.3g} *" in done.out and "* beyond wear.revolutions" in done.out
     check_flanks(path, folder, rows)
     check_report(folder, path, "wear", path, "--output", folder, "--report")
 
