@@ -1,4 +1,4 @@
-"""REXS files: what is written reads back as it was, is of the schema, and what cannot be meant is refused."""
+"""REXS files: what is written reads back as it was, is of the schema, and values without a meaning are refused."""
 
 import dataclasses
 import re

@@ -95,7 +95,7 @@ def test_a_limit_that_is_never_reached_is_no_failure(mesh):
 
 
 def test_overlong_blocks_give_no_number_but_their_error(mesh):
-    """Where flanks overshoot from block to block nobody knows what is left; the estimated error tells."""
+    """Where flanks overshoot from block to block the depth is unknown; the estimated error tells."""
     cycle = Analysis(solve_case(mesh, TORQUE, NONE, NONE), mesh)
     long, enough = (Wear(revolutions, 1e-18, blocks=BLOCKS) for revolutions in (2e9, REVOLUTIONS))
     assert np.isnan(float(long.quantity("wear_depth")(cycle)))
