@@ -63,13 +63,14 @@ def wear_history(
             function of a cycle.
         ax: Axes to draw into; None for a new figure.
     """
+    known = quantity_of(quantity, "wear_history")
     with report_axes(ax) as ax:
         for index, name, life in styled(of):
-            values = wear_depth(life) if quantity == "wear_depth" else over_life(life, quantity)
+            values = wear_depth(life) if quantity == "wear_depth" else over_life(life, known)
             done = np.asarray(life.revolutions)
             every = max(1, len(done) // 10)
             ax.plot(done, np.asarray(values), label=name, markevery=every, **marker_style(index))
-        ax.set(xlabel="revolutions of the pinion", ylabel=meaning_label(quantity_of(quantity, "wear_history")))
+        ax.set(xlabel="revolutions of the pinion", ylabel=meaning_label(known))
         ax.set_xlim(left=0)
         legend_above(ax)
     return ax

@@ -23,8 +23,8 @@ def over_life(life: WearHistory, of: str | Quantity | Any, measure: AbstractMeas
 
     Args:
         life: wear history of one pair of flanks.
-        of: a name of the vocabulary, a `Quantity`, or a function of a cycle; "dynamic_factor" is that of the dynamics
-            of the life.
+        of: name of a quantity of `jaxgear.metrics`, a `Quantity`, as one that you have added, or a function of a cycle;
+            "dynamic_factor" is that of the dynamics of the life.
         measure: how the torques of a load spectrum are joined; None for their mean.
 
     Raises:
