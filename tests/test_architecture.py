@@ -156,33 +156,7 @@ def test_numerics_has_no_gear_word():
         assert not [word for word in words if word in text], path.name
 
 
-# Packages whose public functions and methods say the type of every parameter and of their result.
-TYPED = (
-    "numerics",
-    "geometry",
-    "microgeometry",
-    "compliance",
-    "contact",
-    "shafts",
-    "tolerance",
-    "conditions",
-    "dynamics",
-    "manufacture",
-    "sizing",
-    "metrics",
-    "sweeps",
-    "optimize",
-    "vocabulary",
-    "wear",
-    "layout",
-    "io",
-    "plot",
-    "report",
-    "studies",
-    "cli",
-)
-# Their files that do not yet.
-TO_BE_TYPED: set[str] = set()
+# public functions and methods that do not say the type of every parameter and of their result, and why
 OF_ANY_TYPE = {
     "contact/status.py WithStatus.converged": "of the kind of array that the status is, of JAX or NumPy",
     "contact/solve.py contact_of": "takes forces or approaches, each of a type of its own",
@@ -236,11 +210,10 @@ def untyped(body):
 
 
 def typed_files():
-    """Places in the package of the files that `TYPED` names, and what is at their module level."""
+    """Places in the package of the files of its layers, and what is at their module level."""
     for path in FILES:
-        place = path.relative_to(PACKAGE).as_posix()
-        if layer(path) in TYPED and place not in TO_BE_TYPED:
-            yield place, ast.parse(path.read_text(encoding="utf-8")).body
+        if layer(path) in ORDER:
+            yield path.relative_to(PACKAGE).as_posix(), ast.parse(path.read_text(encoding="utf-8")).body
 
 
 def test_public_signatures_are_typed():
