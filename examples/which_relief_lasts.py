@@ -79,7 +79,9 @@ def lives(name, mesh, optima, fast=False) -> dict:
     judge = settings(name, blocks=16 if fast else 40)
     flanks = {"unmodified": design({"amount": 0.0, "length": BOUNDS[name]["length"][0]})}
     flanks |= {key: design(optimum.parameters) for key, optimum in optima.items()}
-    return {key: judge.life(mesh, TORQUES[name], pinion=pinion, wheel=wheel) for key, (pinion, wheel) in flanks.items()}
+    return {
+        key: judge.history(mesh, TORQUES[name], pinion=pinion, wheel=wheel) for key, (pinion, wheel) in flanks.items()
+    }
 
 
 def study(fast=False, callback=None) -> dict:

@@ -13,7 +13,7 @@ from jaxgear.compliance.edge import cut_off
 from jaxgear.contact import solve_removed
 from jaxgear.contact.kinematics import contacts, corner_gap
 from jaxgear.contact.slide import nothing_removed
-from jaxgear.io.model import ResolutionSection, resolution_of
+from jaxgear.io.model_table import ResolutionSection, resolution_of
 from jaxgear.io.table_keys import decode
 
 # Gap [um] of the approach corner when the mate stays, over the distance before A in base pitches, and its parabola.

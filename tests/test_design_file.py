@@ -32,7 +32,7 @@ from jaxgear.io import (
 )
 from jaxgear.io.design_file import file_section
 from jaxgear.io.gears import GearSection
-from jaxgear.io.model import ModelSection
+from jaxgear.io.model_table import ModelSection
 from jaxgear.io.optimize_table import METHODS_WITHOUT_VARIABLES, method_options, optimize_of
 from jaxgear.io.table_keys import family, section_of
 from jaxgear.io.tables import LoadSection, further_tables

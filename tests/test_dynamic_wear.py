@@ -15,7 +15,7 @@ from jaxgear.contact import removed_material
 from jaxgear.contact.prescribed import solve_forces
 from jaxgear.dynamics import Dynamics, natural_frequencies
 from jaxgear.wear import Wear, mean_over_life, over_life, wear, wear_depth, worn_volume
-from jaxgear.wear.quantities import OF_LIFE
+from jaxgear.wear.quantities import OF_HISTORY
 from jaxgear.wear.worn_volume import deposit
 
 SIZES = LINE
@@ -195,8 +195,8 @@ def test_the_dynamic_factor_is_a_quantity_of_the_life(mesh, natural, resonant):
     settings = Wear(REVOLUTIONS, COEFFICIENT, blocks=BLOCKS, dynamics=SETTINGS)
     factors = np.asarray(resonant.dynamic_factor)
     np.testing.assert_array_equal(over_life(resonant, "dynamic_factor"), factors)
-    assert float(OF_LIFE["worn_dynamic_factor"](resonant, settings)) == factors[-1]
-    assert float(OF_LIFE["max_dynamic_factor_over_life"](resonant, settings)) == factors.max()
+    assert float(OF_HISTORY["worn_dynamic_factor"](resonant, settings)) == factors[-1]
+    assert float(OF_HISTORY["max_dynamic_factor_over_life"](resonant, settings)) == factors.max()
     assert factors.min() < float(mean_over_life(resonant, "dynamic_factor")) < factors.max()
     quantity = settings.quantity("worn_dynamic_factor")
     again = Wear(REVOLUTIONS, COEFFICIENT, blocks=BLOCKS, dynamics=replace(SETTINGS, mesh_frequencies=[1.0]))

@@ -10,8 +10,8 @@ import jaxgear as jg
 from jaxgear.compliance.assembly import with_edge
 from jaxgear.compliance.finite_element.build import POINTS, _wedge, build, hub
 from jaxgear.compliance.finite_element.sector import sector, shape_gradients, sines
+from jaxgear.compliance.finite_element.sectors import Places, along_edge, responses
 from jaxgear.compliance.finite_element.shape import Shape, Tooth
-from jaxgear.compliance.finite_element.solve import Places, along_edge, responses
 from jaxgear.compliance.hertz import contact_geometry
 from jaxgear.compliance.toothload import tooth_load
 from jaxgear.geometry import outline

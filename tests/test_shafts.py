@@ -22,7 +22,7 @@ from jaxgear.shafts import (
     integral_diameter,
     support,
 )
-from jaxgear.shafts.beam import shear_coefficient
+from jaxgear.shafts.stepped_beam import shear_coefficient
 
 E, NU = 206_000.0, 0.3
 G = E / (2 * (1 + NU))

@@ -24,7 +24,7 @@ from jaxgear.shafts import (
     bearing_reactions,
     support,
 )
-from jaxgear.shafts.beam import semidefinite
+from jaxgear.shafts.stepped_beam import semidefinite
 
 NODES = tuple(f"{seat}.{way}" for seat in "ABCDEF" for way in "xy")
 COMPLIANCE = np.diag(np.linspace(1e-3, 3e-3, len(NODES)))

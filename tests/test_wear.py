@@ -24,7 +24,7 @@ from jaxgear.wear import (
 from jaxgear.wear import wear as worn_flanks
 from jaxgear.wear.case import case_of, marched, worn_through
 from jaxgear.wear.history import history_of
-from jaxgear.wear.march import Analysis, march
+from jaxgear.wear.march import WearRate, march
 from jaxgear.wear.worn_volume import deposit, grid, worn
 
 # contacts that stay at their nominal places: sliding down a kinked flank they see rounding, by up to 1e-3 um
@@ -378,7 +378,7 @@ def test_slices_of_an_even_load_wear_alike_and_crowning_wears_in_the_middle():
 
 def levelling(depth):
     """d y / d n = 1 - y: wear levels the load."""
-    return Analysis(1 - depth, depth, jnp.int8(Status.CONVERGED))
+    return WearRate(1 - depth, depth, jnp.int8(Status.CONVERGED))
 
 
 NEW = np.zeros((1, 1, 1, 1))
@@ -603,12 +603,12 @@ def test_lives_of_many_designs_are_asked_one_by_one(life):
     }
     mapped = jax.jit(jax.vmap(lambda life: [of(life) for of in asked.values()]))(many)
     for (name, of), found in zip(asked.items(), mapped):
-        with pytest.raises(ValueError, match=f"{name}: life is of a batch of designs, must be of one"):
+        with pytest.raises(ValueError, match=f"{name}: history is of a batch of designs, must be of one"):
             of(many)
         np.testing.assert_array_equal(np.asarray(found)[1], of(life))
-    with pytest.raises(ValueError, match="over_life: life is of a batch"):
+    with pytest.raises(ValueError, match="over_life: history is of a batch"):
         life_to(many, "ppte", 1.0)
-    with pytest.raises(ValueError, match="wear_depth: life is of a batch"):
+    with pytest.raises(ValueError, match="wear_depth: history is of a batch"):
         life_to_depth(many, 1.0)
 
 

@@ -39,7 +39,7 @@ def mesh():
 def test_quantities_are_those_of_the_life(mesh):
     relief = jg.TipRelief(5.0, 2.0)
     cycle = solve_case(mesh, TORQUE, relief, relief)
-    life = SETTINGS.life(mesh, TORQUE, pinion=relief, wheel=relief, deviation=PERFECT)
+    life = SETTINGS.history(mesh, TORQUE, pinion=relief, wheel=relief, deviation=PERFECT)
     found = {name: float(SETTINGS.quantity(name)(Analysis(cycle, mesh))) for name in ("worn_ppte", "wear_depth")}
     assert found["worn_ppte"] == pytest.approx(float(over_life(life, "ppte")[-1]), rel=1e-9)
     assert found["wear_depth"] == pytest.approx(float(wear_depth(life)[-1]), rel=1e-9)
@@ -62,7 +62,7 @@ def test_quantities_are_those_of_the_life(mesh):
 
 def test_the_pressure_of_worn_flanks_has_an_error_of_its_own(mesh):
     """Wear leaves a ridge at the pitch point, which points blunt; the blocks say nothing of it."""
-    life = SETTINGS.life(mesh, TORQUE, pinion=NONE, wheel=NONE, deviation=PERFECT)
+    life = SETTINGS.history(mesh, TORQUE, pinion=NONE, wheel=NONE, deviation=PERFECT)
     new, _, worn = np.asarray(pressure_error(life))
     assert new == 0 < worn < 0.05 * over_life(life, "max_flank_pressure")[-1]
 
@@ -85,11 +85,11 @@ def test_the_error_of_the_pressure_is_that_of_the_grid_or_more():
 
 def test_a_limit_that_is_never_reached_is_no_failure(mesh):
     """Not finite values are those of failed contacts, which count as the worst of all."""
-    life = SETTINGS.life(mesh, TORQUE, pinion=NONE, wheel=NONE, deviation=PERFECT)
+    life = SETTINGS.history(mesh, TORQUE, pinion=NONE, wheel=NONE, deviation=PERFECT)
     assert np.isinf(life_to(life, "ppte", 1e3))
     far = Wear(REVOLUTIONS, 1e-18, ppte_limit=1e3, depth_limit=1e6)
     assert float(number_of("life_to_ppte", life, far)) == REVOLUTIONS
-    idle = SETTINGS.life(mesh, 0.0, pinion=NONE, wheel=NONE, deviation=PERFECT)
+    idle = SETTINGS.history(mesh, 0.0, pinion=NONE, wheel=NONE, deviation=PERFECT)
     assert np.isinf(life_to_depth(idle, 1.0))
     assert REVOLUTIONS < float(number_of("life_to_depth", idle, far)) < np.inf
 
@@ -107,7 +107,7 @@ def test_a_life_is_under_one_load(mesh):
     spectrum = Wear(2e7, 1e-18, loads=jg.LoadSpectrum([50.0, 100.0]))
     for settings, torque in ((SETTINGS, None), (spectrum, TORQUE)):
         with pytest.raises(ValueError, match="Wear: give a torque where there are no loads, and none where there are"):
-            settings.life(mesh, torque)
+            settings.history(mesh, torque)
 
 
 def test_equal_settings_make_equal_quantities():

@@ -12,8 +12,6 @@ from .assembly import AbstractCompliance as AbstractCompliance
 from .assembly import Compliance as Compliance
 from .assembly import default_compliance as default_compliance
 from .assembly import legacy_compliance as legacy_compliance
-from .beam import AbstractTooth as AbstractTooth
-from .beam import Beam as Beam
 from .body import AbstractBody as AbstractBody
 from .body import ElasticRing as ElasticRing
 from .body import HalfPlane as HalfPlane
@@ -41,4 +39,6 @@ from .laws import AbstractLaw as AbstractLaw
 from .plane import Plane as Plane
 from .plane import PlaneState as PlaneState
 from .plane import plane_stress_share as plane_stress_share
+from .tooth import AbstractTooth as AbstractTooth
+from .tooth import Beam as Beam
 from .toothload import ToothLoad as ToothLoad

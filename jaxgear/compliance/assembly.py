@@ -9,12 +9,12 @@ from jaxtyping import Array, Float, PyTree
 
 from ..geometry import GearPair, Outline
 from ..numerics import AbstractSpring, on_both
-from .beam import AbstractTooth, Beam
 from .body import AbstractBody, ElasticRing, Sainsot
 from .edge import EdgeLaw, edge
 from .hertz import AbstractContact, ConstantHertz, ContactGeometry, DepthReferenced
 from .laws import AbstractLaw
 from .plane import PlaneState, check_plane_state, plane_stress_share, structure_planes
+from .tooth import AbstractTooth, Beam
 from .toothload import ToothLoad
 
 Structures = Float[Array, "gears pairs pairs positions"]

@@ -3,6 +3,7 @@
 from .component import ModifiedMesh as ModifiedMesh
 from .covering import fewest_pairs as fewest_pairs
 from .cycle import MeshCycle as MeshCycle
+from .flank_table import flank_table as flank_table
 from .kinematics import Kinematics as Kinematics
 from .kinematics import Side as Side
 from .mesh import Mesh as Mesh
@@ -19,4 +20,3 @@ from .solve import solve as solve
 from .solve import solve_removed as solve_removed
 from .status import Status as Status
 from .support import AbstractSupport as AbstractSupport
-from .table import flank_table as flank_table

@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float, Int
 from ..contact.prescribed import solve_series
 from ..contact.status import Statuses, WithStatus
 from ..numerics import program, result
-from .flanks import Flanks
+from .drive_and_coast import Flanks
 from .force import AbstractMeshForce
 
 Scalar = Float[Array, ""]

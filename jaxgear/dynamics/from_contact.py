@@ -17,7 +17,7 @@ from ..contact.status import Status, status_of
 from ..microgeometry import AbstractModification
 from ..numerics import Given, check, concrete, real, whole
 from ..numerics.programs import is_eager
-from .flanks import Both, Flanks, Static, coast_flanks, drive_flanks, static
+from .drive_and_coast import Both, Flanks, Static, coast_flanks, drive_flanks, static
 from .force import AbstractMeshForce
 from .force_map import FlankSprings, ForceMap, Tangent, tabulate
 

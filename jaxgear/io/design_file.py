@@ -33,7 +33,7 @@ from .gears import (
     pair_of,
     quality_of,
 )
-from .model import ModelSection, ResolutionSection, model_part, resolution_of, with_tables
+from .model_table import ModelSection, ResolutionSection, model_part, resolution_of, with_tables
 from .table_keys import FileTable, Key, decode, described, entry, nested, part_of, section_of, summary
 from .tables import FurtherTable, LoadSection, Rest, further_tables
 from .template import Free, Part, build

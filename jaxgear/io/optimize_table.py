@@ -23,10 +23,10 @@ from ..optimize.free_form import CURVES
 from ..optimize.refine import POSITIONS
 from ..vocabulary import quantity_of
 from ..wear import WEAR_QUANTITIES, Wear
-from ..wear.quantities import LIVES_AHEAD
+from ..wear.quantities import MOST_LIVES
 from .design_file import DesignFile
 from .errors import DesignFileError, check_known, naming, refused, suggestion
-from .model import FINITE_ELEMENTS
+from .model_table import FINITE_ELEMENTS
 from .named_quantities import quantity_named
 from .table_keys import FileTable, Key, entry, nested, section_of
 from .tables import FurtherTable, Rest
@@ -433,7 +433,7 @@ def _constraint(design: DesignFile, section: ConstraintSection) -> Constraint:
 
 def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:
     """A life to a limit is known for so many of the lives that are looked at: no design can be shown to last longer."""
-    lives = {"life_to_ppte": 1.0, "life_to_depth": LIVES_AHEAD}
+    lives = {"life_to_ppte": 1.0, "life_to_depth": MOST_LIVES}
     if low is None or not (isinstance(of, Quantity) and of.name in lives):
         return
     looked_at = design.tables["wear"].revolutions  # or there were no such quantity

@@ -20,7 +20,7 @@ from . import gearbox
 from .design_file import file_section
 from .flanks import FlankFileSection
 from .gears import GearSection, PairSection
-from .model import ModelSection, ResolutionSection
+from .model_table import ModelSection, ResolutionSection
 from .table_keys import FileTable, family, meanings, section_of, snake, summary
 from .tables import LoadSection, further_tables
 from .value_types import allowed

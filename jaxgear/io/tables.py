@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self
 from ..contact import OperatingPoint
 from ..numerics import Checked, Number
 from .errors import DesignFileError, join, referring
-from .model import ModelSection
+from .model_table import ModelSection
 from .table_keys import FileTable, built, decode, descendants, entry, section_of
 from .template import Free
 from .toml import read

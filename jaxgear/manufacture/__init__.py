@@ -16,10 +16,6 @@ from .chart import profile_range as profile_range
 from .chart import profile_trace as profile_trace
 from .chart import start_of_relief as start_of_relief
 from .chart import table_traces as table_traces
-from .spline import WheelSpline as WheelSpline
-from .spline import best_wheel_spline as best_wheel_spline
-from .spline import relief_start as relief_start
-from .spline import wheel_spline as wheel_spline
 from .tooth_thickness import Measures as Measures
 from .tooth_thickness import ToothThickness as ToothThickness
 from .tooth_thickness import allowance_of_balls as allowance_of_balls
@@ -47,3 +43,7 @@ from .wheel import run_out as run_out
 from .wheel import smallest_wheel_radius as smallest_wheel_radius
 from .wheel import space_flank as space_flank
 from .wheel import wheel_profile as wheel_profile
+from .wheel_spline import WheelSpline as WheelSpline
+from .wheel_spline import best_wheel_spline as best_wheel_spline
+from .wheel_spline import relief_start as relief_start
+from .wheel_spline import wheel_spline as wheel_spline

@@ -16,7 +16,7 @@ from ..metrics import removed_at
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
 from ..numerics import Checked, Given, check, concrete, maximum, minimum, program, result, whole
 from ..tolerance import ToleranceClass, iso_rounded
-from .spline import relief_start
+from .wheel_spline import relief_start
 
 Scalar = Float[Array, ""]
 Points = Float[Array, " points"]

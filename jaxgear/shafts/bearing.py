@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..numerics import Checked, concrete, number
-from .beam import ROUNDING, check_symmetric, symmetric
+from .stepped_beam import ROUNDING, check_symmetric, symmetric
 
 Scalar = Float[Array, ""]
 Matrix = Float[Array, "5 5"]

@@ -13,10 +13,10 @@ from jaxtyping import Array, Float
 from ..contact.status import Status, Statuses, status_of
 from ..geometry import GearPair, margins
 from ..numerics import Checked, concrete, number, program, within_limits
-from .beam import semidefinite
 from .housing import Housing
 from .misalignment import Misalignment
 from .shaft import MountedGear, Shaft
+from .stepped_beam import semidefinite
 
 
 class Path(NamedTuple):

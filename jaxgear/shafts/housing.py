@@ -44,7 +44,7 @@ from jaxtyping import Array, Bool, Float
 from threadpoolctl import threadpool_limits
 
 from ..numerics import Checked, Numbers, concrete, number, positive_definite, solve_dense
-from .beam import DIRECTIONS, check_symmetric, semidefinite, symmetric
+from .stepped_beam import DIRECTIONS, check_symmetric, semidefinite, symmetric
 
 Matrix = Float[Array, "rows columns"]
 Kind = Literal["stiffness", "compliance"]

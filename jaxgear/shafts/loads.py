@@ -17,8 +17,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import gauss_legendre, solve_dense
-from .beam import DIRECTIONS, flexibility, rigid
 from .gearbox import Gearbox
+from .stepped_beam import DIRECTIONS, flexibility, rigid
 
 _WAYS = len(DIRECTIONS)
 

@@ -9,11 +9,11 @@ from ..contact.status import Status, Statuses, status_of
 from ..contact.support import AbstractSupport
 from ..geometry import GearPair, margins
 from ..numerics import Given, concrete, number, program, real, whole, within_limits
-from .beam import ROUNDING, check_symmetric, semidefinite, symmetric, twist
 from .gearbox import Gearbox
 from .loads import acting, load_pattern, mesh_patterns, side_by_side, solve, torques_on
 from .misalignment import Misalignment
 from .operating_point import system_under_load
+from .stepped_beam import ROUNDING, check_symmetric, semidefinite, symmetric, twist
 
 Slices = Float[Array, " slices"]
 Scalar = Float[Array, ""]

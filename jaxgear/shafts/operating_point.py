@@ -18,9 +18,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import implicit_root, solve_dense
-from .beam import DIRECTIONS
 from .gearbox import Gearbox
 from .loads import Patterns, System, load_pattern, solve, system
+from .stepped_beam import DIRECTIONS
 
 _WAYS = len(DIRECTIONS)
 # What may be left of the conditions, relative to the largest load, over the square root of rounding.

@@ -9,10 +9,10 @@ from jaxtyping import Array, Float
 
 from ..contact.status import Status
 from ..numerics import Checked, Numbers, check, concrete, program, real, result
-from .beam import DIRECTIONS, twist
 from .gearbox import Gearbox
 from .loads import Patterns, load_pattern, side_by_side, solve, torques_on
 from .operating_point import system_under_load
+from .stepped_beam import DIRECTIONS, twist
 
 _WAYS = len(DIRECTIONS)
 _ROUNDED = 1 + 1e-6  # an end of a shaft in single precision

@@ -18,8 +18,8 @@ from jaxtyping import Array, Bool, Float
 
 from ..geometry import Gear, Material
 from ..numerics import Checked, concrete, number, positive_definite, program
-from .beam import SteppedBeam, beam, rigid
 from .bearing import AbstractBearing
+from .stepped_beam import SteppedBeam, beam, rigid
 
 Scalar = Float[Array, ""]
 

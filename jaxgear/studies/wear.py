@@ -70,12 +70,12 @@ class WearStudy(AbstractStudy[WearResult]):
             start = first_mesh(design, highest, quick=quick)
             _, designs[OVER_LIFE] = sought(design, OVER_LIFE, self.over_life, start, checkpoints, stages, quick=quick)
         kept = checkpoints.of(Marches())
-        lives = {name: self._life(mesh, name, flanks, kept, stages) for name, flanks in designs.items()}
+        histories = {name: self._life(mesh, name, flanks, kept, stages) for name, flanks in designs.items()}
         scatters: Mapping[str, wear_scatter.Samples] = {}
         if self.tolerance is not None:
             stages.begin("wear of manufactured gears of all designs")
             # of one length, as quantities take them, and as many as the nominal gears have taken
-            blocks = min(max(len(life.revolutions) - 1 for life in lives.values()), _MOST_BLOCKS)
+            blocks = min(max(len(history.revolutions) - 1 for history in histories.values()), _MOST_BLOCKS)
             settings = dataclasses.replace(self.request.settings, blocks=blocks)
             scatters = wear_scatter.manufactured_wear(
                 settings,
@@ -86,7 +86,7 @@ class WearStudy(AbstractStudy[WearResult]):
                 **manufactured.drawn(design, quick=quick),
                 keep=checkpoints.of(NamedArrays()),
             )
-        return WearResult(design, self.request, designs, lives, scatters)
+        return WearResult(design, self.request, designs, histories, scatters)
 
     def _life(
         self, mesh: Mesh, name: str, flanks: Modifications, kept: CheckpointsOfKind[Any], stages: Stages

@@ -70,39 +70,39 @@ class WearResult(AbstractStudyResult):
     design: DesignFile
     request: WearRequest
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]]
-    lives: Mapping[str, WearHistory]
+    histories: Mapping[str, WearHistory]
     scatters: Mapping[str, wear_scatter.Samples]
 
-    def _numbers(self, life: WearHistory) -> dict[str, float]:
-        """What a life comes to."""
-        ppte, settings = np.asarray(over_life(life, "ppte")), self.request.settings
-        volume = np.asarray(worn_volume(life))[-1]
+    def _numbers(self, history: WearHistory) -> dict[str, float]:
+        """What a wear history comes to."""
+        ppte, settings = np.asarray(over_life(history, "ppte")), self.request.settings
+        volume = np.asarray(worn_volume(history))[-1]
         found = {
-            "pinion_wear_depth_um": wear_depth(life, "pinion")[-1],
-            "wheel_wear_depth_um": wear_depth(life, "wheel")[-1],
+            "pinion_wear_depth_um": wear_depth(history, "pinion")[-1],
+            "wheel_wear_depth_um": wear_depth(history, "wheel")[-1],
             "new_ppte_um": ppte[0],
             "max_ppte_over_life_um": ppte.max(),
             "worn_ppte_um": ppte[-1],
-            "mean_ppte_over_life_um": mean_over_life(life, "ppte"),
+            "mean_ppte_over_life_um": mean_over_life(history, "ppte"),
             "pinion_worn_volume_per_flank_mm3": volume[0].sum(),
             "wheel_worn_volume_per_flank_mm3": volume[1].sum(),
             "volume_by_tip_corners_share": volume[:, 1].sum() / max(volume.sum(), np.finfo(float).tiny),
-            "wear_depth_error_um": life.error[-1],
+            "wear_depth_error_um": history.error[-1],
             **{
-                f"{name}_MPa": number_of(name, life, settings)
+                f"{name}_MPa": number_of(name, history, settings)
                 for name in ("max_pressure_over_life", "max_pressure_over_life_error")
             },
-            "worn_flank_pressure_MPa": over_life(life, "max_flank_pressure")[-1],
-            "worn_flank_pressure_error_MPa": pressure_error(life)[-1],
+            "worn_flank_pressure_MPa": over_life(history, "max_flank_pressure")[-1],
+            "worn_flank_pressure_error_MPa": pressure_error(history)[-1],
         }
-        if life.dynamic_factor is not None:
-            factors = np.asarray(over_life(life, "dynamic_factor"))
+        if history.dynamic_factor is not None:
+            factors = np.asarray(over_life(history, "dynamic_factor"))
             found["new_dynamic_factor"], found["worn_dynamic_factor"] = factors[0], factors[-1]
             found["max_dynamic_factor_over_life"] = factors.max()
         if settings.depth_limit is not None:
-            found["life_to_depth_revolutions"] = life_to_depth(life, settings.depth_limit)
+            found["life_to_depth_revolutions"] = life_to_depth(history, settings.depth_limit)
         if settings.ppte_limit is not None:
-            found["life_to_ppte_revolutions"] = life_to(life, "ppte", settings.ppte_limit)
+            found["life_to_ppte_revolutions"] = life_to(history, "ppte", settings.ppte_limit)
         return {name: float(value) for name, value in found.items()}
 
     def tables(self) -> list[Table]:
@@ -131,8 +131,8 @@ class WearResult(AbstractStudyResult):
         columns |= {key: text.format(float(limit)) for key, (limit, text) in limits.items() if limit is not None}
         result = Table(("design", *columns.values()), title=title)
         ended = float(settings.revolutions)
-        for name, life in self.lives.items():
-            numbers = self._numbers(life)
+        for name, history in self.histories.items():
+            numbers = self._numbers(history)
             result.add_row(name, *(_cell(key, numbers[key], ended) for key in columns))
             if ended < numbers.get("life_to_depth_revolutions", 0.0) < np.inf:
                 result.note = f"{_BEYOND} beyond wear.revolutions, extrapolated at the rate of the last block"
@@ -163,7 +163,7 @@ class WearResult(AbstractStudyResult):
 
     def verdict(self) -> Iterator[str]:
         """The best on the mean over the life, and how sure the depths are."""
-        means = {name: float(mean_over_life(life, "ppte")) for name, life in self.lives.items()}
+        means = {name: float(mean_over_life(history, "ppte")) for name, history in self.histories.items()}
         found = {name: mean for name, mean in means.items() if np.isfinite(mean)}
         if found:
             best = min(found, key=lambda name: found[name])
@@ -174,8 +174,8 @@ class WearResult(AbstractStudyResult):
         yield from wear_scatter.lines(self.design, self.scatters)
         if OVER_LIFE in self.designs:
             yield f"{OVER_LIFE}: {self._sought()}"
-        for name, life in self.lives.items():
-            error, deepest = float(life.error[-1]), float(wear_depth(life)[-1])
+        for name, history in self.histories.items():
+            error, deepest = float(history.error[-1]), float(wear_depth(history)[-1])
             if np.isfinite(deepest) and not error <= _WORTH_A_WORD * deepest:  # NaN where it could not be told
                 by = f"by {error:.3g} um" if np.isfinite(error) else "by an amount that is not estimated"
                 yield f"{name}: the depth is uncertain {by}, take more blocks"
@@ -188,19 +188,19 @@ class WearResult(AbstractStudyResult):
         return text + ", not under the dynamic one under which all designs wear here" * vibrates
 
     def failures(self) -> Iterator[str]:
-        """A line for every design whose contact was not found at some life, or whose blocks were too long."""
-        for name, life in self.lives.items():
-            found = np.asarray(life.cycles.converged)
+        """A line for every design whose contact was not found at some time step, or whose blocks were too long."""
+        for name, history in self.histories.items():
+            found = np.asarray(history.cycles.converged)
             lost = ~found.reshape(len(found), -1).all(axis=1)
             if lost.any():
-                first = float(life.revolutions[int(lost.argmax())])
+                first = float(history.revolutions[int(lost.argmax())])
                 yield (
-                    f"NOT CONVERGED: {name} from {first:.3g} revolutions on, {reason(life.cycles.status)}; do not use "
+                    f"NOT CONVERGED: {name} from {first:.3g} revolutions on, {reason(history.cycles.status)}; do not use "
                     "its numbers. Take more blocks, or raise resolution.newton_steps or resolution.pairs."
                     + _OF_MOTION
-                    * (life.dynamic_factor is not None)
+                    * (history.dynamic_factor is not None)
                 )
-            elif not blocks_are_short(life):
+            elif not blocks_are_short(history):
                 yield f"BLOCKS TOO LONG: {name}, flanks overshoot; do not use its numbers. Take more blocks."
         yield from wear_scatter.failures(self.scatters)
 
@@ -209,12 +209,12 @@ class WearResult(AbstractStudyResult):
         settings = self.request.settings
         designs = {
             name: {
-                **self._numbers(life),
-                "blocks": len(life.revolutions) - 1,
+                **self._numbers(history),
+                "blocks": len(history.revolutions) - 1,
                 **flanks_data(*self.designs[name]),
                 **(wear_scatter.summary(self.scatters[name]) if name in self.scatters else {}),
             }
-            for name, life in self.lives.items()
+            for name, history in self.histories.items()
         }
         return {
             "torque_Nm": self.design.torque,
@@ -227,43 +227,48 @@ class WearResult(AbstractStudyResult):
         }
 
     def write(self, folder: Path) -> None:
-        """Every life and every flank of every design: `life.csv`, `worn_flanks.csv` and `worn_flanks.parquet`."""
+        """Every time step and every flank of every design: `life.csv`, `worn_flanks.csv` and `worn_flanks.parquet`."""
         self._write_lives(folder / "life.csv")
         for name in ("worn_flanks.csv", "worn_flanks.parquet"):
-            write_worn(folder / name, self.lives)
+            write_worn(folder / name, self.histories)
 
     def _write_lives(self, path: Path) -> None:
-        """Every life of every design as CSV."""
+        """Every time step of every design as CSV."""
         vibrates = self.request.settings.dynamics is not None
         known = [quantity_of(name) for name in (*_QUANTITIES, *(["dynamic_factor"] if vibrates else []))]
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             depths = "pinion_wear_depth_um", "wheel_wear_depth_um", "wear_depth_error_um", "flank_pressure_error_MPa"
             writer.writerow(["design", "revolutions", *depths, *(quantity.key for quantity in known)])
-            for name, life in self.lives.items():
-                columns = [life.revolutions, wear_depth(life, "pinion"), wear_depth(life, "wheel"), life.error]
-                columns += [pressure_error(life)]
-                columns += [over_life(life, quantity) for quantity in known]
+            for name, history in self.histories.items():
+                columns = [
+                    history.revolutions,
+                    wear_depth(history, "pinion"),
+                    wear_depth(history, "wheel"),
+                    history.error,
+                ]
+                columns += [pressure_error(history)]
+                columns += [over_life(history, quantity) for quantity in known]
                 for row in zip(*map(np.asarray, columns)):
                     writer.writerow([name, *(f"{value:.7g}" for value in row)])
 
     def figures(self) -> dict[str, Any]:
-        """Flanks at several lives, PPTE and depth over the life, and the scatter over manufactured pairs."""
+        """Flanks at several time steps, PPTE and depth over the life, and the scatter over manufactured pairs."""
         from .. import plot
 
-        shown = list(self.lives)
+        shown = list(self.histories)
         size: dict[str, Any] = {"columns": len(shown), "width": _PANEL * len(shown), "height": _HEIGHT}
         axes: dict[str, Any] = {}
         for gear in ("pinion", "wheel"):
             with plot.figure.report_axes(None, **size) as panels:
                 for number, (panel, name) in enumerate(zip(np.ravel(panels), shown)):
-                    plot.worn_flank(self.lives[name], gear, panel, title=name)
+                    plot.worn_flank(self.histories[name], gear, panel, title=name)
                     panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
             axes[f"worn_{gear}"] = panels
-        axes["ppte_over_life"] = plot.wear_history(self.lives, "ppte")
-        axes["depth_over_life"] = plot.wear_history(self.lives, "wear_depth")
+        axes["ppte_over_life"] = plot.wear_history(self.histories, "ppte")
+        axes["depth_over_life"] = plot.wear_history(self.histories, "wear_depth")
         if self.request.settings.dynamics is not None:
-            axes["dynamic_factor_over_life"] = plot.wear_history(self.lives, "dynamic_factor")
+            axes["dynamic_factor_over_life"] = plot.wear_history(self.histories, "dynamic_factor")
         return axes | wear_scatter.figures(self.scatters)
 
 

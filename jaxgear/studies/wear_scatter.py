@@ -15,7 +15,7 @@ from ..numerics import Quantile, program, real
 from ..report import Table
 from ..tolerance import Tolerance
 from ..wear import WEAR_QUANTITIES, Wear
-from ..wear.quantities import LIVES_AHEAD, number_of
+from ..wear.quantities import MOST_LIVES, number_of
 from . import manufactured
 from .checkpoints import Checkpoints, NamedArrays
 
@@ -23,7 +23,7 @@ from .checkpoints import Checkpoints, NamedArrays
 Samples = Mapping[str, np.ndarray]
 
 _PPTE, _DEPTH = "mean_ppte_over_life", "wear_depth"
-_LIVES = {"life_to_depth": ("depth_limit", LIVES_AHEAD), "life_to_ppte": ("ppte_limit", 1.0)}
+_LIVES = {"life_to_depth": ("depth_limit", MOST_LIVES), "life_to_ppte": ("ppte_limit", 1.0)}
 _LEVEL = 0.95
 _SIDE_BY_SIDE = 32  # lives
 
@@ -88,8 +88,8 @@ def _numbers(settings: Wear, names: tuple[str, ...], mesh: Mesh, torque, pinion,
     load = torque if settings.loads is None else None
 
     def of(deviation):
-        life = settings.life(mesh, load, pinion=pinion, wheel=wheel, deviation=deviation)
-        return {name: number_of(name, life, settings) for name in names}
+        history = settings.history(mesh, load, pinion=pinion, wheel=wheel, deviation=deviation)
+        return {name: number_of(name, history, settings) for name in names}
 
     return jax.lax.map(of, removed, batch_size=_SIDE_BY_SIDE)
 

@@ -28,7 +28,7 @@ from ..geometry.involute import half_tooth_angle
 from ..metrics.lubrication import flash_temperature
 from ..microgeometry import AbstractModification, Flank, TabulatedFlank, TabulatedProfile
 from ..numerics import Numbers, check, kernel, program, real, result, whole
-from .march import Analysis, Depth, March, march
+from .march import Depth, March, WearRate, march
 from .vibration import Flanks, LineLoad, Vibration, vibration_of
 from .worn_volume import PARTS, Deposit, deposit, grid, worn
 
@@ -219,7 +219,7 @@ class Case(eqx.Module):
         """Where every load wears the flanks, leading axis (torques,)."""
         return jax.vmap(lambda load: deposit(self.mesh, load.torque, self.points))(self.loads)
 
-    def under(self, load: OperatingPoint, place: Deposit, depth: Depth) -> Analysis:
+    def under(self, load: OperatingPoint, place: Deposit, depth: Depth) -> WearRate:
         """The contact of worn flanks under one load, and how fast that wears them by one passage."""
         flanks = self._worn(place.roll_length, depth)
         removed = removed_material(self.mesh, load, **flanks) + self.deviation
@@ -231,7 +231,7 @@ class Case(eqx.Module):
             found[_DYNAMIC_FACTOR] = jnp.where(motion.status == Status.CONVERGED, motion.dynamic_factor, jnp.nan)
             if self.vibration.wears:
                 rate, status = self._dynamic_rate(cycle, motion, removed, place)
-        return Analysis(rate, found, jnp.maximum(status, cycle_status(cycle)))
+        return WearRate(rate, found, jnp.maximum(status, cycle_status(cycle)))
 
     def _worn(self, roll_length, depth: Depth) -> Flanks:
         """Both flanks with what is worn off them, as the contact analyses look it up."""
@@ -347,10 +347,10 @@ def _march(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> Mar
     def through(depth) -> Statuses:
         return status_of({Status.GEARS_CANNOT_RUN: worn_through(mesh.pair, grid(mesh, case.points), depth)})
 
-    def analyze(depth) -> Analysis:
+    def analyze(depth) -> WearRate:
         rates, seen, statuses = over_loads(lambda load, place: case.under(load, place, depth))
         rate = jnp.tensordot(shares, rates, 1) * passages[:, None, None, None]
-        return Analysis(rate, seen, jnp.maximum(jnp.max(statuses), through(depth)))
+        return WearRate(rate, seen, jnp.maximum(jnp.max(statuses), through(depth)))
 
     def over_loads(under):
         if case.vibration is None:

@@ -39,7 +39,7 @@ _STARTS = 0, 2  # the analyses of flanks at the start of a block
 _SHARE = 2 / (8 - 2)
 
 
-class Analysis(NamedTuple):
+class WearRate(NamedTuple):
     """The contact on a flank: how fast it wears [um per revolution], what else it gives, and its status."""
 
     rate: Depth
@@ -64,7 +64,7 @@ class March(NamedTuple):
     seen: Any
 
 
-def march(analyze: Callable[[Depth], Analysis], depth: Depth, revolutions: Float[Array, " pairs"]) -> March:
+def march(analyze: Callable[[Depth], WearRate], depth: Depth, revolutions: Float[Array, " pairs"]) -> March:
     """Wear over pairs of blocks.
 
     Args:

@@ -20,7 +20,7 @@ from .settings import Wear
 
 # A limit that is never reached is no failure, which not finite values of a quantity are. Nothing is known of the
 # transmission error beyond the life that was looked at; the depth goes on, but so far nobody extrapolates.
-LIVES_AHEAD = 1000.0
+MOST_LIVES = 1000.0
 # Blocks are too long, and flanks overshoot from one to the next, where the error is estimated at more than this share
 # of the depth, or a block wears off more than so many deflections of the new teeth under their load (see `wear`). The
 # estimate alone misses some: on a 20/30 pair, 2 blocks against 128, it says 5 % for 9 %, and 21 % for 56 % where a
@@ -29,41 +29,43 @@ _LARGEST_ERROR, _MOST_IN_DEFLECTIONS = 0.1, 2.0
 _ERROR = "wear_depth_error"
 
 
-def _at_most(longest, life):
-    return jnp.where(life > longest, longest, life)
+def _at_most(longest, history):
+    return jnp.where(history > longest, longest, history)
 
 
-def _pressure_error(life: WearHistory):
+def _pressure_error(history: WearHistory):
     """By how much the largest pressure of a life may be larger [MPa]; that at tip corners depends on no grid."""
-    largest = over_life(life, "max_contact_pressure")
-    may_be = jnp.maximum(largest, over_life(life, "max_flank_pressure") + pressure_error(life))
+    largest = over_life(history, "max_contact_pressure")
+    may_be = jnp.maximum(largest, over_life(history, "max_flank_pressure") + pressure_error(history))
     return maximum(may_be) - maximum(largest)
 
 
-# of a life and the settings that it was worn by, by the name of the quantity
-OF_LIFE: Mapping[str, Callable[[WearHistory, Wear], Float[Array, ""]]] = {
-    "worn_ppte": lambda life, _: over_life(life, "ppte")[-1],
-    "mean_ppte_over_life": lambda life, _: mean_over_life(life, "ppte"),
-    "max_ppte_over_life": lambda life, _: maximum(over_life(life, "ppte")),
-    "max_pressure_over_life": lambda life, _: maximum(over_life(life, "max_contact_pressure")),
-    "max_pressure_over_life_error": lambda life, _: _pressure_error(life),
-    "worn_dynamic_factor": lambda life, _: over_life(life, "dynamic_factor")[-1],
-    "max_dynamic_factor_over_life": lambda life, _: maximum(over_life(life, "dynamic_factor")),
-    "wear_depth": lambda life, _: wear_depth(life)[-1],
-    "pinion_wear_depth": lambda life, _: wear_depth(life, "pinion")[-1],
-    "wheel_wear_depth": lambda life, _: wear_depth(life, "wheel")[-1],
-    _ERROR: lambda life, _: life.error[-1],
-    "life_to_depth": lambda life, wear: _at_most(
-        LIVES_AHEAD * wear.revolutions, life_to_depth(life, cast(Given, wear.depth_limit))
+# of a wear history and the settings that it was worn by, by the name of the quantity
+OF_HISTORY: Mapping[str, Callable[[WearHistory, Wear], Float[Array, ""]]] = {
+    "worn_ppte": lambda history, _: over_life(history, "ppte")[-1],
+    "mean_ppte_over_life": lambda history, _: mean_over_life(history, "ppte"),
+    "max_ppte_over_life": lambda history, _: maximum(over_life(history, "ppte")),
+    "max_pressure_over_life": lambda history, _: maximum(over_life(history, "max_contact_pressure")),
+    "max_pressure_over_life_error": lambda history, _: _pressure_error(history),
+    "worn_dynamic_factor": lambda history, _: over_life(history, "dynamic_factor")[-1],
+    "max_dynamic_factor_over_life": lambda history, _: maximum(over_life(history, "dynamic_factor")),
+    "wear_depth": lambda history, _: wear_depth(history)[-1],
+    "pinion_wear_depth": lambda history, _: wear_depth(history, "pinion")[-1],
+    "wheel_wear_depth": lambda history, _: wear_depth(history, "wheel")[-1],
+    _ERROR: lambda history, _: history.error[-1],
+    "life_to_depth": lambda history, wear: _at_most(
+        MOST_LIVES * wear.revolutions, life_to_depth(history, cast(Given, wear.depth_limit))
     ),
-    "life_to_ppte": lambda life, wear: _at_most(wear.revolutions, life_to(life, "ppte", cast(Given, wear.ppte_limit))),
+    "life_to_ppte": lambda history, wear: _at_most(
+        wear.revolutions, life_to(history, "ppte", cast(Given, wear.ppte_limit))
+    ),
 }
 
 
-def number_of(name: str, life: WearHistory, settings: Wear) -> Float[Array, ""]:
+def number_of(name: str, history: WearHistory, settings: Wear) -> Float[Array, ""]:
     """A quantity of a life that was worn by `Wear` settings; NaN as `Wear` says."""
-    usable = jnp.all(solved(life.cycles)) & (name == _ERROR or blocks_are_short(life))
-    return jnp.where(usable, OF_LIFE[name](life, settings), jnp.nan)
+    usable = jnp.all(solved(history.cycles)) & (name == _ERROR or blocks_are_short(history))
+    return jnp.where(usable, OF_HISTORY[name](history, settings), jnp.nan)
 
 
 def _number(name: str, analysis: Analysis, wear: Wear) -> Float[Array, ""]:
@@ -73,15 +75,15 @@ def _number(name: str, analysis: Analysis, wear: Wear) -> Float[Array, ""]:
 
 def _life(name: str, analysis: Analysis, wear: Wear) -> WearHistory:
     load = analysis.operating_point if wear.loads is None else None
-    return wear.life(analysis.mesh_for(name), load, **analysis.flanks, deviation=analysis.deviation(name))
+    return wear.history(analysis.mesh_for(name), load, **analysis.flanks, deviation=analysis.deviation(name))
 
 
-def blocks_are_short(life: WearHistory) -> Bool[Array, ""]:
+def blocks_are_short(history: WearHistory) -> Bool[Array, ""]:
     """Whether the blocks are short enough for the depth to mean something."""
-    worn = jnp.sum(life.depth, axis=2)
-    deflection = life.cycles.transmission_error[0] - life.cycles.unloaded_transmission_error[0]
+    worn = jnp.sum(history.depth, axis=2)
+    deflection = history.cycles.transmission_error[0] - history.cycles.unloaded_transmission_error[0]
     overshoots = maximum(jnp.abs(worn[1:] - worn[:-1])) > _MOST_IN_DEFLECTIONS * maximum(deflection)
-    return ~overshoots & (life.error[-1] <= _LARGEST_ERROR * wear_depth(life)[-1])
+    return ~overshoots & (history.error[-1] <= _LARGEST_ERROR * wear_depth(history)[-1])
 
 
 def _quantity(name: str, unit: str, meaning: str, **options: Any) -> Quantity:

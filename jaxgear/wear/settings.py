@@ -71,7 +71,7 @@ class Wear(AbstractSettings):
         wheel = self.coefficient if self.wheel_coefficient is None else self.wheel_coefficient
         return jnp.stack([self.coefficient, wheel])
 
-    def life(
+    def history(
         self,
         mesh: Mesh,
         torque: Torque | None = None,
@@ -80,7 +80,7 @@ class Wear(AbstractSettings):
         wheel: AbstractModification | None = None,
         deviation: Numbers | None = None,
     ) -> WearHistory:
-        """The life of a design; arguments and errors as `wear`.
+        """The wear history of a design; arguments and errors as `wear`.
 
         Args:
             mesh: prepared mesh.

@@ -6,5 +6,5 @@ files: tables of other programs
 
 from .compliance import TabulatedCompliance as TabulatedCompliance
 from .compliance import finite_element_compliance as finite_element_compliance
+from .compliance_table import GearTable as GearTable
 from .files import write_table as write_table
-from .table import GearTable as GearTable

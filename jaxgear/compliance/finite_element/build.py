@@ -7,8 +7,8 @@ import scipy  # its packages load when they are used
 
 from ..edge import APEX_DISTANCE, WEDGE_REACH
 from .sector import Sector, sector
+from .sectors import Places, along_edge, responses
 from .shape import Shape, Tooth
-from .solve import Places, along_edge, responses
 
 # of everything here that the numbers depend on: files of another version are made anew
 VERSION = 1

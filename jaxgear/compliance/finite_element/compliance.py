@@ -24,9 +24,9 @@ from ..plane import (
 )
 from ..toothload import ToothLoad
 from .build import build, hub
+from .compliance_table import GearTable, Scale, different, scaled, shape_of
 from .files import read_table
 from .shape import Shape
-from .table import GearTable, Scale, different, scaled, shape_of
 from .table_cache import cached, default_folder
 
 Matrix = Float[Array, "pairs pairs positions"]

@@ -7,8 +7,8 @@ import numpy as np
 
 from ...numerics.durable import write_durably
 from .build import GearNumbers
+from .compliance_table import GearTable, gear_table
 from .shape import Shape
-from .table import GearTable, gear_table
 
 COLUMNS = ("kind", "neighbour", "loaded_mm", "displaced_mm", "um_mm_per_N")
 _SINGLE = ("module", "modulus", "hub")  # kinds with one value

@@ -10,7 +10,7 @@ from ...geometry import Gear, Material
 from ...manufacture import allowance_of_balls, measures, over_balls
 from ...numerics import real
 from ..errors import refused
-from .model import CUSTOM, Component, Model
+from .rexs_model import CUSTOM, Component, Model
 from .values import shifted
 
 _EDGE = f"{CUSTOM}tip_edge_radius"

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ..errors import DesignFileError
-from .model import Attribute, Component, Model, Relation, current, origin
+from .rexs_model import Attribute, Component, Model, Relation, current, origin
 from .values import checked_version, decoded, whole
 
 _SCALARS = (

@@ -16,8 +16,8 @@ from ..errors import DesignFileError, naming, refused
 from ..toml import content
 from .gears import QUALITY, check_spur, read_gear, read_quality
 from .json_form import parse_json
-from .model import Component, Model, parse
 from .read_flank import read_modification
+from .rexs_model import Component, Model, parse
 from .topography import joined
 from .values import Frame, frames
 

@@ -22,7 +22,7 @@ from ...microgeometry import (
 )
 from ...numerics import real
 from ..errors import DesignFileError, problem
-from .model import Component
+from .rexs_model import Component
 from .topography import flank_of
 from .values import Frame, same
 

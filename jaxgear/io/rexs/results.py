@@ -5,7 +5,7 @@ import numpy as np
 from ...contact import MeshCycle
 from ...geometry import tooth_thickness
 from ...metrics import flash_temperature
-from .model import Component, Model
+from .rexs_model import Component, Model
 
 
 def write_results(

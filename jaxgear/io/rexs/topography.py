@@ -34,7 +34,7 @@ from ...microgeometry import (
     TipRelief,
 )
 from ...numerics import real
-from .model import Component
+from .rexs_model import Component
 from .values import Frame
 
 _SAME = 1e-6  # relative difference that files of fewer digits leave

@@ -15,8 +15,8 @@ from ...numerics.durable import write_durably
 from ..folder import writing
 from .gears import write_gear
 from .json_form import to_json
-from .model import Model, xml
 from .results import write_results
+from .rexs_model import Model, xml
 from .values import frames
 from .write_flank import Writer
 

@@ -21,7 +21,7 @@ from ...microgeometry import (
     TipRelief,
 )
 from ..errors import DesignFileError
-from .model import Component, Model
+from .rexs_model import Component, Model
 from .topography import plain_terms, points, powers
 from .values import Frame, shifted
 
