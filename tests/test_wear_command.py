@@ -151,7 +151,7 @@ def test_the_figures_of_worn_flanks_show_every_design(monkeypatch):
     }
     request = SimpleNamespace(settings=SimpleNamespace(dynamics=None))
     monkeypatch.setattr(plot, "wear_history", lambda *given: None)
-    drawn = WearResult.figures(SimpleNamespace(lives=lives, request=request, scatters={}))
+    drawn = WearResult.figures(SimpleNamespace(histories=lives, request=request, scatters={}))
     for gear in ("pinion", "wheel"):
         panels = np.ravel(drawn[f"worn_{gear}"])
         assert [panel.get_title() for panel in panels] == list(lives)
