@@ -195,8 +195,8 @@ class WearResult(AbstractStudyResult):
             if lost.any():
                 first = float(history.revolutions[int(lost.argmax())])
                 yield (
-                    f"NOT CONVERGED: {name} from {first:.3g} revolutions on, {reason(history.cycles.status)}; do not use "
-                    "its numbers. Take more blocks, or raise resolution.newton_steps or resolution.pairs."
+                    f"NOT CONVERGED: {name} from {first:.3g} revolutions on, {reason(history.cycles.status)}; do not "
+                    "use its numbers. Take more blocks, or raise resolution.newton_steps or resolution.pairs."
                     + _OF_MOTION
                     * (history.dynamic_factor is not None)
                 )
